@@ -96,7 +96,7 @@ static inline void txm_parallel_for(const txm_env *env, int count,
 /* *bytes = a * b * c; 0 (and *bytes untouched) if that does not fit a size_t */
 static inline int txm_mul(size_t a, size_t b, size_t c, size_t *bytes) {
     if (a && b > SIZE_MAX / a) return 0;
-    if (a * b && c > SIZE_MAX / (a * b)) return 0;
+    if (a && b && c > SIZE_MAX / a / b) return 0;
     *bytes = a * b * c;
     return 1;
 }
