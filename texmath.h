@@ -1,21 +1,101 @@
 /* texmath.h - v0.1.0 - the common ground of the texkit headers
-   SPDX-License-Identifier: MIT                                (full text: end of file)
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
      Small things that every texkit header needs: status codes, the environment (allocator,
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
-     generator, vectors, matrices, quaternions and colour spaces.
+     generator, a sort, vectors, matrices, quaternions and colour spaces; and the few kernels that
+     more than one of them uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the
+     halving of an image, the Poisson equation on a masked image.
 
-   (head comment to be completed)                                                        */
+   QUICK START                                 (tests build and run this very block)
+     // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
+     #include "texmath.h"
+     #include <stdio.h>
+
+     int main(void) {
+         static float pixels[64 * 64];            // the caller owns all pixels
+         static unsigned char hole[64 * 64];
+         txm_poisson_desc desc = {0};             // zero = the default, for every field
+         txm_env env = {0};                       // malloc, silent, serial; receives the message
+         desc.image.pixels = pixels;
+         desc.image.width = desc.image.height = 64;
+         desc.image.sample = TXM_F32;
+         desc.mask = desc.image;
+         desc.mask.pixels = hole;
+         desc.mask.sample = TXM_U8;
+         for (int y = 0; y < 64; y++) {
+             for (int x = 0; x < 64; x++) {
+                 hole[64 * y + x] = x >= 16 && x < 48 && y >= 16 && y < 48;
+                 txm_image_set(&desc.image, x, y, 0, hole[64 * y + x] ? 0.0f : (float)x / 63.0f);
+             }
+         }
+         if (txm_poisson(&desc, &env) != TXM_OK) {
+             fprintf(stderr, "poisson: %s\n", env.message);
+             return 1;
+         }
+         printf("centre of the ramp: %.4f\n", txm_image_get(&desc.image, 32, 32, 0)); // 0.5079
+         return 0;
+     }
+
+   CONFIGURATION
+     None. Every function is static inline, there is no implementation section: include the file
+     wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
+
+   CONVENTIONS
+     Vectors are columns; matrices are stored column by column, as OpenGL and glTF have them:
+     m[rows * column + row]; the product a b applies b first. Right-handed space; a camera looks
+     along -z; clip space is -1..1 on all axes. Angles are in radians. A quaternion (x, y, z, w) has
+     its scalar last. Colours are linear unless the name says srgb; see each function for ranges.
+     Image rows go from top to bottom, x to the right.
+
+   MEMORY
+     Only txm_arena_alloc and txm_poisson allocate, through the environment. txm_poisson holds
+     64 + 4 * channels bytes for each unknown pixel, and gives all of it back before it returns.
+     The sort and the cut work in scratch memory of the caller.
+
+   THREADS
+     No global state. Two calls may overlap unless they share what one of them writes: an env, an
+     arena, a generator, an image.
+
+   SAME BYTES
+     Integers, 8-bit samples, generator, hash and sort: the same bits everywhere. All else is
+     computed in double in a fixed order and rounded to float once; that gives the same bits with
+     IEEE 754 arithmetic (32-bit x86: -msse2), -ffp-contract=off (gcc -std=c99 has it on) and no
+     -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one result of
+     10^8: use it to show colours and place cameras, not to decide. Sort, cut and eigenvectors
+     leave no ties open.
+
+   LIMITS
+     An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
+     that return no status expect arguments in the range stated and do not check them.
+
+   REFERENCES
+     [1] M. O'Neill. PCG: a family of simple fast space-efficient statistically good algorithms for
+         random number generation. Harvey Mudd College HMC-CS-2014-0905, 2014.
+     [2] Y. Ohta, T. Kanade, T. Sakai. Color information for region segmentation. Computer Graphics
+         and Image Processing 13, 1980.
+     [3] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
+         SIGGRAPH 2001.
+     [4] P. Perez, M. Gangnet, A. Blake. Poisson image editing. SIGGRAPH 2003.
+     [5] R. Bridson. Fluid simulation for computer graphics, section 4.3 (the preconditioner
+         MIC(0) of I. Gustafsson. A class of first order factorization methods. BIT 18, 1978).
+     [6] IEC 61966-2-1:1999 (sRGB); CIE 15:2004 (XYZ, L*a*b*).
+     [7] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
+     [8] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.  */
 #ifndef TEXMATH_H
 #define TEXMATH_H
 
+#include <limits.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define TEXMATH_VERSION "0.1.0"
+
+#define TXM_PI 3.14159265358979323846
 
 #ifdef __cplusplus
 extern "C" {
@@ -33,6 +113,20 @@ typedef enum txm_status {
     TXM_CANCELLED,     /* the progress callback asked to stop             */
     TXM_BAD_DATA       /* bytes that are not a valid file of their kind   */
 } txm_status;
+
+/* What a status means, a few English words without a full stop. */
+static inline const char *txm_status_text(txm_status status) {
+    switch (status) {
+    case TXM_OK: return "success";
+    case TXM_BAD_ARGUMENT: return "bad argument";
+    case TXM_TOO_SMALL: return "too small to work on";
+    case TXM_TOO_LARGE: return "too large";
+    case TXM_OUT_OF_MEMORY: return "out of memory";
+    case TXM_CANCELLED: return "cancelled";
+    case TXM_BAD_DATA: return "damaged or foreign data";
+    }
+    return "unknown status";
+}
 
 /* ---- environment ------------------------------------------------------------------------ */
 
@@ -63,6 +157,19 @@ static inline txm_status txm_fail(txm_env *env, txm_status status, const char *m
         env->message[i] = 0;
     }
     return status;
+}
+
+/* The same with the name of what is wrong in front: "name: message". */
+static inline txm_status txm_fail_at(txm_env *env, txm_status status, const char *name,
+                                     const char *message) {
+    char line[sizeof env->message];
+    const char *part[3] = {name, ": ", message};
+    size_t n = 0;
+    for (int k = 0; k < 3; k++) {
+        for (const char *s = part[k]; *s && n + 1 < sizeof line; s++) line[n++] = *s;
+    }
+    line[n] = 0;
+    return txm_fail(env, status, line);
 }
 
 /* bytes of the environment's memory, not cleared; NULL if there is none or bytes is 0 */
@@ -101,6 +208,99 @@ static inline int txm_mul(size_t a, size_t b, size_t c, size_t *bytes) {
     return 1;
 }
 
+/* *sum = a + b; 0 (and *sum untouched) if that does not fit a size_t */
+static inline int txm_add(size_t a, size_t b, size_t *sum) {
+    if (b > SIZE_MAX - a) return 0;
+    *sum = a + b;
+    return 1;
+}
+
+/* ---- arena ------------------------------------------------------------------------------ */
+
+/* Blocks that are freed together: one exit path gives back whatever was allocated so far. Keeps
+   a copy of the allocator, so it may outlive the env and may lie in one of its own blocks.
+
+       raw block:  | link to the older block | padding | 64-byte aligned result ...        */
+typedef struct txm_arena {
+    void *(*allocate)(void *user, size_t bytes); /* as in txm_env                 */
+    void (*release)(void *user, void *block);
+    void *memory_user;
+    void *blocks; /* the newest block, which links to the older ones; NULL = none */
+} txm_arena;
+
+enum { TXM_ALIGN = 64 }; /* bytes; a cache line, and enough for any vector unit   */
+
+/* An empty arena on the memory of env (NULL = malloc and free). */
+static inline void txm_arena_init(txm_arena *arena, const txm_env *env) {
+    arena->allocate = env ? env->allocate : NULL;
+    arena->release = env ? env->release : NULL;
+    arena->memory_user = env ? env->memory_user : NULL;
+    arena->blocks = NULL;
+}
+
+/* count * size bytes, not cleared, aligned to 64. NULL if that is 0, overflows, or there is no
+   memory. One request to the allocator each, 64 bytes and a pointer longer. */
+static inline void *txm_arena_alloc(txm_arena *arena, size_t count, size_t size) {
+    size_t bytes, total;
+    void *raw;
+    if (!txm_mul(count, size, 1, &bytes) || bytes == 0) return NULL;
+    if (!txm_add(bytes, TXM_ALIGN + sizeof(void *), &total)) return NULL;
+    raw = arena->allocate ? arena->allocate(arena->memory_user, total) : malloc(total);
+    if (!raw) return NULL;
+    memcpy(raw, &arena->blocks, sizeof(void *));
+    arena->blocks = raw;
+    unsigned char *first = (unsigned char *)raw + sizeof(void *);
+    return first + (TXM_ALIGN - (uintptr_t)first % TXM_ALIGN) % TXM_ALIGN;
+}
+
+/* The same, all bytes 0. */
+static inline void *txm_arena_zero(txm_arena *arena, size_t count, size_t size) {
+    void *block = txm_arena_alloc(arena, count, size);
+    if (block) memset(block, 0, count * size);
+    return block;
+}
+
+/* Give back all blocks; the arena is empty and may be used again (unless it lay in one of them). */
+static inline void txm_arena_free(txm_arena *arena) {
+    const txm_arena copy = *arena;
+    void *block = arena->blocks;
+    arena->blocks = NULL;
+    while (block) {
+        void *older;
+        memcpy(&older, block, sizeof(void *));
+        if (copy.release) copy.release(copy.memory_user, block);
+        else free(block);
+        block = older;
+    }
+}
+
+/* ---- numbers ---------------------------------------------------------------------------- */
+
+/* neither infinite nor NaN; looks at the bits, so that -ffast-math cannot remove it */
+static inline int txm_is_finite(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return ((bits >> 52) & 0x7ff) != 0x7ff;
+}
+
+static inline float txm_minf(float a, float b) {
+    return b < a ? b : a;
+}
+static inline float txm_maxf(float a, float b) {
+    return b > a ? b : a;
+}
+/* x limited to low..high; low for NaN */
+static inline float txm_clampf(float x, float low, float high) {
+    return x >= low ? txm_minf(x, high) : low;
+}
+static inline int txm_clampi(int x, int low, int high) {
+    return x < low ? low : x > high ? high : x;
+}
+/* a (1 - t) + b t; exactly a at t = 0, b at t = 1, and a wherever a = b */
+static inline float txm_lerpf(float a, float b, float t) {
+    return (float)((double)a - (double)a * t + (double)b * t);
+}
+
 /* ---- images ----------------------------------------------------------------------------- */
 
 typedef enum txm_sample {
@@ -114,8 +314,102 @@ typedef struct txm_image {
     int width, height; /* pixels, 1 or more                                                   */
     int channels;      /* 1..4: gray, gray + alpha, RGB, RGBA; 0 = 1                          */
     txm_sample sample; /* sample type; 0 = 8 bit                                              */
-    ptrdiff_t stride;  /* bytes from one row to the next; 0 = packed rows                     */
+    ptrdiff_t stride;  /* bytes from one row to the next; 0 = packed rows; negative: the rows lie
+                          bottom-up in memory, pixels still points at the top one             */
 } txm_image;
+
+/* bytes of one sample */
+static inline size_t txm_sample_bytes(txm_sample sample) {
+    return sample == TXM_F32 ? sizeof(float) : 1;
+}
+
+/* Is this a view that can be worked on? Everything but the samples themselves is checked.
+
+   name        what the caller calls the image, for the message: "mask: pixels is NULL; ..."
+   max_pixels  refuse larger images; 0 = whatever the address space holds
+   return      TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                    */
+static inline txm_status txm_image_check(const txm_image *image, const char *name,
+                                         size_t max_pixels, txm_env *env) {
+    if (!image || !image->pixels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "pixels is NULL; point it at the first sample of the top row");
+    if (image->width < 1 || image->height < 1)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "width and height must be 1 or more");
+    if (image->channels < 0 || image->channels > 4)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "channels must be 1 to 4 (0 means 1)");
+    if (image->sample != TXM_U8 && image->sample != TXM_F32)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "sample must be TXM_U8 or TXM_F32");
+
+    const size_t channels = image->channels ? (size_t)image->channels : 1;
+    const size_t width = (size_t)image->width, height = (size_t)image->height;
+    const size_t bytes = txm_sample_bytes(image->sample);
+    size_t row, span;
+    if (max_pixels && height > max_pixels / width)
+        return txm_fail_at(env, TXM_TOO_LARGE, name,
+                           "too many pixels; make it smaller or raise the limit");
+    if (!txm_mul(width, channels, bytes, &row)) row = SIZE_MAX;
+    /* the magnitude, also of PTRDIFF_MIN */
+    size_t stride = image->stride < 0 ? 0 - (size_t)image->stride : (size_t)image->stride;
+    if (stride == 0) stride = row;
+    if (stride < row && row <= PTRDIFF_MAX)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "stride is shorter than a row; give bytes per row, or 0 if packed");
+    if (!txm_mul(stride, height - 1, 1, &span) || !txm_add(span, row, &span) || span > PTRDIFF_MAX)
+        return txm_fail_at(env, TXM_TOO_LARGE, name,
+                           "width * height * channels is beyond the address space; use tiles");
+    if ((uintptr_t)image->pixels % bytes || stride % bytes)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "float pixels and stride must be multiples of 4 bytes");
+    return TXM_OK;
+}
+
+/* The same view with channels and stride spelled out where they were 0. The functions below do
+   this for themselves; it is for loops that walk the samples on their own. */
+static inline txm_image txm_image_resolve(txm_image image) {
+    if (image.channels == 0) image.channels = 1;
+    if (image.stride == 0)
+        image.stride = (ptrdiff_t)((size_t)image.width * (size_t)image.channels *
+                                   txm_sample_bytes(image.sample));
+    return image;
+}
+
+/* first sample of row y, 0..height-1; cast it to uint8_t * or float * */
+static inline void *txm_image_row(const txm_image *image, int y) {
+    return (char *)image->pixels + txm_image_resolve(*image).stride * y;
+}
+static inline const void *txm_image_row_const(const txm_image *image, int y) {
+    return txm_image_row(image, y);
+}
+
+/* sample c of pixel (x, y), all inside; 8 bit: value / 255 */
+static inline float txm_image_get(const txm_image *image, int x, int y, int c) {
+    const void *row = txm_image_row_const(image, y);
+    const size_t i = (size_t)x * (size_t)(image->channels ? image->channels : 1) + (size_t)c;
+    if (image->sample == TXM_F32) return ((const float *)row)[i];
+    return (float)((const uint8_t *)row)[i] / 255.0f;
+}
+
+/* Store a sample. 8 bit: clamped to 0..1 (NaN to 0), times 255, rounded; float: as it is. */
+static inline void txm_image_set(const txm_image *image, int x, int y, int c, float value) {
+    void *row = txm_image_row(image, y);
+    const size_t i = (size_t)x * (size_t)(image->channels ? image->channels : 1) + (size_t)c;
+    if (image->sample == TXM_F32) ((float *)row)[i] = value;
+    else ((uint8_t *)row)[i] = (uint8_t)((double)txm_clampf(value, 0, 1) * 255.0 + 0.5);
+}
+
+/* non-zero if no sample is infinite or NaN (8-bit samples never are) */
+static inline int txm_image_is_finite(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    const size_t count = (size_t)im.width * (size_t)im.channels;
+    if (im.sample != TXM_F32) return 1;
+    for (int y = 0; y < im.height; y++) {
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < count; i++) {
+            if (!txm_is_finite(row[i])) return 0;
+        }
+    }
+    return 1;
+}
 
 /* ---- random numbers --------------------------------------------------------------------- */
 
@@ -153,7 +447,1079 @@ static inline uint32_t txm_rng_below(txm_rng *rng, uint32_t n) {
     return (uint32_t)(((uint64_t)txm_rng_next(rng) * n) >> 32);
 }
 
+/* uniform in low..high, both included, low <= high; the whole range of int is allowed */
+static inline int txm_rng_range(txm_rng *rng, int low, int high) {
+    const uint64_t n = (uint64_t)((int64_t)high - low) + 1; /* 1..2^32 */
+    return (int)(low + (int64_t)((txm_rng_next(rng) * n) >> 32));
+}
+
+/* uniform multiples of 2^-24 in [0, 1): all have equal chances, 1 is never returned */
+static inline float txm_rng_float(txm_rng *rng) {
+    return (float)(txm_rng_next(rng) >> 8) * (1.0f / 16777216.0f);
+}
+
+/* uniform multiples of 2^-53 in [0, 1); takes two steps of the generator */
+static inline double txm_rng_double(txm_rng *rng) {
+    const uint64_t high = txm_rng_next(rng) >> 5, low = txm_rng_next(rng) >> 6;
+    return (double)((high << 26) | low) * (1.0 / 9007199254740992.0);
+}
+
+/* Put the items in random order, every order as likely (Fisher and Yates). */
+static inline void txm_shuffle(txm_rng *rng, int *items, int count) {
+    for (int i = count - 1; i > 0; i--) {
+        const int j = (int)txm_rng_below(rng, (uint32_t)i + 1);
+        const int item = items[i];
+        items[i] = items[j];
+        items[j] = item;
+    }
+}
+
+/* ---- sorting ---------------------------------------------------------------------------- */
+
+typedef struct txm_pair {
+    uint32_t key, value;
+} txm_pair;
+
+/* A key in the order of the floats: a < b gives key(a) < key(b), and -0 comes before +0. */
+static inline uint32_t txm_sort_key(float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+}
+
+/* Sort by rising key; pairs of equal key keep their order, so there is only one result.
+
+   Counting sort by each byte of the key, lowest first; a byte that all keys share is skipped.
+   scratch  room for count pairs; its contents are lost
+   cost     O(count), 8 KiB of stack on 64-bit machines                                    */
+static inline void txm_sort_pairs(txm_pair *pairs, txm_pair *scratch, size_t count) {
+    size_t next[4][256];
+    txm_pair *from = pairs, *to = scratch;
+    memset(next, 0, sizeof next);
+    for (size_t i = 0; i < count; i++) {
+        for (int b = 0; b < 4; b++) next[b][(pairs[i].key >> (8 * b)) & 255]++;
+    }
+    for (int b = 0; b < 4 && count > 1; b++) {
+        size_t sum = 0;
+        if (next[b][(pairs[0].key >> (8 * b)) & 255] == count) continue;
+        for (int d = 0; d < 256; d++) { /* from how many to where the first goes */
+            const size_t n = next[b][d];
+            next[b][d] = sum;
+            sum += n;
+        }
+        for (size_t i = 0; i < count; i++) to[next[b][(from[i].key >> (8 * b)) & 255]++] = from[i];
+        txm_pair *t = from;
+        from = to;
+        to = t;
+    }
+    if (from != pairs) memcpy(pairs, from, count * sizeof *pairs);
+}
+
+/* ---- vectors ---------------------------------------------------------------------------- */
+
+typedef struct txm_vec2 {
+    float x, y;
+} txm_vec2;
+typedef struct txm_vec3 {
+    float x, y, z;
+} txm_vec3;
+typedef struct txm_vec4 {
+    float x, y, z, w;
+} txm_vec4;
+
+/* Makers; C++11 has no compound literals. */
+static inline txm_vec2 txm_v2(float x, float y) {
+    const txm_vec2 v = {x, y};
+    return v;
+}
+static inline txm_vec3 txm_v3(float x, float y, float z) {
+    const txm_vec3 v = {x, y, z};
+    return v;
+}
+static inline txm_vec4 txm_v4(float x, float y, float z, float w) {
+    const txm_vec4 v = {x, y, z, w};
+    return v;
+}
+
+/* Component by component: a + b, a - b, a * b, a s, the smaller, the larger, a (1 - t) + b t. Dot
+   product; length; length 1 in the same direction, the zero vector for the zero vector. */
+static inline txm_vec2 txm_vec2_add(txm_vec2 a, txm_vec2 b) {
+    return txm_v2(a.x + b.x, a.y + b.y);
+}
+static inline txm_vec2 txm_vec2_sub(txm_vec2 a, txm_vec2 b) {
+    return txm_v2(a.x - b.x, a.y - b.y);
+}
+static inline txm_vec2 txm_vec2_mul(txm_vec2 a, txm_vec2 b) {
+    return txm_v2(a.x * b.x, a.y * b.y);
+}
+static inline txm_vec2 txm_vec2_scale(txm_vec2 a, float s) {
+    return txm_v2(a.x * s, a.y * s);
+}
+static inline txm_vec2 txm_vec2_min(txm_vec2 a, txm_vec2 b) {
+    return txm_v2(txm_minf(a.x, b.x), txm_minf(a.y, b.y));
+}
+static inline txm_vec2 txm_vec2_max(txm_vec2 a, txm_vec2 b) {
+    return txm_v2(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y));
+}
+static inline txm_vec2 txm_vec2_lerp(txm_vec2 a, txm_vec2 b, float t) {
+    return txm_v2(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t));
+}
+static inline float txm_vec2_dot(txm_vec2 a, txm_vec2 b) {
+    return (float)((double)a.x * b.x + (double)a.y * b.y);
+}
+static inline float txm_vec2_length(txm_vec2 a) {
+    return (float)sqrt((double)a.x * a.x + (double)a.y * a.y);
+}
+static inline txm_vec2 txm_vec2_normalize(txm_vec2 a) {
+    const double n = sqrt((double)a.x * a.x + (double)a.y * a.y);
+    return n > 0 ? txm_v2((float)(a.x / n), (float)(a.y / n)) : a;
+}
+
+static inline txm_vec3 txm_vec3_add(txm_vec3 a, txm_vec3 b) {
+    return txm_v3(a.x + b.x, a.y + b.y, a.z + b.z);
+}
+static inline txm_vec3 txm_vec3_sub(txm_vec3 a, txm_vec3 b) {
+    return txm_v3(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+static inline txm_vec3 txm_vec3_mul(txm_vec3 a, txm_vec3 b) {
+    return txm_v3(a.x * b.x, a.y * b.y, a.z * b.z);
+}
+static inline txm_vec3 txm_vec3_scale(txm_vec3 a, float s) {
+    return txm_v3(a.x * s, a.y * s, a.z * s);
+}
+static inline txm_vec3 txm_vec3_min(txm_vec3 a, txm_vec3 b) {
+    return txm_v3(txm_minf(a.x, b.x), txm_minf(a.y, b.y), txm_minf(a.z, b.z));
+}
+static inline txm_vec3 txm_vec3_max(txm_vec3 a, txm_vec3 b) {
+    return txm_v3(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z));
+}
+static inline txm_vec3 txm_vec3_lerp(txm_vec3 a, txm_vec3 b, float t) {
+    return txm_v3(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t));
+}
+static inline float txm_vec3_dot(txm_vec3 a, txm_vec3 b) {
+    return (float)((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z);
+}
+static inline float txm_vec3_length(txm_vec3 a) {
+    return (float)sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z);
+}
+static inline txm_vec3 txm_vec3_normalize(txm_vec3 a) {
+    const double n = sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z);
+    return n > 0 ? txm_v3((float)(a.x / n), (float)(a.y / n), (float)(a.z / n)) : a;
+}
+
+static inline txm_vec4 txm_vec4_add(txm_vec4 a, txm_vec4 b) {
+    return txm_v4(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
+}
+static inline txm_vec4 txm_vec4_sub(txm_vec4 a, txm_vec4 b) {
+    return txm_v4(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w);
+}
+static inline txm_vec4 txm_vec4_mul(txm_vec4 a, txm_vec4 b) {
+    return txm_v4(a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w);
+}
+static inline txm_vec4 txm_vec4_scale(txm_vec4 a, float s) {
+    return txm_v4(a.x * s, a.y * s, a.z * s, a.w * s);
+}
+static inline txm_vec4 txm_vec4_min(txm_vec4 a, txm_vec4 b) {
+    return txm_v4(txm_minf(a.x, b.x), txm_minf(a.y, b.y), txm_minf(a.z, b.z), txm_minf(a.w, b.w));
+}
+static inline txm_vec4 txm_vec4_max(txm_vec4 a, txm_vec4 b) {
+    return txm_v4(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z), txm_maxf(a.w, b.w));
+}
+static inline txm_vec4 txm_vec4_lerp(txm_vec4 a, txm_vec4 b, float t) {
+    return txm_v4(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t),
+                  txm_lerpf(a.z, b.z, t), txm_lerpf(a.w, b.w, t));
+}
+static inline float txm_vec4_dot(txm_vec4 a, txm_vec4 b) {
+    return (float)((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w);
+}
+static inline float txm_vec4_length(txm_vec4 a) {
+    return (float)sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z +
+                          (double)a.w * a.w);
+}
+static inline txm_vec4 txm_vec4_normalize(txm_vec4 a) {
+    const double n = sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z +
+                          (double)a.w * a.w);
+    return n > 0 ? txm_v4((float)(a.x / n), (float)(a.y / n),
+                         (float)(a.z / n), (float)(a.w / n)) : a;
+}
+/* z of the cross product: positive if b lies counter-clockwise of a (y up) */
+static inline float txm_vec2_cross(txm_vec2 a, txm_vec2 b) {
+    return (float)((double)a.x * b.y - (double)a.y * b.x);
+}
+static inline txm_vec3 txm_vec3_cross(txm_vec3 a, txm_vec3 b) {
+    return txm_v3((float)((double)a.y * b.z - (double)a.z * b.y),
+                  (float)((double)a.z * b.x - (double)a.x * b.z),
+                  (float)((double)a.x * b.y - (double)a.y * b.x));
+}
+
+/* some unit vector at a right angle to v; x for the zero vector */
+static inline txm_vec3 txm_vec3_perpendicular(txm_vec3 v) {
+    const float x = fabsf(v.x), y = fabsf(v.y), z = fabsf(v.z);
+    if (x <= 0 && y <= 0 && z <= 0) return txm_v3(1, 0, 0);
+    /* the cross product with the axis that v is least along */
+    const txm_vec3 axis = x <= y && x <= z ? txm_v3(1, 0, 0)
+                          : y <= z         ? txm_v3(0, 1, 0)
+                                           : txm_v3(0, 0, 1);
+    return txm_vec3_normalize(txm_vec3_cross(txm_vec3_normalize(v), axis));
+}
+
+/* ---- matrices --------------------------------------------------------------------------- */
+
+/* Stored column by column: row r of column c is m[3 * c + r], of a mat4 m[4 * c + r]. */
+typedef struct txm_mat3 {
+    float m[9];
+} txm_mat3;
+typedef struct txm_mat4 {
+    float m[16];
+} txm_mat4;
+
+/* out = a b, n x n; the helper of the two below */
+static inline void txm_matrix_mul(int n, const float *a, const float *b, float *out) {
+    for (int c = 0; c < n; c++) {
+        for (int r = 0; r < n; r++) {
+            double sum = 0;
+            for (int k = 0; k < n; k++) sum += (double)a[n * k + r] * b[n * c + k];
+            out[n * c + r] = (float)sum;
+        }
+    }
+}
+
+/* out = inverse of m, n x n, n <= 4: Gauss and Jordan with row scaling and partial pivoting.
+   A pivot below 2^-40 of its column counts as 0: by then a float matrix has no rank left. */
+static inline txm_status txm_matrix_inverse(int n, const float *m, float *out) {
+    double a[4][8], largest[4] = {0, 0, 0, 0};
+    for (int r = 0; r < n; r++) {
+        double scale = 0;
+        for (int c = 0; c < n; c++) {
+            if (!txm_is_finite(m[n * c + r])) return TXM_BAD_ARGUMENT;
+            scale = fmax(scale, fabs((double)m[n * c + r]));
+        }
+        if (scale <= 0) return TXM_BAD_ARGUMENT;
+        for (int c = 0; c < n; c++) {
+            a[r][c] = m[n * c + r] / scale;
+            a[r][n + c] = r == c ? 1 / scale : 0;
+            largest[c] = fmax(largest[c], fabs(a[r][c]));
+        }
+    }
+    for (int k = 0; k < n; k++) {
+        int p = k;
+        for (int r = k + 1; r < n; r++) {
+            if (fabs(a[r][k]) > fabs(a[p][k])) p = r;
+        }
+        const double pivot = a[p][k];
+        if (fabs(pivot) <= largest[k] * (1.0 / 1099511627776.0)) return TXM_BAD_ARGUMENT;
+        for (int c = 0; c < 2 * n; c++) {
+            const double t = a[p][c];
+            a[p][c] = a[k][c];
+            a[k][c] = t / pivot;
+        }
+        for (int r = 0; r < n; r++) {
+            const double f = a[r][k];
+            for (int c = 0; c < 2 * n && r != k; c++) a[r][c] -= f * a[k][c];
+        }
+    }
+    for (int i = 0; i < n * n; i++) {
+        if (fabs(a[i % n][n + i / n]) > 3.4e38) return TXM_BAD_ARGUMENT; /* no float */
+    }
+    for (int i = 0; i < n * n; i++) out[i] = (float)a[i % n][n + i / n];
+    return TXM_OK;
+}
+
+static inline txm_mat3 txm_mat3_identity(void) {
+    const txm_mat3 m = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    return m;
+}
+static inline txm_mat3 txm_mat3_mul(txm_mat3 a, txm_mat3 b) {
+    txm_mat3 out;
+    txm_matrix_mul(3, a.m, b.m, out.m);
+    return out;
+}
+static inline txm_mat3 txm_mat3_transpose(txm_mat3 m) {
+    txm_mat3 out;
+    for (int i = 0; i < 9; i++) out.m[i] = m.m[3 * (i % 3) + i / 3];
+    return out;
+}
+/* TXM_BAD_ARGUMENT, and *out untouched, if m is singular to float precision or not finite */
+static inline txm_status txm_mat3_inverse(txm_mat3 m, txm_mat3 *out) {
+    return txm_matrix_inverse(3, m.m, out->m);
+}
+/* m v */
+static inline txm_vec3 txm_mat3_vec(txm_mat3 m, txm_vec3 v) {
+    float r[3];
+    for (int i = 0; i < 3; i++)
+        r[i] = (float)((double)m.m[i] * v.x + (double)m.m[3 + i] * v.y + (double)m.m[6 + i] * v.z);
+    return txm_v3(r[0], r[1], r[2]);
+}
+
+static inline txm_mat4 txm_mat4_identity(void) {
+    const txm_mat4 m = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
+    return m;
+}
+static inline txm_mat4 txm_mat4_mul(txm_mat4 a, txm_mat4 b) {
+    txm_mat4 out;
+    txm_matrix_mul(4, a.m, b.m, out.m);
+    return out;
+}
+static inline txm_mat4 txm_mat4_transpose(txm_mat4 m) {
+    txm_mat4 out;
+    for (int i = 0; i < 16; i++) out.m[i] = m.m[4 * (i % 4) + i / 4];
+    return out;
+}
+/* as txm_mat3_inverse */
+static inline txm_status txm_mat4_inverse(txm_mat4 m, txm_mat4 *out) {
+    return txm_matrix_inverse(4, m.m, out->m);
+}
+/* m v */
+static inline txm_vec4 txm_mat4_vec(txm_mat4 m, txm_vec4 v) {
+    float r[4];
+    for (int i = 0; i < 4; i++)
+        r[i] = (float)((double)m.m[i] * v.x + (double)m.m[4 + i] * v.y + (double)m.m[8 + i] * v.z +
+                       (double)m.m[12 + i] * v.w);
+    return txm_v4(r[0], r[1], r[2], r[3]);
+}
+/* the point p moved by m, divided by its w (unless that is 0) */
+static inline txm_vec3 txm_mat4_point(txm_mat4 m, txm_vec3 p) {
+    const txm_vec4 q = txm_mat4_vec(m, txm_v4(p.x, p.y, p.z, 1));
+    const float w = q.w < 0 || q.w > 0 ? q.w : 1;
+    return txm_v3(q.x / w, q.y / w, q.z / w);
+}
+/* the direction v turned by m; translation does not move it */
+static inline txm_vec3 txm_mat4_vector(txm_mat4 m, txm_vec3 v) {
+    const txm_vec4 q = txm_mat4_vec(m, txm_v4(v.x, v.y, v.z, 0));
+    return txm_v3(q.x, q.y, q.z);
+}
+/* the linear part; for normals take its inverse transposed */
+static inline txm_mat3 txm_mat4_mat3(txm_mat4 m) {
+    txm_mat3 out;
+    for (int i = 0; i < 9; i++) out.m[i] = m.m[4 * (i / 3) + i % 3];
+    return out;
+}
+static inline txm_mat4 txm_mat4_translation(txm_vec3 t) {
+    const txm_mat4 m = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, t.x, t.y, t.z, 1}};
+    return m;
+}
+static inline txm_mat4 txm_mat4_scale(txm_vec3 s) {
+    const txm_mat4 m = {{s.x, 0, 0, 0, 0, s.y, 0, 0, 0, 0, s.z, 0, 0, 0, 0, 1}};
+    return m;
+}
+/* World to camera: eye goes to the origin, target onto the -z axis, up to the upper half. Any up
+   will do, also one along the line of sight. */
+static inline txm_mat4 txm_mat4_look_at(txm_vec3 eye, txm_vec3 target, txm_vec3 up) {
+    txm_vec3 z = txm_vec3_normalize(txm_vec3_sub(eye, target));
+    if (txm_vec3_dot(z, z) <= 0) z = txm_v3(0, 0, 1);
+    txm_vec3 x = txm_vec3_cross(txm_vec3_normalize(up), z);
+    x = txm_vec3_length(x) > 1e-6f ? txm_vec3_normalize(x) : txm_vec3_perpendicular(z);
+    const txm_vec3 y = txm_vec3_cross(z, x);
+    const txm_mat4 m = {{x.x, y.x, z.x, 0, x.y, y.y, z.y, 0, x.z, y.z, z.z, 0,
+                         -txm_vec3_dot(x, eye), -txm_vec3_dot(y, eye), -txm_vec3_dot(z, eye), 1}};
+    return m;
+}
+/* Camera to clip space: fov_y between 0 and pi, aspect = width / height > 0, 0 < near < far;
+   z = -near goes to -1, z = -far to 1. (near_z, far_z: near and far are macros on Windows.) */
+static inline txm_mat4 txm_mat4_perspective(float fov_y, float aspect, float near_z, float far_z) {
+    const double f = cos(0.5 * fov_y) / sin(0.5 * fov_y), d = (double)near_z - far_z;
+    const txm_mat4 m = {{(float)(f / aspect), 0, 0, 0, 0, (float)f, 0, 0, 0, 0,
+                         (float)(((double)far_z + near_z) / d), -1, 0, 0,
+                         (float)(2.0 * far_z * near_z / d), 0}};
+    return m;
+}
+
+/* ---- quaternions ------------------------------------------------------------------------ */
+
+/* A rotation: x, y, z = axis * sin(angle / 2), w = cos(angle / 2); length 1. q and -q are the same
+   rotation. No rotation is {0, 0, 0, 1}. */
+typedef struct txm_quat {
+    float x, y, z, w;
+} txm_quat;
+
+/* length 1; no rotation for the zero quaternion */
+static inline txm_quat txm_quat_normalize(txm_quat q) {
+    const double n = sqrt((double)q.x * q.x + (double)q.y * q.y + (double)q.z * q.z +
+                          (double)q.w * q.w);
+    const txm_quat none = {0, 0, 0, 1}, unit = {(float)(q.x / n), (float)(q.y / n),
+                                                (float)(q.z / n), (float)(q.w / n)};
+    return n > 0 ? unit : none;
+}
+/* counter-clockwise about axis (of any length above 0) seen from its tip */
+static inline txm_quat txm_quat_axis_angle(txm_vec3 axis, float angle) {
+    const txm_vec3 a = txm_vec3_normalize(axis);
+    const double s = sin(0.5 * angle);
+    const txm_quat q = {(float)(s * a.x), (float)(s * a.y), (float)(s * a.z),
+                        (float)cos(0.5 * angle)};
+    return txm_quat_normalize(q);
+}
+/* a after b */
+static inline txm_quat txm_quat_mul(txm_quat a, txm_quat b) {
+    const double ax = a.x, ay = a.y, az = a.z, aw = a.w;
+    const txm_quat q = {(float)(aw * b.x + ax * b.w + ay * b.z - az * b.y),
+                        (float)(aw * b.y - ax * b.z + ay * b.w + az * b.x),
+                        (float)(aw * b.z + ax * b.y - ay * b.x + az * b.w),
+                        (float)(aw * b.w - ax * b.x - ay * b.y - az * b.z)};
+    return q;
+}
+/* the opposite rotation */
+static inline txm_quat txm_quat_conjugate(txm_quat q) {
+    const txm_quat c = {-q.x, -q.y, -q.z, q.w};
+    return c;
+}
+/* the matrix of a unit quaternion */
+static inline txm_mat3 txm_quat_mat3(txm_quat q) {
+    const double x = q.x, y = q.y, z = q.z, w = q.w;
+    const txm_mat3 m = {{(float)(1 - 2 * (y * y + z * z)), (float)(2 * (x * y + w * z)),
+                         (float)(2 * (x * z - w * y)), (float)(2 * (x * y - w * z)),
+                         (float)(1 - 2 * (x * x + z * z)), (float)(2 * (y * z + w * x)),
+                         (float)(2 * (x * z + w * y)), (float)(2 * (y * z - w * x)),
+                         (float)(1 - 2 * (x * x + y * y))}};
+    return m;
+}
+static inline txm_mat4 txm_quat_mat4(txm_quat q) {
+    const txm_mat3 r = txm_quat_mat3(q);
+    txm_mat4 m = txm_mat4_identity();
+    for (int i = 0; i < 9; i++) m.m[4 * (i / 3) + i % 3] = r.m[i];
+    return m;
+}
+static inline txm_mat4 txm_mat4_rotation(txm_vec3 axis, float angle) {
+    return txm_quat_mat4(txm_quat_axis_angle(axis, angle));
+}
+/* v turned by the unit quaternion q: v + 2 w (u x v) + 2 u x (u x v), u = (x, y, z) */
+static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
+    const double x = q.x, y = q.y, z = q.z, w = q.w;
+    const double tx = 2 * (y * v.z - z * v.y), ty = 2 * (z * v.x - x * v.z),
+                 tz = 2 * (x * v.y - y * v.x);
+    return txm_v3((float)(v.x + w * tx + (y * tz - z * ty)),
+                  (float)(v.y + w * ty + (z * tx - x * tz)),
+                  (float)(v.z + w * tz + (x * ty - y * tx)));
+}
+/* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [8] takes the one whose
+   component is largest: that one never divides by something small. */
+static inline txm_quat txm_quat_from_mat3(txm_mat3 m) {
+    const double xx = m.m[0], yy = m.m[4], zz = m.m[8];
+    const double c[4] = {1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz};
+    const double yz = (double)m.m[5] + m.m[7], wx = (double)m.m[5] - m.m[7];
+    const double xz = (double)m.m[6] + m.m[2], wy = (double)m.m[6] - m.m[2];
+    const double xy = (double)m.m[1] + m.m[3], wz = (double)m.m[1] - m.m[3];
+    const double all[4][4] = {
+        {c[0], xy, xz, wx}, {xy, c[1], yz, wy}, {xz, yz, c[2], wz}, {wx, wy, wz, c[3]}};
+    int k = 3;
+    for (int i = 0; i < 3; i++) {
+        if (c[i] > c[k]) k = i;
+    }
+    /* the row is 4 q_k (x, y, z, w); its length is 4 |q_k| */
+    const double *q = all[k];
+    const double n = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) *
+                     (q[3] < 0 ? -1 : 1);
+    const txm_quat none = {0, 0, 0, 1}, unit = {(float)(q[0] / n), (float)(q[1] / n),
+                                                (float)(q[2] / n), (float)(q[3] / n)};
+    return n < 0 || n > 0 ? unit : none;
+}
+/* a * s + b * t, the shorter way round, to length 1; the helper of the two below */
+static inline txm_quat txm_quat_blend(txm_quat a, txm_quat b, double s, double t) {
+    const txm_quat q = {(float)(s * a.x + t * b.x), (float)(s * a.y + t * b.y),
+                        (float)(s * a.z + t * b.z), (float)(s * a.w + t * b.w)};
+    return txm_quat_normalize(q);
+}
+static inline double txm_quat_dot(txm_quat a, txm_quat b) {
+    return (double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w;
+}
+/* From a (t = 0) to b (t = 1) the shorter way round; cheap, speed not quite even. */
+static inline txm_quat txm_quat_nlerp(txm_quat a, txm_quat b, float t) {
+    return txm_quat_blend(a, b, 1.0 - t, txm_quat_dot(a, b) < 0 ? -(double)t : t);
+}
+/* The same at even speed. */
+static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
+    const double d = txm_quat_dot(a, b), cosine = fabs(d);
+    if (cosine > 0.9995) return txm_quat_nlerp(a, b, t); /* the sine would be too small */
+    const double angle = acos(cosine), s = sin((1.0 - t) * angle), u = sin(t * angle);
+    return txm_quat_blend(a, b, s, d < 0 ? -u : u); /* blend divides by sin(angle) */
+}
+
+/* ---- colour ----------------------------------------------------------------------------- */
+
+/* sRGB code value to linear light and back [6]; 0..1 to 0..1. Outside, values go on along the
+   same curves (below 0: the straight part), nothing is clamped. */
+static inline float txm_srgb_to_linear(float s) {
+    return (float)(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+}
+static inline float txm_linear_to_srgb(float l) {
+    return (float)(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
+}
+static inline txm_vec3 txm_srgb_to_linear3(txm_vec3 s) {
+    return txm_v3(txm_srgb_to_linear(s.x), txm_srgb_to_linear(s.y), txm_srgb_to_linear(s.z));
+}
+static inline txm_vec3 txm_linear_to_srgb3(txm_vec3 l) {
+    return txm_v3(txm_linear_to_srgb(l.x), txm_linear_to_srgb(l.y), txm_linear_to_srgb(l.z));
+}
+
+/* Linear RGB of the sRGB primaries to CIE XYZ and back; white (1, 1, 1) is D65, XYZ (0.95047, 1,
+   1.08883). Linear maps: any range. */
+static inline txm_vec3 txm_rgb_to_xyz(txm_vec3 c) {
+    return txm_v3((float)(0.4124564 * c.x + 0.3575761 * c.y + 0.1804375 * c.z),
+                  (float)(0.2126729 * c.x + 0.7151522 * c.y + 0.0721750 * c.z),
+                  (float)(0.0193339 * c.x + 0.1191920 * c.y + 0.9503041 * c.z));
+}
+static inline txm_vec3 txm_xyz_to_rgb(txm_vec3 c) {
+    return txm_v3((float)(3.2404542 * c.x - 1.5371385 * c.y - 0.4985314 * c.z),
+                  (float)(-0.9692660 * c.x + 1.8760108 * c.y + 0.0415560 * c.z),
+                  (float)(0.0556434 * c.x - 0.2040259 * c.y + 1.0572252 * c.z));
+}
+
+/* f of CIE L*a*b*: cube root, straight below (6/29)^3; and its inverse */
+static inline double txm_lab_f(double t) {
+    return t > 216.0 / 24389.0 ? pow(t, 1.0 / 3.0) : (24389.0 / 27.0 * t + 16.0) / 116.0;
+}
+static inline double txm_lab_f_inverse(double f) {
+    return f > 6.0 / 29.0 ? f * f * f : (116.0 * f - 16.0) * (27.0 / 24389.0);
+}
+/* CIE XYZ to L*a*b* under D65 and back [6]: L 0..100; a, b about -128..128; for sRGB colours
+   a lies in -86.2..98.3, b in -107.9..94.5. The Euclidean distance is Delta E 1976. */
+static inline txm_vec3 txm_xyz_to_lab(txm_vec3 c) {
+    const double x = txm_lab_f(c.x / 0.95047), y = txm_lab_f(c.y), z = txm_lab_f(c.z / 1.08883);
+    return txm_v3((float)(116 * y - 16), (float)(500 * (x - y)), (float)(200 * (y - z)));
+}
+static inline txm_vec3 txm_lab_to_xyz(txm_vec3 c) {
+    const double y = (c.x + 16.0) / 116, x = y + c.y / 500.0, z = y - c.z / 200.0;
+    return txm_v3((float)(0.95047 * txm_lab_f_inverse(x)), (float)txm_lab_f_inverse(y),
+                  (float)(1.08883 * txm_lab_f_inverse(z)));
+}
+/* linear RGB to L*a*b* and back in one go */
+static inline txm_vec3 txm_rgb_to_lab(txm_vec3 c) {
+    return txm_xyz_to_lab(txm_rgb_to_xyz(c));
+}
+static inline txm_vec3 txm_lab_to_rgb(txm_vec3 c) {
+    return txm_xyz_to_rgb(txm_lab_to_xyz(c));
+}
+
+/* RGB to opponent space and back: I1 = (R + G + B) / 3, I2 = (R - B) / 2, I3 = (2 G - R - B) / 4
+   [2]. The three axes are at right angles and nearly uncorrelated in photographs. For RGB in
+   0..1: I1 in 0..1, I2 and I3 in -0.5..0.5. A linear map of whatever RGB it is given. */
+static inline txm_vec3 txm_rgb_to_opponent(txm_vec3 c) {
+    const double r = c.x, g = c.y, b = c.z;
+    return txm_v3((float)((r + g + b) / 3), (float)((r - b) / 2), (float)((2 * g - r - b) / 4));
+}
+static inline txm_vec3 txm_opponent_to_rgb(txm_vec3 c) {
+    const double i1 = c.x, i2 = c.y, i3 = c.z / 1.5;
+    return txm_v3((float)(i1 + i2 - i3), (float)(i1 + 2 * i3), (float)(i1 - i2 - i3));
+}
+
+/* RGB in 0..1 to hue, saturation, value and back. Hue in turns: [0, 1), red 0, green 1/3, blue 2/3,
+   0 for grays; going back, whole turns do not matter. Saturation and value 0..1. */
+static inline txm_vec3 txm_rgb_to_hsv(txm_vec3 c) {
+    const double r = c.x, g = c.y, b = c.z;
+    const double v = fmax(r, fmax(g, b)), d = v - fmin(r, fmin(g, b));
+    double h = 0;
+    if (d > 0) {
+        h = (r >= v ? (g - b) / d : g >= v ? 2 + (b - r) / d : 4 + (r - g) / d) / 6;
+        if (h < 0) h += 1;
+    }
+    const float hue = (float)h;
+    return txm_v3(hue < 1 ? hue : 0, v > 0 ? (float)(d / v) : 0, (float)v);
+}
+static inline txm_vec3 txm_hsv_to_rgb(txm_vec3 c) {
+    float out[3];
+    for (int i = 0; i < 3; i++) {
+        /* a trapezoid over the circle, shifted by a third for each channel */
+        double t = c.x + (3 - i) / 3.0;
+        t = fabs(6 * (t - floor(t)) - 3) - 1;
+        t = t < 0 ? 0 : t > 1 ? 1 : t;
+        out[i] = (float)(c.z * (1 + c.y * (t - 1)));
+    }
+    return txm_v3(out[0], out[1], out[2]);
+}
+
+/* ---- kernel: symmetric 3x3 eigensystem -------------------------------------------------- */
+
+/* Eigenvalues and eigenvectors of
+
+       | a[0] a[1] a[2] |
+   A = | a[1] a[3] a[4] |      A vectors[k] = values[k] vectors[k]
+       | a[2] a[4] a[5] |
+
+   by cyclic Jacobi rotations in double [7]; the covariance of points is the usual A.
+
+   values   falling
+   vectors  unit length, at right angles, vectors[2] = vectors[0] x vectors[1]; of the first two
+            the component of largest magnitude (the first such) is positive. For equal values any
+            basis of their space is right; this one depends on the bits of A only.
+   return   TXM_OK, or TXM_BAD_ARGUMENT (nothing written) if an entry is not finite         */
+static inline txm_status txm_eigen3(const double a[6], double values[3], double vectors[3][3]) {
+    double m[3][3] = {{a[0], a[1], a[2]}, {a[1], a[3], a[4]}, {a[2], a[4], a[5]}};
+    double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; /* columns become the vectors */
+    double scale = 0;
+    int order[3] = {0, 1, 2};
+    for (int i = 0; i < 6; i++) {
+        if (!txm_is_finite(a[i])) return TXM_BAD_ARGUMENT;
+        scale = fmax(scale, fabs(a[i]));
+    }
+    for (int i = 0; i < 9 && scale > 0; i++) m[i / 3][i % 3] /= scale; /* squares cannot overflow */
+
+    /* Each rotation zeroes m[p][q]; what is left off the diagonal shrinks quadratically, 6 sweeps
+       are the rule and 32 never needed. Rotations that no longer change the diagonal end it. */
+    for (int sweep = 0, turned = 1; turned && sweep < 32; sweep++) {
+        turned = 0;
+        for (int k = 0; k < 3; k++) {
+            const int p = k == 2 ? 1 : 0, q = k == 0 ? 1 : 2, r = 3 - p - q;
+            if (fabs(m[p][q]) <= 1e-18) {
+                m[p][q] = m[q][p] = 0;
+                continue;
+            }
+            turned = 1;
+            const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+            const double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1));
+            const double c = 1 / sqrt(t * t + 1), s = t * c;
+            const double rp = m[r][p], rq = m[r][q];
+            m[p][p] -= t * m[p][q];
+            m[q][q] += t * m[p][q];
+            m[p][q] = m[q][p] = 0;
+            m[r][p] = m[p][r] = c * rp - s * rq;
+            m[r][q] = m[q][r] = s * rp + c * rq;
+            for (int i = 0; i < 3; i++) {
+                const double ip = v[i][p], iq = v[i][q];
+                v[i][p] = c * ip - s * iq;
+                v[i][q] = s * ip + c * iq;
+            }
+        }
+    }
+    for (int k = 0; k < 3; k++) { /* three compare-and-swaps that keep the order of equals */
+        const int i = k == 1 ? 1 : 0, x = order[i], y = order[i + 1];
+        if (m[y][y] > m[x][x]) {
+            order[i] = y;
+            order[i + 1] = x;
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        const int o = order[k];
+        double sign = 0, most = 0;
+        for (int i = 0; i < 3; i++) {
+            /* nearly equal magnitudes count as equal, so that rounding does not choose the sign */
+            if (fabs(v[i][o]) > most * (1 + 1e-9)) {
+                most = fabs(v[i][o]);
+                sign = v[i][o] < 0 ? -1 : 1;
+            }
+        }
+        values[k] = m[o][o] * scale;
+        for (int i = 0; i < 3; i++) vectors[k][i] = sign * v[i][o];
+    }
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        vectors[2][i] = vectors[0][j] * vectors[1][k] - vectors[0][k] * vectors[1][j];
+    }
+    return TXM_OK;
+}
+
+/* ---- kernel: minimum-error cut ---------------------------------------------------------- */
+
+/* The cheapest path through a strip from its first line to its last, moving at most one pixel
+   sideways per line [3]:
+
+       E(i, j) = e(i, j) + min(E(i-1, j-1), E(i-1, j), E(i-1, j+1)),  path(last) = argmin E(last, .)
+
+             j 0 .. width-1             e(i, j) = error[i * along + j * across], in floats
+         i 0 . . # . .
+           1 . # . . .                  a cut from top to bottom: along = row, across = 1
+           2 . # . . .                  from left to right:       along = 1, across = row
+           3 . . # . .
+
+   Of equal sums straight on wins, then the smaller j; of equal ends the smaller j.
+   error    >= 0; INFINITY forbids a pixel as long as there is a way round it
+   path     receives j for each line, length of them
+   scratch  room for length * width doubles
+   return   the sum of the errors on the path; 0 (nothing written) if length or width is below 1
+   cost     O(length * width)                                                              */
+static inline double txm_cut(const float *error, int length, int width, ptrdiff_t along,
+                             ptrdiff_t across, int *path, double *scratch) {
+    if (length < 1 || width < 1) return 0;
+    const size_t w = (size_t)width;
+    for (int i = 0; i < length; i++) {
+        double *line = scratch + (size_t)i * w;
+        const double *above = i ? line - w : NULL;
+        for (int j = 0; j < width; j++) {
+            double best = above ? above[j] : 0;
+            if (above && j > 0 && above[j - 1] < best) best = above[j - 1];
+            if (above && j + 1 < width && above[j + 1] < best) best = above[j + 1];
+            line[j] = best + error[i * along + j * across];
+        }
+    }
+    const double *line = scratch + (size_t)(length - 1) * w;
+    int j = 0;
+    for (int k = 1; k < width; k++) {
+        if (line[k] < line[j]) j = k;
+    }
+    const double total = line[j];
+    for (int i = length - 1;; i--) {
+        path[i] = j;
+        if (i == 0) return total;
+        const double *above = scratch + (size_t)(i - 1) * w;
+        int best = j;
+        if (j > 0 && above[j - 1] < above[best]) best = j - 1;
+        if (j + 1 < width && above[j + 1] < above[best]) best = j + 1;
+        j = best;
+    }
+}
+
+/* ---- kernel: half size ------------------------------------------------------------------ */
+
+/* One step of an image pyramid: each pixel of half is the mean of the 2x2 pixels of image below
+   it. Of an odd width the last column is averaged by itself, of an odd height the last row: no
+   pixel is lost. In linear values if the caller's are; nothing is decoded.
+
+   image, half  float, the same channels, not overlapping; half is (width + 1) / 2 x
+                (height + 1) / 2 and receives the result, or is untouched after an error
+   return       TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                    */
+static inline txm_status txm_image_halve(const txm_image *image, const txm_image *half,
+                                         txm_env *env) {
+    txm_status status = txm_image_check(image, "image", 0, env);
+    if (status == TXM_OK) status = txm_image_check(half, "half", 0, env);
+    if (status != TXM_OK) return status;
+    const txm_image from = txm_image_resolve(*image), to = txm_image_resolve(*half);
+    if (from.sample != TXM_F32 || to.sample != TXM_F32 || from.channels != to.channels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
+                           "image and half must both be TXM_F32 with the same channels");
+    if (to.width != from.width / 2 + from.width % 2 ||
+        to.height != from.height / 2 + from.height % 2)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
+                           "its sides must be half those of image, rounded up");
+    const size_t n = (size_t)from.channels;
+    for (int y = 0; y < to.height; y++) {
+        const int rows = 2 * y + 1 < from.height ? 2 : 1;
+        const float *upper = (const float *)txm_image_row_const(&from, 2 * y);
+        const float *lower = (const float *)txm_image_row_const(&from, 2 * y + rows - 1);
+        float *out = (float *)txm_image_row(&to, y);
+        for (int x = 0; x < to.width; x++) {
+            /* at an odd border the same pixel is simply taken twice */
+            const size_t left = 2 * (size_t)x * n, right = 2 * x + 1 < from.width ? left + n : left;
+            for (size_t c = 0; c < n; c++) {
+                const double sum = ((double)upper[left + c] + upper[right + c]) +
+                                   ((double)lower[left + c] + lower[right + c]);
+                out[(size_t)x * n + c] = (float)(sum * 0.25);
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- kernel: Poisson equation ----------------------------------------------------------- */
+
+typedef struct txm_poisson_desc {
+    txm_image image;    /* TXM_F32, finite. In: known values outside the mask, a first guess
+                           inside. Out: the solution inside; untouched after an error       */
+    txm_image mask;     /* TXM_U8, 1 channel, same size: non-zero = unknown                 */
+    txm_image target;   /* TXM_F32, size and channels of image: wanted Laplacian; NULL = 0  */
+    float screen;       /* 0..1e6: pull towards the first guess; 0 = none                   */
+    float tolerance;    /* relative residual to stop at, 1e-12..1; 0 = 1e-6                 */
+    int max_iterations; /* per channel, then the last iterate is taken; 0 = 10000           */
+    float progress_from, progress_to; /* the part of the caller's bar that this call fills,
+                           0 <= from <= to <= 1; both 0 = all of it                         */
+} txm_poisson_desc;
+
+/* What txm_poisson works on: one number per unknown pixel, in raster order. */
+typedef struct txm_poisson_grid {
+    size_t count;
+    int32_t *side[4];     /* unknown to the left, right, above, below; -1 = known or no pixel */
+    double *diagonal;     /* screen + number of neighbours, known or not                      */
+    double *factor;       /* 1 / diagonal of the incomplete factor                            */
+    double *r, *z, *p, *x; /* residual, preconditioned residual, direction, solution           */
+} txm_poisson_grid;
+
+/* z = M^-1 r: with A = L + D + L^T and factor f, solves (F + L) F^-1 (F + L^T) z = r, the two
+   triangular halves one after the other. */
+static inline void txm_poisson_precondition(const txm_poisson_grid *g) {
+    const double *f = g->factor;
+    double *z = g->z;
+    for (size_t i = 0; i < g->count; i++) {
+        const int32_t left = g->side[0][i], up = g->side[2][i];
+        double sum = g->r[i];
+        if (left >= 0) sum += f[left] * z[left];
+        if (up >= 0) sum += f[up] * z[up];
+        z[i] = sum * f[i];
+    }
+    for (size_t i = g->count; i-- > 0;) {
+        const int32_t right = g->side[1][i], down = g->side[3][i];
+        double sum = 0;
+        if (right >= 0) sum += z[right];
+        if (down >= 0) sum += z[down];
+        z[i] = (z[i] + f[i] * sum) * f[i];
+    }
+}
+
+/* (A v)(i) */
+static inline double txm_poisson_apply(const txm_poisson_grid *g, const double *v, size_t i) {
+    double sum = g->diagonal[i] * v[i];
+    for (int k = 0; k < 4; k++) {
+        if (g->side[k][i] >= 0) sum -= v[g->side[k][i]];
+    }
+    return sum;
+}
+
+/* The bar of channel c, which is reached (0..1) of its way to the goal. */
+static inline int txm_poisson_report(const txm_poisson_desc *desc, const txm_env *env, int c,
+                                     double reached) {
+    const double from = desc->progress_from, to = desc->progress_to > 0 ? desc->progress_to : 1;
+    const int channels = desc->image.channels ? desc->image.channels : 1;
+    return txm_progress(env, (float)(from + (to - from) * ((c + reached) / channels)), "blending");
+}
+
+/* Solve A x = b by preconditioned conjugate gradients; on entry x holds the guess, r holds b. */
+static inline txm_status txm_poisson_solve(const txm_poisson_grid *g, const txm_poisson_desc *desc,
+                                           int c, const txm_env *env) {
+    const double tolerance = desc->tolerance > 0 ? desc->tolerance : 1e-6;
+    const int most = desc->max_iterations ? desc->max_iterations : 10000;
+    const size_t n = g->count;
+    double norm = 0, rest = 0, rz = 0, reached = 0;
+    for (size_t i = 0; i < n; i++) {
+        norm += g->r[i] * g->r[i];
+        g->r[i] -= txm_poisson_apply(g, g->x, i);
+        rest += g->r[i] * g->r[i];
+    }
+    const double goal = norm * tolerance * tolerance, first = rest;
+    for (int k = 0; k < most && rest > goal; k++) {
+        double old = rz, curvature = 0;
+        /* how far on the way from the first residual to the goal, in digits */
+        if (rest < first && goal > 0)
+            reached = fmin(fmax(reached, log(first / rest) / log(first / goal)), 1);
+        if (txm_poisson_report(desc, env, c, reached)) return TXM_CANCELLED;
+        txm_poisson_precondition(g);
+        rz = 0;
+        for (size_t i = 0; i < n; i++) rz += g->r[i] * g->z[i];
+        for (size_t i = 0; i < n; i++) g->p[i] = g->z[i] + (k ? rz / old : 0) * (k ? g->p[i] : 0);
+        for (size_t i = 0; i < n; i++) {
+            g->z[i] = txm_poisson_apply(g, g->p, i);
+            curvature += g->p[i] * g->z[i];
+        }
+        if (!(curvature > 0)) break; /* nothing left but rounding */
+        const double step = rz / curvature;
+        rest = 0;
+        for (size_t i = 0; i < n; i++) {
+            g->x[i] += step * g->p[i];
+            g->r[i] -= step * g->z[i];
+            rest += g->r[i] * g->r[i];
+        }
+    }
+    return TXM_OK;
+}
+
+/* Number the unknowns, link them, and build diagonal and factor. above: width numbers of scratch.
+
+   MIC(0): an incomplete factor with the stencil of A; what it drops is taken off the diagonal to
+   0.97, so that smooth vectors pass almost unchanged. For rows of five points this is [5]
+
+       e = d - f_left^2 (1 + 0.97 [left has a lower neighbour])
+             - f_up^2   (1 + 0.97 [upper has a right neighbour]),   f = 1 / sqrt(e),
+
+   and e = d where that would fall below d / 4. It makes the iterations grow with the square root
+   of the width of the hole, not with the width itself. */
+static inline void txm_poisson_link(txm_poisson_grid *g, const txm_image *mask, double screen,
+                                    int32_t *above) {
+    const int width = mask->width, height = mask->height;
+    size_t i = 0;
+    for (int x = 0; x < width; x++) above[x] = -1;
+    for (int y = 0; y < height; y++) {
+        const uint8_t *row = (const uint8_t *)txm_image_row_const(mask, y);
+        int32_t left = -1;
+        for (int x = 0; x < width; x++) {
+            const int32_t up = above[x], me = row[x] ? (int32_t)i : -1;
+            if (me >= 0) {
+                g->side[0][i] = left;
+                g->side[1][i] = -1;
+                g->side[2][i] = up;
+                g->side[3][i] = -1;
+                g->diagonal[i] = screen + (x > 0) + (x + 1 < width) + (y > 0) + (y + 1 < height);
+                if (left >= 0) g->side[1][left] = me;
+                if (up >= 0) g->side[3][up] = me;
+                i++;
+            }
+            above[x] = left = me;
+        }
+    }
+    for (i = 0; i < g->count; i++) {
+        const int32_t left = g->side[0][i], up = g->side[2][i];
+        double e = g->diagonal[i];
+        if (left >= 0) e -= g->factor[left] * g->factor[left] * (g->side[3][left] >= 0 ? 1.97 : 1);
+        if (up >= 0) e -= g->factor[up] * g->factor[up] * (g->side[1][up] >= 0 ? 1.97 : 1);
+        if (e < 0.25 * g->diagonal[i]) e = g->diagonal[i];
+        g->factor[i] = 1 / sqrt(e);
+    }
+}
+
+/* Fill r with the right side and x with the guess of channel c. */
+static inline void txm_poisson_load(const txm_poisson_grid *g, const txm_poisson_desc *desc,
+                                    const txm_image *image, int c) {
+    const int width = image->width, height = image->height;
+    size_t i = 0;
+    for (int y = 0; y < height; y++) {
+        const uint8_t *row = (const uint8_t *)txm_image_row_const(&desc->mask, y);
+        for (int x = 0; x < width; x++) {
+            if (!row[x]) continue;
+            double b = (double)desc->screen * txm_image_get(image, x, y, c);
+            if (desc->target.pixels) b -= txm_image_get(&desc->target, x, y, c);
+            if (x > 0 && g->side[0][i] < 0) b += txm_image_get(image, x - 1, y, c);
+            if (x + 1 < width && g->side[1][i] < 0) b += txm_image_get(image, x + 1, y, c);
+            if (y > 0 && g->side[2][i] < 0) b += txm_image_get(image, x, y - 1, c);
+            if (y + 1 < height && g->side[3][i] < 0) b += txm_image_get(image, x, y + 1, c);
+            g->r[i] = b;
+            g->x[i++] = txm_image_get(image, x, y, c);
+        }
+    }
+}
+
+/* Refuse what cannot be solved; *unknown receives the number of masked pixels. */
+static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t *unknown,
+                                           txm_env *env) {
+    const txm_image *image = &desc->image, *mask = &desc->mask, *target = &desc->target;
+    txm_status status = txm_image_check(image, "image", 0, env);
+    if (status == TXM_OK) status = txm_image_check(mask, "mask", 0, env);
+    if (status == TXM_OK && target->pixels) status = txm_image_check(target, "target", 0, env);
+    if (status != TXM_OK) return status;
+    if (image->sample != TXM_F32 || !txm_image_is_finite(image))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image",
+                           "samples must be TXM_F32 and finite, in the hole too");
+    if (mask->sample != TXM_U8 || mask->channels > 1 || mask->width != image->width ||
+        mask->height != image->height)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "mask",
+                           "must be TXM_U8 with 1 channel and the size of image");
+    if (target->pixels &&
+        (target->sample != TXM_F32 || target->width != image->width ||
+         target->height != image->height || !txm_image_is_finite(target) ||
+         txm_image_resolve(*target).channels != txm_image_resolve(*image).channels))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "target",
+                           "must be finite TXM_F32 with the size and channels of image");
+    if (!(desc->screen >= 0 && desc->screen <= 1e6f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "screen must be 0 to 1e6");
+    if (!(desc->tolerance >= 0 && desc->tolerance <= 1) ||
+        (desc->tolerance > 0 && desc->tolerance < 1e-12f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "tolerance must be 1e-12 to 1, or 0 for 1e-6");
+    if (desc->max_iterations < 0)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "max_iterations must be 1 or more, or 0 for 10000");
+    if (!(desc->progress_from >= 0 && desc->progress_to <= 1 &&
+          desc->progress_from <= desc->progress_to))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "progress_from..progress_to must lie in 0..1");
+    *unknown = 0;
+    for (int y = 0; y < mask->height; y++) {
+        const uint8_t *row = (const uint8_t *)txm_image_row_const(mask, y);
+        for (int x = 0; x < mask->width; x++) *unknown += row[x] != 0;
+    }
+    if (*unknown > INT32_MAX)
+        return txm_fail_at(env, TXM_TOO_LARGE, "mask",
+                           "more than 2^31 - 1 unknown pixels; use tiles");
+    /* Pixels of an image hang together, so one known pixel is enough to hold every unknown one. */
+    if (!(desc->screen > 0) && *unknown == (size_t)mask->width * (size_t)mask->height)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "mask",
+                           "every pixel is unknown; leave one known, or set screen");
+    return TXM_OK;
+}
+
+/* Solve the (screened) Poisson equation inside a mask, with known values around it [4]:
+
+       screen (u - u0) - Lu = -target,   Lu(x) = sum over the neighbours y of x: u(y) - u(x)
+
+   where x has up to four neighbours: none beyond the border of the image (so nothing is pulled
+   there, the natural or Neumann border), and outside the mask u is the image (Dirichlet). With
+   target and screen 0 this is the membrane through the known values. To paste gradients, let
+   target(x) be the sum of the wanted differences u(y) - u(x).
+
+   The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [5].
+   desc    nothing in it is written but the pixels of desc->image, and those only on success
+   env     NULL, or how to allocate, report and cancel
+   return  TXM_OK (also where no pixel is masked, or max_iterations was reached);
+           TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost    some 20 to 200 iterations (they grow with the square root of the width of the hole) of
+           about 30 ns per unknown and channel; 64 + 4 * channels bytes per unknown       */
+static inline txm_status txm_poisson(const txm_poisson_desc *desc, txm_env *env) {
+    txm_poisson_grid g;
+    txm_arena arena;
+    size_t n = 0;
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a txm_poisson_desc");
+    txm_status status = txm_poisson_check(desc, &n, env);
+    if (status != TXM_OK || n == 0) return status;
+
+    const txm_image image = txm_image_resolve(desc->image);
+    const size_t channels = (size_t)image.channels;
+    txm_arena_init(&arena, env);
+    double *numbers = (double *)txm_arena_alloc(&arena, n, 6 * sizeof(double));
+    int32_t *sides = (int32_t *)txm_arena_alloc(&arena, n, 4 * sizeof(int32_t));
+    int32_t *above = (int32_t *)txm_arena_alloc(&arena, (size_t)image.width, sizeof(int32_t));
+    float *result = (float *)txm_arena_alloc(&arena, n, channels * sizeof(float));
+    if (!numbers || !sides || !above || !result) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the Poisson equation");
+        goto done;
+    }
+    g.count = n;
+    g.diagonal = numbers;
+    g.factor = numbers + n;
+    g.r = numbers + 2 * n;
+    g.z = numbers + 3 * n;
+    g.p = numbers + 4 * n;
+    g.x = numbers + 5 * n;
+    for (int k = 0; k < 4; k++) g.side[k] = sides + (size_t)k * n;
+    txm_poisson_link(&g, &desc->mask, desc->screen, above);
+
+    for (int c = 0; c < image.channels; c++) {
+        txm_poisson_load(&g, desc, &image, c);
+        status = txm_poisson_solve(&g, desc, c, env);
+        if (status != TXM_OK) {
+            txm_fail(env, status, "cancelled while solving the Poisson equation");
+            goto done;
+        }
+        for (size_t i = 0; i < n; i++) result[i * channels + (size_t)c] = (float)g.x[i];
+    }
+    for (int y = 0, i = 0; y < image.height; y++) {
+        const uint8_t *row = (const uint8_t *)txm_image_row_const(&desc->mask, y);
+        float *out = (float *)txm_image_row(&image, y);
+        for (int x = 0; x < image.width; x++) {
+            if (!row[x]) continue;
+            memcpy(out + (size_t)x * channels, result + (size_t)i++ * channels,
+                   channels * sizeof(float));
+        }
+    }
+done:
+    txm_arena_free(&arena);
+    return status;
+}
+
 #ifdef __cplusplus
 }
 #endif
 #endif /* TEXMATH_H */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/
