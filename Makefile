@@ -1,0 +1,110 @@
+# texkit - `make` builds build/texkit; `make help` lists the rest
+
+CC      ?= cc
+CXX     ?= c++
+CFLAGS  ?= -O2
+PREFIX  ?= /usr/local
+BUILD   ?= build
+
+VERSION := $(shell sed -n 's/^.define TEXKIT_VERSION "\(.*\)"/\1/p' tools/cli.h)
+OPENMP  := $(shell echo 'int main(void) { return 0; }' | \
+             $(CC) -fopenmp -xc - -o /dev/null 2>/dev/null && echo -fopenmp)
+WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow
+
+# -ffp-contract=off: the same bytes on machines with and without fused multiply-add
+COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -I. -Itools $(CPPFLAGS)
+LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
+
+HEADERS := $(wildcard *.h)
+TEXKIT   = $(addprefix $(BUILD)/,texkit.o cli.o image_io.o stb.o)
+EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%,$(wildcard examples/*.c))
+BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
+
+.PHONY: all help demo test examples bench lint install uninstall clean setup samples helpers
+.DELETE_ON_ERROR:
+
+all: $(BUILD)/texkit
+
+help:
+	@echo "make            build $(BUILD)/texkit, the command line tool"
+	@echo "make demo       synthesise from sample photographs, write out/index.html"
+	@echo "make test       run all tests, with the sanitizers on"
+	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
+	@echo "make bench      print a table of timings"
+	@echo "make lint       cppcheck and clang-tidy"
+	@echo "make install    headers, pkg-config file and tool; PREFIX=$(PREFIX), DESTDIR="
+	@echo "make uninstall  take them away again"
+	@echo "make clean      remove $(BUILD)/ and out/"
+
+# ---- the tool and its helpers
+
+setup:
+	@CC="$(CC)" tools/setup.sh tool
+
+$(BUILD)/%.o: tools/%.c $(wildcard tools/*.h) $(HEADERS) Makefile | setup
+	@mkdir -p $(@D)
+	$(COMPILE) -c $< -o $@
+
+# stb shifts into the sign bit on purpose; that is not what our sanitizer runs look for
+$(BUILD)/stb.o: COMPILE += -fno-sanitize=undefined
+
+$(BUILD)/texkit: $(TEXKIT)
+	$(LINK) $^ -o $@ -lm
+
+# small programs that the demo, the tests and the benchmark use
+helpers: $(BUILD)/crop $(BUILD)/draw
+
+$(BUILD)/crop $(BUILD)/draw: $(BUILD)/%: $(BUILD)/%.o $(BUILD)/image_io.o $(BUILD)/stb.o
+	$(LINK) $^ -o $@ -lm
+
+# ---- examples and benchmarks
+
+examples: $(EXAMPLES)
+
+$(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
+	@mkdir -p $(@D)
+	$(COMPILE) $< $(BUILD)/stb.o -o $@ -lm
+
+bench: $(BENCHES) samples
+	@for b in $(BENCHES); do $$b $(BUILD)/samples/*.png || exit 1; done
+
+$(BUILD)/bench/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
+	@mkdir -p $(@D)
+	$(COMPILE) $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
+
+# ---- demo, tests, lint
+
+samples: helpers
+	@BUILD=$(BUILD) tools/samples.sh
+
+demo: all samples
+	@BUILD=$(BUILD) tools/demo.sh
+
+test:
+	@CC="$(CC)" tools/setup.sh test
+	@CC="$(CC)" CXX="$(CXX)" tests/run.sh
+
+lint:
+	@tools/setup.sh lint
+	cppcheck --quiet --std=c99 --enable=warning,performance,portability --inline-suppr \
+	    --error-exitcode=1 --suppress=missingIncludeSystem --suppress=uninitvar:texmath.h \
+	    -I. -Itools tools/*.c examples/*.c bench/*.c
+	clang-tidy --quiet --warnings-as-errors='*' tools/*.c examples/*.c bench/*.c -- \
+	    -std=c99 -I. -Itools
+
+# ---- installing
+
+install: all
+	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/include/texkit" \
+	    "$(DESTDIR)$(PREFIX)/lib/pkgconfig"
+	install -m 755 $(BUILD)/texkit "$(DESTDIR)$(PREFIX)/bin/texkit"
+	install -m 644 $(HEADERS) "$(DESTDIR)$(PREFIX)/include/texkit"
+	sed 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(VERSION)|' tools/texkit.pc.in \
+	    > "$(DESTDIR)$(PREFIX)/lib/pkgconfig/texkit.pc"
+
+uninstall:
+	rm -f "$(DESTDIR)$(PREFIX)/bin/texkit" "$(DESTDIR)$(PREFIX)/lib/pkgconfig/texkit.pc"
+	rm -rf "$(DESTDIR)$(PREFIX)/include/texkit"
+
+clean:
+	rm -rf $(BUILD) out

@@ -1,0 +1,110 @@
+/* cli.h - what every texkit command shares: options, messages, progress, timing, output files
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   A command of texkit.c is one function. It declares the options it knows as a table, lets
+   cli_begin read the command line into variables of its own, does its work with cli.env as the
+   environment of the library, and hands the bytes of its output to cli_finish. Everything that the
+   commands must do alike - exit status, one-line messages, --stats, --threads, leaving no file
+   behind after a failure - is here and only here.                                              */
+#ifndef CLI_H
+#define CLI_H
+
+#include "texmath.h"
+
+#define TEXKIT_VERSION "0.1.0"
+
+/* "0.1.0 (texmath 0.1.0, ...)" for --version; defined by texkit.c, which knows the headers. */
+extern const char cli_versions[];
+
+/* Exit status of the program, as the manual promises. */
+enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
+
+enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16 };
+
+/* ---- options ---------------------------------------------------------------------------- */
+
+typedef enum cli_kind {
+    CLI_FLAG,   /* int *: 1 if given                                   */
+    CLI_TEXT,   /* const char **                                       */
+    CLI_INT,    /* int *, min..max                                     */
+    CLI_SEED,   /* uint64_t *                                          */
+    CLI_EXTENT, /* int[2], width and height, written WxH, min..max each */
+    CLI_END     /* closes the table                                    */
+} cli_kind;
+
+typedef struct cli_option {
+    cli_kind kind;
+    const char *name;  /* "--size"                                          */
+    const char *value; /* what stands for its value in the help, or NULL    */
+    const char *help;  /* one line                                          */
+    void *target;      /* written only if the option is given               */
+    int min, max;
+} cli_option;
+
+/* The manual of a command; --help prints it with the table of options. */
+typedef struct cli_manual {
+    const char *name;    /* "synth"                                         */
+    const char *usage;   /* "EXEMPLAR|MODEL.txs -o OUT --size WxH"          */
+    const char *summary; /* one line, also in the list of commands          */
+    const char *details; /* lines of at most 78 characters, each ending \n  */
+    const char *example; /* the same                                        */
+    int inputs;          /* how many input files it takes                   */
+    const char *input;   /* what the first is called in messages            */
+} cli_manual;
+
+/* ---- one run of one command --------------------------------------------------------------- */
+
+typedef struct cli {
+    const cli_manual *manual;
+
+    /* from the command line */
+    const char *inputs[4];
+    const char *output;
+    const char *stats; /* NULL: none wanted */
+    uint64_t seed;
+    int threads, quiet;
+
+    txm_env env; /* for the calls into the library */
+
+    /* the rest belongs to cli.c */
+    double started, stage_started, shown;
+    struct {
+        const char *name;
+        double seconds;
+    } stages[CLI_MAX_STAGES];
+    struct {
+        const char *name;
+        double value;
+    } figures[CLI_MAX_FIGURES];
+    int stage_count, figure_count, bar_is_on;
+    size_t live_bytes, peak_bytes;
+} cli;
+
+/* Read the command line after the command's name. 0: go on; otherwise *status is the exit status
+   and all that there was to say has been said. */
+int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int argc, char **argv,
+              int *status);
+
+/* Say in one line on stderr what failed and how to mend it; returns status. */
+int cli_fail(cli *run, int status, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__((format(printf, 3, 4)))
+#endif
+    ;
+
+/* From here on the clock runs for this stage (a string literal). */
+void cli_stage(cli *run, const char *name);
+
+/* A figure of the result for --stats (name: a string literal). */
+void cli_figure(cli *run, const char *name, double value);
+
+/* Seconds since the command began. */
+double cli_seconds(const cli *run);
+
+/* Before the work: can this path be written at all? Says so if not; returns an exit status. */
+int cli_check_output(cli *run, const char *path);
+
+/* Write the output and the statistics, both or neither; returns the exit status. */
+int cli_finish(cli *run, const void *bytes, size_t size);
+
+#endif /* CLI_H */

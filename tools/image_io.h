@@ -1,0 +1,39 @@
+/* image_io.h - image files in and out, through stb_image and stb_image_write
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   Reads PNG, JPEG, BMP, TGA and binary PNM with 1, 3 or 4 channels of 8 bits; gray with alpha
+   becomes RGBA, 16 bits become 8. Writes PNG, TGA, BMP and JPEG. Where a function fails, *why is
+   set to an English phrase that fits behind "cannot read 'x.png': ".                            */
+#ifndef IMAGE_IO_H
+#define IMAGE_IO_H
+
+#include "texmath.h"
+
+/* The whole file in a block for free(), or NULL with errno set. */
+unsigned char *file_read(const char *path, size_t *size);
+
+/* ".png" of "a/b.PNG": in lower case, at most 7 characters; "" if there is none */
+void file_extension(const char *path, char extension[8]);
+
+/* Do these bytes begin like an image of a kind that image_decode reads? */
+int image_is_known(const unsigned char *bytes, size_t size);
+
+/* Decode a whole file; channels 0 keeps what it has, 1 converts to gray. Release the result with
+   image_free. 1 if all went well. */
+int image_decode(const unsigned char *bytes, size_t size, int channels, txm_image *image,
+                 const char **why);
+
+/* The same from a path. */
+int image_read(const char *path, int channels, txm_image *image, const char **why);
+
+void image_free(txm_image *image);
+
+/* Can a path that ends in this extension (".png") take a width x height picture with so many
+   channels? 0 for one or all of them: not known yet. */
+int image_can_write(const char *extension, int width, int height, int channels, const char **why);
+
+/* Encode for that extension into a block for free(). 1 if all went well. */
+int image_encode(const char *extension, const txm_image *image, unsigned char **bytes, size_t *size,
+                 const char **why);
+
+#endif /* IMAGE_IO_H */

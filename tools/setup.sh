@@ -1,0 +1,59 @@
+#!/bin/sh
+# setup.sh PROFILE - make sure that what a make target needs is installed
+#
+# PROFILE is tool, test, lint or ci (ci holds all the others). What is missing is installed by
+# apt-get, with sudo if need be; without apt-get the script says what to install and fails. With
+# everything in place it only looks, which takes a few hundredths of a second.
+set -eu
+
+profile=${1:?usage: setup.sh tool|test|lint|ci}
+missing=
+
+has_header() { echo "#include <$1>" | ${CC:-cc} -E -xc - >/dev/null 2>&1; }
+has_cxx_header() { find /usr/include /usr/local/include -path "*/$1" 2>/dev/null | grep -q .; }
+has_command() { command -v "$1" >/dev/null 2>&1; }
+
+# need TEST NAME PACKAGE: unless the test finds the name, the Debian package is to be installed
+need() { "$1" "$2" || missing="$missing $3"; }
+
+need has_header stb/stb_image.h libstb-dev
+case $profile in test | ci)
+    need has_command g++ g++
+    need has_header cmocka.h libcmocka-dev
+    need has_cxx_header OpenImageIO/imagebuf.h libopenimageio-dev
+esac
+case $profile in lint | ci)
+    need has_command cppcheck cppcheck
+    need has_command clang-tidy clang-tidy
+esac
+case $profile in ci)
+    need has_command clang clang
+    need has_command clang++ clang
+    need has_command llvm-symbolizer llvm
+    need has_command pkg-config pkg-config
+esac
+[ -n "$missing" ] || exit 0
+
+give_up() {
+    echo "setup: $1; please install what these Debian packages hold:$missing" >&2
+    exit 1
+}
+has_command apt-get || give_up "no apt-get here"
+root=
+if [ "$(id -u)" != 0 ]; then
+    has_command sudo || give_up "not root, and no sudo here"
+    if [ -t 0 ]; then root=sudo; else root="sudo -n"; fi
+fi
+
+echo "setup: installing$missing"
+install() {
+    # shellcheck disable=SC2086 # the words of $root and $missing are meant to be split
+    $root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends install \
+        $missing </dev/null >"$log" 2>&1
+}
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+install || { $root apt-get -qq update >/dev/null 2>&1 || true; install; } || {
+    tail -n 5 "$log" >&2
+    give_up "apt-get could not install them"
+}

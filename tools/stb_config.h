@@ -1,0 +1,15 @@
+/* stb_config.h - the stb libraries with the formats that we read, and no others
+   SPDX-License-Identifier: MIT OR Unlicense */
+#ifndef STB_CONFIG_H
+#define STB_CONFIG_H
+
+#define STBI_ONLY_PNG
+#define STBI_ONLY_JPEG
+#define STBI_ONLY_BMP
+#define STBI_ONLY_TGA
+#define STBI_ONLY_PNM
+
+#include <stb/stb_image.h>
+#include <stb/stb_image_write.h>
+
+#endif /* STB_CONFIG_H */
