@@ -1,0 +1,123 @@
+/* fuzz_texsyn_load.c - hostile bytes into texsyn_load
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   With clang: -fsanitize=fuzzer,address,undefined, run on a folder of model files.
+   With any compiler: -DFUZZ_STANDALONE; the program then mutates the files it is given itself:
+   fuzz_texsyn_load RUNS FILE...
+
+   Whatever texsyn_load accepts must survive all that one can do with a model, and be written back.
+   The allocator refuses to hand out more than MOST_BYTES, a multiple of what any model of a
+   few thousand bytes needs: a loader that believes a forged size stops the run.                 */
+#define TEXSYN_IMPLEMENTATION
+#include "texsyn.h"
+
+#include <stdio.h>
+
+enum { MOST_BYTES = 1 << 26, MOST_INPUT = 1 << 16 };
+
+static void *allocate(void *user, size_t bytes) {
+    (void)user;
+    if (bytes > MOST_BYTES) {
+        fprintf(stderr, "asked for %lu bytes\n", (unsigned long)bytes);
+        abort();
+    }
+    return malloc(bytes);
+}
+
+static void release(void *user, void *block) {
+    (void)user;
+    free(block);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static unsigned count;
+    static uint8_t again[4 * MOST_INPUT], pixels[24 * 20 * 4];
+    texsyn_model *model = NULL;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    env.allocate = allocate;
+    env.release = release;
+    if (size > MOST_INPUT) return 0;
+    if (texsyn_load(data, size, &env, &model) != TXM_OK) {
+        if (model || !env.message[0]) abort();
+        return 0;
+    }
+
+    texsyn_clique clique;
+    float bins[64];
+    for (int i = -1; i <= texsyn_clique_count(model); i++)
+        texsyn_clique_at(model, i, &clique, bins, 64);
+
+    size_t written = 0;
+    if (texsyn_save(model, &env, again, sizeof again, &written) != TXM_OK) abort();
+
+    if (count++ % 64 == 0) { /* the slow part, now and then */
+        texsyn_synth_desc desc;
+        txm_image out;
+        memset(&desc, 0, sizeof desc);
+        memset(&out, 0, sizeof out);
+        desc.model = model;
+        desc.width = out.width = 24;
+        desc.height = out.height = 20;
+        desc.quality = -2;
+        out.channels = texsyn_channels(model);
+        out.pixels = pixels;
+        if (texsyn_synthesize(&desc, &env, out) != TXM_OK && !env.message[0]) abort();
+    }
+    texsyn_free(model);
+    return 0;
+}
+
+#ifdef FUZZ_STANDALONE
+/* Copy one of the seeds and change it in one to four places. */
+static size_t mutate(txm_rng *rng, const uint8_t *seed, size_t size, uint8_t *data) {
+    memcpy(data, seed, size);
+    for (uint32_t n = 1 + txm_rng_below(rng, 4); n > 0 && size > 0; n--) {
+        size_t at = txm_rng_below(rng, (uint32_t)size);
+        if (txm_rng_below(rng, 2)) at %= 64; /* the header, half of the time */
+        if (at >= size) at = 0;
+        switch (txm_rng_below(rng, 5)) {
+        case 0: data[at] = (uint8_t)txm_rng_next(rng); break;
+        case 1: data[at] ^= (uint8_t)(1u << txm_rng_below(rng, 8)); break;
+        case 2: data[at] = txm_rng_below(rng, 2) ? 0xff : 0; break;
+        case 3: size = at; break;
+        default: /* a piece moved elsewhere */
+            memmove(data + at, data + size / 2, (size - at) / 3 < size / 2 ? (size - at) / 3 : 0);
+        }
+    }
+    return size;
+}
+
+int main(int argc, char **argv) {
+    static uint8_t seed[MOST_INPUT], data[MOST_INPUT];
+    long runs = argc > 2 ? atol(argv[1]) : 0;
+    int files = argc - 2;
+    txm_rng rng = txm_rng_make(1, 0);
+    if (runs < 1) {
+        fprintf(stderr, "usage: fuzz_texsyn_load RUNS FILE...\n");
+        return 2;
+    }
+    for (int f = 0; f < files; f++) {
+        FILE *file = fopen(argv[2 + f], "rb");
+        size_t size = file ? fread(seed, 1, sizeof seed, file) : 0;
+        if (!file || fclose(file) != 0 || size == 0) {
+            fprintf(stderr, "cannot read '%s'\n", argv[2 + f]);
+            return 2;
+        }
+        LLVMFuzzerTestOneInput(seed, size);
+        for (long i = 0; i < runs / files; i++) {
+            size_t n = mutate(&rng, seed, size, data);
+            /* an exact copy on the heap, so that the sanitizer sees any read beyond it */
+            uint8_t *copy = (uint8_t *)malloc(n ? n : 1);
+            if (!copy) return 2;
+            memcpy(copy, data, n);
+            LLVMFuzzerTestOneInput(copy, n);
+            free(copy);
+        }
+    }
+    printf("%ld runs\n", runs);
+    return 0;
+}
+#endif

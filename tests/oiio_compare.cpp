@@ -1,0 +1,279 @@
+// oiio_compare.cpp - compare pictures by what they have in common, through OpenImageIO
+// SPDX-License-Identifier: MIT OR Unlicense
+//
+//   oiio_compare same    A B         [LIMIT...]   the same picture, pixel by pixel
+//   oiio_compare texture EXEMPLAR B  [LIMIT...]   the same kind of texture
+//   oiio_compare wrap    A           [LIMIT...]   does it continue across its borders
+//
+// Prints one "figure value" per line. A limit is written mean<0.1 or psnr>30; the exit status is 1
+// if a figure is beyond its limit, 2 if a picture cannot be read.
+//
+// same:    mean, rms and max difference (0..1), psnr (dB).
+// texture: each figure is a distance between statistics of the two pictures over the same distance
+//          between the left and the right half of the exemplar: 1 = as alike as the exemplar's own
+//          halves. histogram: values per channel; gradient: differences of neighbours; reach:
+//          differences of pixels 2 to 16 apart; each the largest over channels and displacements of
+//          the earth mover's distance. autocorrelation: rms over displacements up to 12 pixels.
+//          mean: the largest difference of a channel's mean, in levels of 0..255, not a ratio.
+//          novelty: the distance of blocks of B to their nearest blocks in the exemplar, over the
+//          same for blocks of the exemplar to their nearest blocks elsewhere in it; 0 = copied.
+// wrap:    x and y: the mean difference across the border over the mean difference inside.
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace {
+
+struct Picture {
+    int width = 0, height = 0, channels = 0;
+    std::vector<float> samples; // 0..255
+
+    float at(int x, int y, int c) const {
+        return samples[(size_t(y) * size_t(width) + size_t(x)) * size_t(channels) + size_t(c)];
+    }
+
+    float luma(int x, int y) const {
+        if (channels < 3) return at(x, y, 0);
+        return 0.299f * at(x, y, 0) + 0.587f * at(x, y, 1) + 0.114f * at(x, y, 2);
+    }
+
+    Picture columns(int first, int count) const {
+        Picture part;
+        part.width = count;
+        part.height = height;
+        part.channels = channels;
+        for (int y = 0; y < height; y++) {
+            for (int x = first; x < first + count; x++) {
+                for (int c = 0; c < channels; c++) part.samples.push_back(at(x, y, c));
+            }
+        }
+        return part;
+    }
+};
+
+[[noreturn]] void give_up(const std::string &message) {
+    std::fprintf(stderr, "oiio_compare: %s\n", message.c_str());
+    std::exit(2);
+}
+
+Picture load(const std::string &path) {
+    OIIO::ImageBuf buffer(path);
+    if (!buffer.read(0, 0, true, OIIO::TypeDesc::FLOAT)) give_up(path + ": " + buffer.geterror());
+    Picture p;
+    p.width = buffer.spec().width;
+    p.height = buffer.spec().height;
+    p.channels = buffer.spec().nchannels;
+    p.samples.resize(size_t(p.width) * size_t(p.height) * size_t(p.channels));
+    buffer.get_pixels(buffer.roi(), OIIO::TypeDesc::FLOAT, p.samples.data());
+    for (float &s : p.samples) s *= 255.0f;
+    return p;
+}
+
+// ---- statistics
+
+using Histogram = std::vector<double>; // over 0..255 or -255..255, sums to 1
+
+void normalise(Histogram &h) {
+    double sum = 0;
+    for (double v : h) sum += v;
+    for (double &v : h) v /= std::max(sum, 1.0);
+}
+
+Histogram values(const Picture &p, int c) {
+    Histogram h(256, 0.0);
+    for (int y = 0; y < p.height; y++) {
+        for (int x = 0; x < p.width; x++) h[size_t(std::lround(p.at(x, y, c)))] += 1;
+    }
+    normalise(h);
+    return h;
+}
+
+Histogram differences(const Picture &p, int c, int dx, int dy) {
+    Histogram h(511, 0.0);
+    for (int y = 0; y + dy < p.height; y++) {
+        for (int x = std::max(0, -dx); x < p.width - std::max(0, dx); x++)
+            h[size_t(std::lround(p.at(x + dx, y + dy, c)) - std::lround(p.at(x, y, c)) + 255)] += 1;
+    }
+    normalise(h);
+    return h;
+}
+
+// The earth mover's distance, in levels.
+double distance(const Histogram &a, const Histogram &b) {
+    double carried = 0, work = 0;
+    for (size_t i = 0; i < a.size(); i++) {
+        carried += a[i] - b[i];
+        work += std::fabs(carried);
+    }
+    return work;
+}
+
+double mean(const Picture &p, int c) {
+    double sum = 0;
+    for (size_t i = size_t(c); i < p.samples.size(); i += size_t(p.channels)) sum += p.samples[i];
+    return sum / (double(p.width) * double(p.height));
+}
+
+// Normalised autocorrelation of the luma for all displacements up to reach pixels.
+std::vector<double> autocorrelation(const Picture &p, int reach) {
+    double average = 0, variance = 0;
+    const double count = double(p.width) * double(p.height);
+    for (int y = 0; y < p.height; y++) {
+        for (int x = 0; x < p.width; x++) average += double(p.luma(x, y)) / count;
+    }
+    std::vector<double> centred;
+    for (int y = 0; y < p.height; y++) {
+        for (int x = 0; x < p.width; x++) {
+            centred.push_back(double(p.luma(x, y)) - average);
+            variance += centred.back() * centred.back() / count;
+        }
+    }
+    std::vector<double> result;
+    for (int dy = 0; dy <= reach; dy++) {
+        for (int dx = dy ? -reach : 1; dx <= reach; dx++) {
+            double sum = 0, n = 0;
+            for (int y = 0; y + dy < p.height; y++) {
+                for (int x = std::max(0, -dx); x < p.width - std::max(0, dx); x++, n++)
+                    sum += centred[size_t(y) * size_t(p.width) + size_t(x)] *
+                           centred[size_t(y + dy) * size_t(p.width) + size_t(x + dx)];
+            }
+            result.push_back(sum / std::max(n * variance, 1e-9));
+        }
+    }
+    return result;
+}
+
+struct Distances {
+    double histogram = 0, gradient = 0, reach = 0, autocorrelation = 0, mean = 0;
+};
+
+Distances compare(const Picture &a, const Picture &b) {
+    static const int near_by[4][2] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
+    static const int far_off[8][2] = {{2, 0},  {0, 2},  {4, 3},  {-3, 4},
+                                      {8, 0},  {0, 8}, {12, 9}, {-9, 12}};
+    Distances d;
+    for (int c = 0; c < a.channels; c++) {
+        d.mean = std::max(d.mean, std::fabs(mean(a, c) - mean(b, c)));
+        d.histogram = std::max(d.histogram, distance(values(a, c), values(b, c)));
+        for (const auto &v : near_by)
+            d.gradient = std::max(d.gradient, distance(differences(a, c, v[0], v[1]),
+                                                       differences(b, c, v[0], v[1])));
+        for (const auto &v : far_off)
+            d.reach = std::max(d.reach, distance(differences(a, c, v[0], v[1]),
+                                                 differences(b, c, v[0], v[1])));
+    }
+    const std::vector<double> f = autocorrelation(a, 12), g = autocorrelation(b, 12);
+    for (size_t i = 0; i < f.size(); i++) d.autocorrelation += (f[i] - g[i]) * (f[i] - g[i]);
+    d.autocorrelation = std::sqrt(d.autocorrelation / double(f.size()));
+    return d;
+}
+
+// The mean over some blocks of p of the distance to the nearest block in q. Where the two are one
+// picture, blocks that overlap the block itself do not count.
+double nearest_blocks(const Picture &p, const Picture &q, bool same_picture) {
+    const int side = 12, per_axis = 6;
+    double total = 0;
+    for (int k = 0; k < per_axis * per_axis; k++) {
+        const int px = (p.width - side) * (k % per_axis) / (per_axis - 1);
+        const int py = (p.height - side) * (k / per_axis) / (per_axis - 1);
+        float best = 1e30f;
+        for (int qy = 0; qy + side <= q.height; qy++) {
+            for (int qx = 0; qx + side <= q.width; qx++) {
+                if (same_picture && std::abs(qx - px) < side && std::abs(qy - py) < side) continue;
+                float sum = 0;
+                for (int y = 0; y < side && sum < best; y++) {
+                    for (int x = 0; x < side; x++) {
+                        for (int c = 0; c < p.channels; c++)
+                            sum += std::fabs(p.at(px + x, py + y, c) - q.at(qx + x, qy + y, c));
+                    }
+                }
+                best = std::min(best, sum);
+            }
+        }
+        total += double(best);
+    }
+    return total;
+}
+
+// ---- commands
+
+using Figures = std::map<std::string, double>;
+
+Figures same(const std::string &a, const std::string &b) {
+    OIIO::ImageBuf p(a), q(b);
+    if (!p.read() || !q.read()) give_up("cannot read " + a + " or " + b);
+    if (p.spec().width != q.spec().width || p.spec().height != q.spec().height ||
+        p.spec().nchannels != q.spec().nchannels)
+        give_up("the pictures differ in size or channels");
+    const auto result = OIIO::ImageBufAlgo::compare(p, q, 1.0f, 1.0f);
+    return {{"mean", result.meanerror},
+            {"rms", result.rms_error},
+            {"max", result.maxerror},
+            {"psnr", std::min(result.PSNR, 999.0)}};
+}
+
+Figures texture(const Picture &exemplar, const Picture &b) {
+    if (exemplar.channels != b.channels) give_up("the pictures differ in channels");
+    const int half = exemplar.width / 2;
+    const Distances d = compare(exemplar, b);
+    const Distances own = compare(exemplar.columns(0, half), exemplar.columns(half, half));
+    return {{"mean", d.mean},
+            {"histogram", d.histogram / std::max(own.histogram, 1.0)},
+            {"gradient", d.gradient / std::max(own.gradient, 1.0)},
+            {"reach", d.reach / std::max(own.reach, 1.0)},
+            {"autocorrelation", d.autocorrelation / std::max(own.autocorrelation, 0.01)},
+            {"novelty", nearest_blocks(b, exemplar, false) /
+                            std::max(nearest_blocks(exemplar, exemplar, true), 1.0)}};
+}
+
+Figures wrap(const Picture &p) {
+    double border[2] = {0, 0}, inside[2] = {0, 0};
+    for (int y = 0; y < p.height; y++) {
+        for (int x = 0; x < p.width; x++) {
+            for (int c = 0; c < p.channels; c++) {
+                const double dx = double(p.at((x + 1) % p.width, y, c) - p.at(x, y, c));
+                const double dy = double(p.at(x, (y + 1) % p.height, c) - p.at(x, y, c));
+                (x + 1 == p.width ? border : inside)[0] += std::fabs(dx);
+                (y + 1 == p.height ? border : inside)[1] += std::fabs(dy);
+            }
+        }
+    }
+    return {{"x", border[0] * (p.width - 1) / std::max(inside[0], 1e-9)},
+            {"y", border[1] * (p.height - 1) / std::max(inside[1], 1e-9)}};
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    const std::string command = argc > 1 ? argv[1] : "";
+    const int files = command == "wrap" ? 1 : 2;
+    if (argc < 2 + files) give_up("usage: same A B | texture EXEMPLAR B | wrap A, [FIGURE<LIMIT...]");
+
+    Figures figures;
+    if (command == "same") figures = same(argv[2], argv[3]);
+    else if (command == "texture") figures = texture(load(argv[2]), load(argv[3]));
+    else if (command == "wrap") figures = wrap(load(argv[2]));
+    else give_up("unknown command " + command);
+    for (const auto &f : figures) std::printf("%s %.4g\n", f.first.c_str(), f.second);
+
+    int status = 0;
+    for (int i = 2 + files; i < argc; i++) {
+        const char *sign = std::strpbrk(argv[i], "<>");
+        const std::string name(argv[i], sign ? size_t(sign - argv[i]) : 0);
+        if (!sign || !figures.count(name)) give_up(std::string("bad limit ") + argv[i]);
+        const double limit = std::atof(sign + 1), value = figures[name];
+        if (*sign == '<' ? value < limit : value > limit) continue;
+        std::printf("%s is %.4g, not %c %.4g\n", name.c_str(), value, *sign, limit);
+        status = 1;
+    }
+    return status;
+}

@@ -1,0 +1,74 @@
+#!/bin/sh
+# run.sh [--full] [NAME...] - run the tests and count them
+#
+# Every tests/test_*.c is a cmocka program, built here with the address and undefined-behaviour
+# sanitizers; every tests/test_*.sh is a script that prints "ok - what" or "not ok - what" for each
+# of its tests. NAME picks some of them (cli, texmath ...). --full widens what the scripts try, as
+# CI does. The last line counts everything.
+set -u
+
+cd "$(dirname "$0")/.." || exit 1
+FULL=0
+[ "${1:-}" = --full ] && FULL=1 && shift
+CC=${CC:-cc} CXX=${CXX:-c++}
+SANITIZE="-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined"
+OUT=build/tests
+export CC CXX FULL OUT SANITIZE
+export UBSAN_OPTIONS=print_stacktrace=1 CMOCKA_MESSAGE_OUTPUT=TAP LC_ALL=C
+mkdir -p "$OUT"
+
+passed=0 failed=0
+
+# count NAME LOG STATUS: add up a log of "ok" lines; a crash or an empty log is a failure
+count() {
+    good=$(grep -c '^ok' "$2") bad=$(grep -c '^not ok' "$2")
+    if [ "$bad" = 0 ] && { [ "$3" != 0 ] || [ "$good" = 0 ]; }; then
+        bad=1
+        echo "not ok - $1 ended with status $3 after $good tests"
+    fi
+    passed=$((passed + good)) failed=$((failed + bad))
+    printf '%-14s %4d passed %4d failed\n' "$1" "$good" "$bad"
+    # of a failed piece show what is not a passed test
+    [ "$bad" = 0 ] || grep -v '^ok' "$2" | sed 's/^/    /' | tail -n 60
+}
+
+wanted() {
+    [ -z "$names" ] && return 0
+    case " $names " in *" $1 "*) return 0 ;; esac
+    return 1
+}
+names=$*
+
+for source in tests/test_*.c; do
+    [ -e "$source" ] || continue
+    name=$(basename "$source" .c)
+    name=${name#test_}
+    wanted "$name" || continue
+    log=$OUT/$name.log
+    # shellcheck disable=SC2086 # flags are words
+    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests "$source" \
+        -o "$OUT/test_$name" -lcmocka -lpthread -lm >"$log" 2>&1; then
+        "$OUT/test_$name" >>"$log" 2>&1
+        count "$name" "$log" $?
+    else
+        count "$name" "$log" "of the compiler"
+    fi
+done
+
+# the scripts use the tool as released and with the sanitizers, and the helpers of tools/
+if ! { make -s all helpers && make -s BUILD="$OUT/asan" CFLAGS="$SANITIZE" all; } \
+    >"$OUT/make.log" 2>&1; then
+    count make "$OUT/make.log" 1
+fi
+
+for script in tests/test_*.sh; do
+    name=$(basename "$script" .sh)
+    name=${name#test_}
+    wanted "$name" || continue
+    log=$OUT/$name.log
+    sh "$script" >"$log" 2>&1
+    count "$name" "$log" $?
+done
+
+echo "$passed passed, $failed failed"
+[ "$failed" = 0 ] && [ "$passed" -gt 0 ]
