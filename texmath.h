@@ -60,11 +60,11 @@
 
    SAME BYTES
      Integers, 8-bit samples, generator, hash and sort: the same bits everywhere. All else is
-     computed in double in a fixed order and rounded to float once; that gives the same bits with
-     IEEE 754 arithmetic (32-bit x86: -msse2), -ffp-contract=off (gcc -std=c99 has it on) and no
-     -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one result of
-     10^8: use it to show colours and place cameras, not to decide. Sort, cut and eigenvectors
-     leave no ties open.
+     computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
+     makes necessary. That gives the same bits wherever arithmetic is IEEE 754 (on 32-bit x86:
+     -msse2), with -ffp-contract=off (as gcc -std=c99 has it) and without -ffast-math. What calls
+     pow, sin, cos or acos depends on the C library in about one result of 10^8: use it to show
+     colours and place cameras, not to decide. Sort, cut and eigenvectors leave no ties open.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
@@ -283,6 +283,24 @@ static inline int txm_is_finite(double x) {
     return ((bits >> 52) & 0x7ff) != 0x7ff;
 }
 
+/* x rounded to float, for good. gcc 12 drops the rounding of neighbouring values that are widened
+   again ((double)(float)x becomes x, from -O2 on), so results would depend on what was inlined
+   where. Code that needs the same bits everywhere rounds with this and not with a cast: the empty
+   asm might have changed f, for all that gcc knows, and costs nothing. */
+static inline float txm_float(double x) {
+    float f = (float)x;
+#if defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__)
+#if defined(__SSE2__)
+    __asm__("" : "+x"(f));
+#elif defined(__aarch64__)
+    __asm__("" : "+w"(f));
+#else
+    __asm__("" : "+m"(f));
+#endif
+#endif
+    return f;
+}
+
 static inline float txm_minf(float a, float b) {
     return b < a ? b : a;
 }
@@ -298,7 +316,7 @@ static inline int txm_clampi(int x, int low, int high) {
 }
 /* a (1 - t) + b t; exactly a at t = 0, b at t = 1, and a wherever a = b */
 static inline float txm_lerpf(float a, float b, float t) {
-    return (float)((double)a - (double)a * t + (double)b * t);
+    return txm_float((double)a - (double)a * t + (double)b * t);
 }
 
 /* ---- images ----------------------------------------------------------------------------- */
@@ -565,14 +583,14 @@ static inline txm_vec2 txm_vec2_lerp(txm_vec2 a, txm_vec2 b, float t) {
     return txm_v2(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t));
 }
 static inline float txm_vec2_dot(txm_vec2 a, txm_vec2 b) {
-    return (float)((double)a.x * b.x + (double)a.y * b.y);
+    return txm_float((double)a.x * b.x + (double)a.y * b.y);
 }
 static inline float txm_vec2_length(txm_vec2 a) {
-    return (float)sqrt((double)a.x * a.x + (double)a.y * a.y);
+    return txm_float(sqrt((double)a.x * a.x + (double)a.y * a.y));
 }
 static inline txm_vec2 txm_vec2_normalize(txm_vec2 a) {
     const double n = sqrt((double)a.x * a.x + (double)a.y * a.y);
-    return n > 0 ? txm_v2((float)(a.x / n), (float)(a.y / n)) : a;
+    return n > 0 ? txm_v2(txm_float(a.x / n), txm_float(a.y / n)) : a;
 }
 
 static inline txm_vec3 txm_vec3_add(txm_vec3 a, txm_vec3 b) {
@@ -597,14 +615,14 @@ static inline txm_vec3 txm_vec3_lerp(txm_vec3 a, txm_vec3 b, float t) {
     return txm_v3(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t));
 }
 static inline float txm_vec3_dot(txm_vec3 a, txm_vec3 b) {
-    return (float)((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z);
+    return txm_float((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z);
 }
 static inline float txm_vec3_length(txm_vec3 a) {
-    return (float)sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z);
+    return txm_float(sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z));
 }
 static inline txm_vec3 txm_vec3_normalize(txm_vec3 a) {
     const double n = sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z);
-    return n > 0 ? txm_v3((float)(a.x / n), (float)(a.y / n), (float)(a.z / n)) : a;
+    return n > 0 ? txm_v3(txm_float(a.x / n), txm_float(a.y / n), txm_float(a.z / n)) : a;
 }
 
 static inline txm_vec4 txm_vec4_add(txm_vec4 a, txm_vec4 b) {
@@ -626,30 +644,31 @@ static inline txm_vec4 txm_vec4_max(txm_vec4 a, txm_vec4 b) {
     return txm_v4(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z), txm_maxf(a.w, b.w));
 }
 static inline txm_vec4 txm_vec4_lerp(txm_vec4 a, txm_vec4 b, float t) {
-    return txm_v4(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t),
-                  txm_lerpf(a.z, b.z, t), txm_lerpf(a.w, b.w, t));
+    return txm_v4(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t),
+                  txm_lerpf(a.w, b.w, t));
 }
 static inline float txm_vec4_dot(txm_vec4 a, txm_vec4 b) {
-    return (float)((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w);
+    return txm_float((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w);
 }
 static inline float txm_vec4_length(txm_vec4 a) {
-    return (float)sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z +
-                          (double)a.w * a.w);
+    return txm_float(
+        sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z + (double)a.w * a.w));
 }
 static inline txm_vec4 txm_vec4_normalize(txm_vec4 a) {
-    const double n = sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z +
-                          (double)a.w * a.w);
-    return n > 0 ? txm_v4((float)(a.x / n), (float)(a.y / n),
-                         (float)(a.z / n), (float)(a.w / n)) : a;
+    const double n =
+        sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z + (double)a.w * a.w);
+    return n > 0 ? txm_v4(txm_float(a.x / n), txm_float(a.y / n), txm_float(a.z / n),
+                          txm_float(a.w / n))
+                 : a;
 }
 /* z of the cross product: positive if b lies counter-clockwise of a (y up) */
 static inline float txm_vec2_cross(txm_vec2 a, txm_vec2 b) {
-    return (float)((double)a.x * b.y - (double)a.y * b.x);
+    return txm_float((double)a.x * b.y - (double)a.y * b.x);
 }
 static inline txm_vec3 txm_vec3_cross(txm_vec3 a, txm_vec3 b) {
-    return txm_v3((float)((double)a.y * b.z - (double)a.z * b.y),
-                  (float)((double)a.z * b.x - (double)a.x * b.z),
-                  (float)((double)a.x * b.y - (double)a.y * b.x));
+    return txm_v3(txm_float((double)a.y * b.z - (double)a.z * b.y),
+                  txm_float((double)a.z * b.x - (double)a.x * b.z),
+                  txm_float((double)a.x * b.y - (double)a.y * b.x));
 }
 
 /* some unit vector at a right angle to v; x for the zero vector */
@@ -679,7 +698,7 @@ static inline void txm_matrix_mul(int n, const float *a, const float *b, float *
         for (int r = 0; r < n; r++) {
             double sum = 0;
             for (int k = 0; k < n; k++) sum += (double)a[n * k + r] * b[n * c + k];
-            out[n * c + r] = (float)sum;
+            out[n * c + r] = txm_float(sum);
         }
     }
 }
@@ -721,7 +740,7 @@ static inline txm_status txm_matrix_inverse(int n, const float *m, float *out) {
     for (int i = 0; i < n * n; i++) {
         if (fabs(a[i % n][n + i / n]) > 3.4e38) return TXM_BAD_ARGUMENT; /* no float */
     }
-    for (int i = 0; i < n * n; i++) out[i] = (float)a[i % n][n + i / n];
+    for (int i = 0; i < n * n; i++) out[i] = txm_float(a[i % n][n + i / n]);
     return TXM_OK;
 }
 
@@ -747,7 +766,8 @@ static inline txm_status txm_mat3_inverse(txm_mat3 m, txm_mat3 *out) {
 static inline txm_vec3 txm_mat3_vec(txm_mat3 m, txm_vec3 v) {
     float r[3];
     for (int i = 0; i < 3; i++)
-        r[i] = (float)((double)m.m[i] * v.x + (double)m.m[3 + i] * v.y + (double)m.m[6 + i] * v.z);
+        r[i] =
+            txm_float((double)m.m[i] * v.x + (double)m.m[3 + i] * v.y + (double)m.m[6 + i] * v.z);
     return txm_v3(r[0], r[1], r[2]);
 }
 
@@ -773,8 +793,8 @@ static inline txm_status txm_mat4_inverse(txm_mat4 m, txm_mat4 *out) {
 static inline txm_vec4 txm_mat4_vec(txm_mat4 m, txm_vec4 v) {
     float r[4];
     for (int i = 0; i < 4; i++)
-        r[i] = (float)((double)m.m[i] * v.x + (double)m.m[4 + i] * v.y + (double)m.m[8 + i] * v.z +
-                       (double)m.m[12 + i] * v.w);
+        r[i] = txm_float((double)m.m[i] * v.x + (double)m.m[4 + i] * v.y +
+                         (double)m.m[8 + i] * v.z + (double)m.m[12 + i] * v.w);
     return txm_v4(r[0], r[1], r[2], r[3]);
 }
 /* the point p moved by m, divided by its w (unless that is 0) */
@@ -818,9 +838,9 @@ static inline txm_mat4 txm_mat4_look_at(txm_vec3 eye, txm_vec3 target, txm_vec3 
    z = -near goes to -1, z = -far to 1. (near_z, far_z: near and far are macros on Windows.) */
 static inline txm_mat4 txm_mat4_perspective(float fov_y, float aspect, float near_z, float far_z) {
     const double f = cos(0.5 * fov_y) / sin(0.5 * fov_y), d = (double)near_z - far_z;
-    const txm_mat4 m = {{(float)(f / aspect), 0, 0, 0, 0, (float)f, 0, 0, 0, 0,
-                         (float)(((double)far_z + near_z) / d), -1, 0, 0,
-                         (float)(2.0 * far_z * near_z / d), 0}};
+    const txm_mat4 m = {{txm_float(f / aspect), 0, 0, 0, 0, txm_float(f), 0, 0, 0, 0,
+                         txm_float(((double)far_z + near_z) / d), -1, 0, 0,
+                         txm_float(2.0 * far_z * near_z / d), 0}};
     return m;
 }
 
@@ -834,27 +854,27 @@ typedef struct txm_quat {
 
 /* length 1; no rotation for the zero quaternion */
 static inline txm_quat txm_quat_normalize(txm_quat q) {
-    const double n = sqrt((double)q.x * q.x + (double)q.y * q.y + (double)q.z * q.z +
-                          (double)q.w * q.w);
-    const txm_quat none = {0, 0, 0, 1}, unit = {(float)(q.x / n), (float)(q.y / n),
-                                                (float)(q.z / n), (float)(q.w / n)};
+    const double n =
+        sqrt((double)q.x * q.x + (double)q.y * q.y + (double)q.z * q.z + (double)q.w * q.w);
+    const txm_quat none = {0, 0, 0, 1}, unit = {txm_float(q.x / n), txm_float(q.y / n),
+                                                txm_float(q.z / n), txm_float(q.w / n)};
     return n > 0 ? unit : none;
 }
 /* counter-clockwise about axis (of any length above 0) seen from its tip */
 static inline txm_quat txm_quat_axis_angle(txm_vec3 axis, float angle) {
     const txm_vec3 a = txm_vec3_normalize(axis);
     const double s = sin(0.5 * angle);
-    const txm_quat q = {(float)(s * a.x), (float)(s * a.y), (float)(s * a.z),
-                        (float)cos(0.5 * angle)};
+    const txm_quat q = {txm_float(s * a.x), txm_float(s * a.y), txm_float(s * a.z),
+                        txm_float(cos(0.5 * angle))};
     return txm_quat_normalize(q);
 }
 /* a after b */
 static inline txm_quat txm_quat_mul(txm_quat a, txm_quat b) {
     const double ax = a.x, ay = a.y, az = a.z, aw = a.w;
-    const txm_quat q = {(float)(aw * b.x + ax * b.w + ay * b.z - az * b.y),
-                        (float)(aw * b.y - ax * b.z + ay * b.w + az * b.x),
-                        (float)(aw * b.z + ax * b.y - ay * b.x + az * b.w),
-                        (float)(aw * b.w - ax * b.x - ay * b.y - az * b.z)};
+    const txm_quat q = {txm_float(aw * b.x + ax * b.w + ay * b.z - az * b.y),
+                        txm_float(aw * b.y - ax * b.z + ay * b.w + az * b.x),
+                        txm_float(aw * b.z + ax * b.y - ay * b.x + az * b.w),
+                        txm_float(aw * b.w - ax * b.x - ay * b.y - az * b.z)};
     return q;
 }
 /* the opposite rotation */
@@ -865,11 +885,11 @@ static inline txm_quat txm_quat_conjugate(txm_quat q) {
 /* the matrix of a unit quaternion */
 static inline txm_mat3 txm_quat_mat3(txm_quat q) {
     const double x = q.x, y = q.y, z = q.z, w = q.w;
-    const txm_mat3 m = {{(float)(1 - 2 * (y * y + z * z)), (float)(2 * (x * y + w * z)),
-                         (float)(2 * (x * z - w * y)), (float)(2 * (x * y - w * z)),
-                         (float)(1 - 2 * (x * x + z * z)), (float)(2 * (y * z + w * x)),
-                         (float)(2 * (x * z + w * y)), (float)(2 * (y * z - w * x)),
-                         (float)(1 - 2 * (x * x + y * y))}};
+    const txm_mat3 m = {{txm_float(1 - 2 * (y * y + z * z)), txm_float(2 * (x * y + w * z)),
+                         txm_float(2 * (x * z - w * y)), txm_float(2 * (x * y - w * z)),
+                         txm_float(1 - 2 * (x * x + z * z)), txm_float(2 * (y * z + w * x)),
+                         txm_float(2 * (x * z + w * y)), txm_float(2 * (y * z - w * x)),
+                         txm_float(1 - 2 * (x * x + y * y))}};
     return m;
 }
 static inline txm_mat4 txm_quat_mat4(txm_quat q) {
@@ -886,9 +906,9 @@ static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
     const double x = q.x, y = q.y, z = q.z, w = q.w;
     const double tx = 2 * (y * v.z - z * v.y), ty = 2 * (z * v.x - x * v.z),
                  tz = 2 * (x * v.y - y * v.x);
-    return txm_v3((float)(v.x + w * tx + (y * tz - z * ty)),
-                  (float)(v.y + w * ty + (z * tx - x * tz)),
-                  (float)(v.z + w * tz + (x * ty - y * tx)));
+    return txm_v3(txm_float(v.x + w * tx + (y * tz - z * ty)),
+                  txm_float(v.y + w * ty + (z * tx - x * tz)),
+                  txm_float(v.z + w * tz + (x * ty - y * tx)));
 }
 /* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [8] takes the one whose
    component is largest: that one never divides by something small. */
@@ -906,16 +926,16 @@ static inline txm_quat txm_quat_from_mat3(txm_mat3 m) {
     }
     /* the row is 4 q_k (x, y, z, w); its length is 4 |q_k| */
     const double *q = all[k];
-    const double n = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) *
-                     (q[3] < 0 ? -1 : 1);
-    const txm_quat none = {0, 0, 0, 1}, unit = {(float)(q[0] / n), (float)(q[1] / n),
-                                                (float)(q[2] / n), (float)(q[3] / n)};
+    const double n =
+        sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) * (q[3] < 0 ? -1 : 1);
+    const txm_quat none = {0, 0, 0, 1}, unit = {txm_float(q[0] / n), txm_float(q[1] / n),
+                                                txm_float(q[2] / n), txm_float(q[3] / n)};
     return n < 0 || n > 0 ? unit : none;
 }
 /* a * s + b * t, the shorter way round, to length 1; the helper of the two below */
 static inline txm_quat txm_quat_blend(txm_quat a, txm_quat b, double s, double t) {
-    const txm_quat q = {(float)(s * a.x + t * b.x), (float)(s * a.y + t * b.y),
-                        (float)(s * a.z + t * b.z), (float)(s * a.w + t * b.w)};
+    const txm_quat q = {txm_float(s * a.x + t * b.x), txm_float(s * a.y + t * b.y),
+                        txm_float(s * a.z + t * b.z), txm_float(s * a.w + t * b.w)};
     return txm_quat_normalize(q);
 }
 static inline double txm_quat_dot(txm_quat a, txm_quat b) {
@@ -938,10 +958,10 @@ static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
 /* sRGB code value to linear light and back [6]; 0..1 to 0..1. Outside, values go on along the
    same curves (below 0: the straight part), nothing is clamped. */
 static inline float txm_srgb_to_linear(float s) {
-    return (float)(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+    return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
 }
 static inline float txm_linear_to_srgb(float l) {
-    return (float)(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
+    return txm_float(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
 }
 static inline txm_vec3 txm_srgb_to_linear3(txm_vec3 s) {
     return txm_v3(txm_srgb_to_linear(s.x), txm_srgb_to_linear(s.y), txm_srgb_to_linear(s.z));
@@ -953,14 +973,14 @@ static inline txm_vec3 txm_linear_to_srgb3(txm_vec3 l) {
 /* Linear RGB of the sRGB primaries to CIE XYZ and back; white (1, 1, 1) is D65, XYZ (0.95047, 1,
    1.08883). Linear maps: any range. */
 static inline txm_vec3 txm_rgb_to_xyz(txm_vec3 c) {
-    return txm_v3((float)(0.4124564 * c.x + 0.3575761 * c.y + 0.1804375 * c.z),
-                  (float)(0.2126729 * c.x + 0.7151522 * c.y + 0.0721750 * c.z),
-                  (float)(0.0193339 * c.x + 0.1191920 * c.y + 0.9503041 * c.z));
+    return txm_v3(txm_float(0.4124564 * c.x + 0.3575761 * c.y + 0.1804375 * c.z),
+                  txm_float(0.2126729 * c.x + 0.7151522 * c.y + 0.0721750 * c.z),
+                  txm_float(0.0193339 * c.x + 0.1191920 * c.y + 0.9503041 * c.z));
 }
 static inline txm_vec3 txm_xyz_to_rgb(txm_vec3 c) {
-    return txm_v3((float)(3.2404542 * c.x - 1.5371385 * c.y - 0.4985314 * c.z),
-                  (float)(-0.9692660 * c.x + 1.8760108 * c.y + 0.0415560 * c.z),
-                  (float)(0.0556434 * c.x - 0.2040259 * c.y + 1.0572252 * c.z));
+    return txm_v3(txm_float(3.2404542 * c.x - 1.5371385 * c.y - 0.4985314 * c.z),
+                  txm_float(-0.9692660 * c.x + 1.8760108 * c.y + 0.0415560 * c.z),
+                  txm_float(0.0556434 * c.x - 0.2040259 * c.y + 1.0572252 * c.z));
 }
 
 /* f of CIE L*a*b*: cube root, straight below (6/29)^3; and its inverse */
@@ -974,12 +994,12 @@ static inline double txm_lab_f_inverse(double f) {
    a lies in -86.2..98.3, b in -107.9..94.5. The Euclidean distance is Delta E 1976. */
 static inline txm_vec3 txm_xyz_to_lab(txm_vec3 c) {
     const double x = txm_lab_f(c.x / 0.95047), y = txm_lab_f(c.y), z = txm_lab_f(c.z / 1.08883);
-    return txm_v3((float)(116 * y - 16), (float)(500 * (x - y)), (float)(200 * (y - z)));
+    return txm_v3(txm_float(116 * y - 16), txm_float(500 * (x - y)), txm_float(200 * (y - z)));
 }
 static inline txm_vec3 txm_lab_to_xyz(txm_vec3 c) {
     const double y = (c.x + 16.0) / 116, x = y + c.y / 500.0, z = y - c.z / 200.0;
-    return txm_v3((float)(0.95047 * txm_lab_f_inverse(x)), (float)txm_lab_f_inverse(y),
-                  (float)(1.08883 * txm_lab_f_inverse(z)));
+    return txm_v3(txm_float(0.95047 * txm_lab_f_inverse(x)), txm_float(txm_lab_f_inverse(y)),
+                  txm_float(1.08883 * txm_lab_f_inverse(z)));
 }
 /* linear RGB to L*a*b* and back in one go */
 static inline txm_vec3 txm_rgb_to_lab(txm_vec3 c) {
@@ -994,11 +1014,12 @@ static inline txm_vec3 txm_lab_to_rgb(txm_vec3 c) {
    0..1: I1 in 0..1, I2 and I3 in -0.5..0.5. A linear map of whatever RGB it is given. */
 static inline txm_vec3 txm_rgb_to_opponent(txm_vec3 c) {
     const double r = c.x, g = c.y, b = c.z;
-    return txm_v3((float)((r + g + b) / 3), (float)((r - b) / 2), (float)((2 * g - r - b) / 4));
+    return txm_v3(txm_float((r + g + b) / 3), txm_float((r - b) / 2),
+                  txm_float((2 * g - r - b) / 4));
 }
 static inline txm_vec3 txm_opponent_to_rgb(txm_vec3 c) {
     const double i1 = c.x, i2 = c.y, i3 = c.z / 1.5;
-    return txm_v3((float)(i1 + i2 - i3), (float)(i1 + 2 * i3), (float)(i1 - i2 - i3));
+    return txm_v3(txm_float(i1 + i2 - i3), txm_float(i1 + 2 * i3), txm_float(i1 - i2 - i3));
 }
 
 /* RGB in 0..1 to hue, saturation, value and back. Hue in turns: [0, 1), red 0, green 1/3, blue 2/3,
@@ -1011,8 +1032,8 @@ static inline txm_vec3 txm_rgb_to_hsv(txm_vec3 c) {
         h = (r >= v ? (g - b) / d : g >= v ? 2 + (b - r) / d : 4 + (r - g) / d) / 6;
         if (h < 0) h += 1;
     }
-    const float hue = (float)h;
-    return txm_v3(hue < 1 ? hue : 0, v > 0 ? (float)(d / v) : 0, (float)v);
+    const float hue = txm_float(h);
+    return txm_v3(hue < 1 ? hue : 0, v > 0 ? txm_float(d / v) : 0, txm_float(v));
 }
 static inline txm_vec3 txm_hsv_to_rgb(txm_vec3 c) {
     float out[3];
@@ -1021,7 +1042,7 @@ static inline txm_vec3 txm_hsv_to_rgb(txm_vec3 c) {
         double t = c.x + (3 - i) / 3.0;
         t = fabs(6 * (t - floor(t)) - 3) - 1;
         t = t < 0 ? 0 : t > 1 ? 1 : t;
-        out[i] = (float)(c.z * (1 + c.y * (t - 1)));
+        out[i] = txm_float(c.z * (1 + c.y * (t - 1)));
     }
     return txm_v3(out[0], out[1], out[2]);
 }
@@ -1190,7 +1211,7 @@ static inline txm_status txm_image_halve(const txm_image *image, const txm_image
             for (size_t c = 0; c < n; c++) {
                 const double sum = ((double)upper[left + c] + upper[right + c]) +
                                    ((double)lower[left + c] + lower[right + c]);
-                out[(size_t)x * n + c] = (float)(sum * 0.25);
+                out[(size_t)x * n + c] = txm_float(sum * 0.25);
             }
         }
     }
@@ -1214,9 +1235,9 @@ typedef struct txm_poisson_desc {
 /* What txm_poisson works on: one number per unknown pixel, in raster order. */
 typedef struct txm_poisson_grid {
     size_t count;
-    int32_t *side[4];     /* unknown to the left, right, above, below; -1 = known or no pixel */
-    double *diagonal;     /* screen + number of neighbours, known or not                      */
-    double *factor;       /* 1 / diagonal of the incomplete factor                            */
+    int32_t *side[4];      /* unknown to the left, right, above, below; -1 = known or no pixel */
+    double *diagonal;      /* screen + number of neighbours, known or not                      */
+    double *factor;        /* 1 / diagonal of the incomplete factor                            */
     double *r, *z, *p, *x; /* residual, preconditioned residual, direction, solution           */
 } txm_poisson_grid;
 
@@ -1255,7 +1276,8 @@ static inline int txm_poisson_report(const txm_poisson_desc *desc, const txm_env
                                      double reached) {
     const double from = desc->progress_from, to = desc->progress_to > 0 ? desc->progress_to : 1;
     const int channels = desc->image.channels ? desc->image.channels : 1;
-    return txm_progress(env, (float)(from + (to - from) * ((c + reached) / channels)), "blending");
+    return txm_progress(env, txm_float(from + (to - from) * ((c + reached) / channels)),
+                        "blending");
 }
 
 /* Solve A x = b by preconditioned conjugate gradients; on entry x holds the guess, r holds b. */
@@ -1422,7 +1444,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
    return  TXM_OK (also where no pixel is masked, or max_iterations was reached);
            TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED
    cost    some 20 to 200 iterations (they grow with the square root of the width of the hole) of
-           about 30 ns per unknown and channel; 64 + 4 * channels bytes per unknown       */
+           about 20 ns per unknown and channel; 64 + 4 * channels bytes per unknown       */
 static inline txm_status txm_poisson(const txm_poisson_desc *desc, txm_env *env) {
     txm_poisson_grid g;
     txm_arena arena;
@@ -1459,7 +1481,7 @@ static inline txm_status txm_poisson(const txm_poisson_desc *desc, txm_env *env)
             txm_fail(env, status, "cancelled while solving the Poisson equation");
             goto done;
         }
-        for (size_t i = 0; i < n; i++) result[i * channels + (size_t)c] = (float)g.x[i];
+        for (size_t i = 0; i < n; i++) result[i * channels + (size_t)c] = txm_float(g.x[i]);
     }
     for (int y = 0, i = 0; y < image.height; y++) {
         const uint8_t *row = (const uint8_t *)txm_image_row_const(&desc->mask, y);

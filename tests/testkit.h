@@ -2,13 +2,13 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    WHAT IT DOES
-     Environments that misbehave on purpose: an allocator that counts, poisons and fails at a chosen
-     call, a progress callback that cancels at a chosen call, parallel-for hooks that run the indices
-     backwards or on real threads. And the test that builds and runs a header's quick start.
+     Environments that misbehave on purpose: an allocator that counts, poisons and fails at a
+     chosen call, a progress callback that cancels at a chosen call, parallel-for hooks that run
+     the indices backwards or on real threads. And the test that builds and runs a quick start.
 
    HOW TO USE IT
      #include the four headers cmocka wants, cmocka.h, then this file. Everything is static inline.
-     Link with -lpthread where the C library keeps threads apart. Run the tests from the root folder.
+     Link with -lpthread where the C library keeps threads apart. Run tests from the root folder.
 
      Every allocation in turn made to fail, alone and from there on:
 
@@ -26,7 +26,7 @@
            }
        }
 
-     Every cancel point: the same with progress.cancel_at = k, progress.calls < k, TXM_CANCELLED.  */
+     Every cancel point: the same with progress.cancel_at, progress.calls and TXM_CANCELLED.  */
 #ifndef TESTKIT_H
 #define TESTKIT_H
 
@@ -60,7 +60,8 @@ enum { TK_HEAD = 16, TK_TAIL = 8, TK_GUARD = 0x5a, TK_FRESH = 0xa5, TK_DEAD = 0x
 static inline void *tk_allocate(void *user, size_t bytes) {
     tk_memory *m = (tk_memory *)user;
     m->calls++;
-    int refuse = m->fail_at && (m->calls == m->fail_at || (m->fail_onward && m->calls > m->fail_at));
+    int refuse =
+        m->fail_at && (m->calls == m->fail_at || (m->fail_onward && m->calls > m->fail_at));
     if (m->limit && (bytes > m->limit || m->live_bytes > m->limit - bytes)) refuse = 1;
     unsigned char *p = NULL;
     if (!refuse && bytes <= SIZE_MAX - TK_HEAD - TK_TAIL)
