@@ -749,7 +749,7 @@ static inline txm_mat3 txm_mat3_identity(void) {
     return m;
 }
 static inline txm_mat3 txm_mat3_mul(txm_mat3 a, txm_mat3 b) {
-    txm_mat3 out;
+    txm_mat3 out = {{0}};
     txm_matrix_mul(3, a.m, b.m, out.m);
     return out;
 }
@@ -776,7 +776,7 @@ static inline txm_mat4 txm_mat4_identity(void) {
     return m;
 }
 static inline txm_mat4 txm_mat4_mul(txm_mat4 a, txm_mat4 b) {
-    txm_mat4 out;
+    txm_mat4 out = {{0}};
     txm_matrix_mul(4, a.m, b.m, out.m);
     return out;
 }
