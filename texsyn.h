@@ -675,7 +675,7 @@ typedef struct txs_sampler {
 static void txs_noise_table(int16_t *noise) {
     txm_rng rng = txm_rng_make(1, 2);
     for (int i = 0; i < TXS_NOISE; i++) {
-        double gumbel = log(-log((i + 0.5) / TXS_NOISE));
+        double gumbel = log(-log((i + 0.5) / (double)TXS_NOISE));
         int j = (int)txm_rng_below(&rng, (uint32_t)i + 1);
         noise[i] = noise[j];
         noise[j] = (int16_t)floor(gumbel * (TXS_NAT * TXS_FINE) + 0.5);
@@ -949,7 +949,7 @@ static void txs_gather(txs_sampler *s, int passes) {
 static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, float from, float to) {
     enum { ALL = TXS_GRID * TXS_GRID };
     int order[ALL], phases = s->strips > 1 ? 2 : 1;
-    int passes = ALL / TXS_GROUP * phases, done = 0;
+    int passes = (int)ALL / TXS_GROUP * phases, done = 0;
     txm_rng rng = txm_rng_make(s->seed, ~s->sweep++);
     for (int i = 0; i < ALL; i++) order[i] = i;
     txm_shuffle(&rng, order, ALL);
@@ -1146,7 +1146,7 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
         high = (double)v[i] > high ? (double)v[i] : high;
         count++;
     }
-    const double bin = (high - low) / FINE;
+    const double bin = (high - low) / (double)FINE;
     for (size_t i = 0; i < pixels && bin > 0; i++)
         if (!s->mask || s->mask[i])
             histogram[txm_clampi((int)(((double)v[i] - low) / bin), 0, FINE - 1)]++;
@@ -1260,7 +1260,7 @@ static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, i
 static float txs_distance(const int32_t *a, const int32_t *b) {
     int64_t sum = 0;
     for (int i = 0; i < TXS_BINS; i++) sum += (int64_t)(a[i] - b[i]) * (a[i] - b[i]);
-    return txm_float(sqrt((double)sum) / TXS_ONE);
+    return txm_float(sqrt((double)sum) / (double)TXS_ONE);
 }
 
 /* ---- learning: the neighbourhood system ------------------------------------------------- */
@@ -1426,8 +1426,8 @@ static int txs_root_scale(int kind, int level) {
 static void txs_round_statistics(txs_type *t, int level) {
     const int scale = txs_root_scale(t->kind, level);
     for (int i = 0; i < TXS_BINS; i++) {
-        t->root[i] = (int16_t)floor(sqrt((double)t->share[i] / TXS_ONE) * scale + 0.5);
-        t->level[i] = (int16_t)floor((double)t->potential[i] / TXS_COARSE + 0.5);
+        t->root[i] = (int16_t)floor(sqrt((double)t->share[i] / (double)TXS_ONE) * scale + 0.5);
+        t->level[i] = (int16_t)floor((double)t->potential[i] / (double)TXS_COARSE + 0.5);
     }
 }
 
@@ -1463,8 +1463,8 @@ static float txs_visibility(const txs_level *l, int band) {
     const int32_t *share = l->types[band].share;
     double mean = 0, square = 0;
     for (int v = 0; v < TXS_VALUES; v++) {
-        mean += (double)share[v] * v / TXS_ONE;
-        square += (double)share[v] * v * v / TXS_ONE;
+        mean += (double)share[v] * v / (double)TXS_ONE;
+        square += (double)share[v] * v * v / (double)TXS_ONE;
     }
     double deviation =
         sqrt(square - mean * mean > 0 ? square - mean * mean : 0) * (double)l->step[band];
@@ -1980,7 +1980,8 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
             clique->ex = t->ex;
             clique->ey = t->ey;
         }
-        for (int k = 0; bins && k < n && k < bin_count; k++) bins[k] = (float)t->share[k] / TXS_ONE;
+        for (int k = 0; bins && k < n && k < bin_count; k++)
+            bins[k] = (float)t->share[k] / (float)TXS_ONE;
         return n;
     }
     return 0;
