@@ -334,7 +334,14 @@ void cli_stage(cli *run, const char *name) {
 void cli_figure(cli *run, const char *name, double value) {
     if (run->figure_count == CLI_MAX_FIGURES) return;
     run->figures[run->figure_count].name = name;
-    run->figures[run->figure_count++].value = value;
+    run->figures[run->figure_count++].values[0] = value;
+}
+
+void cli_figures(cli *run, const char *name, const int *values, int count) {
+    if (run->figure_count == CLI_MAX_FIGURES || count > CLI_MAX_LIST) return;
+    run->figures[run->figure_count].name = name;
+    for (int i = 0; i < count; i++) run->figures[run->figure_count].values[i] = values[i];
+    run->figures[run->figure_count++].count = count;
 }
 
 /* The statistics as JSON. All names are literals of ours: nothing to escape. */
@@ -349,9 +356,13 @@ static size_t format_stats(const cli *run, char *text, size_t capacity) {
         ADD("    \"%s\": %.6f,\n", run->stages[i].name, run->stages[i].seconds);
     ADD("    \"total\": %.6f\n  },\n  \"peak_bytes\": %zu,\n  \"result\": {\n", cli_seconds(run),
         run->peak_bytes);
-    for (int i = 0; i < run->figure_count; i++)
-        ADD("    \"%s\": %.15g%s\n", run->figures[i].name, run->figures[i].value,
-            i + 1 < run->figure_count ? "," : "");
+    for (int i = 0; i < run->figure_count; i++) {
+        const int count = run->figures[i].count;
+        ADD("    \"%s\": %s%.15g", run->figures[i].name, count ? "[" : "",
+            run->figures[i].values[0]);
+        for (int k = 1; k < count; k++) ADD(", %.15g", run->figures[i].values[k]);
+        ADD("%s%s\n", count ? "]" : "", i + 1 < run->figure_count ? "," : "");
+    }
     ADD("  }\n}\n");
 #undef ADD
     return n;

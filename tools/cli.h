@@ -19,7 +19,7 @@ extern const char cli_versions[];
 /* Exit status of the program, as the manual promises. */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
-enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16 };
+enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8 };
 
 /* ---- options ---------------------------------------------------------------------------- */
 
@@ -74,7 +74,8 @@ typedef struct cli {
     } stages[CLI_MAX_STAGES];
     struct {
         const char *name;
-        double value;
+        double values[CLI_MAX_LIST];
+        int count; /* 0: a single number; else a list of so many */
     } figures[CLI_MAX_FIGURES];
     int stage_count, figure_count, bar_is_on;
     size_t live_bytes, peak_bytes;
@@ -97,6 +98,9 @@ void cli_stage(cli *run, const char *name);
 
 /* A figure of the result for --stats (name: a string literal). */
 void cli_figure(cli *run, const char *name, double value);
+
+/* The same for a list of 1 to CLI_MAX_LIST numbers. */
+void cli_figures(cli *run, const char *name, const int *values, int count);
 
 /* Seconds since the command began. */
 double cli_seconds(const cli *run);

@@ -60,7 +60,12 @@ static int finish_with_picture(cli *run, const txm_image *image) {
 
 static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
     cli_figure(run, "model_bytes", (double)bytes);
+    int per_level[CLI_MAX_LIST] = {0}; /* full resolution first */
+    texsyn_clique clique;
+    for (int i = 0; texsyn_clique_at(model, i, &clique, NULL, 0) > 0; i++)
+        per_level[clique.level]++;
     cli_figure(run, "clique_types", texsyn_clique_count(model));
+    cli_figures(run, "clique_types_per_level", per_level, texsyn_level_count(model));
     cli_figure(run, "levels", texsyn_level_count(model));
     cli_figure(run, "bands", texsyn_band_count(model));
 }
@@ -70,8 +75,9 @@ static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
 static const cli_manual learn_manual = {
     "learn", "EXEMPLAR -o MODEL.txs [options]", "learn a small model of a texture from a picture",
     "EXEMPLAR is a PNG, JPEG, BMP, TGA or binary PNM picture of the texture, at least\n"
-    "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is taken as RGBA). The model\n"
-    "holds statistics, no pixels; 'texkit synth' makes new texture from it.\n",
+    "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is taken as RGBA). About\n"
+    "256 x 256 pixels that show the largest element some dozens of times are enough. The\n"
+    "model holds statistics, no pixels; 'texkit synth' makes new texture from it.\n",
     "  texkit learn gravel.jpg -o gravel.txs\n"
     "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
     1, "exemplar"};
@@ -83,7 +89,7 @@ static int run_learn(int argc, char **argv) {
     const cli_option options[] = {
         {CLI_INT, "--max-distance", "D", "longest clique in pixels, 2 to 60; default 40",
          &desc.max_distance, 2, 60},
-        {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 16",
+        {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 26",
          &desc.max_types, 1, 60},
         {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: by the size",
          &desc.levels, 1, 6},
@@ -144,7 +150,9 @@ static const cli_manual synth_manual = {
     "make new texture from a model or a picture",
     "The input is a model of 'texkit learn', or a picture to learn from first (the file's\n"
     "content decides, not its name). OUT ends in .png, .tga, .bmp or .jpg; it has the\n"
-    "channels of the exemplar. JPEG and BMP hold gray as RGB; JPEG takes no alpha.\n",
+    "channels of the exemplar. JPEG and BMP hold gray as RGB; JPEG takes no alpha. A\n"
+    "higher --quality sweeps over the picture more often: statistics closer to the\n"
+    "exemplar's, and more time.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
     1, "exemplar or model"};
@@ -190,7 +198,7 @@ static int run_synth(int argc, char **argv) {
          MAX_SIDE},
         {CLI_FLAG, "--tileable", NULL, "the result continues across its own borders", &tileable, 0,
          0},
-        {CLI_INT, "--quality", "N", "-2 (fast) to 2 (best); default 0", &quality, -2, 2},
+        {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0", &quality, -2, 2},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     texsyn_model *model = NULL;
