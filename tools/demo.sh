@@ -7,8 +7,47 @@ out=out
 tab=$(printf '\t')
 mkdir -p "$out"
 
-# figure NAME FILE: a number out of a --stats file
-figure() { sed -n "s/^ *\"$1\": \([0-9.]*\),*\$/\1/p" "$2"; }
+# OpenMP's threads wait for each other by spinning unless told otherwise: slow on a busy machine
+export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
+
+# figure NAME FILE: a number, or a list of them, out of a --stats file
+figure() { sed -n "s/^ *\"$1\": \[*\([0-9., ]*[0-9]\).*/\1/p" "$2"; }
+seconds() { printf %.1f "$(figure "$1" "$2")"; }
+
+# pair SAMPLE TITLE SOURCE LICENCE NOTE: learn, synthesise, append both pictures to the page
+pair() {
+    name=${1##*/}
+    exemplar=$out/$name.png model=$out/$name.txs result=$out/$name-512.png
+    cp "$build/samples/$1.png" "$exemplar"
+    "$build/texkit" learn "$exemplar" -o "$model" --stats "$out/$name.learn.json" --quiet
+    "$build/texkit" synth "$model" -o "$result" --size 512x512 \
+        --stats "$out/$name.synth.json" --quiet
+    bytes=$(figure model_bytes "$out/$name.learn.json")
+    types=$(figure clique_types "$out/$name.learn.json")
+    per_level=$(figure clique_types_per_level "$out/$name.learn.json" | sed 's/, / + /g')
+    learn=$(seconds learn "$out/$name.learn.json")
+    synth=$(seconds synthesise "$out/$name.synth.json")
+    threads=$(figure threads "$out/$name.synth.json")
+    printf 'demo: %-8s learned in %4s s, %4s bytes; synthesised in %4s s\n' \
+        "$name" "$learn" "$bytes" "$synth"
+    cat >>"$out/index.part" <<PAIR
+<section class="pair">
+<div>
+<img src="$name.png" alt="exemplar: $2">
+<h3>$2</h3>
+<dl>
+<dt>model</dt><dd><a href="$name.txs">$bytes bytes</a></dd>
+<dt>clique types</dt><dd>$types <small>= $per_level</small></dd>
+<dt>learned in</dt><dd>$learn s</dd>
+<dt>synthesised in</dt><dd>$synth s</dd>
+</dl>
+<p>${5:-}</p>
+<p class="source">Exemplar: $3; licence $4.</p>
+</div>
+<img src="$name-512.png" width="512" height="512" alt="synthesis: $2">
+</section>
+PAIR
+}
 
 cat >"$out/index.part" <<'HEAD'
 <!DOCTYPE html>
@@ -18,50 +57,75 @@ cat >"$out/index.part" <<'HEAD'
 <meta name="viewport" content="width=device-width">
 <title>texkit: from a photograph to new texture</title>
 <style>
-body { margin: 2rem auto; max-width: 60rem; padding: 0 1rem; font: 16px/1.5 sans-serif; }
-h2 { margin: 2.5rem 0 0.5rem; }
-figure { display: inline-block; margin: 0 1rem 0.5rem 0; vertical-align: top; }
-figcaption, .source { color: #555; font-size: 0.9rem; }
+body { margin: 0 auto; max-width: 50rem; padding: 3rem 1rem; color: #222; background: #fbfaf8;
+       font: 16px/1.5 system-ui, sans-serif; }
+h1 { margin: 0 0 0.5rem; font-size: 2rem; line-height: 1.2; font-weight: 600; }
+h2 { margin: 4rem 0 0.5rem; font-size: 1.4rem; font-weight: 600; }
+h3 { margin: 0.8rem 0 0.3rem; font-size: 1.1rem; font-weight: 600; }
+img { display: block; max-width: 100%; height: auto; }
+.pair { display: grid; grid-template-columns: 256px 512px; gap: 1.5rem; margin: 2rem 0; }
+dl { display: grid; grid-template-columns: auto 1fr; gap: 0 0.8rem; margin: 0; font-size: 0.9rem; }
+dt { color: #666; }
+dd { margin: 0; }
+small { color: #666; font-size: 0.8rem; }
+p { margin: 0.5rem 0; }
+.pair p { font-size: 0.9rem; }
+.pair .source, footer { color: #666; font-size: 0.8rem; overflow-wrap: anywhere; }
+.repeated { width: 768px; height: 768px; max-width: 100%; margin: 1.5rem 0 0.5rem; }
+footer { margin-top: 4rem; border-top: 1px solid #ddd; padding-top: 1rem; }
+a { color: #15558a; }
+@media (max-width: 50rem) { .pair { grid-template-columns: minmax(0, 1fr); } }
 </style>
 </head>
 <body>
 <h1>From a photograph to new texture</h1>
-<p>On the left the exemplar, 256 pixels wide. On the right 512 x 512 pixels of new texture,
-synthesised from statistics of the exemplar alone: the model file holds no pixel of it.
-Each picture is shown at full size.</p>
+<p>On the left the exemplar, 256 &times; 256 pixels. On the right 512 &times; 512 pixels of new
+texture, made from the model alone: statistics of the exemplar, no pixel of it. All pictures are
+shown at full size. The clique types are those of the pyramid levels, the finest first.</p>
 HEAD
 
-count=0
-while IFS=$tab read -r name source licence; do
-    exemplar=$out/$name.png model=$out/$name.txs result=$out/$name-512.png
-    cp "$build/samples/$name.png" "$exemplar"
-    "$build/texkit" learn "$exemplar" -o "$model" --stats "$out/$name.learn.json" --quiet
-    "$build/texkit" synth "$model" -o "$result" --size 512x512 \
-        --stats "$out/$name.synth.json" --quiet
-    bytes=$(figure model_bytes "$out/$name.learn.json")
-    types=$(figure clique_types "$out/$name.learn.json")
-    learn=$(printf %.2f "$(figure learn "$out/$name.learn.json")")
-    synth=$(printf %.2f "$(figure synthesise "$out/$name.synth.json")")
-    threads=$(figure threads "$out/$name.synth.json")
+count=0 limits=0 first=
+while IFS=$tab read -r role sample title source licence; do
+    [ "$role" = good ] || continue
+    pair "$sample" "$title" "$source" "$licence"
     count=$((count + 1))
-    printf 'demo: %-8s learned in %5s s, %4s bytes; synthesised in %5s s\n' \
-        "$name" "$learn" "$bytes" "$synth"
-    cat >>"$out/index.part" <<PAIR
-<h2>$name</h2>
-<figure><img src="$name.png" alt="exemplar: $name"><figcaption>exemplar</figcaption></figure>
-<figure><img src="$name-512.png" width="512" height="512" alt="synthesis: $name"><figcaption>synthesis:
-learned in $learn s, made in $synth s; <a href="$name.txs">model</a> of $bytes bytes,
-$types clique types</figcaption></figure>
-<p class="source">$source; licence of the picture: $licence</p>
-PAIR
+    [ -n "$first" ] || first=$name
+    [ "$name" != pebbles ] || first=$name
+done <"$build/samples/list.txt"
+
+"$build/texkit" synth "$out/$first.txs" -o "$out/$first-tile.png" --size 384x384 --tileable --quiet
+cat >>"$out/index.part" <<TILE
+<h2>Without a seam</h2>
+<p>One tile of 384 &times; 384 pixels, synthesised with <code>--tileable</code> from the model of
+$first and repeated 2 &times; 2.</p>
+<div class="repeated" role="img" aria-label="a tile of $first, repeated"
+  style="background: url($first-tile.png) repeat"></div>
+TILE
+
+while IFS=$tab read -r role sample title source licence; do
+    [ "$role" = limit ] || continue
+    if [ $limits = 0 ]; then
+        cat >>"$out/index.part" <<'LIMITS'
+<h2>What it cannot do</h2>
+<p>Statistics of pixels and their neighbours know nothing of long thin lines, closed contours and
+exact layouts.</p>
+LIMITS
+    fi
+    limits=$((limits + 1))
+    case $sample in
+    */grass) note="The tones and the grain are right, the long blades are lost." ;;
+    */brick) note="The courses of the wall are lost." ;;
+    *) note= ;;
+    esac
+    pair "$sample" "$title" "$source" "$licence" "$note"
 done <"$build/samples/list.txt"
 
 cat >>"$out/index.part" <<TAIL
-<p class="source">Made by <code>make demo</code> with $threads threads.
-Each pair: <code>texkit learn NAME.png -o NAME.txs</code>,
-<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>.</p>
+<footer>Made by <code>make demo</code> with $("$build/texkit" --version) on $threads threads. Each
+pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
+<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Seconds are of this run.</footer>
 </body>
 </html>
 TAIL
 mv "$out/index.part" "$out/index.html"
-echo "demo: $count pairs; open $out/index.html"
+echo "demo: $((count + limits)) pairs; open $out/index.html"

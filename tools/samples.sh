@@ -3,29 +3,34 @@
 #
 # The photographs belong to Debian packages; they are taken from where the package puts them, or
 # the package is downloaded and unpacked under build/packages/, never installed. With none of them
-# in reach the project draws exemplars of its own. build/samples/list.txt names each picture, where
-# it comes from and its licence, separated by tabs.
+# in reach the project draws exemplars of its own. build/samples/list.txt has a line for each: role,
+# path below build/samples/, title, where it comes from, licence, separated by tabs. Those of the
+# role "limit" lie in build/samples/limit/, out of the way of tests and benchmarks.
 set -eu
 
 build=${BUILD:-build}
 samples=$build/samples
 packages=$build/packages
 
-# name, package, path, licence
+# role, name, title, package, path, licence, times to shrink before cutting the middle out. The role
+# "good": the method is made for it; "limit": it shows what the method cannot do.
 photographs="
-gravel  python3-skimage      usr/lib/python3/dist-packages/skimage/data/gravel.png  CC0-1.0
-grass   python3-skimage      usr/lib/python3/dist-packages/skimage/data/grass.png   CC0-1.0
-sand    extremetuxracer-data usr/share/games/etr/terrains/sand01.png                GPL-2+
-pebbles extremetuxracer-data usr/share/games/etr/terrains/pebbles04.png             GPL-2+
-lawn    extremetuxracer-data usr/share/games/etr/terrains/grass02.png               GPL-2+
-clover  extremetuxracer-data usr/share/games/etr/terrains/grass03.png               GPL-2+
-mud     extremetuxracer-data usr/share/games/etr/terrains/mud01.png                 GPL-2+
-dirt    extremetuxracer-data usr/share/games/etr/terrains/dirt01.png                GPL-2+
-rock    extremetuxracer-data usr/share/games/etr/terrains/rock07.png                GPL-2+
+good  gravel  Gravel   python3-skimage      usr/lib/python3/dist-packages/skimage/data/gravel.png CC0-1.0 2
+good  pebbles Pebbles  extremetuxracer-data usr/share/games/etr/terrains/pebbles04.png            GPL-2+ 1
+good  sand    Sand     extremetuxracer-data usr/share/games/etr/terrains/sand01.png               GPL-2+ 1
+good  lawn    Lawn     extremetuxracer-data usr/share/games/etr/terrains/grass02.png              GPL-2+ 1
+good  clover  Clover   extremetuxracer-data usr/share/games/etr/terrains/grass03.png              GPL-2+ 1
+good  mud     Mud      extremetuxracer-data usr/share/games/etr/terrains/mud01.png                GPL-2+ 1
+good  frost   Frost    extremetuxracer-data usr/share/games/etr/terrains/pebbles05.png            GPL-2+ 1
+good  lichen  Lichen   extremetuxracer-data usr/share/games/etr/terrains/rock05.png               GPL-2+ 1
+limit grass   Blades   python3-skimage      usr/lib/python3/dist-packages/skimage/data/grass.png  CC0-1.0 1
+limit brick   Bricks   python3-skimage      usr/lib/python3/dist-packages/skimage/data/brick.png  CC0-1.0 1
 "
 
-[ -s "$samples/list.txt" ] && exit 0
-mkdir -p "$samples" "$packages"
+# nothing to do while the samples are there and this list of them is the same
+[ -s "$samples/list.txt" ] && [ -z "$(find "$0" -newer "$samples/list.txt")" ] && exit 0
+rm -rf "$samples"
+mkdir -p "$samples/limit" "$packages"
 log=$packages/log.txt
 tab=$(printf '\t')
 
@@ -46,7 +51,7 @@ download() (
 : >"$samples/list.part"
 unreachable=
 echo "$photographs" | {
-    while read -r name package path licence; do
+    while read -r role name title package path licence shrink; do
         [ -n "$name" ] || continue
         file=/$path
         if [ ! -e "$file" ]; then
@@ -58,8 +63,10 @@ echo "$photographs" | {
             fi
             file=$packages/$package/$path
         fi
-        "$build/crop" "$file" "$samples/$name.png" 256 || continue
-        echo "$name${tab}photograph from $package, /$path$tab$licence" >>"$samples/list.part"
+        [ "$role" = good ] || name=$role/$name
+        "$build/crop" "$file" "$samples/$name.png" 256 "$shrink" || continue
+        echo "$role$tab$name$tab$title${tab}photograph ${path##*/} of the Debian package \
+$package$tab$licence" >>"$samples/list.part"
     done
 }
 
@@ -67,8 +74,8 @@ if [ ! -s "$samples/list.part" ]; then
     echo "samples: no photographs in reach; drawing exemplars instead (tools/draw.c)"
     for name in $("$build/draw" list); do
         "$build/draw" "$name" "$samples/$name.png"
-        echo "$name${tab}drawn by tools/draw.c, not a photograph${tab}as texkit" \
-            >>"$samples/list.part"
+        echo "good$tab$name$tab$name${tab}drawn by tools/draw.c, not a photograph$tab\
+as texkit" >>"$samples/list.part"
     done
 fi
 mv "$samples/list.part" "$samples/list.txt"
