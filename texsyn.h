@@ -129,7 +129,8 @@ typedef struct texsyn_learn_desc {
     txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
     int max_distance;  /* longest clique in pixels of the example, 2..60; 0 = 40. A level looks at
                           most 10 of its own pixels far, except the coarsest: that is 40 here too  */
-    int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 26    */
+    int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
+                          36 for a gray example                                                   */
     int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px   */
     float threshold;   /* stop adding types when no histogram differs by more; 0 = 0.005          */
     uint64_t seed;     /* of the random numbers; any value                                        */
@@ -255,11 +256,12 @@ enum {
     TXS_PROPORTIONAL = 150,
     TXS_INTEGRAL = 40, /* gains of the control, nats per unit of
                              histogram error; half or double makes little difference          */
-    TXS_TYPES = 26,    /* added per level unless the caller says otherwise                 */
+    TXS_TYPES = 24,    /* added per level unless the caller says otherwise                 */
+    TXS_TYPES_GRAY = 36, /* if there is only one band                                       */
     TXS_COARSE = 8,    /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
     TXS_STEEPEST = 20, /* such steps: the largest stored potential                         */
     TXS_UNSEEN = 1,    /* such steps: the potential of a bin that has none stored          */
-    TXS_RARE = 2,      /* the smallest root whose bin has a stored potential               */
+    TXS_RARE = 3,      /* the smallest root whose bin has a stored potential               */
     TXS_SMALLEST = 64  /* pixels: a narrower canvas has no statistics to speak of          */
 };
 
@@ -281,6 +283,7 @@ static const uint8_t txs_difference_class[TXS_DIFFERENCES + 1] = {
 typedef struct txs_type {
     int kind, band, other;
     int dx, dy, ex, ey;
+    int phase; /* tails counted: 0 all, 1 at even, 2 at odd coordinates; see txs_is_tail */
     int32_t share[TXS_BINS];     /* the example's histogram, sum about TXS_ONE                  */
     int16_t potential[TXS_BINS]; /* where the synthesis starts, 1/TXS_NAT nat                   */
     int16_t root[TXS_BINS];      /* the two as a model file keeps them: square roots of the     */
@@ -394,6 +397,14 @@ static int txs_members(const txs_type *t, int at[4][2]) {
         at[i][1] = y[i];
     }
     return counts[t->kind];
+}
+
+/* May a pixel with these parities (x & 1, y & 1) be the tail? The neighbours (1, 0) and (0, 1) are
+   two clique types each below the coarsest level: within a pixel of the coarser level, and across
+   its border. In a photograph they have the same histogram; were they one type, a synthesised
+   level would be smoother within than across, and show the grid of the one above. */
+static int txs_is_tail(const txs_type *t, int px, int py) {
+    return t->phase == 0 || ((t->dx & 1 ? px : py) & 1) == t->phase - 1;
 }
 
 /* the largest distance along an axis between two members */
@@ -650,16 +661,21 @@ static txs_pick *txs_best_pick(void) {
    strips are worked on at the same time, then odd ones, so that no pixel changes while another
    thread looks at it, and the result does not depend on the number of threads.              */
 
+/* The ends of cliques at a pixel, and the clique types that have a tail there. */
+typedef struct txs_list {
+    txs_end ends[TXS_MAX_BANDS][TXS_MAX_ENDS]; /* sorted by form */
+    int end_count[TXS_MAX_BANDS][TXS_FORMS];
+    txs_tally tally[TXS_MAX_TYPES]; /* sorted by form */
+    int tally_count[TXS_FORMS];
+} txs_list;
+
 typedef struct txs_sampler {
     const txs_level *level;
     const txs_canvas *canvas;
     int bands;
     uint64_t seed;
     txs_pick *pick;
-    txs_end ends[TXS_MAX_BANDS][TXS_MAX_ENDS]; /* sorted by form                     */
-    int end_count[TXS_MAX_BANDS][TXS_FORMS];
-    txs_tally tally[TXS_MAX_TYPES]; /* sorted by form */
-    int tally_count[TXS_FORMS];
+    txs_list list[4]; /* for pixels of each parity, (x & 1) + 2 (y & 1)   */
     int16_t single[TXS_MAX_BANDS][TXS_VALUES];
     uint8_t *tables;                /* TXS_TABLE bytes a type               */
     int32_t (*histogram)[TXS_BINS]; /* TXS_WINDOW times the counts of the last sweep */
@@ -849,15 +865,19 @@ static void txs_control(txs_sampler *s, int integrate) {
 }
 
 /* Count the cliques whose tail is p. */
-static void txs_count(const txs_sampler *s, const uint8_t *p, int32_t (*counts)[TXS_BINS]) {
-    const txs_tally *t = s->tally, *stop = t + s->tally_count[0];
+static void txs_count(const txs_list *list, const uint8_t *p, int32_t (*counts)[TXS_BINS]) {
+    const txs_tally *t = list->tally, *stop = t + list->tally_count[0];
     for (; t < stop; t++) counts[t->type][p[t->a]]++;
-    for (stop += s->tally_count[1]; t < stop; t++) counts[t->type][p[t->a] - p[t->b] + 31]++;
-    for (stop += s->tally_count[2]; t < stop; t++)
+    for (stop += list->tally_count[1]; t < stop; t++) counts[t->type][p[t->a] - p[t->b] + 31]++;
+    for (stop += list->tally_count[2]; t < stop; t++)
         counts[t->type][t->ca[p[t->a]] * TXS_CLASSES + t->cb[p[t->b]]]++;
-    for (stop += s->tally_count[3]; t < stop; t++)
+    for (stop += list->tally_count[3]; t < stop; t++)
         counts[t->type]
               [txs_class(p[t->a] - p[t->b]) * TXS_CLASSES + txs_class(p[t->c] - p[t->d])]++;
+}
+
+static const txs_list *txs_list_at(const txs_sampler *s, int x, int y) {
+    return &s->list[(x & 1) + 2 * (y & 1)];
 }
 
 static int txs_is_counted(const txs_sampler *s, int x, int y) {
@@ -869,28 +889,29 @@ static int txs_is_counted(const txs_sampler *s, int x, int y) {
 static void txs_visit(const txs_sampler *s, int x, int y, int count, txm_rng *rng) {
     const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
     const uint8_t *p = txs_at(s->canvas, 0, x, y);
+    const txs_list *list = txs_list_at(s, x, y);
     for (int b = 0; b < s->bands; b++) {
-        const txs_end *e = s->ends[b], *stop = e + s->end_count[b][0];
+        const txs_end *e = list->ends[b], *stop = e + list->end_count[b][0];
         int n = 0;
         for (; e < stop; e++, n++) {
             const uint8_t *p1 = p + e->o1, *table = e->table;
             for (int i = 0; i < count; i++) rows[i][n] = table - p1[i * TXS_GRID];
         }
-        for (stop += s->end_count[b][1]; e < stop; e++, n++) {
+        for (stop += list->end_count[b][1]; e < stop; e++, n++) {
             const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *p3 = p + e->o3, *table = e->table;
             for (int i = 0; i < count; i++) {
                 int known = txs_class(p2[i * TXS_GRID] - p3[i * TXS_GRID]);
                 rows[i][n] = table + known * TXS_ROW - p1[i * TXS_GRID];
             }
         }
-        for (stop += s->end_count[b][2]; e < stop; e++, n++) {
+        for (stop += list->end_count[b][2]; e < stop; e++, n++) {
             const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *table = e->table;
             for (int i = 0; i < count; i++) {
                 int arm = p1[i * TXS_GRID];
                 rows[i][n] = table + (p2[i * TXS_GRID] - arm) * TXS_ROW - arm;
             }
         }
-        for (stop += s->end_count[b][3]; e < stop; e++, n++) {
+        for (stop += list->end_count[b][3]; e < stop; e++, n++) {
             const uint8_t *p1 = p + e->o1, *classes = e->classes, *table = e->table;
             for (int i = 0; i < count; i++)
                 rows[i][n] = table + classes[p1[i * TXS_GRID]] * TXS_VALUES;
@@ -924,8 +945,9 @@ static void txs_work(void *context, int task) {
                     int n = (width - x + TXS_GRID - 1) / TXS_GRID;
                     txs_visit(s, x, y, n < TXS_TOGETHER ? n : TXS_TOGETHER, &rng);
                 }
+                const txs_list *list = txs_list_at(s, sx, y);
                 for (int x = sx; x < width; x += TXS_GRID)
-                    if (txs_is_counted(s, x, y)) txs_count(s, txs_at(s->canvas, 0, x, y), counts);
+                    if (txs_is_counted(s, x, y)) txs_count(list, txs_at(s->canvas, 0, x, y), counts);
             }
         }
     }
@@ -967,31 +989,40 @@ static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, flo
     return TXM_OK;
 }
 
+/* Ends and tallies of the pixels with parities px, py. */
+static void txs_list_fill(txs_sampler *s, int px, int py) {
+    txs_list *list = &s->list[px + 2 * py];
+    for (int form = 0, filled = 0; form < TXS_FORMS; form++) {
+        for (int k = 0; k < s->level->type_count; k++) {
+            const txs_type *t = &s->level->types[k];
+            txs_tally tally = txs_tally_make(t, s->level, s->canvas, s->bands);
+            txs_end ends[4];
+            int band[4], forms[4], n = txs_type_ends(s, k, ends, band, forms);
+            for (int i = 0; i < n; i++) {
+                int *count = list->end_count[band[i]];
+                /* of a pair, end 0 is the head; only pairs have a phase */
+                if (forms[i] != form || !txs_is_tail(t, px - (i ? 0 : t->dx), py - (i ? 0 : t->dy)))
+                    continue;
+                list->ends[band[i]][count[0] + count[1] + count[2] + count[3]] = ends[i];
+                count[form]++;
+            }
+            if (tally.form != form || !txs_is_tail(t, px, py)) continue;
+            tally.type = k;
+            list->tally[filled++] = tally;
+            list->tally_count[form]++;
+        }
+    }
+}
+
 /* Lay out the work for the level's types as they are now, and count the canvas as it is. */
 static void txs_sampler_start(txs_sampler *s) {
     const txs_canvas *c = s->canvas;
     const int types = s->level->type_count;
     int reach = 16; /* a strip is at least that high: less is too little work for a thread */
-    memset(s->end_count, 0, sizeof s->end_count);
-    memset(s->tally_count, 0, sizeof s->tally_count);
-    for (int form = 0, filled = 0; form < TXS_FORMS; form++) {
-        for (int k = 0; k < types; k++) {
-            txs_end ends[4];
-            int band[4], forms[4], n = txs_type_ends(s, k, ends, band, forms);
-            for (int i = 0; i < n; i++) {
-                int *count = s->end_count[band[i]];
-                if (forms[i] != form) continue;
-                s->ends[band[i]][count[0] + count[1] + count[2] + count[3]] = ends[i];
-                count[form]++;
-            }
-            txs_tally tally = txs_tally_make(&s->level->types[k], s->level, c, s->bands);
-            if (tally.form != form) continue;
-            tally.type = k;
-            s->tally[filled++] = tally;
-            s->tally_count[form]++;
-            if (txs_reach(&s->level->types[k]) > reach) reach = txs_reach(&s->level->types[k]);
-        }
-    }
+    for (int k = 0; k < types; k++)
+        if (txs_reach(&s->level->types[k]) > reach) reach = txs_reach(&s->level->types[k]);
+    memset(s->list, 0, sizeof s->list);
+    for (int parity = 0; parity < 4; parity++) txs_list_fill(s, parity & 1, parity >> 1);
     const int64_t pixels = (int64_t)c->width * c->height;
     s->strips = c->height / reach & ~1;
     if (s->strips < 2) s->strips = 1;
@@ -1003,7 +1034,7 @@ static void txs_sampler_start(txs_sampler *s) {
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
     for (int y = 0; y < c->height; y++)
         for (int x = 0; x < c->width; x++)
-            if (txs_is_counted(s, x, y)) txs_count(s, txs_at(c, 0, x, y), s->histogram);
+            if (txs_is_counted(s, x, y)) txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
     for (int k = 0; k < types; k++)
         for (int i = 0; i < TXS_BINS; i++) s->histogram[k][i] *= TXS_WINDOW;
     txs_control(s, 0);
@@ -1232,10 +1263,10 @@ static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, i
     }
     for (int row = y0; row < y1; row += step) {
         const uint8_t *p = txs_at(c, 0, 0, row);
-        if (mask) {
+        if (mask || t->phase) {
             for (int x = x0; x < x1; x++) {
-                int inside = 1;
-                for (int i = 0; i < members; i++)
+                int inside = txs_is_tail(t, x, row);
+                for (int i = 0; i < members && mask; i++)
                     inside &= mask[(ptrdiff_t)(row + at[i][1]) * c->width + x + at[i][0]] != 0;
                 if (inside) h[0][txs_bin(&y, p + x)]++;
             }
@@ -1419,7 +1450,7 @@ static int txs_add_worst(txs_learner *a, int count, float threshold) {
 /* A share h is kept as its square root in steps of 1/scale: the sampling noise of a count is the
    same for all roots, and this step about as large. */
 static int txs_root_scale(int kind, int level) {
-    return kind == TEXSYN_SINGLE ? 160 : level == 0 ? 56 : level == 1 ? 42 : 28;
+    return kind == TEXSYN_SINGLE ? 160 : level == 0 ? 48 : level == 1 ? 36 : 26;
 }
 
 /* Round what was measured to what is kept. */
@@ -1442,9 +1473,12 @@ static void txs_preselect(txs_learner *a) {
         txs_make_classes(a->level, b);
     }
     for (int b = 0; b < bands; b++) {
-        txs_add_type(a->level, TEXSYN_PAIR, b, b, 1, 0);
-        txs_add_type(a->level, TEXSYN_PAIR, b, b, 0, 1);
-        if (a->index + 1 < a->model->levels) txs_add_type(a->level, TEXSYN_PARENT, b, b, 0, 0);
+        const int top = a->index + 1 == a->model->levels;
+        for (int phase = !top; phase <= 2 * !top; phase++) {
+            txs_add_type(a->level, TEXSYN_PAIR, b, b, 1, 0)->phase = phase;
+            txs_add_type(a->level, TEXSYN_PAIR, b, b, 0, 1)->phase = phase;
+        }
+        if (!top) txs_add_type(a->level, TEXSYN_PARENT, b, b, 0, 0);
         for (int o = b + 1; o < bands; o++) txs_add_type(a->level, TEXSYN_VALUES, b, o, 0, 0);
     }
     int kept = bands;
@@ -1492,7 +1526,9 @@ static void txs_keep_potentials(txs_level *l, int64_t (*sum)[TXS_BINS], int swee
 /* Learn one level on a canvas whose parent planes are laid. Fraction from..to of the whole. */
 static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env *env, float from,
                                   float to) {
-    const int max_types = a->desc->max_types ? a->desc->max_types : TXS_TYPES;
+    const int max_types = a->desc->max_types      ? a->desc->max_types
+                          : a->model->bands == 1 ? TXS_TYPES_GRAY
+                                                 : TXS_TYPES;
     const float threshold = a->desc->threshold > 0 ? a->desc->threshold : TXS_THRESHOLD;
     const int max_distance = a->desc->max_distance ? a->desc->max_distance : 40;
     enum { FIRST = 6, BETWEEN = 3, LAST = 15, KEPT = 8, BATCH = 6, CANDIDATES = 40000 };
@@ -1771,6 +1807,7 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
                           int level) {
     t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_PARALLEL, t->kind);
     t->band = txs_limited(c, 2, 0, m->bands - 1, t->band);
+    t->phase = t->kind == TEXSYN_PAIR ? txs_limited(c, 2, 0, 2, t->phase) : 0;
     t->other = t->kind == TEXSYN_CORNER ? t->band : txs_limited(c, 2, 0, m->bands - 1, t->other);
     if ((t->kind == TEXSYN_PARENT || t->kind == TEXSYN_SCALE) && level + 1 == m->levels) c->bad = 1;
     if (t->kind != TEXSYN_PARENT) {
@@ -2034,7 +2071,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->width = im->width >> i;
         s->height = im->height >> i;
         const size_t pixels = (size_t)s->width * (size_t)s->height;
-        s->step = (int)(pixels / (1 << 17)) + 1;
+        s->step = (int)(pixels / (1 << 17)) | 1;
         s->value = (float *)txm_arena_alloc(arena, pixels * (size_t)m->channels, sizeof(float));
         if (desc->mask.pixels) s->mask = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
         s->canvas.width = s->width;
