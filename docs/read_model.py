@@ -10,6 +10,9 @@ import zlib
 KINDS = ["single", "pair", "parent", "values", "corner", "scale", "parallel"]
 SINGLE, PAIR, PARENT, VALUES, CORNER, SCALE, PARALLEL = range(7)
 NONE, REVERSED, DIAGONAL = range(3)
+ROOT_SCALES = [48, 36, 26]  # on levels 0, 1, and 2 or more; of all kinds but SINGLE
+ROOT_SCALE_SINGLE = 160
+RARE = 3  # the smallest root that has a potential
 
 
 class BadModel(Exception):
@@ -113,7 +116,7 @@ class Coder:
 class Type:
     def __init__(self, kind, band, other):
         self.kind, self.band, self.other = kind, band, other
-        self.dx = self.dy = self.ex = self.ey = 0
+        self.dx = self.dy = self.ex = self.ey = self.phase = 0
 
     def members(self):
         d, e = (self.dx, self.dy), (self.ex, self.ey)
@@ -132,6 +135,8 @@ class Type:
 def read_description(coder, place, bands, is_coarsest):
     kind = coder.limited(3, PAIR, PARALLEL)
     t = Type(kind, coder.limited(2, 0, bands - 1), 0)
+    if kind == PAIR:
+        t.phase = coder.limited(2, 0, 2)
     t.other = t.band if kind == CORNER else coder.limited(2, 0, bands - 1)
     if kind != PARENT:
         t.dx, t.dy = coder.number(place[0][kind]), coder.number(place[1][kind])
@@ -165,7 +170,7 @@ def most_alike(t, earlier):
 def read_statistics(coder, contexts_of, t, earlier, level, values):
     share, potential = contexts_of
     bins = values if t.kind == SINGLE else 63 if t.kind in (PAIR, PARENT) else 81
-    scale = 160 if t.kind == SINGLE else [56, 42, 28][min(level, 2)]
+    scale = ROOT_SCALE_SINGLE if t.kind == SINGLE else ROOT_SCALES[min(level, 2)]
     like, same = most_alike(t, earlier), t.band == t.other
     mirror = NONE
     if same and t.kind == VALUES:
@@ -173,7 +178,7 @@ def read_statistics(coder, contexts_of, t, earlier, level, values):
     elif same and t.kind not in (SINGLE, CORNER):
         mirror = REVERSED
     root = coder.sequence(share[t.kind], like and like.root, bins, 0, scale, mirror)
-    used = sum(r >= 2 for r in root)
+    used = sum(r >= RARE for r in root)
     mirror = REVERSED if same and t.kind != SINGLE else NONE
     steps = iter(coder.sequence(potential[t.kind], None, used, -20, 20, mirror))
     root += [0] * ((32 if t.kind == SINGLE else bins) - bins)
@@ -181,7 +186,7 @@ def read_statistics(coder, contexts_of, t, earlier, level, values):
     require(total > 0, "an empty histogram")
     t.root = root
     t.share = [r * r * 65536 // total for r in root]
-    t.potential = [(next(steps) if r >= 2 else 1) / 2 for r in root]  # nats
+    t.potential = [(next(steps) if r >= RARE else 1) / 2 for r in root]  # nats
 
 
 class Model:
@@ -236,7 +241,8 @@ def main(arguments):
             for b, (count, low, step) in enumerate(model.values[level]):
                 print(f"level {level} band {b}: {count} values from {low:.6g} by {step:.6g}")
             for t in model.types[level]:
-                print(f"{level} {KINDS[t.kind]} {t.band} {t.other} {t.dx} {t.dy} {t.ex} {t.ey}")
+                print(f"{level} {KINDS[t.kind]} {t.band} {t.other} {t.dx} {t.dy} {t.ex} {t.ey}"
+                      + ["", " even", " odd"][t.phase])
                 if show_bins:
                     print("  share " + " ".join(map(str, t.share)))
                     print("  potential " + " ".join(f"{p:g}" for p in t.potential))

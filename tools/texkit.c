@@ -89,7 +89,7 @@ static int run_learn(int argc, char **argv) {
     const cli_option options[] = {
         {CLI_INT, "--max-distance", "D", "longest clique in pixels, 2 to 60; default 40",
          &desc.max_distance, 2, 60},
-        {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 26",
+        {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 24, gray 36",
          &desc.max_types, 1, 60},
         {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: by the size",
          &desc.levels, 1, 6},
