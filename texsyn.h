@@ -2026,6 +2026,17 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
 
 /* ---- public: learning ------------------------------------------------------------------- */
 
+/* no float sample is NaN or larger than LIMITS says */
+static int txs_image_is_moderate(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < (size_t)im.width * (size_t)im.channels; i++)
+            if (!txm_is_finite((double)row[i]) || !(fabsf(row[i]) <= 1e6f)) return 0;
+    }
+    return 1;
+}
+
 static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
     txm_status status;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "learn: desc is NULL");
@@ -2035,8 +2046,8 @@ static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
         return txm_fail(env, TXM_BAD_ARGUMENT, "example: 2 channels; give 1, 3 or 4");
     if (d->example.width < 16 || d->example.height < 16)
         return txm_fail(env, TXM_TOO_SMALL, "example: both sides must be at least 16 pixels");
-    if (!txm_image_is_finite(&d->example))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "example: a sample is NaN or infinite");
+    if (!txs_image_is_moderate(&d->example))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "example: a sample is NaN or beyond a million");
     if (d->mask.pixels) {
         if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
             return status;
