@@ -1969,6 +1969,7 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
     if (enough) {
         txs_coder_start(&c);
         enough = txs_code_model(&c, m, z);
+        c.bad |= c.at != c.size; /* the coder reads just what was written */
     }
     txm_free(env, z);
     if (enough && !c.bad) {
