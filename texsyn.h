@@ -2372,16 +2372,24 @@ static void txs_paint(void *context, int share) {
     }
 }
 
-TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_image out) {
-    txm_status status = txm_image_check(&out, "out", 0, env);
+/* Can the picture go there? */
+static txm_status txs_check_out(const texsyn_synth_desc *desc, const txm_image *out, txm_env *env) {
+    const txm_status status = txm_image_check(out, "out", 0, env);
+    const int channels = out->channels ? out->channels : 1;
     if (status != TXM_OK) return status;
-    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "image: job is NULL");
-    out = txm_image_resolve(out);
-    if (out.width != job->desc.width || out.height != job->desc.height)
+    if (out->width != desc->width || out->height != desc->height)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out: must have the size of the synthesis");
-    if (out.channels == 2 || out.channels < job->desc.model->channels)
+    if (channels == 2 || channels < desc->model->channels)
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "out: must have the channels of the model, or 3 or 4");
+    return TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_image out) {
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "image: job is NULL");
+    const txm_status status = txs_check_out(&job->desc, &out, env);
+    if (status != TXM_OK) return status;
+    out = txm_image_resolve(out);
     txs_painter painter = {job, &out, job->level < 0 ? 0 : job->level};
     txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS, txs_paint, &painter);
     return TXM_OK;
@@ -2399,6 +2407,7 @@ TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *
     texsyn_job *job;
     float done = 0;
     txm_status status = texsyn_begin(desc, env, &job);
+    if (status == TXM_OK) status = txs_check_out(desc, &out, env); /* before the work, not after */
     while (status == TXM_OK && done < 1) status = texsyn_step(job, env, &done);
     if (status == TXM_OK) status = texsyn_image(job, env, out);
     texsyn_end(job);
