@@ -1203,6 +1203,18 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     return (float)floor((fill > 1 ? 1 : fill) * 255 + 0.5) / 255;
 }
 
+/* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: nearest pixel,
+   the next one on the other side and its weight in quarters. An odd torus lies on one that is half
+   a pixel too long, which is squeezed lest there be a seam. */
+static int txs_place(int x, int fine, int coarse, int *next) {
+    int at = 2 * x + 1; /* in quarters of a coarse pixel, from the border */
+    if (fine == 2 * coarse - 1) at = (int)((int64_t)at * 2 * coarse / fine);
+    const int off = at % 4 - 2; /* -2..1 */
+    next[0] = at / 4 % coarse;
+    next[1] = next[0] + (off > 0 ? 1 : -1);
+    return abs(off);
+}
+
 /* Fill the parent planes of a canvas with the coarser level above, bilinearly, in this level's
    steps. At the borders the coarse canvas wraps if it has a margin, else its last row counts. */
 static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, const txs_level *level,
@@ -1212,16 +1224,17 @@ static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, con
         for (int q = 0; q < 16 * TXS_VALUES; q++)
             map[q] = (uint8_t)txs_quantise(level, b, txs_value(above, b, q / 16.0));
         for (int y = 0; y < canvas->height; y++) {
-            const int cy = (y >> 1) % coarse->height, wrap = coarse->margin > 0;
-            int ny = cy + (y & 1 ? 1 : -1);
-            if (!wrap) ny = txm_clampi(ny, 0, coarse->height - 1);
-            const uint8_t *near_ = txs_at(coarse, b, 0, cy), *far_ = txs_at(coarse, b, 0, ny);
+            const int wrap = coarse->margin > 0;
+            int cy[2], cx[2];
+            const int v = txs_place(y, canvas->height, coarse->height, cy), w = 4 - v;
+            if (!wrap) cy[1] = txm_clampi(cy[1], 0, coarse->height - 1);
+            const uint8_t *near_ = txs_at(coarse, b, 0, cy[0]), *far_ = txs_at(coarse, b, 0, cy[1]);
             uint8_t *to = txs_at(canvas, bands + b, 0, y);
             for (int x = 0; x < canvas->width; x++) {
-                const int cx = (x >> 1) % coarse->width;
-                int nx = cx + (x & 1 ? 1 : -1);
-                if (!wrap) nx = txm_clampi(nx, 0, coarse->width - 1);
-                to[x] = map[9 * near_[cx] + 3 * near_[nx] + 3 * far_[cx] + far_[nx]];
+                const int u = txs_place(x, canvas->width, coarse->width, cx), t = 4 - u;
+                if (!wrap) cx[1] = txm_clampi(cx[1], 0, coarse->width - 1);
+                to[x] = map[w * (t * near_[cx[0]] + u * near_[cx[1]]) +
+                            v * (t * far_[cx[0]] + u * far_[cx[1]])];
             }
         }
         txs_wrap(canvas, bands + b);
