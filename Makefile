@@ -19,6 +19,7 @@ HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o cli.o image_io.o stb.o)
 EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%,$(wildcard examples/*.c))
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
+PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
 .PHONY: all help demo test examples bench lint install uninstall clean setup samples helpers
 .DELETE_ON_ERROR:
@@ -65,12 +66,18 @@ $(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
 	$(COMPILE) $< $(BUILD)/stb.o -o $@ -lm
 
-bench: $(BENCHES) samples
-	@for b in $(BENCHES); do $$b $(BUILD)/samples/*.png || exit 1; done
+# in reverse order: sand, a common case, comes first and is swept over all sizes
+bench: $(BENCHES) $(PLAIN) samples
+	@for b in $(BENCHES); do $$b $$(ls -r $(BUILD)/samples/*.png) || exit 1; done
 
 $(BUILD)/bench/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
 	$(COMPILE) $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
+
+# the same without SIMD, for comparison
+$(BUILD)/bench/plain/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
+	@mkdir -p $(@D)
+	$(COMPILE) -DTEXSYN_NO_SIMD $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
 
 # ---- demo, tests, lint
 
