@@ -252,7 +252,7 @@ enum {
     TXS_SAMPLES = 24576, /* pixels counted per sweep: as many as matter                      */
     TXS_GRID = 8,        /* sub-lattices a side                                              */
     TXS_TOGETHER = 8,    /* pixels drawn together                                            */
-    TXS_GROUP = 4,       /* sub-lattices between two looks at the histograms                 */
+    TXS_GROUP = 2,       /* sub-lattices between two looks at the histograms                 */
     TXS_PROPORTIONAL = 150,
     TXS_INTEGRAL = 40, /* gains of the control, nats per unit of
                              histogram error; half or double makes little difference          */
@@ -970,21 +970,21 @@ static void txs_gather(txs_sampler *s, int passes) {
 /* Visit every pixel once. Progress from..to of the whole work. */
 static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, float from, float to) {
     enum { ALL = TXS_GRID * TXS_GRID };
-    int order[ALL], phases = s->strips > 1 ? 2 : 1;
-    int passes = (int)ALL / TXS_GROUP * phases, done = 0;
+    const int phases = s->strips > 1 ? 2 : 1, groups = (int)ALL / TXS_GROUP;
+    int order[ALL];
     txm_rng rng = txm_rng_make(s->seed, ~s->sweep++);
     for (int i = 0; i < ALL; i++) order[i] = i;
     txm_shuffle(&rng, order, ALL);
-    for (int i = 0; i < ALL; i += TXS_GROUP) {
-        memcpy(s->sublattice, order + i, sizeof s->sublattice);
-        for (s->phase = 0; s->phase < phases; s->phase++) {
-            if (txm_progress(env, from + (to - from) * (float)done++ / (float)passes, stage))
-                return txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
+    for (int group = 0; group < groups; group++, s->pass++) {
+        if (txm_progress(env, from + (to - from) * (float)group / (float)groups, stage))
+            return txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
+        memcpy(s->sublattice, order + group * TXS_GROUP, sizeof s->sublattice);
+        /* Both phases with the same potentials: were they set in between, even strips would be
+           drawn against what odd ones just did and the two could part for good. */
+        for (s->phase = 0; s->phase < phases; s->phase++)
             txm_parallel_for(env, s->tasks, txs_work, s);
-            s->pass++;
-            txs_gather(s, passes);
-            txs_control(s, done == passes);
-        }
+        txs_gather(s, groups);
+        txs_control(s, group + 1 == groups);
     }
     return TXM_OK;
 }
