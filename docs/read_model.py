@@ -50,10 +50,9 @@ class Coder:
             self.shift_in()
 
     def shift_in(self):
-        byte = self.body[self.at] if self.at < len(self.body) else 0
-        require(self.at <= len(self.body) + 8, "cut short")
+        require(self.at < len(self.body), "cut short")
+        self.code = (self.code << 8 | self.body[self.at]) & 0xFFFFFFFF
         self.at += 1
-        self.code = (self.code << 8 | byte) & 0xFFFFFFFF
 
     def bit(self, chance):
         bound = self.range * chance.zero >> 16
@@ -221,7 +220,7 @@ class Model:
                     t = read_description(coder, place, self.bands, level + 1 == self.levels)
                 read_statistics(coder, contexts, t, types, level, values[t.band][0])
                 types.append(t)
-        self.left = len(coder.body) - coder.at
+        require(coder.at == len(coder.body), "bytes left over")
 
 
 def main(arguments):
