@@ -66,10 +66,11 @@
                          AVX2 where the processor has it. The bytes are the same.
 
    MEMORY
-     A model is a few blocks, 70 kB in memory for 3 kB in a file. Learning takes about 12 bytes per
-     sample of the example, and 5 MB. Synthesis takes 2 bytes per band and pixel for the level in
-     work and the one above (7.5 bytes per RGB pixel) and 2 MB. After an error nothing stays
-     allocated and *out is NULL.
+     A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
+     sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
+     takes 2 bytes per band and pixel for the level in work and the one above, margins aside: 8 to 9
+     bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from a canvas of at
+     least 64 x 64. After an error nothing stays allocated and *out is NULL.
 
    TIME   (one core of 2023; make bench measures yours)
      Learning 256 x 256 RGB about 1.3 s; synthesis about 1.5 s per RGB megapixel. Both grow with
@@ -85,8 +86,10 @@
      texmath.h). Synthesis works in integers up to the last step.
 
    LIMITS
-     Sides of the example 16 pixels or more, images up to TEXSYN_MAX_PIXELS; float samples up to a
-     million. A model file is refused unless every number in it makes sense.
+     Sides of the example 16 pixels or more, images and canvases up to TEXSYN_MAX_PIXELS, which may
+     be lowered; float samples up to a million. Differences under 1/255 are not seen, so scale a
+     float example of narrow range first. A model file is refused unless every number in it makes
+     sense. Build with -ffp-contract=off if the bytes of learned models must agree everywhere.
 
    REFERENCES
      [1] A. Zalesny, D. Auf der Maur, L. Van Gool. Realistic textures for virtual reality.
@@ -107,8 +110,13 @@
 #ifndef TEXSYN_MAX_PIXELS
 #define TEXSYN_MAX_PIXELS (1 << 28) /* larger images are refused */
 #endif
+#if TEXSYN_MAX_PIXELS > (1 << 28)
+#error "TEXSYN_MAX_PIXELS: at most 2^28"
+#endif
 
-#ifdef TEXSYN_STATIC
+#if defined(TEXSYN_STATIC) && defined(__GNUC__)
+#define TEXSYN_API __attribute__((unused)) static
+#elif defined(TEXSYN_STATIC)
 #define TEXSYN_API static
 #else
 #define TEXSYN_API extern
@@ -127,17 +135,25 @@ typedef struct texsyn_learn_desc {
     txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
                           outlive the call                                                       */
     txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
-    int max_distance;  /* longest clique in pixels of the example, 2..60; 0 = 40. A level looks at
-                          most 10 of its own pixels far, except the coarsest: that is 40 here too  */
+    int max_distance;  /* longest clique in pixels of the example, 2..60; 0 = 40. Finer levels look
+                          no further than 10 pixels: what is beyond, the coarsest sees           */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
                           36 for a gray example                                                   */
-    int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px   */
-    float threshold;   /* stop adding types when no histogram differs by more; 0 = 0.005          */
+    int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
+                          fewer are made if a level would be under 8 px or hold little of a mask  */
+    float threshold;   /* stop adding types when no histogram differs by more, or by less than the
+                          sampling noise; 0 = 0.005                                               */
     uint64_t seed;     /* of the random numbers; any value                                        */
 } texsyn_learn_desc;
 
-/* Learn a model. *out receives it, or NULL on any error; release it with texsyn_free.
-   TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_SMALL, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED. */
+/* Learn a model: the analysis of [1], section 3, steps 1 to 6, on every pyramid level.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives the model, or NULL on any error; release it with texsyn_free
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
+          beyond a million; TXM_TOO_SMALL for an example under 16 x 16 or a mask of fewer than 256
+          pixels; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   see MEMORY and TIME above; a larger max_distance or max_types costs in proportion      */
 TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env, texsyn_model **out);
 
 /* Release a model by the allocator it was made with; NULL is allowed. */
@@ -162,6 +178,7 @@ typedef struct texsyn_clique {
     int band, other; /* tail band b, head band c (equal within a band)                           */
     int dx, dy;      /* displacement d in pixels of that level                                   */
     int ex, ey;      /* displacement e                                                           */
+    int phase; /* of a pair of neighbours: 0 = all, 1 = tails at even, 2 = at odd coordinates */
 } texsyn_clique;
 
 TEXSYN_API int texsyn_channels(const texsyn_model *model);    /* of the example: 1, 3 or 4 */
@@ -176,12 +193,16 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
 
 /* ---- saving and loading ----------------------------------------------------------------- */
 
-/* Write the model as bytes. *size receives the number of bytes needed; with buffer NULL nothing
-   else happens. TXM_TOO_SMALL if capacity < *size. */
+/* Write the model as bytes: docs/model-format.md. *size receives the number of bytes needed; with
+   buffer NULL nothing else happens. Saving what was loaded gives the same bytes again.
+   return TXM_OK; TXM_BAD_ARGUMENT for NULL; TXM_TOO_SMALL if capacity < *size, with the buffer
+          untouched; TXM_OUT_OF_MEMORY                                                        */
 TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void *buffer,
                                   size_t capacity, size_t *size);
 
-/* Read a model back. Never trusts the bytes: TXM_BAD_DATA for anything but a whole, intact model. */
+/* Read a model back. *out receives it, or NULL on any error; release it with texsyn_free.
+   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model with sensible numbers;
+          TXM_BAD_ARGUMENT for NULL; TXM_OUT_OF_MEMORY                                        */
 TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, texsyn_model **out);
 
 /* ---- synthesis -------------------------------------------------------------------------- */
@@ -194,18 +215,32 @@ typedef struct texsyn_synth_desc {
     uint64_t seed;             /* another seed, another picture                                  */
 } texsyn_synth_desc;
 
-/* The simple way: one call. out is the caller's: desc->width x desc->height, texsyn_channels
-   (or 3 where the model has 1, or 4 = opaque). Untouched after an error. */
+/* The simple way: one call. out is the caller's: desc->width x desc->height, the channels of the
+   model (or 3 where it has 1, or 4 = opaque), 8-bit, or float, which is not clamped to 0..1.
+   Untouched after an error.
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or a picture that does not fit;
+          TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(width * height * clique types); see MEMORY and TIME above                         */
 TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env, txm_image out);
 
-/* The stepping way, for progressive display. */
+/* The stepping way, for progressive display: begin, step until *done is 1, image whenever a picture
+   is wanted, end. The picture is the same as that of the one call. */
 typedef struct texsyn_job texsyn_job;
 
+/* Check the description and make the job; *job is NULL on any error (as texsyn_synthesize has
+   them). The job keeps the allocator of env; the other calls may be given another env. */
 TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, texsyn_job **job);
-/* Do one sweep. *done (0..1) reaches 1 when the last one is made. */
+
+/* Do one sweep. *done (may be NULL) is the share of the work, 0..1, and 1 when all is made. After
+   TXM_OUT_OF_MEMORY the step may be tried again; after TXM_CANCELLED also, but a sweep was broken
+   off and the picture will not be the one of the same seed. */
 TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, float *done);
-/* The picture so far at full size, at any time, a finished one at the end. */
+
+/* The picture so far at full size, at any time, the finished one at the end. TXM_BAD_ARGUMENT if it
+   does not fit out; out is as for texsyn_synthesize. */
 TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_image out);
+
+/* Give everything back; NULL is allowed. */
 TEXSYN_API void texsyn_end(texsyn_job *job);
 
 #ifdef __cplusplus
@@ -254,15 +289,15 @@ enum {
     TXS_TOGETHER = 8,    /* pixels drawn together                                            */
     TXS_GROUP = 2,       /* sub-lattices between two looks at the histograms                 */
     TXS_PROPORTIONAL = 150,
-    TXS_INTEGRAL = 40, /* gains of the control, nats per unit of
+    TXS_INTEGRAL = 40,   /* gains of the control, nats per unit of
                              histogram error; half or double makes little difference          */
-    TXS_TYPES = 24,    /* added per level unless the caller says otherwise                 */
+    TXS_TYPES = 24,      /* added per level unless the caller says otherwise                 */
     TXS_TYPES_GRAY = 36, /* if there is only one band                                       */
-    TXS_COARSE = 8,    /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
-    TXS_STEEPEST = 20, /* such steps: the largest stored potential                         */
-    TXS_UNSEEN = 1,    /* such steps: the potential of a bin that has none stored          */
-    TXS_RARE = 3,      /* the smallest root whose bin has a stored potential               */
-    TXS_SMALLEST = 64  /* pixels: a narrower canvas has no statistics to speak of          */
+    TXS_COARSE = 8,      /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
+    TXS_STEEPEST = 20,   /* such steps: the largest stored potential                         */
+    TXS_UNSEEN = 1,      /* such steps: the potential of a bin that has none stored          */
+    TXS_RARE = 3,        /* the smallest root whose bin has a stored potential               */
+    TXS_SMALLEST = 64    /* pixels: a narrower canvas has no statistics to speak of          */
 };
 
 /* Learning. Ours, by the medians of several measures over the stochastic exemplars: the kinds of
@@ -687,7 +722,7 @@ typedef struct txs_sampler {
     uint64_t pass, sweep;
 } txs_sampler;
 
-/* -log of the exponential distribution, shuffled: entries i..i+31 for a random i are a noise row */
+/* Minus a Gumbel variable, shuffled: entries i..i+31 for a random i are a noise row. */
 static void txs_noise_table(int16_t *noise) {
     txm_rng rng = txm_rng_make(1, 2);
     for (int i = 0; i < TXS_NOISE; i++) {
@@ -884,8 +919,9 @@ static int txs_is_counted(const txs_sampler *s, int x, int y) {
     return s->skip == 1 || (unsigned)(x / TXS_GRID + 3 * (y / TXS_GRID)) % (unsigned)s->skip == 0;
 }
 
-/* Draw new values for count pixels of a row, TXS_GRID apart. No clique joins two of them, so it
-   is as if one came after the other; doing them together keeps what an end needs in registers. */
+/* Draw new values for count pixels of a row, TXS_GRID apart. No clique joins two of them (but
+   across the border of a torus whose width is no multiple of the grid), so it is as if one came
+   after the other; doing them together keeps what an end needs in registers. */
 static void txs_visit(const txs_sampler *s, int x, int y, int count, txm_rng *rng) {
     const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
     const uint8_t *p = txs_at(s->canvas, 0, x, y);
@@ -947,7 +983,8 @@ static void txs_work(void *context, int task) {
                 }
                 const txs_list *list = txs_list_at(s, sx, y);
                 for (int x = sx; x < width; x += TXS_GRID)
-                    if (txs_is_counted(s, x, y)) txs_count(list, txs_at(s->canvas, 0, x, y), counts);
+                    if (txs_is_counted(s, x, y))
+                        txs_count(list, txs_at(s->canvas, 0, x, y), counts);
             }
         }
     }
@@ -1034,7 +1071,8 @@ static void txs_sampler_start(txs_sampler *s) {
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
     for (int y = 0; y < c->height; y++)
         for (int x = 0; x < c->width; x++)
-            if (txs_is_counted(s, x, y)) txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
+            if (txs_is_counted(s, x, y))
+                txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
     for (int k = 0; k < types; k++)
         for (int i = 0; i < TXS_BINS; i++) s->histogram[k][i] *= TXS_WINDOW;
     txs_control(s, 0);
@@ -1203,15 +1241,16 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     return (float)floor((fill > 1 ? 1 : fill) * 255 + 0.5) / 255;
 }
 
-/* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: nearest pixel,
-   the next one on the other side and its weight in quarters. An odd torus lies on one that is half
+/* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: the nearest pixel,
+   the one on the other side, and as the result the weight of that in quarters. An odd torus lies on one that is half
    a pixel too long, which is squeezed lest there be a seam. */
-static int txs_place(int x, int fine, int coarse, int *next) {
+static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
     int at = 2 * x + 1; /* in quarters of a coarse pixel, from the border */
     if (fine == 2 * coarse - 1) at = (int)((int64_t)at * 2 * coarse / fine);
     const int off = at % 4 - 2; /* -2..1 */
-    next[0] = at / 4 % coarse;
-    next[1] = next[0] + (off > 0 ? 1 : -1);
+    where[0] = wrap ? at / 4 % coarse : txm_clampi(at / 4, 0, coarse - 1);
+    where[1] = where[0] + (off > 0 ? 1 : -1);
+    if (!wrap) where[1] = txm_clampi(where[1], 0, coarse - 1);
     return abs(off);
 }
 
@@ -1226,13 +1265,11 @@ static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, con
         for (int y = 0; y < canvas->height; y++) {
             const int wrap = coarse->margin > 0;
             int cy[2], cx[2];
-            const int v = txs_place(y, canvas->height, coarse->height, cy), w = 4 - v;
-            if (!wrap) cy[1] = txm_clampi(cy[1], 0, coarse->height - 1);
+            const int v = txs_place(y, canvas->height, coarse->height, wrap, cy), w = 4 - v;
             const uint8_t *near_ = txs_at(coarse, b, 0, cy[0]), *far_ = txs_at(coarse, b, 0, cy[1]);
             uint8_t *to = txs_at(canvas, bands + b, 0, y);
             for (int x = 0; x < canvas->width; x++) {
-                const int u = txs_place(x, canvas->width, coarse->width, cx), t = 4 - u;
-                if (!wrap) cx[1] = txm_clampi(cx[1], 0, coarse->width - 1);
+                const int u = txs_place(x, canvas->width, coarse->width, wrap, cx), t = 4 - u;
                 to[x] = map[w * (t * near_[cx[0]] + u * near_[cx[1]]) +
                             v * (t * far_[cx[0]] + u * far_[cx[1]])];
             }
@@ -1369,7 +1406,7 @@ static void txs_list_candidates(txs_learner *a, int reach, const float *seen) {
                                      {1, 1, -1, -1}, {-1, 1, 1, -1}, {1, 1, -1, 1}, {1, 1, 1, -1},
                                      {3, 0, 0, 3},   {-3, 0, 0, 3},  {3, 0, -3, 0}, {0, 3, 0, -3},
                                      {2, 2, -2, -2}, {-2, 2, 2, -2}, {2, 2, -2, 2}, {2, 2, 2, -2},
-                                     {4, 0, 0, 4},   {-4, 0, 0, 4},  {4, 0, -4, 0}, {0, 4, 0, -4},
+                                     {4, 0, 0, 4},   {-4, 0, 0, 4},  {3, 0, -4, 0}, {0, 4, 0, -4},
                                      {1, 0, 2, 0},   {0, 1, 0, 2},   {2, 0, 4, 0},  {0, 2, 0, 4}};
     static const int scales[][4] = {{1, 0, 2, 0},  {0, 1, 0, 2},  {1, 1, 2, 2}, {-1, 1, -2, 2},
                                     {2, 0, 2, 0},  {0, 2, 0, 2},  {2, 2, 2, 2}, {-2, 2, -2, 2},
@@ -1539,12 +1576,12 @@ static void txs_keep_potentials(txs_level *l, int64_t (*sum)[TXS_BINS], int swee
 /* Learn one level on a canvas whose parent planes are laid. Fraction from..to of the whole. */
 static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env *env, float from,
                                   float to) {
-    const int max_types = a->desc->max_types      ? a->desc->max_types
+    const int max_types = a->desc->max_types     ? a->desc->max_types
                           : a->model->bands == 1 ? TXS_TYPES_GRAY
                                                  : TXS_TYPES;
     const float threshold = a->desc->threshold > 0 ? a->desc->threshold : TXS_THRESHOLD;
     const int max_distance = a->desc->max_distance ? a->desc->max_distance : 40;
-    enum { FIRST = 6, BETWEEN = 3, LAST = 15, KEPT = 8, BATCH = 6, CANDIDATES = 40000 };
+    enum { FIRST = 6, BETWEEN = 3, LAST = 15, KEPT = 8, BATCH = 6 };
     const int bands = a->model->bands, top = a->index + 1 == a->model->levels;
     const int rounds = (max_types + BATCH - 1) / BATCH;
     const float sweep = (to - from) / (float)(FIRST + rounds * (BETWEEN + 2) + LAST);
@@ -1562,13 +1599,13 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
     if (reach > a->canvas->margin) reach = a->canvas->margin;
     if (reach < 2) reach = 2;
 
-    a->capacity = (2 * reach + 1) * (2 * reach + 1) * TXS_MAX_BANDS + 1000;
+    a->capacity = (2 * reach + 1) * (2 * reach + 1) * bands + 400;
     a->candidates =
         (txs_candidate *)txm_arena_alloc(&arena, (size_t)a->capacity, sizeof *a->candidates);
     int64_t(*sum)[TXS_BINS] =
         (int64_t(*)[TXS_BINS])txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof *sum);
     txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, a->canvas, bands, noise,
-                                      a->desc->seed + 64 + (uint64_t)a->index);
+                                      txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
     if (!a->candidates || !sum || !s) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
@@ -1578,7 +1615,7 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
     for (int b = 0; b < bands; b++) seen[b] = txs_visibility(a->level, b);
     txs_list_candidates(a, reach, seen);
     txm_parallel_for(env, a->candidate_count, txs_measure_example, a);
-    txs_lay_start(a->level, a->canvas, bands, !top, a->desc->seed + (uint64_t)a->index);
+    txs_lay_start(a->level, a->canvas, bands, !top, txm_hash(a->desc->seed) + (uint64_t)a->index);
 
     /* steps 3 to 6 of [1]; what was synthesised so far, and its potentials, are kept */
     for (;;) {
@@ -1631,7 +1668,7 @@ static void txs_put(txs_coder *c, uint8_t byte) {
 
 static uint8_t txs_get(txs_coder *c) {
     if (c->at < c->size) return c->in[c->at++];
-    c->bad |= c->at++ > c->size + 8; /* the writer leaves out no more than that */
+    c->bad = 1;
     return 0;
 }
 
@@ -1709,7 +1746,7 @@ static float txs_real(txs_coder *c, float value) {
     memcpy(&bits, &value, sizeof bits);
     bits = txs_raw(c, 24, bits >> 8) << 8;
     memcpy(&value, &bits, sizeof value);
-    if (!txm_is_finite((double)value)) c->bad = 1;
+    if (!(fabsf(value) <= 1e9f)) c->bad = 1; /* NaN too */
     return c->bad ? 1 : value;
 }
 
@@ -1763,7 +1800,7 @@ typedef struct txs_codec {
     int16_t used[TXS_BINS]; /* the potential, where it is kept */
 } txs_codec;
 
-/* And back. A potential is kept only where the example has something; elsewhere values are dear,
+/* The inverse of txs_round_statistics. A potential is kept only where the example has something; elsewhere values are dear,
    and the control makes them dearer if they turn up. Returns 0 for an empty histogram. */
 static int txs_unround_statistics(txs_type *t) {
     int32_t total = 0;
@@ -1840,12 +1877,21 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     if (t->kind == TEXSYN_CORNER && (same_e || equal)) c->bad = 1;
     if (t->kind == TEXSYN_PARALLEL && t->band == t->other && (same_e || equal || opposite))
         c->bad = 1;
+    /* and so would members that are drawn together, see txs_visit */
+    int at[4][2], drawn = t->kind == TEXSYN_SCALE ? 2 : txs_members(t, at);
+    txs_members(t, at);
+    for (int i = 0; i < drawn; i++) {
+        for (int j = 0; j < i; j++) {
+            const int apart = at[i][0] - at[j][0];
+            if (at[i][1] == at[j][1] && apart != 0 && apart % TXS_GRID == 0) c->bad = 1;
+        }
+    }
     if (abs(t->dx) > TXS_MAX_REACH || abs(t->dy) > TXS_MAX_REACH || abs(t->ex) > TXS_MAX_REACH ||
         abs(t->ey) > TXS_MAX_REACH || txs_reach(t) > TXS_MAX_REACH)
         c->bad = 1;
 }
 
-/* The whole model, to or from the coder. env is for what reading allocates in the model's arena.
+/* The whole model, to or from the coder. What reading allocates goes to the model's arena.
    Returns 0 if there is no memory. */
 static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
     static const int channels_of[] = {1, 3, 4};
@@ -1870,7 +1916,7 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             l->values[b] = txs_limited(c, 5, 1, TXS_VALUES, l->values[b]);
             l->low[b] = txs_real(c, l->low[b]);
             l->step[b] = txs_real(c, l->step[b]);
-            if (!(l->step[b] > 0)) c->bad = 1;
+            if (!(l->step[b] > 1e-6f)) c->bad = 1;
         }
         l->type_count = txs_limited(c, 7, m->bands, TXS_MAX_TYPES, l->type_count);
         if (c->bad) break;
@@ -1934,24 +1980,21 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         copy->level[i].types = types + i * TXS_MAX_TYPES;
         memcpy(copy->level[i].types, l->types, sizeof *types * (size_t)l->type_count);
     }
-    {
+    for (int writing = 0; writing <= (buffer != NULL) && status == TXM_OK; writing++) {
+        uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
         txs_coder c;
         memset(&c, 0, sizeof c);
-        uint8_t *bytes = (uint8_t *)buffer;
         c.out = bytes;
-        c.size = capacity < TXS_CRC_BYTES ? 0 : capacity - TXS_CRC_BYTES;
+        c.size = capacity;
         txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'S'), txs_put(&c, '1');
         txs_coder_start(&c);
         txs_code_model(&c, copy, z);
         txs_coder_finish(&c);
         *size = c.at + TXS_CRC_BYTES;
-        if (buffer && capacity < *size) {
+        if (buffer && capacity < *size)
             status = txm_fail(env, TXM_TOO_SMALL, "save: the buffer is smaller than *size says");
-        } else if (buffer) {
-            uint32_t crc = txs_crc(bytes, c.at);
-            for (int i = 0; i < TXS_CRC_BYTES; i++)
-                bytes[c.at + (size_t)i] = (uint8_t)(crc >> 8 * i);
-        }
+        for (int i = 0; i < TXS_CRC_BYTES && writing; i++)
+            bytes[c.at + (size_t)i] = (uint8_t)(txs_crc(bytes, c.at) >> 8 * i);
     }
 done:
     txm_arena_free(&arena);
@@ -2030,6 +2073,7 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
             clique->dy = t->dy;
             clique->ex = t->ex;
             clique->ey = t->ey;
+            clique->phase = t->phase;
         }
         for (int k = 0; bins && k < n && k < bin_count; k++)
             bins[k] = (float)t->share[k] / (float)TXS_ONE;
@@ -2226,19 +2270,18 @@ static int txs_sweeps(const texsyn_synth_desc *d, int level) {
 }
 
 /* Size of a level's canvas. A canvas is always a torus. Where the result need not tile, it is a
-   crop of one that is not too small to have statistics and halves evenly. */
-static void txs_canvas_size(const texsyn_synth_desc *d, int level, int *width, int *height) {
-    const int even = 1 << (d->model->levels - 1);
-    *width = d->width;
-    *height = d->height;
+   crop of one that is not too small to have statistics and halves evenly. Returns 0 if the finest
+   is larger than TEXSYN_MAX_PIXELS. */
+static int txs_canvas_size(const texsyn_synth_desc *d, int level, int *width, int *height) {
+    const int64_t even = (int64_t)1 << (d->model->levels - 1);
+    int64_t w = d->width, h = d->height;
     if (!d->tileable) {
-        if (*width < TXS_SMALLEST) *width = TXS_SMALLEST;
-        if (*height < TXS_SMALLEST) *height = TXS_SMALLEST;
-        *width = (*width + even - 1) / even * even;
-        *height = (*height + even - 1) / even * even;
+        w = ((w < TXS_SMALLEST ? (int)TXS_SMALLEST : w) + even - 1) / even * even;
+        h = ((h < TXS_SMALLEST ? (int)TXS_SMALLEST : h) + even - 1) / even * even;
     }
-    *width = (*width + (1 << level) - 1) >> level;
-    *height = (*height + (1 << level) - 1) >> level;
+    *width = (int)((w + (1 << level) - 1) >> level);
+    *height = (int)((h + (1 << level) - 1) >> level);
+    return h <= TEXSYN_MAX_PIXELS / w;
 }
 
 /* Make canvas and sampler of the next finer level. */
@@ -2260,26 +2303,28 @@ static txm_status txs_enter_level(texsyn_job *job, txm_env *env) {
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
     }
     job->sampler = txs_sampler_make(&job->level_arena, l, l->type_count, &job->canvas, m->bands,
-                                    job->noise, job->desc.seed + 128 + (uint64_t)i);
+                                    job->noise, txm_hash(job->desc.seed) + 128 + (uint64_t)i);
     if (!job->sampler) {
         txs_canvas_free(&job->canvas, &job->memory);
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the sampler");
     }
     if (coarse.pixels) txs_lay_parent(l + 1, &coarse, l, &job->canvas, m->bands);
-    txs_lay_start(l, &job->canvas, m->bands, coarse.pixels != NULL, job->desc.seed + (uint64_t)i);
+    txs_lay_start(l, &job->canvas, m->bands, coarse.pixels != NULL,
+                  txm_hash(job->desc.seed) + (uint64_t)i);
     txs_canvas_free(&coarse, &job->memory);
     txs_sampler_start(job->sampler);
     return TXM_OK;
 }
 
 TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, texsyn_job **out) {
+    int width, height;
     if (out) *out = NULL;
     if (!desc || !out || !desc->model)
         return txm_fail(env, TXM_BAD_ARGUMENT, "begin: desc, model or out is NULL");
     if (desc->width < 1 || desc->height < 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
-    if (desc->height > TEXSYN_MAX_PIXELS / desc->width)
+    if (!txs_canvas_size(desc, 0, &width, &height))
         return txm_fail(env, TXM_TOO_LARGE, "more than TEXSYN_MAX_PIXELS pixels; make tiles");
     if (desc->quality < -2 || desc->quality > 2)
         return txm_fail(env, TXM_BAD_ARGUMENT, "quality must be -2 to 2");
@@ -2304,7 +2349,6 @@ TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, 
     job->desc = *desc;
     job->level = desc->model->levels - 1;
     for (int i = 0; i <= job->level; i++) {
-        int width, height;
         txs_canvas_size(desc, i, &width, &height);
         job->work += (double)width * height * txs_sweeps(desc, i);
     }
@@ -2357,29 +2401,33 @@ static void txs_paint(void *context, int share) {
     const txs_level *l = &m->level[painter->level];
     const txs_canvas *c = &painter->job->canvas;
     const txm_image *out = painter->out;
+    const uint64_t seed = txm_hash(painter->job->desc.seed);
     int end =
         (share + 1) * TXS_PAINT_ROWS < out->height ? (share + 1) * TXS_PAINT_ROWS : out->height;
     for (int y = share * TXS_PAINT_ROWS; y < end; y++) {
         for (int x = 0; x < out->width; x++) {
-            float v[4] = {m->mean[0], m->mean[1], m->mean[2], m->mean[3]};
+            double v[4] = {(double)m->mean[0], (double)m->mean[1], (double)m->mean[2],
+                           (double)m->mean[3]};
             const uint8_t *p = txs_at(c, 0, x >> painter->level, y >> painter->level);
-            uint64_t noise =
-                txm_hash(((uint64_t)(unsigned)y << 32 | (unsigned)x) + painter->job->desc.seed);
+            uint64_t noise = txm_hash(((uint64_t)(unsigned)y << 32 | (unsigned)x) ^ seed);
             for (int b = 0; b < m->bands; b++, p += c->plane, noise >>= 16) {
                 const uint8_t *q = p - c->stride, *r = p + c->stride;
                 const int n[8] = {q[-1], q[0], q[1], p[-1], p[1], r[-1], r[0], r[1]};
                 int smooth = 1, sum = 4 * p[0];
                 for (int i = 0; i < 8; i++) smooth &= abs(n[i] - p[0]) <= 1;
                 sum += n[0] + n[2] + n[5] + n[7] + 2 * (n[1] + n[3] + n[4] + n[6]);
-                float off = smooth ? (float)(sum - 16 * p[0]) / 16
-                                   : (float)(int)(noise & 0xffff) / 65536 - 0.5f;
-                off = txm_clampf(off, -0.5f, 0.5f) * m->dither[b];
-                const float value = (float)txs_value(l, b, (double)(p[0] + off));
-                for (int i = 0; i < m->channels; i++) v[i] += value * m->basis[b][i];
+                double off =
+                    smooth ? (sum - 16 * p[0]) / 16.0 : (double)(noise & 0xffff) / 65536 - 0.5;
+                off = off < -0.5 ? -0.5 : off > 0.5 ? 0.5 : off;
+                /* a product of two floats is exact in double, contracted or not */
+                const float at = txm_float(p[0] + off * (double)m->dither[b]);
+                const float value = txm_float(txs_value(l, b, (double)at));
+                for (int i = 0; i < m->channels; i++)
+                    v[i] += (double)value * (double)m->basis[b][i];
             }
             for (int i = 0; i < out->channels; i++) {
-                float sample = i == 3 && m->channels < 4 ? 255 : v[m->channels == 1 ? 0 : i];
-                txm_image_set(out, x, y, i, sample / 255);
+                double sample = i == 3 && m->channels < 4 ? 255 : v[m->channels == 1 ? 0 : i];
+                txm_image_set(out, x, y, i, txm_float(sample / 255));
             }
         }
     }
