@@ -2,7 +2,7 @@
 
 CC      ?= cc
 CXX     ?= c++
-CFLAGS  ?= -O2
+CFLAGS  ?= -O3
 PREFIX  ?= /usr/local
 BUILD   ?= build
 

@@ -1241,9 +1241,9 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     return (float)floor((fill > 1 ? 1 : fill) * 255 + 0.5) / 255;
 }
 
-/* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: the nearest pixel,
-   the one on the other side, and as the result the weight of that in quarters. An odd torus lies on one that is half
-   a pixel too long, which is squeezed lest there be a seam. */
+/* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: the nearest
+   pixel, the one on the other side, and as the result the weight of that in quarters. An odd torus
+   lies on one that is half a pixel too long, which is squeezed lest there be a seam. */
 static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
     int at = 2 * x + 1; /* in quarters of a coarse pixel, from the border */
     if (fine == 2 * coarse - 1) at = (int)((int64_t)at * 2 * coarse / fine);
@@ -1800,8 +1800,9 @@ typedef struct txs_codec {
     int16_t used[TXS_BINS]; /* the potential, where it is kept */
 } txs_codec;
 
-/* The inverse of txs_round_statistics. A potential is kept only where the example has something; elsewhere values are dear,
-   and the control makes them dearer if they turn up. Returns 0 for an empty histogram. */
+/* The inverse of txs_round_statistics. A potential is kept only where the example has something;
+   elsewhere values are dear, and the control makes them dearer if they turn up. Returns 0 for an
+   empty histogram. */
 static int txs_unround_statistics(txs_type *t) {
     int32_t total = 0;
     for (int i = 0; i < TXS_BINS; i++) total += t->root[i] * t->root[i];

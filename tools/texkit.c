@@ -4,6 +4,7 @@
    Each command is a manual (cli_manual), a table of options and one function that calls the
    library; the table at the end lists them. What they share is in cli.c, image files are in
    image_io.c. Read run_learn first: it shows all there is to embedding a header.              */
+#define _POSIX_C_SOURCE 200809L /* setenv, execv */
 #include "cli.h"
 #include "image_io.h"
 
@@ -12,6 +13,7 @@
 
 #include <errno.h>
 #include <stdio.h>
+#include <unistd.h>
 
 const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION ")";
@@ -262,7 +264,18 @@ static int print_overview(void) {
     return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
 }
 
+/* OpenMP's threads spin while they wait, which stands still when something else wants the cores.
+   How they wait is read before main begins, so say it and begin again. */
+static void wait_politely(char **argv) {
+#ifdef _OPENMP
+    if (!getenv("OMP_WAIT_POLICY") && setenv("OMP_WAIT_POLICY", "passive", 0) == 0)
+        execv("/proc/self/exe", argv); /* where that fails, work goes on as it is */
+#endif
+    (void)argv;
+}
+
 int main(int argc, char **argv) {
+    wait_politely(argv);
     if (argc < 2) {
         fprintf(stderr, "texkit: no command given; see 'texkit --help'\n");
         return CLI_USAGE;
