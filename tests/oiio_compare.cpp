@@ -3,7 +3,8 @@
 //
 //   oiio_compare same    A B         [LIMIT...]   the same picture, pixel by pixel
 //   oiio_compare texture EXEMPLAR B  [LIMIT...]   the same kind of texture
-//   oiio_compare wrap    A           [LIMIT...]   does it continue across its borders
+//   oiio_compare wrap    A...        [LIMIT...]   do they continue across their borders
+//   oiio_compare shuffle A OUT                    write A's pixels in random order
 //
 // Prints one "figure value" per line. A limit is written mean<0.1 or psnr>30; the exit status is 1
 // if a figure is beyond its limit, 2 if a picture cannot be read.
@@ -17,7 +18,8 @@
 //          mean: the largest difference of a channel's mean, in levels of 0..255, not a ratio.
 //          novelty: the distance of blocks of B to their nearest blocks in the exemplar, over the
 //          same for blocks of the exemplar to their nearest blocks elsewhere in it; 0 = copied.
-// wrap:    x and y: the mean difference across the border over the mean difference inside.
+// wrap:    x and y: the mean difference across the border over the mean difference inside, over
+//          all pictures together.
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 
@@ -28,6 +30,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -235,33 +238,63 @@ Figures texture(const Picture &exemplar, const Picture &b) {
                             std::max(nearest_blocks(exemplar, exemplar, true), 1.0)}};
 }
 
-Figures wrap(const Picture &p) {
+Figures wrap(const std::vector<std::string> &paths) {
     double border[2] = {0, 0}, inside[2] = {0, 0};
-    for (int y = 0; y < p.height; y++) {
-        for (int x = 0; x < p.width; x++) {
-            for (int c = 0; c < p.channels; c++) {
-                const double dx = double(p.at((x + 1) % p.width, y, c) - p.at(x, y, c));
-                const double dy = double(p.at(x, (y + 1) % p.height, c) - p.at(x, y, c));
-                (x + 1 == p.width ? border : inside)[0] += std::fabs(dx);
-                (y + 1 == p.height ? border : inside)[1] += std::fabs(dy);
+    for (const std::string &path : paths) {
+        const Picture p = load(path);
+        for (int y = 0; y < p.height; y++) {
+            for (int x = 0; x < p.width; x++) {
+                for (int c = 0; c < p.channels; c++) {
+                    const double dx = double(p.at((x + 1) % p.width, y, c) - p.at(x, y, c));
+                    const double dy = double(p.at(x, (y + 1) % p.height, c) - p.at(x, y, c));
+                    (x + 1 == p.width ? border : inside)[0] +=
+                        std::fabs(dx) / (x + 1 == p.width ? 1 : p.width - 1);
+                    (y + 1 == p.height ? border : inside)[1] +=
+                        std::fabs(dy) / (y + 1 == p.height ? 1 : p.height - 1);
+                }
             }
         }
     }
-    return {{"x", border[0] * (p.width - 1) / std::max(inside[0], 1e-9)},
-            {"y", border[1] * (p.height - 1) / std::max(inside[1], 1e-9)}};
+    return {{"x", border[0] / std::max(inside[0], 1e-9)},
+            {"y", border[1] / std::max(inside[1], 1e-9)}};
+}
+
+void shuffle(const std::string &from, const std::string &to) {
+    const Picture p = load(from);
+    const size_t channels = size_t(p.channels), count = p.samples.size() / channels;
+    std::vector<unsigned char> out(p.samples.size());
+    std::vector<size_t> order(count);
+    std::mt19937 random(1);
+    for (size_t i = 0; i < count; i++) {
+        const size_t j = random() % (i + 1);
+        order[i] = order[j];
+        order[j] = i;
+    }
+    for (size_t i = 0; i < count; i++) {
+        for (size_t c = 0; c < channels; c++)
+            out[i * channels + c] =
+                static_cast<unsigned char>(std::lround(p.samples[order[i] * channels + c]));
+    }
+    OIIO::ImageSpec spec(p.width, p.height, p.channels, OIIO::TypeDesc::UINT8);
+    OIIO::ImageBuf buffer(spec, out.data());
+    if (!buffer.write(to)) give_up("cannot write " + to);
 }
 
 } // namespace
 
 int main(int argc, char **argv) {
     const std::string command = argc > 1 ? argv[1] : "";
-    const int files = command == "wrap" ? 1 : 2;
-    if (argc < 2 + files) give_up("usage: same A B | texture EXEMPLAR B | wrap A, [FIGURE<LIMIT...]");
+    std::vector<std::string> paths;
+    for (int i = 2; i < argc && !std::strpbrk(argv[i], "<>"); i++) paths.emplace_back(argv[i]);
+    const int files = int(paths.size());
+    if (command == "wrap" ? files < 1 : files != 2)
+        give_up("usage: same A B | texture EXEMPLAR B | wrap A..., [FIGURE<LIMIT...] | shuffle A OUT");
 
     Figures figures;
     if (command == "same") figures = same(argv[2], argv[3]);
     else if (command == "texture") figures = texture(load(argv[2]), load(argv[3]));
-    else if (command == "wrap") figures = wrap(load(argv[2]));
+    else if (command == "wrap") figures = wrap(paths);
+    else if (command == "shuffle") shuffle(paths[0], paths[1]);
     else give_up("unknown command " + command);
     for (const auto &f : figures) std::printf("%s %.4g\n", f.first.c_str(), f.second);
 
