@@ -356,6 +356,7 @@ struct texsyn_model {
    bands of the coarser level at this resolution ("parent"), which do not change. */
 typedef struct txs_canvas {
     int width, height, margin;
+    int slip_x, slip_y;      /* from here on odd and even swap, see txs_place; or the size */
     ptrdiff_t stride, plane; /* bytes to the next row, to the next plane */
     uint8_t *pixels;         /* the margin's first corner                */
 } txs_canvas;
@@ -376,6 +377,8 @@ static int txs_canvas_make(txs_canvas *c, const txm_env *env, int width, int hei
     c->width = width;
     c->height = height;
     c->margin = margin;
+    c->slip_x = width;
+    c->slip_y = height;
     c->pixels = NULL;
     size_t stride = (size_t)width + 2 * (size_t)margin;
     if (!txm_mul(stride, (size_t)height + 2 * (size_t)margin, 1, &plane) ||
@@ -912,7 +915,8 @@ static void txs_count(const txs_list *list, const uint8_t *p, int32_t (*counts)[
 }
 
 static const txs_list *txs_list_at(const txs_sampler *s, int x, int y) {
-    return &s->list[(x & 1) + 2 * (y & 1)];
+    const int px = x + (x >= s->canvas->slip_x), py = y + (y >= s->canvas->slip_y);
+    return &s->list[(px & 1) + 2 * (py & 1)];
 }
 
 static int txs_is_counted(const txs_sampler *s, int x, int y) {
@@ -977,14 +981,15 @@ static void txs_work(void *context, int task) {
             for (int y = top + txs_mod(sy - top, TXS_GRID); y < bottom; y += TXS_GRID) {
                 txm_rng rng =
                     txm_rng_make(s->seed ^ (s->pass * TXS_GROUP + (uint64_t)j) << 24, (uint64_t)y);
-                for (int x = sx; x < width; x += TXS_TOGETHER * TXS_GRID) {
-                    int n = (width - x + TXS_GRID - 1) / TXS_GRID;
-                    txs_visit(s, x, y, n < TXS_TOGETHER ? n : TXS_TOGETHER, &rng);
+                for (int x = sx, n; x < width; x += n * TXS_GRID) {
+                    const int stop = x < s->canvas->slip_x ? s->canvas->slip_x : width;
+                    n = (stop - x + TXS_GRID - 1) / TXS_GRID; /* all of one parity */
+                    if (n > TXS_TOGETHER) n = TXS_TOGETHER;
+                    txs_visit(s, x, y, n, &rng);
                 }
-                const txs_list *list = txs_list_at(s, sx, y);
                 for (int x = sx; x < width; x += TXS_GRID)
                     if (txs_is_counted(s, x, y))
-                        txs_count(list, txs_at(s->canvas, 0, x, y), counts);
+                        txs_count(txs_list_at(s, x, y), txs_at(s->canvas, 0, x, y), counts);
             }
         }
     }
@@ -1243,10 +1248,11 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
 
 /* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: the nearest
    pixel, the one on the other side, and as the result the weight of that in quarters. An odd torus
-   lies on one that is half a pixel too long, which is squeezed lest there be a seam. */
+   lies on one that is half a pixel too long, which is squeezed lest there be a seam: by a quarter
+   each at two places far from the border. From the first on, parities swap. */
 static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
     int at = 2 * x + 1; /* in quarters of a coarse pixel, from the border */
-    if (fine == 2 * coarse - 1) at = (int)((int64_t)at * 2 * coarse / fine);
+    if (fine == 2 * coarse - 1) at = (int)(((int64_t)at * 2 * coarse + coarse - 1) / fine);
     const int off = at % 4 - 2; /* -2..1 */
     where[0] = wrap ? at / 4 % coarse : txm_clampi(at / 4, 0, coarse - 1);
     where[1] = where[0] + (off > 0 ? 1 : -1);
@@ -1257,7 +1263,9 @@ static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
 /* Fill the parent planes of a canvas with the coarser level above, bilinearly, in this level's
    steps. At the borders the coarse canvas wraps if it has a margin, else its last row counts. */
 static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, const txs_level *level,
-                           const txs_canvas *canvas, int bands) {
+                           txs_canvas *canvas, int bands) {
+    if (canvas->width == 2 * coarse->width - 1) canvas->slip_x = coarse->width / 2;
+    if (canvas->height == 2 * coarse->height - 1) canvas->slip_y = coarse->height / 2;
     for (int b = 0; b < bands; b++) {
         uint8_t map[16 * TXS_VALUES];
         for (int q = 0; q < 16 * TXS_VALUES; q++)
