@@ -1989,7 +1989,7 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         copy->level[i].types = types + i * TXS_MAX_TYPES;
         memcpy(copy->level[i].types, l->types, sizeof *types * (size_t)l->type_count);
     }
-    for (int writing = 0; writing <= (buffer != NULL) && status == TXM_OK; writing++) {
+    for (int writing = 0; writing < (buffer ? 2 : 1) && status == TXM_OK; writing++) {
         uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
         txs_coder c;
         memset(&c, 0, sizeof c);
