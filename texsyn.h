@@ -1071,6 +1071,7 @@ static void txs_sampler_start(txs_sampler *s) {
     s->tasks = s->strips > 1 ? s->strips / 2 : 1;
     if (s->tasks > TXS_TASKS) s->tasks = TXS_TASKS;
     s->skip = pixels > TXS_SAMPLES ? (int)(pixels / TXS_SAMPLES) : 1;
+    if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find next to none */
 
     memset(s->histogram, 0, sizeof *s->histogram * (size_t)types);
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
