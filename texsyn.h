@@ -135,7 +135,7 @@ typedef struct texsyn_learn_desc {
     txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
                           outlive the call                                                       */
     txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
-    int max_distance;  /* longest clique in pixels of the example, 2..60; 0 = 40. Finer levels look
+    int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Finer levels look
                           no further than 10 pixels: what is beyond, the coarsest sees           */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
                           36 for a gray example                                                   */

@@ -74,7 +74,7 @@ if [ ! -s "$samples/list.part" ]; then
     echo "samples: no photographs in reach; drawing exemplars instead (tools/draw.c)"
     for name in $("$build/draw" list); do
         "$build/draw" "$name" "$samples/$name.png"
-        echo "good$tab$name$tab$name${tab}drawn by tools/draw.c, not a photograph$tab\
+        echo "good$tab$name$tab$name${tab}drawn by tools/draw.c, not a photograph${tab}\
 as texkit" >>"$samples/list.part"
     done
 fi

@@ -4,7 +4,7 @@
    Each command is a manual (cli_manual), a table of options and one function that calls the
    library; the table at the end lists them. What they share is in cli.c, image files are in
    image_io.c. Read run_learn first: it shows all there is to embedding a header.              */
-#define _POSIX_C_SOURCE 200809L /* setenv, execv */
+#define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
 #include "cli.h"
 #include "image_io.h"
 
@@ -89,7 +89,7 @@ static int run_learn(int argc, char **argv) {
     texsyn_learn_desc desc = {0};
     const char *mask_path = NULL;
     const cli_option options[] = {
-        {CLI_INT, "--max-distance", "D", "longest clique in pixels, 2 to 60; default 40",
+        {CLI_INT, "--max-distance", "D", "longest pair in pixels, 2 to 60; default 40",
          &desc.max_distance, 2, 60},
         {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 24, gray 36",
          &desc.max_types, 1, 60},
