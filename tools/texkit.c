@@ -264,11 +264,13 @@ static int print_overview(void) {
     return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
 }
 
-/* OpenMP's threads spin while they wait, which stands still when something else wants the cores.
-   How they wait is read before main begins, so say it and begin again. */
+/* OpenMP's threads spin for milliseconds while they wait, which stands still when something else
+   wants the cores. Let them spin for some microseconds only (GNU's library knows the second word)
+   and then sleep. How they wait is read before main begins, so say it and begin again. */
 static void wait_politely(char **argv) {
 #ifdef _OPENMP
-    if (!getenv("OMP_WAIT_POLICY") && setenv("OMP_WAIT_POLICY", "passive", 0) == 0)
+    if (!getenv("OMP_WAIT_POLICY") && setenv("OMP_WAIT_POLICY", "passive", 0) == 0 &&
+        setenv("GOMP_SPINCOUNT", "20000", 0) == 0)
         execv("/proc/self/exe", argv); /* where that fails, work goes on as it is */
 #endif
     (void)argv;
