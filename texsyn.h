@@ -288,9 +288,8 @@ enum {
     TXS_GRID = 8,        /* sub-lattices a side                                              */
     TXS_TOGETHER = 8,    /* pixels drawn together                                            */
     TXS_GROUP = 2,       /* sub-lattices between two looks at the histograms                 */
-    TXS_PROPORTIONAL = 150,
-    TXS_INTEGRAL = 40,   /* gains of the control, nats per unit of
-                             histogram error; half or double makes little difference          */
+    TXS_PROPORTIONAL = 150, /* gains of the control, nats per unit of histogram error; see   */
+    TXS_INTEGRAL = 40,      /* docs/choices.md                                               */
     TXS_TYPES = 24,      /* added per level unless the caller says otherwise                 */
     TXS_TYPES_GRAY = 36, /* if there is only one band                                       */
     TXS_COARSE = 8,      /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
@@ -1984,7 +1983,7 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to save the model");
         goto done;
     }
-    *copy = *model; /* coding rounds the statistics, so it works on a copy */
+    *copy = *model; /* the coder stores what it codes, so it works on a copy */
     for (int i = 0; i < model->levels; i++) {
         const txs_level *l = &model->level[i];
         copy->level[i].types = types + i * TXS_MAX_TYPES;
@@ -2003,8 +2002,9 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         *size = c.at + TXS_CRC_BYTES;
         if (buffer && capacity < *size)
             status = txm_fail(env, TXM_TOO_SMALL, "save: the buffer is smaller than *size says");
-        for (int i = 0; i < TXS_CRC_BYTES && writing; i++)
-            bytes[c.at + (size_t)i] = (uint8_t)(txs_crc(bytes, c.at) >> 8 * i);
+        if (!writing) continue;
+        const uint32_t crc = txs_crc(bytes, c.at);
+        for (int i = 0; i < TXS_CRC_BYTES; i++) bytes[c.at + (size_t)i] = (uint8_t)(crc >> 8 * i);
     }
 done:
     txm_arena_free(&arena);
