@@ -7,9 +7,6 @@ out=out
 tab=$(printf '\t')
 mkdir -p "$out"
 
-# OpenMP's threads wait for each other by spinning unless told otherwise: slow on a busy machine
-export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
-
 # figure NAME FILE: a number, or a list of them, out of a --stats file
 figure() { sed -n "s/^ *\"$1\": \[*\([0-9., ]*[0-9]\).*/\1/p" "$2"; }
 seconds() { printf %.1f "$(figure "$1" "$2")"; }
