@@ -11,7 +11,14 @@ missing=
 
 has_header() { echo "#include <$1>" | ${CC:-cc} -E -xc - >/dev/null 2>&1; }
 has_cxx_header() { find /usr/include /usr/local/include -path "*/$1" 2>/dev/null | grep -q .; }
+# one of these files, patterns allowed
+has_file() {
+    for file in $1; do [ -e "$file" ] && return 0; done
+    return 1
+}
 has_command() { command -v "$1" >/dev/null 2>&1; }
+# a module of Debian's own python3, another python3 may come first in the path
+has_python() { has_command /usr/bin/python3 && has_file "/usr/lib/python3*/*-packages/$1"; }
 
 # need TEST NAME PACKAGE: unless the test finds the name, the Debian package is to be installed
 need() { "$1" "$2" || missing="$missing $3"; }
@@ -21,6 +28,13 @@ case $profile in test | ci)
     need has_command g++ g++
     need has_header cmocka.h libcmocka-dev
     need has_cxx_header OpenImageIO/imagebuf.h libopenimageio-dev
+    need has_python jsonschema python3-jsonschema
+    # OpenGL without a window and without a graphics card
+    need has_header EGL/egl.h libegl-dev
+    need has_header GL/glext.h libgl-dev
+    need has_file "/usr/lib*/libOpenGL.so /usr/lib/*/libOpenGL.so" libopengl-dev
+    need has_file "/usr/share/glvnd/egl_vendor.d/*mesa.json" libegl-mesa0
+    need has_file "/usr/lib*/dri/swrast_dri.so /usr/lib/*/dri/swrast_dri.so" libgl1-mesa-dri
 esac
 case $profile in lint | ci)
     need has_command cppcheck cppcheck
