@@ -16,7 +16,7 @@ COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -I. -Ito
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 HEADERS := $(wildcard *.h)
-TEXKIT   = $(addprefix $(BUILD)/,texkit.o cli.o image_io.o stb.o)
+TEXKIT   = $(addprefix $(BUILD)/,texkit.o tiles.o command.o cli.o image_io.o stb.o)
 EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%,$(wildcard examples/*.c))
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
@@ -33,7 +33,7 @@ help:
 	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
 	@echo "make bench      print a table of timings"
 	@echo "make lint       cppcheck and clang-tidy"
-	@echo "make install    headers, pkg-config file and tool; PREFIX=$(PREFIX), DESTDIR="
+	@echo "make install    headers, shaders, pkg-config file and tool; PREFIX=$(PREFIX), DESTDIR="
 	@echo "make uninstall  take them away again"
 	@echo "make clean      remove $(BUILD)/ and out/"
 
@@ -103,15 +103,16 @@ lint:
 
 install: all
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/include/texkit" \
-	    "$(DESTDIR)$(PREFIX)/lib/pkgconfig"
+	    "$(DESTDIR)$(PREFIX)/lib/pkgconfig" "$(DESTDIR)$(PREFIX)/share/texkit/shaders"
 	install -m 755 $(BUILD)/texkit "$(DESTDIR)$(PREFIX)/bin/texkit"
 	install -m 644 $(HEADERS) "$(DESTDIR)$(PREFIX)/include/texkit"
+	install -m 644 shaders/*.glsl "$(DESTDIR)$(PREFIX)/share/texkit/shaders"
 	sed 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(VERSION)|' tools/texkit.pc.in \
 	    > "$(DESTDIR)$(PREFIX)/lib/pkgconfig/texkit.pc"
 
 uninstall:
 	rm -f "$(DESTDIR)$(PREFIX)/bin/texkit" "$(DESTDIR)$(PREFIX)/lib/pkgconfig/texkit.pc"
-	rm -rf "$(DESTDIR)$(PREFIX)/include/texkit"
+	rm -rf "$(DESTDIR)$(PREFIX)/include/texkit" "$(DESTDIR)$(PREFIX)/share/texkit"
 
 clean:
 	rm -rf $(BUILD) out

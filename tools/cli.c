@@ -310,7 +310,8 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
     } else if (run->stats && strcmp(run->stats, run->output) == 0) {
         *status = cli_fail(run, CLI_USAGE, "-o and --stats name the same file '%s'", run->stats);
     } else {
-        *status = cli_check_output(run, run->output);
+        *status = manual->makes_folder ? cli_check_folder(run, run->output)
+                                       : cli_check_output(run, run->output);
         if (*status == CLI_DONE && run->stats) *status = cli_check_output(run, run->stats);
     }
     if (*status != CLI_DONE) return 1;
@@ -411,6 +412,22 @@ int cli_check_output(cli *run, const char *path) {
                     strerror(errno));
 }
 
+int cli_check_folder(cli *run, const char *path) {
+    struct stat info;
+    char place[PATH_MAX + 2];
+    size_t n = strlen(path);
+    if (stat(path, &info) == 0) {
+        if (!S_ISDIR(info.st_mode)) errno = ENOTDIR;
+        else if (access(path, W_OK | X_OK) == 0) return CLI_DONE;
+        return cli_fail(run, CLI_FAILED, "cannot write into '%s': %s; name a folder of yours", path,
+                        strerror(errno));
+    }
+    if (n > PATH_MAX) return cli_fail(run, CLI_FAILED, "the path is too long");
+    memcpy(place, path, n + 1);
+    while (n > 1 && place[n - 1] == '/') place[--n] = 0; /* "new/" would be looked for in itself */
+    return cli_check_output(run, place);
+}
+
 static int write_all(const char *path, const output *o, int flags) {
     int file = open(path, flags, 0666);
     size_t done = 0;
@@ -427,20 +444,17 @@ static int write_all(const char *path, const output *o, int flags) {
     return error == 0;
 }
 
-int cli_finish(cli *run, const void *bytes, size_t size) {
+/* Write all outputs, and the statistics behind them, or none. There must be room for one more. */
+static int finish(cli *run, output *outputs, int count) {
     char text[4096];
-    output outputs[2] = {{0}, {0}};
-    int count = 1, i, written = 0, status = CLI_DONE;
+    int i, written = 0, status = CLI_DONE;
     cli_stage(run, NULL);
     clear_bar(run);
-    outputs[0].path = run->output;
-    outputs[0].bytes = bytes;
-    outputs[0].size = size;
     if (run->stats) {
-        outputs[1].path = run->stats;
-        outputs[1].bytes = text;
-        outputs[1].size = format_stats(run, text, sizeof text);
-        count = 2;
+        outputs[count].path = run->stats;
+        outputs[count].bytes = text;
+        outputs[count].size = format_stats(run, text, sizeof text);
+        count++;
     }
 
     for (i = 0; i < count; i++) {
@@ -460,5 +474,39 @@ int cli_finish(cli *run, const void *bytes, size_t size) {
                           strerror(errno));
         for (int k = 0; k < written; k++) unlink(outputs[k].temporary);
     }
+    return status;
+}
+
+int cli_finish(cli *run, const void *bytes, size_t size) {
+    output outputs[2] = {{0}, {0}};
+    outputs[0].path = run->output;
+    outputs[0].bytes = bytes;
+    outputs[0].size = size;
+    return finish(run, outputs, 1);
+}
+
+int cli_finish_folder(cli *run, const cli_file *files, int count) {
+    output *outputs = (output *)calloc((size_t)count + 1, sizeof *outputs);
+    char *paths = (char *)calloc((size_t)count, PATH_MAX);
+    int status = CLI_DONE, made = 0;
+    if (!outputs || !paths) status = cli_fail(run, CLI_FAILED, "out of memory");
+    for (int i = 0; i < count && !status; i++) {
+        char *path = paths + (size_t)i * PATH_MAX;
+        outputs[i].path = path;
+        outputs[i].bytes = files[i].bytes;
+        outputs[i].size = files[i].size;
+        if (snprintf(path, PATH_MAX, "%s/%s", run->output, files[i].name) >= PATH_MAX)
+            status = cli_fail(run, CLI_FAILED, "'%s': the path is too long", run->output);
+    }
+    if (!status) {
+        made = mkdir(run->output, 0777) == 0;
+        if (!made && errno != EEXIST)
+            status = cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", run->output,
+                              strerror(errno));
+    }
+    if (!status) status = finish(run, outputs, count);
+    if (status && made) rmdir(run->output);
+    free(paths);
+    free(outputs);
     return status;
 }

@@ -19,7 +19,7 @@ extern const char cli_versions[];
 /* Exit status of the program, as the manual promises. */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
-enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8 };
+enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8, CLI_MAX_FILES = 16 };
 
 /* ---- options ---------------------------------------------------------------------------- */
 
@@ -50,6 +50,7 @@ typedef struct cli_manual {
     const char *example; /* the same                                        */
     int inputs;          /* how many input files it takes                   */
     const char *input;   /* what the first is called in messages            */
+    int makes_folder;    /* the output is a folder of files                 */
 } cli_manual;
 
 /* ---- one run of one command --------------------------------------------------------------- */
@@ -108,7 +109,18 @@ double cli_seconds(const cli *run);
 /* Before the work: can this path be written at all? Says so if not; returns an exit status. */
 int cli_check_output(cli *run, const char *path);
 
+/* The same for a folder: is it there and writable, or can it be made? */
+int cli_check_folder(cli *run, const char *path);
+
 /* Write the output and the statistics, both or neither; returns the exit status. */
 int cli_finish(cli *run, const void *bytes, size_t size);
+
+/* The same for several files in the output folder, which is made if it is not there: all or none. */
+typedef struct cli_file {
+    const char *name; /* within the folder */
+    const void *bytes;
+    size_t size;
+} cli_file;
+int cli_finish_folder(cli *run, const cli_file *files, int count);
 
 #endif /* CLI_H */

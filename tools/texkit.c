@@ -2,63 +2,28 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    Each command is a manual (cli_manual), a table of options and one function that calls the
-   library; the table at the end lists them. What they share is in cli.c, image files are in
-   image_io.c. Read run_learn first: it shows all there is to embedding a header.              */
+   library; the table at the end lists them. learn and synth are here, tiles is in tiles.c. What
+   commands share is in command.c and cli.c, image files are in image_io.c. Read run_learn first: it
+   shows all there is to embedding a header.                                                     */
 #define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
-#include "cli.h"
+#include "command.h"
 #include "image_io.h"
 
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
+#include "textiles.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <unistd.h>
 
 const char cli_versions[] =
-    TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION ")";
+    TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
+                   ", textiles " TEXTILES_VERSION ")";
 
 enum { MAX_SIDE = 1 << 24 };
 
-/* ---- what several commands do ------------------------------------------------------------ */
-
-/* A call into the library failed: say so in its own words. */
-static int fail_library(cli *run, txm_status status, const char *what) {
-    if (status == TXM_CANCELLED) return cli_fail(run, CLI_FAILED, "stopped; nothing was written");
-    if (status == TXM_OUT_OF_MEMORY)
-        return cli_fail(run, CLI_FAILED, "'%s': out of memory; take a smaller size", what);
-    return cli_fail(run, CLI_FAILED, "'%s': %s", what, run->env.message);
-}
-
-static int read_image(cli *run, const char *path, int channels, txm_image *image) {
-    const char *why;
-    if (image_read(path, channels, image, &why)) return CLI_DONE;
-    return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
-}
-
-/* Refuse, before any work, an output path that cannot hold such a picture. */
-static int check_picture_path(cli *run, const char *path, int width, int height, int channels) {
-    const char *why;
-    char extension[8];
-    file_extension(path, extension);
-    if (image_can_write(extension, width, height, channels, &why)) return CLI_DONE;
-    return cli_fail(run, CLI_USAGE, "cannot write '%s': %s", path, why);
-}
-
-static int finish_with_picture(cli *run, const txm_image *image) {
-    const char *why;
-    char extension[8];
-    unsigned char *bytes;
-    size_t size;
-    cli_stage(run, "encode");
-    file_extension(run->output, extension);
-    if (!image_encode(extension, image, &bytes, &size, &why))
-        return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
-    cli_figure(run, "file_bytes", (double)size);
-    int status = cli_finish(run, bytes, size);
-    free(bytes);
-    return status;
-}
+/* ---- texkit learn ------------------------------------------------------------------------ */
 
 static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
     cli_figure(run, "model_bytes", (double)bytes);
@@ -72,8 +37,6 @@ static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
     cli_figure(run, "bands", texsyn_band_count(model));
 }
 
-/* ---- texkit learn ------------------------------------------------------------------------ */
-
 static const cli_manual learn_manual = {
     "learn", "EXEMPLAR -o MODEL.txs [options]", "learn a small model of a texture from a picture",
     "EXEMPLAR is a PNG, JPEG, BMP, TGA or binary PNM picture of the texture, at least\n"
@@ -82,7 +45,7 @@ static const cli_manual learn_manual = {
     "model holds statistics, no pixels; 'texkit synth' makes new texture from it.\n",
     "  texkit learn gravel.jpg -o gravel.txs\n"
     "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
-    1, "exemplar"};
+    1, "exemplar", 0};
 
 static int run_learn(int argc, char **argv) {
     cli run;
@@ -157,7 +120,7 @@ static const cli_manual synth_manual = {
     "exemplar's, and more time.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
-    1, "exemplar or model"};
+    1, "exemplar or model", 0};
 
 /* The input as a model: loaded if it is one, else learned from the picture. */
 static int get_model(cli *run, texsyn_model **model) {
@@ -245,20 +208,17 @@ done:
 
 /* ---- the table of commands ---------------------------------------------------------------- */
 
-static const struct {
-    const cli_manual *manual;
-    int (*run)(int argc, char **argv); /* the arguments behind the command's name */
-} commands[] = {
-    {&learn_manual, run_learn},
-    {&synth_manual, run_synth},
-};
+const command learn_command = {&learn_manual, run_learn};
+const command synth_command = {&synth_manual, run_synth};
+
+static const command *const commands[] = {&learn_command, &synth_command, &tiles_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static int print_overview(void) {
     printf("texkit COMMAND [INPUT...] [options]\n\nCommands:\n");
     for (int i = 0; i < COMMAND_COUNT; i++)
-        printf("  %-10s %s\n", commands[i].manual->name, commands[i].manual->summary);
+        printf("  %-10s %s\n", commands[i]->manual->name, commands[i]->manual->summary);
     printf("\n'texkit COMMAND --help' shows the options of one. Exit status: 0 done, 1 the work\n"
            "failed, 2 the command line was wrong.\n\nExample:\n%s", synth_manual.example);
     return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
@@ -288,7 +248,7 @@ int main(int argc, char **argv) {
         return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
     }
     for (int i = 0; i < COMMAND_COUNT; i++) {
-        if (!strcmp(argv[1], commands[i].manual->name)) return commands[i].run(argc - 2, argv + 2);
+        if (!strcmp(argv[1], commands[i]->manual->name)) return commands[i]->run(argc - 2, argv + 2);
     }
     fprintf(stderr, "texkit: unknown command '%.60s'; see 'texkit --help'\n", argv[1]);
     return CLI_USAGE;

@@ -1,0 +1,30 @@
+/* command.h - what the commands of texkit share with the table in texkit.c, and with each other
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   A command is a manual and a function; how it reads its command line is in cli.h.             */
+#ifndef COMMAND_H
+#define COMMAND_H
+
+#include "cli.h"
+
+typedef struct command {
+    const cli_manual *manual;
+    int (*run)(int argc, char **argv); /* the arguments behind the command's name; exit status */
+} command;
+
+extern const command learn_command, synth_command; /* texkit.c */
+extern const command tiles_command;                /* tiles.c  */
+
+/* A call into the library failed: say so in its own words. */
+int fail_library(cli *run, txm_status status, const char *what);
+
+/* Read a picture; channels 0 keeps what it has. An exit status. */
+int read_image(cli *run, const char *path, int channels, txm_image *image);
+
+/* Refuse, before any work, an output path that cannot hold such a picture. 0: not known yet. */
+int check_picture_path(cli *run, const char *path, int width, int height, int channels);
+
+/* Encode the picture for the output's extension and write it. */
+int finish_with_picture(cli *run, const txm_image *image);
+
+#endif /* COMMAND_H */

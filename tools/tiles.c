@@ -1,0 +1,374 @@
+/* tiles.c - texkit tiles: a photograph in, a tile set out
+   SPDX-License-Identifier: MIT OR Unlicense */
+#define _XOPEN_SOURCE 700 /* POSIX: open_memstream */
+#include "command.h"
+#include "image_io.h"
+
+#define TEXTILES_IMPLEMENTATION
+#include "textiles.h"
+
+#include <stdio.h>
+
+enum {
+    PREVIEW_TILES = 8,     /* a side of the preview, as long as it stays ...    */
+    PREVIEW_PIXELS = 2048, /* ... below so many pixels, and two tiles at least  */
+    MAX_PHOTOS = TEXTILES_MAX_EXEMPLARS
+};
+
+static const char *const kind_names[] = {"wang", "corner", "triangle", "frame", NULL};
+static const char *const packing_names[] = {"packed", "torus", "slices", NULL};
+static const char *const repair_names[] = {"poisson", "none", NULL};
+
+static const cli_manual tiles_manual = {
+    "tiles", "EXEMPLAR -o DIR --kind KIND [options]",
+    "cut a set of tiles that join invisibly out of a picture",
+    "KIND is wang (squares with colors on their edges), corner (squares with colors on\n"
+    "their corners), triangle (equilateral triangles with directed colors on their edges)\n"
+    "or frame (squares of a few classes with fixed edges). DIR, which is made if it is\n"
+    "not there, receives atlas.png, tiles.json (docs/tiles.md tells what it says) and\n"
+    "preview.png. The edges of a tile are untouched pixels of EXEMPLAR on both sides of\n"
+    "the joint. EXEMPLAR should be larger than a tile, three times a side or more.\n"
+    "Maps of the same material (normals, roughness) are cut in register with --maps:\n"
+    "atlas-2.png is of the first of them, and so on.\n",
+    "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
+    "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
+    1, "exemplar", 1};
+
+/* ---- tiles.json ------------------------------------------------------------------------- */
+
+static void print_ints(FILE *to, const char *name, const int *values, int count) {
+    fprintf(to, "\"%s\": [", name);
+    for (int i = 0; i < count; i++) fprintf(to, i ? ",%d" : "%d", values[i]);
+    fprintf(to, "]");
+}
+
+/* One tile; x, y: the top left pixel of the square that it lies in, gutter left out. */
+static void print_tile(FILE *to, const textiles_set *set, const textiles_layout *layout, int index) {
+    textiles_tile tile;
+    int x, y, step;
+    float uv[4][2];
+    const int is_triangle = layout->kind == TEXTILES_TRIANGLE, corners = is_triangle ? 3 : 4;
+    textiles_tile_at(set, index, &tile);
+    textiles_place(layout, index, &x, &y, &step, uv);
+    if (step < 0) {
+        x -= layout->size;
+        y -= layout->size;
+    }
+    fprintf(to, "    {\"x\": %d, \"y\": %d, ", x, y);
+    print_ints(to, layout->kind == TEXTILES_CORNER ? "corners" : "edges", tile.edges, corners);
+    if (is_triangle) {
+        fprintf(to, ", ");
+        print_ints(to, "directions", tile.directions, 3);
+        fprintf(to, ", \"step\": %d", step);
+    }
+    fprintf(to, ", \"variant\": %d, \"uv\": [", tile.variant);
+    for (int k = 0; k < corners; k++)
+        fprintf(to, "%s[%.9g,%.9g]", k ? "," : "", (double)uv[k][0], (double)uv[k][1]);
+    fprintf(to, "]}");
+}
+
+static void print_document(FILE *to, const textiles_set *set, const textiles_layout *layout,
+                         int map_count) {
+    const int count = textiles_count(set);
+    fprintf(to, "{\n  \"kind\": \"%s\",\n  \"size\": %d,\n  \"colors\": %d,\n  \"variants\": %d,\n",
+             kind_names[layout->kind], layout->size, textiles_colors(set), textiles_variants(set));
+    fprintf(to, "  \"atlas\": {\"width\": %d, \"height\": %d, \"packing\": \"%s\", \"gutter\": %d, ",
+             layout->width, layout->height, packing_names[layout->packing], layout->gutter);
+    fprintf(to, "\"columns\": %d, \"pitch\": [%d,%d], \"files\": [\"atlas.png\"", layout->columns,
+             layout->pitch_x, layout->pitch_y);
+    for (int m = 1; m < map_count; m++) fprintf(to, ", \"atlas-%d.png\"", m + 1);
+    fprintf(to, "]},\n  \"tiles\": [\n");
+    for (int i = 0; i < count; i++) {
+        print_tile(to, set, layout, i);
+        fprintf(to, i + 1 < count ? ",\n" : "\n");
+    }
+    fprintf(to, "  ]\n}\n");
+}
+
+/* ---- pictures --------------------------------------------------------------------------- */
+
+static int new_picture(cli *run, txm_image *image, int width, int height, int channels) {
+    memset(image, 0, sizeof *image);
+    image->width = width;
+    image->height = height;
+    image->channels = channels;
+    image->pixels = calloc((size_t)width * (size_t)height, (size_t)channels);
+    return image->pixels ? CLI_DONE : cli_fail(run, CLI_FAILED, "out of memory; make smaller tiles");
+}
+
+/* Some of the plane that the set covers; what has no plane is laid in scan-line order. */
+static txm_status draw_preview(cli *run, const textiles_set *set, const textiles_layout *layout,
+                               const txm_image *atlas, const txm_image *out) {
+    textiles_plane plane;
+    const int size = layout->size, columns = out->width / size, rows = out->height / size;
+    if (textiles_plane_make(set, (uint32_t)run->seed, &run->env, &plane) == TXM_OK)
+        return textiles_draw_plane(&plane, layout, atlas, 0, 0, 1, &run->env, *out);
+    int tiles[PREVIEW_TILES * PREVIEW_TILES];
+    txm_status status = textiles_scanline(set, columns, rows, run->seed, &run->env, tiles);
+    if (status == TXM_BAD_ARGUMENT) /* a frame set whose classes do not go on everywhere: side by side */
+        for (int i = 0; i < columns * rows; i++) tiles[i] = i % textiles_count(set);
+    else if (status != TXM_OK) return status;
+    const size_t texel = (size_t)out->channels, row = (size_t)out->width * texel;
+    for (int i = 0; i < columns * rows; i++) {
+        int px, py, step;
+        textiles_place(layout, tiles[i], &px, &py, &step, NULL);
+        for (int y = 0; y < size; y++)
+            memcpy((char *)out->pixels + (size_t)(i / columns * size + y) * row +
+                       (size_t)(i % columns * size) * texel,
+                   (const char *)txm_image_row_const(atlas, py + y) + (size_t)px * texel,
+                   (size_t)size * texel);
+    }
+    return TXM_OK;
+}
+
+/* Atlases, preview and tiles.json, all in memory, then all into the folder. */
+static int write_set(cli *run, const textiles_set *set, const textiles_layout *layout) {
+    const int maps = textiles_map_count(set);
+    txm_image atlas[TEXTILES_MAX_MAPS], preview = {0};
+    cli_file files[TEXTILES_MAX_MAPS + 2];
+    char names[TEXTILES_MAX_MAPS][24];
+    unsigned char *bytes[TEXTILES_MAX_MAPS + 1] = {NULL};
+    char *json = NULL;
+    size_t json_size = 0;
+    const char *why = NULL;
+    int status = CLI_DONE, count = 0, side = PREVIEW_TILES;
+    memset(atlas, 0, sizeof atlas);
+
+    cli_stage(run, "draw");
+    for (int m = 0; m < maps && !status; m++) {
+        status = new_picture(run, &atlas[m], layout->width, layout->height, textiles_channels(set, m));
+        if (status) break;
+        const txm_status result = textiles_draw_atlas(set, layout, m, &run->env, atlas[m]);
+        if (result != TXM_OK) status = fail_library(run, result, run->inputs[0]);
+    }
+    while (side > 2 && side * layout->size > PREVIEW_PIXELS) side--;
+    if (!status)
+        status = new_picture(run, &preview, side * layout->size, side * layout->size,
+                             atlas[0].channels);
+    if (!status) {
+        const txm_status result = draw_preview(run, set, layout, &atlas[0], &preview);
+        if (result != TXM_OK) status = fail_library(run, result, run->inputs[0]);
+    }
+
+    cli_stage(run, "encode");
+    for (int m = 0; m <= maps && !status; m++) { /* the preview comes last */
+        size_t size;
+        snprintf(names[m % TEXTILES_MAX_MAPS], sizeof names[0], m ? "atlas-%d.png" : "atlas.png",
+                 m + 1);
+        if (!image_encode(".png", m < maps ? &atlas[m] : &preview, &bytes[m], &size, &why))
+            status = cli_fail(run, CLI_FAILED, "cannot write into '%s': %s", run->output, why);
+        files[count].name = m < maps ? names[m] : "preview.png";
+        files[count].bytes = bytes[m];
+        files[count++].size = size;
+    }
+    if (!status) {
+        FILE *to = open_memstream(&json, &json_size);
+        if (to) print_document(to, set, layout, maps);
+        if (!to || ferror(to) | fclose(to)) status = cli_fail(run, CLI_FAILED, "out of memory");
+        files[count].name = "tiles.json";
+        files[count].bytes = json;
+        files[count++].size = json_size;
+    }
+    if (!status) status = cli_finish_folder(run, files, count);
+    free(json);
+    for (int m = 0; m <= maps; m++) free(bytes[m]);
+    for (int m = 0; m < maps; m++) free(atlas[m].pixels);
+    free(preview.pixels);
+    return status;
+}
+
+/* ---- the command ------------------------------------------------------------------------- */
+
+/* The index of a name in a list that ends in NULL, or -1 with the names in the message. */
+static int find_name(cli *run, const char *option, const char *name, const char *const *names) {
+    char all[80] = "";
+    for (int i = 0; names[i]; i++) {
+        if (!strcmp(names[i], name)) return i;
+        const size_t n = strlen(all);
+        snprintf(all + n, sizeof all - n, "%s%s", i ? ", " : "", names[i]);
+    }
+    cli_fail(run, CLI_USAGE, "%s '%s': choose one of %s", option, name, all);
+    return -1;
+}
+
+/* "0,0,0,0;0,1,0,0" as classes. Returns how many, or 0 if it is nothing of the kind. */
+static int parse_classes(const char *list, int classes[TEXTILES_MAX_CLASSES][4]) {
+    int count = 0;
+    for (const char *c = list;; c++) {
+        if (count == TEXTILES_MAX_CLASSES) return 0;
+        for (int k = 0; k < 4; k++) {
+            if (*c < '0' || *c > '9') return 0;
+            classes[count][k] = *c++ - '0';
+            if (k < 3 && *c++ != ',') return 0;
+        }
+        count++;
+        if (*c == 0) return count;
+        if (*c != ';') return 0;
+    }
+}
+
+/* The photographs of a run: exemplars[0] is EXEMPLAR with its maps. */
+typedef struct photos {
+    textiles_exemplar exemplars[MAX_PHOTOS];
+    txm_image images[MAX_PHOTOS][TEXTILES_MAX_MAPS];
+    int count;
+} photos;
+
+/* Read the pictures that a list names, separated by commas, one after the other by the given function. */
+static int read_list(cli *run, const char *list, const char *option, int most, photos *p,
+                     int (*take)(cli *run, photos *p, const char *path)) {
+    char path[4096];
+    for (int n = 0; list; n++) {
+        const char *comma = strchr(list, ',');
+        const size_t length = comma ? (size_t)(comma - list) : strlen(list);
+        if (n == most) return cli_fail(run, CLI_USAGE, "%s: at most %d pictures", option, most);
+        if (length == 0 || length >= sizeof path)
+            return cli_fail(run, CLI_USAGE, "%s: a name is empty or too long", option);
+        memcpy(path, list, length);
+        path[length] = 0;
+        const int status = take(run, p, path);
+        if (status) return status;
+        list = comma ? comma + 1 : NULL;
+    }
+    return CLI_DONE;
+}
+
+static int take_map(cli *run, photos *p, const char *path) {
+    textiles_exemplar *x = &p->exemplars[0];
+    txm_image *image = &p->images[0][x->map_count];
+    const int status = read_image(run, path, 0, image);
+    if (status) return status;
+    x->map_count++;
+    if (image->width == p->images[0][0].width && image->height == p->images[0][0].height)
+        return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "the map '%s' is %d x %d; make it %d x %d as '%s'", path,
+                    image->width, image->height, p->images[0][0].width, p->images[0][0].height,
+                    run->inputs[0]);
+}
+
+static int take_photo(cli *run, photos *p, const char *path) {
+    const int status = read_image(run, path, p->images[0][0].channels, &p->images[p->count][0]);
+    if (status) return status;
+    p->exemplars[p->count].maps = p->images[p->count];
+    p->exemplars[p->count].map_count = 1;
+    p->count++;
+    return CLI_DONE;
+}
+
+static void free_photos(photos *p) {
+    for (int e = 0; e < p->count; e++) {
+        for (int m = 0; m < p->exemplars[e].map_count; m++) image_free(&p->images[e][m]);
+    }
+}
+
+static void set_figures(cli *run, const textiles_set *set, const textiles_layout *layout,
+                        const textiles_joints *joints) {
+    cli_figure(run, "tiles", textiles_count(set));
+    cli_figure(run, "atlas_width", layout->width);
+    cli_figure(run, "atlas_height", layout->height);
+    cli_figure(run, "joint_pairs", joints->pairs);
+    cli_figure(run, "joint_mean", joints->mean);
+    cli_figure(run, "joint_worst", joints->worst);
+}
+
+static int run_tiles(int argc, char **argv) {
+    cli run;
+    textiles_desc desc = {0};
+    const char *kind = NULL, *packing = "packed", *repair = "poisson", *classes = NULL;
+    const char *maps = NULL, *more = NULL, *edges = NULL;
+    int gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
+    const cli_option options[] = {
+        {CLI_TEXT, "--kind", "KIND", "wang, corner, triangle or frame", &kind, 0, 0},
+        {CLI_INT, "--colors", "C", "per axis, of corners, or of triangle edges, 2 to 4; default 2",
+         &desc.colors, 1, TEXTILES_MAX_COLORS},
+        {CLI_INT, "--variants", "V", "tiles with the same colors, 1 to 16; default 1",
+         &desc.variants, 1, TEXTILES_MAX_VARIANTS},
+        {CLI_INT, "--size", "S", "pixels a side, 32 to 1024; default 128", &desc.size,
+         TEXTILES_MIN_SIZE, TEXTILES_MAX_SIZE},
+        {CLI_FLAG, "--reduced", NULL, "wang: 2 C C tiles for scan-line tiling; triangle: for meshes",
+         &desc.reduced, 0, 0},
+        {CLI_TEXT, "--classes", "LIST", "frame: edge colors n,e,s,w of each class, ';' between them",
+         &classes, 0, 0},
+        {CLI_TEXT, "--maps", "M1,M2,...", "more maps of the exemplar, cut in register", &maps, 0, 0},
+        {CLI_TEXT, "--more", "E2,E3,...", "more exemplars of the same texture", &more, 0, 0},
+        {CLI_TEXT, "--edges", "P0,P1,...", "pictures to cut the edges of each color from", &edges, 0,
+         0},
+        {CLI_TEXT, "--packing", "HOW", "packed (with gutters), torus (Wei's layout) or slices",
+         &packing, 0, 0},
+        {CLI_INT, "--gutter", "G", "pixels around each tile; 2^n for n mip levels; default 8",
+         &gutter, 0, TEXTILES_MAX_SIZE / 2},
+        {CLI_TEXT, "--repair", "HOW", "steps inside tiles: poisson (default) or none", &repair, 0, 0},
+        {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
+    };
+    photos p;
+    textiles_set *set = NULL;
+    textiles_layout layout;
+    textiles_joints joints;
+    memset(&p, 0, sizeof p);
+
+    if (cli_begin(&run, &tiles_manual, options, argc, argv, &status)) return status;
+    if (!kind)
+        return cli_fail(&run, CLI_USAGE, "no kind given; add --kind wang, corner, triangle or frame");
+    const int kind_index = find_name(&run, "--kind", kind, kind_names);
+    const int packing_index = kind_index < 0 ? -1 : find_name(&run, "--packing", packing, packing_names);
+    const int repair_index = packing_index < 0 ? -1 : find_name(&run, "--repair", repair, repair_names);
+    if (repair_index < 0) return CLI_USAGE;
+    desc.kind = (textiles_kind)kind_index;
+    desc.repair = repair_index ? TEXTILES_REPAIR_NONE : TEXTILES_REPAIR_POISSON;
+    desc.seed = run.seed;
+    if (desc.colors == 1 && desc.kind != TEXTILES_FRAME)
+        return cli_fail(&run, CLI_USAGE, "--colors 1 is for frame sets; give 2 to 4");
+    if (classes && !(desc.class_count = parse_classes(classes, list)))
+        return cli_fail(&run, CLI_USAGE,
+                        "--classes '%s': give four colors for each class, such as '0,0,0,0;0,1,0,0'",
+                        classes);
+    if (classes) desc.classes = (const int(*)[4])list;
+    if (maps && (more || edges))
+        return cli_fail(&run, CLI_USAGE, "--maps goes with one exemplar, without --more and --edges");
+
+    cli_stage(&run, "read");
+    status = read_image(&run, run.inputs[0], 0, &p.images[0][0]);
+    if (!status) {
+        p.exemplars[0].maps = p.images[0];
+        p.exemplars[0].map_count = p.count = 1;
+        if (maps) status = read_list(&run, maps, "--maps", TEXTILES_MAX_MAPS - 1, &p, take_map);
+    }
+    const int colors = desc.colors ? desc.colors : 2;
+    if (!status && edges) {
+        status = read_list(&run, edges, "--edges", colors, &p, take_photo);
+        if (!status && p.count != 1 + colors)
+            status = cli_fail(&run, CLI_USAGE, "--edges: give %d pictures, one for each color", colors);
+        for (int c = 0; c < colors; c++) edge_exemplars[c] = 1 + c;
+        desc.edge_exemplars = edge_exemplars;
+    }
+    if (!status && more)
+        status = read_list(&run, more, "--more", MAX_PHOTOS - p.count, &p, take_photo);
+    if (status) goto done;
+
+    cli_stage(&run, "cut");
+    desc.exemplars = p.exemplars;
+    desc.exemplar_count = p.count;
+    txm_status result = textiles_make(&desc, &run.env, &set);
+    if (result == TXM_OK)
+        result = textiles_layout_make(set, (textiles_packing)packing_index, gutter, &run.env, &layout);
+    if (result == TXM_OK) {
+        cli_stage(&run, "measure");
+        result = textiles_measure(set, 0, &run.env, &joints);
+    }
+    if (result != TXM_OK) {
+        status = fail_library(&run, result, run.inputs[0]);
+        goto done;
+    }
+    set_figures(&run, set, &layout, &joints);
+    status = write_set(&run, set, &layout);
+    if (!status && !run.quiet)
+        printf("%s: %d tiles, atlas %d x %d, steps at joints %.3f of those inside (worst pair %.3f), "
+               "%.1f s\n", run.output, textiles_count(set), layout.width, layout.height, joints.mean,
+               joints.worst, cli_seconds(&run));
+done:
+    textiles_free(set);
+    free_photos(&p);
+    return status;
+}
+
+const command tiles_command = {&tiles_manual, run_tiles};
