@@ -2506,7 +2506,7 @@ enum {
     TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
     TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
     TXT_MISSING = 256,    /* difference to a texel beyond the exemplar, quarter gray levels    */
-    TXT_CORNERS = 40,     /* places tried for the corner                                       */
+    TXT_CORNERS = 160,    /* places looked at for the corner                                   */
     TXT_PLACES = 16,      /* found for the inside of a tile                                    */
     TXT_TRIES = 4,        /* inside pieces cut for each tile, of which the best stays          */
     TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
@@ -2625,6 +2625,13 @@ static int32_t txt_number(const txt_build *b, int sheet, int i, int j) {
     const int k = b->is_triangle ? i + txt_half(j) : i;
     if (k < 0 || k >= s->width || j < 0 || j >= s->height) return -1;
     return s->first + j * s->width + k;
+}
+
+/* the sheet that a texel lies in */
+static int txt_sheet_of(const txt_build *b, int32_t t) {
+    int e = 0;
+    while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
+    return e;
 }
 
 /* number of the texel that a layer shows at (x, y) of a tile; -1: none */
@@ -3000,8 +3007,7 @@ static txm_status txt_fill_salience(txt_build *b) {
 
 /* Traits of one texel; 0 for those that there are none of. */
 static void txt_texel_traits(const txt_build *b, int32_t t, double traits[TXT_TRAITS]) {
-    int e = 0;
-    while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
+    const int e = txt_sheet_of(b, t);
     const txt_sheet *s = &b->sheets[e];
     const int at = t - s->first, x = at % s->width, y = at / s->width;
     for (int k = 0; k < TXT_TRAITS; k++) traits[k] = 0;
@@ -3318,241 +3324,6 @@ static int txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m
     return m->sum32 && m->starts && m->pairs && m->places;
 }
 
-/* ---- minimum cuts ------------------------------------------------------------------------ */
-
-/* Maximum flow on a grid by two growing search trees (Boykov and Kolmogorov 2004, with their time
-   stamps). A node is a place of the grid, with a margin of one on all sides whose capacities stay
-   zero. Arc d of node p goes to p + step[d]; the opposite arc is d + half there. */
-enum { TXT_FREE = 0, TXT_SOURCE = 1, TXT_SINK = 2 };
-enum { TXT_TERMINAL = 6, TXT_NONE = 7, TXT_ORPHAN = 8 }; /* parents that are no arc */
-
-typedef struct txt_flow {
-    int directions; /* 4 or 6 */
-    int step[6];
-    int count;        /* nodes, margin included             */
-    int32_t *arc[6];  /* residual capacities                */
-    int32_t *excess;  /* > 0 from the source, < 0 to the sink */
-    int32_t *next;    /* queue of active nodes: -2 = not in it, -1 = last */
-    int32_t *orphans; /* circular                           */
-    int32_t *stamp, *distance;
-    uint8_t *tree, *parent;
-    int first, last, orphan_at, orphan_count, time;
-} txt_flow;
-
-static int txt_opposite(const txt_flow *g, int d) {
-    const int half = g->directions / 2;
-    return d < half ? d + half : d - half;
-}
-
-static void txt_activate(txt_flow *g, int p) {
-    if (g->next[p] != -2) return;
-    g->next[p] = -1;
-    if (g->last >= 0) g->next[g->last] = p;
-    else g->first = p;
-    g->last = p;
-}
-
-static void txt_orphan(txt_flow *g, int p) {
-    int at = g->orphan_at + g->orphan_count++;
-    if (at >= g->count) at -= g->count;
-    g->parent[p] = TXT_ORPHAN;
-    g->orphans[at] = p;
-}
-
-/* Push flow along the path that arc d of p (in the source's tree) closes. */
-static void txt_augment(txt_flow *g, int p, int d) {
-    const int q = p + g->step[d];
-    int32_t flow = g->arc[d][p];
-    for (int x = p;; x += g->step[g->parent[x]]) {
-        const int up = g->parent[x];
-        const int32_t rest = up == TXT_TERMINAL
-                                 ? g->excess[x]
-                                 : g->arc[txt_opposite(g, up)][x + g->step[up]];
-        if (rest < flow) flow = rest;
-        if (up == TXT_TERMINAL) break;
-    }
-    for (int x = q;; x += g->step[g->parent[x]]) {
-        const int up = g->parent[x];
-        const int32_t rest = up == TXT_TERMINAL ? -g->excess[x] : g->arc[up][x];
-        if (rest < flow) flow = rest;
-        if (up == TXT_TERMINAL) break;
-    }
-    g->arc[d][p] -= flow;
-    g->arc[txt_opposite(g, d)][q] += flow;
-    for (int x = p, end = 0; !end;) {
-        const int up = g->parent[x];
-        if (up == TXT_TERMINAL) {
-            g->excess[x] -= flow;
-            if (g->excess[x] == 0) txt_orphan(g, x);
-            end = 1;
-        } else {
-            const int y = x + g->step[up];
-            g->arc[up][x] += flow;
-            g->arc[txt_opposite(g, up)][y] -= flow;
-            if (g->arc[txt_opposite(g, up)][y] == 0) txt_orphan(g, x);
-            x = y;
-        }
-    }
-    for (int x = q, end = 0; !end;) {
-        const int up = g->parent[x];
-        if (up == TXT_TERMINAL) {
-            g->excess[x] += flow;
-            if (g->excess[x] == 0) txt_orphan(g, x);
-            end = 1;
-        } else {
-            const int y = x + g->step[up];
-            g->arc[up][x] -= flow;
-            g->arc[txt_opposite(g, up)][y] += flow;
-            if (g->arc[up][x] == 0) txt_orphan(g, x);
-            x = y;
-        }
-    }
-}
-
-/* Capacity of the arc by which p hangs on its neighbour in direction d, in p's tree. */
-static int32_t txt_hold(const txt_flow *g, int p, int d) {
-    return g->tree[p] == TXT_SOURCE ? g->arc[txt_opposite(g, d)][p + g->step[d]] : g->arc[d][p];
-}
-
-/* Find a new parent for an orphan, the nearest to the terminal, or set it and its children free. */
-static void txt_adopt(txt_flow *g, int p) {
-    int best = TXT_NONE, least = INT_MAX;
-    const uint8_t tree = g->tree[p];
-    for (int d = 0; d < g->directions; d++) {
-        const int q = p + g->step[d];
-        if (g->tree[q] != tree || g->parent[q] == TXT_NONE || txt_hold(g, p, d) == 0) continue;
-        int length = 0, x = q;
-        for (;;) { /* does q still hang on the terminal? */
-            if (g->stamp[x] == g->time) {
-                length += g->distance[x];
-                break;
-            }
-            const int up = g->parent[x];
-            length++;
-            if (up == TXT_TERMINAL) {
-                g->stamp[x] = g->time;
-                g->distance[x] = 1;
-                break;
-            }
-            if (up == TXT_ORPHAN || up == TXT_NONE) {
-                length = INT_MAX;
-                break;
-            }
-            x += g->step[up];
-        }
-        if (length == INT_MAX) continue;
-        if (length < least) {
-            least = length;
-            best = d;
-        }
-        for (x = q; g->stamp[x] != g->time; x += g->step[g->parent[x]]) {
-            g->stamp[x] = g->time;
-            g->distance[x] = length--;
-        }
-    }
-    g->parent[p] = (uint8_t)best;
-    if (best != TXT_NONE) {
-        g->stamp[p] = g->time;
-        g->distance[p] = least + 1;
-        return;
-    }
-    for (int d = 0; d < g->directions; d++) {
-        const int q = p + g->step[d];
-        if (g->tree[q] != tree || g->parent[q] == TXT_NONE) continue;
-        if (txt_hold(g, p, d) > 0) txt_activate(g, q);
-        if (g->parent[q] < 6 && q + g->step[g->parent[q]] == p) txt_orphan(g, q);
-    }
-    g->tree[p] = TXT_FREE;
-}
-
-/* Grow the tree of p by one ring. Returns 1 with (*from, *d) the arc where the two trees touch. */
-static int txt_grow(txt_flow *g, int p, int *from, int *direction) {
-    const int is_source = g->tree[p] == TXT_SOURCE;
-    for (int d = 0; d < g->directions; d++) {
-        const int q = p + g->step[d], back = txt_opposite(g, d);
-        if ((is_source ? g->arc[d][p] : g->arc[back][q]) == 0) continue;
-        if (g->tree[q] == TXT_FREE) {
-            g->tree[q] = g->tree[p];
-            g->parent[q] = (uint8_t)back;
-            g->stamp[q] = g->stamp[p];
-            g->distance[q] = g->distance[p] + 1;
-            txt_activate(g, q);
-        } else if (g->tree[q] != g->tree[p]) {
-            *from = is_source ? p : q;
-            *direction = is_source ? d : back;
-            return 1;
-        } else if (g->stamp[q] <= g->stamp[p] && g->distance[q] > g->distance[p]) {
-            g->parent[q] = (uint8_t)back; /* a shorter way */
-            g->stamp[q] = g->stamp[p];
-            g->distance[q] = g->distance[p] + 1;
-        }
-    }
-    return 0;
-}
-
-/* Afterwards the nodes whose tree is TXT_SINK are those beyond the cut. */
-static void txt_max_flow(txt_flow *g) {
-    g->first = g->last = -1;
-    g->orphan_at = g->orphan_count = 0;
-    g->time = 0;
-    for (int p = 0; p < g->count; p++) {
-        g->next[p] = -2;
-        g->stamp[p] = 0;
-        g->distance[p] = 1;
-        g->tree[p] = TXT_FREE;
-        g->parent[p] = TXT_NONE;
-        if (g->excess[p] == 0) continue;
-        g->tree[p] = g->excess[p] > 0 ? TXT_SOURCE : TXT_SINK;
-        g->parent[p] = TXT_TERMINAL;
-        txt_activate(g, p);
-    }
-    int current = -1;
-    for (;;) {
-        int p = current, from, d;
-        if (p < 0 || g->parent[p] == TXT_NONE) {
-            do { /* the next active node that still hangs on a tree */
-                p = g->first;
-                if (p < 0) return;
-                g->first = g->next[p];
-                if (g->first < 0) g->last = -1;
-                g->next[p] = -2;
-            } while (g->parent[p] == TXT_NONE);
-        }
-        current = -1;
-        const int touch = txt_grow(g, p, &from, &d);
-        g->time++;
-        if (!touch) continue;
-        current = p; /* it may touch again */
-        txt_augment(g, from, d);
-        while (g->orphan_count) {
-            const int orphan = g->orphans[g->orphan_at];
-            if (++g->orphan_at == g->count) g->orphan_at = 0;
-            g->orphan_count--;
-            txt_adopt(g, orphan);
-        }
-    }
-}
-
-static int txt_flow_make(txt_flow *g, txm_arena *arena, int directions, int most) {
-    const size_t n = (size_t)most;
-    g->directions = directions;
-    int ok = 1;
-    for (int d = 0; d < directions && ok; d++) {
-        g->arc[d] = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
-        ok = g->arc[d] != NULL;
-    }
-    int32_t *block = ok ? (int32_t *)txm_arena_alloc(arena, n, 5 * sizeof(int32_t)) : NULL;
-    g->tree = (uint8_t *)txm_arena_alloc(arena, n, 2);
-    if (!block || !g->tree) return 0;
-    g->excess = block;
-    g->next = block + n;
-    g->orphans = block + 2 * n;
-    g->stamp = block + 3 * n;
-    g->distance = block + 4 * n;
-    g->parent = g->tree + n;
-    return 1;
-}
-
 /* ---- corners and edges ------------------------------------------------------------------- */
 
 static int txt_zone_end(const txt_build *b) {
@@ -3802,8 +3573,8 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
     txt_cut_strip(b, s, s->count, size - zone - 1, size - TXT_NEAR - 1);
 }
 
-/* Is the corner's place usual enough: differences and salience around it. */
-static int txt_corner_cost(const txt_build *b, int sheet, int i, int j, uint32_t *cost) {
+/* How far a corner's place is from usual, in roughness and salience around it. */
+static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     const int x = i + (b->is_triangle ? txt_half(j) : 0), r = 10;
     double off = 0, loud = 0;
     const int axes = b->is_triangle ? 1 : 2;
@@ -3822,7 +3593,7 @@ static int txt_corner_cost(const txt_build *b, int sheet, int i, int j, uint32_t
         off += 0.5 * fabs(step - 1);
     }
     loud = loud / (2 * r) - 1;
-    *cost = (uint32_t)((30 * off + (loud > 0 ? 8 * loud : 0)) * TXT_SCALE);
+    uint32_t cost = (uint32_t)((30 * off + (loud > 0 ? 8 * loud : 0)) * TXT_SCALE);
     if (b->is_triangle) {
         /* what surrounds the vertex should look alike turned by any sixth of a circle */
         int sum = 0, n = 0;
@@ -3838,9 +3609,9 @@ static int txt_corner_cost(const txt_build *b, int sheet, int i, int j, uint32_t
                 }
             }
         }
-        *cost += (uint32_t)(sum * (TXT_SCALE / 4) / n);
+        cost += (uint32_t)(sum * (TXT_SCALE / 4) / n);
     }
-    return 1;
+    return cost;
 }
 
 /* the exemplar that edges of a colour are taken from; -1: any */
@@ -3912,17 +3683,17 @@ static txm_status txt_choose_corner(txt_build *b, txm_rng *rng, txt_query *q, tx
     uint64_t least = UINT64_MAX;
     const int me = b->corner_count++;
     memset(list, 0, sizeof list);
-    for (int k = 0; k < TXT_CORNERS * 4; k++) {
+    for (int k = 0; k < TXT_CORNERS; k++) {
         int sheet, i, j;
-        uint32_t cost = 0;
         txt_random_corner(b, rng, &sheet, &i, &j);
         int away = 1;
         for (int c = 0; c < me; c++) {
             if (b->corner[c].sheet == sheet && abs(b->corner[c].i - i) < 24 &&
-                abs(b->corner[c].j - j) < 24 && k < TXT_CORNERS * 3)
+                abs(b->corner[c].j - j) < 24 && k < TXT_CORNERS * 3 / 4)
                 away = 0;
         }
-        if (!away || !txt_corner_cost(b, sheet, i, j, &cost)) continue;
+        if (!away) continue;
+        const uint32_t cost = txt_corner_cost(b, sheet, i, j);
         if (count == SHORT_LIST && list[count - 1].cost <= cost) continue;
         if (count < SHORT_LIST) count++;
         int at = count - 1;
@@ -4012,7 +3783,7 @@ typedef struct txt_canvas {
     txt_layer *layers;
     int layer_capacity;
     int layer_count, frame_count; /* the first frame_count belong to edges and corners */
-    txt_flow flow;
+    txm_flow flow;
     txt_query query;
     txt_scratch scratch;
     txt_place places[TXT_PLACES]; /* found for the inside */
@@ -4069,7 +3840,7 @@ static int64_t txt_energy(const txt_canvas *c, int x0, int y0, int x1, int y1) {
    [Boykov 2001]. Returns by how much the energy fell; if it would not, all stays as it was. */
 static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) {
     const txt_build *b = c->b;
-    txt_flow *g = &c->flow;
+    txm_flow *g = &c->flow;
     const int side = c->side, half = c->half, width = x1 - x0 + 2, height = y1 - y0 + 2;
     g->count = width * height;
     for (int k = 0; k < half; k++) {
@@ -4140,7 +3911,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
     }
     if (!any) return 0;
     const int64_t before = txt_energy(c, x0, y0, x1, y1);
-    txt_max_flow(g);
+    txm_flow_solve(g);
     for (int y = y0; y < y1; y++)
         memcpy(c->kept + y * side + x0, c->label + y * side + x0,
                (size_t)(x1 - x0) * sizeof *c->label);
@@ -4148,7 +3919,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
         for (int x = x0; x < x1; x++) {
             const int p = y * side + x, node = (y - y0 + 1) * width + (x - x0 + 1);
             if (!c->inside[p] || !TXT_MAY(p, x, y)) continue;
-            if (g->tree[node] == TXT_SINK) {
+            if (g->tree[node] == TXM_FLOW_SINK) {
                 c->label[p] = (uint16_t)l;
                 const int32_t t = c->shows[p];
                 c->shows[p] = c->other[p];
@@ -4426,8 +4197,7 @@ static void txt_count_use(txt_build *b, const txt_canvas *c) {
             const int p = y * c->side + x;
             if (!c->inside[p] || c->layers[c->label[p]].is_frame) continue;
             const int32_t t = c->shows[p];
-            int e = 0;
-            while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
+            const int e = txt_sheet_of(b, t);
             const int w = b->sheets[e].width, at = t - b->sheets[e].first;
             const int across = w / TXT_CELL + 2;
             const uint32_t weight = 8 + b->salient[t] / 2; /* 16 of usual salience */
@@ -4718,9 +4488,7 @@ static size_t txt_pool_bytes(size_t texels, size_t side) {
 
 /* the value of a map at a texel of the sheets */
 static float txt_sheet_value(const txt_build *b, int map, int32_t t, int channel) {
-    int e = 0;
-    while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
-    const txt_sheet *s = &b->sheets[e];
+    const txt_sheet *s = &b->sheets[txt_sheet_of(b, t)];
     const int at = t - s->first;
     return txm_image_get(&s->maps[map], at % s->width, at / s->width, channel);
 }
@@ -4831,8 +4599,7 @@ static void txt_store_tile(const txt_canvas *c) {
         source[p] = c->inside[p] ? c->shows[p] : -1;
         if (!c->inside[p]) continue;
         const int32_t t = c->shows[p];
-        int e = 0;
-        while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
+        const int e = txt_sheet_of(b, t);
         const int at = t - b->sheets[e].first, w = b->sheets[e].width;
         for (int m = 0; m < set->map_count; m++) {
             const char *row = (const char *)txm_image_row_const(&b->sheets[e].maps[m], at / w);
@@ -4901,7 +4668,7 @@ static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_re
         r->target = r->image + 4 * n;
     }
     return txt_scratch_make(b, arena, &c->scratch) &&
-           txt_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
+           txm_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
 }
 
 /* In which order the tiles of a batch try the places found for their insides: what another tile of the

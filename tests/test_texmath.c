@@ -1255,6 +1255,79 @@ static void test_quick_start(void **state) {
     assert_string_equal(line, "centre of the ramp: 0.5079\n");
 }
 
+/* ---- minimum cut of a grid ---- */
+
+enum { FLOW_W = 4, FLOW_H = 3, FLOW_STRIDE = FLOW_W + 2, FLOW_NODES = (FLOW_W + 2) * (FLOW_H + 2) };
+
+static int flow_node(int i) {
+    return (i / FLOW_W + 1) * FLOW_STRIDE + i % FLOW_W + 1;
+}
+
+/* Capacities cut when the nodes of the mask are the sink's. */
+static long flow_cut(int directions, const int step[6], int32_t arc[6][FLOW_NODES],
+                     const int32_t excess[FLOW_NODES], unsigned mask) {
+    long sum = 0;
+    int is_sink[FLOW_NODES] = {0};
+    for (int i = 0; i < FLOW_W * FLOW_H; i++) is_sink[flow_node(i)] = (int)(mask >> i & 1);
+    for (int i = 0; i < FLOW_W * FLOW_H; i++) {
+        const int p = flow_node(i);
+        if (excess[p] > 0 && is_sink[p]) sum += excess[p];
+        if (excess[p] < 0 && !is_sink[p]) sum -= excess[p];
+        for (int d = 0; d < directions; d++) {
+            if (!is_sink[p] && is_sink[p + step[d]]) sum += arc[d][p];
+        }
+    }
+    return sum;
+}
+
+/* On random grids the cut is as cheap as the cheapest of all 2^12. */
+static void test_flow(void **state) {
+    (void)state;
+    txm_arena arena;
+    txm_flow g;
+    txm_arena_init(&arena, NULL);
+    for (int directions = 4; directions <= 6; directions += 2) {
+        assert_true(txm_flow_make(&g, &arena, directions, FLOW_NODES));
+        for (int trial = 0; trial < 150; trial++) {
+            static int32_t arc[6][FLOW_NODES], excess[FLOW_NODES];
+            txm_rng rng = txm_rng_make(5, (uint64_t)(trial * 10 + directions));
+            const int most = trial % 3 == 0 ? 3 : 1000; /* small ones give ties */
+            const int half = directions / 2;
+            const int step[3] = {1, FLOW_STRIDE, FLOW_STRIDE - 1};
+            memset(arc, 0, sizeof arc);
+            memset(excess, 0, sizeof excess);
+            for (int d = 0; d < half; d++) {
+                g.step[d] = step[d];
+                g.step[d + half] = -step[d];
+            }
+            for (int i = 0; i < FLOW_W * FLOW_H; i++) {
+                const int p = flow_node(i);
+                excess[p] = txm_rng_range(&rng, -most, most);
+                for (int k = 0; k < FLOW_W * FLOW_H; k++) {
+                    for (int d = 0; d < directions; d++) {
+                        if (flow_node(k) == p + g.step[d])
+                            arc[d][p] = txm_rng_range(&rng, 0, most);
+                    }
+                }
+            }
+            g.count = FLOW_NODES;
+            for (int d = 0; d < directions; d++) memcpy(g.arc[d], arc[d], sizeof arc[d]);
+            memcpy(g.excess, excess, sizeof excess);
+            txm_flow_solve(&g);
+            unsigned mask = 0;
+            for (int i = 0; i < FLOW_W * FLOW_H; i++)
+                mask |= (unsigned)(g.tree[flow_node(i)] == TXM_FLOW_SINK) << i;
+            long least = LONG_MAX;
+            for (unsigned m = 0; m < 1u << (FLOW_W * FLOW_H); m++) {
+                const long cut = flow_cut(directions, g.step, arc, excess, m);
+                if (cut < least) least = cut;
+            }
+            assert_int_equal(flow_cut(directions, g.step, arc, excess, mask), least);
+        }
+    }
+    txm_arena_free(&arena);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_status_text),
@@ -1281,6 +1354,7 @@ int main(void) {
         cmocka_unit_test(test_colour_back),
         cmocka_unit_test(test_eigen),
         cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_flow),
         cmocka_unit_test(test_halve),
         cmocka_unit_test(test_poisson_harmonic),
         cmocka_unit_test(test_poisson_equation),
