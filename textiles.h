@@ -4687,7 +4687,7 @@ static void txt_rank_places(const txt_build *b, txt_batch *batch, int count) {
             for (int t = TXT_STEP; t < TXT_STEP + 2; t++) {
                 /* joints are as rough as is usual; beside a smooth inside they would show */
                 const double rough = b->usual[t] > 0 ? 1 + more[t] / b->usual[t] : 1;
-                if (rough < 0.9) cost += 300 * (0.9 - rough);
+                if (rough < 0.9) cost += 600 * (0.9 - rough);
             }
             for (int o = 0; o < k; o++) {
                 const txt_canvas *other = &batch->canvas[o];
@@ -4813,7 +4813,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     b.desc = desc;
     b.env = env;
     b.is_triangle = desc->kind == TEXTILES_TRIANGLE;
-    b.wanted_step = 1;
+    b.wanted_step = b.is_triangle ? 0.94 : 1; /* cuts inside triangles are a little rougher */
     txm_arena_init(&b.arena, env);
     status = txt_prepare(&b);
     if (status == TXM_OK) status = txt_make_frames(&b);
