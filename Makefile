@@ -77,7 +77,7 @@ $(BUILD)/bench/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
 # the same without SIMD, for comparison
 $(BUILD)/bench/plain/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
-	$(COMPILE) -DTEXSYN_NO_SIMD $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
+	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
 
 # ---- demo, tests, lint
 

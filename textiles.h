@@ -89,12 +89,14 @@
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXTILES_STATIC       every function static to the including file (set it everywhere)
      TEXTILES_MAX_PIXELS   refuse larger exemplars, sets and pictures; default 2^28
-     TEXTILES_NO_SIMD      plain C only. Else SSE2 where the compiler has it. The bytes are the same.
+     TEXTILES_NO_SIMD      plain C only. Else SSE2 where the compiler has it and, with gcc and clang,
+                           AVX2 where the processor has it. The bytes are the same.
 
    MEMORY
      A set keeps its tiles' pixels and 4 bytes per pixel that tell where each comes from. Making
-     one takes besides, for each pixel of the exemplars, some 40 bytes and one or two per channel,
-     and for eight tiles at work 190 bytes per pixel of a tile. Laying the plane takes none.
+     one takes besides, for each pixel of the exemplars, some 35 bytes and 9 per channel of the
+     first map, and for each of eight tiles at work 1 MB and 190 bytes per pixel of a tile. Laying
+     the plane takes none.
 
    TIME   (one core of 2023; make bench measures yours)
      About 0.1 s for a tile of 128 x 128 out of 512 x 512 pixels, RGB: 16 Wang tiles in 1.5 s,
@@ -110,7 +112,9 @@
 
    LIMITS
      Tiles of 32 to 1024 pixels, 2 to 4 colours, 1 to 16 variants, up to 8 maps and 8 exemplars of
-     64 x 64 pixels or more. Cuts look at 8 channels at most; float maps are compared after scaling
+     64 x 64 pixels or more. Joints are as rough as insides within a few percent on average and
+     35 % for any pair (textiles_measure tells), unless the tiles are under 64 pixels or the
+     exemplar has smooth parts and rough ones larger than a tile. Cuts look at 8 channels at most; float maps are compared after scaling
      to their range.
 
    REFERENCES
@@ -466,8 +470,10 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
 #if !defined(TEXTILES_NO_SIMD) && defined(__SSE2__)
 #include <emmintrin.h>
 #define TXT_SSE2 1
-#else
-#define TXT_SSE2 0
+#if defined(__GNUC__)
+#include <immintrin.h>
+#define TXT_AVX2 1 /* compiled for AVX2 function by function, chosen when running */
+#endif
 #endif
 
 /* ---- private types ---------------------------------------------------------------------- */
@@ -509,9 +515,8 @@ static int txt_code(const textiles_set *s, const int edges[4], const int directi
     const int digits = s->kind == TEXTILES_TRIANGLE ? 3 : 4;
     int code = 0;
     for (int k = 0; k < digits; k++) {
-        const int symbol = txt_symbol(s, edges, directions, k);
-        if (symbol < 0 || symbol >= s->symbols) return -1;
-        code = code * s->symbols + symbol;
+        if (edges[k] < 0 || edges[k] >= s->colors) return -1;
+        code = code * s->symbols + txt_symbol(s, edges, directions, k);
     }
     return code;
 }
@@ -684,6 +689,18 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     return TXM_OK;
 }
 
+/* non-zero if no sample is infinite or NaN; of a triangle's square only the triangle counts */
+static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
+    for (int y = 0; y < im->height; y++) {
+        txm_image row = *im;
+        row.pixels = txm_image_row(im, y);
+        row.height = 1;
+        if (kind == TEXTILES_TRIANGLE) row.width = im->width - y;
+        if (!txm_image_is_finite(&row)) return 0;
+    }
+    return 1;
+}
+
 /* ---- public: sets ------------------------------------------------------------------------- */
 
 TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_image *tiles,
@@ -715,7 +732,7 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
                 txm_image_resolve(*im).channels != maps[m].channels)
                 return txm_fail(env, TXM_BAD_ARGUMENT,
                                 "tiles: all must have the size of the set and the same channels");
-            if (!txm_image_is_finite(im))
+            if (!txt_tile_is_finite(im, desc->kind))
                 return txm_fail(env, TXM_BAD_ARGUMENT, "tiles: a sample is not finite");
         }
     }
@@ -2507,7 +2524,7 @@ enum {
     TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
     TXT_MISSING = 256,    /* difference to a texel beyond the exemplar, quarter gray levels    */
     TXT_CORNERS = 160,    /* places looked at for the corner                                   */
-    TXT_PLACES = 16,      /* found for the inside of a tile                                    */
+    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
     TXT_TRIES = 4,        /* inside pieces cut for each tile, of which the best stays          */
     TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
     TXT_WINDOW = 12,      /* half width of such a place                                        */
@@ -2567,6 +2584,12 @@ typedef struct txt_seam_strip {
     uint8_t *which; /* by a, u: 0 the start's corner, 1..count a segment, count + 1 the end's */
 } txt_seam_strip;
 
+/* A place of the exemplars where a piece may come from. */
+typedef struct txt_place {
+    int sheet, turn, i, j;
+    uint32_t cost; /* mean difference of a sample in 1 / TXT_SCALE gray levels, and the extra cost */
+} txt_place;
+
 typedef struct txt_build {
     textiles_set *set;
     const textiles_desc *desc;
@@ -2599,6 +2622,7 @@ typedef struct txt_build {
     int corner_count;
     txt_seam_strip *strips;
     int strip_count;
+    txt_place *inside; /* by tile: where its inside comes from; sheet -1: nowhere as yet */
     int lock_from, lock_count; /* u of a strip's first line, how many                         */
     double step_mean;          /* from texel to texel, both axes                               */
     double wanted_step;        /* of joints, in units of the mean step of the exemplars       */
@@ -3113,11 +3137,6 @@ typedef struct txt_sample {
     uint8_t value[TXT_MAX_FEATURES]; /* blurred */
 } txt_sample;
 
-typedef struct txt_place {
-    int sheet, turn, i, j;
-    uint32_t cost; /* mean difference of a sample in 1 / TXT_SCALE gray levels, and the extra cost */
-} txt_place;
-
 /* How to search: samples, and what a place costs besides. */
 typedef struct txt_query {
     txt_sample *samples;
@@ -3176,9 +3195,33 @@ static int txt_row_range(const txt_build *b, const txt_query *q, int sheet, int 
 
 /* Sums of the differences of samples first..last-1 at TXT_LANES places side by side, added to sum. One
    group has at most 256 differences, so that 16 bits suffice. */
+#ifdef TXT_AVX2
+__attribute__((target("avx2"))) static void txt_add_lanes_avx2(const txt_build *b,
+                                                               const txt_query *q,
+                                                               const size_t *starts, int first,
+                                                               int last, int at, uint32_t *sum) {
+    const __m256i zero = _mm256_setzero_si256();
+    __m256i low = zero, high = zero; /* places 0-7 and 16-23, 8-15 and 24-31 */
+    for (int k = first; k < last; k++) {
+        const uint8_t *line = b->plane + starts[k] + at;
+        for (int f = 0; f < b->features; f++, line += b->texels) {
+            const __m256i want = _mm256_set1_epi8((char)q->samples[k].value[f]);
+            const __m256i v = _mm256_loadu_si256((const __m256i *)(const void *)line);
+            const __m256i d = _mm256_or_si256(_mm256_subs_epu8(v, want), _mm256_subs_epu8(want, v));
+            low = _mm256_add_epi16(low, _mm256_unpacklo_epi8(d, zero));
+            high = _mm256_add_epi16(high, _mm256_unpackhi_epi8(d, zero));
+        }
+    }
+    uint16_t sums[TXT_LANES];
+    _mm256_storeu_si256((__m256i *)(void *)sums, low);
+    _mm256_storeu_si256((__m256i *)(void *)(sums + 16), high);
+    for (int i = 0; i < TXT_LANES; i++) sum[i] += sums[(i & 7) | (i & 16) >> 1 | (i & 8) << 1];
+}
+#endif
+
 static void txt_add_lanes(const txt_build *b, const txt_query *q, const size_t *starts, int first,
                           int last, int at, uint32_t *sum) {
-#if TXT_SSE2
+#ifdef TXT_SSE2
     const __m128i zero = _mm_setzero_si128();
     __m128i sums[4] = {zero, zero, zero, zero};
     for (int k = first; k < last; k++) {
@@ -3229,10 +3272,14 @@ static void txt_row_costs(const txt_build *b, const txt_query *q, int sheet, int
         const int column = from + q->samples[k].i + (b->is_triangle ? txt_half(row) : 0);
         m->starts[k] = (size_t)(s->first + row * s->width + column);
     }
+    void (*add)(const txt_build *, const txt_query *, const size_t *, int, int, int, uint32_t *) =
+        txt_add_lanes;
+#ifdef TXT_AVX2
+    if (__builtin_cpu_supports("avx2")) add = txt_add_lanes_avx2;
+#endif
     for (int i = 0; i < lanes; i += TXT_LANES) {
         for (int k = 0; k < q->count; k += group)
-            txt_add_lanes(b, q, m->starts, k, k + group < q->count ? k + group : q->count, i,
-                          m->sum32 + i);
+            add(b, q, m->starts, k, k + group < q->count ? k + group : q->count, i, m->sum32 + i);
     }
     const uint32_t parts = (uint32_t)(q->count * b->features);
     for (int i = 0; i < n; i++) m->sum32[i] = m->sum32[i] * TXT_SCALE / parts;
@@ -3760,7 +3807,11 @@ static txm_status txt_make_frames(txt_build *b) {
     }
     if (status != TXM_OK) goto done;
     b->corners_are_final = 1;
-    txt_choose_strips(b, b->strips, &q, &m);
+    if (txt_choose_strips(b, b->strips, &q, &m) == UINT64_MAX) {
+        status = txm_fail(b->env, TXM_TOO_SMALL,
+                          "exemplars: too small to cut an edge from; give a larger picture");
+        goto done;
+    }
     for (int s = 0; s < b->strip_count; s++) txt_finish_strip(b, &b->strips[s]);
 done:
     txm_arena_free(&arena);
@@ -3787,7 +3838,7 @@ typedef struct txt_canvas {
     txt_query query;
     txt_scratch scratch;
     txt_place places[TXT_PLACES]; /* found for the inside */
-    int place_count;
+    int place_count, tries; /* how many of them are cut */
     int64_t best_energy;
     int best_place;
 } txt_canvas;
@@ -4080,7 +4131,7 @@ static void txt_begin_tile(txt_canvas *c, int tile) {
 static void txt_settle(txt_canvas *c) {
     const int reach = 20;
     for (int l = 0; l < c->layer_count; l++) {
-        int x0 = c->side, y0 = c->side, x1 = 0, y1 = 0;
+        int x0 = INT_MAX, y0 = INT_MAX, x1 = 0, y1 = 0;
         for (int y = 0; y < c->side; y++) {
             for (int x = 0; x < c->side; x++) {
                 if (!c->inside[y * c->side + x] || c->label[y * c->side + x] != l) continue;
@@ -4238,7 +4289,7 @@ static void txt_find_insides(txt_canvas *c) {
     c->place_count = 0;
     c->query.extra = txt_use_extra;
     c->query.context = &use;
-    c->query.apart = 1 + b->set->size / 12;
+    c->query.apart = 1 + b->set->size / (b->set->variants > 1 ? 8 : 12);
     c->query.coarse = turns > 1 ? 3 : 0;
     for (int turn = 0; turn < turns; turn++) {
         c->query.count = 0;
@@ -4247,7 +4298,7 @@ static void txt_find_insides(txt_canvas *c) {
             for (int x = 0; x < side; x++) {
                 const int p = y * side + x;
                 if (!c->inside[p] || c->border[p] < 2 || c->border[p] > 10) continue;
-                if (c->border[p] % 3 != 2 || (x + y) % c->query.apart % 4) continue;
+                if (c->border[p] % 3 != 2 || (x + y) % 3 || (turns > 1 && (x ^ y) & 1)) continue;
                 int i, j;
                 txt_turn(turn, x, y, &i, &j);
                 txt_sample_add(b, &c->query, i, j, c->shows[p]);
@@ -4259,14 +4310,17 @@ static void txt_find_insides(txt_canvas *c) {
     }
 }
 
+/* The layer of a place: a new one, or the one there is. -1: no room. */
 static int txt_add_layer(txt_canvas *c, const txt_place *p) {
+    const txt_layer layer = {p->sheet, p->turn, p->i, p->j, 0};
+    for (int l = 0; l < c->layer_count; l++) {
+        txt_layer *old = &c->layers[l];
+        if (!old->is_frame && old->sheet == layer.sheet && old->turn == layer.turn &&
+            old->i == layer.i && old->j == layer.j)
+            return l;
+    }
     if (c->layer_count == c->layer_capacity) return -1;
-    txt_layer *l = &c->layers[c->layer_count];
-    l->sheet = p->sheet;
-    l->turn = p->turn;
-    l->i = p->i;
-    l->j = p->j;
-    l->is_frame = 0;
+    c->layers[c->layer_count] = layer;
     return c->layer_count++;
 }
 
@@ -4334,9 +4388,9 @@ static void txt_mend(txt_canvas *c) {
         for (int e = 0; e < b->sheet_count; e++)
             count = txt_search(b, &c->query, e, turn, &c->scratch, found, count, 2);
         for (int k = 0; k < count; k++) {
-            const int l = txt_add_layer(c, &found[k]);
+            const int before = c->layer_count, l = txt_add_layer(c, &found[k]);
             if (l < 0) return;
-            if (txt_expand(c, l, x0, y0, x1, y1) == 0) c->layer_count--;
+            if (txt_expand(c, l, x0, y0, x1, y1) == 0) c->layer_count = before;
         }
     }
 }
@@ -4437,7 +4491,7 @@ static void txt_cut_tile(txt_canvas *c) {
         return;
     }
     memcpy(c->start, c->label, bytes);
-    for (int k = 0; k < c->place_count && k < TXT_TRIES; k++) {
+    for (int k = 0; k < c->place_count && k < c->tries; k++) {
         c->layer_count = c->frame_count;
         memcpy(c->label, c->start, bytes);
         txt_show(c);
@@ -4671,32 +4725,57 @@ static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_re
            txm_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
 }
 
-/* In which order the tiles of a batch try the places found for their insides: what another tile of the
-   batch tries first comes late, and what brings the traits of the set back to those of the exemplars
-   early. */
+/* variant 0 of a tile */
+static int txt_base(const txt_build *b, int tile) {
+    return tile - b->set->tiles[tile].variant;
+}
+
+/* Do two places show nearly the same? */
+static int txt_places_agree(const txt_place *a, const txt_place *b, int near) {
+    return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < near &&
+           abs(a->j - b->j) < near;
+}
+
+/* What a place costs, in gray levels, because other tiles show it: variants of one tile must not show
+   the same, and no two tiles quite the same. */
+static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k,
+                               const txt_place *place) {
+    const int near = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
+    const int first = txt_base(b, tile), begun = batch->canvas[0].tile;
+    double cost = 0;
+    for (int t = 0; t < begun; t++) {
+        if (txt_places_agree(&b->inside[t], place, t >= first ? apart : 3)) cost += 300;
+    }
+    for (int o = 0; o < k; o++) {
+        const txt_canvas *other = &batch->canvas[o];
+        for (int q = 0; q < other->place_count && q < other->tries; q++) {
+            const int variant = other->tile >= first;
+            if (!txt_places_agree(&other->places[q], place, variant ? apart : near)) continue;
+            cost += variant ? 300 : TXT_USE / (q ? 2 : 1);
+        }
+    }
+    return cost;
+}
+
+/* In which order the tiles of a batch try the places found for their insides: what another tile shows
+   or tries comes late, and what brings the traits of the set back to those of the exemplars early. */
 static void txt_rank_places(const txt_build *b, txt_batch *batch, int count) {
-    const int near = b->set->size / 3;
     double surplus[TXT_TRAITS], more[TXT_TRAITS];
     memcpy(surplus, b->surplus, sizeof surplus);
     for (int k = 0; k < count; k++) {
         txt_canvas *c = &batch->canvas[k];
+        int same = 1; /* variants of one tile that are in the batch share the places */
+        for (int o = 0; o < count; o++)
+            same += o != k && txt_base(b, batch->canvas[o].tile) == txt_base(b, c->tile);
+        c->tries = txm_clampi(c->place_count / same, 1, TXT_TRIES - b->is_triangle);
         for (int p = 0; p < c->place_count; p++) {
-            double cost = 0;
+            double cost = txt_sharing_cost(b, batch, k, &c->places[p]);
             txt_piece_traits(b, &c->places[p], more);
             for (int t = 0; t < TXT_TRAITS; t++) cost += fabs(surplus[t] + more[t]);
             for (int t = TXT_STEP; t < TXT_STEP + 2; t++) {
                 /* joints are as rough as is usual; beside a smooth inside they would show */
                 const double rough = b->usual[t] > 0 ? 1 + more[t] / b->usual[t] : 1;
                 if (rough < 0.9) cost += 600 * (0.9 - rough);
-            }
-            for (int o = 0; o < k; o++) {
-                const txt_canvas *other = &batch->canvas[o];
-                for (int q = 0; q < other->place_count && q < TXT_TRIES; q++) {
-                    if (other->places[q].sheet == c->places[p].sheet &&
-                        abs(other->places[q].i - c->places[p].i) < near &&
-                        abs(other->places[q].j - c->places[p].j) < near)
-                        cost += TXT_USE / (q ? 2 : 1);
-                }
             }
             c->places[p].cost += (uint32_t)(cost * TXT_SCALE * TXT_BALANCE);
         }
@@ -4721,13 +4800,15 @@ static txm_status txt_make_tiles(txt_build *b) {
     const int slots = count < TXT_BATCH ? count : TXT_BATCH;
     txm_arena_init(&arena, b->env);
     txt_batch *batch = (txt_batch *)txm_arena_zero(&arena, 1, sizeof *batch);
-    int ok = batch != NULL;
+    b->inside = (txt_place *)txm_arena_zero(&arena, (size_t)count, sizeof(txt_place));
+    int ok = batch && b->inside;
     for (int k = 0; k < slots && ok; k++)
         ok = txt_canvas_make(b, &arena, &batch->canvas[k], &batch->repair[k]);
     if (!ok) {
         status = txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory to cut tiles");
         goto done;
     }
+    for (int t = 0; t < count; t++) b->inside[t].sheet = -1;
     for (int first = 0; first < count; first += TXT_BATCH) {
         const int n = count - first < TXT_BATCH ? count - first : TXT_BATCH;
         if (txm_progress(b->env, 0.1f + 0.9f * (float)first / (float)count, "tiles")) {
@@ -4742,6 +4823,8 @@ static txm_status txt_make_tiles(txt_build *b) {
         for (int k = 0; k < n; k++) {
             txt_count_use(b, &batch->canvas[k]);
             txt_count_traits(b, &batch->canvas[k]);
+            const int best = batch->canvas[k].best_place;
+            if (best >= 0) b->inside[first + k] = batch->canvas[k].places[best];
         }
     }
 done:
@@ -4813,7 +4896,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     b.desc = desc;
     b.env = env;
     b.is_triangle = desc->kind == TEXTILES_TRIANGLE;
-    b.wanted_step = b.is_triangle ? 0.94 : 1; /* cuts inside triangles are a little rougher */
+    b.wanted_step = b.is_triangle ? 0.97 : 1; /* cuts inside triangles are a little rougher */
     txm_arena_init(&b.arena, env);
     status = txt_prepare(&b);
     if (status == TXM_OK) status = txt_make_frames(&b);
@@ -4903,16 +4986,17 @@ static void txt_side_texel(const textiles_set *s, int k, int a, int r, int *x, i
     }
 }
 
-/* Half the mean step from side k of a triangle to the row beside it, of both sides' texels. */
-static double txt_row_step(const textiles_set *s, int map, int tile, int k) {
+/* Mean step from the texels on side k of triangle a to the row beside it in triangle b, whose side m
+   lies there and runs the other way. */
+static double txt_row_step(const textiles_set *s, int map, int a, int k, int b, int m) {
     double sum = 0;
-    for (int a = 0; a < s->size; a++) {
-        for (int e = 0; e < 2; e++) { /* row 1's texel a lies between the edge's a and a + 1 */
+    for (int i = 0; i < s->size; i++) {
+        for (int e = 0; e < 2; e++) { /* texel i of row 1 lies between the edge's i and i + 1 */
             int x, y, u, v;
-            txt_side_texel(s, k, a + e, 0, &x, &y);
-            txt_side_texel(s, k, a, 1, &u, &v);
-            sum += txt_texel_step(&s->maps[map], txt_texel(s, map, tile, x, y),
-                                  txt_texel(s, map, tile, u, v));
+            txt_side_texel(s, k, s->size - i - e, 0, &x, &y);
+            txt_side_texel(s, m, i, 1, &u, &v);
+            sum += txt_texel_step(&s->maps[map], txt_texel(s, map, a, x, y),
+                                  txt_texel(s, map, b, u, v));
         }
     }
     return sum / (2 * s->size);
@@ -4954,14 +5038,15 @@ static void txt_measure_squares(const textiles_set *s, int map, int a, int b, co
     }
 }
 
-static void txt_measure_triangles(const textiles_set *s, int a, int b, const double *inside,
-                                  const double *rows, txt_tally *tally) {
+static void txt_measure_triangles(const textiles_set *s, int map, int a, int b,
+                                  const double *inside, txt_tally *tally) {
     for (int k = 0; k < 3; k++) {
         for (int m = 0; m < 3; m++) {
             if (s->tiles[a].edges[k] != s->tiles[b].edges[m] ||
                 s->tiles[a].directions[k] == s->tiles[b].directions[m])
                 continue;
-            txt_count_joint(tally, 0.5 * (rows[3 * a + k] + rows[3 * b + m]),
+            txt_count_joint(tally,
+                            0.5 * (txt_row_step(s, map, a, k, b, m) + txt_row_step(s, map, b, m, a, k)),
                             0.5 * (inside[2 * a] + inside[2 * b]));
         }
     }
@@ -4972,19 +5057,17 @@ TEXTILES_API txm_status textiles_measure(const textiles_set *set, int map, txm_e
     if (!set || !joints) return txm_fail(env, TXM_BAD_ARGUMENT, "set or joints is NULL");
     if (map < 0 || map >= set->map_count) return txm_fail(env, TXM_BAD_ARGUMENT, "map: no such map");
     const size_t count = (size_t)set->count;
-    double *inside = (double *)txm_alloc(env, count * 5 * sizeof(double));
+    double *inside = (double *)txm_alloc(env, count * 2 * sizeof(double));
     if (!inside) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to measure");
-    double *rows = inside + 2 * count;
     textiles_joints result = {0, 0, 0, 0, 0};
     txt_tally tally = {&result, 0, 0};
     const int is_triangle = set->kind == TEXTILES_TRIANGLE;
     for (int t = 0; t < set->count; t++) {
         for (int axis = 0; axis < 2; axis++) inside[2 * t + axis] = txt_inside_step(set, map, t, axis);
-        for (int k = 0; k < 3 && is_triangle; k++) rows[3 * t + k] = txt_row_step(set, map, t, k);
     }
     for (int a = 0; a < set->count; a++) {
         for (int b = 0; b < set->count; b++) {
-            if (is_triangle) txt_measure_triangles(set, a, b, inside, rows, &tally);
+            if (is_triangle) txt_measure_triangles(set, map, a, b, inside, &tally);
             else txt_measure_squares(set, map, a, b, inside, &tally);
         }
     }

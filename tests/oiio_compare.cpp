@@ -4,7 +4,8 @@
 //   oiio_compare same    A B         [LIMIT...]   the same picture, pixel by pixel
 //   oiio_compare texture EXEMPLAR B  [LIMIT...]   the same kind of texture
 //   oiio_compare wrap    A...        [LIMIT...]   do they continue across their borders
-//   oiio_compare shuffle A OUT                    write A's pixels in random order
+//   oiio_compare seam    A SIZE      [LIMIT...]   does a picture of square tiles hide its joints
+//   oiio_compare shuffle A OUT [SIDE]             write A's pixels, or squares of it, in random order
 //
 // Prints one "figure value" per line. A limit is written mean<0.1 or psnr>30; the exit status is 1
 // if a figure is beyond its limit, 2 if a picture cannot be read.
@@ -20,6 +21,9 @@
 //          same for blocks of the exemplar to their nearest blocks elsewhere in it; 0 = copied.
 // wrap:    x and y: the mean difference across the border over the mean difference inside, over
 //          all pictures together.
+// seam:    x and y: the mean difference across the joints of tiles of SIZE pixels over the mean
+//          difference inside the tiles; beside: the same for the places 2 to 4 pixels beside the
+//          joints, where cuts begin, both axes together. 1 = like any other place.
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 
@@ -259,10 +263,43 @@ Figures wrap(const std::vector<std::string> &paths) {
             {"y", border[1] / std::max(inside[1], 1e-9)}};
 }
 
-void shuffle(const std::string &from, const std::string &to) {
+Figures seam(const Picture &p, int size) {
+    if (size < 8 || p.width < 2 * size || p.height < 2 * size) give_up("seam: fewer than 2 x 2 tiles");
+    Figures figures{{"beside", 0}};
+    for (int axis = 0; axis < 2; axis++) {
+        const int dx = axis == 0, dy = axis == 1;
+        std::vector<double> sum(size_t(size), 0.0), count(size_t(size), 0.0); // by place in the tile
+        for (int y = 0; y + dy < p.height; y++) {
+            for (int x = 0; x + dx < p.width; x++) {
+                const size_t place = size_t((axis ? y : x) % size);
+                for (int c = 0; c < p.channels; c++)
+                    sum[place] += std::fabs(double(p.at(x + dx, y + dy, c) - p.at(x, y, c)));
+                count[place] += p.channels;
+            }
+        }
+        double inside = 0, pixels = 0;
+        for (size_t i = 0; i + 1 < sum.size(); i++) {
+            inside += sum[i];
+            pixels += count[i];
+        }
+        const auto ratio = [&](int i) {
+            return sum[size_t(i)] / count[size_t(i)] / std::max(inside / pixels, 1e-9);
+        };
+        figures[axis ? "y" : "x"] = ratio(size - 1);
+        for (const int i : {1, 2, 3, size - 5, size - 4, size - 3})
+            figures["beside"] += ratio(i) / 12;
+    }
+    return figures;
+}
+
+// What does not fill a square at the right and lower border is left out.
+void shuffle(const std::string &from, const std::string &to, int side) {
     const Picture p = load(from);
-    const size_t channels = size_t(p.channels), count = p.samples.size() / channels;
-    std::vector<unsigned char> out(p.samples.size());
+    const int columns = p.width / side, rows = p.height / side, channels = p.channels;
+    const size_t count = size_t(columns) * size_t(rows);
+    if (side < 1 || count == 0) give_up("shuffle: larger squares than the picture");
+    OIIO::ImageSpec spec(columns * side, rows * side, channels, OIIO::TypeDesc::UINT8);
+    std::vector<unsigned char> out(count * size_t(side) * size_t(side) * size_t(channels));
     std::vector<size_t> order(count);
     std::mt19937 random(1);
     for (size_t i = 0; i < count; i++) {
@@ -270,12 +307,16 @@ void shuffle(const std::string &from, const std::string &to) {
         order[i] = order[j];
         order[j] = i;
     }
-    for (size_t i = 0; i < count; i++) {
-        for (size_t c = 0; c < channels; c++)
-            out[i * channels + c] =
-                static_cast<unsigned char>(std::lround(p.samples[order[i] * channels + c]));
+    size_t to_sample = 0;
+    for (int y = 0; y < spec.height; y++) {
+        for (int x = 0; x < spec.width; x++) {
+            const int block = int(order[size_t(y / side * columns + x / side)]);
+            for (int c = 0; c < channels; c++)
+                out[to_sample++] = static_cast<unsigned char>(
+                    std::lround(p.at(block % columns * side + x % side,
+                                     block / columns * side + y % side, c)));
+        }
     }
-    OIIO::ImageSpec spec(p.width, p.height, p.channels, OIIO::TypeDesc::UINT8);
     OIIO::ImageBuf buffer(spec, out.data());
     if (!buffer.write(to)) give_up("cannot write " + to);
 }
@@ -287,14 +328,17 @@ int main(int argc, char **argv) {
     std::vector<std::string> paths;
     for (int i = 2; i < argc && !std::strpbrk(argv[i], "<>"); i++) paths.emplace_back(argv[i]);
     const int files = int(paths.size());
-    if (command == "wrap" ? files < 1 : files != 2)
-        give_up("usage: same A B | texture EXEMPLAR B | wrap A..., [FIGURE<LIMIT...] | shuffle A OUT");
+    if (command == "wrap" ? files < 1 : files != 2 && !(command == "shuffle" && files == 3))
+        give_up("usage: same A B | texture EXEMPLAR B | wrap A... | seam A SIZE, [FIGURE<LIMIT...] | "
+                "shuffle A OUT [SIDE]");
 
     Figures figures;
     if (command == "same") figures = same(argv[2], argv[3]);
     else if (command == "texture") figures = texture(load(argv[2]), load(argv[3]));
     else if (command == "wrap") figures = wrap(paths);
-    else if (command == "shuffle") shuffle(paths[0], paths[1]);
+    else if (command == "seam") figures = seam(load(paths[0]), std::atoi(argv[3]));
+    else if (command == "shuffle")
+        shuffle(paths[0], paths[1], files == 3 ? std::atoi(argv[4]) : 1);
     else give_up("unknown command " + command);
     for (const auto &f : figures) std::printf("%s %.4g\n", f.first.c_str(), f.second);
 

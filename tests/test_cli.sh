@@ -4,15 +4,16 @@
 
 texkit=$(pwd)/$OUT/asan/texkit   # with the sanitizers
 released=$(pwd)/build/texkit     # as users have it
-draw=$(pwd)/build/draw crop=$(pwd)/build/crop
+draw=$(pwd)/build/draw
+check_tiles="/usr/bin/python3 $(pwd)/tests/check_tiles.py"
 cd "$tmp" || exit 1
 
 # run STATUS ARGUMENTS...: texkit must end with that status. After success stderr is empty. After a
-# failure it holds one line that names the command, and no file was made or changed.
+# failure it holds one line that names the command, and no file or folder was made or changed.
 run() {
     want=$1
     shift
-    before=$(find . -type f ! -name '*.log' -exec cksum {} + | sort)
+    before=$(all_files)
     "$texkit" "$@" >out.log 2>err.log
     got=$?
     [ $got = "$want" ] || { echo "status $got instead of $want"; cat err.log; return 1; }
@@ -22,9 +23,12 @@ run() {
         [ "$(wc -l <err.log)" = 1 ] || { echo "not one line on stderr:"; cat err.log; return 1; }
         grep -q '^texkit' err.log || { cat err.log; return 1; }
         [ ! -s out.log ] || { echo "stdout is not empty:"; cat out.log; return 1; }
-        after=$(find . -type f ! -name '*.log' -exec cksum {} + | sort)
-        [ "$before" = "$after" ] || { echo "files were made or changed"; ls -l; return 1; }
+        [ "$before" = "$(all_files)" ] || { echo "files were made or changed"; ls -l; return 1; }
     fi
+}
+all_files() {
+    find . -type f ! -name '*.log' -exec cksum {} + | sort
+    find . -type d | sort
 }
 
 # says TEXT: the last message holds this text
@@ -61,10 +65,11 @@ size="--size 40x30"
 
 # ---- help and version
 check "--help" run 0 --help
-check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log"
+check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log && grep -q tiles out.log"
 check "--version" run 0 --version
-check "--version names the headers" grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*)$' out.log
-for command in learn synth; do
+check "--version names the headers" \
+    grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, textiles [0-9.]*)$' out.log
+for command in learn synth tiles; do
     check "$command --help" run 0 $command --help
     check "$command --help has an example" grep -q "  texkit $command .*-o" out.log
     check "$command -h, behind other arguments" run 0 $command sand.png --seed 3 -h
@@ -276,6 +281,174 @@ check "$flips models with one byte changed" changed_bytes
 check "a model with bytes behind its end" accepts_or_refuses long.txs
 { head -c 8 sand.txs; head -c 2000 /dev/urandom; } >random.txs
 refuses 1 "random.txs" synth random.txs -o n.png $size
+
+# ---- tiles: all kinds
+"$draw" cells cells.png 96
+"$draw" cells cells-gray.png 96 1
+"$draw" clouds clouds.png 96
+"$draw" sand other.png 100
+# holds FOLDER NAME...: exactly these files
+holds() {
+    folder=$1
+    shift
+    [ "$(ls -A "$folder")" = "$(printf '%s\n' "$@" | sort)" ] || { ls -lA "$folder"; return 1; }
+}
+for kind in wang corner triangle frame; do
+    check "tiles --kind $kind" run 0 tiles cells.png -o $kind --kind $kind --size 32
+    check "tells what it made" grep -q "^$kind: .* tiles, atlas .* steps at joints" out.log
+    check "makes the folder with three files" holds $kind atlas.png preview.png tiles.json
+    check "the set is whole and true" $check_tiles $kind
+    $check_tiles $kind --damaged
+done
+# tiles_so WHAT OPTIONS...: a set with these options is as the schema and check_tiles.py want it
+tiles_so() {
+    rm -rf so
+    run 0 tiles cells.png -o so --size 32 "$@" || return 1
+    how=
+    case "$*" in *--reduced*) how=--reduced ;; esac
+    $check_tiles so $how
+}
+check "wang --reduced" tiles_so --kind wang --reduced
+check "triangle --reduced" tiles_so --kind triangle --reduced
+check "wang, 3 colors" tiles_so --kind wang --colors 3
+check "corner, 3 colors, torus" tiles_so --kind corner --colors 3 --packing torus
+check "wang, 2 variants, torus" tiles_so --kind wang --variants 2 --packing torus
+check "triangle, 3 colors, 2 variants, gutter 13" \
+    tiles_so --kind triangle --colors 3 --variants 2 --gutter 13
+check "a gutter is rounded up to a power of two" grep -q '"gutter": 16' so/tiles.json
+check "triangle, no gutter" tiles_so --kind triangle --gutter 0
+check "triangle, slices" tiles_so --kind triangle --packing slices
+check "wang, slices, gutter 1" tiles_so --kind wang --packing slices --gutter 1
+check "frame, 1 color, 16 variants" tiles_so --kind frame --colors 1 --variants 16
+check "corner, odd size" tiles_so --kind corner --size 45
+check "wang, --repair none" tiles_so --kind wang --repair none
+classes='0,0,0,0;0,1,0,0;1,1,0,1'
+check "frame --classes" run 0 tiles cells.png -o classes --size 32 --kind frame \
+    --classes "$classes" --variants 2
+check "has these classes" $check_tiles classes --classes "$classes"
+check "and not others" sh -c "! $check_tiles classes --classes '0,0,0,0;0,1,0,0;1,1,0,0'"
+check "four variants of a frame" run 0 tiles cells.png -o variants --size 32 --kind frame \
+    --colors 1 --variants 4
+check "are four pictures" $check_tiles variants --different
+check "gray" run 0 tiles cells-gray.png -o gray --kind wang --size 32
+check "gray stays gray" test "$(byte gray/atlas.png 25) $(byte gray/preview.png 25)" = "0 0"
+check "the gray set is whole" $check_tiles gray
+
+# ---- tiles: the folder
+check "a name that ends in /" run 0 tiles cells.png -o slash/ --kind frame --size 32
+check "makes the same folder" holds slash atlas.png preview.png tiles.json
+mkdir there
+echo old >there/atlas.png
+echo mine >there/mine.txt
+check "an existing folder" run 0 tiles cells.png -o there --kind wang --size 32
+check "its other files stay" sh -c "grep -q mine there/mine.txt && cmp there/atlas.png wang/atlas.png"
+check "nothing else is in it" holds there atlas.png mine.txt preview.png tiles.json
+check "--quiet says nothing" sh -c "
+    '$texkit' tiles cells.png -o q --kind frame --size 32 --quiet | wc -c | grep -qx 0"
+check "an odd name" run 0 tiles cells.png -o 'odd tiles;$(x)' --kind frame --size 32
+
+# ---- tiles: maps and more pictures
+check "--maps" run 0 tiles cells.png -o maps --kind wang --size 32 --maps clouds.png,cells-gray.png
+check "an atlas for each map" holds maps atlas.png atlas-2.png atlas-3.png preview.png tiles.json
+check "the set with maps is whole" $check_tiles maps
+check "maps keep their channels" \
+    test "$(byte maps/atlas-2.png 25) $(byte maps/atlas-3.png 25)" = "2 0"
+check "--maps of the same picture" run 0 tiles cells.png -o twin --kind triangle --size 32 \
+    --maps cells.png
+check "is cut in register" cmp twin/atlas.png twin/atlas-2.png
+check "--more" run 0 tiles cells.png -o more --kind wang --size 32 --more other.png,clouds.png
+check "--edges" run 0 tiles cells.png -o edges --kind wang --size 32 --edges cells.png,clouds.png
+check "the set with chosen edges is whole" $check_tiles edges
+
+# ---- tiles: the same bytes
+for threads in 1 2 8; do
+    check "tiles --threads $threads" run 0 tiles cells.png -o t$threads --kind wang --size 32 \
+        --threads $threads
+    check "makes the same files" diff -r wang t$threads
+done
+check "tiles --seed 1" run 0 tiles cells.png -o seed1 --kind triangle --size 32 --seed 1
+check "is the default" diff -r triangle seed1
+check "tiles --seed 2" run 0 tiles cells.png -o seed2 --kind triangle --size 32 --seed 2
+check "another seed, another set" sh -c "! cmp -s triangle/atlas.png seed2/atlas.png"
+check "the set of another seed is whole" $check_tiles seed2
+
+# ---- tiles: statistics
+check "tiles --stats" run 0 tiles cells.png -o wang --kind wang --size 32 --stats tiles-stats.json
+for key in command seed threads seconds read cut measure draw encode total peak_bytes result tiles \
+    atlas_width atlas_height joint_pairs joint_mean joint_worst; do
+    check "tiles --stats has $key" grep -q "\"$key\": " tiles-stats.json
+done
+check "16 tiles, 4 x 4 cells of 48 pixels" sh -c "
+    grep -q '\"tiles\": 16,' tiles-stats.json && grep -q '\"atlas_width\": 192,' tiles-stats.json"
+check "tiles --stats is JSON" /usr/bin/python3 -m json.tool tiles-stats.json
+
+# ---- tiles: usage errors and failures leave nothing behind
+refuses 2 "no exemplar" tiles
+refuses 2 "add -o" tiles cells.png --kind wang
+refuses 2 "no kind" tiles cells.png -o n
+refuses 2 "wang, corner, triangle, frame" tiles cells.png -o n --kind hexagon
+refuses 2 "needs a value" tiles cells.png -o n --kind
+refuses 2 "--colors 1" tiles cells.png -o n --kind wang --colors 1
+for bad in 0 5 x 2.5; do refuses 2 "--colors" tiles cells.png -o n --kind wang --colors $bad; done
+for bad in 0 17 x; do refuses 2 "--variants" tiles cells.png -o n --kind wang --variants $bad; done
+for bad in 31 1025 x 64x64; do refuses 2 "--size" tiles cells.png -o n --kind wang --size $bad; done
+for bad in -1 513 x; do refuses 2 "--gutter" tiles cells.png -o n --kind wang --gutter $bad; done
+refuses 2 "packed, torus, slices" tiles cells.png -o n --kind wang --packing loose
+refuses 2 "poisson, none" tiles cells.png -o n --kind wang --repair all
+for bad in 0 0,0,0 0,0,0,0,0 '0,0,0,0;' ';0,0,0,0' 0,0,0,x 0,0,,0 '0,0,0,0;0,0,0' ' 0,0,0,0' \
+    0,0,0,10 -1,0,0,0; do
+    refuses 2 "--classes" tiles cells.png -o n --kind frame --classes "$bad"
+done
+many=$(i=0; while [ $i -lt 64 ]; do printf '0,0,0,0;'; i=$((i + 1)); done)
+refuses 2 "--classes" tiles cells.png -o n --kind frame --classes "${many}0,0,0,0"
+refuses 2 "--maps" tiles cells.png -o n --kind wang --maps clouds.png --more other.png
+refuses 2 "--maps" tiles cells.png -o n --kind wang --maps clouds.png --edges clouds.png,cells.png
+refuses 2 "give 2 pictures" tiles cells.png -o n --kind wang --edges clouds.png
+refuses 2 "give 3 pictures" tiles cells.png -o n --kind wang --colors 3 --edges clouds.png,cells.png
+refuses 2 "at most 2" tiles cells.png -o n --kind wang --edges clouds.png,cells.png,other.png
+refuses 2 "empty" tiles cells.png -o n --kind wang --more other.png,
+refuses 1 "clouds.png,cells.png" tiles clouds.png,cells.png -o n --kind wang
+refuses 1 "make it 96 x 96" tiles cells.png -o n --kind wang --size 32 --maps clouds.png,other.png
+refuses 1 "missing.png" tiles cells.png -o n --kind wang --maps missing.png
+refuses 1 "missing.png" tiles cells.png -o n --kind wang --more other.png,missing.png
+refuses 1 "missing.png" tiles missing.png -o n --kind wang
+# options that do not go together
+refuses_with_any_status() {
+    run 1 tiles cells.png -o n --size 32 --kind "$@" || run 2 tiles cells.png -o n --size 32 --kind "$@"
+}
+for bad in "frame --classes 0,0,0,3" "wang --classes 0,0,0,0" "corner --reduced" "frame --reduced" \
+    "triangle --packing torus" "wang --reduced --packing torus" "frame --packing torus" \
+    "corner --colors 4 --packing torus" "wang --packing torus --gutter 4" "wang --gutter 17" \
+    "corner --edges clouds.png,cells.png"; do
+    check "does not go together: $bad" refuses_with_any_status $bad
+done
+refuses 1 "too small" tiles cells.png -o n --kind wang --size 1024
+refuses 1 "64 pixels" tiles sand.png -o n --kind wang --size 32
+refuses 1 "cannot write into 'sand.png'" tiles cells.png -o sand.png --kind wang --size 32
+refuses 1 "cannot write" tiles cells.png -o nowhere/n --kind wang --size 32
+refuses 1 "cannot write" tiles cells.png -o n --kind wang --size 32 --stats nowhere/n.json
+mkdir taken taken/preview.png
+refuses 1 "taken/preview.png" tiles cells.png -o taken --kind frame --size 32
+check "a full disk: the folder is not made" run 1 tiles cells.png -o n --kind frame --size 32 \
+    --stats /dev/full
+check "a folder of the system: status 1" run 1 tiles cells.png -o /proc/n --kind frame --size 32
+# root may write anywhere: without capabilities it may not
+mkdir locked
+chmod 555 locked
+locked() {
+    if [ "$(id -u)" != 0 ]; then "$texkit" "$@"
+    else setpriv --bounding-set=-all --inh-caps=-all "$texkit" "$@"
+    fi 2>err.log
+    [ $? = 1 ] && says "cannot write" && [ "$(wc -l <err.log)" = 1 ] && [ -z "$(ls -A locked)" ]
+}
+check "a read-only folder" locked tiles cells.png -o locked --kind frame --size 32
+check "a folder in a read-only folder" locked tiles cells.png -o locked/n --kind frame --size 32
+chmod 755 locked
+for part in 10 50 90; do
+    head -c $(($(wc -c <cells.png) * part / 100)) cells.png >cut.png
+    refuses 1 "cannot read 'cut.png'" tiles cut.png -o n --kind wang --size 32
+    refuses 1 "cannot read 'cut.png'" tiles cells.png -o n --kind wang --size 32 --more cut.png
+done
 
 # ---- stopped, out of memory (the tool as released)
 stop() {

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Synthesised pictures look like their exemplars, as far as figures tell: statistics within the
-# exemplar's own sampling noise, no pasted blocks, a seamless wrap where one was asked for. And all
-# output formats hold the same picture. tests/oiio_compare.cpp explains the figures.
+# exemplar's own sampling noise, no pasted blocks, a seamless wrap where one was asked for. Tiles lie
+# side by side as if there were no joints. And all output formats hold the same picture.
+# tests/oiio_compare.cpp explains the figures.
 . tests/tap.sh
 
 compare=$OUT/oiio_compare
@@ -54,6 +55,27 @@ for name in sand blades cells; do
 done
 check "sand is not cells" fails alike "$tmp/sand.png" "$tmp/cells-out.png"
 check "cells are not blades" fails alike "$tmp/cells.png" "$tmp/blades-out.png"
+
+# joins PICTURE SIZE: the joints of its tiles do not show. Small tiles have few pixels at joints.
+joins() {
+    if [ "$2" -ge 64 ]; then "$compare" seam "$1" "$2" 'x>0.85' 'x<1.2' 'y>0.85' 'y<1.2' 'beside<1.2'
+    else "$compare" seam "$1" "$2" 'x>0.7' 'x<1.3' 'y>0.7' 'y<1.3' 'beside<1.3'
+    fi
+}
+for name in $exemplars; do
+    case $name in photo-*) size=64 ;; *) size=32 ;; esac
+    for kind in wang corner frame; do
+        build/texkit tiles "$tmp/$name.png" -o "$tmp/$name-$kind" --kind $kind --size $size \
+            --variants 2 --quiet
+        check "$name: no joints between $kind tiles" joins "$tmp/$name-$kind/preview.png" $size
+    done
+    # of drawn sand every pixel is for itself
+    case $name in sand | photo-sand) continue ;; esac
+    "$compare" shuffle "$tmp/$name.png" "$tmp/shuffled.png" 32
+    check "$name: squares of the exemplar show theirs" fails joins "$tmp/shuffled.png" 32
+    "$compare" shuffle "$tmp/$name-corner/preview.png" "$tmp/shuffled.png" $size
+    check "$name: so do tiles that do not match" fails joins "$tmp/shuffled.png" $size
+done
 
 build/texkit synth "$tmp/sand.txs" -o "$tmp/f.png" --size 100x80 --quiet
 for format in tga bmp; do

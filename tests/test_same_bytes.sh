@@ -1,6 +1,7 @@
 #!/bin/sh
-# The same models and pictures, byte for byte, from each compiler, at each level of optimisation,
-# on 1, 2 and 8 threads, and with the indices of each parallel loop taken backwards (0 below).
+# The same models, pictures and tile sets, byte for byte, from each compiler, at each level of
+# optimisation, on 1, 2 and 8 threads, and with the indices of each parallel loop taken backwards (0
+# below); and from plain C as with SIMD.
 . tests/tap.sh
 
 levels="-O0 -O3"
@@ -23,6 +24,15 @@ for cc in $(compilers); do
         done
     done
 done
+
+# without SIMD the same
+set -- $(compilers)
+check "builds without SIMD" \
+    "$1" -std=gnu99 -O2 -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -ffp-contract=off -I. -Itests \
+    tests/same_bytes.c -o "$tmp/plain" -lpthread -lm && {
+    hash=$("$tmp/plain" 2)
+    check "hash $hash, $1 -O2 without SIMD, threads 2" test -n "$hash" -a "$hash" = "$expected"
+}
 
 # the tool with OpenMP agrees with itself
 build/draw cells "$tmp/cells.png" 64

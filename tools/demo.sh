@@ -1,5 +1,6 @@
 #!/bin/sh
-# demo.sh - learn and synthesise every sample of build/samples/, show them in out/index.html
+# demo.sh - learn and synthesise every sample of build/samples/, cut tiles out of some, show them in
+# out/index.html
 set -eu
 
 build=${BUILD:-build}
@@ -46,6 +47,35 @@ pair() {
 PAIR
 }
 
+# tile_set NAME KIND COLORS NOTE: cut tiles out of a sample, append them to the page
+tile_set() {
+    folder=$1-tiles-$2 stats=$out/$1-tiles-$2.json
+    "$build/texkit" tiles "$out/$1.png" -o "$out/$folder" --kind "$2" --colors "$3" --size 64 \
+        --stats "$stats" --quiet
+    tiles=$(figure tiles "$stats")
+    width=$(figure atlas_width "$stats") height=$(figure atlas_height "$stats")
+    joint=$(printf %.2f "$(figure joint_mean "$stats")")
+    worst=$(printf %.2f "$(figure joint_worst "$stats")")
+    total=$(seconds total "$stats")
+    printf 'demo: %-8s %s tiles of kind %s in %4s s, steps at joints %s of those inside\n' \
+        "$1" "$tiles" "$2" "$total" "$joint"
+    cat >>"$out/index.part" <<SET
+<section class="pair">
+<div>
+<h3>$1, $2</h3>
+<dl>
+<dt>tiles</dt><dd><a href="$folder/tiles.json">$tiles</a> <small>of 64 pixels a side, $3 colours</small></dd>
+<dt>made in</dt><dd>$total s</dd>
+<dt>joints</dt><dd>$joint <small>(worst pair $worst)</small></dd>
+</dl>
+<p>$4</p>
+</div>
+<img src="$folder/preview.png" width="512" height="512" alt="a plane of $2 tiles of $1">
+</section>
+<img class="atlas" src="$folder/atlas.png" width="$width" height="$height" alt="all $2 tiles of $1">
+SET
+}
+
 cat >"$out/index.part" <<'HEAD'
 <!DOCTYPE html>
 <html lang="en">
@@ -69,6 +99,7 @@ p { margin: 0.5rem 0; }
 .pair p { font-size: 0.9rem; }
 .pair .source, footer { color: #666; font-size: 0.8rem; overflow-wrap: anywhere; }
 .repeated { width: 768px; height: 768px; max-width: 100%; margin: 1.5rem 0 0.5rem; }
+.atlas { margin: -0.5rem 0 3rem; }
 footer { margin-top: 4rem; border-top: 1px solid #ddd; padding-top: 1rem; }
 a { color: #15558a; }
 @media (max-width: 50rem) { .pair { grid-template-columns: minmax(0, 1fr); } }
@@ -117,12 +148,33 @@ LIMITS
     pair "$sample" "$title" "$source" "$licence" "$note"
 done <"$build/samples/list.txt"
 
+# those of the photographs that are here, else the first samples
+good=$(awk -F "$tab" '$1 == "good" { print $2 }' "$build/samples/list.txt")
+pick() { # NAME NUMBER
+    echo "$good" | grep -x "$1" || echo "$good" | sed -n "$2p"
+}
+cat >>"$out/index.part" <<'TILES'
+<h2>Tiles that join</h2>
+<p>Here the photograph itself is cut, into sets of tiles that join wherever their colours match: an
+endless plane out of a small atlas. Above an atlas some of the plane, laid tile by tile. The figure
+for the joints is the mean step from pixel to pixel across them, over that inside the tiles; at 1
+they are like any other place.</p>
+TILES
+tile_set "$(pick pebbles 1)" wang 3 "Squares with colours on their edges. Between the tiles of the
+atlas lie gutters, for filtering."
+tile_set "$(pick lawn 2)" corner 2 "Squares with colours on their corners: neighbours match across
+the corner too, and no pixel is in all of them."
+tile_set "$(pick gravel 3)" triangle 2 "Equilateral triangles, two to a cell of the atlas, stored with
+a right angle. They are turned as they are laid, and cover meshes too."
+
 cat >>"$out/index.part" <<TAIL
 <footer>Made by <code>make demo</code> with $("$build/texkit" --version) on $threads threads. Each
 pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
-<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Seconds are of this run.</footer>
+<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Each set of tiles:
+<code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Seconds are of
+this run.</footer>
 </body>
 </html>
 TAIL
 mv "$out/index.part" "$out/index.html"
-echo "demo: $((count + limits)) pairs; open $out/index.html"
+echo "demo: $((count + limits)) pairs, 3 tile sets; open $out/index.html"

@@ -261,6 +261,43 @@ static void free_photos(photos *p) {
     }
 }
 
+/* Refuse, before any work, options that do not go together. */
+static int check_options(cli *run, const textiles_desc *d, textiles_packing packing, int gutter,
+                         int has_edges) {
+    const int is_frame = d->kind == TEXTILES_FRAME, size = d->size ? d->size : 128;
+    const int colors = d->colors ? d->colors : 2;
+    if (d->colors == 1 && !is_frame)
+        return cli_fail(run, CLI_USAGE, "--colors 1 is for frame sets; give 2 to 4");
+    if (d->class_count && !is_frame)
+        return cli_fail(run, CLI_USAGE, "--classes goes with --kind frame only");
+    for (int k = 0; k < d->class_count; k++) {
+        for (int i = 0; i < k; i++) {
+            if (!memcmp(d->classes[i], d->classes[k], sizeof d->classes[k]))
+                return cli_fail(run, CLI_USAGE, "--classes: class %d is class %d again; add "
+                                "--variants instead", k, i);
+        }
+        for (int i = 0; i < 4; i++) {
+            if (d->classes[k][i] >= colors)
+                return cli_fail(run, CLI_USAGE, "--classes: color %d of class %d; with --colors %d "
+                                "they are 0 to %d", d->classes[k][i], k, colors, colors - 1);
+        }
+    }
+    if (d->reduced && d->kind != TEXTILES_WANG && d->kind != TEXTILES_TRIANGLE)
+        return cli_fail(run, CLI_USAGE, "--reduced goes with --kind wang or triangle only");
+    if (has_edges && d->kind == TEXTILES_CORNER)
+        return cli_fail(run, CLI_USAGE, "--edges does not go with --kind corner, whose edges have no "
+                        "colors");
+    if (gutter > size / 2)
+        return cli_fail(run, CLI_USAGE, "--gutter %d: at most half a tile, %d", gutter, size / 2);
+    if (packing != TEXTILES_TORUS) return CLI_DONE;
+    if (d->reduced || is_frame || d->kind == TEXTILES_TRIANGLE ||
+        (d->kind == TEXTILES_CORNER && colors > 3))
+        return cli_fail(run, CLI_USAGE, "--packing torus is for whole wang sets, and corner sets of "
+                        "2 or 3 colors; take packed");
+    if (gutter > 0) return cli_fail(run, CLI_USAGE, "--packing torus has no gutter; leave it out");
+    return CLI_DONE;
+}
+
 static void set_figures(cli *run, const textiles_set *set, const textiles_layout *layout,
                         const textiles_joints *joints) {
     cli_figure(run, "tiles", textiles_count(set));
@@ -316,13 +353,13 @@ static int run_tiles(int argc, char **argv) {
     desc.kind = (textiles_kind)kind_index;
     desc.repair = repair_index ? TEXTILES_REPAIR_NONE : TEXTILES_REPAIR_POISSON;
     desc.seed = run.seed;
-    if (desc.colors == 1 && desc.kind != TEXTILES_FRAME)
-        return cli_fail(&run, CLI_USAGE, "--colors 1 is for frame sets; give 2 to 4");
     if (classes && !(desc.class_count = parse_classes(classes, list)))
         return cli_fail(&run, CLI_USAGE,
                         "--classes '%s': give four colors for each class, such as '0,0,0,0;0,1,0,0'",
                         classes);
     if (classes) desc.classes = (const int(*)[4])list;
+    status = check_options(&run, &desc, (textiles_packing)packing_index, gutter, edges != NULL);
+    if (status) return status;
     if (maps && (more || edges))
         return cli_fail(&run, CLI_USAGE, "--maps goes with one exemplar, without --more and --edges");
 

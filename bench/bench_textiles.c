@@ -1,0 +1,327 @@
+/* bench_textiles.c - seconds and memory of textiles.h: bench_textiles EXEMPLAR...
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   The first table cuts sets of all kinds out of the first picture, on one thread and on all; the
+   second looks tiles of the plane up; the third has a line for each picture; the fourth compares this
+   build with one for TEXTILES_NO_SIMD, which lies in plain/ beside it. Seconds are of the clock, of
+   one run; what is repeated counts with its fastest run.
+
+   bench_textiles --once EXEMPLAR cuts one set and fills one window of the plane, and prints the CPU
+   seconds and the million tiles per second. */
+#define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
+#define TEXTILES_IMPLEMENTATION
+#include "image_io.h"
+#include "textiles.h"
+
+#include <stdio.h>
+#include <time.h>
+#include <unistd.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+enum { COMPARED = 2, LOOKUPS = 3, WINDOW = 1024 };
+
+static const char *const kind_names[] = {"wang", "corner", "triangle", "frame"};
+
+static double clock_of(clockid_t which) {
+    struct timespec t;
+    clock_gettime(which, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void give_up(const char *what, const char *why) {
+    fprintf(stderr, "bench_textiles: %s: %s\n", what, why);
+    exit(1);
+}
+
+/* ---- the environment: counted memory, a given number of threads --------------------------- */
+
+typedef union block_head {
+    size_t bytes;
+    long double align_1;
+    void *align_2;
+} block_head;
+
+static size_t live_bytes, peak_bytes;
+
+static void *allocate(void *user, size_t bytes) {
+    (void)user;
+    block_head *head = (block_head *)malloc(sizeof *head + bytes);
+    if (!head) return NULL;
+    head->bytes = bytes;
+#ifdef _OPENMP
+#pragma omp critical(memory)
+#endif
+    {
+        live_bytes += bytes;
+        if (live_bytes > peak_bytes) peak_bytes = live_bytes;
+    }
+    return head + 1;
+}
+
+static void release(void *user, void *block) {
+    (void)user;
+    block_head *head = (block_head *)block - 1;
+#ifdef _OPENMP
+#pragma omp critical(memory)
+#endif
+    live_bytes -= head->bytes;
+    free(head);
+}
+
+static void parallel_for(void *user, int count, void (*body)(void *context, int index),
+                         void *context) {
+    int threads = *(const int *)user;
+    (void)threads;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) num_threads(threads)
+#endif
+    for (int i = 0; i < count; i++) body(context, i);
+}
+
+static int all_threads(void) {
+#ifdef _OPENMP
+    return omp_get_num_procs();
+#else
+    return 1;
+#endif
+}
+
+static txm_env make_env(int *threads) {
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    env.allocate = allocate;
+    env.release = release;
+    if (*threads > 1) env.parallel_for = parallel_for;
+    env.parallel_user = threads;
+    return env;
+}
+
+/* ---- making sets -------------------------------------------------------------------------- */
+
+typedef struct result {
+    double seconds, cpu; /* processor time of all threads                       */
+    size_t peak;         /* bytes that the library held at most, the set included */
+} result;
+
+static textiles_set *make(const txm_image *picture, textiles_kind kind, int colors, int size,
+                          int threads, result *r) {
+    textiles_set *set;
+    textiles_exemplar exemplar;
+    textiles_desc desc;
+    txm_env env = make_env(&threads);
+    memset(&desc, 0, sizeof desc);
+    exemplar.maps = picture;
+    exemplar.map_count = 1;
+    desc.kind = kind;
+    desc.exemplars = &exemplar;
+    desc.exemplar_count = 1;
+    desc.size = size;
+    desc.colors = colors;
+    const size_t held = live_bytes;
+    peak_bytes = live_bytes;
+    const double wall = clock_of(CLOCK_MONOTONIC), cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID);
+    if (textiles_make(&desc, &env, &set) != TXM_OK) give_up(kind_names[kind], env.message);
+    r->seconds = clock_of(CLOCK_MONOTONIC) - wall;
+    r->cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID) - cpu;
+    r->peak = peak_bytes - held;
+    return set;
+}
+
+static double mean_joint(const textiles_set *set) {
+    textiles_joints joints;
+    memset(&joints, 0, sizeof joints);
+    if (textiles_measure(set, 0, NULL, &joints) != TXM_OK) give_up("measure", "failed");
+    return joints.mean;
+}
+
+static const char *file_name(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+static void kinds(const char *path, const txm_image *picture) {
+    const int threads = all_threads();
+    char head[16];
+    snprintf(head, sizeof head, "%d threads", threads);
+    printf("tiles of 128 x 128 out of %s, %d x %d, %d channels: seconds on 1 and on %d threads\n\n",
+           file_name(path), picture->width, picture->height, picture->channels, threads);
+    printf("kind     colors tiles 1 thread %10s  speedup  s/tile peak MiB  joint\n", head);
+    for (int kind = TEXTILES_WANG; kind <= TEXTILES_FRAME; kind++) {
+        for (int colors = 2; colors <= 3; colors++) {
+            result one, all;
+            textiles_free(make(picture, (textiles_kind)kind, colors, 128, 1, &one));
+            textiles_set *set = make(picture, (textiles_kind)kind, colors, 128, threads, &all);
+            printf("%-8s %6d %5d %8.2f %10.2f %8.2f %7.3f %8.1f %6.3f\n", kind_names[kind], colors,
+                   textiles_count(set), one.seconds, all.seconds, one.seconds / all.seconds,
+                   one.seconds / textiles_count(set), (double)all.peak / 1048576, mean_joint(set));
+            fflush(stdout);
+            textiles_free(set);
+        }
+    }
+}
+
+static void one_line(const char *path, const txm_image *picture) {
+    result wang, triangle;
+    textiles_set *w = make(picture, TEXTILES_WANG, 2, 64, 1, &wang);
+    textiles_set *t = make(picture, TEXTILES_TRIANGLE, 2, 64, 1, &triangle);
+    printf("%-16s %4d x %-4d %d %10.2f %8.3f %14.2f %8.3f\n", file_name(path), picture->width,
+           picture->height, picture->channels, wang.cpu, mean_joint(w), triangle.cpu,
+           mean_joint(t));
+    fflush(stdout);
+    textiles_free(w);
+    textiles_free(t);
+}
+
+/* ---- the plane ---------------------------------------------------------------------------- */
+
+/* Pictures that nobody looks at: the plane takes the same time for any. */
+static void make_plane(textiles_kind kind, int colors, int variants, textiles_set **set,
+                       textiles_plane *plane) {
+    enum { SIDE = TEXTILES_MIN_SIZE };
+    static uint8_t pixels[(SIDE + 1) * (SIDE + 1)];
+    const int c = colors, count = (kind == TEXTILES_TRIANGLE ? (8 * c * c * c + 4 * c) / 3
+                                                             : c * c * c * c) * variants;
+    txm_image *tiles = (txm_image *)calloc((size_t)count, sizeof *tiles);
+    textiles_desc desc;
+    txm_env env;
+    memset(&desc, 0, sizeof desc);
+    memset(&env, 0, sizeof env);
+    if (!tiles) give_up("tiles", "out of memory");
+    for (int i = 0; i < count; i++) {
+        tiles[i].pixels = pixels;
+        tiles[i].width = tiles[i].height = SIDE + (kind == TEXTILES_TRIANGLE);
+        tiles[i].channels = 1;
+    }
+    desc.kind = kind;
+    desc.size = SIDE;
+    desc.colors = colors;
+    desc.variants = variants;
+    if (textiles_import(&desc, tiles, count, 1, &env, set) != TXM_OK ||
+        textiles_plane_make(*set, 1, &env, plane) != TXM_OK)
+        give_up(kind_names[kind], env.message);
+    free(tiles);
+}
+
+/* Million tiles per second, of WINDOW x WINDOW tiles; by plane_fill if there is room for them. */
+static double lookup_rate(const textiles_plane *plane, int *tiles, unsigned *sum) {
+    double best = 1e30;
+    for (int run = 0; run < LOOKUPS; run++) {
+        const int from = run * WINDOW;
+        const double start = clock_of(CLOCK_MONOTONIC);
+        if (tiles) {
+            textiles_plane_fill(plane, from, 0, WINDOW, WINDOW, tiles);
+            *sum += (unsigned)tiles[run];
+        }
+        for (int y = 0; y < WINDOW && !tiles; y++) {
+            for (int x = 0; x < WINDOW; x++) {
+                int rotation;
+                *sum += (unsigned)(plane->kind == TEXTILES_TRIANGLE
+                                       ? textiles_plane_triangle(plane, from + x / 2, y, x & 1,
+                                                                 &rotation)
+                                       : textiles_plane_tile(plane, from + x, y));
+            }
+        }
+        const double seconds = clock_of(CLOCK_MONOTONIC) - start;
+        if (seconds < best) best = seconds;
+    }
+    return 1e-6 * WINDOW * WINDOW / best;
+}
+
+static void lookups(void) {
+    int *tiles = (int *)malloc((size_t)WINDOW * WINDOW * sizeof *tiles);
+    unsigned sum = 0;
+    if (!tiles) give_up("tiles", "out of memory");
+    printf("\nlooking tiles of the plane up, one thread: million tiles per second\n\n"
+           "kind     colors variants one by one   window\n");
+    for (int kind = TEXTILES_WANG; kind <= TEXTILES_TRIANGLE; kind++) {
+        for (int i = 0; i < 4; i++) {
+            const int colors = 2 + i / 2, variants = 1 + 3 * (i % 2);
+            textiles_set *set;
+            textiles_plane plane;
+            make_plane((textiles_kind)kind, colors, variants, &set, &plane);
+            printf("%-8s %6d %8d %10.1f", kind_names[kind], colors, variants,
+                   lookup_rate(&plane, NULL, &sum));
+            if (kind == TEXTILES_TRIANGLE) printf("        -\n");
+            else printf(" %8.1f\n", lookup_rate(&plane, tiles, &sum));
+            textiles_free(set);
+        }
+    }
+    free(tiles);
+    if (sum == 1) printf("\n"); /* so that no compiler leaves the lookups out */
+}
+
+/* ---- this build against the one without SIMD --------------------------------------------- */
+
+static void once(const char *program, const char *path, double best[2]) {
+    char command[4096];
+    double got[2] = {0, 0};
+    snprintf(command, sizeof command, "'%s' --once '%s'", program, path);
+    FILE *pipe = popen(command, "r");
+    int ok = pipe && fscanf(pipe, "%lf %lf", &got[0], &got[1]) == 2;
+    if (pipe && pclose(pipe) != 0) ok = 0;
+    if (!ok) give_up(program, "failed");
+    if (best[0] <= 0 || got[0] < best[0]) best[0] = got[0];
+    if (got[1] > best[1]) best[1] = got[1];
+}
+
+static void compare(const char *program, const char *path) {
+    char plain[2048];
+    double simd[2] = {0, 0}, scalar[2] = {0, 0};
+    snprintf(plain, sizeof plain, "%.*s/plain/%s", (int)(file_name(program) - program - 1), program,
+             file_name(program));
+    if (access(plain, X_OK) != 0) return;
+    for (int i = 0; i < COMPARED; i++) {
+        once(program, path, simd);
+        once(plain, path, scalar);
+    }
+    printf("\none thread, 16 wang tiles of 128 x 128 out of %s\n\n", file_name(path));
+    printf("                               SIMD  TEXTILES_NO_SIMD  ratio\n");
+    printf("making them, CPU seconds   %8.2f %17.2f %6.1f\n", simd[0], scalar[0],
+           scalar[0] / simd[0]);
+    printf("windows, million tiles/s   %8.1f %17.1f %6.1f\n", simd[1], scalar[1],
+           simd[1] / scalar[1]);
+}
+
+static void do_once(const txm_image *picture) {
+    int *tiles = (int *)malloc((size_t)WINDOW * WINDOW * sizeof *tiles);
+    unsigned sum = 0;
+    textiles_plane plane;
+    result r;
+    textiles_set *set = make(picture, TEXTILES_WANG, 2, 128, 1, &r);
+    if (!tiles || textiles_plane_make(set, 1, NULL, &plane) != TXM_OK) give_up("plane", "no memory");
+    printf("%f %f\n", r.cpu, lookup_rate(&plane, tiles, &sum));
+    textiles_free(set);
+    free(tiles);
+}
+
+int main(int argc, char **argv) {
+    const char *why;
+    const int is_once = argc == 3 && !strcmp(argv[1], "--once");
+    if (argc < 2) give_up("usage", "bench_textiles [--once] EXEMPLAR...");
+    /* OpenMP reads this before main: its threads wait by spinning, which costs much where other
+       programs run too, and would count as CPU seconds */
+    if (!getenv("OMP_WAIT_POLICY")) {
+        setenv("OMP_WAIT_POLICY", "passive", 1);
+        execv(argv[0], argv);
+    }
+    for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the first table */
+        const char *path = argv[i ? i : 1];
+        txm_image picture;
+        if (!image_read(path, 0, &picture, &why)) give_up(path, why);
+        if (is_once) {
+            do_once(&picture);
+        } else if (i == 0) {
+            kinds(path, &picture);
+            lookups();
+            printf("\none thread, 16 wang tiles and 24 triangles of 64 pixels\n\n"
+                   "exemplar         size        ch wang CPU s    joint triangle CPU s    joint\n");
+        } else {
+            one_line(path, &picture);
+        }
+        image_free(&picture);
+    }
+    if (!is_once) compare(argv[0], argv[1]);
+    return 0;
+}
