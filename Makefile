@@ -70,12 +70,12 @@ $(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
 bench: $(BENCHES) $(PLAIN) samples
 	@for b in $(BENCHES); do $$b $$(ls -r $(BUILD)/samples/*.png) || exit 1; done
 
-$(BUILD)/bench/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
+$(BUILD)/bench/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
 	$(COMPILE) $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
 
 # the same without SIMD, for comparison
-$(BUILD)/bench/plain/%: bench/%.c $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
+$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
 
