@@ -28,7 +28,7 @@ all: $(BUILD)/texkit
 
 help:
 	@echo "make            build $(BUILD)/texkit, the command line tool"
-	@echo "make demo       synthesise from sample photographs, write out/index.html"
+	@echo "make demo       texture and tiles from sample photographs, write out/index.html"
 	@echo "make test       run all tests, with the sanitizers on"
 	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
 	@echo "make bench      print a table of timings"
