@@ -422,7 +422,6 @@ for bad in "frame --classes 0,0,0,3" "wang --classes 0,0,0,0" "corner --reduced"
     "corner --edges clouds.png,cells.png"; do
     check "does not go together: $bad" refuses_with_any_status $bad
 done
-refuses 1 "too small" tiles cells.png -o n --kind wang --size 1024
 refuses 1 "64 pixels" tiles sand.png -o n --kind wang --size 32
 refuses 1 "cannot write into 'sand.png'" tiles cells.png -o sand.png --kind wang --size 32
 refuses 1 "cannot write" tiles cells.png -o nowhere/n --kind wang --size 32
