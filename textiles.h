@@ -4332,7 +4332,8 @@ static void txt_mend(txt_canvas *c) {
     c->query.extra = NULL;
     c->query.apart = 3;
     c->query.coarse = 2;
-    for (int n = 0; n < TXT_MENDS; n++) {
+    const int mends = b->is_triangle ? TXT_MENDS * 2 / 3 : TXT_MENDS; /* half the area */
+    for (int n = 0; n < mends; n++) {
         /* the window of the highest cost, on a grid */
         int64_t worst = 0;
         int wx = -1, wy = -1;
@@ -4896,7 +4897,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     b.desc = desc;
     b.env = env;
     b.is_triangle = desc->kind == TEXTILES_TRIANGLE;
-    b.wanted_step = b.is_triangle ? 0.97 : 1; /* cuts inside triangles are a little rougher */
+    b.wanted_step = b.is_triangle ? 0.99 : 1; /* cuts inside triangles are a little rougher */
     txm_arena_init(&b.arena, env);
     status = txt_prepare(&b);
     if (status == TXM_OK) status = txt_make_frames(&b);
