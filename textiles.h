@@ -3839,7 +3839,6 @@ typedef struct txt_canvas {
     txt_scratch scratch;
     txt_place places[TXT_PLACES]; /* found for the inside */
     int place_count, tries; /* how many of them are cut */
-    int64_t best_energy;
     int best_place;
 } txt_canvas;
 
@@ -4484,6 +4483,7 @@ static void txt_cut_tile(txt_canvas *c) {
     const int side = c->side, size = b->set->size;
     const size_t bytes = (size_t)side * (size_t)side * sizeof *c->label;
     const int forced = b->is_triangle ? size / 6 : size / 5;
+    int64_t least = 0;
     c->best_place = -1;
     if (txt_block_side(b) < side || c->place_count == 0) {
         txt_fill_blocks(c, forced);
@@ -4502,8 +4502,8 @@ static void txt_cut_tile(txt_canvas *c) {
         txt_settle(c);
         const int64_t energy = txt_energy(c, 0, 0, side, side) +
                                (int64_t)c->places[k].cost * TXT_PLACE_WEIGHT * side;
-        if (c->best_place >= 0 && energy >= c->best_energy) continue;
-        c->best_energy = energy;
+        if (c->best_place >= 0 && energy >= least) continue;
+        least = energy;
         c->best_place = k;
         memcpy(c->best, c->label, bytes);
     }
