@@ -16,7 +16,7 @@ COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -I. -Ito
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 HEADERS := $(wildcard *.h)
-TEXKIT   = $(addprefix $(BUILD)/,texkit.o tiles.o command.o cli.o image_io.o stb.o)
+TEXKIT   = $(addprefix $(BUILD)/,texkit.o tiles.o retile.o command.o cli.o image_io.o mesh_io.o stb.o)
 EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%,$(wildcard examples/*.c))
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
@@ -50,12 +50,15 @@ $(BUILD)/%.o: tools/%.c $(wildcard tools/*.h) $(HEADERS) Makefile | setup
 $(BUILD)/stb.o: COMPILE += -fno-sanitize=undefined
 
 $(BUILD)/texkit: $(TEXKIT)
-	$(LINK) $^ -o $@ -lm
+	$(LINK) $^ -o $@ -lcjson -lm
 
 # small programs that the demo, the tests and the benchmark use
-helpers: $(BUILD)/crop $(BUILD)/draw
+helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/view
 
 $(BUILD)/crop $(BUILD)/draw: $(BUILD)/%: $(BUILD)/%.o $(BUILD)/image_io.o $(BUILD)/stb.o
+	$(LINK) $^ -o $@ -lm
+
+$(BUILD)/view: $(addprefix $(BUILD)/,view.o render.o mesh_io.o image_io.o stb.o)
 	$(LINK) $^ -o $@ -lm
 
 # ---- examples and benchmarks

@@ -2,9 +2,10 @@
 # run.sh [--full] [NAME...] - run the tests and count them
 #
 # Every tests/test_*.c is a cmocka program, built here with the address and undefined-behaviour
-# sanitizers; every tests/test_*.sh is a script that prints "ok - what" or "not ok - what" for each
-# of its tests. NAME picks some of them (cli, texmath ...). --full widens what the scripts try, as
-# CI does. The last line counts everything.
+# sanitizers, together with the files that its line "Built with:" names, if it has one; every
+# tests/test_*.sh is a script that prints "ok - what" or "not ok - what" for each of its tests. NAME
+# picks some of them (cli, texmath ...). --full widens what the scripts try, as CI does. The last
+# line counts everything.
 set -u
 
 cd "$(dirname "$0")/.." || exit 1
@@ -46,7 +47,8 @@ for source in tests/test_*.c; do
     wanted "$name" || continue
     log=$OUT/$name.log
     # shellcheck disable=SC2086 # flags are words
-    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests "$source" \
+    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests -Itools "$source" \
+        $(sed -n 's/^   Built with: \([a-z_./ ]*[a-z]\).*/\1/p' "$source") \
         -o "$OUT/test_$name" -lcmocka -lpthread -lm >"$log" 2>&1; then
         "$OUT/test_$name" >>"$log" 2>&1
         count "$name" "$log" $?

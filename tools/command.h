@@ -14,6 +14,7 @@ typedef struct command {
 
 extern const command learn_command, synth_command; /* texkit.c */
 extern const command tiles_command;                /* tiles.c  */
+extern const command retile_command;               /* retile.c */
 
 /* A call into the library failed: say so in its own words. */
 int fail_library(cli *run, txm_status status, const char *what);

@@ -24,6 +24,7 @@ has_python() { has_command /usr/bin/python3 && has_file "/usr/lib/python3*/*-pac
 need() { "$1" "$2" || missing="$missing $3"; }
 
 need has_header stb/stb_image.h libstb-dev
+need has_header cjson/cJSON.h libcjson-dev
 case $profile in test | ci)
     need has_command g++ g++
     need has_header cmocka.h libcmocka-dev

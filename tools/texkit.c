@@ -2,9 +2,9 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    Each command is a manual (cli_manual), a table of options and one function that calls the
-   library; the table at the end lists them. learn and synth are here, tiles is in tiles.c. What
-   commands share is in command.c and cli.c, image files are in image_io.c. Read run_learn first: it
-   shows all there is to embedding a header.                                                     */
+   library; the table at the end lists them. learn and synth are here, tiles is in tiles.c, retile in
+   retile.c. What commands share is in command.c and cli.c; image files are in image_io.c, mesh files
+   in mesh_io.c. Read run_learn first: it shows all there is to embedding a header.               */
 #define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
 #include "command.h"
 #include "image_io.h"
@@ -12,6 +12,7 @@
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 #include "textiles.h"
+#include "trimesh_relax.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -19,7 +20,7 @@
 
 const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
-                   ", textiles " TEXTILES_VERSION ")";
+                   ", textiles " TEXTILES_VERSION ", trimesh_relax " TRIMESH_RELAX_VERSION ")";
 
 enum { MAX_SIDE = 1 << 24 };
 
@@ -211,7 +212,8 @@ done:
 const command learn_command = {&learn_manual, run_learn};
 const command synth_command = {&synth_manual, run_synth};
 
-static const command *const commands[] = {&learn_command, &synth_command, &tiles_command};
+static const command *const commands[] = {&learn_command, &synth_command, &tiles_command,
+                                         &retile_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 

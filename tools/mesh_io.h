@@ -1,0 +1,85 @@
+/* mesh_io.h - mesh files in and out
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   Reads OBJ and PLY (ascii and binary); writes OBJ with its material, PLY and GLB (glTF 2.0). Where
+   a function fails it returns 0, nothing stays allocated, and *why is set to an English phrase that
+   fits behind "cannot read 'x.obj': "; the phrase may lie in the mesh's own message.
+
+   Texture coordinates: in memory v runs downwards, as rows of pictures do, and as glTF and
+   textiles.h have it. In OBJ and PLY files v runs upwards. One function in mesh_io.c, turn_v,
+   stands between the two, and nothing else converts.
+
+   Colors: 8 bits as in pictures, that is sRGB; GLB, which has them linear, gets them so.         */
+#ifndef MESH_IO_H
+#define MESH_IO_H
+
+#include "texmath.h"
+
+/* A triangle mesh, or a list of points. What reads one fills it whole; mesh_free releases it. */
+typedef struct mesh_data {
+    size_t vertex_count, triangle_count; /* no triangles: a list of points                    */
+    float *positions;                    /* 3 per vertex, finite                              */
+    float *normals;                      /* 3 per vertex, or NULL                             */
+    float *rotations;                    /* 4 per vertex, quaternions x y z w, or NULL        */
+    unsigned char *colors;               /* 4 per vertex, RGBA, or NULL                       */
+    uint32_t *indices;                   /* 3 per triangle, each below vertex_count           */
+    float *uvs;                          /* 2 per corner, so 6 per triangle, finite; or NULL  */
+    float *corner_normals;               /* 3 per corner, or NULL; mesh_crease makes them     */
+    char message[120];
+} mesh_data;
+
+/* Many copies of a small mesh. */
+typedef struct mesh_instances {
+    const mesh_data *mesh;
+    size_t count;
+    const float *translations; /* 3 per copy                                          */
+    const float *rotations;    /* 4 per copy, unit quaternions x y z w; NULL = none   */
+    const float *scales;       /* 3 per copy; NULL = 1                                */
+} mesh_instances;
+
+/* What goes into one file. */
+typedef struct mesh_scene {
+    const mesh_data *surface;        /* or NULL                                                */
+    const mesh_instances *instances; /* each with triangles; GLB only: mesh_bake for the others */
+    int instance_count;
+    const char *texture;      /* OBJ, GLB: name of the picture on the surface, '/' between folders;
+                                 NULL = none                                                    */
+    const unsigned char *png; /* GLB: the picture itself, to embed; NULL = refer to it by name  */
+    size_t png_size;
+    const char *library; /* OBJ: name of the file that mesh_encode_mtl makes; NULL = none       */
+} mesh_scene;
+
+/* Read the bytes of an OBJ or PLY file; the content decides which. Polygons become triangles. With
+   points_too a PLY without faces will do. 1 if all went well. */
+int mesh_decode(const unsigned char *bytes, size_t size, int points_too, mesh_data *mesh,
+                const char **why);
+
+/* The same from a path. */
+int mesh_read(const char *path, int points_too, mesh_data *mesh, const char **why);
+
+/* Release what the mesh owns; the message stays. */
+void mesh_free(mesh_data *mesh);
+
+/* Can a mesh be written to a path with this extension (".glb")? */
+int mesh_can_write(const char *extension, const char **why);
+
+/* Encode for that extension into a block for free(). */
+int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
+                const char **why);
+
+/* The material that an OBJ with scene->library refers to. */
+int mesh_encode_mtl(const mesh_scene *scene, unsigned char **bytes, size_t *size, const char **why);
+
+/* Give the corners normals of their own: smooth, but not across edges where triangles differ by more
+   than so many degrees. Normals that the mesh has stay where all around them is smooth. OBJ and GLB
+   write them, PLY does not, as it would have to double vertices. 0: no memory, the mesh stays. */
+int mesh_crease(mesh_data *mesh, float degrees);
+
+/* A sphere of radius 1 about the origin, 8 steps^2 triangles; 0: no memory. */
+int mesh_sphere(int steps, mesh_data *mesh);
+
+/* The copies as one mesh, or list of points: their normals, colors and texture coordinates with
+   them, where all have some. */
+int mesh_bake(const mesh_instances *instances, int count, mesh_data *mesh, const char **why);
+
+#endif /* MESH_IO_H */
