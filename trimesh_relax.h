@@ -166,7 +166,8 @@ typedef struct trimesh_report {
 
 typedef enum trimesh_method {
     TRIMESH_LATTICE = 0, /* points from a lattice that follows the surface: most regular     */
-    TRIMESH_REPEL = 1    /* points strewn by area that repel each other, as in [1] and [2]   */
+    TRIMESH_REPEL = 1    /* points strewn by area that repel each other, as in [1] and [2]; where
+                            that gives crossings, the lattice after all                      */
 } trimesh_method;
 
 typedef struct trimesh_desc {
@@ -255,7 +256,8 @@ typedef struct trimesh_update_desc {
     float radius;      /* how far from the change vertices may move, in edge lengths, 1..1000;
                           0 = 4                                                                */
     float tolerance;   /* how far off the new surface an old vertex may lie, in edge lengths,
-                          0..0.5; 0 = 0.05                                                     */
+                          0..0.5; 0 = 0.2. Smaller changes of the surface go unnoticed; results
+                          lie up to 0.1 or so off it where it bends, for the sake of the whole  */
 } trimesh_update_desc;
 
 /* Retile a surface that was edited or cut, from the mesh of what it was before: old vertices that
@@ -1985,6 +1987,57 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
     return 1;
 }
 
+enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are near it is no tip */
+#define TMR_TIP_DEFECT 1.3  /* ours: radians of angle missing around a tip                    */
+
+/* 2 pi minus the angles around each vertex: what is missing there for the surface to be flat. */
+static void tmr_angle_defects(const tmr_surface *s, float *defect) {
+    for (int32_t v = 0; v < s->vertex_count; v++) defect[v] = (float)(2 * TXM_PI);
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        const tmr_vec p = s->point[s->vertex[c]];
+        const tmr_vec a = tmr_sub(s->point[s->vertex[tmr_next(c)]], p);
+        const tmr_vec b = tmr_sub(s->point[s->vertex[tmr_prev(c)]], p);
+        defect[s->vertex[c]] -= txm_float(atan2(tmr_len(tmr_cross(a, b)), tmr_dot(a, b)));
+    }
+}
+
+/* Is v the tip of something thinner than an edge, such as a horn? Within reach much angle is
+   missing, and no vertex there lies beyond v along its normal. */
+static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *kind, int32_t v,
+                      double reach) {
+    int32_t list[TMR_TIP_BALL];
+    int count = 1;
+    double sum = 0;
+    list[0] = v;
+    for (int i = 0; i < count; i++) {
+        const int32_t u = list[i], first = s->corner[u];
+        if (kind[u] != TRIMESH_FREE) return 0;
+        if (tmr_dot(tmr_sub(s->point[u], s->point[v]), s->vertex_normal[v]) > 1e-9) return 0;
+        sum += defect[u];
+        for (int32_t c = first; c >= 0;) {
+            const int32_t x = s->vertex[tmr_next(c)];
+            int known = tmr_dist2(s->point[x], s->point[v]) > reach * reach;
+            for (int j = 0; j < count && !known; j++) known = list[j] == x;
+            if (!known && count == TMR_TIP_BALL) return 0;
+            if (!known) list[count++] = x;
+            c = tmr_ccw(s->opposite, c);
+            if (c == first) break;
+        }
+    }
+    return sum >= TMR_TIP_DEFECT;
+}
+
+/* Make the tips corners, so that they stay. 0: no memory. */
+static int tmr_find_tips(const tmr_surface *s, double reach, txm_arena *scratch, uint8_t *kind) {
+    float *defect = (float *)txm_arena_alloc(scratch, (size_t)s->vertex_count, sizeof(float));
+    if (!defect) return 0;
+    tmr_angle_defects(s, defect);
+    for (int32_t v = 0; v < s->vertex_count; v++)
+        if (kind[v] == TRIMESH_FREE && defect[v] > 0 && tmr_is_tip(s, defect, kind, v, reach))
+            kind[v] = TRIMESH_CORNER;
+    return 1;
+}
+
 /* Follow the line from v over the edge of corner c to its end, as one more line. */
 static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, int32_t v,
                       int32_t c) {
@@ -2021,7 +2074,7 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
     const size_t n = (size_t)s->vertex_count, corners = 3 * (size_t)s->face_count;
     if (tmr_find_creases(s, angle)) {
         if (!tmr_list_ends(s, scratch, &ends)) return 0;
-        if (!tmr_drop_short_creases(s, &ends, 4 * spacing, scratch)) return 0;
+        if (!tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch)) return 0;
     }
     if (!tmr_list_ends(s, scratch, &ends)) return 0;
     const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
@@ -2042,6 +2095,7 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
         !l->line || !l->start || !l->edge || !l->kind || !l->segment)
         return 0;
     if (!tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind)) return 0;
+    if (!tmr_find_tips(s, 0.75 * spacing, scratch, l->kind)) return 0;
     for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
         for (int32_t v = 0; v < s->vertex_count; v++) {
             if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
@@ -2563,7 +2617,11 @@ typedef struct tmr_work {
     tmr_vec *moved;    /* 1 per vertex: room for where it shall go                              */
     int32_t *landed;   /* 1 per vertex: room for the face or segment there                      */
     uint8_t *bad;      /* 1 per vertex: room for a mark                                         */
+    uint8_t *flag;     /* 1 per triangle: room for a mark                                       */
     float *height;     /* 1 per triangle: room for the height of the surface over it            */
+    uint8_t *mask;     /* of relaxation: NULL, or 1 per vertex: may it move?                    */
+    uint8_t *mask_room; /* 1 per vertex: room for that                                           */
+    int cancelled;     /* somewhere the caller wanted no more; looked at after each stage       */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
 } tmr_work;
@@ -2652,8 +2710,11 @@ static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_ar
     w->moved = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
     w->landed = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
+    w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
+    w->flag = (uint8_t *)txm_arena_alloc(arena, (size_t)faces, 1);
     if (!m->p || !m->n || !m->source || !m->corner || !m->flags || !m->valence || !m->vertex ||
-        !m->opposite || !m->edge || !w->size || !w->moved || !w->landed || !w->bad)
+        !m->opposite || !m->edge || !w->size || !w->moved || !w->landed || !w->bad ||
+        !w->flag || !w->mask_room)
         return 0;
     m->vertex_count = m->live = s->vertex_count;
     m->face_count = m->live_faces = s->face_count;
@@ -2804,18 +2865,36 @@ static int tmr_is_wide(const tmr_mesh *m, int32_t c) {
                                             * tmr_len2(eb));
 }
 
+/* Which corners' edges are wide? Bits 0 to 2 of w->flag, one byte per triangle. */
+static void tmr_wide_chunk(void *context, int index) {
+    tmr_work *w = (tmr_work *)context;
+    const tmr_mesh *m = &w->m;
+    const int32_t from = index * TMR_CHUNK;
+    const int32_t to = from + TMR_CHUNK < m->face_count ? from + TMR_CHUNK : m->face_count;
+    for (int32_t f = from; f < to; f++) {
+        w->flag[f] = 0;
+        for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
+            if (m->vertex[c] < 0 || m->opposite[c] < c || m->edge[c] || !tmr_is_wide(m, c)) continue;
+            w->flag[f] |= (uint8_t)(1 << (c - 3 * f));
+        }
+    }
+}
+
 /* Turn edges until the mesh is Delaunay, as far as the normals allow. */
 static void tmr_flip_delaunay(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     tmr_quad q;
     for (int round = 0; round < rounds; round++) {
         int32_t turned = 0;
-        for (int32_t c = 0; c < 3 * m->face_count; c++) {
-            if (m->vertex[c] < 0 || m->opposite[c] < c || m->edge[c]) continue;
-            if (!tmr_is_wide(m, c) || !tmr_look_at_flip(w, c, &q)) continue;
-            if (q.after <= 0 && q.after <= q.before) continue;
-            tmr_flip(m, c);
-            turned++;
+        txm_parallel_for(w->env, (m->face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_wide_chunk, w);
+        for (int32_t f = 0; f < m->face_count; f++) {
+            for (int32_t c = 3 * f; w->flag[f] && c < 3 * f + 3; c++) {
+                if (!((w->flag[f] >> (c - 3 * f)) & 1) || m->edge[c]) continue;
+                if (!tmr_is_wide(m, c) || !tmr_look_at_flip(w, c, &q)) continue;
+                if (q.after <= 0 && q.after <= q.before) continue;
+                tmr_flip(m, c);
+                turned++;
+            }
         }
         if (turned == 0) break;
     }
@@ -2884,6 +2963,7 @@ static void tmr_relax_vertex(tmr_work *w, int32_t v) {
     const int kind = tmr_kind_of(m, v);
     w->moved[v] = m->p[v];
     w->landed[v] = m->source[v];
+    if (w->mask && !w->mask[v]) return;
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
         return;
     if (kind != TRIMESH_FREE) {
@@ -2924,25 +3004,37 @@ static void tmr_relax_chunk(void *context, int index) {
     for (int32_t v = from; v < to; v++) tmr_relax_vertex(w, v);
 }
 
+static int tmr_has_moved(const tmr_work *w, int32_t v) {
+    const tmr_vec a = w->moved[v], b = w->m.p[v];
+    return a.x < b.x || a.x > b.x || a.y < b.y || a.y > b.y || a.z < b.z || a.z > b.z;
+}
+
 /* Is the triangle worse than allowed when its corners go where they shall? */
 static int tmr_is_spoilt(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
     if (v[0] < 0 || tmr_is_ghost_face(m, face)) return 0;
+    if (!tmr_has_moved(w, v[0]) && !tmr_has_moved(w, v[1]) && !tmr_has_moved(w, v[2])) return 0;
     const double after =
         tmr_agreement(w, v[0], v[1], v[2], w->moved[v[0]], w->moved[v[1]], w->moved[v[2]]);
     if (after >= TMR_LEAST_AGREEMENT) return 0;
     return after < tmr_agreement(w, v[0], v[1], v[2], m->p[v[0]], m->p[v[1]], m->p[v[2]]);
 }
 
-/* Marks are only ever set, each to the same value, so tasks may overlap. Each face chunk keeps its
-   verdict in its own slot: w->bad of the face's own slot would be nicer, but vertices are what is
-   put back. */
+static void tmr_spoilt_chunk(void *context, int index) {
+    tmr_work *w = (tmr_work *)context;
+    const int32_t from = index * TMR_CHUNK;
+    const int32_t to = from + TMR_CHUNK < w->m.face_count ? from + TMR_CHUNK : w->m.face_count;
+    for (int32_t f = from; f < to; f++) w->flag[f] = (uint8_t)tmr_is_spoilt(w, f);
+}
+
+/* Mark the vertices of all spoilt triangles in w->bad; how many triangles there are. */
 static int32_t tmr_find_spoilt(tmr_work *w) {
     tmr_mesh *m = &w->m;
     int32_t found = 0;
+    txm_parallel_for(w->env, (m->face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_spoilt_chunk, w);
     for (int32_t f = 0; f < m->face_count; f++) {
-        if (!tmr_is_spoilt(w, f)) continue;
+        if (!w->flag[f]) continue;
         found++;
         for (int k = 0; k < 3; k++) w->bad[m->vertex[3 * f + k]] = 1;
     }
@@ -2955,7 +3047,7 @@ static void tmr_settle_chunk(void *context, int index) {
     const int32_t from = index * TMR_CHUNK;
     const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
     for (int32_t v = from; v < to; v++) {
-        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || w->bad[v]) continue;
+        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || w->bad[v] || !tmr_has_moved(w, v)) continue;
         const int kind = tmr_kind_of(m, v);
         if (kind == TRIMESH_CORNER) continue;
         if (kind == TRIMESH_FREE) {
@@ -3801,34 +3893,17 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
             /* not too many at once, so that the rest of them are looked at afresh */
             if (pass < 8 && done * 4 > (*missing < 0 ? -*missing : *missing) + 8) break;
         }
-        tmr_flip_valences(w, 3, 0.4);
+        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count); /* relax where something was done */
+        w->mask = pass % 4 == 3 ? NULL : w->mask_room;
+        tmr_flip_valences(w, 2, 0.4);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
-        tmr_flip_delaunay(w, 3);
+        tmr_flip_delaunay(w, 2);
+        w->mask = NULL;
         if (done == 0 && pass >= 40) break;
     }
     return 1;
 }
 
-#ifdef TMR_DEBUG
-#include <time.h>
-static void tmr_debug(const tmr_work *w, const char *what) {
-    const tmr_mesh *m = &w->m;
-    static double t0; struct timespec tt; clock_gettime(CLOCK_MONOTONIC, &tt); double t1 = (double)tt.tv_sec + 1e-9 * (double)tt.tv_nsec; if (t0 > 0) fprintf(stderr, "%.3f ", t1 - t0); t0 = t1;
-    int bad = 0, worse = 0, irregular = 0, all = 0; double q = 0, a2 = 0, a1 = 0;
-    for (int32_t f = 0; f < m->face_count; f++) {
-        const int32_t *v = m->vertex + 3 * f;
-        if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
-        double g = tmr_agreement(w, v[0], v[1], v[2], m->p[v[0]], m->p[v[1]], m->p[v[2]]);
-        bad += g < TMR_LEAST_AGREEMENT; worse += g < 0; all++;
-        q += tmr_quality(m->p[v[0]], m->p[v[1]], m->p[v[2]], tmr_expected_normal(w, v[0], v[1], v[2]));
-        double ar = tmr_len(tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]])); a1 += ar; a2 += ar * ar;
-    }
-    for (int32_t v = 0; v < m->vertex_count; v++) irregular += m->corner[v] >= 0 && !tmr_is_ghost(m, v) && m->valence[v] != tmr_ideal_valence(m, v);
-    fprintf(stderr, "%-12s live %d faces %d bad %d worse %d irregular %d Q %.4f areacv %.4f\n", what, m->live, all, bad, worse, irregular, q / all, sqrt(a2 / all / (a1 / all) / (a1 / all) - 1));
-}
-#else
-#define tmr_debug(w, x) (void)0
-#endif
 /* ---- resampling --------------------------------------------------------------------------- */
 
 /* Bring the copy of the surface to about two vertices per lattice point to come. */
@@ -3839,7 +3914,7 @@ static int tmr_resample(tmr_work *w, double share) {
     while (limit < 0.72 * aim) {
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
         limit *= 1.5;
-        if (txm_progress(w->env, 0.08f, "thin")) return 0;
+        if (txm_progress(w->env, 0, "resample")) return 0;
     }
     for (int round = 0; round < 24; round++) {
         const int32_t split = tmr_split_long(w, 1.4 * aim, 1.4);
@@ -3847,7 +3922,7 @@ static int tmr_resample(tmr_work *w, double share) {
         const int32_t gone = tmr_collapse_short(w, 0.7 * aim, 0.7, 1.4 * aim, 0);
         tmr_flip_delaunay(w, 2);
         if (round >= 3 && (split + gone) * 200.0 < w->m.live) break;
-        if (txm_progress(w->env, 0.09f, "resample")) return 0;
+        if (txm_progress(w->env, 0, "resample")) return 0;
     }
     return 1;
 }
@@ -3972,9 +4047,11 @@ static int tmr_rebuild(tmr_work *w, int cut, int32_t vertices, int32_t faces, tx
     w->moved = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
     w->landed = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
+    w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
+    w->flag = (uint8_t *)txm_arena_alloc(arena, (size_t)faces, 1);
     if (!number || !middle || !where || !m->p || !m->n || !m->source || !m->corner || !m->flags ||
         !m->valence || !m->vertex || !m->opposite || !m->edge || !w->size || !w->moved ||
-        !w->landed || !w->bad)
+        !w->landed || !w->bad || !w->flag || !w->mask_room)
         return 0;
     m->vertex_limit = vertices;
     m->face_limit = faces;
@@ -4261,26 +4338,54 @@ static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
     }
 }
 
+enum { TMR_NEAR_CELLS = 1 << 16 }; /* coarse cells by hash that are near a marked vertex, or seem so */
+
+static uint32_t tmr_near_key(tmr_vec p, double cell, int dx, int dy, int dz) {
+    return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
+                        (int32_t)floor(p.z / cell) + dz) % TMR_NEAR_CELLS;
+}
+
+/* Set near for the coarse cells around the vertices marked in w->bad. */
+static void tmr_mark_near(const tmr_work *w, uint8_t *near) {
+    memset(near, 0, TMR_NEAR_CELLS);
+    for (int32_t v = 0; v < w->m.vertex_count; v++) {
+        if (!w->bad[v]) continue;
+        for (int k = 0; k < 27; k++)
+            near[tmr_near_key(w->m.p[v], 3 * w->length, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)] = 1;
+    }
+}
+
+/* The cells of all triangles, or of those near, in order. 0: no memory. */
+static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, txm_arena *arena) {
+    const tmr_mesh *m = &w->m;
+    memset(g, 0, sizeof *g);
+    g->cell = w->length * 0.65;
+    g->limit = (size_t)m->live_faces * 10 + 1000;
+    g->entry = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
+    g->spare = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
+    if (!g->entry || !g->spare) return 0;
+    do { /* in coarser cells if there are many large triangles */
+        g->cell *= 2;
+        g->count = 0;
+        g->overflow = 0;
+        for (int32_t f = 0; f < m->face_count && !g->overflow; f++) {
+            if (tmr_is_dead(m, f) || tmr_is_ghost_face(m, f)) continue;
+            if (near && !near[tmr_near_key(m->p[m->vertex[3 * f]], 3 * w->length, 0, 0, 0)]) continue;
+            tmr_cells_add(m, g, f);
+        }
+    } while (g->overflow);
+    txm_sort_pairs(g->entry, g->spare, g->count);
+    return 1;
+}
+
 /* How many pairs of triangles cross each other, and mark their vertices in w->bad? -1: no memory.
-   Linear in the number of triangles. */
-static long tmr_count_crossings(tmr_work *w, txm_arena *scratch) {
+   near: where to look, as tmr_mark_near has it; NULL = everywhere. Linear in the number of
+   triangles. */
+static long tmr_count_crossings(tmr_work *w, const uint8_t *near, txm_arena *scratch) {
     const tmr_mesh *m = &w->m;
     tmr_cells g;
     long found = 0;
-    memset(&g, 0, sizeof g);
-    g.cell = w->length * 1.3;
-    g.limit = (size_t)m->live_faces * 10 + 1000;
-    g.entry = (txm_pair *)txm_arena_alloc(scratch, g.limit, sizeof(txm_pair));
-    g.spare = (txm_pair *)txm_arena_alloc(scratch, g.limit, sizeof(txm_pair));
-    if (!g.entry || !g.spare) return -1;
-    do { /* in coarser cells if there are many large triangles */
-        g.count = 0;
-        g.overflow = 0;
-        for (int32_t f = 0; f < m->face_count && !g.overflow; f++)
-            if (!tmr_is_dead(m, f) && !tmr_is_ghost_face(m, f)) tmr_cells_add(m, &g, f);
-        g.cell *= 2;
-    } while (g.overflow);
-    txm_sort_pairs(g.entry, g.spare, g.count);
+    if (!tmr_cells_make(w, near, &g, scratch)) return -1;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
@@ -4410,7 +4515,7 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
     tmr_mesh *m = &w->m;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         const int kind = tmr_kind_of(m, v);
-        if (!w->bad[v] || m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
+        if (!w->bad[v] || m->corner[v] < 0 || (m->flags[v] & (TMR_GHOST | TMR_PINNED))) continue;
         if (kind == TRIMESH_BORDER || (kind != TRIMESH_FREE && !lines_too)) continue;
         tmr_vec sum = tmr_v(0, 0, 0);
         int32_t count = 0, c = m->corner[v];
@@ -4431,6 +4536,35 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
     }
 }
 
+#define TMR_FAIR 0.85 /* ours: quality of triangles that gets no further attention */
+
+/* A few more rounds of relaxation and flips just around the triangles that are still poor. */
+static void tmr_improve_spots(tmr_work *w, int rounds) {
+    tmr_mesh *m = &w->m;
+    w->pull = w->step = 1;
+    for (int round = 0; round < rounds; round++) {
+        int32_t poor = 0;
+        memset(w->bad, 0, (size_t)m->vertex_count);
+        for (int32_t f = 0; f < m->face_count; f++) {
+            const int32_t *v = m->vertex + 3 * f;
+            if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
+            if (tmr_quality(m->p[v[0]], m->p[v[1]], m->p[v[2]],
+                            tmr_expected_normal(w, v[0], v[1], v[2])) >= TMR_FAIR)
+                continue;
+            poor++;
+            for (int k = 0; k < 3; k++) w->bad[v[k]] = 1;
+        }
+        if (poor == 0) break;
+        for (int k = 0; k < 3; k++) tmr_grow_marks(w);
+        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count);
+        w->mask = w->mask_room;
+        for (int k = 0; k < 3; k++) tmr_relax(w);
+        w->mask = NULL;
+        tmr_flip_valences(w, 2, 0.4);
+        tmr_flip_delaunay(w, 2);
+    }
+}
+
 enum { TMR_SPOT_ROUNDS = 16 };
 
 /* Mend the few spots where triangles cross or face against the surface, by smoothing around them,
@@ -4441,13 +4575,17 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
     long best = -1;
     tmr_vec *kept = NULL;
     int32_t *kept_source = NULL;
+    uint8_t *near;
     txm_arena_init(&arena, env);
+    near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
+    if (!near) goto no_memory;
     for (int round = 0; round <= TMR_SPOT_ROUNDS; round++) {
         txm_arena scratch;
         long doubtful;
+        if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
         memset(w->bad, 0, count);
         txm_arena_init(&scratch, env);
-        const long crossings = tmr_count_crossings(w, &scratch);
+        const long crossings = tmr_count_crossings(w, round > 0 ? near : NULL, &scratch);
         txm_arena_free(&scratch);
         if (crossings < 0) goto no_memory;
         const long turned = tmr_count_turned(w, &doubtful);
@@ -5215,6 +5353,8 @@ static void tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, d
     w->pull = pull;
     w->step = step;
     for (int round = 0; round < rounds; round++) {
+        w->cancelled |= txm_progress(w->env, 0, "relax") != 0; /* jobs keep it from falling */
+        if (w->cancelled) return;
         w->length = tmr_ideal_length(w);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
@@ -5222,55 +5362,51 @@ static void tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, d
     }
 }
 
-/* Bring w->m to a lattice of about so many vertices. */
-static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
-    txm_arena arena;
-    tmr_fields f;
-    txm_status status = TXM_CANCELLED;
-    int32_t missing = 0;
-    txm_arena_init(&arena, w->env);
-    tmr_debug(w,"copy");
-    if (!tmr_resample(w, 2)) goto done;
-    tmr_debug(w,"resample"); tmr_even_lines(w);
+/* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
+   many equilateral triangles on the area there is, somewhat less (ours, measured), since taking
+   vertices away mends the pattern later, and putting more in harms it. */
+static void tmr_set_spacing(tmr_work *w, int32_t target) {
+    const double faces = w->m.live_faces;
     w->pull = 0.5;
     w->step = 1;
-    { /* even it a little */
-        const double m_faces = w->m.live_faces;
-        w->length = tmr_ideal_length(w);
-        for (int k = 0; k < 3; k++) {
-            tmr_relax(w);
-            tmr_flip_delaunay(w, 2);
-        }
-        w->length = tmr_ideal_length(w);
-        /* that many equilateral triangles on the area that there is; somewhat
-           shorter, since taking vertices away mends the pattern, putting more in harms it (ours,
-           measured) */
-        w->length = 0.982 * w->length * sqrt((double)m_faces / (m_faces + 2.0 * (target - w->m.live)));
+    w->length = tmr_ideal_length(w);
+    for (int k = 0; k < 3; k++) {
+        tmr_relax(w);
+        tmr_flip_delaunay(w, 2);
     }
-    status = TXM_OUT_OF_MEMORY;
-    tmr_debug(w,"evened");
-    if (!tmr_fields_build(w, &f, &arena)) goto done;
+    w->length =
+        0.982 * tmr_ideal_length(w) * sqrt(faces / (faces + 2.0 * (target - w->m.live)));
+}
+
+/* Directions, lattice points, and the mesh collapsed onto them. 0: no memory. */
+static int tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
+    tmr_fields f;
+    if (!tmr_fields_build(w, &f, arena)) return 0;
     tmr_solve_directions(&f, seed);
-    tmr_debug(w,"directions");tmr_solve_points(&f);tmr_debug(w,"points");
-    if (!tmr_collapse_lattice(w, &f, &arena)) goto done;
-    tmr_debug(w,"collapsed");
-    for (int round = 0; round < 4; round++) {
+    tmr_solve_points(&f);
+    return tmr_collapse_lattice(w, &f, arena);
+}
+
+/* Bring w->m, a copy of the surface, to a lattice of so many vertices. */
+static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
+    txm_arena arena;
+    int32_t missing = 0;
+    if (!tmr_resample(w, 2)) return TXM_CANCELLED;
+    tmr_even_lines(w);
+    tmr_set_spacing(w, target);
+    txm_arena_init(&arena, w->env);
+    int ok = tmr_solve_lattice(w, seed, &arena);
+    for (int round = 0; round < 4 && ok; round++) { /* what the lattice left undone */
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, 0.3);
         for (int k = 0; k < 3; k++) tmr_relax(w);
         tmr_split_long(w, 1.5, 1.6);
         tmr_collapse_short(w, 0.55, 0.5, 1.5, 1);
     }
-    tmr_debug(w,"relaxed");
-    if (!tmr_fix_count(w, target, 2, &arena, &missing)) goto done;
-    tmr_debug(w,"counted");
-    tmr_improve(w, 6, 3, 1.5, 0.8);
-    status = TXM_OK;
-done:
+    ok = ok && tmr_fix_count(w, target, 2, &arena, &missing);
+    if (ok) tmr_improve(w, 6, 3, 1.5, 0.8);
     txm_arena_free(&arena);
-    if (status == TXM_OUT_OF_MEMORY) txm_fail(w->env, status, "no memory to retile the surface");
-    if (status == TXM_CANCELLED) txm_fail(w->env, status, "cancelled");
-    return status;
+    return ok ? TXM_OK : TXM_OUT_OF_MEMORY;
 }
 
 /* The last part of every method: the exact number, and as much regularity as pays. */
@@ -5279,6 +5415,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     if (!tmr_fix_count(w, target, 2, scratch, &missing)) return TXM_OUT_OF_MEMORY;
     tmr_improve(w, 1, 2, 1.5, 0.8);
     tmr_improve(w, 2, 2, 1.2, 1);
+    tmr_improve_spots(w, 3);
     if (w->m.live != target) {
         char text[160];
         snprintf(text, sizeof text, "reached %ld vertices instead of %ld", (long)w->m.live,
@@ -5387,7 +5524,7 @@ struct trimesh_job {
     double mean, largest;  /* movement in the last one                                         */
     int retries;           /* with adapted density                                              */
     float *plain_scale;    /* before that                                                       */
-    int cut;               /* lattice: at a quarter of the vertices, then each triangle in four */
+    int cut;               /* lattice: how often the number is quartered, then triangles cut in four */
     tmr_surface s;
     tmr_lines l;
     tmr_work w;
@@ -5465,7 +5602,8 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     job->w.step = 1;
     /* closed: V - E + F with a ghost for each loop */
     const double euler = (double)job->report.euler + (double)job->report.loops;
-    job->cut = job->desc.vertices >= TMR_CUT_FROM && (double)job->desc.vertices + 3 * euler > 1000;
+    if (job->desc.vertices >= TMR_CUT_FROM && (double)job->desc.vertices + 3 * euler > 1000)
+        job->cut = job->desc.vertices >= 4 * TMR_CUT_FROM ? 2 : 1;
     job->stage = job->desc.method == TRIMESH_REPEL ? TMR_STAGE_STREW : TMR_STAGE_LATTICE;
     return TXM_OK;
 }
@@ -5495,14 +5633,17 @@ static txm_status tmr_job_join(trimesh_job *job) {
 static txm_status tmr_job_repel(trimesh_job *job) {
     tmr_repel_round(&job->w, tmr_repel_force(job->round, job->rounds), &job->mean, &job->largest);
     job->round++;
-    if (job->round >= job->rounds || job->mean < TMR_CALM) job->stage = TMR_STAGE_FINISH;
+    if (job->round < job->rounds && job->mean >= TMR_CALM) return TXM_OK;
+    tmr_improve(&job->w, 10, 2, 0.8, 1); /* more than the lattice needs: it is regular already */
+    job->stage = TMR_STAGE_FINISH;
     return TXM_OK;
 }
 
 static txm_status tmr_job_lattice(trimesh_job *job) {
     const double euler = (double)job->report.euler + (double)job->report.loops;
     const double target = (double)job->desc.vertices;
-    const int32_t aim = (int32_t)(job->cut ? floor((target + 3 * euler) / 4) : target);
+    int32_t aim = (int32_t)target;
+    for (int k = 0; k < job->cut; k++) aim = (int32_t)floor((aim + 3 * euler) / 4);
     int32_t vertices = job->s.vertex_count + (int32_t)job->report.loops;
     if (vertices < 3 * aim) vertices = 3 * aim;
     vertices = vertices + vertices / 4 + 1000;
@@ -5513,7 +5654,7 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_SUBDIVIDE;
     if (!job->cut || tmr_may_subdivide(&job->w)) return TXM_OK;
-    job->cut = 0; /* too coarse: once more, at full number */
+    job->cut--; /* too coarse: once more, at four times the number */
     job->stage = TMR_STAGE_LATTICE;
     txm_arena_free(&job->first);
     memset(&job->w.m, 0, sizeof job->w.m);
@@ -5522,13 +5663,19 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
 
 static txm_status tmr_job_subdivide(trimesh_job *job) {
     tmr_work *w = &job->w;
-    const int32_t vertices =
-        (job->cut ? w->m.live + (w->m.live_faces * 3) / 2 : w->m.live) + w->m.ghosts + 1000;
-    if (!tmr_rebuild(w, job->cut, vertices, 4 * w->m.live_faces + 4000, &job->second,
-                     &job->scratch))
-        return TXM_OUT_OF_MEMORY;
-    txm_arena_free(&job->first);
-    if (job->cut) tmr_improve(w, 2, 2, 1, 1);
+    for (int left = job->cut;; left--) {
+        const int32_t vertices = (left ? w->m.live + (w->m.live_faces * 3) / 2 : w->m.live) +
+                                 w->m.ghosts + 1000;
+        const int32_t faces = (left ? 4 : 1) * w->m.live_faces + 4000;
+        if (!tmr_rebuild(w, left > 0, vertices, faces, &job->second, &job->scratch))
+            return TXM_OUT_OF_MEMORY;
+        txm_arena_free(&job->first);
+        txm_arena_free(&job->scratch);
+        job->first = job->second;
+        txm_arena_init(&job->second, &job->env);
+        if (left) tmr_improve(w, 2, 2, 1, 1);
+        if (left <= 1) break;
+    }
     job->stage = TMR_STAGE_FINISH;
     return TXM_OK;
 }
@@ -5541,7 +5688,7 @@ static int tmr_surface_crosses(trimesh_job *job) {
     const int32_t loops = (int32_t)job->report.loops;
     txm_arena_init(&arena, &job->env);
     if (tmr_copy_surface(&w, job->s.vertex_count + loops, 2 * job->s.face_count + 8, &arena))
-        found = tmr_count_crossings(&w, &arena);
+        found = tmr_count_crossings(&w, NULL, &arena);
     txm_arena_free(&arena);
     return found > 0;
 }
@@ -5553,7 +5700,7 @@ static int tmr_job_retry(trimesh_job *job, txm_status *status) {
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
     if (job->desc.method == TRIMESH_LATTICE && job->cut) {
-        job->cut = 0;
+        job->cut--;
     } else {
         if (job->retries == 2) return 0;
         job->s.scale = job->retries ? job->plain_scale : job->s.scale;
@@ -5616,6 +5763,7 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
+    if (status == TXM_OK && job->w.cancelled) status = TXM_CANCELLED;
     if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its flags are there */
     job->shown = stage;
     job->status = status;
@@ -6214,7 +6362,7 @@ static int tmr_update_old(tmr_update *u) {
    still there? */
 static int tmr_is_covered(const tmr_update *u, tmr_vec p, tmr_vec n, double length) {
     tmr_place at;
-    const int32_t f = tmr_tree_nearest(&u->old_tree, p, n, 0.5, 0.3 * length, &at);
+    const int32_t f = tmr_tree_nearest(&u->old_tree, p, n, 0.5, 0.5 * length, &at);
     if (f < 0) return 0;
     for (int k = 0; k < 3; k++)
         if (u->now[u->old_vertex[3 * f + k]] < 0) return 0;
@@ -6437,6 +6585,11 @@ static txm_status tmr_update_relax(tmr_update *u) {
     if (missing != 0)
         return txm_fail(w->env, TXM_TOO_SMALL,
                         "the vertices asked for do not fit into what has changed; ask for 0");
+    long faults;
+    if (!tmr_mend_spots(w, &faults, w->env)) return TXM_OUT_OF_MEMORY;
+    if (faults > 0)
+        return txm_fail(w->env, TXM_TOO_SMALL, "the changed part is too thin or too fine for "
+                        "edges of this length; retile the whole with more vertices");
     return TXM_OK;
 }
 
@@ -6513,7 +6666,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
     u->old = old;
     u->desc = desc->desc;
     u->radius = desc->radius > 0 ? desc->radius : 4;
-    u->tolerance = desc->tolerance > 0 ? desc->tolerance : 0.05;
+    u->tolerance = desc->tolerance > 0 ? desc->tolerance : 0.2;
     u->w.env = env;
     txm_arena_init(&u->input, env);
     txm_arena_init(&u->first, env);
