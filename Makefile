@@ -28,7 +28,7 @@ all: $(BUILD)/texkit
 
 help:
 	@echo "make            build $(BUILD)/texkit, the command line tool"
-	@echo "make demo       texture and tiles from sample photographs, write out/index.html"
+	@echo "make demo       texture, tiles and meshes from sample photographs, write out/index.html"
 	@echo "make test       run all tests, with the sanitizers on"
 	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
 	@echo "make bench      print a table of timings"
@@ -53,9 +53,12 @@ $(BUILD)/texkit: $(TEXKIT)
 	$(LINK) $^ -o $@ -lcjson -lm
 
 # small programs that the demo, the tests and the benchmark use
-helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/view
+helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/shape $(BUILD)/view
 
 $(BUILD)/crop $(BUILD)/draw: $(BUILD)/%: $(BUILD)/%.o $(BUILD)/image_io.o $(BUILD)/stb.o
+	$(LINK) $^ -o $@ -lm
+
+$(BUILD)/shape: $(BUILD)/shape.o
 	$(LINK) $^ -o $@ -lm
 
 $(BUILD)/view: $(addprefix $(BUILD)/,view.o render.o mesh_io.o image_io.o stb.o)
@@ -67,7 +70,9 @@ examples: $(EXAMPLES)
 
 $(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
-	$(COMPILE) $< $(BUILD)/stb.o -o $@ -lm
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ -lm
+
+$(BUILD)/examples/membrane: $(addprefix $(BUILD)/,mesh_io.o render.o image_io.o)
 
 # in reverse order: sand, a common case, comes first and is swept over all sizes
 bench: $(BENCHES) $(PLAIN) samples
@@ -87,7 +92,7 @@ $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb
 samples: helpers
 	@BUILD=$(BUILD) tools/samples.sh
 
-demo: all samples
+demo: all samples examples
 	@BUILD=$(BUILD) tools/demo.sh
 
 test:

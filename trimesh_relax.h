@@ -180,7 +180,8 @@ typedef struct trimesh_desc {
     float crease_angle;    /* degrees between the normals of two triangles from which on their
                               edge may be a crease, 0 = 40; 180 = no creases                    */
     float line_spacing;    /* edge length along creases and borders relative to that inside,
-                              0.25..4; 0 = 1                                                    */
+                              0.25..4; 0 = 1. More, where they would take over half of the
+                              vertices                                                          */
     float weld;            /* weld vertices nearer than this, relative to the diagonal of the
                               bounding box, 0..0.01; 0 = only those in equal places             */
     int iterations;        /* TRIMESH_REPEL: at most so many rounds of repulsion, 1..1000; 0 = 40 */
@@ -1977,7 +1978,8 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
                 way += tmr_dist(s->point[at], s->point[next]);
                 at = next;
                 if (way > reach || at == v || turn[at] <= 0) break;
-                sharpest = turn[at] < turn[v] || (turn[at] <= turn[v] && at >= v);
+                const float other = turn[at];
+                sharpest = other < turn[v] || (other <= turn[v] && at >= v);
                 const int32_t j = ends->first[at];
                 e = ends->corner[j] == e ? ends->corner[j + 1] : ends->corner[j];
             }
@@ -2095,7 +2097,7 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
         !l->line || !l->start || !l->edge || !l->kind || !l->segment)
         return 0;
     if (!tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind)) return 0;
-    if (!tmr_find_tips(s, 0.75 * spacing, scratch, l->kind)) return 0;
+    if (angle < 180 && !tmr_find_tips(s, 0.75 * spacing, scratch, l->kind)) return 0;
     for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
         for (int32_t v = 0; v < s->vertex_count; v++) {
             if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
@@ -2167,6 +2169,27 @@ enum { TMR_GRADE_SWEEPS = 12 };   /* ours: of the limit on how fast the edge len
 #define TMR_TURN_PER_EDGE 0.6     /* ours: radians that one edge may turn where density adapts    */
 #define TMR_LEAST_SIZE 0.2        /* ours: the shortest edges where it adapts fully               */
 
+/* The edge length, where the scale is 1, of so many vertices on the surface: triangles of edge L
+   take sqrt(3) / 4 L^2 each, and there are two per vertex. */
+static double tmr_spacing(const tmr_surface *s, double vertices) {
+    double sum = 0;
+    for (int32_t f = 0; f < s->face_count && s->scale; f++) {
+        const int32_t *v = s->vertex + 3 * f;
+        const double scale = (s->scale[v[0]] + (double)s->scale[v[1]] + s->scale[v[2]]) / 3;
+        const tmr_vec n = tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
+        sum += 0.5 * tmr_len(n) / (scale * scale);
+    }
+    return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
+}
+
+/* Make the mean of the scale such that with and without it the same number of vertices gives the
+   same spacing where it is 1. */
+static void tmr_normalize_scale(tmr_surface *s) {
+    if (!s->scale) return;
+    const double factor = tmr_spacing(s, 1) / sqrt(s->area * 1.1547005383792515);
+    for (int32_t v = 0; v < s->vertex_count; v++) s->scale[v] = txm_float(s->scale[v] * factor);
+}
+
 /* Curvature at every vertex: the most that the normal turns per unit of length along an edge. */
 static void tmr_curvature(const tmr_surface *s, float *curvature) {
     for (int32_t v = 0; v < s->vertex_count; v++) curvature[v] = 0;
@@ -2180,8 +2203,8 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     }
 }
 
-/* Shorten the wanted edge lengths where the surface bends: such that an edge turns by no more than
-   TMR_TURN_PER_EDGE, to the power of adapt; and let them grow with the distance no faster than by
+/* Shorten the wanted edge lengths where the surface bends, such that an edge turns by no more than
+   TMR_TURN_PER_EDGE, fully or in part (adapt); and let them grow with the distance no faster than by
    a third of it. 0: no memory. */
 static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
                            txm_arena *scratch) {
@@ -2208,18 +2231,6 @@ static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_are
     return 1;
 }
 
-/* The edge length, where the scale is 1, of so many vertices on the surface: triangles of edge L
-   take sqrt(3) / 4 L^2 each, and there are two per vertex. */
-static double tmr_spacing(const tmr_surface *s, double vertices) {
-    double sum = 0;
-    for (int32_t f = 0; f < s->face_count && s->scale; f++) {
-        const int32_t *v = s->vertex + 3 * f;
-        const double scale = (s->scale[v[0]] + (double)s->scale[v[1]] + s->scale[v[2]]) / 3;
-        const tmr_vec n = tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
-        sum += 0.5 * tmr_len(n) / (scale * scale);
-    }
-    return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
-}
 /* ---- the mesh that changes ---------------------------------------------------------------- */
 
 /* Flags of a vertex besides the trimesh_kind in the lowest two bits. */
@@ -3909,6 +3920,8 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
 /* Bring the copy of the surface to about two vertices per lattice point to come. */
 static int tmr_resample(tmr_work *w, double share) {
     const double aim = sqrt(1 / share); /* of edges, relative to w->length */
+    /* lines first: what is inside is split to fit them */
+    tmr_split_long(w, 1e9, 1.4);
     /* fine input: take away, the shortest edges first */
     double limit = 0.05 * aim;
     while (limit < 0.72 * aim) {
@@ -5353,7 +5366,7 @@ static void tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, d
     w->pull = pull;
     w->step = step;
     for (int round = 0; round < rounds; round++) {
-        w->cancelled |= txm_progress(w->env, 0, "relax") != 0; /* jobs keep it from falling */
+        if (!w->cancelled) w->cancelled = txm_progress(w->env, 0, "relax") != 0; /* never falls */
         if (w->cancelled) return;
         w->length = tmr_ideal_length(w);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
@@ -5586,6 +5599,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
     if (status != TXM_OK) return status;
     if (tmr_check_least(job, &job->env) != TXM_OK) return TXM_TOO_SMALL;
+    tmr_normalize_scale(&job->s);
     if (job->desc.adapt > 0 &&
         !tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input, &job->scratch))
         return TXM_OUT_OF_MEMORY;
@@ -5598,6 +5612,10 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     job->w.desc = &job->desc;
     job->w.env = &job->env;
     job->w.line_scale = job->desc.line_spacing > 0 ? job->desc.line_spacing : 1;
+    double lines = 0; /* at most half of the vertices go to lines: further apart if need be */
+    for (int32_t i = 0; i < job->l.line_count; i++) lines += job->l.length[i];
+    job->w.line_scale = fmax(job->w.line_scale, lines / tmr_job_spacing(job) /
+                                                    (0.5 * (double)job->desc.vertices));
     job->w.pull = 1;
     job->w.step = 1;
     /* closed: V - E + F with a ghost for each loop */
@@ -5680,17 +5698,17 @@ static txm_status tmr_job_subdivide(trimesh_job *job) {
     return TXM_OK;
 }
 
-/* Does the surface cross itself? Then the result may, too. */
+/* Does the surface cross itself? Then the result may, too. -1: no memory. */
 static int tmr_surface_crosses(trimesh_job *job) {
     tmr_work w = job->w;
     txm_arena arena;
-    long found = 0;
+    long found = -1;
     const int32_t loops = (int32_t)job->report.loops;
     txm_arena_init(&arena, &job->env);
     if (tmr_copy_surface(&w, job->s.vertex_count + loops, 2 * job->s.face_count + 8, &arena))
         found = tmr_count_crossings(&w, NULL, &arena);
     txm_arena_free(&arena);
-    return found > 0;
+    return found < 0 ? -1 : found > 0;
 }
 
 /* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
@@ -5699,7 +5717,9 @@ static int tmr_job_retry(trimesh_job *job, txm_status *status) {
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
-    if (job->desc.method == TRIMESH_LATTICE && job->cut) {
+    if (job->w.line_scale > 1) {
+        job->w.line_scale = 1; /* lines too coarse for what lies between them */
+    } else if (job->desc.method == TRIMESH_LATTICE && job->cut) {
         job->cut--;
     } else {
         if (job->retries == 2) return 0;
@@ -5727,7 +5747,8 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         long faults;
         job->stage = TMR_STAGE_DONE;
         if (!tmr_mend_spots(&job->w, &faults, &job->env)) return TXM_OUT_OF_MEMORY;
-        if (faults == 0 || tmr_surface_crosses(job)) return TXM_OK;
+        const int crosses = faults == 0 ? 1 : tmr_surface_crosses(job);
+        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
     }
     if (tmr_job_retry(job, &status)) return status;
     snprintf(text, sizeof text, "the surface has parts too thin or too fine for %ld vertices without "

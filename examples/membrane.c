@@ -97,25 +97,25 @@ typedef struct bead {
 } bead;
 
 #define TAIL(x, y) \
-    {"C", x, y, -2.5f, 2.7f, {222, 200, 140}}, {"C", 1.1f * (x), y, -5.6f, 2.7f, {222, 200, 140}}, \
-    {"C", 1.2f * (x), y, -8.6f, 2.7f, {216, 190, 126}}, {"C", x, 1.3f * (y), -11, 2.6f, {206, 178, 112}}
-#define GLYCEROL {"O", -1.7f, 0, 1, 2.8f, {214, 96, 70}}, {"O", 1.7f, 0, 1, 2.8f, {214, 96, 70}}
+    {"C", x, y, -2.5f, 3.3f, {222, 200, 140}}, {"C", 1.1f * (x), y, -5.6f, 3.3f, {222, 200, 140}}, \
+    {"C", 1.2f * (x), y, -8.6f, 3.3f, {216, 190, 126}}, {"C", x, 1.3f * (y), -11, 3.2f, {206, 178, 112}}
+#define GLYCEROL {"O", -1.7f, 0, 1, 3.2f, {214, 96, 70}}, {"O", 1.7f, 0, 1, 3.2f, {214, 96, 70}}
 
-static const bead choline[] = {{"N", 0.8f, 0, 8.4f, 3.7f, {70, 110, 210}},
-                               {"P", 0, 0, 4.4f, 3.3f, {240, 150, 40}},
+static const bead choline[] = {{"N", 0.8f, 0, 8.4f, 4.3f, {70, 110, 210}},
+                               {"P", 0, 0, 4.4f, 3.8f, {240, 150, 40}},
                                GLYCEROL, TAIL(-2.1f, 0), TAIL(2.1f, 0.6f)};
-static const bead ethanolamine[] = {{"N", -0.5f, 0.4f, 7.6f, 3.1f, {90, 190, 220}},
-                                    {"P", 0, 0, 4.2f, 3.3f, {240, 150, 40}},
+static const bead ethanolamine[] = {{"N", -0.5f, 0.4f, 7.6f, 3.7f, {90, 190, 220}},
+                                    {"P", 0, 0, 4.2f, 3.8f, {240, 150, 40}},
                                     GLYCEROL, TAIL(-2.2f, 0.5f), TAIL(1.9f, -0.5f)};
-static const bead serine[] = {{"N", 1.6f, 0, 8, 3, {150, 90, 200}},
-                              {"O", -1.6f, 0.3f, 7.8f, 2.8f, {220, 70, 110}},
-                              {"P", 0, 0, 4.4f, 3.3f, {240, 150, 40}},
+static const bead serine[] = {{"N", 1.6f, 0, 8, 3.4f, {150, 90, 200}},
+                              {"O", -1.6f, 0.3f, 7.8f, 3.2f, {220, 70, 110}},
+                              {"P", 0, 0, 4.4f, 3.8f, {240, 150, 40}},
                               GLYCEROL, TAIL(-2, -0.6f), TAIL(2.2f, 0)};
-static const bead cholesterol[] = {{"O", 0, 0, 1.5f, 2.6f, {210, 80, 70}},
-                                   {"C", -1, 0, -1.6f, 2.9f, {130, 180, 110}},
-                                   {"C", 1, 0, -3.6f, 2.9f, {130, 180, 110}},
-                                   {"C", -0.6f, 0, -6.2f, 2.9f, {120, 170, 100}},
-                                   {"C", 0.4f, 0, -9.6f, 2.6f, {120, 160, 96}}};
+static const bead cholesterol[] = {{"O", 0, 0, 1.5f, 3.2f, {210, 80, 70}},
+                                   {"C", -1, 0, -1.6f, 3.4f, {130, 180, 110}},
+                                   {"C", 1, 0, -3.6f, 3.4f, {130, 180, 110}},
+                                   {"C", -0.6f, 0, -6.2f, 3.4f, {120, 170, 100}},
+                                   {"C", 0.4f, 0, -9.6f, 3.1f, {120, 160, 96}}};
 
 enum { KINDS = 4, MOST_BEADS = 13 };
 static const struct {
@@ -127,41 +127,32 @@ static const struct {
                    {serine, sizeof serine / sizeof *serine, 1},
                    {cholesterol, sizeof cholesterol / sizeof *cholesterol, 3}};
 
-/* A lipid as a mesh: an icosahedron for each bead, with the normals of a ball. */
-typedef struct ball_mesh {
-    float positions[36 * MOST_BEADS], normals[36 * MOST_BEADS];
-    unsigned char colors[48 * MOST_BEADS];
-    uint32_t indices[60 * MOST_BEADS];
-} ball_mesh;
-
-static void make_lipid(int kind, ball_mesh *b, mesh_data *out) {
-    static const unsigned char faces[60] = {
-        0, 11, 5, 0, 5, 1,  0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4,  11, 10, 2, 10, 7, 6,
-        7, 1, 8,  3, 9, 4,  3, 4, 2, 3, 2, 6,  3, 6, 8,   3, 8, 9, 4, 9, 5,   2, 4, 11,  6, 2, 10,
-        8, 6, 7,  9, 8, 1};
-    static const float at[12][3] = {
-        {-.5257f, .8507f, 0}, {.5257f, .8507f, 0}, {-.5257f, -.8507f, 0}, {.5257f, -.8507f, 0},
-        {0, -.5257f, .8507f}, {0, .5257f, .8507f}, {0, -.5257f, -.8507f}, {0, .5257f, -.8507f},
-        {.8507f, 0, -.5257f}, {.8507f, 0, .5257f}, {-.8507f, 0, -.5257f}, {-.8507f, 0, .5257f}};
-    const int count = lipids[kind].count;
-    for (int i = 0; i < 12 * count; i++) {
-        const bead *d = &lipids[kind].beads[i / 12];
+/* A lipid as one mesh: a ball of 8 steps^2 triangles for each bead. */
+static int make_lipid(int kind, int steps, mesh_data *out, const char **why) {
+    mesh_data balls[MOST_BEADS];
+    mesh_instances beads[MOST_BEADS];
+    float at[3 * MOST_BEADS], scales[3 * MOST_BEADS];
+    int made = 0, ok = 1;
+    memset(beads, 0, sizeof beads);
+    for (; made < lipids[kind].count && ok; made++) {
+        const bead *d = &lipids[kind].beads[made];
         const float centre[3] = {d->x, d->y, d->z};
+        ok = mesh_sphere(steps, &balls[made]);
+        for (size_t i = 0; ok && i < balls[made].vertex_count; i++)
+            memcpy(balls[made].colors + 4 * i, d->color, 3);
         for (int k = 0; k < 3; k++) {
-            b->normals[3 * i + k] = at[i % 12][k];
-            b->positions[3 * i + k] = centre[k] + d->radius * at[i % 12][k];
-            b->colors[4 * i + k] = d->color[k];
+            at[3 * made + k] = centre[k];
+            scales[3 * made + k] = d->radius;
         }
-        b->colors[4 * i + 3] = 255;
+        beads[made].mesh = &balls[made];
+        beads[made].count = 1;
+        beads[made].translations = at + 3 * made;
+        beads[made].scales = scales + 3 * made;
     }
-    for (int i = 0; i < 60 * count; i++) b->indices[i] = (uint32_t)(i / 60 * 12 + faces[i % 60]);
-    memset(out, 0, sizeof *out);
-    out->vertex_count = 12 * (size_t)count;
-    out->triangle_count = 20 * (size_t)count;
-    out->positions = b->positions;
-    out->normals = b->normals;
-    out->colors = b->colors;
-    out->indices = b->indices;
+    if (!ok) *why = "no memory";
+    ok = ok && mesh_bake(beads, made, out, why);
+    while (made > 0) mesh_free(&balls[--made]);
+    return ok;
 }
 
 /* ---- the bilayer ---- */
@@ -172,7 +163,7 @@ typedef struct membrane {
 } membrane;
 
 /* One leaflet, appended. Lipids have a size: `unit` 1 keeps heights and shapes in Angstrom, and
-   density thins the patches until there is one for every 62 square Angstrom where the tails begin. */
+   density thins the patches until there is one for every 50 square Angstrom where the tails begin. */
 static txm_status add_leaflet(const trimesh_mesh *mesh, const trimesh_patch *patches, int patch_count,
                               int inside, txm_env *env, membrane *m) {
     trimesh_scatter_desc d = {0};
@@ -187,7 +178,7 @@ static txm_status add_leaflet(const trimesh_mesh *mesh, const trimesh_patch *pat
     d.height = 13;
     d.inside = inside;
     d.curve = 1;
-    d.density = 1 / 62.0f;
+    d.density = 1 / 50.0f;
     d.spin = 1;
     d.mix = mix;
     d.mix_count = KINDS;
@@ -279,7 +270,6 @@ static const char *write_bytes(const char *path, const unsigned char *bytes, siz
 
 /* The lipids of each kind as one mesh with many places; a GLB, or a picture of it. */
 static const char *write_scene(const membrane *m, const char *extension, const char *path) {
-    static ball_mesh balls[KINDS];
     mesh_data meshes[KINDS];
     mesh_instances groups[KINDS];
     mesh_scene scene = {0};
@@ -287,10 +277,12 @@ static const char *write_scene(const membrane *m, const char *extension, const c
     unsigned char *bytes = NULL;
     size_t size = 0, n = 0;
     const char *why = NULL;
+    const int is_picture = strcmp(extension, ".png") == 0;
     if (!at || !turn) why = "no memory";
     memset(groups, 0, sizeof groups);
+    memset(meshes, 0, sizeof meshes);
     for (int k = 0; k < KINDS && !why; k++) {
-        make_lipid(k, &balls[k], &meshes[k]);
+        if (!make_lipid(k, is_picture ? 3 : 2, &meshes[k], &why)) break;
         groups[k].mesh = &meshes[k];
         groups[k].translations = at + 3 * n;
         groups[k].rotations = turn + 4 * n;
@@ -303,8 +295,9 @@ static const char *write_scene(const membrane *m, const char *extension, const c
     }
     scene.instances = groups;
     scene.instance_count = KINDS;
-    if (!why && strcmp(extension, ".png") == 0) {
-        const render_desc view = {.width = 1200, .height = 900, .azimuth = 35, .elevation = 30,
+    if (!why && is_picture) {
+        /* into the opening if there is one, past the near rim */
+        const render_desc view = {.width = 1200, .height = 900, .azimuth = 18, .elevation = 14,
                                   .colors = 1, .field = 30};
         txm_image picture;
         if (render(&scene, &view, &picture, &why)) {
@@ -315,6 +308,7 @@ static const char *write_scene(const membrane *m, const char *extension, const c
         mesh_encode(extension, &scene, &bytes, &size, &why);
     }
     if (bytes) why = write_bytes(path, bytes, size);
+    for (int k = 0; k < KINDS; k++) mesh_free(&meshes[k]);
     free(bytes);
     free(at);
     free(turn);

@@ -1,13 +1,15 @@
-/* same_bytes.c - print one hash over models, pictures and tile sets: same_bytes THREADS
+/* same_bytes.c - print one hash over models, pictures, tile sets and meshes: same_bytes THREADS
    SPDX-License-Identifier: MIT OR Unlicense
 
    test_same_bytes.sh builds this with each compiler and optimisation level and runs it on several
    numbers of threads; all must print the same line. Everything here is in integers, but for what
-   lies between the pixels of an exemplar in triangles, and repair.                              */
+   lies between the pixels of an exemplar in triangles, repair, and meshes.                      */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 #define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
+#define TRIMESH_RELAX_IMPLEMENTATION
+#include "trimesh_relax.h"
 #include "testkit.h"
 
 enum { SIDE = 64, WIDTH = 96, HEIGHT = 80 };
@@ -106,6 +108,74 @@ static uint64_t run_tiles(textiles_kind kind, int channels, txm_env *env, uint64
     return hash;
 }
 
+/* Hash over a retiled surface and the things that stand on it. The surface is a bumpy ring, or open:
+   a bent sheet. Only integers and sqrt make it, so that libm has no part in it. */
+static uint64_t run_mesh(trimesh_method method, int open, txm_env *env, uint64_t hash) {
+    enum { N = 20, M = 10 };
+    static float at[3 * N * M];
+    static uint32_t t[6 * N * M];
+    static trimesh_instance things[1 << 14];
+    static trimesh_point points[64];
+    uint32_t corners = 0;
+    for (int i = 0; i < N; i++) { /* about a square, and a square about that */
+        for (int j = 0; j < M; j++) {
+            const double x = open ? i : i < N / 2 ? i - N / 4 : 3 * N / 4 - i;
+            const double y = open ? j : i < N / 2 ? N / 4 - fabs(x) : fabs(x) - N / 4;
+            const double p = j < M / 2 ? j - M / 4.0 : 3 * M / 4.0 - j;
+            const double q = j < M / 2 ? M / 4.0 - fabs(p) : fabs(p) - M / 4.0;
+            const double l = sqrt(x * x + y * y), s = sqrt(p * p + q * q);
+            const double r = open ? 1 : (3 + p / s + 0.1 * ((i * 7 + j * 3) % 4)) / l;
+            float *v = at + 3 * (i * M + j);
+            v[0] = txm_float(x * r);
+            v[1] = txm_float(y * r);
+            v[2] = txm_float(open ? 0.03 * x * y : q / s);
+        }
+    }
+    for (int i = 0; i < N - open; i++) {
+        for (int j = 0; j < M - open; j++) {
+            const int i1 = (i + 1) % N, j1 = (j + 1) % M;
+            const int quad[6] = {i * M + j, i1 * M + j, i1 * M + j1, i * M + j, i1 * M + j1, i * M + j1};
+            for (int k = 0; k < 6; k++) t[corners++] = (uint32_t)quad[k];
+        }
+    }
+    trimesh_desc desc;
+    trimesh_scatter_desc scatter;
+    trimesh_patch patch;
+    trimesh_patch_desc spread;
+    trimesh_mesh *mesh = NULL;
+    size_t count = 0;
+    memset(&desc, 0, sizeof desc);
+    desc.surface.positions = at;
+    desc.surface.indices = t;
+    desc.surface.vertex_count = N * M;
+    desc.surface.triangle_count = corners / 3;
+    desc.vertices = 401;
+    desc.method = method;
+    desc.adapt = open ? 0.5f : 0;
+    desc.crease_angle = 60;
+    if (trimesh_retile(&desc, env, NULL, &mesh) != TXM_OK) give_up("retile", env);
+    hash = tk_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float));
+    hash = tk_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float));
+    hash = tk_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t));
+    hash = tk_hash(hash, mesh->sources, mesh->vertex_count * sizeof(trimesh_source));
+    hash = tk_hash(hash, mesh->kinds, mesh->vertex_count);
+
+    memset(&spread, 0, sizeof spread);
+    memset(&scatter, 0, sizeof scatter);
+    spread.points = 12;
+    if (trimesh_reference_patch(&spread, env, points, 64, &patch.count) != TXM_OK)
+        give_up("patch", env);
+    patch.points = points;
+    scatter.mesh = trimesh_as_view(mesh);
+    scatter.normals = mesh->normals;
+    scatter.patches = &patch;
+    scatter.patch_count = 1;
+    if (trimesh_scatter(&scatter, env, things, 1 << 14, &count) != TXM_OK) give_up("scatter", env);
+    hash = tk_hash(hash, things, count * sizeof *things);
+    trimesh_free(mesh);
+    return hash;
+}
+
 int main(int argc, char **argv) {
     int threads = argc > 1 ? atoi(argv[1]) : 1;
     txm_env env;
@@ -120,6 +190,10 @@ int main(int argc, char **argv) {
     hash = run(4, 0, &env, hash);
     hash = run_tiles(TEXTILES_WANG, 3, &env, hash);
     hash = run_tiles(TEXTILES_TRIANGLE, 1, &env, hash);
+    for (int open = 0; open < 2; open++) {
+        hash = run_mesh(TRIMESH_LATTICE, open, &env, hash);
+        hash = run_mesh(TRIMESH_REPEL, open, &env, hash);
+    }
     printf("%08lx%08lx\n", (unsigned long)(hash >> 32), (unsigned long)(hash & 0xffffffffu));
     return 0;
 }

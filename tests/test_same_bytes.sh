@@ -1,5 +1,5 @@
 #!/bin/sh
-# The same models, pictures and tile sets, byte for byte, from each compiler, at each level of
+# The same models, pictures, tile sets and meshes, byte for byte, from each compiler, at each level of
 # optimisation, on 1, 2 and 8 threads, and with the indices of each parallel loop taken backwards (0
 # below); and from plain C as with SIMD.
 . tests/tap.sh

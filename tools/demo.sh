@@ -1,6 +1,6 @@
 #!/bin/sh
-# demo.sh - learn and synthesise every sample of build/samples/, cut tiles out of some, show them in
-# out/index.html
+# demo.sh - learn and synthesise every sample of build/samples/, cut tiles out of some, retile meshes
+# and cover them, show all in out/index.html
 set -eu
 
 build=${BUILD:-build}
@@ -76,6 +76,64 @@ tile_set() {
 SET
 }
 
+# retiled SHAPE VERTICES: a mesh beside its retiled form, appended to the page
+retiled() {
+    "$build/shape" "$1" "$out/$1.obj"
+    "$build/texkit" retile "$out/$1.obj" -o "$out/$1-retiled.obj" --vertices "$2" \
+        --stats "$out/$1-retiled.json" --quiet
+    "$build/view" "$out/$1.obj" -o "$out/$1-before.png" --size 512x512 --wire
+    "$build/view" "$out/$1-retiled.obj" -o "$out/$1-after.png" --size 512x512 --wire --valence
+    quality=$(printf %.3f "$(figure quality "$out/$1-retiled.json")")
+    least=$(printf %.0f "$(figure least_angle "$out/$1-retiled.json")")
+    six=$(figure valence_6 "$out/$1-retiled.json" | awk '{ printf "%.1f", 100 * $1 }')
+    edges=$(figure edge_variation "$out/$1-retiled.json" | awk '{ printf "%.1f", 100 * $1 }')
+    total=$(seconds total "$out/$1-retiled.json")
+    printf 'demo: %-8s retiled with %s vertices in %4s s, quality %s\n' "$1" "$2" "$total" "$quality"
+    cat >>"$out/index.part" <<RETILED
+<h3>A $1, $2 vertices</h3>
+<dl>
+<dt>made in</dt><dd>$total s</dd>
+<dt>quality</dt><dd>$quality <small>mean of twice the inscribed over the circumscribed radius; 1 is
+equilateral</small></dd>
+<dt>vertices with six triangles</dt><dd>$six %</dd>
+<dt>edge lengths</dt><dd>vary by $edges % <small>(standard deviation)</small></dd>
+<dt>smallest angle</dt><dd>$least degrees</dd>
+</dl>
+<div class="couple">
+<img src="$1-before.png" width="512" height="512" alt="the $1 as it was made, uneven triangles">
+<img src="$1-after.png" width="512" height="512" alt="the $1 in near-equilateral triangles">
+</div>
+RETILED
+}
+
+# covered SHAPE TILES VERTICES SIZE OPTIONS...: a shape under a set of tiles
+covered() {
+    shape=$1 tiles=$2 vertices=$3 size=$4
+    shift 4
+    "$build/shape" "$shape" "$out/$shape.obj"
+    for kind in obj glb; do
+        "$build/texkit" retile "$out/$shape.obj" -o "$out/$shape-covered.$kind" \
+            --vertices "$vertices" --tiles "$out/$tiles" --quiet
+    done
+    "$build/view" "$out/$shape-covered.obj" --texture "$out/$shape-covered-atlas.png" \
+        -o "$out/$shape-covered.png" --size "$size" --crease 180 "$@"
+    cat >>"$out/index.part" <<COVERED
+<img class="wide" src="$shape-covered.png" alt="a $shape covered with tiles">
+<p class="source">$vertices vertices; as <a href="$shape-covered.glb">GLB</a>, for any viewer of glTF, and
+as <a href="$shape-covered.obj">OBJ</a>.</p>
+COVERED
+}
+
+# bilayer SHAPE: the membrane of examples/membrane.c
+bilayer() {
+    "$build/examples/membrane" "$1" "$out/membrane-$1.glb" | sed 's/^/demo: /'
+    "$build/examples/membrane" "$1" "$out/membrane-$1.png" cut >/dev/null
+    cat >>"$out/index.part" <<BILAYER
+<img class="wide" src="membrane-$1.png" width="1200" height="900" alt="a bilayer of lipids on a $1, cut open">
+<p class="source">Whole, as <a href="membrane-$1.glb">GLB</a> with EXT_mesh_gpu_instancing.</p>
+BILAYER
+}
+
 cat >"$out/index.part" <<'HEAD'
 <!DOCTYPE html>
 <html lang="en">
@@ -97,12 +155,15 @@ dd { margin: 0; }
 small { color: #666; font-size: 0.8rem; }
 p { margin: 0.5rem 0; }
 .pair p { font-size: 0.9rem; }
-.pair .source, footer { color: #666; font-size: 0.8rem; overflow-wrap: anywhere; }
+.source, footer { color: #666; font-size: 0.8rem; overflow-wrap: anywhere; }
 .repeated { width: 768px; height: 768px; max-width: 100%; margin: 1.5rem 0 0.5rem; }
 .atlas { margin: -0.5rem 0 3rem; }
+.couple { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; margin: 1rem 0 3rem; }
+.wide { margin: 1.5rem 0 0.5rem; }
+.source { margin-bottom: 2.5rem; }
 footer { margin-top: 4rem; border-top: 1px solid #ddd; padding-top: 1rem; }
 a { color: #15558a; }
-@media (max-width: 50rem) { .pair { grid-template-columns: minmax(0, 1fr); } }
+@media (max-width: 50rem) { .pair, .couple { grid-template-columns: minmax(0, 1fr); } }
 </style>
 </head>
 <body>
@@ -167,14 +228,50 @@ the corner too, and no pixel is in all of them."
 tile_set "$(pick gravel 3)" triangle 2 "Equilateral triangles, two to a cell of the atlas, stored with
 a right angle. They are turned as they are laid, and cover meshes too."
 
+cat >>"$out/index.part" <<'RETILE'
+<h2>Any surface as near-equilateral triangles</h2>
+<p>On the left meshes as they came: crowded here, stretched there. On the right the same surfaces
+retiled. Red vertices have seven triangles, blue ones five, all others six. On a surface of the kind of
+a ball, fives outnumber sevens by twelve, so some there must be.</p>
+RETILE
+retiled blob 3000
+retiled knot 3000
+
+stones=$(pick pebbles 1) leaves=$(pick lichen 3)
+"$build/texkit" tiles "$out/$stones.png" -o "$out/$stones-tiles-mesh" --kind triangle --variants 2 \
+    --size 96 --quiet
+"$build/texkit" tiles "$out/$leaves.png" -o "$out/$leaves-tiles-mesh" --kind triangle --variants 2 \
+    --size 64 --quiet
+cat >>"$out/index.part" <<COVER
+<h3>Tiles on meshes</h3>
+<p>Each triangle of a retiled mesh shows a tile whose edges match its neighbours': no seams, no
+stretching, no texture coordinates of the input needed. The tiles are cut from the photographs
+$stones and $leaves, as above.</p>
+COVER
+covered sphere "$stones-tiles-mesh" 600 800x800
+covered knot "$leaves-tiles-mesh" 1600 800x600 --elevation 40
+printf 'demo: sphere and knot covered with tiles of %s and %s\n' "$stones" "$leaves"
+
+# where the examples are not, as in an unpacked source of the tool alone, there is no membrane
+if [ -x "$build/examples/membrane" ]; then
+    cat >>"$out/index.part" <<'MEMBRANE'
+<h3>Things on triangles</h3>
+<p>A bilayer of lipids, a dozen beads each, on a sphere and on a capsule with a bump
+(<code>examples/membrane.c</code>): a patch of places on every triangle, once for each leaflet, thinned to
+the same density inside and outside. An eighth is cut away.</p>
+MEMBRANE
+    bilayer sphere
+    bilayer capsule
+fi
+
 cat >>"$out/index.part" <<TAIL
 <footer>Made by <code>make demo</code> with $("$build/texkit" --version) on $threads threads. Each
 pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
 <code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Each set of tiles:
-<code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Seconds are of
-this run.</footer>
+<code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Each retiled
+mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>. Seconds are of this run.</footer>
 </body>
 </html>
 TAIL
 mv "$out/index.part" "$out/index.html"
-echo "demo: $((count + limits)) pairs, 3 tile sets; open $out/index.html"
+echo "demo: $((count + limits)) pairs, 3 tile sets, 2 meshes; open $out/index.html"

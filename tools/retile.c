@@ -19,7 +19,7 @@ enum {
     MAX_PATH = 4096,
     MAX_PROTOTYPES = 64, /* distinct colors of instanced points */
     SPHERE_STEPS = 3,    /* 72 triangles                        */
-    CREASE = 40          /* degrees, where --crease is not given */
+    CREASE = 50          /* degrees, where --crease is not given */
 };
 
 static const double TRIANGLE_HEIGHT = 0.86602540378443864676; /* sqrt(3) / 2 */
@@ -902,8 +902,8 @@ static int run_job(job *j, int argc, char **argv) {
          TRIMESH_MAX_VERTICES},
         {CLI_TEXT, "--method", "HOW", "lattice (default, most regular) or repel (as published)",
          &method, 0, 0},
-        {CLI_INT, "--crease", "DEGREES", "keep edges that bend more, 1 to 180; default 40", &crease,
-         1, 180},
+        {CLI_INT, "--crease", "DEGREES", "keep sharp edges that bend by so much, 1 to 180; default 50",
+         &crease, 1, 180},
         {CLI_INT, "--adapt", "PERCENT", "shorter edges where the surface bends, 0 to 100", &adapt,
          0, 100},
         {CLI_INT, "--spacing", "PERCENT",
