@@ -3921,7 +3921,7 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
 static int tmr_resample(tmr_work *w, double share) {
     const double aim = sqrt(1 / share); /* of edges, relative to w->length */
     /* lines first: what is inside is split to fit them */
-    tmr_split_long(w, 1e9, 1.4);
+    tmr_split_long(w, 1e9, 1.0);
     /* fine input: take away, the shortest edges first */
     double limit = 0.05 * aim;
     while (limit < 0.72 * aim) {
@@ -3936,6 +3936,29 @@ static int tmr_resample(tmr_work *w, double share) {
         tmr_flip_delaunay(w, 2);
         if (round >= 3 && (split + gone) * 200.0 < w->m.live) break;
         if (txm_progress(w->env, 0, "resample")) return 0;
+    }
+    return 1;
+}
+
+/* Take away what a line has more of edges than fit its length; the rest is spread evenly later.
+   0: no memory. */
+static int tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
+    tmr_mesh *m = &w->m;
+    const tmr_lines *l = w->l;
+    if (l->line_count == 0) return 1;
+    int32_t *over = (int32_t *)txm_arena_alloc(scratch, (size_t)l->line_count, sizeof(int32_t));
+    if (!over) return 0;
+    for (int32_t i = 0; i < l->line_count; i++) {
+        const int32_t fit = (int32_t)(l->length[i] / (w->length * w->line_scale) + 0.5);
+        const int32_t least = l->closed[i] ? 3 : 1;
+        over[i] = -(fit > least ? fit : least);
+    }
+    for (int32_t c = 0; c < 3 * m->face_count; c++)
+        if (tmr_is_real_edge(m, c) && m->edge[c]) over[m->edge[c] - 1]++;
+    for (int32_t c = 0; c < 3 * m->face_count && !w->s->scale; c++) {
+        if (!tmr_is_real_edge(m, c) || !m->edge[c] || over[m->edge[c] - 1] <= 0) continue;
+        const int32_t line = m->edge[c] - 1;
+        over[line] -= tmr_try_collapse(w, c, 0, 0);
     }
     return 1;
 }
@@ -5405,10 +5428,13 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
     if (!tmr_resample(w, 2)) return TXM_CANCELLED;
-    tmr_even_lines(w);
-    tmr_set_spacing(w, target);
     txm_arena_init(&arena, w->env);
-    int ok = tmr_solve_lattice(w, seed, &arena);
+    int ok = tmr_thin_lines(w, &arena);
+    if (ok) {
+        tmr_even_lines(w);
+        tmr_set_spacing(w, target);
+        ok = tmr_solve_lattice(w, seed, &arena);
+    }
     for (int round = 0; round < 4 && ok; round++) { /* what the lattice left undone */
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, 0.3);
