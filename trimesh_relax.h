@@ -178,7 +178,9 @@ typedef struct trimesh_desc {
                               above 0, at most 1000 times the least; NULL = uniform             */
     float adapt;           /* 0..1: how much shorter edges are where the surface bends; 0 = not */
     float crease_angle;    /* degrees between the normals of two triangles from which on their
-                              edge may be a crease, 0 = 40; 180 = no creases                    */
+                              edge may be a crease, 0 = 50; 180 = none. Below 75 it must also
+                              stand out from the edges around, and creases that hang together
+                              to less than 6 percent of the diagonal are left out              */
     float line_spacing;    /* edge length along creases and borders relative to that inside,
                               0.25..4; 0 = 1. More, where they would take over half of the
                               vertices                                                          */

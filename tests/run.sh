@@ -18,6 +18,24 @@ export CC CXX FULL OUT SANITIZE
 export UBSAN_OPTIONS=print_stacktrace=1 CMOCKA_MESSAGE_OUTPUT=TAP LC_ALL=C
 mkdir -p "$OUT"
 
+# unit NAME: build and run one cmocka program; its log and status stay in $OUT
+unit() {
+    source=tests/test_$1.c
+    # shellcheck disable=SC2086 # flags are words
+    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests -Itools "$source" \
+        $(sed -n 's/^   Built with: \([a-z_./ ]*[a-z]\).*/\1/p' "$source") \
+        -o "$OUT/test_$1" -lcmocka -lpthread -lm >"$OUT/$1.log" 2>&1; then
+        "$OUT/test_$1" >>"$OUT/$1.log" 2>&1
+        echo $? >"$OUT/$1.status"
+    else
+        echo "of the compiler" >"$OUT/$1.status"
+    fi
+}
+if [ "${1:-}" = --unit ]; then
+    unit "$2"
+    exit 0
+fi
+
 passed=0 failed=0
 
 # count NAME LOG STATUS: add up a log of "ok" lines; a crash or an empty log is a failure
@@ -40,21 +58,17 @@ wanted() {
 }
 names=$*
 
+# two programs at a time; they are counted in order afterwards
+units=
 for source in tests/test_*.c; do
-    [ -e "$source" ] || continue
     name=$(basename "$source" .c)
     name=${name#test_}
-    wanted "$name" || continue
-    log=$OUT/$name.log
-    # shellcheck disable=SC2086 # flags are words
-    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests -Itools "$source" \
-        $(sed -n 's/^   Built with: \([a-z_./ ]*[a-z]\).*/\1/p' "$source") \
-        -o "$OUT/test_$name" -lcmocka -lpthread -lm >"$log" 2>&1; then
-        "$OUT/test_$name" >>"$log" 2>&1
-        count "$name" "$log" $?
-    else
-        count "$name" "$log" "of the compiler"
-    fi
+    wanted "$name" && units="$units $name"
+done
+# shellcheck disable=SC2086 # names are words
+[ -z "$units" ] || printf '%s\n' $units | xargs -n 1 -P 2 sh tests/run.sh --unit
+for name in $units; do
+    count "$name" "$OUT/$name.log" "$(cat "$OUT/$name.status")"
 done
 
 # the scripts use the tool as released and with the sanitizers, and the helpers of tools/
