@@ -1980,8 +1980,8 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
                 way += tmr_dist(s->point[at], s->point[next]);
                 at = next;
                 if (way > reach || at == v || turn[at] <= 0) break;
-                const float other = turn[at];
-                sharpest = other < turn[v] || (other <= turn[v] && at >= v);
+                const float other = turn[at], own = turn[v];
+                sharpest = other < own || (at >= v && other <= own);
                 const int32_t j = ends->first[at];
                 e = ends->corner[j] == e ? ends->corner[j + 1] : ends->corner[j];
             }
