@@ -2655,6 +2655,12 @@ static void tmr_put(tmr_work *w, int32_t v, const tmr_place *at) {
     w->size[v] = txm_float(tmr_scale_at(w->s, at));
 }
 
+/* Until something else is said vertex v stays where it is. */
+static void tmr_stay(tmr_work *w, int32_t v) {
+    w->moved[v] = w->m.p[v];
+    w->landed[v] = w->m.source[v];
+}
+
 /* Put vertex v on segment k of a line. */
 static void tmr_put_on_line(tmr_work *w, int32_t v, tmr_vec p, int32_t k) {
     const int32_t *a = w->l->a, *b = w->l->b;
@@ -2663,6 +2669,22 @@ static void tmr_put_on_line(tmr_work *w, int32_t v, tmr_vec p, int32_t k) {
     w->m.n[v] = tmr_unit(tmr_add(w->s->vertex_normal[a[k]], w->s->vertex_normal[b[k]]));
     w->m.source[v] = k;
     w->size[v] = txm_float(tmr_scale_at(w->s, &at));
+}
+
+/* the middle of the triangle of these vertices */
+static tmr_vec tmr_middle(const tmr_mesh *m, const int32_t *v) {
+    return tmr_scale(tmr_add(tmr_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
+}
+
+/* the place of the surface nearest to that, walking from all three vertices */
+static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
+    const tmr_vec middle = tmr_middle(&w->m, v);
+    tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
+    for (int k = 1; k < 3; k++) {
+        const tmr_place other = tmr_project(w->s, middle, tmr_face_of(w, v[k]));
+        if (other.d2 < at.d2) at = other;
+    }
+    return at;
 }
 
 /* The normal that a triangle should have: that of the surface around, judged by its free vertices
@@ -2678,13 +2700,7 @@ static tmr_vec tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int3
         any = 1;
     }
     if (any) return tmr_unit(n);
-    const tmr_vec middle = tmr_scale(tmr_add(tmr_add(m->p[a], m->p[b]), m->p[c]), 1.0 / 3);
-    tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, a));
-    for (int k = 1; k < 3; k++) {
-        const tmr_place other = tmr_project(w->s, middle, tmr_face_of(w, v[k]));
-        if (other.d2 < at.d2) at = other;
-    }
-    return w->s->normal[at.face];
+    return w->s->normal[tmr_below_middle(w, v).face];
 }
 
 /* how well a triangle at these points agrees with the normals of its vertices: -1..1, -1 also for
@@ -2702,14 +2718,13 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
-/* Copy the surface into w->m, with room for so many vertices and triangles. */
-static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
-    const tmr_surface *s = w->s;
+/* Arrays for so many vertices and triangles; the mesh in them is empty. 0: no memory. */
+static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
     tmr_mesh *m = &w->m;
     const size_t nv = (size_t)vertices, nc = 3 * (size_t)faces;
-    memset(m, 0, sizeof *m);
     m->vertex_limit = vertices;
     m->face_limit = faces;
+    m->vertex_count = m->live = m->face_count = m->live_faces = 0;
     m->p = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
     m->n = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
     m->source = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
@@ -2725,10 +2740,17 @@ static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_ar
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
     w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
     w->flag = (uint8_t *)txm_arena_alloc(arena, (size_t)faces, 1);
-    if (!m->p || !m->n || !m->source || !m->corner || !m->flags || !m->valence || !m->vertex ||
-        !m->opposite || !m->edge || !w->size || !w->moved || !w->landed || !w->bad ||
-        !w->flag || !w->mask_room)
-        return 0;
+    return m->p && m->n && m->source && m->corner && m->flags && m->valence && m->vertex &&
+           m->opposite && m->edge && w->size && w->moved && w->landed && w->bad && w->mask_room &&
+           w->flag;
+}
+
+/* Copy the surface into w->m, with room for so many vertices and triangles. */
+static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
+    const tmr_surface *s = w->s;
+    tmr_mesh *m = &w->m;
+    memset(m, 0, sizeof *m);
+    if (!tmr_alloc_mesh(w, vertices, faces, arena)) return 0;
     m->vertex_count = m->live = s->vertex_count;
     m->face_count = m->live_faces = s->face_count;
     const size_t corners = 3 * (size_t)s->face_count;
@@ -2974,8 +2996,7 @@ static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
 static void tmr_relax_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
-    w->moved[v] = m->p[v];
-    w->landed[v] = m->source[v];
+    tmr_stay(w, v);
     if (w->mask && !w->mask[v]) return;
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
         return;
@@ -3064,11 +3085,9 @@ static void tmr_settle_chunk(void *context, int index) {
         const int kind = tmr_kind_of(m, v);
         if (kind == TRIMESH_CORNER) continue;
         if (kind == TRIMESH_FREE) {
-            const tmr_place at = tmr_on_face(w->s, w->landed[v], w->moved[v]);
-            m->p[v] = w->moved[v];
-            m->n[v] = tmr_normal_at(w->s, w->l, &at);
-            m->source[v] = at.face;
-            w->size[v] = txm_float(tmr_scale_at(w->s, &at));
+            tmr_place at = tmr_on_face(w->s, w->landed[v], w->moved[v]);
+            at.p = w->moved[v]; /* fitting takes vertices off the surface */
+            tmr_put(w, v, &at);
         } else {
             tmr_put_on_line(w, v, w->moved[v], w->landed[v]);
         }
@@ -3202,21 +3221,28 @@ static int tmr_split_is_fair(const tmr_work *w, int32_t c, tmr_vec p, tmr_vec n)
     return 1;
 }
 
+/* The place on the line half-way between two neighbours on it, a and b; *k: its segment. Between two
+   corners, which may belong to other lines too, that is the middle of the whole line. */
+static tmr_vec tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32_t b, int32_t *k) {
+    const tmr_mesh *m = &w->m;
+    const int bound_a = tmr_kind_of(m, a) == TRIMESH_CORNER;
+    const int bound_b = tmr_kind_of(m, b) == TRIMESH_CORNER;
+    if (bound_a && bound_b) return tmr_line_at(w->s, w->l, id, 0.5 * w->l->length[id], k);
+    *k = m->source[bound_a ? b : a];
+    return tmr_project_line(w->s, w->l, tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5), k);
+}
+
 /* Put a vertex on the middle of the edge opposite to c, on the surface; -1 if there is no room or
    no place. */
 static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t line = m->edge[c];
-    const int bound_a = tmr_kind_of(m, a) == TRIMESH_CORNER;
-    const int bound_b = tmr_kind_of(m, b) == TRIMESH_CORNER;
     const tmr_vec middle = tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5);
     if (line) {
         const int32_t id = line - 1;
-        int32_t k = !bound_a ? m->source[a] : !bound_b ? m->source[b] : w->l->first[id];
-        const tmr_vec p = bound_a && bound_b
-                              ? tmr_line_at(w->s, w->l, id, 0.5 * w->l->length[id], &k)
-                              : tmr_project_line(w->s, w->l, middle, &k);
+        int32_t k;
+        const tmr_vec p = tmr_line_middle(w, id, a, b, &k);
         if (!tmr_split_is_fair(w, c, p, tmr_v(0, 0, 0))) return -1;
         const int32_t v = tmr_split(m, c);
         if (v < 0) return v;
@@ -3919,9 +3945,9 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
 
 /* ---- resampling --------------------------------------------------------------------------- */
 
-/* Bring the copy of the surface to about two vertices per lattice point to come. */
-static int tmr_resample(tmr_work *w, double share) {
-    const double aim = sqrt(1 / share); /* of edges, relative to w->length */
+/* Bring the copy of the surface to about two vertices per lattice point to come. 0: cancelled. */
+static int tmr_resample(tmr_work *w) {
+    const double aim = sqrt(0.5); /* of edges, relative to w->length */
     /* lines first: what is inside is split to fit them */
     tmr_split_long(w, 1e9, 1.0);
     /* fine input: take away, the shortest edges first */
@@ -3973,8 +3999,7 @@ static void tmr_even_lines(tmr_work *w) {
         const int kind = m->corner[v] < 0 || tmr_is_ghost(m, v) ? 0 : tmr_kind_of(m, v);
         w->bad[v] = kind == TRIMESH_CREASE || kind == TRIMESH_BORDER; /* still to do */
         any |= w->bad[v];
-        w->moved[v] = m->p[v];
-        w->landed[v] = m->source[v];
+        tmr_stay(w, v);
     }
     for (int32_t v = 0; v < m->vertex_count && any; v++) {
         int32_t two[2];
@@ -4068,32 +4093,10 @@ static int tmr_rebuild(tmr_work *w, int cut, int32_t vertices, int32_t faces, tx
     const tmr_mesh old = w->m;
     const float *old_size = w->size;
     tmr_mesh *m = &w->m;
-    const size_t nv = (size_t)vertices, nc = 3 * (size_t)faces;
     int32_t *number = (int32_t *)txm_arena_alloc(scratch, (size_t)old.vertex_count, sizeof(int32_t));
     int32_t *middle = (int32_t *)txm_arena_alloc(scratch, 3 * (size_t)old.face_count, sizeof(int32_t));
     int32_t *where = (int32_t *)txm_arena_alloc(scratch, (size_t)old.face_count, sizeof(int32_t));
-    m->p = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
-    m->n = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
-    m->source = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
-    m->corner = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
-    m->flags = (uint8_t *)txm_arena_zero(arena, nv, 1);
-    m->valence = (int32_t *)txm_arena_zero(arena, nv, sizeof(int32_t));
-    m->vertex = (int32_t *)txm_arena_alloc(arena, nc, sizeof(int32_t));
-    m->opposite = (int32_t *)txm_arena_alloc(arena, nc, sizeof(int32_t));
-    m->edge = (int32_t *)txm_arena_zero(arena, nc, sizeof(int32_t));
-    w->size = (float *)txm_arena_alloc(arena, nv, sizeof(float));
-    w->moved = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
-    w->landed = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
-    w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
-    w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
-    w->flag = (uint8_t *)txm_arena_alloc(arena, (size_t)faces, 1);
-    if (!number || !middle || !where || !m->p || !m->n || !m->source || !m->corner || !m->flags ||
-        !m->valence || !m->vertex || !m->opposite || !m->edge || !w->size || !w->moved ||
-        !w->landed || !w->bad || !w->flag || !w->mask_room)
-        return 0;
-    m->vertex_limit = vertices;
-    m->face_limit = faces;
-    m->vertex_count = m->live = m->face_count = m->live_faces = 0;
+    if (!number || !middle || !where || !tmr_alloc_mesh(w, vertices, faces, arena)) return 0;
     for (int32_t v = 0; v < old.vertex_count; v++) {
         if (old.corner[v] < 0) continue;
         const int32_t k = number[v] = m->vertex_count++;
@@ -4130,13 +4133,9 @@ static int tmr_rebuild(tmr_work *w, int cut, int32_t vertices, int32_t faces, tx
         const int32_t x = number[a], y = number[b];
         if (old.edge[c]) {
             const int32_t id = old.edge[c] - 1;
-            int32_t k = w->l->first[id];
+            int32_t k;
             m->flags[v] = w->l->border[id] ? TRIMESH_BORDER : TRIMESH_CREASE;
-            if (tmr_kind_of(m, x) != TRIMESH_CORNER) k = m->source[x];
-            else if (tmr_kind_of(m, y) != TRIMESH_CORNER) k = m->source[y];
-            if (tmr_kind_of(m, x) == TRIMESH_CORNER && tmr_kind_of(m, y) == TRIMESH_CORNER)
-                p = tmr_line_at(w->s, w->l, id, 0.5 * w->l->length[id], &k);
-            else p = tmr_project_line(w->s, w->l, tmr_scale(tmr_add(old.p[a], old.p[b]), 0.5), &k);
+            p = tmr_line_middle(w, id, x, y, &k);
             tmr_put_on_line(w, v, p, k);
         } else {
             const int32_t from = tmr_kind_of(m, x) == TRIMESH_FREE ? x : y;
@@ -4232,7 +4231,7 @@ static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
     const tmr_vec n = tmr_unit(tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]));
-    const tmr_vec centre = tmr_scale(tmr_add(tmr_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
+    const tmr_vec centre = tmr_middle(m, v);
     double sum = 0;
     int32_t from = v[0];
     for (int k = 0; k < 3; k++) {
@@ -4251,8 +4250,7 @@ static void tmr_fit_chunk(void *context, int index) {
     const int32_t from = index * TMR_CHUNK;
     const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
     for (int32_t v = from; v < to; v++) {
-        w->moved[v] = m->p[v];
-        w->landed[v] = m->source[v];
+        tmr_stay(w, v);
         if (m->corner[v] < 0 || tmr_is_ghost(m, v) || tmr_kind_of(m, v) != TRIMESH_FREE) continue;
         double sum = 0;
         int count = 0;
@@ -4487,16 +4485,10 @@ static long tmr_count_turned(tmr_work *w, long *doubtful) {
         const double area2 = tmr_len(n);
         int turned = area2 < 1e-4 * longest, doubt = 0;
         if (!turned && tmr_agreement(w, v[0], v[1], v[2], m->p[v[0]], m->p[v[1]], m->p[v[2]]) < 0.2) {
-            const tmr_vec middle = tmr_scale(
-                tmr_add(tmr_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
-            tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
-            for (int k = 1; k < 3; k++) {
-                const tmr_place other = tmr_project(w->s, middle, tmr_face_of(w, v[k]));
-                if (other.d2 < at.d2) at = other;
-            }
+            const tmr_place at = tmr_below_middle(w, v);
             doubt = tmr_dot(n, w->s->normal[at.face]) < 0 &&
                     tmr_dot(n, tmr_normal_at(w->s, w->l, &at)) < 0;
-            turned = doubt && !tmr_faces_along(w->s, tmr_scale(n, 1 / area2), at.face, middle,
+            turned = doubt && !tmr_faces_along(w->s, tmr_scale(n, 1 / area2), at.face, tmr_middle(m, v),
                                                sqrt(at.d2) + 0.45 * w->length);
         }
         if (!turned && !doubt) continue;
@@ -4514,8 +4506,7 @@ static long tmr_open_folds(tmr_work *w, double share) {
     tmr_mesh *m = &w->m;
     long found = 0;
     for (int32_t v = 0; v < m->vertex_count; v++) {
-        w->moved[v] = m->p[v];
-        w->landed[v] = m->source[v];
+        tmr_stay(w, v);
     }
     for (int32_t c = 0; c < 3 * m->face_count; c++) {
         if (!tmr_is_real_edge(m, c)) continue;
@@ -5284,8 +5275,7 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const int kind = tmr_kind_of(m, v);
     int32_t near[TMR_NEAR];
     tmr_vec push = tmr_v(0, 0, 0);
-    w->moved[v] = m->p[v];
-    w->landed[v] = m->source[v];
+    tmr_stay(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
     const int count = tmr_find_near(w, v, near);
     for (int i = 1; i < count; i++) {
@@ -5341,8 +5331,7 @@ static void tmr_hold_turning(tmr_work *w) {
             found++;
             for (int k = 0; k < 3; k++) {
                 const int32_t v = m->vertex[3 * f + k];
-                w->moved[v] = m->p[v];
-                w->landed[v] = m->source[v];
+                tmr_stay(w, v);
             }
         }
         if (found == 0) break;
@@ -5429,7 +5418,7 @@ static int tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
 static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
-    if (!tmr_resample(w, 2)) return TXM_CANCELLED;
+    if (!tmr_resample(w)) return TXM_CANCELLED;
     txm_arena_init(&arena, w->env);
     int ok = tmr_thin_lines(w, &arena);
     if (ok) {

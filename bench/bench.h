@@ -67,6 +67,14 @@ static inline void parallel_for(void *user, int count, void (*body)(void *contex
     for (int i = 0; i < count; i++) body(context, i);
 }
 
+static inline int all_threads(void) {
+#ifdef _OPENMP
+    return omp_get_num_procs();
+#else
+    return 1;
+#endif
+}
+
 static inline txm_env make_env(int *threads) {
     txm_env env;
     memset(&env, 0, sizeof env);

@@ -22,14 +22,6 @@ enum { COMPARED = 2, LOOKUPS = 3, WINDOW = 1024 };
 
 static const char *const kind_names[] = {"wang", "corner", "triangle", "frame"};
 
-static int all_threads(void) {
-#ifdef _OPENMP
-    return omp_get_num_procs();
-#else
-    return 1;
-#endif
-}
-
 /* ---- making sets -------------------------------------------------------------------------- */
 
 typedef struct result {

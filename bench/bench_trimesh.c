@@ -16,14 +16,6 @@
 
 #include <stdio.h>
 
-static int all_threads(void) {
-#ifdef _OPENMP
-    return omp_get_num_procs();
-#else
-    return 1;
-#endif
-}
-
 /* ---- surfaces ------------------------------------------------------------------------------ */
 
 typedef struct surface {

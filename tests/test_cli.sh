@@ -1,6 +1,7 @@
 #!/bin/sh
 # The command line keeps its contract: options, exit status, messages, formats, files after failure.
 . tests/tap.sh
+. tests/texkit.sh
 
 texkit=$(pwd)/$OUT/asan/texkit   # with the sanitizers
 released=$(pwd)/build/texkit     # as users have it
@@ -8,44 +9,12 @@ draw=$(pwd)/build/draw
 check_tiles="/usr/bin/python3 $(pwd)/tests/check_tiles.py"
 cd "$tmp" || exit 1
 
-# run STATUS ARGUMENTS...: texkit must end with that status. After success stderr is empty. After a
-# failure it holds one line that names the command, and no file or folder was made or changed.
-run() {
-    want=$1
-    shift
-    before=$(all_files)
-    "$texkit" "$@" >out.log 2>err.log
-    got=$?
-    [ $got = "$want" ] || { echo "status $got instead of $want"; cat err.log; return 1; }
-    if [ "$want" = 0 ]; then
-        [ ! -s err.log ] || { echo "stderr is not empty:"; cat err.log; return 1; }
-    else
-        [ "$(wc -l <err.log)" = 1 ] || { echo "not one line on stderr:"; cat err.log; return 1; }
-        grep -q '^texkit' err.log || { cat err.log; return 1; }
-        [ ! -s out.log ] || { echo "stdout is not empty:"; cat out.log; return 1; }
-        [ "$before" = "$(all_files)" ] || { echo "files were made or changed"; ls -l; return 1; }
-    fi
-}
-all_files() {
-    find . -type f ! -name '*.log' -exec cksum {} + | sort
-    find . -type d | sort
-}
-
-# says TEXT: the last message holds this text
-says() { grep -qF -- "$1" err.log; }
-
 # refuses STATUS TEXT ARGUMENTS...: both in one test
 refuses() {
     status=$1 text=$2
     shift 2
     check "status $status, \"$text\": texkit $(echo "$*" | tail -c 70)" \
         refuses_so "$status" "$text" "$@"
-}
-refuses_so() {
-    status=$1 text=$2
-    shift 2
-    run "$status" "$@" || return 1
-    says "$text" || { echo "the message lacks '$text':"; cat err.log; return 1; }
 }
 
 # kind FILE: width, height and channels in the header of a PNG, BMP, TGA or JPEG file

@@ -1,50 +1,22 @@
 #!/bin/sh
 # texkit retile keeps the contract of the command line; and its files hold what they should.
 . tests/tap.sh
+. tests/texkit.sh
 
 root=$(pwd)
 texkit=$root/$OUT/asan/texkit # with the sanitizers
+prefix=retile
 python=/usr/bin/python3
 check_glb="$python $root/tests/check_glb.py"
 glbs=$root/$OUT/glb # kept: .ci/run hands them to the Khronos validator
 rm -rf "$glbs" && mkdir -p "$glbs"
 cd "$tmp" || exit 1
 
-# run STATUS ARGUMENTS...: as in test_cli.sh: texkit retile must end with that status. After success
-# stderr is empty. After a failure it holds one line that names the command, and no file or folder
-# was made or changed.
-run() {
-    want=$1
-    shift
-    before=$(all_files)
-    "$texkit" retile "$@" >out.log 2>err.log
-    got=$?
-    [ $got = "$want" ] || { echo "status $got instead of $want"; cat err.log; return 1; }
-    if [ "$want" = 0 ]; then
-        [ ! -s err.log ] || { echo "stderr is not empty:"; cat err.log; return 1; }
-    else
-        [ "$(wc -l <err.log)" = 1 ] || { echo "not one line on stderr:"; cat err.log; return 1; }
-        grep -q '^texkit' err.log || { cat err.log; return 1; }
-        [ ! -s out.log ] || { echo "stdout is not empty:"; cat out.log; return 1; }
-        [ "$before" = "$(all_files)" ] || { echo "files were made or changed"; ls -l; return 1; }
-    fi
-}
-all_files() {
-    find . -type f ! -name '*.log' -exec cksum {} + | sort
-    find . -type d | sort
-}
-
 # refuses STATUS TEXT ARGUMENTS...: and the message holds this text
 refuses() {
     status=$1 text=$2
     shift 2
     check "status $status, \"$text\": $(echo "$*" | tail -c 70)" refuses_so "$status" "$text" "$@"
-}
-refuses_so() {
-    status=$1 text=$2
-    shift 2
-    run "$status" "$@" || return 1
-    grep -qF -- "$text" err.log || { echo "the message lacks '$text':"; cat err.log; return 1; }
 }
 
 # counts FILE: vertices and triangles of an OBJ or PLY file

@@ -11,55 +11,21 @@
 
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
+#include "meshkit.h"
 #include "testkit.h"
-
-enum { MOST_VERTICES = 4000, MOST_TRIANGLES = 8000 };
 
 /* ---- made meshes ---- */
 
-typedef struct mesh {
-    float at[3 * MOST_VERTICES], scale[MOST_VERTICES];
-    uint32_t t[3 * MOST_TRIANGLES];
-    size_t vertices, triangles;
-} mesh;
-
-static mesh in;
 static trimesh_report report;
 static txm_env env;
 
-static uint32_t vertex(double x, double y, double z) {
-    float *p = in.at + 3 * in.vertices;
-    assert_true(in.vertices < MOST_VERTICES);
-    p[0] = (float)x;
-    p[1] = (float)y;
-    p[2] = (float)z;
-    return (uint32_t)in.vertices++;
-}
-static void triangle(uint32_t a, uint32_t b, uint32_t c) {
-    uint32_t *t = in.t + 3 * in.triangles++;
-    assert_true(in.triangles <= MOST_TRIANGLES);
-    t[0] = a;
-    t[1] = b;
-    t[2] = c;
-}
-static void quad(uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
-    triangle(a, b, c);
-    triangle(a, c, d);
-}
 static void clear(void) {
     in.vertices = in.triangles = 0;
 }
 
 /* The cube of side 1 at (x, y, z). */
 static void cube(double x, double y, double z) {
-    uint32_t c[8];
-    for (int i = 0; i < 8; i++) c[i] = vertex(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2));
-    quad(c[0], c[2], c[3], c[1]);
-    quad(c[4], c[5], c[7], c[6]);
-    quad(c[0], c[1], c[5], c[4]);
-    quad(c[2], c[6], c[7], c[3]);
-    quad(c[0], c[4], c[6], c[2]);
-    quad(c[1], c[3], c[7], c[5]);
+    add_box(x, y, z, 1, 1, 1);
 }
 
 /* A torus of n * n vertices and 2 n * n triangles, or (open) a wavy sheet. */
