@@ -73,9 +73,10 @@ static surface make_ball(size_t n) {
     float *p = s.positions;
     uint32_t *t = s.indices;
     for (size_t i = 0; i <= n * m + 1; i++) {
+        const size_t ring = i / m + 1;
         const double v = i == south   ? -TXM_PI / 2
                          : i == north ? TXM_PI / 2
-                                      : TXM_PI * ((double)(i / m + 1) / (double)(n + 1) - 0.5);
+                                      : TXM_PI * ((double)ring / (double)(n + 1) - 0.5);
         const double u = i < south ? 2 * TXM_PI * (double)(i % m) / (double)m : 0;
         const double x = cos(u) * cos(v), y = sin(u) * cos(v), z = sin(v);
         const double r = 1 + 0.06 * (sin(7 * x) + sin(8 * y) + sin(6 * z));

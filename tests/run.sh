@@ -9,7 +9,7 @@
 set -u
 
 cd "$(dirname "$0")/.." || exit 1
-FULL=0
+FULL=${FULL:-0}
 [ "${1:-}" = --full ] && FULL=1 && shift
 CC=${CC:-cc} CXX=${CXX:-c++}
 SANITIZE="-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined"
@@ -31,10 +31,15 @@ unit() {
         echo "of the compiler" >"$OUT/$1.status"
     fi
 }
-if [ "${1:-}" = --unit ]; then
-    unit "$2"
-    exit 0
-fi
+# script NAME: run one script; its log and status stay in $OUT
+script() {
+    sh "tests/test_$1.sh" >"$OUT/$1.log" 2>&1
+    echo $? >"$OUT/$1.status"
+}
+case ${1:-} in
+--unit) unit "$2"; exit 0 ;;
+--script) script "$2"; exit 0 ;;
+esac
 
 passed=0 failed=0
 
@@ -58,7 +63,7 @@ wanted() {
 }
 names=$*
 
-# two programs at a time; they are counted in order afterwards
+# two at a time, programs as well as scripts; they are counted in order afterwards
 units=
 for source in tests/test_*.c; do
     name=$(basename "$source" .c)
@@ -77,13 +82,16 @@ if ! { make -s all helpers && make -s BUILD="$OUT/asan" CFLAGS="$SANITIZE" all; 
     count make "$OUT/make.log" 1
 fi
 
-for script in tests/test_*.sh; do
-    name=$(basename "$script" .sh)
+scripts=
+for source in tests/test_*.sh; do
+    name=$(basename "$source" .sh)
     name=${name#test_}
-    wanted "$name" || continue
-    log=$OUT/$name.log
-    sh "$script" >"$log" 2>&1
-    count "$name" "$log" $?
+    wanted "$name" && scripts="$scripts $name"
+done
+# shellcheck disable=SC2086 # names are words
+[ -z "$scripts" ] || printf '%s\n' $scripts | xargs -n 1 -P 2 sh tests/run.sh --script
+for name in $scripts; do
+    count "$name" "$OUT/$name.log" "$(cat "$OUT/$name.status")"
 done
 
 echo "$passed passed, $failed failed"

@@ -434,7 +434,7 @@ static void draw_band(picture *p, int index) {
     b.columns = p->out->width * n;
     const size_t count = (size_t)b.rows * (size_t)b.columns;
     b.near = (float *)malloc(count * sizeof(float));
-    b.rgb = (float *)malloc(3 * count * sizeof(float));
+    b.rgb = (float *)calloc(count, 3 * sizeof(float));
     if (b.near && b.rgb) {
         for (size_t i = 0; i < count; i++) {
             b.near[i] = -1e30f;
