@@ -63,18 +63,24 @@ wanted() {
 }
 names=$*
 
-# two at a time, programs as well as scripts; they are counted in order afterwards
-units=
-for source in tests/test_*.c; do
-    name=$(basename "$source" .c)
-    name=${name#test_}
-    wanted "$name" && units="$units $name"
-done
-# shellcheck disable=SC2086 # names are words
-[ -z "$units" ] || printf '%s\n' $units | xargs -n 1 -P 2 sh tests/run.sh --unit
-for name in $units; do
-    count "$name" "$OUT/$name.log" "$(cat "$OUT/$name.status")"
-done
+# run_all KIND SUFFIX: the wanted tests/test_*SUFFIX, two at a time, counted in order afterwards
+run_all() {
+    chosen=
+    for source in tests/test_*"$2"; do
+        name=$(basename "$source" "$2")
+        name=${name#test_}
+        wanted "$name" || continue
+        chosen="$chosen $name"
+        echo "before its end" >"$OUT/$name.status" # not that of an earlier run
+    done
+    # shellcheck disable=SC2086 # names are words
+    [ -z "$chosen" ] || printf '%s\n' $chosen | xargs -n 1 -P 2 sh tests/run.sh "--$1"
+    for name in $chosen; do
+        count "$name" "$OUT/$name.log" "$(cat "$OUT/$name.status")"
+    done
+}
+
+run_all unit .c
 
 # the scripts use the tool as released and with the sanitizers, and the helpers of tools/
 if ! { make -s all helpers && make -s BUILD="$OUT/asan" CFLAGS="$SANITIZE" all; } \
@@ -82,17 +88,7 @@ if ! { make -s all helpers && make -s BUILD="$OUT/asan" CFLAGS="$SANITIZE" all; 
     count make "$OUT/make.log" 1
 fi
 
-scripts=
-for source in tests/test_*.sh; do
-    name=$(basename "$source" .sh)
-    name=${name#test_}
-    wanted "$name" && scripts="$scripts $name"
-done
-# shellcheck disable=SC2086 # names are words
-[ -z "$scripts" ] || printf '%s\n' $scripts | xargs -n 1 -P 2 sh tests/run.sh --script
-for name in $scripts; do
-    count "$name" "$OUT/$name.log" "$(cat "$OUT/$name.status")"
-done
+run_all script .sh
 
 echo "$passed passed, $failed failed"
 [ "$failed" = 0 ] && [ "$passed" -gt 0 ]
