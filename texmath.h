@@ -59,8 +59,8 @@
      arena, a generator, an image.
 
    SAME BYTES
-     Integers, 8-bit samples, generator, hash and sort: the same bits everywhere. All else is
-     computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
+     Integers, 8- and 16-bit samples, generator, hash and sort: the same bits everywhere. All else
+     is computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
      makes necessary. That gives the same bits wherever arithmetic is IEEE 754 (on 32-bit x86:
      -msse2), with -ffp-contract=off (as gcc -std=c99 has it) and without -ffast-math. What calls
      pow, sin, cos or acos depends on the C library in about one result of 10^8: use it to show
@@ -324,13 +324,14 @@ static inline float txm_lerpf(float a, float b, float t) {
 /* ---- images ----------------------------------------------------------------------------- */
 
 typedef enum txm_sample {
-    TXM_U8 = 0, /* 0..255, sRGB-encoded unless a function says otherwise */
-    TXM_F32 = 1 /* nominally 0..1                                        */
+    TXM_U8 = 0,  /* 0..255, sRGB-encoded unless a function says otherwise         */
+    TXM_F32 = 1, /* nominally 0..1                                                */
+    TXM_U16 = 2  /* uint16_t, 0..65535, sRGB-encoded unless a function says otherwise */
 } txm_sample;
 
 /* A view of pixels that the caller owns: rows from top to bottom, channels interleaved. */
 typedef struct txm_image {
-    void *pixels;      /* uint8_t or float, first sample of the top row; aligned for its type */
+    void *pixels;      /* first sample of the top row: uint8_t, uint16_t or float, aligned    */
     int width, height; /* pixels, 1 or more                                                   */
     int channels;      /* 1..4: gray, gray + alpha, RGB, RGBA; 0 = 1                          */
     txm_sample sample; /* sample type; 0 = 8 bit                                              */
@@ -340,7 +341,7 @@ typedef struct txm_image {
 
 /* bytes of one sample */
 static inline size_t txm_sample_bytes(txm_sample sample) {
-    return sample == TXM_F32 ? sizeof(float) : 1;
+    return sample == TXM_F32 ? sizeof(float) : sample == TXM_U16 ? sizeof(uint16_t) : 1;
 }
 
 /* Is this a view that can be worked on? Everything but the samples themselves is checked.
@@ -357,8 +358,9 @@ static inline txm_status txm_image_check(const txm_image *image, const char *nam
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "width and height must be 1 or more");
     if (image->channels < 0 || image->channels > 4)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "channels must be 1 to 4 (0 means 1)");
-    if (image->sample != TXM_U8 && image->sample != TXM_F32)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "sample must be TXM_U8 or TXM_F32");
+    if (image->sample != TXM_U8 && image->sample != TXM_U16 && image->sample != TXM_F32)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "sample must be TXM_U8, TXM_U16 or TXM_F32");
 
     const size_t channels = image->channels ? (size_t)image->channels : 1;
     const size_t width = (size_t)image->width, height = (size_t)image->height;
@@ -379,7 +381,8 @@ static inline txm_status txm_image_check(const txm_image *image, const char *nam
                            "width * height * channels is beyond the address space; use tiles");
     if ((uintptr_t)image->pixels % bytes || stride % bytes)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
-                           "float pixels and stride must be multiples of 4 bytes");
+                           bytes == 2 ? "16-bit pixels and stride must be multiples of 2 bytes"
+                                      : "float pixels and stride must be multiples of 4 bytes");
     return TXM_OK;
 }
 
@@ -393,7 +396,7 @@ static inline txm_image txm_image_resolve(txm_image image) {
     return image;
 }
 
-/* first sample of row y, 0..height-1; cast it to uint8_t * or float * */
+/* first sample of row y, 0..height-1; cast it to uint8_t *, uint16_t * or float * */
 static inline void *txm_image_row(const txm_image *image, int y) {
     return (char *)image->pixels + txm_image_resolve(*image).stride * y;
 }
@@ -401,23 +404,27 @@ static inline const void *txm_image_row_const(const txm_image *image, int y) {
     return txm_image_row(image, y);
 }
 
-/* sample c of pixel (x, y), all inside; 8 bit: value / 255 */
+/* sample c of pixel (x, y), all inside; 8 bit: value / 255; 16 bit: value / 65535 */
 static inline float txm_image_get(const txm_image *image, int x, int y, int c) {
     const void *row = txm_image_row_const(image, y);
     const size_t i = (size_t)x * (size_t)(image->channels ? image->channels : 1) + (size_t)c;
     if (image->sample == TXM_F32) return ((const float *)row)[i];
+    if (image->sample == TXM_U16) return (float)((const uint16_t *)row)[i] / 65535.0f;
     return (float)((const uint8_t *)row)[i] / 255.0f;
 }
 
-/* Store a sample. 8 bit: clamped to 0..1 (NaN to 0), times 255, rounded; float: as it is. */
+/* Store a sample. 8 and 16 bit: clamped to 0..1 (NaN to 0), times 255 or 65535, rounded; float: as
+   it is. */
 static inline void txm_image_set(const txm_image *image, int x, int y, int c, float value) {
     void *row = txm_image_row(image, y);
     const size_t i = (size_t)x * (size_t)(image->channels ? image->channels : 1) + (size_t)c;
+    const double unit = (double)txm_clampf(value, 0, 1);
     if (image->sample == TXM_F32) ((float *)row)[i] = value;
-    else ((uint8_t *)row)[i] = (uint8_t)((double)txm_clampf(value, 0, 1) * 255.0 + 0.5);
+    else if (image->sample == TXM_U16) ((uint16_t *)row)[i] = (uint16_t)(unit * 65535.0 + 0.5);
+    else ((uint8_t *)row)[i] = (uint8_t)(unit * 255.0 + 0.5);
 }
 
-/* non-zero if no sample is infinite or NaN (8-bit samples never are) */
+/* non-zero if no sample is infinite or NaN (8- and 16-bit samples never are) */
 static inline int txm_image_is_finite(const txm_image *image) {
     const txm_image im = txm_image_resolve(*image);
     const size_t count = (size_t)im.width * (size_t)im.channels;

@@ -88,8 +88,9 @@
    LIMITS
      Sides of the example 16 pixels or more, images and canvases up to TEXSYN_MAX_PIXELS, which may
      be lowered; float samples up to a million. Differences under 1/255 are not seen, so scale a
-     float example of narrow range first. A model file is refused unless every number in it makes
-     sense. Build with -ffp-contract=off if the bytes of learned models must agree everywhere.
+     float or 16-bit example of narrow range first. A model file is refused unless every number in
+     it makes sense. Build with -ffp-contract=off if the bytes of learned models must agree
+     everywhere.
 
    REFERENCES
      [1] A. Zalesny, D. Auf der Maur, L. Van Gool. Realistic textures for virtual reality.
@@ -216,7 +217,7 @@ typedef struct texsyn_synth_desc {
 } texsyn_synth_desc;
 
 /* The simple way: one call. out is the caller's: desc->width x desc->height, the channels of the
-   model (or 3 where it has 1, or 4 = opaque), 8-bit, or float, which is not clamped to 0..1.
+   model (or 3 where it has 1, or 4 = opaque), 8 or 16 bits, or float, which is not clamped to 0..1.
    Untouched after an error.
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or a picture that does not fit;
           TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED

@@ -207,7 +207,7 @@ typedef struct textiles_tile {
 typedef struct textiles_exemplar {
     const txm_image *maps; /* map_count pictures of one size; the first counts most when cutting */
     int map_count;         /* 1..TEXTILES_MAX_MAPS; all exemplars have the same maps: number,
-                              channels and sample type                                           */
+                              channels and sample type, which the tiles have as well             */
 } textiles_exemplar;
 
 typedef enum textiles_repair {
@@ -483,7 +483,7 @@ typedef struct txt_map {
     int channels;
     txm_sample sample;
     size_t texel;    /* bytes of one texel                                     */
-    uint8_t *pixels; /* count * side * side * texel bytes; floats if TXM_F32   */
+    uint8_t *pixels; /* count * side * side * texel bytes; aligned for sample  */
 } txt_map;
 
 struct textiles_set {
@@ -531,6 +531,13 @@ static uint8_t *txt_texel(const textiles_set *s, int map, int tile, int x, int y
     const size_t side = (size_t)s->side;
     return s->maps[map].pixels +
            (((size_t)tile * side + (size_t)y) * side + (size_t)x) * s->maps[map].texel;
+}
+
+/* sample i of a row, as it is stored: not scaled to 0..1 */
+static double txt_stored(txm_sample sample, const void *row, size_t i) {
+    if (sample == TXM_F32) return (double)((const float *)row)[i];
+    if (sample == TXM_U16) return ((const uint16_t *)row)[i];
+    return ((const uint8_t *)row)[i];
 }
 
 /* ---- which tiles a set has ---------------------------------------------------------------- */
@@ -2256,13 +2263,13 @@ typedef struct txt_view {
 
 /* A sample between the pixels of a tile's picture: at (x, y), pixel centres at whole numbers. Torus
    layouts repeat; of others the last pixels go on for ever, of slices those of the slice. */
-static void txt_bilinear(const txt_view *v, int tile, double x, double y, uint8_t *to) {
+static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *to) {
     const textiles_layout *l = v->layout;
-    const int slices = l->packing == TEXTILES_SLICES, floats = v->atlas.sample == TXM_F32;
+    const int slices = l->packing == TEXTILES_SLICES;
     const int top = slices ? tile * l->pitch_y : 0;
     const int bottom = slices ? top + l->pitch_y - 1 : l->height - 1;
     const double fx = x - floor(x), fy = y - floor(y);
-    const uint8_t *rows[2];
+    const void *rows[2];
     size_t at[2];
     for (int k = 0; k < 2; k++) {
         int ix = (int)floor(x) + k, iy = (int)floor(y) + k;
@@ -2271,19 +2278,17 @@ static void txt_bilinear(const txt_view *v, int tile, double x, double y, uint8_
             iy = (iy + l->height) % l->height;
         }
         at[k] = (size_t)txm_clampi(ix, 0, l->width - 1) * (size_t)v->atlas.channels;
-        rows[k] = (const uint8_t *)txm_image_row_const(&v->atlas, txm_clampi(iy, top, bottom));
+        rows[k] = txm_image_row_const(&v->atlas, txm_clampi(iy, top, bottom));
     }
     for (int c = 0; c < v->atlas.channels; c++) {
         double s[4];
-        for (int k = 0; k < 4; k++) {
-            const size_t i = at[k & 1] + (size_t)c;
-            s[k] = floats ? (double)((const float *)(const void *)rows[k / 2])[i]
-                          : (double)rows[k / 2][i];
-        }
+        for (int k = 0; k < 4; k++)
+            s[k] = txt_stored(v->atlas.sample, rows[k / 2], at[k & 1] + (size_t)c);
         const double above = s[0] * (1 - fx) + s[1] * fx, below = s[2] * (1 - fx) + s[3] * fx;
         const double value = above * (1 - fy) + below * fy;
-        if (floats) ((float *)(void *)to)[c] = txm_float(value);
-        else to[c] = (uint8_t)(value + 0.5);
+        if (v->atlas.sample == TXM_F32) ((float *)to)[c] = txm_float(value);
+        else if (v->atlas.sample == TXM_U16) ((uint16_t *)to)[c] = (uint16_t)(value + 0.5);
+        else ((uint8_t *)to)[c] = (uint8_t)(value + 0.5);
     }
 }
 
@@ -4936,16 +4941,8 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
 /* sum over the channels of the absolute difference of two texels */
 static double txt_texel_step(const txt_map *m, const uint8_t *p, const uint8_t *q) {
     double sum = 0;
-    for (int c = 0; c < m->channels; c++) {
-        if (m->sample == TXM_F32) {
-            float a, b;
-            memcpy(&a, p + (size_t)c * sizeof a, sizeof a);
-            memcpy(&b, q + (size_t)c * sizeof b, sizeof b);
-            sum += fabs((double)a - b);
-        } else {
-            sum += abs(p[c] - q[c]);
-        }
-    }
+    for (size_t c = 0; c < (size_t)m->channels; c++)
+        sum += fabs(txt_stored(m->sample, p, c) - txt_stored(m->sample, q, c));
     return sum;
 }
 

@@ -6,6 +6,7 @@
 //   oiio_compare wrap    A...        [LIMIT...]   do they continue across their borders
 //   oiio_compare seam    A SIZE      [LIMIT...]   does a picture of square tiles hide its joints
 //   oiio_compare shuffle A OUT [SIDE]             write A's pixels, or squares of it, in random order
+//   oiio_compare deep    OUT CHANNELS             write a picture of 16 bits, noise and slopes
 //
 // Prints one "figure value" per line. A limit is written mean<0.1 or psnr>30; the exit status is 1
 // if a figure is beyond its limit, 2 if a picture cannot be read.
@@ -321,6 +322,32 @@ void shuffle(const std::string &from, const std::string &to, int side) {
     if (!buffer.write(to)) give_up("cannot write " + to);
 }
 
+// OpenImageIO itself writes PNM of 8 bits only (and reads those of 16 off by one here and there).
+void deep(const std::string &to, int channels) {
+    if (channels < 1 || channels > 4) give_up("deep: 1 to 4 channels");
+    OIIO::ImageSpec spec(150, 90, channels, OIIO::TypeDesc::UINT16);
+    spec.attribute("oiio:UnassociatedAlpha", 1); // as PNG has it: write the numbers as they are
+    std::vector<std::uint16_t> samples;
+    std::mt19937 random(1);
+    for (int i = 0; i < spec.width * spec.height * channels; i++) {
+        const int x = i / channels % spec.width, noise = int(random() & 0xffff);
+        samples.push_back(std::uint16_t(i % channels % 2 ? 437 * x + noise % 4 : noise));
+    }
+    if (to.back() == 'm') {
+        std::FILE *file = std::fopen(to.c_str(), "wb");
+        if (!file) give_up("cannot write " + to);
+        std::fprintf(file, "P%d %d %d 65535\n", channels == 1 ? 5 : 6, spec.width, spec.height);
+        for (const int s : samples) {
+            std::fputc(s >> 8, file);
+            std::fputc(s & 255, file);
+        }
+        std::fclose(file);
+        return;
+    }
+    OIIO::ImageBuf buffer(spec, samples.data());
+    if (!buffer.write(to)) give_up("cannot write " + to);
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
@@ -330,7 +357,7 @@ int main(int argc, char **argv) {
     const int files = int(paths.size());
     if (command == "wrap" ? files < 1 : files != 2 && !(command == "shuffle" && files == 3))
         give_up("usage: same A B | texture EXEMPLAR B | wrap A... | seam A SIZE, [FIGURE<LIMIT...] | "
-                "shuffle A OUT [SIDE]");
+                "shuffle A OUT [SIDE] | deep OUT CHANNELS");
 
     Figures figures;
     if (command == "same") figures = same(argv[2], argv[3]);
@@ -339,6 +366,7 @@ int main(int argc, char **argv) {
     else if (command == "seam") figures = seam(load(paths[0]), std::atoi(argv[3]));
     else if (command == "shuffle")
         shuffle(paths[0], paths[1], files == 3 ? std::atoi(argv[4]) : 1);
+    else if (command == "deep") deep(paths[0], std::atoi(argv[3]));
     else give_up("unknown command " + command);
     for (const auto &f : figures) std::printf("%s %.4g\n", f.first.c_str(), f.second);
 

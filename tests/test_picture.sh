@@ -84,3 +84,15 @@ for format in tga bmp; do
 done
 build/texkit synth "$tmp/sand.txs" -o "$tmp/f.jpg" --size 100x80 --quiet
 check "nearly the same picture as .jpg" "$compare" same "$tmp/f.png" "$tmp/f.jpg" 'psnr>25'
+
+# 16 bits: what others write is read and written again to the last bit
+check "copy_deep builds" $CC -std=c99 -O2 -Wall -Wextra -I. -Itools tests/copy_deep.c \
+    build/image_io.o build/stb.o -o "$tmp/copy_deep" -lm
+for input in "png 1" "png 3" "png 4" "pgm 1" "ppm 3"; do
+    set -- $input
+    "$compare" deep "$tmp/reference.png" "$2"
+    "$compare" deep "$tmp/deep.$1" "$2"
+    check "the same 16 bits from .$1 with $2 channels" sh -c "
+        '$tmp/copy_deep' '$tmp/deep.$1' '$tmp/copy.png' &&
+        '$compare' same '$tmp/reference.png' '$tmp/copy.png' 'max<1e-9' 'mean<1e-9'"
+done

@@ -314,7 +314,7 @@ static void test_image_check(void **state) {
     assert_refused(im, 0, TXM_BAD_ARGUMENT, "channels");
     im = good, im.channels = -1;
     assert_refused(im, 0, TXM_BAD_ARGUMENT, "channels");
-    im = good, im.sample = (txm_sample)2;
+    im = good, im.sample = (txm_sample)3;
     assert_refused(im, 0, TXM_BAD_ARGUMENT, "sample");
     assert_refused(good, 15, TXM_TOO_LARGE, "too many pixels");
     im = good, im.stride = 63;
@@ -325,6 +325,14 @@ static void test_image_check(void **state) {
     assert_refused(im, 0, TXM_BAD_ARGUMENT, "multiples of 4");
     im = good, im.pixels = (char *)pixels + 2;
     assert_refused(im, 0, TXM_BAD_ARGUMENT, "multiples of 4");
+    im = good, im.sample = TXM_U16, im.stride = 34, im.pixels = (char *)pixels + 2;
+    assert_int_equal(txm_image_check(&im, "picture", 0, NULL), TXM_OK);
+    im.stride = 31;
+    assert_refused(im, 0, TXM_BAD_ARGUMENT, "stride is shorter");
+    im.stride = 33;
+    assert_refused(im, 0, TXM_BAD_ARGUMENT, "multiples of 2");
+    im.stride = 0, im.pixels = (char *)pixels + 1;
+    assert_refused(im, 0, TXM_BAD_ARGUMENT, "multiples of 2");
     im = good, im.stride = PTRDIFF_MAX - 3;
     assert_refused(im, 0, TXM_TOO_LARGE, "address space");
     im = good, im.stride = PTRDIFF_MIN;
@@ -341,14 +349,19 @@ static void test_image_check(void **state) {
 static void test_image_samples(void **state) {
     (void)state;
     uint8_t bytes[64];
+    uint16_t words[64];
     float floats[64];
     for (int flip = 0; flip < 2; flip++) {
-        for (int f = 0; f < 2; f++) {
-            txm_image im = f ? view(floats, 3, 4, 2, TXM_F32) : view(bytes, 3, 4, 2, TXM_U8);
-            const ptrdiff_t step = f ? 32 : 8;
+        for (int f = 0; f < 3; f++) {
+            txm_image im = f == TXM_F32   ? view(floats, 3, 4, 2, TXM_F32)
+                           : f == TXM_U16 ? view(words, 3, 4, 2, TXM_U16)
+                                          : view(bytes, 3, 4, 2, TXM_U8);
+            char *const memory = (char *)im.pixels;
+            const ptrdiff_t step = 8 * (ptrdiff_t)txm_sample_bytes(im.sample);
             im.stride = flip ? -step : step;
             if (flip) im.pixels = (char *)im.pixels + 3 * step;
             memset(bytes, 0, sizeof bytes);
+            memset(words, 0, sizeof words);
             memset(floats, 0, sizeof floats);
             for (int y = 0; y < 4; y++) {
                 for (int x = 0; x < 3; x++) {
@@ -358,12 +371,12 @@ static void test_image_samples(void **state) {
             }
             for (int y = 0; y < 4; y++) {
                 const int line = flip ? 3 - y : y; /* where the row lies in memory */
-                assert_ptr_equal(txm_image_row_const(&im, y),
-                                 (char *)(f ? (void *)floats : (void *)bytes) + line * step);
+                assert_ptr_equal(txm_image_row_const(&im, y), memory + line * step);
                 for (int x = 0; x < 3; x++) {
                     for (int c = 0; c < 2; c++) {
                         const int value = 16 * y + 4 * x + c, i = 8 * line + 2 * x + c;
-                        if (!f) assert_int_equal(bytes[i], value);
+                        if (f == TXM_U8) assert_int_equal(bytes[i], value);
+                        if (f == TXM_U16) assert_int_equal(words[i], 257 * value);
                         assert_near(txm_image_get(&im, x, y, c), value / 255.0, 1e-7);
                     }
                 }
@@ -371,6 +384,7 @@ static void test_image_samples(void **state) {
         }
     }
     txm_image one = view(bytes, 1, 1, 0, TXM_U8), real = view(floats, 1, 1, 0, TXM_F32);
+    txm_image deep = view(words, 1, 1, 0, TXM_U16);
     for (int v = 0; v < 256; v++) { /* there and back for each value; rounding at the half */
         bytes[0] = (uint8_t)v;
         const float value = txm_image_get(&one, 0, 0, 0);
@@ -381,6 +395,24 @@ static void test_image_samples(void **state) {
         txm_image_set(&one, 0, 0, 0, ((float)v - 0.49f) / 255.0f);
         assert_int_equal(bytes[0], v);
     }
+    words[1] = 77;
+    for (int v = 0; v < 65536; v++) {
+        words[0] = (uint16_t)v;
+        const float value = txm_image_get(&deep, 0, 0, 0);
+        txm_image_set(&deep, 0, 0, 0, value);
+        assert_int_equal(words[0], v);
+        for (int k = -1; k <= 1; k += 2) {
+            txm_image_set(&deep, 0, 0, 0, (float)((v + k * 0.49) / 65535));
+            assert_int_equal(words[0], v);
+        }
+        bytes[0] = (uint8_t)(v / 257); /* 8 bits made wider have the very same value */
+        if (v % 257 == 0) assert_true(txm_image_get(&one, 0, 0, 0) == value);
+    }
+    txm_image_set(&deep, 0, 0, 0, -7), assert_int_equal(words[0], 0);
+    txm_image_set(&deep, 0, 0, 0, 7), assert_int_equal(words[0], 65535);
+    txm_image_set(&deep, 0, 0, 0, -INFINITY), assert_int_equal(words[0], 0);
+    txm_image_set(&deep, 0, 0, 0, NAN), assert_int_equal(words[0], 0);
+    assert_int_equal(words[1], 77); /* its neighbour was left alone */
     txm_image_set(&one, 0, 0, 0, -7), assert_int_equal(bytes[0], 0);
     txm_image_set(&one, 0, 0, 0, 7), assert_int_equal(bytes[0], 255);
     txm_image_set(&one, 0, 0, 0, INFINITY), assert_int_equal(bytes[0], 255);
@@ -405,8 +437,12 @@ static void test_image_finite(void **state) {
     memset(floats, 0xff, sizeof floats);
     im = view(floats, 3, 4, 3, TXM_U8);
     assert_true(txm_image_is_finite(&im));
+    im = view(floats, 3, 4, 3, TXM_U16);
+    assert_true(txm_image_is_finite(&im));
     im = txm_image_resolve(view(floats, 3, 4, 0, TXM_F32));
     assert_int_equal(im.channels, 1);
+    assert_int_equal(im.stride, 12);
+    im = txm_image_resolve(view(floats, 3, 4, 2, TXM_U16));
     assert_int_equal(im.stride, 12);
 }
 
@@ -927,7 +963,7 @@ static void test_halve(void **state) {
     bad[1].width = 4;
     bad[2].height = 5;
     bad[3].channels = 2;
-    bad[4].sample = TXM_U8;
+    bad[4].sample = TXM_U16;
     bad[5].width = 6;
     bad[6].stride = 4;
     bad[7].channels = 9;

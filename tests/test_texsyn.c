@@ -42,6 +42,12 @@ static txm_image view_float(float *pixels, int width, int height, int channels) 
     return im;
 }
 
+static txm_image view_words(uint16_t *pixels, int width, int height, int channels) {
+    txm_image im = view(pixels, width, height, channels);
+    im.sample = TXM_U16;
+    return im;
+}
+
 /* Patches of one value: a pixel is the one to its left, the one above, or new, of `values` values
    that are `step` apart. The channels repeat each other in part; alpha is one of two values. */
 static void draw_patches(uint8_t *p, int width, int height, int channels, int values, int step,
@@ -227,7 +233,10 @@ static void test_learn_bad_arguments(void **state) {
     REFUSES(mask.stride, 31, TXM_BAD_ARGUMENT);
     REFUSES(mask.sample, (txm_sample)7, TXM_BAD_ARGUMENT);
     static float float_mask[32 * 32];
+    static uint16_t deep_mask[32 * 32];
     good.mask = view_float(float_mask, 32, 32, 1);
+    REFUSES(max_types, 0, TXM_BAD_ARGUMENT);
+    good.mask = view_words(deep_mask, 32, 32, 1);
     REFUSES(max_types, 0, TXM_BAD_ARGUMENT);
 }
 
@@ -337,11 +346,15 @@ static void test_learn_half(void **state) {
 static void test_learn_kinds(void **state) {
     (void)state;
     static uint8_t pixels[40 * 32 * 4], out[50 * 40 * 4];
+    static uint16_t words[40 * 32 * 4];
     static float floats[40 * 32 * 4];
     for (int channels = 1; channels <= 4; channels++) {
         if (channels == 2) continue;
         draw_patches(pixels, 40, 32, channels, 16, 12, 9);
-        for (int i = 0; i < 40 * 32 * channels; i++) floats[i] = (float)pixels[i] / 255.0f;
+        for (int i = 0; i < 40 * 32 * channels; i++) {
+            words[i] = (uint16_t)(257 * pixels[i]);
+            floats[i] = (float)pixels[i] / 255.0f;
+        }
         texsyn_learn_desc d = learn_desc(view(pixels, 40, 32, channels), 4);
         texsyn_model *model = learn(&d);
         assert_int_equal(texsyn_channels(model), channels);
@@ -358,11 +371,13 @@ static void test_learn_kinds(void **state) {
             assert_near(mean_out, mean, 12);
         }
 
-        /* the same samples as floats: the same model */
-        d.example = view_float(floats, 40, 32, channels);
-        texsyn_model *other = learn(&d);
-        assert_same_saved(model, other);
-        texsyn_free(other);
+        /* the same samples as floats or with 16 bits: the same model */
+        for (int i = 0; i < 2; i++) {
+            d.example = i ? view_words(words, 40, 32, channels) : view_float(floats, 40, 32, channels);
+            texsyn_model *other = learn(&d);
+            assert_same_saved(model, other);
+            texsyn_free(other);
+        }
         texsyn_free(model);
     }
     assert_int_equal(texsyn_channels(NULL), 0);
@@ -1101,6 +1116,7 @@ static void test_synth_formats(void **state) {
     (void)state;
     enum { W = 40, H = 30 };
     static uint8_t plain[W * H * 4], out[W * H * 4];
+    static uint16_t words[W * H * 4];
     static float floats[W * H * 4];
     for (int channels = 1; channels <= 4; channels++) {
         if (channels == 2) continue;
@@ -1122,9 +1138,11 @@ static void test_synth_formats(void **state) {
             }
         }
         synthesize(&d, view_float(floats, W, H, channels));
+        synthesize(&d, view_words(words, W, H, channels));
         for (int i = 0; i < W * H * channels; i++) {
-            const double v = (double)txm_clampf(floats[i], 0, 1) * 255;
-            assert_near(v, plain[i], 0.501);
+            const double v = (double)txm_clampf(floats[i], 0, 1);
+            assert_near(v * 255, plain[i], 0.501);
+            assert_near(v * 65535, words[i], 0.501);
         }
         texsyn_free(model);
     }

@@ -167,7 +167,7 @@ typedef struct book {
     const textiles_set *set;
     textiles_kind kind;
     int size, side, count, colors, variants, maps;
-    int is_float; /* bit m: map m is of floats */
+    int types; /* bit m: map m is of floats; bit m + 8: of 16 bits */
     int channels[TEXTILES_MAX_MAPS];
     size_t texel[TEXTILES_MAX_MAPS];
     uint8_t *bytes[TEXTILES_MAX_MAPS]; /* as textiles_draw_tile gives them, tile by tile */
@@ -184,7 +184,7 @@ static size_t place_of(const book *b, int t, int x, int y) {
     return ((size_t)t * (size_t)b->side + (size_t)y) * (size_t)b->side + (size_t)x;
 }
 
-static book open_book(const textiles_set *set, int is_float) {
+static book open_book(const textiles_set *set, int types) {
     book b;
     memset(&b, 0, sizeof b);
     b.set = set;
@@ -195,13 +195,15 @@ static book open_book(const textiles_set *set, int is_float) {
     b.colors = textiles_colors(set);
     b.variants = textiles_variants(set);
     b.maps = textiles_map_count(set);
-    b.is_float = is_float;
+    b.types = types;
     const size_t n = (size_t)b.count * (size_t)b.side * (size_t)b.side;
     b.tiles = (textiles_tile *)need((size_t)b.count * sizeof *b.tiles);
     b.sheet = (signed char *)need(n);
     b.from = (float(*)[2])need(n * sizeof *b.from);
     for (int m = 0; m < b.maps; m++) {
-        const txm_sample sample = is_float >> m & 1 ? TXM_F32 : TXM_U8;
+        const txm_sample sample = types >> m & 1         ? TXM_F32
+                                  : types >> (m + 8) & 1 ? TXM_U16
+                                                         : TXM_U8;
         b.channels[m] = textiles_channels(set, m);
         b.texel[m] = (size_t)b.channels[m] * txm_sample_bytes(sample);
         b.bytes[m] = (uint8_t *)need(n * b.texel[m]);
@@ -238,11 +240,10 @@ static const uint8_t *pixel(const book *b, int m, size_t place) {
 }
 
 static double sample_of(const book *b, int m, size_t place, int c) {
-    const uint8_t *p = pixel(b, m, place);
-    float f;
-    if (!(b->is_float >> m & 1)) return p[c];
-    memcpy(&f, p + (size_t)c * sizeof f, sizeof f);
-    return (double)f;
+    const void *p = pixel(b, m, place);
+    if (b->types >> m & 1) return (double)((const float *)p)[c];
+    if (b->types >> (m + 8) & 1) return ((const uint16_t *)p)[c];
+    return ((const uint8_t *)p)[c];
 }
 
 static int same_source(const book *b, size_t p, size_t q) {
@@ -280,8 +281,8 @@ static uint64_t hash_of(const book *b) {
     return h;
 }
 
-static uint64_t hash_and_free(textiles_set *set, int is_float) {
-    book b = open_book(set, is_float);
+static uint64_t hash_and_free(textiles_set *set, int types) {
+    book b = open_book(set, types);
     const uint64_t h = hash_of(&b);
     close_book(&b);
     textiles_free(set);
@@ -1138,20 +1139,22 @@ static double smooth(double x, double y, int c) {
 static void test_triangle_values(void **state) {
     (void)state;
     const int n = 96, sizes[][2] = {{96, 96}};
-    txm_image maps[2] = {new_image(n, n, 3, TXM_F32), new_image(n, n, 2, TXM_U8)};
+    txm_image maps[3] = {new_image(n, n, 3, TXM_F32), new_image(n, n, 2, TXM_U8),
+                         new_image(n, n, 1, TXM_U16)};
     for (int i = 0; i < n * n; i++) {
+        ((uint16_t *)maps[2].pixels)[i] = (uint16_t)(65535 * smooth(i % n, i / n, 5) + 0.5);
         for (int c = 0; c < 3; c++)
             ((float *)maps[0].pixels)[3 * i + c] = (float)smooth(i % n, i / n, c);
         for (int c = 0; c < 2; c++)
             ((uint8_t *)maps[1].pixels)[2 * i + c] =
                 (uint8_t)(255 * smooth(i % n, i / n, c + 3) + 0.5);
     }
-    const textiles_exemplar exemplar = {maps, 2};
+    const textiles_exemplar exemplar = {maps, 3};
     textiles_desc d = desc_of(TEXTILES_TRIANGLE, &exemplar, 1, 33);
     d.reduced = 1;
     d.repair = TEXTILES_REPAIR_NONE;
     textiles_set *set = make(&d);
-    book b = open_book(set, 1);
+    book b = open_book(set, 1 | 4 << 8);
     check_sources(&b, sizes);
     check_set(&b, 1);
     int turned = 0, inner = 0;
@@ -1165,6 +1168,7 @@ static void test_triangle_values(void **state) {
                     assert_near(sample_of(&b, 0, p, c), smooth(u, v, c), 2e-4);
                 for (int c = 0; c < 2; c++)
                     assert_near(sample_of(&b, 1, p, c), 255 * smooth(u, v, c + 3), 1.5);
+                assert_near(sample_of(&b, 2, p, 0), 65535 * smooth(u, v, 5), 2e-4 * 65535);
                 inner++;
                 turned += x + y < b.side - 1 &&
                           fabs((double)(b.from[p + 1][0] - b.from[p][0]) - 1) > 0.1;
@@ -1174,11 +1178,50 @@ static void test_triangle_values(void **state) {
     assert_true(inner > b.count * 300 && turned > b.count * 20);
     close_book(&b);
     textiles_free(set);
-    free(maps[0].pixels);
-    free(maps[1].pixels);
+    for (int m = 0; m < 3; m++) free(maps[m].pixels);
 }
 
 /* ---- tests: exemplars of many sorts ------------------------------------------------------------ */
+
+/* 8 bits made 16: the same tiles. (Those of triangles are resampled, to 16 bits.) */
+static void test_sixteen_bits(void **state) {
+    (void)state;
+    enum { N = 96 };
+    txm_image maps[2] = {draw(BLOBS, N, N, 3, 64), new_image(N, N, 3, TXM_U16)};
+    for (int i = 0; i < N * N * 3; i++)
+        ((uint16_t *)maps[1].pixels)[i] = (uint16_t)(257 * ((const uint8_t *)maps[0].pixels)[i]);
+    for (int k = 0; k < KINDS; k++) {
+        if (k == TEXTILES_TRIANGLE) continue;
+        for (int repair = 1; repair <= 2; repair++) {
+            textiles_joints joints[2];
+            book b[2];
+            textiles_set *sets[2];
+            for (int i = 0; i < 2; i++) {
+                const textiles_exemplar exemplar = {&maps[i], 1};
+                textiles_desc d = desc_of((textiles_kind)k, &exemplar, 1, 34);
+                d.repair = (textiles_repair)repair;
+                d.reduced = k == TEXTILES_WANG;
+                sets[i] = make(&d);
+                b[i] = open_book(sets[i], i << 8);
+                joints[i] = measure(sets[i], 0);
+            }
+            for (size_t p = 0; p < place_of(b, b->count, 0, 0); p++) {
+                assert_true(b[0].sheet[p] == b[1].sheet[p]);
+                assert_memory_equal(b[0].from[p], b[1].from[p], sizeof b[0].from[p]);
+                for (int c = 0; c < 3; c++)
+                    assert_near(sample_of(&b[1], 0, p, c) / 257, sample_of(&b[0], 0, p, c),
+                                repair == TEXTILES_REPAIR_NONE ? 0 : 0.51);
+            }
+            assert_int_equal(joints[0].pairs, joints[1].pairs);
+            assert_near(joints[0].mean, joints[1].mean, repair == TEXTILES_REPAIR_NONE ? 1e-9 : 0.01);
+            for (int i = 0; i < 2; i++) {
+                close_book(&b[i]);
+                textiles_free(sets[i]);
+            }
+        }
+    }
+    for (int i = 0; i < 2; i++) free(maps[i].pixels);
+}
 
 /* Three exemplars; edges of a colour show the one they are told to. */
 static void test_several_exemplars(void **state) {
@@ -1578,7 +1621,7 @@ static void test_bad_arguments(void **state) {
         REFUSES_MAP(m, height, TEXTILES_MAX_PIXELS / 64 + 1, TXM_TOO_LARGE);
         REFUSES_MAP(m, channels, -1, TXM_BAD_ARGUMENT);
         REFUSES_MAP(m, channels, 5, TXM_BAD_ARGUMENT);
-        REFUSES_MAP(m, sample, (txm_sample)2, TXM_BAD_ARGUMENT);
+        REFUSES_MAP(m, sample, (txm_sample)3, TXM_BAD_ARGUMENT);
         REFUSES_MAP(m, stride, 5, TXM_BAD_ARGUMENT);
         REFUSES_MAP(m, stride, PTRDIFF_MAX, TXM_TOO_LARGE);
     }
@@ -1589,6 +1632,7 @@ static void test_bad_arguments(void **state) {
     REFUSES_MAP(2, channels, 4, TXM_BAD_ARGUMENT);
     REFUSES_MAP(3, channels, 2, TXM_BAD_ARGUMENT);
     REFUSES_MAP(3, sample, TXM_U8, TXM_BAD_ARGUMENT);
+    REFUSES_MAP(3, sample, TXM_U16, TXM_BAD_ARGUMENT);
     REFUSES_MAP(1, pixels, (char *)floats + 2, TXM_BAD_ARGUMENT);
 
     static const float bad[] = {(float)NAN, (float)INFINITY, -(float)INFINITY};
@@ -1688,17 +1732,20 @@ static void test_import_round_trip(void **state) {
         const int n = 35, side = n + (k == TEXTILES_TRIANGLE), count = counts[k];
         const size_t texels = (size_t)side * (size_t)side, row = (size_t)side * 2 + 3;
         uint8_t *bytes = (uint8_t *)need((size_t)count * texels * 3);
+        uint16_t *words = (uint16_t *)need((size_t)count * texels * sizeof *words);
         float *floats = (float *)need((size_t)count * row * (size_t)side * sizeof *floats);
-        txm_image *tiles = (txm_image *)need((size_t)count * 2 * sizeof *tiles);
+        txm_image *tiles = (txm_image *)need((size_t)count * 3 * sizeof *tiles);
         txm_rng rng = txm_rng_make(9, (uint64_t)k);
         for (size_t i = 0; i < (size_t)count * texels * 3; i++) bytes[i] = (uint8_t)txm_rng_next(&rng);
         for (size_t i = 0; i < (size_t)count * row * (size_t)side; i++)
             floats[i] = txm_rng_float(&rng) * 1e6f - 5e5f;
+        for (size_t i = 0; i < (size_t)count * texels; i++) words[i] = (uint16_t)txm_rng_next(&rng);
         for (int t = 0; t < count; t++) { /* the second map bottom-up, rows apart */
-            tiles[2 * t] = view(bytes + (size_t)t * texels * 3, side, side, 3, TXM_U8);
-            tiles[2 * t + 1] = view(floats + ((size_t)t * (size_t)side + (size_t)side - 1) * row, side,
+            tiles[3 * t] = view(bytes + (size_t)t * texels * 3, side, side, 3, TXM_U8);
+            tiles[3 * t + 1] = view(floats + ((size_t)t * (size_t)side + (size_t)side - 1) * row, side,
                                     side, 2, TXM_F32);
-            tiles[2 * t + 1].stride = -(ptrdiff_t)(row * sizeof(float));
+            tiles[3 * t + 1].stride = -(ptrdiff_t)(row * sizeof(float));
+            tiles[3 * t + 2] = view(words + (size_t)t * texels, side, side, 1, TXM_U16);
         }
         textiles_desc d = desc_of((textiles_kind)k, NULL, 77, n);
         d.variants = k == TEXTILES_CORNER ? 2 : 0;
@@ -1706,10 +1753,10 @@ static void test_import_round_trip(void **state) {
         textiles_set *set = NULL;
         tk_memory memory = {0};
         txm_env env = tk_env(&memory, NULL);
-        assert_int_equal(textiles_import(&d, tiles, count, 2, &env, &set), TXM_OK);
+        assert_int_equal(textiles_import(&d, tiles, count, 3, &env, &set), TXM_OK);
         memset(&env, 0xff, sizeof env); /* need not outlive the call */
-        book b = open_book(set, 2);
-        assert_int_equal(b.maps, 2);
+        book b = open_book(set, 2 | 4 << 8);
+        assert_int_equal(b.maps, 3);
         assert_int_equal(b.channels[0], 3);
         assert_int_equal(b.channels[1], 2);
         for (int t = 0; t < count; t++) {
@@ -1718,8 +1765,8 @@ static void test_import_round_trip(void **state) {
                     const size_t p = place_of(&b, t, x, y);
                     assert_int_equal(b.sheet[p], -1);
                     if (!is_inside(&b, x, y)) continue;
-                    for (int m = 0; m < 2; m++) {
-                        const char *from = (const char *)txm_image_row_const(&tiles[2 * t + m], y);
+                    for (int m = 0; m < 3; m++) {
+                        const char *from = (const char *)txm_image_row_const(&tiles[3 * t + m], y);
                         assert_memory_equal(pixel(&b, m, p), from + (size_t)x * b.texel[m], b.texel[m]);
                     }
                 }
@@ -1729,6 +1776,7 @@ static void test_import_round_trip(void **state) {
         textiles_free(set);
         assert_int_equal(tk_leaks(&memory), 0);
         free(bytes);
+        free(words);
         free(floats);
         free(tiles);
     }
@@ -1794,7 +1842,7 @@ static void test_import_refuses(void **state) {
             if (i == 1) tiles[t].width = 31;
             if (i == 2) tiles[t].height = 33;
             if (i == 3) tiles[t].channels = 2;
-            if (i == 4) tiles[t].sample = TXM_U8;
+            if (i == 4) tiles[t].sample = t ? TXM_U8 : TXM_U16;
             if (i == 5) tiles[t].stride = 31 * 4;
             if (i == 6) tiles[t].channels = 5;
             if (i == 7) *sample = (float)NAN;
@@ -1979,6 +2027,7 @@ int main(void) {
         cmocka_unit_test(test_repair),
         cmocka_unit_test(test_register),
         cmocka_unit_test(test_triangle_values),
+        cmocka_unit_test(test_sixteen_bits),
         cmocka_unit_test(test_several_exemplars),
         cmocka_unit_test(test_sizes),
         cmocka_unit_test(test_small_exemplars),

@@ -95,6 +95,14 @@ static textiles_set *import(const kind_of *k, int size) {
     return import_desc(&d, k->count);
 }
 
+/* a refusal, with a message */
+#define refused(call)                                                                              \
+    do {                                                                                           \
+        txm_env env = {0};                                                                         \
+        assert_int_equal(call, TXM_BAD_ARGUMENT);                                                  \
+        assert_true(strlen(env.message) > 10);                                                     \
+    } while (0)
+
 static txm_image picture(int width, int height, int channels, txm_sample sample) {
     txm_image im;
     memset(&im, 0, sizeof im);
@@ -711,6 +719,42 @@ static void test_plane_triangles(void **state) {
     }
 }
 
+/* Of 8 bits made 16 the plane shows what it shows of 8 bits, rounded more finely. */
+static void test_plane_of_sixteen_bits(void **state) {
+    (void)state;
+    enum { SIDE = 60 };
+    for (int i = 1; i < 9; i += 7) {
+        textiles_set *set = import(&kinds[i], N);
+        const textiles_plane plane = plane_of(set, 1);
+        const textiles_layout l = lay_out(set, TEXTILES_PACKED, 4);
+        txm_image bytes = atlas_of(set, &l, 1), words = picture(l.width, l.height, 4, TXM_U16);
+        txm_image out = picture(SIDE, SIDE, 4, TXM_U8), deep = picture(SIDE, SIDE, 4, TXM_U16);
+        for (size_t k = 0; k < bytes_of(&bytes); k++)
+            ((uint16_t *)words.pixels)[k] = (uint16_t)(257 * ((uint8_t *)bytes.pixels)[k]);
+        for (int step = 1; step <= 2; step++) {
+            const double x = -7 + 0.3 * (step - 1), s = step == 1 ? 1 : 0.37;
+            assert_int_equal(textiles_draw_plane(&plane, &l, &bytes, x, 5, s, NULL, out), TXM_OK);
+            assert_int_equal(textiles_draw_plane(&plane, &l, &words, x, 5, s, NULL, deep), TXM_OK);
+            int between = 0;
+            for (int k = 0; k < SIDE * SIDE * 4; k++) {
+                const int v = ((uint16_t *)deep.pixels)[k];
+                assert_near(v / 257.0, ((uint8_t *)out.pixels)[k], 0.51);
+                between += v % 257 != 0;
+            }
+            if (i == 1 && step == 1) assert_int_equal(between, 0); /* copied as they are */
+            else assert_true(between > SIDE * SIDE * 2);
+        }
+        refused(textiles_draw_plane(&plane, &l, &words, 0, 0, 1, &env, out));
+        refused(textiles_draw_plane(&plane, &l, &bytes, 0, 0, 1, &env, deep));
+        refused(textiles_draw_atlas(set, &l, 1, &env, words));
+        free(bytes.pixels);
+        free(words.pixels);
+        free(out.pixels);
+        free(deep.pixels);
+        textiles_free(set);
+    }
+}
+
 /* Views with strides, more channels and other hooks show the same. */
 static void test_same_bytes(void **state) {
     (void)state;
@@ -751,14 +795,6 @@ static void test_same_bytes(void **state) {
 }
 
 /* ---- bad input ---------------------------------------------------------------------------- */
-
-/* a refusal, with a message */
-#define refused(call)                                                                              \
-    do {                                                                                           \
-        txm_env env = {0};                                                                         \
-        assert_int_equal(call, TXM_BAD_ARGUMENT);                                                  \
-        assert_true(strlen(env.message) > 10);                                                     \
-    } while (0)
 
 static void test_bad_layouts(void **state) {
     (void)state;
@@ -919,6 +955,7 @@ int main(void) {
         cmocka_unit_test(test_uv),              cmocka_unit_test(test_plane_copies),
         cmocka_unit_test(test_plane_filters),   cmocka_unit_test(test_plane_borders),
         cmocka_unit_test(test_plane_triangles),
+        cmocka_unit_test(test_plane_of_sixteen_bits),
         cmocka_unit_test(test_same_bytes),      cmocka_unit_test(test_bad_layouts),
         cmocka_unit_test(test_too_large),       cmocka_unit_test(test_bad_pictures),
     };

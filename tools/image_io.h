@@ -1,9 +1,9 @@
 /* image_io.h - image files in and out, through stb_image and stb_image_write
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Reads PNG, JPEG, BMP, TGA and binary PNM with 1, 3 or 4 channels of 8 bits; gray with alpha
-   becomes RGBA, 16 bits become 8. Writes PNG, TGA, BMP and JPEG. Where a function fails, *why is
-   set to an English phrase that fits behind "cannot read 'x.png': ".                            */
+   Reads PNG, JPEG, BMP, TGA and binary PNM with 1, 3 or 4 channels; gray with alpha becomes RGBA,
+   16 bits become 8 unless a function says otherwise. Writes PNG, TGA, BMP and JPEG. Where a
+   function fails, *why is set to an English phrase that fits behind "cannot read 'x.png': ".    */
 #ifndef IMAGE_IO_H
 #define IMAGE_IO_H
 
@@ -26,13 +26,19 @@ int image_decode(const unsigned char *bytes, size_t size, int channels, txm_imag
 /* The same from a path. */
 int image_read(const char *path, int channels, txm_image *image, const char **why);
 
+/* Both keeping the depth: TXM_U16 if the file has 16 bits a sample, TXM_U8 otherwise. */
+int image_decode_deep(const unsigned char *bytes, size_t size, int channels, txm_image *image,
+                      const char **why);
+int image_read_deep(const char *path, int channels, txm_image *image, const char **why);
+
 void image_free(txm_image *image);
 
 /* Can a path that ends in this extension (".png") take a width x height picture with so many
    channels? 0 for one or all of them: not known yet. */
 int image_can_write(const char *extension, int width, int height, int channels, const char **why);
 
-/* Encode for that extension into a block for free(). 1 if all went well. */
+/* Encode for that extension into a block for free(). Samples are TXM_U8, for ".png" also TXM_U16,
+   which makes a PNG of 16 bits. 1 if all went well. */
 int image_encode(const char *extension, const txm_image *image, unsigned char **bytes, size_t *size,
                  const char **why);
 

@@ -44,13 +44,17 @@ static int mips_make(mips *m, const txm_image *texture) {
     txm_env env = {0};
     for (int i = 0; i < 256; i++) linear[i] = txm_srgb_to_linear((float)i / 255.0f);
     const txm_image from = txm_image_resolve(*texture);
-    if (from.sample != TXM_U8 || !add_level(m, from.width, from.height)) return 0;
+    if (from.sample == TXM_F32 || !add_level(m, from.width, from.height)) return 0;
     const int n = from.channels;
     for (int y = 0; y < from.height; y++) {
         const unsigned char *row = (const unsigned char *)txm_image_row_const(&from, y);
         float *to = (float *)m->levels[0].pixels + 3 * (size_t)y * (size_t)from.width;
         for (int x = 0; x < from.width; x++) {
-            for (int k = 0; k < 3; k++) *to++ = linear[row[x * n + (n < 3 ? 0 : k)]];
+            for (int k = 0; k < 3; k++) {
+                const int c = n < 3 ? 0 : k;
+                *to++ = from.sample == TXM_U8 ? linear[row[x * n + c]]
+                                              : txm_srgb_to_linear(txm_image_get(&from, x, y, c));
+            }
         }
     }
     while (m->count < MAX_LEVELS) {

@@ -12,4 +12,8 @@
 #include <stb/stb_image.h>
 #include <stb/stb_image_write.h>
 
+/* public, but declared nowhere */
+STBIWDEF unsigned char *stbi_zlib_compress(unsigned char *data, int data_len, int *out_len,
+                                           int quality);
+
 #endif /* STB_CONFIG_H */
