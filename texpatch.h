@@ -1,0 +1,5527 @@
+#ifndef TEXPATCH_H
+#define TEXPATCH_H
+
+#include "texmath.h"
+
+#define TEXPATCH_VERSION "0.1.0"
+
+#ifndef TEXPATCH_MAX_PIXELS
+#define TEXPATCH_MAX_PIXELS (1 << 28) /* larger exemplars and outputs are refused */
+#endif
+
+#if defined(TEXPATCH_STATIC) && defined(__GNUC__)
+#define TEXPATCH_API __attribute__((unused)) static
+#elif defined(TEXPATCH_STATIC)
+#define TEXPATCH_API static
+#else
+#define TEXPATCH_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- what to synthesise ------------------------------------------------------------------ */
+
+enum {
+    TEXPATCH_MAX_MAPS = 16,     /* pictures in register: albedo, normal, roughness, ...      */
+    TEXPATCH_MAX_EXEMPLARS = 8,
+    TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
+    TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
+    TEXPATCH_MAX_SIDE = 8192    /* of an exemplar; their heights together (with turns: the
+                                   larger sides, times turns) may be 32767                   */
+};
+
+/* How one of the maps is treated; all zero: a picture that follows the others. */
+typedef struct texpatch_map {
+    float weight;  /* 0..16: how much a difference in this map counts when pieces are matched;
+                      0 = it follows the others                                              */
+    int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
+                      as vectors, kept at unit length, turned with the piece. x to the right,
+                      y up (OpenGL); 2 = y down (DirectX)                                     */
+    int is_label;  /* values are names, not amounts: never blended or interpolated           */
+    int is_data;   /* amounts (height, roughness), not colours: averaged as they are         */
+} texpatch_map;
+
+/* One exemplar: a photograph, or several maps of one material in register. */
+typedef struct texpatch_exemplar {
+    const txm_image *maps; /* map_count pictures of one size; every exemplar has the same maps:
+                              channels and sample type                                       */
+    txm_image guide;       /* its guide, the size of the maps, 1..4 channels; pixels NULL: none */
+    txm_image mask;        /* TXM_U8, 1 channel: 0 = never use this pixel; pixels NULL: use all */
+} texpatch_exemplar;
+
+enum { TEXPATCH_TILE_X = 1, TEXPATCH_TILE_Y = 2 }; /* for texpatch_desc.tileable               */
+
+/* What to make. All zero but exemplars, their count, map_count and the size is a good default. */
+typedef struct texpatch_desc {
+    const texpatch_exemplar *exemplars; /* not modified; must live as long as the job draws     */
+    int exemplar_count;                 /* 1..TEXPATCH_MAX_EXEMPLARS                             */
+    int map_count;                      /* 1..TEXPATCH_MAX_MAPS                                  */
+    const texpatch_map *maps; /* map_count of them; NULL = only the first has weight, 1          */
+    int width, height;        /* of the output, in pixels, 1 or more                             */
+    int tileable;             /* TEXPATCH_TILE_X | TEXPATCH_TILE_Y: opposite sides fit            */
+    int patch;  /* side N of the patches of the first pass, in pixels of the output, which are laid
+                   N / 2 apart; 0 = what suits the exemplar                                      */
+    int passes; /* optimisation passes for each size of neighbourhood, 1..16; 0 = 3 (2 at full
+                   size); -1 = none: patches, cuts and blending alone, four times as fast        */
+    int turns;  /* 1, 2 or 4: pieces may be turned by half or quarter turns; 0 = 1               */
+    int mirror; /* pieces may be mirrored left to right                                          */
+    float novelty; /* 0..1: how strongly to avoid long verbatim pieces of the exemplar           */
+    int lattice;   /* 0 = find out whether the exemplar has a lattice and keep it; 1 = it has this
+                      one; -1 = treat it as having none                                          */
+    float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
+    txm_image guide;    /* what the exemplars' guides should look like here: width x height,
+                           channels and sample of theirs; pixels NULL: none                      */
+    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide says nothing here;
+                           pixels NULL: it counts everywhere                                     */
+    float guide_weight; /* 0..16: of a difference in the guide against one in a map of weight 1;
+                           0 = 2                                                                 */
+    const txm_image *kept; /* map_count pictures of width x height to be kept where keep is
+                           non-zero; NULL: none. They need not come from the exemplar            */
+    txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
+    uint64_t seed;         /* another seed, another texture                                      */
+} texpatch_desc;
+
+/* Make a texture in one call.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    map_count pictures of desc->width x desc->height, channels and sample of the maps;
+          untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps or guides that do not go
+          together or samples that are not finite; TXM_TOO_SMALL for an exemplar under
+          TEXPATCH_MIN_SIDE, or whose mask leaves no piece; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   see TIME and MEMORY                                                                 */
+TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
+                                      const txm_image *out);
+
+/* ---- step by step ------------------------------------------------------------------------ */
+
+/* A texture in the making. It keeps a copy of the allocator, not of the exemplars' pictures. */
+typedef struct texpatch_job texpatch_job;
+
+/* Prepare a job: pyramids, lattice. The same statuses as texpatch_make. */
+TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
+                                       texpatch_job **out);
+
+/* One step of the work, coarse first: at 512 x 512 some 5 to 60 ms. After an error (cancelling
+   included) the job is as before the step and the step may be tried again.
+   more   receives 0 once nothing is left to do; NULL is allowed                              */
+TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
+
+/* 0..1: how much of the work is done; 1 when texpatch_step has nothing left */
+TEXPATCH_API float texpatch_done(const texpatch_job *job);
+
+/* Draw a map as it is now. Possible after any step but no step at all: before the first,
+   TXM_BAD_ARGUMENT. A window of the output may be drawn: out's top left pixel is pixel (x, y) of
+   it, and all of out must lie inside. */
+TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
+                                      txm_image out);
+
+/* Where a pixel of the output comes from. Anything that lies in register with the exemplars can be
+   looked up later through it. */
+typedef struct texpatch_source {
+    float x, y;    /* pixel of the exemplar, as it is given (turns undone); fractions lie between
+                      pixel centres, which are whole numbers                                    */
+    int exemplar;  /* -1: the pixel was kept                                                    */
+    int turn;      /* quarter turns counter-clockwise that the piece has made, 0..3; + 4: it is
+                      mirrored (before turning)                                                 */
+} texpatch_source;
+TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
+
+/* Make a part anew: where again is non-zero (TXM_U8, 1 channel, the size of the output), after
+   all steps are done (else they are done first). What lies outside is kept and joined to. The
+   following steps do the work, in time proportional to the part's bounding box.
+   guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = as it was */
+TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
+                                       const txm_image *guide, const txm_image *guide_mask,
+                                       uint64_t seed, txm_env *env);
+
+/* Release a job; NULL is allowed. */
+TEXPATCH_API void texpatch_free(texpatch_job *job);
+
+/* The lattice that a job keeps: x, y of both steps in pixels of the exemplar; 0: it has none. */
+TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
+
+/* ---- levels of detail -------------------------------------------------------------------- */
+
+/* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
+   pixels, in linear light for 8- and 16-bit colours that are not data, normals renormalised, labels
+   picked. So all
+   levels agree with each other and with what a renderer makes of level 0.                    */
+TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
+                                      txm_env *env, const txm_image *half);
+
+/* ---- the unbounded plane ----------------------------------------------------------------- */
+
+/* Any window of an endless texture that has no period. Windows that overlap agree to the byte,
+   whoever makes them, so a large picture can be made tile by tile, on many machines.
+
+   The plane is cut into square cells. Pieces at the cells' corners are made first, from the seed
+   and their place alone; then what lies along the edges between two of them; then the insides. */
+typedef struct texpatch_plane texpatch_plane;
+
+/* desc as for a job; width, height, tileable, guide and kept are not looked at. */
+TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
+                                            texpatch_plane **out);
+
+/* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
+   map_count pictures of one size. sources may be NULL, or width * height of them.
+   cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
+          that are multiples of cells waste least                                             */
+TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
+                                            txm_env *env, const txm_image *out,
+                                            texpatch_source *sources);
+TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane);
+TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
+
+/* ---- layered edges ----------------------------------------------------------------------- */
+
+enum { TEXPATCH_MAX_LEVELS = 16 };
+
+/* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
+   value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1). */
+typedef struct texpatch_polyline {
+    int layer;        /* 0..levels-1: this is a boundary of that layer                        */
+    int is_hole;      /* the layer lies outside it                                            */
+    size_t first;     /* its points are points[first .. first + count - 1], closed: the last is
+                         joined to the first                                                  */
+    size_t count;
+} texpatch_polyline;
+
+/* Found lines run along the cracks between pixels, a point at each pixel corner that they pass.
+   The layer lies to the right of the way (outer boundaries run clockwise as seen, holes the other
+   way), and what lies beyond the picture belongs to no layer. Each side of each crack between two
+   layers is part of exactly one line. Pixels that touch at a corner only do not belong together:
+   where a layer meets itself so, its line turns right, around the pixel that it came along. So
+   lines may touch at a corner but never cross, neither themselves nor others.
+
+         +---+              lines are in raster order of their first points: the top left corner
+         | k |              of the topmost (then leftmost) pixel of an outer boundary
+     +---+---+  the two pixels of layer k have a line each; the two
+     | k |      others too, whether of one layer or not
+     +---+                                                                                    */
+typedef struct texpatch_edges {
+    int levels, width, height;
+    float thresholds[TEXPATCH_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
+    int beside[TEXPATCH_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
+                                        none, it has no boundary but the picture's              */
+    texpatch_polyline *lines;
+    size_t line_count;
+    txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
+                         top left pixel                                                        */
+    size_t point_count;
+    txm_arena memory; /* belongs to the header                                                 */
+} texpatch_edges;
+
+/* What to find. All zero but the image is a good default. */
+typedef struct texpatch_edges_desc {
+    txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
+                        samples as they are, cut off at 0 and 1; alpha is not looked at        */
+    int levels;      /* 2..TEXPATCH_MAX_LEVELS; 0 = 4, as the paper has it                     */
+    float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
+                        1 to 3                                                                 */
+    int least;       /* regions whose boundary (holes and the picture's border included) is shorter
+                        than so many pixels go to the surrounding layer that they share most of
+                        it with, the shortest first; 0 = all are kept                          */
+    const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers have
+                        about the same area, at the emptiest gray near there                   */
+} texpatch_edges_desc;
+
+/* Find the boundaries of all layers.
+
+   env    NULL, or how to allocate, report and cancel
+   out    receives them; release it with texpatch_edges_free. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
+          TXM_TOO_LARGE above TEXPATCH_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   O(pixels (1 + smooth + log least)) time, about 0.2 us a pixel; 13 bytes a pixel while it
+          works (9 without least, 5 without both), and the result: 8 bytes for each point, of which
+          there are up to four a pixel, and 24 for each line                                   */
+TEXPATCH_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+                                            texpatch_edges *out);
+
+/* Release edges, which are all zero then; NULL and all zero are allowed. Of several copies of the
+   struct only one may be released. */
+TEXPATCH_API void texpatch_edges_free(texpatch_edges *edges);
+
+/* The layer of each pixel of a picture, by the thresholds of edges, as a gray value: layer k is
+   255 k / (levels - 1), rounded. It serves as the guide of an exemplar (see control edges).
+
+   desc   image, smooth and least are looked at; with those that edges were found with, the layers
+          change exactly where its lines run
+   layers TXM_U8, 1 channel, the size of the picture; untouched after an error
+   return as texpatch_edges_find
+   cost   as texpatch_edges_find; 13 bytes a pixel                                             */
+TEXPATCH_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
+                                        const texpatch_edges *edges, txm_env *env,
+                                        const txm_image *layers);
+
+/* Draw boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
+   wide, on the layer's own side; colours run from dark to light with the layers, in one channel the
+   gray. What lies outside of the picture is not drawn.
+   cost   a byte for each pixel; O(pixels + length of the lines) time                           */
+TEXPATCH_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+                                            const txm_image *image);
+
+/* ---- control edges ----------------------------------------------------------------------- */
+
+/* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. Where it is closed,
+   its inside becomes the layer; an open one becomes a band of the layer, as wide as width says,
+   with round ends. */
+typedef struct texpatch_stroke {
+    const txm_vec2 *points; /* count of them, 2 or more (closed: 3), not all the same, in pixels of
+                               the output; they may lie outside it, up to 2^20                  */
+    int count;
+    int is_closed;
+    int layer;   /* 0..levels-1: what lies within                                               */
+    float width; /* of an open stroke, pixels, 2..256; 0 = 8                                    */
+} texpatch_stroke;
+
+typedef struct texpatch_control {
+    const texpatch_edges *edges; /* of the exemplar, from texpatch_edges_find                   */
+    const texpatch_stroke *strokes;
+    int stroke_count;  /* 0 or more                                                             */
+    int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but next
+                          to a stroke not the stroke's own layer                                */
+    float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
+                          -1 = none                                                             */
+    uint64_t seed;     /* another seed, another unrest                                          */
+} texpatch_control;
+
+/* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the
+   way in which those stray from their own smooth course are strung together along the stroke.
+
+   out    receives one closed line for each stroke, in their order (of an open stroke: around its
+          band), inside to the right; levels, thresholds and beside are the exemplar's, width and
+          height those given. Release it with texpatch_edges_free; untouched after an error.
+          A line strays from its stroke (the edge of its band) by 4 pixels at most; less from short
+          strokes and narrow bands, by 1/16 of the length and 7/16 of the width. Where the stroke
+          turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
+          cross itself. Of a layer without edges of 64 pixels in the exemplar, and with disturb = -1,
+          it is the stroke itself
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
+          edges that texpatch_edges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
+          pixels; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(edges + length of the strokes) time, about 1 us for each pixel of either; 200 bytes for
+          each pixel of the longest stroke (its band's outline), 30 for each of all, 100 for each of
+          the edges of a layer                                                                 */
+TEXPATCH_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
+                                         txm_env *env, texpatch_edges *out);
+
+/* The guide that makes a job follow the strokes, for texpatch_desc.guide and .guide_mask; the
+   exemplars' counterpart is texpatch_layers's picture.
+
+   disturbed  what texpatch_disturb made of the same control
+   guide  TXM_U8, 1 channel, the size given to texpatch_disturb: the gray of the layer. Pixels whose
+          centre lies inside a line (winding number not 0; of a centre on the line, that to its
+          right or below is inside) have the stroke's layer, the last stroke on top. With
+          background = -1, up to 8 pixels outside of the strokes it is the layer that the nearest
+          stroke's layer mostly borders on in the exemplar
+   mask   the same format: 0 where the strokes say nothing (with background = -1, farther than 8
+          pixels outside of all strokes), else 255
+   return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED. After an error
+          guide and mask are untouched
+   cost   O(pixels + area and height of the strokes) time, about 50 ns a pixel; 3 bytes a pixel and
+          24 for each row that a stroke's line crosses                                           */
+TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
+                                               const texpatch_edges *disturbed, txm_env *env,
+                                               const txm_image *guide, const txm_image *mask);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TEXPATCH_H */
+
+#ifdef TEXPATCH_IMPLEMENTATION
+
+#if defined(__SSE2__) && !defined(TEXPATCH_NO_SIMD)
+#include <emmintrin.h>
+#endif
+
+/* ---- constants and private types --------------------------------------------------------- */
+
+#if defined(__SSE2__) && !defined(TEXPATCH_NO_SIMD)
+#define TXP_SSE2 1
+#endif
+
+enum {
+    TXP_MAX_LEVELS = 8,
+    TXP_COARSE = 96,      /* pixels: the pyramid ends once the smaller side is under this        */
+    TXP_MARGIN = 8,       /* pixels of canvas beyond the output, cut off at the end              */
+    TXP_BLOCK = 24,       /* pixels: patch of the first pass, at the coarsest level              */
+    TXP_SMALL_BLOCK = 12, /* the same for exemplars without long order                           */
+    TXP_WINDOW = 16,      /* pixels: the larger neighbourhood of the optimisation                */
+    TXP_PAD = 32,         /* columns and rows of a torus that are repeated behind its end        */
+    TXP_STARTS = 6,       /* first passes tried on a small canvas                                */
+    TXP_CELL = 8,         /* pixels a side of a cell of the exemplar in which use is counted     */
+    TXP_LANES = 8,        /* bands worked on at the same time, whatever the number of threads    */
+    TXP_BAND = 32,        /* rows of a band                                                      */
+    TXP_MAX_SHEETS = TEXPATCH_MAX_EXEMPLARS * 8
+};
+
+/* A pixel of the stack of sheets; x = -1: none, the canvas pixel is the caller's. */
+typedef struct txp_place {
+    int16_t x, y;
+} txp_place;
+
+/* One exemplar in one orientation: rows first .. first + height - 1 of the stack. What it shows at
+   (x, y) is the exemplar at (xx x + xy y + x0, yx x + yy y + y0). */
+typedef struct txp_sheet {
+    int exemplar, turn;
+    int width, height;
+    double xx, xy, x0, yx, yy, y0;
+    int plain; /* the map above is that of turn alone: whole pixels onto whole pixels           */
+} txp_sheet;
+
+/* The stack at one resolution: the bytes that are compared, bytes of them per pixel. */
+typedef struct txp_stack {
+    int width, height;
+    size_t pitch;       /* bytes from row to row                                               */
+    uint8_t *pixels;
+    int first[TXP_MAX_SHEETS], wide[TXP_MAX_SHEETS], high[TXP_MAX_SHEETS];
+    uint8_t *sheet;     /* of each row                                                         */
+    uint32_t *bad;      /* (width + 1) x (height + 1) sums of unusable pixels; NULL: none       */
+    double lattice[4];  /* steps in pixels of this level                                       */
+    double inverse[4];  /* lattice coordinates of (x, y): i0 x + i1 y, i2 x + i3 y              */
+} txp_stack;
+
+/* What all jobs on the same exemplars share. */
+typedef struct txp_source {
+    int sheets, levels, bytes, guide_at, guide_bytes;
+    int has_lattice, is_random; /* is_random: no long order at all                              */
+    txp_sheet sheet[TXP_MAX_SHEETS];
+    txp_stack stack[TXP_MAX_LEVELS];
+} txp_source;
+
+/* The picture in the making at one resolution. pixels has a copy of the first columns and rows
+   behind the end of an axis that wraps. */
+typedef struct txp_canvas {
+    int width, height, wrap; /* wrap: bits as in texpatch_desc.tileable                        */
+    size_t pitch;
+    uint8_t *pixels;
+    txp_place *at;
+    uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
+    uint8_t *free_guide; /* 1 = the guide says nothing here; NULL: it always does, or is none  */
+} txp_canvas;
+
+/* ---- sums of absolute differences -------------------------------------------------------- */
+
+/* Sum of |a - b| over rows of bytes, bytes a multiple of 4; once it exceeds limit, anything above
+   limit may be returned. */
+#ifdef TXP_SSE2
+static inline uint32_t txp_sad_sum(__m128i sum) {
+    return (uint32_t)_mm_cvtsi128_si32(sum) +
+           (uint32_t)_mm_cvtsi128_si32(_mm_srli_si128(sum, 8));
+}
+
+static inline __m128i txp_sad16(const uint8_t *a, const uint8_t *b) {
+    return _mm_sad_epu8(_mm_loadu_si128((const __m128i *)(const void *)a),
+                        _mm_loadu_si128((const __m128i *)(const void *)b));
+}
+
+static inline __m128i txp_sad4(const uint8_t *a, const uint8_t *b) {
+    int32_t u, v;
+    memcpy(&u, a, 4);
+    memcpy(&v, b, 4);
+    return _mm_sad_epu8(_mm_cvtsi32_si128(u), _mm_cvtsi32_si128(v));
+}
+
+/* words: 16-byte pieces of a row, tails: 4-byte pieces behind them; constants where it is called */
+static inline uint32_t txp_sad_fixed(const uint8_t *a, size_t a_pitch, const uint8_t *b,
+                                     size_t b_pitch, int words, int tails, int rows,
+                                     uint32_t limit) {
+    uint32_t total = 0;
+    for (int y = 0; y < rows;) {
+        __m128i sum = _mm_setzero_si128();
+        const int stop = y + 4 < rows ? y + 4 : rows;
+        for (; y < stop; y++, a += a_pitch, b += b_pitch) {
+            for (int i = 0; i < words; i++)
+                sum = _mm_add_epi32(sum, txp_sad16(a + 16 * i, b + 16 * i));
+            for (int i = 0; i < tails; i++)
+                sum = _mm_add_epi32(sum, txp_sad4(a + 16 * words + 4 * i, b + 16 * words + 4 * i));
+        }
+        total += txp_sad_sum(sum);
+        if (total > limit) break;
+    }
+    return total;
+}
+
+static uint32_t txp_sad(const uint8_t *a, size_t a_pitch, const uint8_t *b, size_t b_pitch,
+                        int bytes, int rows, uint32_t limit) {
+    switch (bytes) { /* unrolled for RGB */
+    case 64: return txp_sad_fixed(a, a_pitch, b, b_pitch, 4, 0, rows, limit);
+    case 32: return txp_sad_fixed(a, a_pitch, b, b_pitch, 2, 0, rows, limit);
+    case 20: return txp_sad_fixed(a, a_pitch, b, b_pitch, 1, 1, rows, limit);
+    default:
+        return txp_sad_fixed(a, a_pitch, b, b_pitch, bytes / 16, bytes % 16 / 4, rows, limit);
+    }
+}
+#else
+static uint32_t txp_sad(const uint8_t *a, size_t a_pitch, const uint8_t *b, size_t b_pitch,
+                        int bytes, int rows, uint32_t limit) {
+    uint32_t total = 0;
+    for (int y = 0; y < rows && total <= limit; y++, a += a_pitch, b += b_pitch) {
+        for (int i = 0; i < bytes; i++) total += (uint32_t)(a[i] > b[i] ? a[i] - b[i] : b[i] - a[i]);
+    }
+    return total;
+}
+#endif
+
+/* ---- the canvas -------------------------------------------------------------------------- */
+
+static inline const uint8_t *txp_stack_at(const txp_source *s, const txp_stack *k, int x, int y) {
+    return k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes;
+}
+
+static inline uint8_t *txp_canvas_at(const txp_source *s, const txp_canvas *c, int x, int y) {
+    return c->pixels + (size_t)y * c->pitch + (size_t)x * (size_t)s->bytes;
+}
+
+static inline size_t txp_index(const txp_canvas *c, int x, int y) {
+    return (size_t)y * (size_t)c->width + (size_t)x;
+}
+
+/* x in 0..n-1 for x in 0..2n-1 and beyond */
+static inline int txp_wrap(int x, int n) {
+    return x < n ? x : x % n;
+}
+
+/* Does a piece of wide x high pixels at (x, y) lie inside one sheet, on usable pixels? */
+static inline int txp_fits(const txp_source *s, const txp_stack *k, int x, int y, int wide,
+                           int high) {
+    if (x < 0 || y < 0 || y >= k->height) return 0;
+    const int n = s->sheets > 1 ? k->sheet[y] : 0;
+    if (x + wide > k->wide[n] || y + high > k->first[n] + k->high[n]) return 0;
+    if (k->bad) {
+        const size_t w = (size_t)k->width + 1, top = (size_t)y * w, low = (size_t)(y + high) * w;
+        const size_t l = (size_t)x, r = (size_t)(x + wide);
+        if (k->bad[low + r] - k->bad[low + l] - k->bad[top + r] + k->bad[top + l]) return 0;
+    }
+    return 1;
+}
+
+/* Copy the compared bytes of the places into the canvas, rows from..to-1; what is fixed keeps its
+   own, and so does the guide where it binds. */
+static void txp_canvas_show(const txp_source *s, const txp_stack *k, const txp_canvas *c, int from,
+                            int to) {
+    const size_t n = (size_t)s->bytes, guide = (size_t)s->guide_at;
+    for (int y = from; y < to; y++) {
+        uint8_t *out = txp_canvas_at(s, c, 0, y);
+        const size_t row = txp_index(c, 0, y);
+        for (int x = 0; x < c->width; x++, out += n) {
+            const txp_place at = c->at[row + (size_t)x];
+            if (at.x < 0 || (c->fixed && c->fixed[row + (size_t)x])) continue;
+            const uint8_t *in = txp_stack_at(s, k, at.x, at.y);
+            if (n == 4 && guide == 4) memcpy(out, in, 4);
+            else memcpy(out, in, c->free_guide && c->free_guide[row + (size_t)x] ? n : guide);
+        }
+    }
+}
+
+/* Repeat the first columns and rows behind the ends of the axes that wrap. */
+static void txp_canvas_close(const txp_source *s, const txp_canvas *c, uint8_t *pixels) {
+    const size_t n = (size_t)s->bytes;
+    if (c->wrap & TEXPATCH_TILE_X) {
+        for (int y = 0; y < c->height; y++) {
+            uint8_t *row = pixels + (size_t)y * c->pitch;
+            for (int x = 0; x < TXP_PAD; x++)
+                memcpy(row + (size_t)(c->width + x) * n, row + (size_t)x * n, n);
+        }
+    }
+    if (c->wrap & TEXPATCH_TILE_Y) {
+        for (int y = 0; y < TXP_PAD; y++)
+            memcpy(pixels + (size_t)(c->height + y) * c->pitch, pixels + (size_t)y * c->pitch,
+                   c->pitch);
+    }
+}
+
+/* ---- the lattice ------------------------------------------------------------------------- */
+
+/* Squared distance in pixels of the offset (x, y) from the nearest point of the lattice. */
+static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
+    double u = k->inverse[0] * x + k->inverse[1] * y, v = k->inverse[2] * x + k->inverse[3] * y;
+    u -= floor(u + 0.5);
+    v -= floor(v + 0.5);
+    const double dx = k->lattice[0] * u + k->lattice[2] * v;
+    const double dy = k->lattice[1] * u + k->lattice[3] * v;
+    return dx * dx + dy * dy;
+}
+
+/* ---- lattice: does the exemplar repeat itself? ------------------------------------------- */
+
+enum { TXP_PEAKS = 40 };
+
+/* The correlation of a picture with itself over all lags 0 <= dy <= reach, |dx| <= reach. */
+typedef struct txp_correlation {
+    const int16_t *gray; /* -128..127 */
+    int width, height, reach_x, reach_y;
+    float *at; /* (2 reach_x + 1) x (reach_y + 1) */
+} txp_correlation;
+
+static inline double txp_correlated(const txp_correlation *k, int dx, int dy) {
+    if (dy < 0) {
+        dx = -dx;
+        dy = -dy;
+    }
+    if (dx < -k->reach_x || dx > k->reach_x || dy > k->reach_y) return -2;
+    return k->at[dy * (2 * k->reach_x + 1) + dx + k->reach_x];
+}
+
+/* One row of lags: normalised over the pixels that overlap. Sums are exact, in any order. */
+static void txp_correlate_row(void *context, int dy) {
+    const txp_correlation *k = (const txp_correlation *)context;
+    for (int dx = -k->reach_x; dx <= k->reach_x; dx++) {
+        const int x0 = dx < 0 ? -dx : 0, x1 = dx > 0 ? k->width - dx : k->width;
+        const double n = (double)(x1 - x0) * (k->height - dy);
+        int64_t a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+        for (int y = 0; y + dy < k->height; y++) {
+            const int16_t *u = k->gray + (ptrdiff_t)y * k->width;
+            const int16_t *v = u + (ptrdiff_t)dy * k->width + dx;
+            int32_t ra = 0, rb = 0, raa = 0, rbb = 0, rab = 0;
+            for (int x = x0; x < x1; x++) {
+                ra += u[x];
+                rb += v[x];
+                raa += u[x] * u[x];
+                rbb += v[x] * v[x];
+                rab += u[x] * v[x];
+            }
+            a += ra;
+            b += rb;
+            aa += raa;
+            bb += rbb;
+            ab += rab;
+        }
+        const double va = (double)aa - (double)a * (double)a / n;
+        const double vb = (double)bb - (double)b * (double)b / n;
+        const double cov = (double)ab - (double)a * (double)b / n;
+        k->at[dy * (2 * k->reach_x + 1) + dx + k->reach_x] =
+            va > 0 && vb > 0 ? txm_float(cov / sqrt(va * vb)) : 0;
+    }
+}
+
+/* mean correlation at the points of the lattice (a, b) within reach, each the best of 3 x 3 lags */
+static double txp_lattice_score(const txp_correlation *k, const double a[2], const double b[2]) {
+    double sum = 0;
+    int count = 0;
+    for (int i = -8; i <= 8; i++) {
+        for (int j = -8; j <= 8; j++) {
+            const int x = (int)floor(i * a[0] + j * b[0] + 0.5);
+            const int y = (int)floor(i * a[1] + j * b[1] + 0.5);
+            if (y < 0 || (y == 0 && x <= 0) || y > k->reach_y || x < -k->reach_x || x > k->reach_x)
+                continue;
+            double best = -2;
+            for (int d = 0; d < 9; d++)
+                best = fmax(best, txp_correlated(k, x + d % 3 - 1, y + d / 3 - 1));
+            sum += best;
+            count++;
+        }
+    }
+    return count ? sum / count : 0;
+}
+
+/* The highest place of the correlation near (x, y), between lags by parabolas. */
+static void txp_refine_peak(const txp_correlation *k, double p[2]) {
+    int x = (int)floor(p[0] + 0.5), y = (int)floor(p[1] + 0.5), bx = x, by = y;
+    for (int d = 0; d < 9; d++) {
+        const int u = x + d % 3 - 1, v = y + d / 3 - 1;
+        if (txp_correlated(k, u, v) > txp_correlated(k, bx, by)) {
+            bx = u;
+            by = v;
+        }
+    }
+    const double c = txp_correlated(k, bx, by);
+    const double l = txp_correlated(k, bx - 1, by), r = txp_correlated(k, bx + 1, by);
+    const double t = txp_correlated(k, bx, by - 1), d = txp_correlated(k, bx, by + 1);
+    p[0] = bx;
+    p[1] = by;
+    if (l > -2 && r > -2 && l + r < 2 * c) p[0] += 0.5 * (l - r) / (l + r - 2 * c);
+    if (t > -2 && d > -2 && t + d < 2 * c) p[1] += 0.5 * (t - d) / (t + d - 2 * c);
+}
+
+/* The shortest basis of the same lattice (Gauss). */
+static void txp_reduce_basis(double a[2], double b[2]) {
+    for (int i = 0; i < 100; i++) {
+        const double aa = a[0] * a[0] + a[1] * a[1], bb = b[0] * b[0] + b[1] * b[1];
+        if (bb < aa) {
+            for (int c = 0; c < 2; c++) {
+                const double t = a[c];
+                a[c] = b[c];
+                b[c] = t;
+            }
+            continue;
+        }
+        const double m = floor((a[0] * b[0] + a[1] * b[1]) / aa + 0.5);
+        if (m > -0.5 && m < 0.5) return;
+        b[0] -= m * a[0];
+        b[1] -= m * a[1];
+    }
+}
+
+static double txp_det(const double *a, const double *b) {
+    return a[0] * b[1] - a[1] * b[0];
+}
+
+/* Find the lattice in a correlation. 1: there is one; *strongest: the highest peak. */
+static int txp_lattice_find(const txp_correlation *k, double out[4], double *strongest) {
+    int px[TXP_PEAKS], py[TXP_PEAKS], count = 0;
+    double pc[TXP_PEAKS], mean = 0;
+    const int wide = 2 * k->reach_x + 1;
+    for (int i = 0; i < wide * (k->reach_y + 1); i++) mean += fabs((double)k->at[i]);
+    mean /= wide * (k->reach_y + 1);
+    for (int y = 0; y <= k->reach_y; y++) {
+        for (int x = -k->reach_x; x <= k->reach_x; x++) {
+            const double c = txp_correlated(k, x, y);
+            int is_peak = x * x + y * y >= 16 && !(y == 0 && x < 0);
+            for (int d = 0; d < 9 && is_peak; d++)
+                is_peak = d == 4 || txp_correlated(k, x + d % 3 - 1, y + d / 3 - 1) <= c;
+            if (!is_peak) continue;
+            int at = count < TXP_PEAKS ? count++ : TXP_PEAKS;
+            while (at > 0 && pc[at - 1] < c) {
+                if (at < TXP_PEAKS) {
+                    px[at] = px[at - 1];
+                    py[at] = py[at - 1];
+                    pc[at] = pc[at - 1];
+                }
+                at--;
+            }
+            if (at < TXP_PEAKS) {
+                px[at] = x;
+                py[at] = y;
+                pc[at] = c;
+            }
+        }
+    }
+    *strongest = count ? pc[0] : 0;
+    double best = 0, area = 1e30, scores[TXP_PEAKS][TXP_PEAKS];
+    int bi = -1, bj = -1;
+    for (int i = 0; i < count; i++) {
+        for (int j = i + 1; j < count; j++) {
+            double a[2] = {(double)px[i], (double)py[i]}, b[2] = {(double)px[j], (double)py[j]};
+            scores[i][j] = -2;
+            txp_reduce_basis(a, b);
+            const double la = sqrt(a[0] * a[0] + a[1] * a[1]), lb = sqrt(b[0] * b[0] + b[1] * b[1]);
+            if (la < 4 || fabs(txp_det(a, b)) < 0.5 * la * lb) continue;
+            scores[i][j] = txp_lattice_score(k, a, b);
+            if (scores[i][j] > best) best = scores[i][j];
+        }
+    }
+    for (int i = 0; i < count; i++) {
+        for (int j = i + 1; j < count; j++) {
+            double a[2] = {(double)px[i], (double)py[i]}, b[2] = {(double)px[j], (double)py[j]};
+            const double size = fabs(txp_det(a, b));
+            if (scores[i][j] < 0.85 * best || size >= area) continue;
+            area = size;
+            bi = i;
+            bj = j;
+        }
+    }
+    if (bi < 0 || best <= 0.25 || best <= 2 * mean) return 0;
+    double a[2] = {(double)px[bi], (double)py[bi]}, b[2] = {(double)px[bj], (double)py[bj]};
+    txp_reduce_basis(a, b);
+    txp_refine_peak(k, a);
+    txp_refine_peak(k, b);
+    const double ca = txp_correlated(k, (int)floor(a[0] + 0.5), (int)floor(a[1] + 0.5));
+    const double cb = txp_correlated(k, (int)floor(b[0] + 0.5), (int)floor(b[1] + 0.5));
+    if (fmin(ca, cb) < 0.65 * *strongest || fmin(ca, cb) <= 0.3) return 0;
+    /* a farther point of the lattice fixes the steps more exactly */
+    for (int t = 2; t <= 8; t++) {
+        for (int c = 0; c < 2; c++) {
+            double *v = c ? b : a, far_peak[2] = {v[0] * t, v[1] * t};
+            const double x = far_peak[0], y = far_peak[1];
+            if (fabs(x) > k->reach_x - 1 || fabs(y) > k->reach_y - 1) continue;
+            txp_refine_peak(k, far_peak);
+            const double ex = far_peak[0] - x, ey = far_peak[1] - y;
+            if (ex * ex + ey * ey > 1.5 * 1.5) continue;
+            if (txp_correlated(k, (int)floor(far_peak[0] + 0.5), (int)floor(far_peak[1] + 0.5)) <
+                0.7 * fmin(ca, cb))
+                continue;
+            v[0] = far_peak[0] / t;
+            v[1] = far_peak[1] / t;
+        }
+    }
+    out[0] = a[0];
+    out[1] = a[1];
+    out[2] = b[0];
+    out[3] = b[1];
+    return 1;
+}
+
+/* Give a level of the stack the lattice, whose steps are in pixels of level 0. */
+static void txp_lattice_set(txp_stack *k, const double v[4], double scale) {
+    for (int i = 0; i < 4; i++) k->lattice[i] = v[i] * scale;
+    const double det = k->lattice[0] * k->lattice[3] - k->lattice[1] * k->lattice[2];
+    k->inverse[0] = k->lattice[3] / det;
+    k->inverse[1] = -k->lattice[2] / det;
+    k->inverse[2] = -k->lattice[1] / det;
+    k->inverse[3] = k->lattice[0] / det;
+}
+
+/* ---- the stack of sheets ------------------------------------------------------------------ */
+
+/* Sample a map between its pixels: cubic convolution (Keys, a = -1/2), clamped at the border and to
+   the range of the four pixels around, so that no halo appears; exact on whole numbers. */
+static void txp_cubic(double t, double w[4]) {
+    w[0] = ((-0.5 * t + 1) * t - 0.5) * t;
+    w[1] = (1.5 * t - 2.5) * t * t + 1;
+    w[2] = ((-1.5 * t + 2) * t + 0.5) * t;
+    w[3] = (0.5 * t - 0.5) * t * t;
+}
+
+static void txp_sample(const txm_image *im, double x, double y, int is_label, float *out) {
+    const int channels = im->channels;
+    if (is_label) {
+        const int ix = txm_clampi((int)floor(x + 0.5), 0, im->width - 1);
+        const int iy = txm_clampi((int)floor(y + 0.5), 0, im->height - 1);
+        for (int c = 0; c < channels; c++) out[c] = txm_image_get(im, ix, iy, c);
+        return;
+    }
+    const double fx = floor(x), fy = floor(y);
+    const int ix = (int)fx, iy = (int)fy;
+    double wx[4], wy[4];
+    int cx[4], cy[4];
+    txp_cubic(x - fx, wx);
+    txp_cubic(y - fy, wy);
+    for (int k = 0; k < 4; k++) {
+        cx[k] = txm_clampi(ix + k - 1, 0, im->width - 1);
+        cy[k] = txm_clampi(iy + k - 1, 0, im->height - 1);
+    }
+    for (int c = 0; c < channels; c++) {
+        double sum = 0, low = 1e30, high = -1e30;
+        for (int j = 0; j < 4; j++) {
+            double row = 0;
+            for (int i = 0; i < 4; i++) {
+                const double v = txm_image_get(im, cx[i], cy[j], c);
+                row += wx[i] * v;
+                if (i == 1 || i == 2) {
+                    if (j == 1 || j == 2) {
+                        low = v < low ? v : low;
+                        high = v > high ? v : high;
+                    }
+                }
+            }
+            sum += wy[j] * row;
+        }
+        out[c] = txm_float(sum < low ? low : sum > high ? high : sum);
+    }
+}
+
+/* Where sheet pixel (x, y), y within the sheet, lies in its exemplar. */
+static inline void txp_sheet_place(const txp_sheet *s, double x, double y, double *ex, double *ey) {
+    *ex = s->xx * x + s->xy * y + s->x0;
+    *ey = s->yx * x + s->yy * y + s->y0;
+}
+
+/* A job's view of a description after the checks. */
+typedef struct txp_setup {
+    txm_image maps[TEXPATCH_MAX_EXEMPLARS][TEXPATCH_MAX_MAPS]; /* resolved                     */
+    txm_image guides[TEXPATCH_MAX_EXEMPLARS], masks[TEXPATCH_MAX_EXEMPLARS];
+    texpatch_map kinds[TEXPATCH_MAX_MAPS];
+    txm_image kept[TEXPATCH_MAX_MAPS]; /* pixels NULL: nothing is kept                        */
+    int exemplar_count, map_count, width, height, tileable, patch, passes, turns, mirror, lattice;
+    int is_default; /* passes were not given                                                  */
+    float novelty, guide_weight, low[TEXPATCH_MAX_MAPS], high[TEXPATCH_MAX_MAPS];
+    float guide_low, guide_high;
+    double lattice_vectors[4];
+    uint64_t seed;
+} txp_setup;
+
+/* The compared bytes of one picture's pixel; returns how many. */
+static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label, double low,
+                       double high, double weight, uint8_t *out) {
+    float v[4];
+    if (whole) {
+        for (int c = 0; c < im->channels; c++) v[c] = txm_image_get(im, (int)x, (int)y, c);
+    } else {
+        txp_sample(im, x, y, is_label, v);
+    }
+    const double scale = high > low ? 255 / (high - low) * weight : 0;
+    for (int c = 0; c < im->channels; c++) {
+        const double f = ((double)v[c] - low) * scale + 0.5;
+        out[c] = (uint8_t)(f < 0 ? 0 : f > 255 ? 255 : f);
+    }
+    return im->channels;
+}
+
+/* the largest weight: its differences use the whole range of a byte */
+static double txp_most_weight(const txp_setup *u, const txp_source *s) {
+    double most = s->guide_bytes ? (double)u->guide_weight : 0;
+    for (int m = 0; m < u->map_count; m++) most = fmax(most, (double)u->kinds[m].weight);
+    return most;
+}
+
+/* The compared bytes of a pixel: maps with weight, padding, guide last. guide may be NULL. */
+static void txp_features(const txp_setup *u, const txp_source *s, const txm_image *maps,
+                         const txm_image *guide, double x, double y, int whole, uint8_t *out) {
+    const double most = txp_most_weight(u, s);
+    int n = 0;
+    memset(out, 0, (size_t)s->bytes);
+    for (int m = 0; m < u->map_count && maps; m++) {
+        if (!(u->kinds[m].weight > 0)) continue;
+        n += txp_feature(&maps[m], x, y, whole, u->kinds[m].is_label, (double)u->low[m],
+                         (double)u->high[m], (double)u->kinds[m].weight / most, out + n);
+    }
+    if (s->guide_bytes && guide)
+        txp_feature(guide, x, y, whole, 1, (double)u->guide_low, (double)u->guide_high,
+                    (double)u->guide_weight / most, out + s->guide_at);
+}
+
+/* Halve a level of the stack, sheet by sheet. */
+static void txp_stack_halve(const txp_source *s, const txp_stack *from, txp_stack *to) {
+    const size_t n = (size_t)s->bytes;
+    for (int k = 0; k < s->sheets; k++) {
+        for (int y = 0; y < to->high[k]; y++) {
+            const uint8_t *a = txp_stack_at(s, from, 0, from->first[k] + 2 * y);
+            const uint8_t *b = a + from->pitch;
+            uint8_t *out = to->pixels + (size_t)(to->first[k] + y) * to->pitch;
+            for (int x = 0; x < to->wide[k]; x++, a += 2 * n, b += 2 * n, out += n) {
+                for (size_t c = 0; c < n; c++)
+                    out[c] = (uint8_t)((a[c] + a[n + c] + b[c] + b[n + c] + 2) / 4);
+            }
+        }
+    }
+}
+
+/* Lay out one level: sheets one below the other. */
+static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *arena,
+                                 int has_mask, txm_env *env) {
+    int y = 0;
+    k->width = 0;
+    for (int n = 0; n < s->sheets; n++) {
+        k->first[n] = y;
+        y += k->high[n];
+        if (k->wide[n] > k->width) k->width = k->wide[n];
+    }
+    k->height = y;
+    k->pitch = (size_t)k->width * (size_t)s->bytes;
+    k->pixels = (uint8_t *)txm_arena_zero(arena, (size_t)k->height + 1, k->pitch);
+    k->sheet = (uint8_t *)txm_arena_alloc(arena, (size_t)k->height, 1);
+    k->bad = NULL;
+    if (has_mask)
+        k->bad = (uint32_t *)txm_arena_zero(arena, (size_t)(k->width + 1) * (size_t)(k->height + 1),
+                                            sizeof *k->bad);
+    if (!k->pixels || !k->sheet || (has_mask && !k->bad))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
+    for (int n = 0; n < s->sheets; n++) memset(k->sheet + k->first[n], n, (size_t)k->high[n]);
+    return TXM_OK;
+}
+
+/* Sums of the unusable pixels, which lie one byte each in width x height. */
+static void txp_stack_sum(txp_stack *k, const uint8_t *bad) {
+    const size_t w = (size_t)k->width + 1;
+    for (int y = 0; y < k->height; y++) {
+        uint32_t row = 0;
+        for (int x = 0; x < k->width; x++) {
+            row += bad[(size_t)y * (size_t)k->width + (size_t)x];
+            k->bad[(size_t)(y + 1) * w + (size_t)x + 1] = k->bad[(size_t)y * w + (size_t)x + 1] + row;
+        }
+    }
+}
+
+/* The turned (then stretched) sheets of all exemplars. stretch: x and y of exemplar pixels per sheet
+   pixel, column by column, or NULL. */
+static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch) {
+    static const int turn_x[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
+    s->sheets = 0;
+    for (int e = 0; e < u->exemplar_count; e++) {
+        const int w = u->maps[e][0].width, h = u->maps[e][0].height;
+        for (int m = 0; m <= (u->mirror ? 1 : 0); m++) {
+            for (int t = 0; t < 4; t += 4 / u->turns) {
+                txp_sheet *k = &s->sheet[s->sheets++];
+                k->exemplar = e;
+                k->turn = t + 4 * m;
+                k->width = t % 2 ? h : w;
+                k->height = t % 2 ? w : h;
+                k->plain = 1;
+                /* Seen on the sheet the exemplar is turned counter-clockwise t times; the way back
+                   turns clockwise, rows running down. */
+                k->xx = turn_x[t][0];
+                k->xy = turn_x[t][1];
+                k->yx = -turn_x[t][1];
+                k->yy = turn_x[t][0];
+                k->x0 = k->xx + k->xy < 0 ? w - 1 : 0;
+                k->y0 = k->yx + k->yy < 0 ? h - 1 : 0;
+                if (m) { /* mirrored before turning */
+                    k->xx = -k->xx;
+                    k->xy = -k->xy;
+                    k->x0 = w - 1 - k->x0;
+                }
+                if (stretch) { /* one sheet only: (x, y) of the sheet is stretch (x, y) */
+                    k->plain = 0;
+                    k->xx = stretch[0];
+                    k->yx = stretch[1];
+                    k->xy = stretch[2];
+                    k->yy = stretch[3];
+                    /* the largest sheet whose corners stay inside, about the middle */
+                    const double ax = fabs(k->xx), bx = fabs(k->xy), ay = fabs(k->yx), by = fabs(k->yy);
+                    double sw = w / ax, sh = h / by;
+                    for (int i = 0; i < 8; i++) {
+                        const double ow = ax * (sw - 1) + bx * (sh - 1), oh = ay * (sw - 1) + by * (sh - 1);
+                        const double f = fmin((w - 1) / ow, (h - 1) / oh);
+                        sw = (sw - 1) * f + 1;
+                        sh = (sh - 1) * f + 1;
+                    }
+                    k->width = (int)sw;
+                    k->height = (int)sh;
+                    k->x0 = (w - 1) * 0.5 - (k->xx * (k->width - 1) + k->xy * (k->height - 1)) * 0.5;
+                    k->y0 = (h - 1) * 0.5 - (k->yx * (k->width - 1) + k->yy * (k->height - 1)) * 0.5;
+                }
+            }
+        }
+    }
+}
+
+/* How many levels, and how large the sheets are at each. least: the smaller side of the output if
+   it wraps, else large. */
+static void txp_source_sizes(txp_source *s, int least) {
+    int side = least;
+    for (int n = 0; n < s->sheets; n++) {
+        const txp_sheet *k = &s->sheet[n];
+        s->stack[0].wide[n] = k->width;
+        s->stack[0].high[n] = k->height;
+        if (k->width < side) side = k->width;
+        if (k->height < side) side = k->height;
+    }
+    for (s->levels = 1; side >= TXP_COARSE && s->levels < TXP_MAX_LEVELS; s->levels++, side /= 2) {
+        for (int n = 0; n < s->sheets; n++) {
+            s->stack[s->levels].wide[n] = s->stack[s->levels - 1].wide[n] / 2;
+            s->stack[s->levels].high[n] = s->stack[s->levels - 1].high[n] / 2;
+        }
+    }
+}
+
+typedef struct txp_rows {
+    const txp_setup *setup;
+    txp_source *source;
+    uint8_t *bad;
+} txp_rows;
+
+/* One row of the stack at full size. */
+static void txp_stack_row(void *context, int y) {
+    const txp_rows *r = (const txp_rows *)context;
+    const txp_source *s = r->source;
+    const txp_stack *k = &s->stack[0];
+    const int n = k->sheet[y];
+    const txp_sheet *sheet = &s->sheet[n];
+    const txm_image *mask = &r->setup->masks[sheet->exemplar];
+    for (int x = 0; x < k->wide[n]; x++) {
+        double ex, ey;
+        txp_sheet_place(sheet, x, y - k->first[n], &ex, &ey);
+        txp_features(r->setup, s, r->setup->maps[sheet->exemplar],
+                     &r->setup->guides[sheet->exemplar], ex, ey, sheet->plain,
+                     k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes);
+        if (r->bad && mask->pixels) {
+            const int ix = txm_clampi((int)floor(ex + 0.5), 0, mask->width - 1);
+            const int iy = txm_clampi((int)floor(ey + 0.5), 0, mask->height - 1);
+            r->bad[(size_t)y * (size_t)k->width + (size_t)x] =
+                ((const uint8_t *)txm_image_row_const(mask, iy))[ix] == 0;
+        }
+    }
+}
+
+/* All levels of the stack. */
+static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena, txm_env *env) {
+    txm_arena scratch;
+    txp_rows rows;
+    uint8_t *bad[TXP_MAX_LEVELS] = {NULL};
+    int has_mask = 0;
+    txm_status status = TXM_OK;
+    for (int e = 0; e < u->exemplar_count; e++) has_mask |= u->masks[e].pixels != NULL;
+    txm_arena_init(&scratch, env);
+    for (int l = 0; l < s->levels && status == TXM_OK; l++) {
+        status = txp_stack_make(s, &s->stack[l], arena, has_mask, env);
+        if (status != TXM_OK || !has_mask) continue;
+        bad[l] = (uint8_t *)txm_arena_zero(&scratch, (size_t)s->stack[l].width *
+                                                         (size_t)s->stack[l].height, 1);
+        if (!bad[l]) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the masks");
+    }
+    rows.setup = u;
+    rows.source = s;
+    rows.bad = bad[0];
+    if (status == TXM_OK) {
+        txm_parallel_for(env, s->stack[0].height, txp_stack_row, &rows);
+        for (int l = 1; l < s->levels; l++) txp_stack_halve(s, &s->stack[l - 1], &s->stack[l]);
+        for (int l = 0; l < s->levels && has_mask; l++) {
+            txp_stack *k = &s->stack[l];
+            for (int n = 0; n < s->sheets && l > 0; n++) {
+                const size_t w = (size_t)s->stack[l - 1].width;
+                for (int y = 0; y < k->high[n]; y++) {
+                    for (int x = 0; x < k->wide[n]; x++) {
+                        const uint8_t *b = bad[l - 1] + (size_t)(s->stack[l - 1].first[n] + 2 * y) * w +
+                                           2 * (size_t)x;
+                        bad[l][(size_t)(k->first[n] + y) * (size_t)k->width + (size_t)x] =
+                            (uint8_t)(b[0] | b[1] | b[w] | b[w + 1]);
+                    }
+                }
+            }
+            txp_stack_sum(k, bad[l]);
+        }
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* Look for a lattice at the coarsest level; sharpen its steps on finer ones. */
+static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
+    txm_arena scratch;
+    txp_correlation k;
+    double v[4] = {0, 0, 0, 0}, strongest = 0;
+    s->has_lattice = s->is_random = 0;
+    if (u->lattice == 1) {
+        memcpy(v, u->lattice_vectors, sizeof v);
+        s->has_lattice = 1;
+    } else if (s->sheets == 1) {
+        const int top = s->levels - 1;
+        const txp_stack *t = &s->stack[top];
+        txm_arena_init(&scratch, env);
+        k.width = t->wide[0];
+        k.height = t->high[0];
+        k.reach_x = k.width * 5 / 8;
+        k.reach_y = k.height * 5 / 8;
+        int16_t *gray = (int16_t *)txm_arena_alloc(&scratch, (size_t)k.width * (size_t)k.height,
+                                                   sizeof *gray);
+        k.at = (float *)txm_arena_alloc(&scratch, (size_t)(2 * k.reach_x + 1) *
+                                                      (size_t)(k.reach_y + 1), sizeof *k.at);
+        if (!gray || !k.at) {
+            txm_arena_free(&scratch);
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+        }
+        for (int y = 0; y < k.height; y++) {
+            for (int x = 0; x < k.width; x++) {
+                const uint8_t *p = txp_stack_at(s, t, x, y);
+                int sum = 0, n = 0;
+                for (int b = 0; b < s->guide_at && b < 3; b++, n++) sum += p[b];
+                gray[y * k.width + x] = (int16_t)(sum / n - 128);
+            }
+        }
+        k.gray = gray;
+        txm_parallel_for(env, k.reach_y + 1, txp_correlate_row, &k);
+        const int found = txp_lattice_find(&k, v, &strongest);
+        s->has_lattice = found && u->lattice != -1;
+        s->is_random = !found && strongest < 0.26;
+        for (int i = 0; i < 4; i++) v[i] *= 1 << top;
+        txm_arena_free(&scratch);
+    }
+    for (int l = 0; l < s->levels && s->has_lattice; l++)
+        txp_lattice_set(&s->stack[l], v, 1.0 / (1 << l));
+    return TXM_OK;
+}
+
+/* ---- first pass: patches and cuts -------------------------------------------------------- */
+
+/* How use of the exemplar is counted: pixels of the canvas per cell of the stack. */
+typedef struct txp_use {
+    int columns, rows;
+    uint32_t *count;
+    double mean; /* of the cells, once the canvas is full                                      */
+} txp_use;
+
+typedef struct txp_quilt {
+    const txp_source *source;
+    const txp_stack *stack;
+    txp_canvas canvas;
+    uint8_t *known;        /* as canvas.pixels: 255 where a byte is to be compared              */
+    uint8_t *done;         /* of each pixel of the canvas                                       */
+    txp_use use;
+    int block, overlap;
+    double shift_x, shift_y; /* the lattice offset of the canvas                                */
+    double use_weight, lattice_weight;
+    txm_rng rng;
+    double cost;           /* of all cuts                                                      */
+    int failed;            /* no piece of the exemplar fits                                    */
+    float *error;          /* block^2                                                          */
+    double *scratch;       /* block * overlap                                                  */
+    txp_place *near_places; /* candidates within the tolerance                                 */
+    float *near_costs;
+} txp_quilt;
+
+enum { TXP_NEAR = 256 };
+
+/* Sum of |canvas - stack| over the known bytes of a block; span: first and last 16 bytes of each
+   row that hold any. */
+static uint32_t txp_sad_known(const txp_quilt *q, const uint8_t *a, const uint8_t *known,
+                              const uint8_t *b, const int (*span)[2], uint32_t limit) {
+    uint32_t total = 0;
+    for (int y = 0; y < q->block && total <= limit; y++) {
+#ifdef TXP_SSE2
+        __m128i sum = _mm_setzero_si128();
+        for (int i = span[y][0]; i < span[y][1]; i += 16) {
+            const __m128i m = _mm_loadu_si128((const __m128i *)(const void *)(known + i));
+            const __m128i u = _mm_loadu_si128((const __m128i *)(const void *)(a + i));
+            const __m128i v = _mm_loadu_si128((const __m128i *)(const void *)(b + i));
+            sum = _mm_add_epi32(sum, _mm_sad_epu8(_mm_and_si128(u, m), _mm_and_si128(v, m)));
+        }
+        total += txp_sad_sum(sum);
+#else
+        for (int i = span[y][0]; i < span[y][1]; i++) {
+            const int d = (a[i] & known[i]) - (b[i] & known[i]);
+            total += (uint32_t)(d < 0 ? -d : d);
+        }
+#endif
+        a += q->canvas.pitch;
+        known += q->canvas.pitch;
+        b += q->stack->pitch;
+    }
+    return total;
+}
+
+/* Store a pixel and its repetitions behind the ends of a torus. */
+static void txp_quilt_put(txp_quilt *q, int x, int y, txp_place at) {
+    const txp_canvas *c = &q->canvas;
+    const size_t n = (size_t)q->source->bytes, i = txp_index(c, x, y);
+    const size_t guide = (size_t)q->source->guide_at;
+    const int bind = !(c->free_guide && c->free_guide[i]);
+    const uint8_t *in = txp_stack_at(q->source, q->stack, at.x, at.y);
+    c->at[i] = at;
+    q->done[i] = 1;
+    for (int yy = y; yy < c->height + (c->wrap & TEXPATCH_TILE_Y ? TXP_PAD : 0); yy += c->height) {
+        for (int xx = x; xx < c->width + (c->wrap & TEXPATCH_TILE_X ? TXP_PAD : 0); xx += c->width) {
+            const size_t k = (size_t)yy * c->pitch + (size_t)xx * n;
+            memcpy(c->pixels + k, in, bind ? guide : n);
+            memset(q->known + k, 255, guide);
+        }
+    }
+}
+
+/* mean use of the cells that a piece of size x size pixels at (x, y) covers, over the mean of all */
+static double txp_use_at(const txp_use *u, int x, int y, int size) {
+    const int x0 = x / TXP_CELL, y0 = y / TXP_CELL;
+    int x1 = (x + size - 1) / TXP_CELL, y1 = (y + size - 1) / TXP_CELL;
+    uint32_t sum = 0;
+    if (x1 >= u->columns) x1 = u->columns - 1;
+    if (y1 >= u->rows) y1 = u->rows - 1;
+    for (int j = y0; j <= y1; j++) {
+        for (int i = x0; i <= x1; i++) sum += u->count[j * u->columns + i];
+    }
+    return sum / (u->mean * (x1 - x0 + 1) * (y1 - y0 + 1));
+}
+
+/* The piece for the block at (bx, by). */
+static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
+    const txp_source *s = q->source;
+    const txp_stack *k = q->stack;
+    const txp_canvas *c = &q->canvas;
+    const int size = q->block, bytes = size * s->bytes;
+    int span[4 * TXP_BLOCK][2], count = 0;
+    uint32_t known = 0;
+    const uint8_t *a = txp_canvas_at(s, c, bx, by), *m = q->known + (a - c->pixels);
+    for (int y = 0; y < size; y++) {
+        const uint8_t *row = m + (size_t)y * c->pitch;
+        span[y][0] = bytes;
+        span[y][1] = 0;
+        for (int i = 0; i < bytes; i++) {
+            if (!row[i]) continue;
+            known++;
+            if (span[y][0] == bytes) span[y][0] = i / 16 * 16;
+            span[y][1] = i / 16 * 16 + 16;
+        }
+        if (span[y][1] > bytes) span[y][1] = bytes; /* cannot be: bytes is a multiple of 16 */
+    }
+    /* Costs are gray levels summed over known bytes; a block without any compares nothing. */
+    const double unit = known ? (double)known : 1;
+    double best = 1e30;
+    const double tolerance = 1.02;
+    const uint32_t start = txm_rng_next(&q->rng);
+    for (int n = 0; n < s->sheets; n++) {
+        const int rows = k->high[n] - size + 1, columns = k->wide[n] - size + 1;
+        for (int j = 0; j < rows; j++) {
+            for (int i = 0; i < columns; i++) {
+                const int x = i, y = k->first[n] + j;
+                double extra = 0;
+                if (s->has_lattice) {
+                    const double d = txp_off_lattice(k, x - bx - q->shift_x, y - by - q->shift_y);
+                    if (d > 9) continue;
+                    extra += q->lattice_weight * d;
+                }
+                if (k->bad && !txp_fits(s, k, x, y, size, size)) continue;
+                if (!known) extra += (double)(txm_hash(start + (uint64_t)(y * k->width + x)) >> 40) * 1e-5;
+                extra = (extra + q->use_weight * txp_use_at(&q->use, x, y, size)) * unit;
+                const double limit = best * tolerance - extra;
+                if (limit < 0) continue;
+                const uint32_t sad =
+                    known ? txp_sad_known(q, a, m, txp_stack_at(s, k, x, y),
+                                          (const int(*)[2])span,
+                                          limit < 4e9 ? (uint32_t)limit : 4000000000u)
+                          : 0;
+                const double cost = sad + extra;
+                if (cost > best * tolerance) continue;
+                if (cost < best) {
+                    best = cost;
+                    int kept = 0;
+                    for (int t = 0; t < count; t++) {
+                        if (q->near_costs[t] > best * tolerance) continue;
+                        q->near_costs[kept] = q->near_costs[t];
+                        q->near_places[kept++] = q->near_places[t];
+                    }
+                    count = kept;
+                }
+                if (count < TXP_NEAR) {
+                    q->near_costs[count] = txm_float(cost);
+                    q->near_places[count].x = (int16_t)x;
+                    q->near_places[count++].y = (int16_t)y;
+                }
+            }
+        }
+    }
+    if (!count) return 0;
+    *found = q->near_places[txm_rng_below(&q->rng, (uint32_t)count)];
+    return 1;
+}
+
+/* Lay the piece over the block, along minimum-error cuts through what overlaps. */
+static void txp_quilt_lay(txp_quilt *q, int bx, int by, txp_place at) {
+    const txp_source *s = q->source;
+    const txp_canvas *c = &q->canvas;
+    const int size = q->block, o = q->overlap, n = s->guide_at;
+    int cut[4][4 * TXP_BLOCK], is_cut[4], seen[4] = {0, 0, 0, 0};
+    for (int y = 0; y < size; y++) {
+        const uint8_t *a = txp_canvas_at(s, c, bx, by + y);
+        const uint8_t *b = txp_stack_at(s, q->stack, at.x, at.y + y);
+        for (int x = 0; x < size; x++, a += s->bytes, b += s->bytes) {
+            const size_t i = txp_index(c, txp_wrap(bx + x, c->width), txp_wrap(by + y, c->height));
+            int e = 0;
+            if (q->done[i]) {
+                for (int b1 = 0; b1 < n; b1++) e += (a[b1] - b[b1]) * (a[b1] - b[b1]);
+                if (x < o) seen[0]++;
+                if (y < o) seen[1]++;
+                if (x >= size - o) seen[2]++;
+                if (y >= size - o) seen[3]++;
+            }
+            q->error[y * size + x] = (float)e;
+        }
+    }
+    /* sides: left, top, right, bottom; cut[][line] is the first pixel of the new piece, or the last */
+    for (int k = 0; k < 4; k++) {
+        is_cut[k] = seen[k] * 4 > 3 * size * o;
+        if (!is_cut[k]) continue;
+        const float *e = q->error + (k == 2 ? size - o : k == 3 ? (size - o) * size : 0);
+        q->cost += txm_cut(e, size, o, k % 2 ? 1 : size, k % 2 ? size : 1, cut[k], q->scratch);
+    }
+    for (int y = 0; y < size; y++) {
+        for (int x = 0; x < size; x++) {
+            const int cx = txp_wrap(bx + x, c->width), cy = txp_wrap(by + y, c->height);
+            const size_t i = txp_index(c, cx, cy);
+            if (c->fixed && c->fixed[i]) continue;
+            if (q->done[i] && ((is_cut[0] && x < cut[0][y]) || (is_cut[1] && y < cut[1][x]) ||
+                               (is_cut[2] && x - (size - o) > cut[2][y]) ||
+                               (is_cut[3] && y - (size - o) > cut[3][x])))
+                continue;
+            txp_place p;
+            p.x = (int16_t)(at.x + x);
+            p.y = (int16_t)(at.y + y);
+            uint32_t *use = q->use.count + p.y / TXP_CELL * q->use.columns + p.x / TXP_CELL;
+            if (q->done[i]) {
+                const txp_place old = c->at[i];
+                if (old.x >= 0)
+                    q->use.count[old.y / TXP_CELL * q->use.columns + old.x / TXP_CELL]--;
+            }
+            ++*use;
+            txp_quilt_put(q, cx, cy, p);
+        }
+    }
+}
+
+/* The whole canvas in scan order (section 3.4 of [1], N = 2 D). */
+static void txp_quilt_run(txp_quilt *q) {
+    const txp_canvas *c = &q->canvas;
+    const int size = q->block, step = size - q->overlap;
+    const int wx = c->wrap & TEXPATCH_TILE_X, wy = c->wrap & TEXPATCH_TILE_Y;
+    const int columns = wx ? (c->width + step - 1) / step : 1 + (c->width - size + step - 1) / step;
+    const int rows = wy ? (c->height + step - 1) / step : 1 + (c->height - size + step - 1) / step;
+    for (int j = 0; j < rows && !q->failed; j++) {
+        int y = wy ? j * c->height / rows : j * step;
+        if (!wy && y > c->height - size) y = c->height - size;
+        for (int i = 0; i < columns && !q->failed; i++) {
+            int x = wx ? i * c->width / columns : i * step;
+            txp_place at;
+            int open = 0;
+            if (!wx && x > c->width - size) x = c->width - size;
+            for (int v = 0; v < size && !open && c->fixed; v++) {
+                for (int u = 0; u < size && !open; u++)
+                    open = !c->fixed[txp_index(c, txp_wrap(x + u, c->width),
+                                               txp_wrap(y + v, c->height))];
+            }
+            if (c->fixed && !open) continue;
+            if (!txp_quilt_find(q, x, y, &at)) q->failed = 1;
+            else txp_quilt_lay(q, x, y, at);
+        }
+    }
+}
+
+/* ---- second pass: optimisation ----------------------------------------------------------- */
+
+/* Room for a band of rows, per pixel. */
+typedef struct txp_band {
+    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
+    int32_t *nearest;      /* how near the best candidate is to the mean                       */
+    uint8_t *mean;
+} txp_band;
+
+/* The windows of one pass: those of a row lie side by side, `columns` of them, at xs[], ys[]. */
+typedef struct txp_pass {
+    const txp_source *source;
+    const txp_stack *stack;
+    txp_canvas *canvas;
+    int size, step;      /* of the neighbourhoods, and from one to the next                     */
+    int columns, rows;
+    int *xs, *ys;
+    txp_place *match;    /* of each window                                                     */
+    uint32_t *sad;       /* what its match costs, in gray levels; UINT32_MAX: no match          */
+    uint32_t *grain;     /* of each window: sum of differences of neighbours, its high frequencies */
+    int32_t *weight;     /* of each window in the mean                                         */
+    txp_use use;
+    double shift_x, shift_y, use_weight, lattice_weight, novelty;
+    uint64_t seed;
+    int exhaustive, first_row, rows_done;
+    txp_place *next;     /* the places that the pass chooses                                   */
+    int32_t bell[TXP_WINDOW * TXP_WINDOW]; /* 1..256 over a neighbourhood                       */
+    txp_band bands[TXP_LANES];
+    int first_band;
+} txp_pass;
+
+/* A search for the match of one window. */
+typedef struct txp_search {
+    const txp_pass *pass;
+    const uint8_t *target;
+    int x, y;
+    txp_place best;
+    double cost;
+    uint32_t sad;
+    txp_place seen[16];
+    int seen_count;
+} txp_search;
+
+static void txp_try(txp_search *f, int x, int y) {
+    const txp_pass *p = f->pass;
+    const txp_source *s = p->source;
+    const int size = p->size;
+    if (!txp_fits(s, p->stack, x, y, size, size)) return;
+    for (int i = 0; i < 16 && i < f->seen_count; i++) {
+        if (f->seen[i].x == x && f->seen[i].y == y) return;
+    }
+    f->seen[f->seen_count % 16].x = (int16_t)x;
+    f->seen[f->seen_count++ % 16].y = (int16_t)y;
+    double extra = 0;
+    if (s->has_lattice) {
+        double d = txp_off_lattice(p->stack, x - f->x - p->shift_x, y - f->y - p->shift_y);
+        if (d > 9) d = 9;
+        extra += p->lattice_weight * d;
+    }
+    if (p->use_weight > 0) extra += p->use_weight * txp_use_at(&p->use, x, y, size);
+    extra *= size * size;
+    if (extra >= f->cost) return;
+    const double limit = f->cost - extra;
+    const uint32_t sad = txp_sad(f->target, p->canvas->pitch, txp_stack_at(s, p->stack, x, y),
+                                 p->stack->pitch, size * s->bytes, size,
+                                 limit < 4e9 ? (uint32_t)limit : 4000000000u);
+    if (sad + extra >= f->cost) return;
+    f->cost = sad + extra;
+    f->sad = sad;
+    f->best.x = (int16_t)x;
+    f->best.y = (int16_t)y;
+}
+
+/* A sheet's random place that fits a window, near (x, y) within radius. */
+static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
+    const txp_pass *p = f->pass;
+    const txp_stack *k = p->stack;
+    const int n = p->source->sheets > 1 ? k->sheet[f->best.y] : 0;
+    const int x0 = f->best.x - radius < 0 ? 0 : f->best.x - radius;
+    const int y0 = f->best.y - radius < k->first[n] ? k->first[n] : f->best.y - radius;
+    int x1 = f->best.x + radius, y1 = f->best.y + radius;
+    if (x1 > k->wide[n] - p->size) x1 = k->wide[n] - p->size;
+    if (y1 > k->first[n] + k->high[n] - p->size) y1 = k->first[n] + k->high[n] - p->size;
+    int x = txm_rng_range(rng, x0, x1 > x0 ? x1 : x0);
+    int y = txm_rng_range(rng, y0, y1 > y0 ? y1 : y0);
+    if (p->source->has_lattice) { /* onto the nearest point of the lattice */
+        const double ox = x - f->x - p->shift_x, oy = y - f->y - p->shift_y;
+        double u = k->inverse[0] * ox + k->inverse[1] * oy;
+        double v = k->inverse[2] * ox + k->inverse[3] * oy;
+        u -= floor(u + 0.5);
+        v -= floor(v + 0.5);
+        x -= (int)floor(k->lattice[0] * u + k->lattice[2] * v + 0.5);
+        y -= (int)floor(k->lattice[1] * u + k->lattice[3] * v + 0.5);
+    }
+    txp_try(f, x, y);
+}
+
+/* The match of window w. */
+static void txp_match(txp_pass *p, int i, int j) {
+    const txp_source *s = p->source;
+    const txp_stack *k = p->stack;
+    const txp_canvas *c = p->canvas;
+    const int size = p->size, w = j * p->columns + i;
+    txp_search f;
+    f.pass = p;
+    f.x = p->xs[i];
+    f.y = p->ys[j];
+    f.target = txp_canvas_at(s, c, f.x, f.y);
+    f.cost = 1e30;
+    f.sad = UINT32_MAX;
+    f.best = p->match[w];
+    f.seen_count = 0;
+    if (c->fixed) { /* nothing to choose here? */
+        int open = 0;
+        for (int v = 0; v < size && !open; v++) {
+            for (int u = 0; u < size && !open; u++)
+                open = !c->fixed[txp_index(c, txp_wrap(f.x + u, c->width),
+                                           txp_wrap(f.y + v, c->height))];
+        }
+        if (!open) {
+            p->sad[w] = UINT32_MAX;
+            return;
+        }
+    }
+    p->grain[w] = txp_sad(f.target, c->pitch, f.target + s->bytes, c->pitch, size * s->bytes, size,
+                          UINT32_MAX);
+    if (f.best.x >= 0) txp_try(&f, f.best.x, f.best.y);
+    /* the pieces that the window shows now */
+    for (int v = 0; v < 5; v++) {
+        for (int u = 0; u < 5; u++) {
+            const int dx = u * (size - 1) / 4, dy = v * (size - 1) / 4;
+            const txp_place at = c->at[txp_index(c, txp_wrap(f.x + dx, c->width),
+                                                 txp_wrap(f.y + dy, c->height))];
+            if (at.x >= 0) txp_try(&f, at.x - dx, at.y - dy);
+        }
+    }
+    if (f.sad == 0) {
+        p->match[w] = f.best;
+        p->sad[w] = 0;
+        return;
+    }
+    if (p->exhaustive || f.cost > 1e29) {
+        for (int n = 0; n < s->sheets; n++) {
+            for (int y = k->first[n]; y + size <= k->first[n] + k->high[n]; y++) {
+                for (int x = 0; x + size <= k->wide[n]; x++) txp_try(&f, x, y);
+            }
+        }
+    } else {
+        txm_rng rng = txm_rng_make(p->seed, (uint64_t)w);
+        for (int radius = k->width / 2; radius >= 2; radius /= 2) {
+            txp_try_near(&f, &rng, radius);
+        }
+        if (s->has_lattice) {
+            for (int d = 0; d < 8; d++) {
+                static const int jump[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1},
+                                               {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
+                const double x = k->lattice[0] * jump[d][0] + k->lattice[2] * jump[d][1];
+                const double y = k->lattice[1] * jump[d][0] + k->lattice[3] * jump[d][1];
+                txp_try(&f, f.best.x + (int)floor(x + 0.5), f.best.y + (int)floor(y + 0.5));
+            }
+        }
+        for (int round = 0; round < 3; round++) {
+            const txp_place at = f.best;
+            for (int d = 0; d < 9; d++) {
+                if (d != 4) txp_try(&f, at.x + d % 3 - 1, at.y + d / 3 - 1);
+            }
+            if (at.x == f.best.x && at.y == f.best.y) break;
+        }
+    }
+    p->match[w] = f.best;
+    p->sad[w] = f.sad;
+}
+
+static void txp_match_row(void *context, int index) {
+    txp_pass *p = (txp_pass *)context;
+    for (int i = 0; i < p->columns; i++) txp_match(p, i, p->first_row + index);
+}
+
+/* 2^-1.2 .. to the power of n / 8, in 16 bits */
+static double txp_power(double x) {
+    /* x^-1.2 for x >= 1, to 1 %: powers of two from a table, the rest by a parabola */
+    static const double fifth[5] = {1.0, 0.870550563296124, 0.757858283255199, 0.659753955386447,
+                                    0.574349177498518};
+    int e = 0;
+    while (x >= 2) {
+        x *= 0.5;
+        e++;
+    }
+    const double t = x - 1, m = 1 - t * (1.1233 - t * 0.5586);
+    double f = fifth[e % 5] * m;
+    for (int i = 0; i < e / 5; i++) f *= 0.5;
+    for (int i = 0; i < e; i++) f *= 0.5;
+    return f;
+}
+
+/* The adaptive weights (section 3.5 of [1]): w = P |x - z|^(r - 2), r = 0.8, where |x - z|^2 is the
+   energy of the match; P is the share of well-matched windows among those of high frequency around
+   (itself included), so that good structure wins over bad. */
+static void txp_weigh(txp_pass *p) {
+    const double floor_sad = p->size * p->size * 1.5;
+    double mean = 0, grain = 0;
+    size_t count = 0;
+    const int n = p->columns * p->rows;
+    for (int w = 0; w < n; w++) {
+        if (p->sad[w] == UINT32_MAX) continue;
+        mean += p->sad[w];
+        grain += p->grain[w];
+        count++;
+    }
+    if (count) mean /= (double)count;
+    if (count) grain /= (double)count;
+    for (int j = 0; j < p->rows; j++) {
+        for (int i = 0; i < p->columns; i++) {
+            const int w = j * p->columns + i;
+            int tries = 1, hits = 1;
+            p->weight[w] = 0;
+            if (p->sad[w] == UINT32_MAX) continue;
+            for (int v = j > 0 ? j - 1 : 0; v <= j + 1 && v < p->rows; v++) {
+                for (int u = i > 0 ? i - 1 : 0; u <= i + 1 && u < p->columns; u++) {
+                    const int o = v * p->columns + u;
+                    if (p->sad[o] == UINT32_MAX || p->grain[o] < grain) continue;
+                    tries++;
+                    hits += p->sad[o] <= mean;
+                }
+            }
+            const double e = p->sad[w] / floor_sad;
+            const double f = 2000 * (e > 1 ? txp_power(e) : 1) * hits / tries;
+            p->weight[w] = f > 1 ? (int32_t)f : 1;
+        }
+    }
+}
+
+/* A bell over a neighbourhood, 1..256. */
+static void txp_bell(int size, int32_t *bell) {
+    for (int v = 0; v < size; v++) {
+        for (int u = 0; u < size; u++) {
+            const double a = (2 * v + 1 - size) / (double)size, b = (2 * u + 1 - size) / (double)size;
+            const double f = (1 - a * a) * (1 - a * a) * (1 - b * b) * (1 - b * b);
+            bell[v * size + u] = 1 + (int32_t)(255 * f);
+        }
+    }
+}
+
+/* Sums of a window's match over the rows of a band: of its bytes, and of the weights. */
+static void txp_sum_window(const txp_pass *p, int w, int x0, int y0, int top, int bottom,
+                           const txp_band *band) {
+    const txp_source *s = p->source;
+    const txp_canvas *c = p->canvas;
+    const int n = s->bytes, size = p->size;
+    const txp_place m = p->match[w];
+    for (int v = 0; v < size; v++) {
+        const int y = txp_wrap(y0 + v, c->height);
+        if (y < top || y >= bottom) continue;
+        const uint8_t *in = txp_stack_at(s, p->stack, m.x, m.y + v);
+        const size_t line = (size_t)(y - top) * (size_t)c->width;
+        int32_t weight[TXP_WINDOW];
+        for (int u = 0; u < size; u++)
+            weight[u] = ((p->weight[w] * p->bell[v * size + u]) >> 8) + 1;
+        int u = 0;
+#ifdef TXP_SSE2
+        if (n == 4 && x0 + size <= c->width) {
+            const __m128i zero = _mm_setzero_si128();
+            int32_t *total = band->total + line + (size_t)x0;
+            int32_t *sums = band->sums + (line + (size_t)x0) * 4;
+            for (; u < size; u += 4, total += 4, sums += 16, in += 16) {
+                const __m128i pixels = _mm_loadu_si128((const __m128i *)(const void *)in);
+                const __m128i low = _mm_unpacklo_epi8(pixels, zero);
+                const __m128i high = _mm_unpackhi_epi8(pixels, zero);
+                const __m128i f = _mm_loadu_si128((const __m128i *)(const void *)(weight + u));
+                __m128i *t = (__m128i *)(void *)total, *o = (__m128i *)(void *)sums;
+                _mm_storeu_si128(t, _mm_add_epi32(_mm_loadu_si128(t), f));
+                _mm_storeu_si128(o, _mm_add_epi32(_mm_loadu_si128(o),
+                    _mm_madd_epi16(_mm_unpacklo_epi16(low, zero), _mm_shuffle_epi32(f, 0x00))));
+                _mm_storeu_si128(o + 1, _mm_add_epi32(_mm_loadu_si128(o + 1),
+                    _mm_madd_epi16(_mm_unpackhi_epi16(low, zero), _mm_shuffle_epi32(f, 0x55))));
+                _mm_storeu_si128(o + 2, _mm_add_epi32(_mm_loadu_si128(o + 2),
+                    _mm_madd_epi16(_mm_unpacklo_epi16(high, zero), _mm_shuffle_epi32(f, 0xaa))));
+                _mm_storeu_si128(o + 3, _mm_add_epi32(_mm_loadu_si128(o + 3),
+                    _mm_madd_epi16(_mm_unpackhi_epi16(high, zero), _mm_shuffle_epi32(f, 0xff))));
+            }
+        }
+#endif
+        for (; u < size; u++, in += n) {
+            const size_t x = line + (size_t)txp_wrap(x0 + u, c->width);
+            int32_t *to = band->sums + x * (size_t)n;
+            for (int b = 0; b < n; b++) to[b] += weight[u] * in[b];
+            band->total[x] += weight[u];
+        }
+    }
+}
+
+/* Which of the candidates of the pixels of a band is nearest to the mean. */
+static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, int bottom,
+                            const txp_band *band) {
+    const txp_source *s = p->source;
+    const txp_canvas *c = p->canvas;
+    const int n = s->bytes, size = p->size;
+    const txp_place m = p->match[w];
+    for (int v = 0; v < size; v++) {
+        const int y = txp_wrap(y0 + v, c->height);
+        if (y < top || y >= bottom) continue;
+        const uint8_t *in = txp_stack_at(s, p->stack, m.x, m.y + v);
+        const size_t line = (size_t)(y - top) * (size_t)c->width;
+        int u = 0;
+#ifdef TXP_SSE2
+        if (n == 4 && x0 + size <= c->width) {
+            const __m128i zero = _mm_setzero_si128(), four = _mm_set1_epi32(4);
+            const uint8_t *mean = band->mean + (line + (size_t)x0) * 4;
+            int32_t *nearest = band->nearest + line + (size_t)x0;
+            txp_place *next = p->next + txp_index(c, x0, y), first[4];
+            for (int i = 0; i < 4; i++) {
+                first[i].x = (int16_t)(m.x + i);
+                first[i].y = (int16_t)(m.y + v);
+            }
+            __m128i place = _mm_loadu_si128((const __m128i *)(const void *)first);
+            for (; u < size; u += 4, mean += 16, in += 16, nearest += 4, next += 4) {
+                const __m128i a = _mm_loadu_si128((const __m128i *)(const void *)mean);
+                const __m128i b = _mm_loadu_si128((const __m128i *)(const void *)in);
+                const __m128i d = _mm_or_si128(_mm_subs_epu8(a, b), _mm_subs_epu8(b, a));
+                __m128i low = _mm_unpacklo_epi8(d, zero), high = _mm_unpackhi_epi8(d, zero);
+                low = _mm_madd_epi16(low, low);
+                high = _mm_madd_epi16(high, high);
+                /* pairs of sums, one pair for each pixel */
+                const __m128i even = _mm_castps_si128(_mm_shuffle_ps(
+                    _mm_castsi128_ps(low), _mm_castsi128_ps(high), _MM_SHUFFLE(2, 0, 2, 0)));
+                const __m128i odd = _mm_castps_si128(_mm_shuffle_ps(
+                    _mm_castsi128_ps(low), _mm_castsi128_ps(high), _MM_SHUFFLE(3, 1, 3, 1)));
+                const __m128i square = _mm_add_epi32(even, odd);
+                __m128i *o = (__m128i *)(void *)nearest, *at = (__m128i *)(void *)next;
+                const __m128i best = _mm_loadu_si128(o), less = _mm_cmplt_epi32(square, best);
+                _mm_storeu_si128(o, _mm_or_si128(_mm_and_si128(less, square),
+                                                 _mm_andnot_si128(less, best)));
+                _mm_storeu_si128(at, _mm_or_si128(_mm_and_si128(less, place),
+                                                  _mm_andnot_si128(less, _mm_loadu_si128(at))));
+                place = _mm_add_epi16(place, _mm_and_si128(four, _mm_set1_epi32(0xffff)));
+            }
+        }
+#endif
+        for (; u < size; u++, in += n) {
+            const int x = txp_wrap(x0 + u, c->width);
+            const uint8_t *to = band->mean + (line + (size_t)x) * (size_t)n;
+            int32_t d = 0;
+            for (int b = 0; b < n; b++) d += (to[b] - in[b]) * (to[b] - in[b]);
+            if (d >= band->nearest[line + (size_t)x]) continue;
+            band->nearest[line + (size_t)x] = d;
+            txp_place *at = p->next + txp_index(c, x, y);
+            at->x = (int16_t)(m.x + u);
+            at->y = (int16_t)(m.y + v);
+        }
+    }
+}
+
+/* One band of rows: the mean of all windows at each pixel, then the candidate nearest to it. */
+static void txp_choose_band(void *context, int lane) {
+    txp_pass *p = (txp_pass *)context;
+    const txp_canvas *c = p->canvas;
+    const int top = (p->first_band + lane) * TXP_BAND, n = p->source->bytes;
+    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
+    const size_t pixels = (size_t)(bottom - top) * (size_t)c->width;
+    const txp_band *band = &p->bands[lane];
+    memset(band->sums, 0, pixels * (size_t)n * sizeof *band->sums);
+    memset(band->total, 0, pixels * sizeof *band->total);
+    for (int turn = 0; turn < 2; turn++) {
+        for (int j = 0; j < p->rows; j++) {
+            const int y = p->ys[j], end = y + p->size;
+            if (!((y < bottom && end > top) || (end > c->height && end - c->height > top))) continue;
+            for (int i = 0; i < p->columns; i++) {
+                const int w = j * p->columns + i;
+                if (p->sad[w] == UINT32_MAX) continue;
+                if (turn) txp_pick_window(p, w, p->xs[i], y, top, bottom, band);
+                else txp_sum_window(p, w, p->xs[i], y, top, bottom, band);
+            }
+        }
+        for (size_t i = 0; i < pixels && !turn; i++) {
+            const int32_t *sum = band->sums + i * (size_t)n;
+            const float part = band->total[i] ? txm_float(1.0f / (float)band->total[i]) : 0;
+            for (int b = 0; b < n; b++)
+                band->mean[i * (size_t)n + (size_t)b] =
+                    (uint8_t)txm_float(txm_float((float)sum[b] * part) + 0.5f);
+            band->nearest[i] = INT32_MAX;
+        }
+    }
+    for (int y = top; y < bottom && c->fixed; y++) {
+        for (int x = 0; x < c->width; x++) {
+            const size_t i = txp_index(c, x, y);
+            if (c->fixed[i]) p->next[i] = c->at[i];
+        }
+    }
+}
+
+static void txp_count_use(const txp_canvas *c, txp_use *u) {
+    uint32_t total = 0;
+    memset(u->count, 0, (size_t)u->columns * (size_t)u->rows * sizeof *u->count);
+    for (size_t i = 0; i < (size_t)c->width * (size_t)c->height; i++) {
+        if (c->at[i].x < 0) continue;
+        u->count[c->at[i].y / TXP_CELL * u->columns + c->at[i].x / TXP_CELL]++;
+        total++;
+    }
+    u->mean = (double)(total ? total : 1) / (u->columns * u->rows);
+}
+
+/* ---- coherence: single pixels at seams --------------------------------------------------- */
+
+typedef struct txp_polish {
+    const txp_source *source;
+    const txp_stack *stack;
+    const txp_canvas *canvas;
+    txp_place *next;
+    int first_band;
+} txp_polish;
+
+/* For each pixel whose neighbours disagree about the piece it belongs to: of all pieces around, the
+   one whose 5 x 5 pixels fit best (k-coherence with k = 1; pixels inside a piece stay). */
+static void txp_polish_band(void *context, int index) {
+    const txp_polish *p = (const txp_polish *)context;
+    const txp_canvas *c = p->canvas;
+    const txp_source *s = p->source;
+    const txp_stack *k = p->stack;
+    const int top = (p->first_band + index) * TXP_BAND;
+    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
+    const int wx = c->wrap & TEXPATCH_TILE_X, wy = c->wrap & TEXPATCH_TILE_Y;
+    for (int y = top; y < bottom; y++) {
+        for (int x = 0; x < c->width; x++) {
+            const size_t i = txp_index(c, x, y);
+            const txp_place own = c->at[i];
+            txp_place tried[9], best = own;
+            int count = 0;
+            p->next[i] = own;
+            if (own.x < 0 || (c->fixed && c->fixed[i])) continue;
+            tried[count++] = own;
+            for (int d = 0; d < 9; d++) {
+                int qx = x + d % 3 - 1, qy = y + d / 3 - 1;
+                if (d == 4) continue;
+                if (wx) qx = qx < 0 ? qx + c->width : txp_wrap(qx, c->width);
+                if (wy) qy = qy < 0 ? qy + c->height : txp_wrap(qy, c->height);
+                if (qx < 0 || qy < 0 || qx >= c->width || qy >= c->height) continue;
+                txp_place at = c->at[txp_index(c, qx, qy)];
+                if (at.x < 0) continue;
+                at.x = (int16_t)(at.x - (d % 3 - 1));
+                at.y = (int16_t)(at.y - (d / 3 - 1));
+                int known = 0;
+                for (int t = 0; t < count && !known; t++)
+                    known = tried[t].x == at.x && tried[t].y == at.y;
+                if (!known) tried[count++] = at;
+            }
+            if (count == 1) continue;
+            /* the 5 x 5 pixels around, moved inwards at borders that do not wrap */
+            int x0 = x - 2, y0 = y - 2;
+            if (wx) x0 = x0 < 0 ? x0 + c->width : x0;
+            else x0 = txm_clampi(x0, 0, c->width - 5);
+            if (wy) y0 = y0 < 0 ? y0 + c->height : y0;
+            else y0 = txm_clampi(y0, 0, c->height - 5);
+            int dx = x - x0, dy = y - y0;
+            if (dx < 0) dx += c->width;
+            if (dy < 0) dy += c->height;
+            const uint8_t *target = txp_canvas_at(s, c, x0, y0);
+            uint32_t least = UINT32_MAX;
+            for (int t = 0; t < count; t++) {
+                const int sx = tried[t].x - dx, sy = tried[t].y - dy;
+                if (!txp_fits(s, k, sx, sy, 5, 5)) continue;
+                const uint32_t sad = txp_sad(target, c->pitch, txp_stack_at(s, k, sx, sy), k->pitch,
+                                             5 * s->bytes, 5, least);
+                if (sad >= least) continue;
+                least = sad;
+                best = tried[t];
+            }
+            p->next[i] = best;
+        }
+    }
+}
+
+/* ---- finish: pieces bent until lines meet, steps of colour spread ------------------------- */
+
+enum { TXP_REACH = 4, TXP_PROBE = 8, TXP_ROUNDS = 16, TXP_SEAMS = 64 };
+
+/* A field over the canvas that shall jump by given amounts between neighbours: the minimum of
+
+       sum over neighbours of pull |u(q) - u(p) - jump|^2 + screen |u|^2,
+
+   which jumps at the seams and fades within 1 / sqrt(screen) pixels.                            */
+typedef struct txp_field {
+    int width, height, wrap, lanes; /* lanes: values per pixel, 2 or a multiple of 4           */
+    float *value;
+    float *given;   /* lanes per pixel: what the jumps ask of it                               */
+    float *pull[2]; /* to the right neighbour, to the lower one; 1 inside a piece              */
+    float *scale;   /* 1 / (sum of the pulls + screen)                                         */
+    const uint8_t *fixed; /* value stays as it is; NULL: nowhere                               */
+    double screen;
+    int colour;     /* of the pixels that are relaxed now, as on a chessboard                  */
+} txp_field;
+
+static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *next,
+                                   const float *pull, int lanes) {
+    float *own = f->value + i * (size_t)lanes;
+    const float *given = f->given + i * (size_t)lanes, scale = f->scale[i];
+    const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
+    const float *c = f->value + next[2] * (size_t)lanes, *d = f->value + next[3] * (size_t)lanes;
+    for (int k = 0; k < lanes; k++) {
+        const float across = txm_float(txm_float(pull[0] * a[k]) + txm_float(pull[1] * b[k]));
+        const float along = txm_float(txm_float(pull[2] * c[k]) + txm_float(pull[3] * d[k]));
+        const float wanted = txm_float(txm_float(txm_float(across + along) + given[k]) * scale);
+        own[k] = txm_float(own[k] + txm_float(1.6f * txm_float(wanted - own[k])));
+    }
+}
+
+/* The pixels of one colour in 8 rows, relaxed beyond their best value. */
+static void txp_relax_rows(void *context, int index) {
+    const txp_field *f = (const txp_field *)context;
+    const int w = f->width, h = f->height, lanes = f->lanes;
+    for (int y = 8 * index; y < 8 * index + 8 && y < h; y++) {
+        const int up = y > 0 ? y - 1 : f->wrap & TEXPATCH_TILE_Y ? h - 1 : -1;
+        const int down = y + 1 < h ? y + 1 : f->wrap & TEXPATCH_TILE_Y ? 0 : -1;
+        for (int x = (y + f->colour) % 2; x < w; x += 2) {
+            const size_t i = (size_t)y * (size_t)w + (size_t)x;
+            if (f->fixed && f->fixed[i]) continue;
+            const int left = x > 0 ? x - 1 : f->wrap & TEXPATCH_TILE_X ? w - 1 : -1;
+            const int right = x + 1 < w ? x + 1 : f->wrap & TEXPATCH_TILE_X ? 0 : -1;
+            size_t next[4];
+            float pull[4];
+            next[0] = left < 0 ? i : (size_t)y * (size_t)w + (size_t)left;
+            next[1] = right < 0 ? i : (size_t)y * (size_t)w + (size_t)right;
+            next[2] = up < 0 ? i : (size_t)up * (size_t)w + (size_t)x;
+            next[3] = down < 0 ? i : (size_t)down * (size_t)w + (size_t)x;
+            pull[0] = left < 0 ? 0 : f->pull[0][next[0]];
+            pull[1] = right < 0 ? 0 : f->pull[0][i];
+            pull[2] = up < 0 ? 0 : f->pull[1][next[2]];
+            pull[3] = down < 0 ? 0 : f->pull[1][i];
+            if (lanes == 4) txp_relax_pixel(f, i, next, pull, 4);
+            else if (lanes == 2) txp_relax_pixel(f, i, next, pull, 2);
+            else txp_relax_pixel(f, i, next, pull, lanes);
+        }
+    }
+}
+
+static void txp_relax_field(txp_field *f, txm_env *env) {
+    for (f->colour = 0; f->colour < 2; f->colour++)
+        txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
+}
+
+/* A seam between two pieces, as last measured: its key is how far their offsets are apart. */
+typedef struct txp_seam {
+    int x, y, dx, dy, found, shift[2];
+} txp_seam;
+
+/* The shift of the second piece that makes it continue the first, within TXP_REACH pixels; both are
+   seen around the same pixel. 0: none is clearly better than staying. */
+static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shift[2]) {
+    const txp_stack *k = &s->stack[0];
+    const int ax = a.x - TXP_PROBE / 2, ay = a.y - TXP_PROBE / 2;
+    const int bx = b.x - TXP_PROBE / 2, by = b.y - TXP_PROBE / 2;
+    shift[0] = shift[1] = 0;
+    if (!txp_fits(s, k, ax, ay, TXP_PROBE, TXP_PROBE) || !txp_fits(s, k, bx, by, TXP_PROBE, TXP_PROBE))
+        return 0;
+    const uint8_t *target = txp_stack_at(s, k, ax, ay);
+    const uint32_t now = txp_sad(target, k->pitch, txp_stack_at(s, k, bx, by), k->pitch,
+                                 TXP_PROBE * s->bytes, TXP_PROBE, UINT32_MAX);
+    uint32_t best = now / 10 * 7;
+    int found = 0;
+    if (now < TXP_PROBE * TXP_PROBE * 4) return 0;
+    for (int dy = -TXP_REACH; dy <= TXP_REACH; dy++) {
+        for (int dx = -TXP_REACH; dx <= TXP_REACH; dx++) {
+            if (!txp_fits(s, k, bx + dx, by + dy, TXP_PROBE, TXP_PROBE)) continue;
+            const uint32_t sad = txp_sad(target, k->pitch, txp_stack_at(s, k, bx + dx, by + dy),
+                                         k->pitch, TXP_PROBE * s->bytes, TXP_PROBE, best);
+            if (sad >= best) continue;
+            best = sad;
+            shift[0] = dx;
+            shift[1] = dy;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* The same, remembered for the next pixels of the seam between the same two pieces. */
+static int txp_seam_known(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
+                          txp_place b, int shift[2]) {
+    const int dx = a.x - b.x, dy = a.y - b.y;
+    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAMS];
+    if (m->dx != dx || m->dy != dy || abs(m->x - x) + abs(m->y - y) > 3) {
+        m->x = x;
+        m->y = y;
+        m->dx = dx;
+        m->dy = dy;
+        m->found = txp_seam_shift(s, a, b, m->shift);
+    }
+    shift[0] = m->shift[0];
+    shift[1] = m->shift[1];
+    return m->found;
+}
+
+typedef struct txp_seams {
+    const txp_source *source;
+    const txp_canvas *canvas;
+    txp_field *bend, *tone;
+    int first_band;
+} txp_seams;
+
+/* What the seams right of and below the pixels of a band ask of the two fields: bend (x, y) and tone
+   (compared bytes). A step of colour is what both pieces see of each other in 5 x 5 pixels; small
+   steps are tone, large ones another thing. Stored for the first of the two pixels alone. */
+static void txp_measure_band(void *context, int lane) {
+    const txp_seams *m = (const txp_seams *)context;
+    const txp_source *s = m->source;
+    const txp_canvas *c = m->canvas;
+    const txp_stack *k = &s->stack[0];
+    const int top = (m->first_band + 2 * lane) * TXP_BAND, lanes = m->tone->lanes;
+    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
+    txp_seam seams[TXP_SEAMS];
+    memset(seams, 0, sizeof seams);
+    for (int y = top; y < bottom; y++) {
+        for (int x = 0; x < c->width; x++) {
+            const size_t i = txp_index(c, x, y);
+            for (int d = 0; d < 2; d++) {
+                float *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
+                int qx = x + !d, qy = y + d, shift[2];
+                *bend = *tone = 1;
+                if (qx >= c->width) qx = 0;
+                if (qy >= c->height) qy = 0;
+                txp_place a = c->at[i];
+                const txp_place q = c->at[txp_index(c, qx, qy)];
+                if (a.x < 0 || q.x < 0) {
+                    *bend = *tone = 0.05f;
+                    continue;
+                }
+                a.x = (int16_t)(a.x + !d);
+                a.y = (int16_t)(a.y + d);
+                if (a.x == q.x && a.y == q.y) continue;
+                if (!txp_seam_known(s, seams, x, y, a, q, shift)) *bend = 0.3f; /* fits as it is */
+                *tone = 0.05f;
+                const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2, by = q.y + shift[1] - 2;
+                int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
+                if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
+                    for (int v = 0; v < 5; v++) {
+                        const uint8_t *pa = txp_stack_at(s, k, ax, ay + v);
+                        const uint8_t *pb = txp_stack_at(s, k, bx, by + v);
+                        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
+                            for (int b = 0; b < s->guide_at; b++) sum[b] += pa[b] - pb[b];
+                        }
+                    }
+                    for (int b = 0; b < s->guide_at; b++)
+                        most = abs(sum[b]) > most ? abs(sum[b]) : most;
+                    if (most < 32 * 25)
+                        *tone = most < 12 * 25 ? 1 : 0.05f + 0.95f * (float)(32 * 25 - most) / (20 * 25);
+                }
+                /* u(q) - u(i) = jump: asked of q, and its negative of i */
+                const size_t j = txp_index(c, qx, qy);
+                for (int b = 0; b < 2; b++) {
+                    const float jump = *bend * (float)shift[b];
+                    m->bend->given[2 * i + (size_t)b] -= jump;
+                    m->bend->given[2 * j + (size_t)b] += jump;
+                }
+                for (int b = 0; b < s->guide_at && most < 32 * 25; b++) {
+                    const float jump = txm_float(*tone * ((float)sum[b] / 25));
+                    m->tone->given[i * (size_t)lanes + (size_t)b] -= jump;
+                    m->tone->given[j * (size_t)lanes + (size_t)b] += jump;
+                }
+            }
+        }
+    }
+}
+
+/* The scales of a field whose pulls are known. */
+static void txp_field_scale(const txp_field *f) {
+    const int w = f->width, h = f->height;
+    for (int y = 0; y < h; y++) {
+        for (int x = 0; x < w; x++) {
+            const size_t i = (size_t)y * (size_t)w + (size_t)x;
+            float sum = (float)f->screen;
+            if (x + 1 < w || f->wrap & TEXPATCH_TILE_X) sum = txm_float(sum + f->pull[0][i]);
+            if (y + 1 < h || f->wrap & TEXPATCH_TILE_Y) sum = txm_float(sum + f->pull[1][i]);
+            if (x > 0) sum = txm_float(sum + f->pull[0][i - 1]);
+            else if (f->wrap & TEXPATCH_TILE_X) sum = txm_float(sum + f->pull[0][i + (size_t)w - 1]);
+            if (y > 0) sum = txm_float(sum + f->pull[1][i - (size_t)w]);
+            else if (f->wrap & TEXPATCH_TILE_Y)
+                sum = txm_float(sum + f->pull[1][(size_t)(h - 1) * (size_t)w + (size_t)x]);
+            f->scale[i] = txm_float(1 / sum);
+        }
+    }
+}
+
+/* Room for a field; its values are all 0, in memory of their own. */
+static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
+                          txm_arena *memory, txm_arena *scratch) {
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    f->width = c->width;
+    f->height = c->height;
+    f->wrap = c->wrap;
+    f->fixed = c->fixed;
+    f->lanes = lanes;
+    f->screen = screen;
+    f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
+    f->given = (float *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(float));
+    f->pull[0] = (float *)txm_arena_alloc(scratch, pixels, sizeof(float));
+    f->pull[1] = (float *)txm_arena_alloc(scratch, pixels, sizeof(float));
+    f->scale = (float *)txm_arena_alloc(scratch, pixels, sizeof(float));
+    return f->value && f->given && f->pull[0] && f->pull[1] && f->scale;
+}
+/* ---- jobs --------------------------------------------------------------------------------- */
+
+/* gray levels per pixel: what twice the mean use, or a squared pixel off the lattice, counts */
+#ifndef TXP_USE
+#define TXP_USE 16.0
+#endif
+#define TXP_LATTICE 20.0
+
+enum { TXP_MAX_STEPS = 2 * TXP_MAX_LEVELS * 16 + 8 };
+typedef enum txp_kind { TXP_STEP_QUILT, TXP_STEP_PASS, TXP_STEP_POLISH, TXP_STEP_FINISH } txp_kind;
+typedef struct txp_step {
+    txp_kind kind;
+    int level, size, stride, round;
+    float cost; /* of the whole, about */
+} txp_step;
+
+/* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
+typedef struct txp_given {
+    uint8_t *pixels;     /* compared bytes: of what is fixed, and the guide of all               */
+    uint8_t *fixed;      /* 1 = not to be changed                                                */
+    uint8_t *free_guide; /* 1 = the guide says nothing                                           */
+    txp_place *at;       /* of what is fixed                                                     */
+    float *bend, *tone;  /* of what is fixed                                                     */
+} txp_given;
+
+struct texpatch_job {
+    txm_arena memory;       /* of the job, which lies in it                                      */
+    txm_arena source_memory; /* of the source; empty if another job or a plane owns that         */
+    txp_setup setup;
+    txp_source *source;
+    int width, height;      /* of the canvas at full size, margin included                       */
+    int margin_x, margin_y; /* where pixel (0, 0) of the output lies on it                       */
+    double shift_x, shift_y; /* lattice offset at full size                                      */
+    txp_step steps[TXP_MAX_STEPS];
+    int step_count, next_step;
+    int level;              /* that the canvas has now; -1: none yet                             */
+    txm_arena canvas_memory, finish_memory; /* of the canvas; of bend and tone                   */
+    txp_canvas canvas;
+    float *bend;            /* x, y by which each pixel's place is moved; NULL: not yet           */
+    float *tone;            /* what is added to each compared byte, txp_lanes of them             */
+    txp_given given;
+    uint64_t seed;
+    /* a part that is being made anew lies at (part_x, part_y) of the canvas */
+    texpatch_job *part;
+    int part_x, part_y;
+};
+
+/* values per pixel of the field of tones */
+static inline int txp_lanes(const txp_source *s) {
+    return (s->guide_at + 3) / 4 * 4;
+}
+
+static void txp_setup_steps(texpatch_job *job) {
+    const txp_source *s = job->source;
+    const int top = s->levels - 1, passes = job->setup.passes;
+    job->step_count = job->next_step = 0;
+    txp_step *t = &job->steps[job->step_count++];
+    t->kind = TXP_STEP_QUILT;
+    t->level = top;
+    t->cost = 1;
+    for (int l = top; l >= 0 && passes > 0; l--) {
+        for (int half = 0; half < 2; half++) {
+            const int count = l == 0 && job->setup.is_default ? 2 : passes;
+            for (int i = 0; i < count; i++) {
+                t = &job->steps[job->step_count++];
+                t->kind = TXP_STEP_PASS;
+                t->level = l;
+                t->round = i;
+                t->size = TXP_WINDOW >> half;
+                t->stride = half && l < top ? 2 : 4;
+                t->cost = txm_float(1.0 / (double)(1 << 2 * l));
+            }
+        }
+    }
+    for (int i = 0; i < 2 && passes > 0; i++) {
+        t = &job->steps[job->step_count++];
+        t->kind = TXP_STEP_POLISH;
+        t->level = 0;
+        t->round = i;
+        t->cost = 0.2f;
+    }
+    t = &job->steps[job->step_count++];
+    t->kind = TXP_STEP_FINISH;
+    t->level = 0;
+    t->cost = 0.5f;
+}
+
+static inline int txp_half(int x, int level) {
+    return (x + (1 << level) - 1) >> level;
+}
+
+/* A place of one level, as seen one level finer: the pixel with this parity of its four. */
+static inline txp_place txp_finer(const txp_source *s, int level, txp_place p, int px, int py) {
+    const txp_stack *c = &s->stack[level], *f = &s->stack[level - 1];
+    const int n = s->sheets > 1 && p.x >= 0 ? c->sheet[p.y] : 0;
+    txp_place q = p;
+    if (p.x < 0) return q;
+    q.x = (int16_t)(2 * p.x + px);
+    q.y = (int16_t)(f->first[n] + 2 * (p.y - c->first[n]) + py);
+    return q;
+}
+
+/* The empty canvas of a level, with what is kept and the guide in place. */
+static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena *arena,
+                                  txp_canvas *c, txm_env *env) {
+    const txp_source *s = job->source;
+    const size_t n = (size_t)s->bytes;
+    const int side = 1 << level;
+    memset(c, 0, sizeof *c);
+    c->width = txp_half(job->width, level);
+    c->height = txp_half(job->height, level);
+    c->wrap = job->setup.tileable;
+    c->pitch = (size_t)(c->width + TXP_PAD) * n;
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    c->pixels = (uint8_t *)txm_arena_zero(arena, (size_t)(c->height + TXP_PAD) + 1, c->pitch);
+    c->at = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->at);
+    if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
+    if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
+    if (!c->pixels || !c->at || (job->given.fixed && !c->fixed) || (job->given.free_guide && !c->free_guide))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+    memset(c->at, 255, pixels * sizeof *c->at);
+    if (!job->given.pixels) return TXM_OK;
+    for (int y = 0; y < c->height; y++) {
+        for (int x = 0; x < c->width; x++) {
+            const size_t i = txp_index(c, x, y);
+            uint32_t sum[TEXPATCH_MAX_CHANNELS] = {0};
+            int count = 0, kept = 0, unbound = 0;
+            for (int v = y * side; v < (y + 1) * side && v < job->height; v++) {
+                for (int u = x * side; u < (x + 1) * side && u < job->width; u++) {
+                    const size_t k = (size_t)v * (size_t)job->width + (size_t)u;
+                    count++;
+                    if (job->given.fixed) kept += job->given.fixed[k];
+                    if (job->given.free_guide) unbound += job->given.free_guide[k];
+                    for (size_t b = 0; b < n; b++) sum[b] += job->given.pixels[k * n + b];
+                }
+            }
+            uint8_t *out = txp_canvas_at(s, c, x, y);
+            for (size_t b = 0; b < n; b++)
+                out[b] = (uint8_t)((sum[b] + (uint32_t)count / 2) / (uint32_t)count);
+            if (c->free_guide) c->free_guide[i] = unbound * 2 > count;
+            if (c->fixed && kept == count) {
+                const size_t k = (size_t)(y * side) * (size_t)job->width + (size_t)(x * side);
+                c->fixed[i] = 1;
+                if (job->given.at) {
+                    txp_place p = job->given.at[k];
+                    const int sheet = s->sheets > 1 && p.x >= 0 ? s->stack[0].sheet[p.y] : 0;
+                    if (p.x >= 0) {
+                        const txp_stack *t = &s->stack[level];
+                        p.x = (int16_t)txm_clampi(p.x >> level, 0, t->wide[sheet] - 1);
+                        p.y = (int16_t)(t->first[sheet] +
+                                        txm_clampi((p.y - s->stack[0].first[sheet]) >> level, 0,
+                                                   t->high[sheet] - 1));
+                    }
+                    c->at[i] = p;
+                }
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+static int txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
+    u->columns = (k->width + TXP_CELL - 1) / TXP_CELL;
+    u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
+    u->count = (uint32_t *)txm_arena_zero(arena, (size_t)u->columns * (size_t)u->rows,
+                                          sizeof *u->count);
+    u->mean = 1;
+    return u->count != NULL;
+}
+
+static void txp_quilt_one(void *context, int index) {
+    txp_quilt *q = (txp_quilt *)context + index;
+    txp_quilt_run(q);
+}
+
+/* The first pass: some tries side by side on a small canvas, of which the one with the cheapest
+   cuts stays. */
+static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canvas *out,
+                                 txm_env *env) {
+    txp_source *s = job->source;
+    const int level = s->levels - 1;
+    const txp_stack *k = &s->stack[level];
+    txm_arena scratch;
+    txp_quilt q[TXP_STARTS];
+    txm_status status = TXM_OK;
+    int starts = s->is_random || s->bytes > 4 ? 1 : TXP_STARTS, best = -1;
+    memset(q, 0, sizeof q);
+    status = txp_canvas_make(job, level, memory, out, env);
+    if (status != TXM_OK) return status;
+    const size_t pixels = (size_t)out->width * (size_t)out->height;
+    const size_t bytes = out->pitch * ((size_t)(out->height + TXP_PAD) + 1);
+    txm_arena_init(&scratch, env);
+    if (pixels > 300 * 300) starts = 1;
+    for (int i = 0; i < starts; i++) {
+        txp_quilt *t = &q[i];
+        t->source = s;
+        t->stack = k;
+        t->canvas = *out;
+        t->block = job->setup.patch ? txm_clampi(((job->setup.patch >> level) + 2) / 4 * 4, 8, 4 * TXP_BLOCK)
+                   : s->is_random  ? TXP_SMALL_BLOCK
+                                   : TXP_BLOCK;
+        for (int n = 0; n < s->sheets; n++) {
+            const int side = k->wide[n] < k->high[n] ? k->wide[n] : k->high[n];
+            while (t->block > 8 && t->block > side * 2 / 3) t->block -= 4;
+        }
+        if (out->wrap) {
+            while (t->block > 8 && (t->block > out->width * 2 / 3 || t->block > out->height * 2 / 3 || t->block > TXP_PAD))
+                t->block -= 4;
+        }
+        t->overlap = t->block / 2;
+        t->use_weight = TXP_USE;
+        t->lattice_weight = TXP_LATTICE;
+        t->rng = txm_rng_make(job->seed, (uint64_t)(1000 + i));
+        t->shift_x = job->shift_x / (1 << level);
+        t->shift_y = job->shift_y / (1 << level);
+        t->canvas.pixels = (uint8_t *)txm_arena_alloc(&scratch, bytes, 1);
+        t->canvas.at = (txp_place *)txm_arena_alloc(&scratch, pixels, sizeof(txp_place));
+        t->known = (uint8_t *)txm_arena_zero(&scratch, bytes, 1);
+        t->done = (uint8_t *)txm_arena_zero(&scratch, pixels, 1);
+        t->error = (float *)txm_arena_alloc(&scratch, (size_t)(t->block * t->block), sizeof(float));
+        t->scratch = (double *)txm_arena_alloc(&scratch, (size_t)(t->block * t->overlap), sizeof(double));
+        t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(txp_place));
+        t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(float));
+        if (!txp_use_make(k, &t->use, &scratch) || !t->canvas.pixels || !t->canvas.at || !t->known || !t->done || !t->error || !t->scratch ||
+            !t->near_places || !t->near_costs) {
+            status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the first pass");
+            goto done;
+        }
+        t->use.mean = (double)pixels / (t->use.columns * t->use.rows);
+        memcpy(t->canvas.pixels, out->pixels, bytes);
+        memcpy(t->canvas.at, out->at, pixels * sizeof(txp_place));
+        const size_t n = (size_t)s->bytes, guide = (size_t)s->guide_at;
+        for (int y = 0; y < out->height; y++) {
+            for (int x = 0; x < out->width; x++) {
+                const size_t p = txp_index(out, x, y);
+                uint8_t *known = t->known + (size_t)y * out->pitch + (size_t)x * n;
+                if (out->fixed && out->fixed[p]) {
+                    t->done[p] = 1;
+                    memset(known, 255, guide);
+                }
+                if (guide < n && !(out->free_guide && out->free_guide[p]))
+                    memset(known + guide, 255, n - guide);
+            }
+        }
+        txp_canvas_close(s, &t->canvas, t->known);
+        txp_canvas_close(s, &t->canvas, t->canvas.pixels);
+    }
+    if (txm_progress(env, texpatch_done(job), "patches")) {
+        status = txm_fail(env, TXM_CANCELLED, "cancelled");
+        goto done;
+    }
+    txm_parallel_for(env, starts, txp_quilt_one, q);
+    for (int i = 0; i < starts; i++) {
+        if (q[i].failed) {
+            status = txm_fail(env, TXM_TOO_SMALL, "no piece of the exemplar is free of masked pixels; "
+                                                  "mask less, or make smaller patches");
+            goto done;
+        }
+        if (best < 0 || q[i].cost < q[best].cost) best = i;
+    }
+    memcpy(out->at, q[best].canvas.at, pixels * sizeof(txp_place));
+    txp_canvas_show(s, k, out, 0, out->height);
+done:
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* The canvas one level finer. */
+static txm_status txp_refine(const texpatch_job *job, const txp_canvas *from, int level,
+                             txm_arena *memory, txp_canvas *c, txm_env *env) {
+    const txp_source *s = job->source;
+    txm_status status = txp_canvas_make(job, level, memory, c, env);
+    if (status != TXM_OK) return status;
+    for (int y = 0; y < c->height; y++) {
+        for (int x = 0; x < c->width; x++) {
+            const size_t i = txp_index(c, x, y);
+            if (c->fixed && c->fixed[i]) continue;
+            txp_place p = from->at[txp_index(from, x / 2, y / 2)];
+            if (p.x < 0) { /* next to kept pixels: from any side */
+                const int tx[4] = {x / 2 + 1, x / 2 - 1, x / 2, x / 2}, ty[4] = {y / 2, y / 2, y / 2 + 1, y / 2 - 1};
+                for (int d = 0; d < 4 && p.x < 0; d++) {
+                    if (tx[d] >= 0 && ty[d] >= 0 && tx[d] < from->width && ty[d] < from->height)
+                        p = from->at[txp_index(from, tx[d], ty[d])];
+                }
+            }
+            c->at[i] = txp_finer(s, level + 1, p, x & 1, y & 1);
+        }
+    }
+    txp_canvas_show(s, &s->stack[level], c, 0, c->height);
+    return TXM_OK;
+}
+
+static int txp_grid(int extent, int size, int step, int wraps, int *at) {
+    int n = 0;
+    if (wraps) {
+        for (int x = 0; x < extent; x += step) at[n++] = x;
+        return n;
+    }
+    for (int x = 0; x < extent - size; x += step) at[n++] = x;
+    at[n++] = extent - size;
+    return n;
+}
+
+/* Room for a pass over c. */
+static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
+    const int n = p->source->bytes;
+    const size_t band = (size_t)c->width * TXP_BAND;
+    p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
+    p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
+    if (!p->xs || !p->ys) return 0;
+    p->columns = txp_grid(c->width, p->size, p->step, c->wrap & TEXPATCH_TILE_X, p->xs);
+    p->rows = txp_grid(c->height, p->size, p->step, c->wrap & TEXPATCH_TILE_Y, p->ys);
+    const size_t windows = (size_t)p->columns * (size_t)p->rows;
+    p->match = (txp_place *)txm_arena_alloc(scratch, windows, sizeof *p->match);
+    p->sad = (uint32_t *)txm_arena_alloc(scratch, windows, sizeof *p->sad);
+    p->weight = (int32_t *)txm_arena_alloc(scratch, windows, sizeof *p->weight);
+    p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
+    if (!p->match || !p->sad || !p->weight || !p->grain) return 0;
+    memset(p->match, 255, windows * sizeof *p->match);
+    for (int i = 0; i < TXP_LANES; i++) {
+        txp_band *b = &p->bands[i];
+        b->sums = (int32_t *)txm_arena_alloc(scratch, band, (size_t)(n + 2) * sizeof(int32_t));
+        b->mean = (uint8_t *)txm_arena_alloc(scratch, band, (size_t)n);
+        if (!b->sums || !b->mean) return 0;
+        b->total = b->sums + band * (size_t)n;
+        b->nearest = b->total + band;
+    }
+    return 1;
+}
+
+/* One pass of the optimisation over c; the places it chooses go into next. */
+static txm_status txp_run_pass(texpatch_job *job, const txp_step *t, txp_canvas *c, txp_place *next,
+                               txm_env *env) {
+    const txp_source *s = job->source;
+    const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
+    txm_arena scratch;
+    txp_pass p;
+    txm_status status = TXM_OK;
+    memset(&p, 0, sizeof p);
+    txm_arena_init(&scratch, env);
+    p.source = s;
+    p.stack = &s->stack[t->level];
+    p.canvas = c;
+    p.size = t->size;
+    p.step = t->stride;
+    p.next = next;
+    p.shift_x = job->shift_x / (1 << t->level);
+    p.shift_y = job->shift_y / (1 << t->level);
+    p.use_weight = TXP_USE / 2;
+    p.lattice_weight = TXP_LATTICE / 5;
+    p.novelty = t->level == 0 ? (double)job->setup.novelty : 0;
+    p.exhaustive = t->level == s->levels - 1 && t->round == 0 && p.size == TXP_WINDOW;
+    p.seed = txm_hash(job->seed + (uint64_t)(job->next_step + 1) * 7919);
+    txp_bell(p.size, p.bell);
+    if (!txp_pass_make(&p, c, &scratch) || !txp_use_make(p.stack, &p.use, &scratch)) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
+        goto done;
+    }
+    txp_count_use(c, &p.use);
+    txp_canvas_close(s, c, c->pixels);
+    for (p.first_row = 0; p.first_row < p.rows; p.first_row += 32) {
+        if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
+        txm_parallel_for(env, p.rows - p.first_row < 32 ? p.rows - p.first_row : 32, txp_match_row,
+                         &p);
+    }
+    txp_weigh(&p);
+    memcpy(next, c->at, (size_t)c->width * (size_t)c->height * sizeof *next);
+    for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
+        if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
+        txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
+                         txp_choose_band, &p);
+    }
+done:
+    txm_arena_free(&scratch);
+    return status;
+cancelled:
+    txm_arena_free(&scratch);
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+static txm_status txp_run_polish(texpatch_job *job, txp_canvas *c, txp_place *next, txm_env *env) {
+    txp_polish p;
+    p.source = job->source;
+    p.stack = &job->source->stack[0];
+    p.canvas = c;
+    p.next = next;
+    txp_canvas_close(p.source, c, c->pixels);
+    const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
+    for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
+        if (txm_progress(env, texpatch_done(job), "polishing"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
+                         txp_polish_band, &p);
+    }
+    return TXM_OK;
+}
+
+/* ---- public: checks ----------------------------------------------------------------------- */
+
+static int txp_is_in(float x, float low, float high) {
+    return x >= low && x <= high;
+}
+
+/* The smallest and largest sample of a map over all exemplars; 8- and 16-bit samples span 0..1. */
+static void txp_range(const txm_image *im, float *low, float *high) {
+    if (im->sample != TXM_F32) {
+        *low = txm_minf(*low, 0);
+        *high = txm_maxf(*high, 1);
+        return;
+    }
+    for (int y = 0; y < im->height; y++) {
+        const float *row = (const float *)txm_image_row_const(im, y);
+        for (size_t i = 0; i < (size_t)im->width * (size_t)im->channels; i++) {
+            *low = txm_minf(*low, row[i]);
+            *high = txm_maxf(*high, row[i]);
+        }
+    }
+}
+
+static txm_status txp_check_picture(const txm_image *im, const char *name, txm_env *env) {
+    const txm_status status = txm_image_check(im, name, TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (!txm_image_is_finite(im))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite");
+    return TXM_OK;
+}
+
+static txm_status txp_check_mask(const txm_image *im, const char *name, int width, int height,
+                                 txm_env *env) {
+    const txm_status status = txm_image_check(im, name, TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (im->sample != TXM_U8 || im->channels > 1 || im->width != width || im->height != height)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "must be TXM_U8 with 1 channel and the size of its picture");
+    return TXM_OK;
+}
+
+/* The exemplars and how they are treated; the output's side is checked by the caller. */
+static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
+                                      txm_env *env) {
+    txm_status status = TXM_OK;
+    int bytes = 0, rows = 0;
+    if (!d->exemplars || d->exemplar_count < 1 || d->exemplar_count > TEXPATCH_MAX_EXEMPLARS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "exemplar_count must be 1 to 8, exemplars not NULL");
+    if (d->map_count < 1 || d->map_count > TEXPATCH_MAX_MAPS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "map_count must be 1 to 16");
+    if (d->turns != 0 && d->turns != 1 && d->turns != 2 && d->turns != 4)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "turns must be 1, 2 or 4 (0 means 1)");
+    if (d->patch < 0 || d->patch > TEXPATCH_MAX_SIDE)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 8192 pixels");
+    if (d->passes < -1 || d->passes > 16)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "passes must be 1 to 16, 0 for 3, or -1 for none");
+    if (!txp_is_in(d->novelty, 0, 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "novelty must be 0 to 1");
+    if (!txp_is_in(d->guide_weight, 0, 16))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "guide_weight must be 0 to 16");
+    if (d->lattice < -1 || d->lattice > 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "lattice must be -1, 0 or 1");
+    u->exemplar_count = d->exemplar_count;
+    u->map_count = d->map_count;
+    u->turns = d->turns ? d->turns : 1;
+    u->mirror = d->mirror != 0;
+    u->patch = d->patch;
+    u->passes = d->passes < 0 ? 0 : d->passes ? d->passes : 3;
+    u->is_default = d->passes == 0;
+    u->novelty = d->novelty;
+    u->guide_weight = d->guide_weight > 0 ? d->guide_weight : 2;
+    u->lattice = d->lattice;
+    u->seed = d->seed;
+    for (int i = 0; i < 4 && d->lattice == 1; i++) {
+        if (!txm_is_finite((double)d->lattice_vectors[i]))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be finite");
+        u->lattice_vectors[i] = (double)d->lattice_vectors[i];
+    }
+    if (d->lattice == 1 && !(fabs(txp_det(u->lattice_vectors, u->lattice_vectors + 2)) >= 16))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "lattice_vectors must span 16 pixels or more; use lattice 0 to find them");
+    for (int m = 0; m < d->map_count; m++) {
+        if (d->maps) u->kinds[m] = d->maps[m];
+        else u->kinds[m].weight = m ? 0.0f : 1.0f;
+        if (!txp_is_in(u->kinds[m].weight, 0, 16))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "the weight of a map must be 0 to 16");
+        u->low[m] = 0;
+        u->high[m] = 0;
+    }
+    for (int e = 0; e < d->exemplar_count && status == TXM_OK; e++) {
+        const texpatch_exemplar *x = &d->exemplars[e];
+        if (!x->maps) return txm_fail(env, TXM_BAD_ARGUMENT, "the maps of an exemplar are NULL");
+        for (int m = 0; m < d->map_count && status == TXM_OK; m++) {
+            status = txp_check_picture(&x->maps[m], "exemplar", env);
+            if (status != TXM_OK) return status;
+            u->maps[e][m] = txm_image_resolve(x->maps[m]);
+            const txm_image *im = &u->maps[e][m], *first = &u->maps[0][m];
+            if (im->width != u->maps[e][0].width || im->height != u->maps[e][0].height ||
+                im->channels != first->channels || im->sample != first->sample)
+                return txm_fail(env, TXM_BAD_ARGUMENT, "maps of an exemplar must have one size, and "
+                                                       "all exemplars the same channels and samples");
+            if (u->kinds[m].is_normal && im->channels < 3)
+                return txm_fail(env, TXM_BAD_ARGUMENT, "a normal map has 3 or 4 channels");
+            txp_range(im, &u->low[m], &u->high[m]);
+            if (e == 0 && u->kinds[m].weight > 0) bytes += im->channels;
+        }
+        const int w = u->maps[e][0].width, h = u->maps[e][0].height;
+        if (w < TEXPATCH_MIN_SIDE || h < TEXPATCH_MIN_SIDE)
+            return txm_fail(env, TXM_TOO_SMALL, "an exemplar must be 32 x 32 pixels or more");
+        if (w > TEXPATCH_MAX_SIDE || h > TEXPATCH_MAX_SIDE)
+            return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 8192 x 8192 pixels at most");
+        rows += (u->turns > 2 ? (w > h ? w : h) : h) * u->turns * (u->mirror ? 2 : 1);
+        if ((x->guide.pixels != NULL) != (d->exemplars[0].guide.pixels != NULL))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "give all exemplars a guide, or none");
+        if (x->guide.pixels) {
+            status = txp_check_picture(&x->guide, "guide", env);
+            if (status != TXM_OK) return status;
+            u->guides[e] = txm_image_resolve(x->guide);
+            if (u->guides[e].width != w || u->guides[e].height != h ||
+                u->guides[e].channels != u->guides[0].channels ||
+                u->guides[e].sample != u->guides[0].sample)
+                return txm_fail(env, TXM_BAD_ARGUMENT, "a guide has the size of its exemplar, and "
+                                                       "all have the same channels and samples");
+            txp_range(&u->guides[e], &u->guide_low, &u->guide_high);
+        }
+        if (x->mask.pixels) {
+            status = txp_check_mask(&x->mask, "mask", w, h, env);
+            u->masks[e] = x->mask;
+        }
+    }
+    if (status != TXM_OK) return status;
+    if (!bytes) return txm_fail(env, TXM_BAD_ARGUMENT, "one map at least must have a weight");
+    s->guide_bytes = u->guides[0].pixels ? u->guides[0].channels : 0;
+    if (bytes + s->guide_bytes > TEXPATCH_MAX_CHANNELS)
+        return txm_fail(env, TXM_TOO_LARGE, "maps with a weight and the guide may have 16 channels "
+                                            "together; give some maps weight 0");
+    if (rows > INT16_MAX)
+        return txm_fail(env, TXM_TOO_LARGE, "the exemplars are too high together (32767 rows, each "
+                                            "turned form counted)");
+    s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
+    s->guide_at = s->guide_bytes ? bytes : s->bytes;
+    return TXM_OK;
+}
+
+/* The output's side of a description. */
+static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const txp_source *s,
+                                   txm_env *env) {
+    txm_status status = TXM_OK;
+    if (d->width < 1 || d->height < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
+    if (d->height > TEXPATCH_MAX_PIXELS / d->width)
+        return txm_fail(env, TXM_TOO_LARGE, "more than TEXPATCH_MAX_PIXELS pixels; use windows");
+    if (d->tileable < 0 || d->tileable > 3)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "tileable must be a sum of TEXPATCH_TILE_X and _Y");
+    if ((d->tileable & TEXPATCH_TILE_X && d->width < TXP_PAD) ||
+        (d->tileable & TEXPATCH_TILE_Y && d->height < TXP_PAD))
+        return txm_fail(env, TXM_TOO_SMALL, "a tileable side must be 32 pixels or more");
+    u->width = d->width;
+    u->height = d->height;
+    u->tileable = d->tileable;
+    if ((d->guide.pixels != NULL) != (s->guide_bytes > 0))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "a guide is given of the exemplars and of the output, "
+                                               "or of neither");
+    if (d->guide.pixels) {
+        status = txp_check_picture(&d->guide, "guide", env);
+        if (status != TXM_OK) return status;
+        const txm_image guide = txm_image_resolve(d->guide);
+        if (guide.width != d->width || guide.height != d->height ||
+            guide.channels != u->guides[0].channels || guide.sample != u->guides[0].sample)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide", "must have the size of the output and "
+                                                               "the format of the exemplars' guides");
+        if (d->guide_mask.pixels)
+            status = txp_check_mask(&d->guide_mask, "guide_mask", d->width, d->height, env);
+    }
+    if (status != TXM_OK || !d->kept) return status;
+    if (!d->keep.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "kept needs the mask keep");
+    status = txp_check_mask(&d->keep, "keep", d->width, d->height, env);
+    for (int m = 0; m < d->map_count && status == TXM_OK; m++) {
+        status = txp_check_picture(&d->kept[m], "kept", env);
+        if (status != TXM_OK) return status;
+        u->kept[m] = txm_image_resolve(d->kept[m]);
+        if (u->kept[m].width != d->width || u->kept[m].height != d->height ||
+            u->kept[m].channels != u->maps[0][m].channels ||
+            u->kept[m].sample != u->maps[0][m].sample)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "kept",
+                               "must have the size of the output and the format of its map");
+    }
+    return status;
+}
+
+/* ---- public: jobs ------------------------------------------------------------------------- */
+
+/* The lattice of a torus whose sides are multiples of it: the steps nearest to `lattice` of which
+   whole numbers lead along the sides that wrap. 0: none is within a tenth. */
+static int txp_lattice_close(const double lattice[4], int tileable, double width, double height,
+                             double out[4]) {
+    const double *a = lattice, *b = lattice + 2;
+    const double det = txp_det(a, b), sides[2] = {width, height};
+    double count[2][2], target[2][2];
+    for (int d = 0; d < 2; d++) {
+        /* steps to the end of this axis, rounded */
+        const double x = d ? 0 : sides[0], y = d ? sides[1] : 0;
+        const double u = (x * b[1] - y * b[0]) / det, v = (a[0] * y - a[1] * x) / det;
+        count[d][0] = floor(u + 0.5);
+        count[d][1] = floor(v + 0.5);
+        target[d][0] = x;
+        target[d][1] = y;
+        if (!(tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) { /* free: where it is now */
+            target[d][0] = count[d][0] * a[0] + count[d][1] * b[0];
+            target[d][1] = count[d][0] * a[1] + count[d][1] * b[1];
+        }
+    }
+    const double m = count[0][0] * count[1][1] - count[0][1] * count[1][0];
+    if (!(fabs(m) > 0.5)) return 0;
+    for (int c = 0; c < 2; c++) { /* solve count (out a, out b) = target */
+        out[c] = (count[1][1] * target[0][c] - count[0][1] * target[1][c]) / m;
+        out[2 + c] = (count[0][0] * target[1][c] - count[1][0] * target[0][c]) / m;
+    }
+    for (int k = 0; k < 4; k += 2) {
+        const double dx = out[k] - lattice[k], dy = out[k + 1] - lattice[k + 1];
+        if (dx * dx + dy * dy > 0.01 * (lattice[k] * lattice[k] + lattice[k + 1] * lattice[k + 1]))
+            return 0;
+    }
+    return fabs(txp_det(out, out + 2)) > 0.5 * fabs(det);
+}
+
+/* Sheets, stacks and lattice; a torus of a texture with a lattice gets a sheet that is stretched until
+   the sides are multiples of the steps. The arenas hold what is kept. */
+static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *memory,
+                                  txm_env *env) {
+    int least = INT_MAX;
+    if (u->tileable & TEXPATCH_TILE_X) least = u->width;
+    if (u->tileable & TEXPATCH_TILE_Y && u->height < least) least = u->height;
+    txm_arena first;
+    double closed[4], stretch[4], det;
+    const double *v = s->stack[0].lattice;
+    txm_arena_init(&first, env);
+    txp_sheets(u, s, NULL);
+    txp_source_sizes(s, least);
+    txm_status status = txp_stacks(u, s, &first, env);
+    if (status == TXM_OK) status = txp_lattice_search(u, s, env);
+    if (status != TXM_OK || !s->has_lattice || !u->tileable || s->sheets > 1) goto done;
+    if (!txp_lattice_close(v, u->tileable, u->width, u->height, closed)) {
+        s->has_lattice = 0; /* too small a torus for it */
+        goto done;
+    }
+    /* the exemplar at stretch p is what the sheet shows at p: it takes closed to v */
+    det = txp_det(closed, closed + 2);
+    stretch[0] = (v[0] * closed[3] - v[2] * closed[1]) / det;
+    stretch[1] = (v[1] * closed[3] - v[3] * closed[1]) / det;
+    stretch[2] = (v[2] * closed[0] - v[0] * closed[2]) / det;
+    stretch[3] = (v[3] * closed[0] - v[1] * closed[2]) / det;
+    txm_arena_free(&first);
+    txp_sheets(u, s, stretch);
+    txp_source_sizes(s, least);
+    status = txp_stacks(u, s, &first, env);
+    for (int l = 0; l < s->levels && status == TXM_OK; l++)
+        txp_lattice_set(&s->stack[l], closed, 1.0 / (1 << l));
+done:
+    if (status == TXM_OK) *memory = first;
+    else txm_arena_free(&first);
+    return status;
+}
+
+/* A job on a source, with nothing given yet. It owns `memory`, in which it lies, on success. */
+static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, int height,
+                                  uint64_t seed, txm_arena *memory, txm_env *env) {
+    texpatch_job *job = (texpatch_job *)txm_arena_zero(memory, 1, sizeof *job);
+    if (!job) return NULL;
+    job->setup = *u;
+    job->source = s;
+    job->seed = seed;
+    job->level = -1;
+    job->width = width;
+    job->height = height;
+    txp_setup_steps(job);
+    txm_arena_init(&job->canvas_memory, env);
+    txm_arena_init(&job->finish_memory, env);
+    txm_arena_init(&job->source_memory, env);
+    return job;
+}
+
+/* Room for what is given of a canvas; what is 0 here is not wanted. */
+static int txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
+                          int free_guide, int places, txm_arena *memory) {
+    g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);
+    if (fixed) g->fixed = (uint8_t *)txm_arena_zero(memory, pixels, 1);
+    if (free_guide) g->free_guide = (uint8_t *)txm_arena_zero(memory, pixels, 1);
+    if (places) {
+        g->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *g->at);
+        g->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
+        g->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
+    }
+    return g->pixels && (!fixed || g->fixed) && (!free_guide || g->free_guide) &&
+           (!places || (g->at && g->bend && g->tone));
+}
+
+/* The guide and its mask, on the canvas; the margin has what the border has. */
+static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const txm_image *mask,
+                           const txp_given *g) {
+    const txp_source *s = job->source;
+    const txp_setup *u = &job->setup;
+    uint8_t bytes[TEXPATCH_MAX_CHANNELS];
+    for (int y = 0; y < job->height; y++) {
+        const int gy = txm_clampi(y - job->margin_y, 0, u->height - 1);
+        for (int x = 0; x < job->width; x++) {
+            const int gx = txm_clampi(x - job->margin_x, 0, u->width - 1);
+            const size_t i = (size_t)y * (size_t)job->width + (size_t)x;
+            const size_t tail = (size_t)(s->bytes - s->guide_at);
+            txp_features(u, s, NULL, guide, gx, gy, 1, bytes);
+            memcpy(g->pixels + i * (size_t)s->bytes + s->guide_at, bytes + s->guide_at, tail);
+            if (g->free_guide)
+                g->free_guide[i] = mask->pixels &&
+                                   ((const uint8_t *)txm_image_row_const(mask, gy))[gx] == 0;
+        }
+    }
+}
+
+TEXPATCH_API void texpatch_free(texpatch_job *job) {
+    if (!job) return;
+    texpatch_free(job->part);
+    txm_arena_free(&job->canvas_memory);
+    txm_arena_free(&job->finish_memory);
+    txm_arena_free(&job->source_memory);
+    txm_arena memory = job->memory; /* the job lies in it */
+    txm_arena_free(&memory);
+}
+
+TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
+                                       texpatch_job **out) {
+    txp_setup setup;
+    txp_source source;
+    txm_arena memory, source_memory;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
+    memset(&setup, 0, sizeof setup);
+    memset(&source, 0, sizeof source);
+    txm_status status = txp_check_exemplars(desc, &setup, &source, env);
+    if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
+    if (status != TXM_OK) return status;
+    status = txp_source_make(&setup, &source, &source_memory, env);
+    if (status != TXM_OK) return status;
+
+    txm_rng rng = txm_rng_make(desc->seed, 5);
+    const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
+    const int room = 2 * TXP_WINDOW << (source.levels - 1); /* a canvas must hold some patches */
+    int width = desc->width + (wx ? 0 : 2 * TXP_MARGIN);
+    int height = desc->height + (wy ? 0 : 2 * TXP_MARGIN);
+    if (!wx && width < room) width = room;
+    if (!wy && height < room) height = room;
+    const size_t pixels = (size_t)width * (size_t)height;
+    txm_arena_init(&memory, env);
+    txp_source *s = (txp_source *)txm_arena_alloc(&memory, 1, sizeof *s);
+    if (s) *s = source;
+    texpatch_job *job = s ? txp_job_make(&setup, s, width, height, desc->seed, &memory, env) : NULL;
+    if (!job) goto no_memory;
+    job->margin_x = wx ? 0 : TXP_MARGIN;
+    job->margin_y = wy ? 0 : TXP_MARGIN;
+    job->shift_x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
+    job->shift_y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
+    if (s->guide_bytes || desc->kept) {
+        if (!txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0,
+                            &memory))
+            goto no_memory;
+        for (int y = 0; y < desc->height && desc->kept; y++) {
+            const uint8_t *keep = (const uint8_t *)txm_image_row_const(&desc->keep, y);
+            for (int x = 0; x < desc->width; x++) {
+                const size_t i = (size_t)(y + job->margin_y) * (size_t)width +
+                                 (size_t)(x + job->margin_x);
+                if (!keep[x]) continue;
+                job->given.fixed[i] = 1;
+                txp_features(&setup, s, setup.kept, NULL, x, y, 1,
+                             job->given.pixels + i * (size_t)s->bytes);
+            }
+        }
+        if (s->guide_bytes) {
+            const txm_image guide = txm_image_resolve(desc->guide);
+            const txm_image mask = desc->guide_mask.pixels ? txm_image_resolve(desc->guide_mask)
+                                                           : desc->guide_mask;
+            txp_guide_load(job, &guide, &mask, &job->given);
+        }
+    }
+    job->memory = memory;
+    job->source_memory = source_memory;
+    *out = job;
+    return TXM_OK;
+no_memory:
+    txm_arena_free(&memory);
+    txm_arena_free(&source_memory);
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
+}
+/* The two fields of the finished canvas. */
+static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
+                             float **toned, txm_env *env) {
+    const txp_source *s = job->source;
+    const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    txm_arena scratch;
+    txp_field bend, tone;
+    txp_seams seams;
+    txm_status status = TXM_OK;
+    memset(&bend, 0, sizeof bend);
+    memset(&tone, 0, sizeof tone);
+    txm_arena_init(&scratch, env);
+    if (!txp_field_make(&bend, c, 2, 0.02, memory, &scratch) ||
+        !txp_field_make(&tone, c, lanes, 0.004, memory, &scratch)) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
+        goto done;
+    }
+    for (size_t i = 0; i < pixels && job->given.bend; i++) {
+        if (!job->given.fixed[i]) continue;
+        memcpy(bend.value + 2 * i, job->given.bend + 2 * i, 2 * sizeof(float));
+        memcpy(tone.value + (size_t)lanes * i, job->given.tone + (size_t)lanes * i,
+               (size_t)lanes * sizeof(float));
+    }
+    seams.source = s;
+    seams.canvas = c;
+    seams.bend = &bend;
+    seams.tone = &tone;
+    /* A band asks something of the first row of the next: every second one at a time, the last (whose
+       next may be the first) by itself. */
+    for (int turn = 0; turn < 3; turn++) {
+        const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
+        for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
+            const int count = (end - seams.first_band + 1) / 2;
+            if (txm_progress(env, texpatch_done(job), "blending")) {
+                status = txm_fail(env, TXM_CANCELLED, "cancelled");
+                goto done;
+            }
+            txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
+        }
+    }
+    txp_field_scale(&bend);
+    txp_field_scale(&tone);
+    for (int i = 0; i < TXP_ROUNDS; i++) {
+        if (txm_progress(env, texpatch_done(job), "blending")) {
+            status = txm_fail(env, TXM_CANCELLED, "cancelled");
+            goto done;
+        }
+        txp_relax_field(&bend, env);
+        txp_relax_field(&tone, env);
+    }
+    *bent = bend.value;
+    *toned = tone.value;
+done:
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* A step of a job without a part. */
+static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
+    txm_arena memory;
+    txp_canvas canvas, finer;
+    txm_status status = TXM_OK;
+    const txp_step *t = &job->steps[job->next_step];
+    int level = job->level;
+    txm_arena_init(&memory, env);
+    canvas = job->canvas;
+    if (t->kind == TXP_STEP_QUILT) {
+        status = txp_step_quilt(job, &memory, &canvas, env);
+        level = t->level;
+    }
+    while (status == TXM_OK && level > t->level) {
+        status = txp_refine(job, &canvas, --level, &memory, &finer, env);
+        canvas = finer;
+    }
+    const int is_new = level != job->level || t->kind == TXP_STEP_QUILT;
+    if (status == TXM_OK && t->kind != TXP_STEP_QUILT && t->kind != TXP_STEP_FINISH) {
+        const size_t pixels = (size_t)canvas.width * (size_t)canvas.height;
+        if (!is_new) { /* a canvas of its own, so that a failure leaves the old one */
+            status = txp_canvas_make(job, level, &memory, &finer, env);
+            if (status == TXM_OK) {
+                memcpy(finer.at, canvas.at, pixels * sizeof *finer.at);
+                memcpy(finer.pixels, canvas.pixels,
+                       canvas.pitch * ((size_t)(canvas.height + TXP_PAD) + 1));
+                canvas = finer;
+            }
+        }
+        if (status == TXM_OK) {
+            txp_place *next = (txp_place *)txm_arena_alloc(&memory, pixels, sizeof *next);
+            if (!next) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
+            else if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &canvas, next, env);
+            else status = txp_run_polish(job, &canvas, next, env);
+            canvas.at = next;
+        }
+        if (status == TXM_OK)
+            txp_canvas_show(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
+    }
+    if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
+        txm_arena fields;
+        txm_arena_init(&fields, env);
+        status = txp_finish(job, &canvas, &fields, &job->bend, &job->tone, env);
+        if (status == TXM_OK) job->finish_memory = fields;
+        else txm_arena_free(&fields);
+    }
+    if (status != TXM_OK) {
+        txm_arena_free(&memory);
+        return status;
+    }
+    if (t->kind != TXP_STEP_FINISH || is_new) {
+        txm_arena_free(&job->canvas_memory);
+        job->canvas_memory = memory;
+    } else {
+        txm_arena_free(&memory);
+    }
+    job->canvas = canvas;
+    job->level = level;
+    job->next_step++;
+    return TXM_OK;
+}
+
+/* The part that was made anew becomes part of the whole. */
+static void txp_part_join(texpatch_job *job) {
+    texpatch_job *part = job->part;
+    const txp_source *s = job->source;
+    const size_t lanes = (size_t)txp_lanes(s), n = (size_t)s->bytes;
+    for (int y = 0; y < part->height; y++) {
+        for (int x = 0; x < part->width; x++) {
+            const size_t i = txp_index(&part->canvas, x, y);
+            const size_t k = txp_index(&job->canvas, job->part_x + x, job->part_y + y);
+            if (part->given.fixed[i]) continue;
+            job->canvas.at[k] = part->canvas.at[i];
+            memcpy(txp_canvas_at(s, &job->canvas, job->part_x + x, job->part_y + y),
+                   txp_canvas_at(s, &part->canvas, x, y), n);
+            memcpy(job->bend + 2 * k, part->bend + 2 * i, 2 * sizeof(float));
+            memcpy(job->tone + lanes * k, part->tone + lanes * i, lanes * sizeof(float));
+        }
+    }
+    texpatch_free(part);
+    job->part = NULL;
+}
+
+TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more) {
+    txm_status status = TXM_OK;
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
+    texpatch_job *at = job->part ? job->part : job;
+    if (at->next_step < at->step_count) status = txp_step_run(at, env);
+    if (status == TXM_OK && job->part && at->next_step == at->step_count) txp_part_join(job);
+    if (more) *more = job->part || job->next_step < job->step_count;
+    return status;
+}
+
+TEXPATCH_API float texpatch_done(const texpatch_job *job) {
+    double all = 0, done = 0;
+    if (!job) return 1;
+    if (job->part) return texpatch_done(job->part);
+    for (int i = 0; i < job->step_count; i++) {
+        all += (double)job->steps[i].cost;
+        if (i < job->next_step) done += (double)job->steps[i].cost;
+    }
+    return job->next_step < job->step_count ? txm_float(done / all) : 1;
+}
+
+TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {
+    for (int i = 0; i < 4 && vectors; i++) vectors[i] = 0;
+    if (!job || !job->source->has_lattice) return 0;
+    for (int i = 0; i < 4 && vectors; i++) vectors[i] = txm_float(job->source->stack[0].lattice[i]);
+    return 1;
+}
+/* ---- public: what a pixel shows ----------------------------------------------------------- */
+
+/* A pixel of the output: from sheet `sheet` (-1: it is a kept one), place (x, y) of it; bent: not
+   where its neighbours' places say. */
+typedef struct txp_pixel {
+    int sheet, is_whole;
+    double x, y;
+    const float *tone; /* NULL: none */
+} txp_pixel;
+
+static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
+    txp_pixel out = {-1, 1, 0, 0, NULL};
+    const txp_source *s = job->source;
+    x += job->margin_x;
+    y += job->margin_y;
+    const texpatch_job *part = job->part;
+    if (part && part->level >= 0 && x >= job->part_x && y >= job->part_y &&
+        x < job->part_x + part->width && y < job->part_y + part->height &&
+        !part->given.fixed[(size_t)(y - job->part_y) * (size_t)part->width +
+                           (size_t)(x - job->part_x)]) {
+        x -= job->part_x;
+        y -= job->part_y;
+        job = part;
+    }
+    const size_t i = txp_index(&job->canvas, x >> job->level, y >> job->level);
+    txp_place p = job->canvas.at[i];
+    if (p.x < 0) return out;
+    for (int l = job->level; l > 0; l--)
+        p = txp_finer(s, l, p, (x >> (l - 1)) & 1, (y >> (l - 1)) & 1);
+    out.sheet = s->sheets > 1 ? s->stack[0].sheet[p.y] : 0;
+    out.x = p.x;
+    out.y = p.y - s->stack[0].first[out.sheet];
+    if (!job->bend) return out;
+    const double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
+    if (bx * bx + by * by >= 0.05 * 0.05) {
+        out.is_whole = 0;
+        out.x += bx;
+        out.y += by;
+    }
+    out.tone = job->tone + i * (size_t)txp_lanes(s);
+    return out;
+}
+
+TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y) {
+    texpatch_source from = {0, 0, -1, 0};
+    double ex, ey;
+    if (!job || job->level < 0 || x < 0 || y < 0 || x >= job->setup.width || y >= job->setup.height)
+        return from;
+    const txp_pixel p = txp_pixel_at(job, x, y);
+    if (p.sheet < 0) return from;
+    const txp_sheet *sheet = &job->source->sheet[p.sheet];
+    const txm_image *im = &job->setup.maps[sheet->exemplar][0];
+    txp_sheet_place(sheet, p.x, p.y, &ex, &ey);
+    from.x = txm_float(ex < 0 ? 0 : ex > im->width - 1 ? im->width - 1 : ex);
+    from.y = txm_float(ey < 0 ? 0 : ey > im->height - 1 ? im->height - 1 : ey);
+    from.exemplar = sheet->exemplar;
+    from.turn = sheet->turn;
+    return from;
+}
+
+/* Turn the vector of a normal map with its piece and give it unit length. */
+static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
+    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* y of the map in rows downwards */
+    const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
+    double nz = 2 * (double)v[2] - 1;
+    /* The sheet's axes in the exemplar, as orthogonal directions: a turn, perhaps a mirror. */
+    const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
+    const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
+    double x = (sheet->xx * nx + sheet->yx * ny) / lx;
+    double y = (sheet->xy * nx + sheet->yy * ny) / ly;
+    double length = sqrt(x * x + y * y + nz * nz);
+    if (!(length > 1e-6)) {
+        x = y = 0;
+        nz = length = 1;
+    }
+    v[0] = txm_float(0.5 + 0.5 * x / length);
+    v[1] = txm_float(0.5 + 0.5 * y / length * down);
+    v[2] = txm_float(0.5 + 0.5 * nz / length);
+}
+
+typedef struct txp_draw {
+    const texpatch_job *job;
+    int map, x, y;
+    int tone_at;   /* first compared byte of the map; -1: it has no tone                        */
+    double tone_scale;
+    txm_image out;
+} txp_draw;
+
+static void txp_draw_row(void *context, int row) {
+    const txp_draw *d = (const txp_draw *)context;
+    const texpatch_job *job = d->job;
+    const txp_setup *u = &job->setup;
+    const int channels = d->out.channels;
+    const size_t sample = txm_sample_bytes(d->out.sample) * (size_t)channels;
+    const float low = u->low[d->map], high = u->high[d->map];
+    uint8_t *to = (uint8_t *)txm_image_row(&d->out, row);
+    for (int x = 0; x < d->out.width; x++, to += sample) {
+        const txp_pixel p = txp_pixel_at(job, d->x + x, d->y + row);
+        if (p.sheet < 0) {
+            const txm_image *kept = &u->kept[d->map];
+            if (!kept->pixels) continue;
+            memcpy(to, (const uint8_t *)txm_image_row_const(kept, d->y + row) +
+                           (size_t)(d->x + x) * sample, sample);
+            continue;
+        }
+        const txp_sheet *sheet = &job->source->sheet[p.sheet];
+        const txm_image *im = &u->maps[sheet->exemplar][d->map];
+        double ex, ey;
+        float v[4];
+        int is_copy = p.is_whole && sheet->plain && !(u->kinds[d->map].is_normal && sheet->turn);
+        txp_sheet_place(sheet, p.x, p.y, &ex, &ey);
+        for (int c = 0; c < channels && p.tone && d->tone_at >= 0 && is_copy; c++)
+            is_copy = fabsf(p.tone[d->tone_at + c]) < 0.02f;
+        if (is_copy) {
+            memcpy(to, (const uint8_t *)txm_image_row_const(im, (int)ey) + (size_t)(int)ex * sample,
+                   sample);
+            continue;
+        }
+        if (p.is_whole && sheet->plain) {
+            for (int c = 0; c < channels; c++) v[c] = txm_image_get(im, (int)ex, (int)ey, c);
+        } else {
+            txp_sample(im, ex, ey, u->kinds[d->map].is_label, v);
+        }
+        if (p.tone && d->tone_at >= 0) {
+            for (int c = 0; c < channels; c++)
+                v[c] = txm_clampf(
+                    txm_float(v[c] + d->tone_scale * (double)p.tone[d->tone_at + c]), low, high);
+        }
+        if (u->kinds[d->map].is_normal) txp_normal(u, d->map, sheet, v);
+        for (int c = 0; c < channels; c++) txm_image_set(&d->out, x, row, c, v[c]);
+    }
+}
+
+/* The checks of an output, and where the tone of a map is found. */
+static txm_status txp_draw_begin(const texpatch_job *job, int map, txm_env *env, txm_image out,
+                                 txp_draw *d) {
+    const txp_setup *u = &job->setup;
+    const txm_status status = txm_image_check(&out, "out", TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    d->job = job;
+    d->map = map;
+    d->out = txm_image_resolve(out);
+    if (d->out.channels != u->maps[0][map].channels || d->out.sample != u->maps[0][map].sample)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must have the channels and samples of its map");
+    d->tone_at = 0;
+    for (int m = 0; m < u->map_count; m++) {
+        if (m < map && u->kinds[m].weight > 0) d->tone_at += u->maps[0][m].channels;
+    }
+    if (!(u->kinds[map].weight > 0) || u->kinds[map].is_normal || u->kinds[map].is_label)
+        d->tone_at = -1;
+    else
+        d->tone_scale = (double)(u->high[map] - u->low[map]) / 255 * txp_most_weight(u, job->source) /
+                        (double)u->kinds[map].weight;
+    return TXM_OK;
+}
+
+/* All rows of out, some at a time; from..1 is the progress meanwhile. */
+static txm_status txp_draw_rows(const txp_draw *d, float from, txm_env *env) {
+    txp_draw some = *d;
+    for (int y = 0; y < d->out.height; y += 64) {
+        if (txm_progress(env, txm_lerpf(from, 1, (float)y / (float)d->out.height), "drawing"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        some.y = d->y + y;
+        some.out = d->out;
+        some.out.height = d->out.height - y < 64 ? d->out.height - y : 64;
+        some.out.pixels = txm_image_row(&d->out, y);
+        txm_parallel_for(env, some.out.height, txp_draw_row, &some);
+    }
+    return TXM_OK;
+}
+
+TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
+                                      txm_image out) {
+    txp_draw d;
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
+    if (job->level < 0) return txm_fail(env, TXM_BAD_ARGUMENT, "take a step before drawing");
+    if (map < 0 || map >= job->setup.map_count)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "there is no such map");
+    const txm_status status = txp_draw_begin(job, map, env, out, &d);
+    if (status != TXM_OK) return status;
+    d.x = x;
+    d.y = y;
+    if (x < 0 || y < 0 || x > job->setup.width - d.out.width || y > job->setup.height - d.out.height)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "the window reaches beyond the output");
+    return txp_draw_rows(&d, 0, env);
+}
+
+/* All steps that are left. */
+static txm_status txp_run(texpatch_job *job, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int more = 1; more && status == TXM_OK;) status = texpatch_step(job, env, &more);
+    return status;
+}
+
+TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
+                                      const txm_image *out) {
+    texpatch_job *job = NULL;
+    txp_draw draws[TEXPATCH_MAX_MAPS];
+    txm_arena scratch;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    txm_status status = texpatch_begin(desc, env, &job);
+    if (status != TXM_OK) return status;
+    const int maps = job->setup.map_count;
+    txm_arena_init(&scratch, env);
+    memset(draws, 0, sizeof draws);
+    for (int m = 0; m < maps && status == TXM_OK; m++) {
+        status = txp_draw_begin(job, m, env, out[m], &draws[m]);
+        if (status == TXM_OK && (out[m].width != desc->width || out[m].height != desc->height))
+            status = txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must be width x height pixels");
+    }
+    if (status == TXM_OK) status = txp_run(job, env);
+    /* drawn into pictures of our own, so that out is untouched if the caller cancels */
+    for (int m = 0; m < maps && status == TXM_OK; m++) {
+        const size_t row = txm_sample_bytes(out[m].sample) * (size_t)draws[m].out.channels;
+        draws[m].out.stride = (ptrdiff_t)((size_t)desc->width * row);
+        draws[m].out.pixels = txm_arena_alloc(&scratch, (size_t)desc->height,
+                                              (size_t)desc->width * row);
+        if (!draws[m].out.pixels)
+            status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the picture");
+        else
+            status = txp_draw_rows(&draws[m], 1, env);
+    }
+    for (int m = 0; m < maps && status == TXM_OK; m++) {
+        const txm_image to = txm_image_resolve(out[m]);
+        for (int y = 0; y < desc->height; y++)
+            memcpy(txm_image_row(&to, y), txm_image_row_const(&draws[m].out, y),
+                   (size_t)draws[m].out.stride);
+    }
+    txm_arena_free(&scratch);
+    texpatch_free(job);
+    return status;
+}
+/* ---- public: a part anew ------------------------------------------------------------------ */
+
+/* Does the output's pixel under canvas pixel (x, y) belong to the part? */
+static inline int txp_is_again(const texpatch_job *job, const txm_image *again, int x, int y) {
+    x = txm_clampi(x - job->margin_x, 0, job->setup.width - 1);
+    y = txm_clampi(y - job->margin_y, 0, job->setup.height - 1);
+    return ((const uint8_t *)txm_image_row_const(again, y))[x] != 0;
+}
+
+/* One axis of the box around a part: with context, large enough for the coarsest level and in steps
+   of its pixels; all of an axis that wraps if the context reaches over its end. */
+static void txp_part_extent(int low, int high, int extent, int wraps, int level, int *from, int *size) {
+    const int context = 2 * TXP_WINDOW, room = 2 * TXP_WINDOW << level, unit = 1 << level;
+    int a = low - context, b = high + context;
+    if (wraps && (a < 0 || b > extent)) {
+        *from = 0;
+        *size = extent;
+        return;
+    }
+    if (b - a < room) {
+        a -= (room - (b - a)) / 2;
+        b = a + room;
+    }
+    if (a < 0) {
+        b = b - a < extent ? b - a : extent;
+        a = 0;
+    }
+    if (b > extent) {
+        a = a - (b - extent) > 0 ? a - (b - extent) : 0;
+        b = extent;
+    }
+    a = a / unit * unit;
+    *from = a;
+    *size = b - a;
+}
+
+TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
+                                       const txm_image *guide, const txm_image *guide_mask,
+                                       uint64_t seed, txm_env *env) {
+    txm_status status;
+    txm_arena memory;
+    txp_given new_guide;
+    txm_image mask, no_mask;
+    int low_x, low_y, high_x = -1, high_y = -1, x0, y0, wide, high;
+    if (!job || !again) return txm_fail(env, TXM_BAD_ARGUMENT, "job or again is NULL");
+    const txp_source *s = job->source;
+    const txp_setup *u = &job->setup;
+    const size_t n = (size_t)s->bytes, all = (size_t)job->width * (size_t)job->height;
+    const size_t lanes = (size_t)txp_lanes(s), tail = n - (size_t)s->guide_at;
+    status = txp_check_mask(again, "again", u->width, u->height, env);
+    if (status != TXM_OK) return status;
+    mask = txm_image_resolve(*again);
+    if (guide) {
+        if (!s->guide_bytes)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "the job was begun without a guide");
+        status = txp_check_picture(guide, "guide", env);
+        if (status != TXM_OK) return status;
+        if (guide->width != u->width || guide->height != u->height ||
+            txm_image_resolve(*guide).channels != u->guides[0].channels ||
+            guide->sample != u->guides[0].sample)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
+                               "must have the size of the output and the exemplars' format");
+        if (guide_mask && guide_mask->pixels)
+            status = txp_check_mask(guide_mask, "guide_mask", u->width, u->height, env);
+        if (status != TXM_OK) return status;
+    }
+    status = txp_run(job, env);
+    if (status != TXM_OK) return status;
+
+    low_x = job->width;
+    low_y = job->height;
+    for (int y = 0; y < job->height; y++) {
+        for (int x = 0; x < job->width; x++) {
+            if (!txp_is_again(job, &mask, x, y)) continue;
+            low_x = x < low_x ? x : low_x;
+            high_x = x > high_x ? x : high_x;
+            low_y = y < low_y ? y : low_y;
+            high_y = y;
+        }
+    }
+    memset(&new_guide, 0, sizeof new_guide);
+    memset(&no_mask, 0, sizeof no_mask);
+    txm_arena_init(&memory, env);
+    texpatch_job *part = NULL;
+    if (guide && !txp_given_make(&new_guide, s, all, 0, 1, 0, &memory)) goto no_memory;
+    if (guide) {
+        const txm_image to = txm_image_resolve(*guide);
+        txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
+    }
+    if (high_x >= 0) {
+        const int top = s->levels - 1;
+        txm_arena own;
+        txm_arena_init(&own, env);
+        txp_part_extent(low_x, high_x + 1, job->width, u->tileable & TEXPATCH_TILE_X, top, &x0, &wide);
+        txp_part_extent(low_y, high_y + 1, job->height, u->tileable & TEXPATCH_TILE_Y, top, &y0, &high);
+        part = txp_job_make(u, job->source, wide, high, txm_hash(seed ^ (job->seed + 1)), &own, env);
+        if (!part || !txp_given_make(&part->given, s, (size_t)wide * (size_t)high, 1,
+                                     s->guide_bytes > 0, 1, &own)) {
+            txm_arena_free(&own);
+            goto no_memory;
+        }
+        part->memory = own;
+    }
+
+    /* nothing can fail from here on */
+    for (size_t i = 0; i < all && guide; i++) {
+        uint8_t *shown = job->canvas.pixels + i / (size_t)job->width * job->canvas.pitch +
+                         i % (size_t)job->width * n;
+        const txp_place at = job->canvas.at[i];
+        memcpy(job->given.pixels + i * n + s->guide_at, new_guide.pixels + i * n + s->guide_at, tail);
+        job->given.free_guide[i] = new_guide.free_guide[i];
+        job->canvas.free_guide[i] = new_guide.free_guide[i];
+        if (!new_guide.free_guide[i])
+            memcpy(shown + s->guide_at, new_guide.pixels + i * n + s->guide_at, tail);
+        else if (at.x >= 0)
+            memcpy(shown + s->guide_at, txp_stack_at(s, &s->stack[0], at.x, at.y) + s->guide_at, tail);
+    }
+    txm_arena_free(&memory);
+    if (!part) return TXM_OK;
+    part->setup.tileable = 0;
+    if (wide == job->width) part->setup.tileable |= u->tileable & TEXPATCH_TILE_X;
+    if (high == job->height) part->setup.tileable |= u->tileable & TEXPATCH_TILE_Y;
+    part->shift_x = job->shift_x + x0;
+    part->shift_y = job->shift_y + y0;
+    for (int y = 0; y < high; y++) {
+        for (int x = 0; x < wide; x++) {
+            const size_t i = (size_t)y * (size_t)wide + (size_t)x;
+            const size_t k = txp_index(&job->canvas, x0 + x, y0 + y);
+            part->given.fixed[i] = !txp_is_again(job, &mask, x0 + x, y0 + y) ||
+                                   (job->given.fixed && job->given.fixed[k]);
+            memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
+            if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
+            part->given.at[i] = job->canvas.at[k];
+            memcpy(part->given.bend + 2 * i, job->bend + 2 * k, 2 * sizeof(float));
+            memcpy(part->given.tone + lanes * i, job->tone + lanes * k, lanes * sizeof(float));
+        }
+    }
+    job->part = part;
+    job->part_x = x0;
+    job->part_y = y0;
+    return TXM_OK;
+no_memory:
+    txm_arena_free(&memory);
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a part");
+}
+/* An environment for a piece of a call: its progress is that of the whole, which rises piece by
+   piece. */
+typedef struct txp_quiet {
+    txm_env *env;
+    float done, total; /* pieces */
+} txp_quiet;
+
+static int txp_quiet_progress(void *user, float fraction, const char *stage) {
+    const txp_quiet *q = (const txp_quiet *)user;
+    (void)fraction;
+    return txm_progress(q->env, q->done / q->total, stage);
+}
+
+static txm_env txp_quiet_env(txp_quiet *q) {
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    if (q->env) env = *q->env;
+    env.progress = txp_quiet_progress;
+    env.progress_user = q;
+    return env;
+}
+/* ---- public: the unbounded plane ---------------------------------------------------------- */
+
+struct texpatch_plane {
+    txm_arena memory; /* of the plane, which lies in it */
+    txm_arena source_memory;
+    txp_setup setup;
+    txp_source *source;
+    int cell, half; /* pixels: a cell's side; half the width of what is made first along its sides */
+    double shift_x, shift_y;
+    uint64_t seed;
+};
+
+/* A finished rectangle of the plane. */
+typedef struct txp_piece {
+    int width, height; /* 0: not made yet */
+    txp_place *at;
+    float *bend, *tone;
+    txm_arena memory;
+} txp_piece;
+
+static void txp_piece_free(txp_piece *p) {
+    txm_arena_free(&p->memory);
+    p->width = p->height = 0;
+}
+
+/* A job for width x height pixels of the plane from (x, y) on. */
+static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t y, int width,
+                                int height, uint64_t seed, txm_env *env, texpatch_job **out) {
+    txm_arena memory;
+    const txp_source *s = plane->source;
+    double sx = (double)x + plane->shift_x, sy = (double)y + plane->shift_y;
+    txm_arena_init(&memory, env);
+    texpatch_job *job = txp_job_make(&plane->setup, plane->source, width, height, seed, &memory, env);
+    if (!job || !txp_given_make(&job->given, s, (size_t)width * (size_t)height, 1, 0, 1, &memory)) {
+        txm_arena_free(&memory);
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
+    }
+    job->memory = memory;
+    job->setup.width = width;
+    job->setup.height = height;
+    if (s->has_lattice) { /* whole steps away, near 0 */
+        const double *i = s->stack[0].inverse, *l = s->stack[0].lattice;
+        const double u = i[0] * sx + i[1] * sy, v = i[2] * sx + i[3] * sy;
+        sx = l[0] * (u - floor(u)) + l[2] * (v - floor(v));
+        sy = l[1] * (u - floor(u)) + l[3] * (v - floor(v));
+    }
+    job->shift_x = sx;
+    job->shift_y = sy;
+    *out = job;
+    return TXM_OK;
+}
+
+/* Give a job a piece, its top left pixel at (x, y); what lies outside the canvas is left out. */
+static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) {
+    const txp_source *s = job->source;
+    const size_t n = (size_t)s->bytes, lanes = (size_t)txp_lanes(s);
+    for (int v = 0; v < p->height; v++) {
+        for (int u = 0; u < p->width; u++) {
+            const int cx = x + u, cy = y + v;
+            if (cx < 0 || cy < 0 || cx >= job->width || cy >= job->height) continue;
+            const size_t i = (size_t)cy * (size_t)job->width + (size_t)cx;
+            const size_t k = (size_t)v * (size_t)p->width + (size_t)u;
+            job->given.fixed[i] = 1;
+            job->given.at[i] = p->at[k];
+            memcpy(job->given.pixels + i * n,
+                   txp_stack_at(s, &s->stack[0], p->at[k].x, p->at[k].y), n);
+            memcpy(job->given.bend + 2 * i, p->bend + 2 * k, 2 * sizeof(float));
+            memcpy(job->given.tone + lanes * i, p->tone + lanes * k, lanes * sizeof(float));
+        }
+    }
+}
+
+/* Run a job and keep width x height pixels of it from (x, y) on as a piece. Frees the job. */
+static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int height,
+                                 txp_piece *p, txm_env *env) {
+    const size_t lanes = (size_t)txp_lanes(job->source);
+    const size_t pixels = (size_t)width * (size_t)height;
+    txm_status status = txp_run(job, env);
+    txm_arena_init(&p->memory, env);
+    if (status == TXM_OK) {
+        p->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *p->at);
+        p->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
+        p->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
+        if (!p->at || !p->bend || !p->tone)
+            status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
+    }
+    for (int v = 0; v < height && status == TXM_OK; v++) {
+        const size_t from = txp_index(&job->canvas, x, y + v), to = (size_t)v * (size_t)width;
+        memcpy(p->at + to, job->canvas.at + from, (size_t)width * sizeof *p->at);
+        memcpy(p->bend + 2 * to, job->bend + 2 * from, (size_t)width * 2 * sizeof(float));
+        memcpy(p->tone + lanes * to, job->tone + lanes * from, (size_t)width * lanes * sizeof(float));
+    }
+    texpatch_free(job);
+    if (status != TXM_OK) {
+        txp_piece_free(p);
+        return status;
+    }
+    p->width = width;
+    p->height = height;
+    return TXM_OK;
+}
+
+/* What a window of the plane needs: of each column of cells, for the row that is drawn now, what lies
+   on the corners and sides of the cells. */
+typedef struct txp_cells {
+    const texpatch_plane *plane;
+    int64_t first;                  /* column                                                   */
+    int columns;
+    txp_piece *corner[2], *side[2]; /* columns + 1 corners, columns sides: above, below          */
+    txp_piece *upright;             /* columns + 1 sides between above and below                 */
+} txp_cells;
+
+static uint64_t txp_plane_seed(const texpatch_plane *plane, int64_t column, int64_t row, int kind) {
+    return txm_hash(txm_hash(txm_hash(plane->seed + (uint64_t)kind) ^ (uint64_t)column) +
+                    (uint64_t)row * 0x9e3779b97f4a7c15u);
+}
+
+/* The corner (column, row): made alone, its surroundings thrown away. */
+static txm_status txp_plane_corner(const texpatch_plane *plane, int64_t column, int64_t row,
+                                   txp_piece *p, txm_env *env) {
+    const int h = plane->half, c = plane->cell;
+    texpatch_job *job;
+    txm_status status = txp_plane_job(plane, column * c - 2 * h, row * c - 2 * h, 4 * h, 4 * h,
+                                      txp_plane_seed(plane, column, row, 1), env, &job);
+    return status == TXM_OK ? txp_plane_keep(job, h, h, 2 * h, 2 * h, p, env) : status;
+}
+
+/* The side from corner a to corner b, rightwards or downwards. */
+static txm_status txp_plane_side(const texpatch_plane *plane, int64_t column, int64_t row, int down,
+                                 const txp_piece *a, const txp_piece *b, txp_piece *p, txm_env *env) {
+    const int h = plane->half, c = plane->cell;
+    texpatch_job *job;
+    txm_status status = txp_plane_job(plane, column * c - (down ? 2 * h : h),
+                                      row * c - (down ? h : 2 * h), down ? 4 * h : c + 2 * h,
+                                      down ? c + 2 * h : 4 * h,
+                                      txp_plane_seed(plane, column, row, 2 + down), env, &job);
+    if (status != TXM_OK) return status;
+    txp_plane_give(job, a, down ? h : 0, down ? 0 : h);
+    txp_plane_give(job, b, down ? h : c, down ? c : h);
+    return txp_plane_keep(job, h, h, down ? 2 * h : c, down ? c : 2 * h, p, env);
+}
+
+/* The job of a cell, done: its pixel (0, 0) lies at (half, half) of the canvas. */
+static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t row, txm_env *env,
+                                     texpatch_job **out) {
+    const texpatch_plane *plane = cells->plane;
+    const int h = plane->half, c = plane->cell;
+    const int64_t at = cells->first + column;
+    texpatch_job *job;
+    txm_status status = txp_plane_job(plane, at * c - h, row * c - h, c + 2 * h, c + 2 * h,
+                                      txp_plane_seed(plane, at, row, 4), env, &job);
+    if (status != TXM_OK) return status;
+    for (int k = 0; k < 2; k++) {
+        txp_plane_give(job, &cells->side[k][column], h, k * c);
+        txp_plane_give(job, &cells->upright[column + k], k * c, h);
+        for (int d = 0; d < 2; d++) txp_plane_give(job, &cells->corner[k][column + d], d * c, k * c);
+    }
+    status = txp_run(job, env);
+    if (status == TXM_OK) *out = job;
+    else texpatch_free(job);
+    return status;
+}
+
+/* Corners (below = 0: of the upper ones too) and sides of a row of cells. */
+static txm_status txp_plane_row(const txp_cells *cells, int64_t row, txm_env *env) {
+    const texpatch_plane *plane = cells->plane;
+    txm_status status = TXM_OK;
+    for (int below = 0; below < 2; below++) {
+        for (int i = 0; i <= cells->columns && status == TXM_OK; i++) {
+            if (!cells->corner[below][i].width)
+                status = txp_plane_corner(plane, cells->first + i, row + below,
+                                          &cells->corner[below][i], env);
+        }
+        for (int i = 0; i < cells->columns && status == TXM_OK; i++) {
+            if (!cells->side[below][i].width)
+                status = txp_plane_side(plane, cells->first + i, row + below, 0,
+                                        &cells->corner[below][i], &cells->corner[below][i + 1],
+                                        &cells->side[below][i], env);
+        }
+    }
+    for (int i = 0; i <= cells->columns && status == TXM_OK; i++)
+        status = txp_plane_side(plane, cells->first + i, row, 1, &cells->corner[0][i],
+                                &cells->corner[1][i], &cells->upright[i], env);
+    return status;
+}
+
+/* The cells' row is done: what lay below lies above the next. */
+static void txp_plane_next_row(const txp_cells *cells) {
+    for (int i = 0; i <= cells->columns; i++) {
+        txp_piece_free(&cells->upright[i]);
+        txp_piece_free(&cells->corner[0][i]);
+        cells->corner[0][i] = cells->corner[1][i];
+        memset(&cells->corner[1][i], 0, sizeof(txp_piece));
+        if (i == cells->columns) continue;
+        txp_piece_free(&cells->side[0][i]);
+        cells->side[0][i] = cells->side[1][i];
+        memset(&cells->side[1][i], 0, sizeof(txp_piece));
+    }
+}
+
+static int64_t txp_floor_div(int64_t a, int64_t b) {
+    return a >= 0 ? a / b : -((b - 1 - a) / b);
+}
+
+TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
+                                            texpatch_plane **out) {
+    txp_setup setup;
+    txp_source source;
+    txm_arena memory, source_memory;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
+    memset(&setup, 0, sizeof setup);
+    memset(&source, 0, sizeof source);
+    texpatch_desc plain = *desc;
+    texpatch_exemplar exemplars[TEXPATCH_MAX_EXEMPLARS];
+    if (desc->exemplars && desc->exemplar_count > 0 && desc->exemplar_count <= TEXPATCH_MAX_EXEMPLARS) {
+        for (int i = 0; i < desc->exemplar_count; i++) {
+            exemplars[i] = desc->exemplars[i];
+            memset(&exemplars[i].guide, 0, sizeof exemplars[i].guide);
+        }
+        plain.exemplars = exemplars;
+    }
+    txm_status status = txp_check_exemplars(&plain, &setup, &source, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &source_memory, env);
+    if (status != TXM_OK) return status;
+    txm_arena_init(&memory, env);
+    texpatch_plane *plane = (texpatch_plane *)txm_arena_zero(&memory, 1, sizeof *plane);
+    txp_source *s = (txp_source *)txm_arena_alloc(&memory, 1, sizeof *s);
+    if (!plane || !s) {
+        txm_arena_free(&memory);
+        txm_arena_free(&source_memory);
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a plane");
+    }
+    *s = source;
+    plane->setup = setup;
+    plane->source = s;
+    plane->half = TXP_WINDOW / 2 << (s->levels - 1);
+    plane->cell = 16 * plane->half;
+    plane->seed = desc->seed;
+    txm_rng rng = txm_rng_make(desc->seed, 5);
+    plane->shift_x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
+    plane->shift_y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
+    plane->memory = memory;
+    plane->source_memory = source_memory;
+    *out = plane;
+    return TXM_OK;
+}
+
+TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane) {
+    return plane ? plane->cell : 0;
+}
+
+TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
+    if (!plane) return;
+    txm_arena_free(&plane->source_memory);
+    txm_arena memory = plane->memory; /* the plane lies in it */
+    txm_arena_free(&memory);
+}
+
+/* The part of a window that lies on a done cell, its pixel (0, 0) at (cx, cy) of the window. */
+static txm_status txp_plane_show(const texpatch_job *job, int half, int cell, int64_t cx, int64_t cy,
+                                 int width, int height, const txm_image *out,
+                                 texpatch_source *sources, float done, txm_env *env) {
+    const int x0 = cx < 0 ? 0 : (int)cx, y0 = cy < 0 ? 0 : (int)cy;
+    const int x1 = cx + cell < width ? (int)(cx + cell) : width;
+    const int y1 = cy + cell < height ? (int)(cy + cell) : height;
+    const int sx = x0 - (int)cx + half, sy = y0 - (int)cy + half;
+    for (int m = 0; m < job->setup.map_count; m++) {
+        txp_draw d;
+        txm_image to = txm_image_resolve(out[m]);
+        to.pixels = (uint8_t *)txm_image_row(&to, y0) +
+                    (size_t)x0 * (size_t)to.channels * txm_sample_bytes(to.sample);
+        to.width = x1 - x0;
+        to.height = y1 - y0;
+        txm_status status = txp_draw_begin(job, m, env, to, &d);
+        d.x = sx;
+        d.y = sy;
+        if (status == TXM_OK) status = txp_draw_rows(&d, done, env);
+        if (status != TXM_OK) return status;
+    }
+    for (int y = y0; y < y1 && sources; y++) {
+        for (int x = x0; x < x1; x++)
+            sources[(size_t)y * (size_t)width + (size_t)x] =
+                texpatch_source_at(job, sx + x - x0, sy + y - y0);
+    }
+    return TXM_OK;
+}
+
+TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
+                                            txm_env *env, const txm_image *out,
+                                            texpatch_source *sources) {
+    const int64_t far_away = (int64_t)1 << 40;
+    txm_status status = TXM_OK;
+    txm_arena scratch;
+    txp_cells cells;
+    txp_draw d;
+    if (!plane || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "plane or out is NULL");
+    if (x < -far_away || y < -far_away || x > far_away || y > far_away)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "x and y must be -2^40 to 2^40");
+    texpatch_job probe; /* for the checks of the maps */
+    memset(&probe, 0, sizeof probe);
+    probe.setup = plane->setup;
+    probe.source = plane->source;
+    for (int m = 0; m < plane->setup.map_count; m++) {
+        status = txp_draw_begin(&probe, m, env, out[m], &d);
+        if (status != TXM_OK) return status;
+        if (out[m].width != out[0].width || out[m].height != out[0].height)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must be pictures of one size");
+    }
+    const int width = out[0].width, height = out[0].height, cell = plane->cell;
+    const int64_t top = txp_floor_div(y, cell), bottom = txp_floor_div(y + height - 1, cell);
+    memset(&cells, 0, sizeof cells);
+    cells.plane = plane;
+    cells.first = txp_floor_div(x, cell);
+    cells.columns = (int)(txp_floor_div(x + width - 1, cell) - cells.first) + 1;
+    txm_arena_init(&scratch, env);
+    txp_piece *pieces = (txp_piece *)txm_arena_zero(&scratch, (size_t)cells.columns + 1,
+                                                    5 * sizeof *pieces);
+    if (!pieces) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window of the plane");
+    for (int k = 0; k < 2; k++) {
+        cells.corner[k] = pieces + k * (cells.columns + 1);
+        cells.side[k] = pieces + (2 + k) * (cells.columns + 1);
+    }
+    cells.upright = pieces + 4 * (cells.columns + 1);
+    txm_env quiet; /* the steps of a piece report as one: their own progress means nothing here */
+    txp_quiet under;
+    under.env = env;
+    under.total = (float)(bottom - top + 1) * (float)cells.columns;
+    under.done = 0;
+    quiet = txp_quiet_env(&under);
+    for (int64_t row = top; row <= bottom && status == TXM_OK; row++) {
+        status = txp_plane_row(&cells, row, &quiet);
+        for (int i = 0; i < cells.columns && status == TXM_OK; i++) {
+            texpatch_job *job = NULL;
+            status = txp_plane_cell_job(&cells, i, row, &quiet, &job);
+            if (status == TXM_OK)
+                status = txp_plane_show(job, plane->half, cell, (cells.first + i) * cell - x,
+                                        row * cell - y, width, height, out, sources, 1, &quiet);
+            texpatch_free(job);
+            under.done += 1;
+        }
+        if (status == TXM_OK) txp_plane_next_row(&cells);
+    }
+    for (int i = 0; i < 5 * (cells.columns + 1); i++) txp_piece_free(&pieces[i]);
+    txm_arena_free(&scratch);
+    if (status != TXM_OK && env) memcpy(env->message, quiet.message, sizeof quiet.message);
+    return status;
+}
+/* ---- public: levels of detail ------------------------------------------------------------- */
+
+typedef struct txp_halving {
+    const txm_image *image, *half;
+    const texpatch_map *map;
+    const float *linear; /* of 256 bytes; NULL: samples are amounts already                     */
+} txp_halving;
+
+static void txp_half_row(void *context, int y) {
+    const txp_halving *h = (const txp_halving *)context;
+    const txm_image *im = h->image, *to = h->half;
+    const int n = im->channels;
+    const int colours = n == 2 ? 1 : n == 4 ? 3 : n; /* the last of an even count is alpha */
+    for (int x = 0; x < to->width; x++) {
+        float out[4] = {0, 0, 0, 0};
+        int count = 0;
+        for (int v = 2 * y; v < 2 * y + 2 && v < im->height; v++) {
+            for (int u = 2 * x; u < 2 * x + 2 && u < im->width; u++, count++) {
+                for (int c = 0; c < n; c++) {
+                    float g = txm_image_get(im, u, v, c);
+                    if (h->map->is_normal && c < 3) g = 2 * g - 1;
+                    else if (h->linear && c < colours)
+                        g = im->sample == TXM_U8
+                                ? h->linear[((const uint8_t *)txm_image_row_const(im, v))[u * n + c]]
+                                : txm_srgb_to_linear(g);
+                    out[c] += g;
+                }
+            }
+        }
+        if (h->map->is_label) {
+            for (int c = 0; c < n; c++)
+                txm_image_set(to, x, y, c, txm_image_get(im, 2 * x, 2 * y, c));
+            continue;
+        }
+        for (int c = 0; c < n; c++) out[c] = txm_float(out[c] / (float)count);
+        if (h->map->is_normal) {
+            const txm_vec3 v = txm_vec3_normalize(txm_v3(out[0], out[1], out[2]));
+            const int is_none = !(txm_vec3_length(v) > 0.5f);
+            out[0] = is_none ? 0.5f : 0.5f + 0.5f * v.x;
+            out[1] = is_none ? 0.5f : 0.5f + 0.5f * v.y;
+            out[2] = is_none ? 1.0f : 0.5f + 0.5f * v.z;
+        } else if (h->linear) {
+            for (int c = 0; c < colours; c++) out[c] = txm_linear_to_srgb(out[c]);
+        }
+        for (int c = 0; c < n; c++) txm_image_set(to, x, y, c, out[c]);
+    }
+}
+
+TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
+                                      txm_env *env, const txm_image *half) {
+    static const texpatch_map plain = {1, 0, 0, 0};
+    float linear[256];
+    txp_halving h;
+    if (!image || !half) return txm_fail(env, TXM_BAD_ARGUMENT, "image or half is NULL");
+    txm_status status = txm_image_check(image, "image", TEXPATCH_MAX_PIXELS, env);
+    if (status == TXM_OK) status = txm_image_check(half, "half", TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    const txm_image from = txm_image_resolve(*image), to = txm_image_resolve(*half);
+    if (to.width != (from.width + 1) / 2 || to.height != (from.height + 1) / 2 ||
+        to.channels != from.channels || to.sample != from.sample)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
+                           "must have half the size of image, rounded up, and its format");
+    h.image = &from;
+    h.half = &to;
+    h.map = map ? map : &plain;
+    if (h.map->is_normal && from.channels < 3)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a normal map has 3 or 4 channels");
+    h.linear = NULL;
+    if (from.sample != TXM_F32 && !h.map->is_normal && !h.map->is_label && !h.map->is_data) {
+        for (int i = 0; i < 256; i++) linear[i] = txm_srgb_to_linear((float)i / 255);
+        h.linear = linear;
+    }
+    txm_parallel_for(env, to.height, txp_half_row, &h);
+    return TXM_OK;
+}
+/* ---- edges: constants and progress ------------------------------------------------------- */
+
+enum {
+    TXP_E_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
+    TXP_E_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
+    TXP_E_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
+    TXP_E_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
+    TXP_E_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+
+    TXP_E_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
+    TXP_E_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
+    TXP_E_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
+    TXP_E_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
+    TXP_E_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
+    TXP_E_BINS = 16,   /* directions told apart in half a turn                                    */
+    TXP_E_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
+    TXP_E_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
+    TXP_E_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
+    TXP_E_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
+    TXP_E_GOOD = 8,    /* of them so many that join best are looked at closer                     */
+    TXP_E_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+};
+#define TXP_E_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
+#define TXP_E_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+
+/* The bar of one call: a stage fills from..to of it in total pieces of work. */
+typedef struct txp_e_bar {
+    const txm_env *env;
+    const char *stage;
+    double from, to, total, done;
+    size_t quiet; /* work since the last report */
+} txp_e_bar;
+
+static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double total) {
+    bar->from = bar->to;
+    bar->to = to;
+    bar->stage = stage;
+    bar->total = total > 1 ? total : 1;
+    bar->done = 0;
+}
+
+/* So much work is done; non-zero: stop. */
+static inline int txp_e_tick(txp_e_bar *bar, size_t work) {
+    bar->quiet += work;
+    if (bar->quiet < TXP_E_TICK) return 0;
+    bar->done += (double)bar->quiet;
+    bar->quiet = 0;
+    const double part = bar->done < bar->total ? bar->done / bar->total : 1;
+    return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
+}
+
+static txm_status txp_e_no_memory(txm_env *env) {
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the edges");
+}
+
+static txm_status txp_e_stopped(txm_env *env) {
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+/* ---- edges: checks of what the caller gives ---------------------------------------------- */
+
+/* A picture that edges can be found in, or that a guide can be drawn into (bytes: U8, 1 channel). */
+static txm_status txp_e_check_image(const txm_image *image, const char *name, int bytes,
+                                    txm_env *env) {
+    const size_t most = TEXPATCH_MAX_PIXELS < TXP_E_PIXELS ? TEXPATCH_MAX_PIXELS : TXP_E_PIXELS;
+    const txm_status status = txm_image_check(image, name, most, env);
+    if (status != TXM_OK) return status;
+    if (image->width > TXP_E_SIDE || image->height > TXP_E_SIDE)
+        return txm_fail_at(env, TXM_TOO_LARGE, name, "a side is longer than 2^20 pixels");
+    if (bytes && (image->sample != TXM_U8 || image->channels > 1))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be TXM_U8 with 1 channel");
+    return TXM_OK;
+}
+
+static int txp_e_thresholds_are_good(const float *thresholds, int levels) {
+    for (int k = 0; k < levels - 1; k++) {
+        if (!(thresholds[k] >= 0 && thresholds[k] <= 1)) return 0;
+        if (k > 0 && !(thresholds[k] > thresholds[k - 1])) return 0;
+    }
+    return 1;
+}
+
+static txm_status txp_e_check_desc(const texpatch_edges_desc *desc, txm_env *env) {
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    if (!(desc->smooth >= 0 && desc->smooth <= 16))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "smooth", "must be 0 to 16 pixels");
+    if (desc->least < 0)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "least", "must be 0 or more pixels");
+    return txp_e_check_image(&desc->image, "image", 0, env);
+}
+
+/* Edges as one of the functions here makes them. is_found: as texpatch_edges_find does, in unit
+   steps from corner to corner. */
+static txm_status txp_e_check_edges(const texpatch_edges *edges, const char *name, int is_found,
+                                    txp_e_bar *bar, txm_env *env) {
+    const char *foreign = "not as texpatch_edges_find or texpatch_disturb made it";
+    if (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS || edges->width < 1 ||
+        edges->height < 1 || edges->width > TXP_E_SIDE || edges->height > TXP_E_SIDE ||
+        !txp_e_thresholds_are_good(edges->thresholds, edges->levels) ||
+        (edges->line_count && !edges->lines) || (edges->point_count && !edges->points))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+    for (int k = 0; k < edges->levels; k++) {
+        if (edges->beside[k] < -1 || edges->beside[k] >= edges->levels || edges->beside[k] == k)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+    }
+    for (size_t i = 0; i < edges->line_count; i++) {
+        const texpatch_polyline *line = &edges->lines[i];
+        if (line->layer < 0 || line->layer >= edges->levels || line->count < 2 ||
+            line->first > edges->point_count || line->count > edges->point_count - line->first)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+        txm_vec2 p = edges->points[line->first + line->count - 1];
+        for (size_t j = 0; j < line->count; j++) {
+            const txm_vec2 q = edges->points[line->first + j];
+            const float most = (float)(2 * TXP_E_SIDE);
+            int good = q.x >= -most && q.x <= most && q.y >= -most && q.y <= most;
+            if (good && is_found) {
+                const float dx = q.x - p.x, dy = q.y - p.y;
+                good = q.x >= 0 && q.x <= (float)edges->width && q.y >= 0 &&
+                       q.y <= (float)edges->height && dx * dx + dy * dy == 1 && dx * dy == 0 &&
+                       q.x == (float)(int)q.x && q.y == (float)(int)q.y;
+            }
+            if (!good) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            p = q;
+        }
+    }
+    return TXM_OK;
+}
+
+static txm_status txp_e_check_stroke(const texpatch_stroke *s, int levels, double *length,
+                                     txp_e_bar *bar, txm_env *env) {
+    if (!s->points || s->count < (s->is_closed ? 3 : 2))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "needs 2 points or more, closed 3");
+    if (s->layer < 0 || s->layer >= levels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "layer must be 0 to levels - 1");
+    if (s->width != 0 && !(s->width >= 2 && s->width <= 256))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "width must be 0 or 2 to 256 pixels");
+    const float most = (float)TXP_E_SIDE;
+    double own = 0;
+    for (int i = 0; i < s->count; i++) {
+        const txm_vec2 p = s->points[i], q = s->points[i ? i - 1 : 0];
+        const double dx = (double)p.x - q.x, dy = (double)p.y - q.y;
+        if (!(p.x >= -most && p.x <= most && p.y >= -most && p.y <= most))
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke",
+                               "a coordinate is not a number or beyond 2^20 pixels");
+        own += sqrt(dx * dx + dy * dy);
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    if (!(own > 1e-3))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "has no length: its points are one");
+    *length += own;
+    if (*length > (double)TXP_E_LENGTH)
+        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "are longer than 2^26 pixels");
+    return TXM_OK;
+}
+
+static double txp_e_points_of(const texpatch_control *c) {
+    return c && c->edges ? (double)c->edges->point_count : 0;
+}
+
+/* All that texpatch_disturb and texpatch_control_guide look at. */
+static txm_status txp_e_check_control(const texpatch_control *c, txp_e_bar *bar, txm_env *env) {
+    double length = 0;
+    if (!c) return txm_fail(env, TXM_BAD_ARGUMENT, "control is NULL");
+    if (c->stroke_count < 0 || (c->stroke_count && !c->strokes))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "strokes", "NULL, or fewer than none");
+    if (!(c->disturb == -1 || (c->disturb >= 0 && c->disturb <= 4)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturb", "must be -1 or 0 to 4");
+    txm_status status = txp_e_check_edges(c->edges, "edges", 1, bar, env);
+    if (status == TXM_OK && (c->background < -1 || c->background >= c->edges->levels))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "background", "must be -1 to levels - 1");
+    for (int i = 0; i < c->stroke_count && status == TXM_OK; i++)
+        status = txp_e_check_stroke(&c->strokes[i], c->edges->levels, &length, bar, env);
+    return status;
+}
+
+/* ---- edges: from a picture to layers ----------------------------------------------------- */
+
+/* The gray of each pixel, 0..1. 0 = cancelled, -1 = a sample is not finite, 1 = done. */
+static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
+    const int is_color = image->channels >= 3;
+    for (int y = 0; y < image->height; y++) {
+        for (int x = 0; x < image->width; x++) {
+            double g = txm_image_get(image, x, y, 0);
+            if (is_color)
+                g = 0.2126 * g + 0.7152 * txm_image_get(image, x, y, 1) +
+                    0.0722 * txm_image_get(image, x, y, 2);
+            if (!txm_is_finite(g)) return -1;
+            *gray++ = txm_float(g < 0 ? 0 : g > 1 ? 1 : g);
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Blur by the weights 1 - |d| / (radius + 1), rows then columns; beyond its border the picture goes
+   on as it ends. scratch: as large as gray. 0 = cancelled. */
+static int txp_e_blur(float *gray, float *scratch, int width, int height, double radius,
+                      txp_e_bar *bar) {
+    const int reach = (int)radius;
+    double weight[17] = {1}, sum = 0;
+    for (int d = 0; d <= reach; d++) {
+        weight[d] = 1 - d / (radius + 1);
+        sum += d ? 2 * weight[d] : 1;
+    }
+    for (int pass = 0; pass < 2; pass++) {
+        const float *from = pass ? scratch : gray;
+        float *to = pass ? gray : scratch;
+        const int last = (pass ? height : width) - 1;
+        const size_t w = (size_t)width, step = pass ? w : 1;
+        for (int y = 0; y < height; y++) {
+            for (int x = 0; x < width; x++) {
+                const int at = pass ? y : x;
+                const size_t i = (size_t)y * w + (size_t)x;
+                double g = from[i] * weight[0];
+                for (int d = 1; d <= reach; d++) {
+                    const int back = d < at ? d : at, ahead = d < last - at ? d : last - at;
+                    g += weight[d] *
+                         ((double)from[i - (size_t)back * step] + from[i + (size_t)ahead * step]);
+                }
+                to[i] = txm_float(g / sum);
+                if (txp_e_tick(bar, (size_t)reach + 1)) return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+/* Thresholds that part count grays into layers of about the same area.
+
+   In a histogram of 256 bins, cut k lies where k / levels of the area are darker, or up to a quarter
+   of a layer's area beside that, where the two bins next to the cut hold least; of a gap in the
+   middle. Where one bin holds too much for that, on its nearer side. 0 = cancelled. */
+static int txp_e_divide(const float *gray, size_t count, int levels, float *thresholds,
+                        txp_e_bar *bar) {
+    size_t bins[256], below[257];
+    int previous = 0;
+    memset(bins, 0, sizeof bins);
+    for (size_t i = 0; i < count; i++) {
+        bins[(int)((double)gray[i] * 255 + 0.5)]++;
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    below[0] = 0;
+    for (int b = 0; b < 256; b++) below[b + 1] = below[b] + bins[b];
+    for (int k = 1; k < levels; k++) { /* all areas times 4 levels: whole numbers */
+        const uint64_t target = 4 * (uint64_t)k * count, quarter = count;
+        const int most = 256 - (levels - k);
+        int best = 0;
+        uint64_t best_off = 0, best_held = 0;
+        for (int cut = previous + 1; cut <= most; cut++) {
+            const uint64_t area = 4 * (uint64_t)levels * below[cut];
+            const uint64_t held = bins[cut - 1] + bins[cut];
+            const uint64_t off = area > target ? area - target : target - area;
+            const int near = off <= quarter, best_near = best && best_off <= quarter;
+            int better = !best || off < best_off;
+            if (near || best_near)
+                better = near && (!best_near || held < best_held || (held == best_held && better));
+            if (!better) continue;
+            best = cut;
+            best_off = off;
+            best_held = held;
+        }
+        int end = best;
+        while (end < most && below[end + 1] == below[best] &&
+               bins[end] + bins[end + 1] == best_held)
+            end++;
+        previous = best + (end - best) / 2;
+        thresholds[k - 1] = txm_float((previous - 0.5) / 255);
+    }
+    return 1;
+}
+
+/* The neighbour of a pixel beyond its side 0 = top, 1 = right, 2 = bottom, 3 = left; a crack is run
+   through clockwise, so that its pixel lies to the right: along the top to the right, and so on. */
+static const int txp_e_side_x[4] = {0, 1, 0, -1}, txp_e_side_y[4] = {-1, 0, 1, 0};
+
+/* Connected pixels of one layer are a region. It is known by one of its pixels, its root; next
+   links root and boundary pixels to a circle. Two circles are joined by swapping one link each. */
+typedef struct txp_e_regions {
+    int width, height;
+    int32_t *parent, *next;
+    int32_t *length; /* of the root: cracks of the region's boundary */
+    uint8_t *layer;  /* of the root: what the region shows now       */
+} txp_e_regions;
+
+static int32_t txp_e_root(const txp_e_regions *r, int32_t p) {
+    while (r->parent[p] != p) p = r->parent[p] = r->parent[r->parent[p]];
+    return p;
+}
+
+/* Unite the regions of two roots; returns the new root. */
+static int32_t txp_e_unite(txp_e_regions *r, int32_t a, int32_t b) {
+    if (b < a) return txp_e_unite(r, b, a);
+    return r->parent[b] = a;
+}
+
+/* the pixel beyond a side of p, -1: none */
+static int32_t txp_e_beyond(const txp_e_regions *r, int32_t p, int side) {
+    const int x = p % r->width + txp_e_side_x[side], y = p / r->width + txp_e_side_y[side];
+    if (x < 0 || y < 0 || x >= r->width || y >= r->height) return -1;
+    return p + txp_e_side_x[side] + txp_e_side_y[side] * r->width;
+}
+
+static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
+    const int32_t count = (int32_t)r->width * r->height;
+    for (int32_t p = 0; p < count; p++) {
+        r->parent[p] = r->next[p] = p;
+        r->length[p] = 0;
+        int32_t root = p;
+        for (int side = 3; side >= 0; side -= 3) { /* left and above */
+            const int32_t q = txp_e_beyond(r, p, side);
+            if (q < 0 || r->layer[q] != r->layer[p]) continue;
+            const int32_t other = txp_e_root(r, q);
+            if (other != root) root = txp_e_unite(r, root, other);
+        }
+        if (txp_e_tick(bar, 2)) return 0;
+    }
+    for (int32_t p = 0; p < count; p++) {
+        const int32_t root = txp_e_root(r, p);
+        int cracks = 0;
+        for (int side = 0; side < 4; side++) {
+            const int32_t q = txp_e_beyond(r, p, side);
+            cracks += q < 0 || r->layer[q] != r->layer[p];
+        }
+        r->length[root] += cracks;
+        if (cracks && p != root) {
+            r->next[p] = r->next[root];
+            r->next[root] = p;
+        }
+        if (txp_e_tick(bar, 2)) return 0;
+    }
+    return 1;
+}
+
+/* Give a region to the layer with which it shares most of its boundary, the darkest of several, and
+   unite it with all regions of that layer around it. Returns the new root, -1 if the region is the
+   whole picture. Pixels that are on no boundary any more are taken out of the circle. */
+static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
+    int32_t shared[TEXPATCH_MAX_LEVELS];
+    memset(shared, 0, sizeof shared);
+    for (int32_t before = region, p = region;;) {
+        int inner = 1;
+        for (int side = 0; side < 4; side++) {
+            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t other = q < 0 ? region : txp_e_root(r, q);
+            if (other == region) continue;
+            inner = 0;
+            shared[r->layer[other]]++;
+        }
+        ++*work;
+        if (inner && p != region) r->next[before] = r->next[p];
+        else before = p;
+        p = r->next[p];
+        if (p == region) break;
+    }
+    int target = 0;
+    for (int k = 1; k < TEXPATCH_MAX_LEVELS; k++) {
+        if (shared[k] > shared[target]) target = k;
+    }
+    if (shared[target] == 0) return -1;
+    int32_t root = region, length = r->length[region] - 2 * shared[target];
+    for (int32_t p = region, after;; p = after) {
+        after = r->next[p]; /* what is joined in behind p is not walked through */
+        for (int side = 0; side < 4; side++) {
+            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t other = q < 0 ? root : txp_e_root(r, q);
+            if (other == root || r->layer[other] != target) continue;
+            const int32_t link = r->next[p];
+            r->next[p] = r->next[other];
+            r->next[other] = link;
+            length += r->length[other];
+            root = txp_e_unite(r, root, other);
+        }
+        ++*work;
+        if (after == region) break;
+    }
+    r->layer[root] = (uint8_t)target;
+    r->length[root] = length;
+    return root;
+}
+
+/* Dissolve regions until all have a boundary of least cracks or more: first those under 8, then
+   under 16 and so on, each time in raster order of the roots. A region of n cracks is one of
+   O(pixels / n), so all this takes O(pixels log least). 0 = cancelled. */
+static int txp_e_regions_clean(txp_e_regions *r, int least, txp_e_bar *bar) {
+    const int32_t count = (int32_t)r->width * r->height;
+    for (int bound = 4; bound < least;) {
+        bound = bound < least / 2 ? 2 * bound : least;
+        for (int32_t p = 0; p < count; p++) {
+            int32_t region = r->parent[p] == p ? p : -1;
+            while (region >= 0 && r->length[region] < bound) {
+                size_t work = 0;
+                region = txp_e_dissolve(r, region, &work);
+                if (txp_e_tick(bar, 8 * work)) return 0;
+            }
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+    }
+    for (int32_t p = 0; p < count; p++) {
+        r->layer[p] = r->layer[txp_e_root(r, p)];
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+/* The layer of each pixel. is_given: thresholds holds levels - 1 of them, else it receives them.
+   to: the part of the bar that is full then. */
+static txm_status txp_e_split(const texpatch_edges_desc *desc, int levels, int is_given,
+                              float *thresholds, uint8_t *layer, double to, txp_e_bar *bar,
+                              txm_arena *arena, txm_env *env) {
+    const int width = desc->image.width, height = desc->image.height;
+    const size_t count = (size_t)width * (size_t)height;
+    const double smooth = desc->smooth;
+    float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
+    float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
+    if (!gray || (smooth > 0 && !scratch)) return txp_e_no_memory(env);
+    txp_e_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
+    const int good = txp_e_gray(&desc->image, gray, bar);
+    if (good < 0)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is infinite or not a number");
+    if (!good || (smooth > 0 && !txp_e_blur(gray, scratch, width, height, smooth, bar)) ||
+        (!is_given && !txp_e_divide(gray, count, levels, thresholds, bar)))
+        return txp_e_stopped(env);
+    for (size_t i = 0; i < count; i++) {
+        int k = 0;
+        while (k < levels - 1 && gray[i] >= thresholds[k]) k++;
+        layer[i] = (uint8_t)k;
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    txm_arena_free(arena);
+    if (desc->least <= 4) return TXM_OK; /* nothing is shorter */
+
+    txp_e_regions r;
+    r.width = width;
+    r.height = height;
+    r.layer = layer;
+    r.parent = (int32_t *)txm_arena_alloc(arena, count, 3 * sizeof(int32_t));
+    if (!r.parent) return txp_e_no_memory(env);
+    r.next = r.parent + count;
+    r.length = r.next + count;
+    txp_e_stage(bar, "regions", to, (double)count * 12);
+    if (!txp_e_regions_make(&r, bar) || !txp_e_regions_clean(&r, desc->least, bar))
+        return txp_e_stopped(env);
+    txm_arena_free(arena);
+    return TXM_OK;
+}
+
+/* ---- edges: from layers to lines --------------------------------------------------------- */
+
+/* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the upper
+   four the sides of the pixel whose cracks are still to be run through. */
+typedef struct txp_e_map {
+    int width, height;
+    uint8_t *at;
+} txp_e_map;
+
+/* is the pixel of this layer? */
+static int txp_e_is(const txp_e_map *m, int x, int y, int layer) {
+    if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
+    return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
+}
+
+/* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
+static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPATCH_MAX_LEVELS],
+                      txp_e_bar *bar) {
+    const int w = m->width;
+    *cracks = 0;
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < w; x++) {
+            uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
+            const int layer = *at & 15;
+            for (int side = 0; side < 4; side++) {
+                const int u = x + txp_e_side_x[side], v = y + txp_e_side_y[side];
+                if (txp_e_is(m, u, v, layer)) continue;
+                *at = (uint8_t)(*at | 16 << side);
+                ++*cracks;
+                if (u >= 0 && v >= 0 && u < w && v < m->height)
+                    shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
+            }
+            if (txp_e_tick(bar, 4)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Run through the cracks of one line, from side `side` of pixel (x, y), and unmark them.
+
+           l | a      p: the pixel to the right of the way (here upwards, along its left side)
+             ^        a: the next one on the same hand, l: the one across
+           - | p      a is of another layer: turn right, around p, whatever l is;
+                      a and l are of p's: turn left, around the corner of what lies between;
+                      only a is: straight on
+
+   As each crack has one successor and is that of one, the way comes back to its beginning.
+   points  receives the corners, or NULL; returns their number; 0 = cancelled
+   area    receives the area to the right, negative if the line is a hole's                   */
+static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *points,
+                          int64_t *area, txp_e_bar *bar) {
+    const int x0 = x, y0 = y, side0 = side, w = m->width;
+    const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
+    size_t count = 0;
+    *area = 0;
+    do {
+        uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
+        *at = (uint8_t)(*at & ~(16 << side));
+        if (points)
+            points[count] = txm_v2((float)(x + (side == 1 || side == 2)), (float)(y + (side >= 2)));
+        count++;
+        if (side == 1) *area += x + 1; /* integral of x dy */
+        if (side == 3) *area -= x;
+        const int ahead = (side + 1) & 3; /* the side across which a lies */
+        const int ax = x + txp_e_side_x[ahead], ay = y + txp_e_side_y[ahead];
+        if (!txp_e_is(m, ax, ay, layer)) {
+            side = ahead;
+        } else {
+            x = ax;
+            y = ay;
+            const int lx = ax + txp_e_side_x[side], ly = ay + txp_e_side_y[side];
+            if (txp_e_is(m, lx, ly, layer)) {
+                x = lx;
+                y = ly;
+                side = (side + 3) & 3;
+            }
+        }
+        if (txp_e_tick(bar, 4)) return 0;
+    } while (x != x0 || y != y0 || side != side0);
+    return count;
+}
+
+/* All lines in raster order of where they begin: run through once to count them, once to keep them. */
+static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_edges *e,
+                                  txm_env *env) {
+    size_t shared[TEXPATCH_MAX_LEVELS][TEXPATCH_MAX_LEVELS], cracks;
+    for (int pass = 0; pass < 2; pass++) {
+        size_t lines = 0, points = 0;
+        memset(shared, 0, sizeof shared);
+        if (!txp_e_mark(m, &cracks, shared, bar)) return txp_e_stopped(env);
+        if (pass == 1) {
+            e->lines =
+                (texpatch_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
+            e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
+            if (!e->lines || !e->points) return txp_e_no_memory(env);
+        }
+        for (int y = 0; y < m->height; y++) {
+            for (int x = 0; x < m->width; x++) {
+                const uint8_t *at = m->at + (size_t)y * (size_t)m->width + (size_t)x;
+                for (int side = 0; side < 4; side++) {
+                    if (!(*at & 16 << side)) continue;
+                    int64_t area;
+                    const size_t count =
+                        txp_e_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
+                    if (!count) return txp_e_stopped(env);
+                    if (pass) {
+                        e->lines[lines].layer = *at & 15;
+                        e->lines[lines].is_hole = area < 0;
+                        e->lines[lines].first = points;
+                        e->lines[lines].count = count;
+                    }
+                    points += count;
+                    lines++;
+                }
+                if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            }
+        }
+        e->line_count = lines;
+        e->point_count = points;
+    }
+    for (int k = 0; k < e->levels; k++) {
+        int best = -1;
+        for (int j = 0; j < e->levels; j++) {
+            if (shared[k][j] > (best < 0 ? 0 : shared[k][best])) best = j;
+        }
+        e->beside[k] = best;
+    }
+    return TXM_OK;
+}
+
+static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, txm_arena *layers,
+                             txm_arena *scratch, texpatch_edges *e, txm_env *env) {
+    txp_e_map map;
+    const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
+    e->width = map.width = desc->image.width;
+    e->height = map.height = desc->image.height;
+    e->levels = desc->levels ? desc->levels : 4;
+    for (int k = 0; k < e->levels - 1 && desc->thresholds; k++)
+        e->thresholds[k] = desc->thresholds[k];
+    map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
+    if (!map.at) return txp_e_no_memory(env);
+    const txm_status status = txp_e_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
+                                          map.at, 0.7, bar, scratch, env);
+    if (status != TXM_OK) return status;
+    txp_e_stage(bar, "lines", 1, (double)count * 14);
+    return txp_e_trace_all(&map, bar, e, env);
+}
+
+TEXPATCH_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+                                            texpatch_edges *out) {
+    txm_status status = txp_e_check_desc(desc, env);
+    if (status != TXM_OK) return status;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    if (desc->levels && (desc->levels < 2 || desc->levels > TEXPATCH_MAX_LEVELS))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels",
+                           "must be 0 or 2 to TEXPATCH_MAX_LEVELS");
+    if (desc->thresholds &&
+        !txp_e_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
+
+    txm_arena layers, scratch;
+    txp_e_bar bar;
+    texpatch_edges e;
+    memset(&e, 0, sizeof e);
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_arena_init(&layers, env);
+    txm_arena_init(&scratch, env);
+    txm_arena_init(&e.memory, env);
+    status = txp_e_find(desc, &bar, &layers, &scratch, &e, env);
+    txm_arena_free(&scratch);
+    txm_arena_free(&layers);
+    if (status == TXM_OK) *out = e;
+    else txm_arena_free(&e.memory);
+    return status;
+}
+
+TEXPATCH_API void texpatch_edges_free(texpatch_edges *edges) {
+    if (!edges) return;
+    txm_arena_free(&edges->memory);
+    memset(edges, 0, sizeof *edges);
+}
+
+/* Turn layers into grays. 0 = cancelled. */
+static int txp_e_show(uint8_t *layer, size_t count, int levels, txp_e_bar *bar) {
+    uint8_t gray[TEXPATCH_MAX_LEVELS] = {0};
+    for (int k = 0; k < levels; k++)
+        gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
+    for (size_t i = 0; i < count; i++) {
+        layer[i] = gray[layer[i]];
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+TEXPATCH_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
+                                        const texpatch_edges *edges, txm_env *env,
+                                        const txm_image *layers) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_status status = txp_e_check_desc(desc, env);
+    if (status == TXM_OK) status = txp_e_check_image(layers, "layers", 1, env);
+    if (status == TXM_OK &&
+        (layers->width != desc->image.width || layers->height != desc->image.height))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
+    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS ||
+                             !txp_e_thresholds_are_good(edges->thresholds, edges->levels)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texpatch_edges_find made it");
+    if (status != TXM_OK) return status;
+
+    float thresholds[TEXPATCH_MAX_LEVELS];
+    txm_arena map, scratch;
+    txm_arena_init(&map, env);
+    txm_arena_init(&scratch, env);
+    memcpy(thresholds, edges->thresholds, sizeof thresholds);
+    const size_t width = (size_t)layers->width;
+    uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
+    status = layer ? txp_e_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+                   : txp_e_no_memory(env);
+    if (status == TXM_OK && !txp_e_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+        status = txp_e_stopped(env);
+    for (int y = 0; y < layers->height && status == TXM_OK; y++)
+        memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
+    txm_arena_free(&scratch);
+    txm_arena_free(&map);
+    return status;
+}
+
+/* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
+   twice a pixel. 0 = cancelled. */
+static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *line, uint8_t *marks,
+                           int width, int height, txp_e_bar *bar) {
+    const txm_vec2 *points = e->points + line->first;
+    for (size_t j = 0; j < line->count; j++) {
+        const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
+        const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
+        const double length = sqrt(dx * dx + dy * dy);
+        const int steps = 2 * (int)length + 1;
+        if (txp_e_tick(bar, 1)) return 0;
+        for (int i = 0; i < steps && length > 0; i++) {
+            const double t = (i + 0.5) / steps;
+            const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
+            if (x >= 0 && y >= 0 && x < width && y < height)
+                marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
+            if (txp_e_tick(bar, 2)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
+   not quite black. One channel: gray. */
+static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
+    static const int ramp[5][3] = {
+        {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
+    const int t = 1024 * (layer + 1) / levels; /* 0..1024: four spans of 256 */
+    if (channels == 1) return (uint8_t)((255 * (layer + 1) + levels / 2) / levels);
+    const int span = t < 1024 ? t / 256 : 3, rest = t - 256 * span;
+    return (uint8_t)((ramp[span][channel] * (256 - rest) + ramp[span + 1][channel] * rest) / 256);
+}
+
+TEXPATCH_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+                                            const txm_image *image) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txp_e_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
+    txm_status status = txp_e_check_image(image, "image", 0, env);
+    if (status != TXM_OK) return status;
+    const int channels = image->channels ? image->channels : 1;
+    if (image->sample != TXM_U8 || (channels != 1 && channels != 3))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "must be TXM_U8 with 1 or 3 channels");
+    status = txp_e_check_edges(edges, "edges", 0, &bar, env);
+    if (status != TXM_OK) return status;
+    if (layer < -1 || layer >= edges->levels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layer", "must be -1 to levels - 1");
+
+    const int width = image->width, height = image->height;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint8_t *marks = (uint8_t *)txm_arena_zero(&arena, (size_t)width, (size_t)height);
+    if (!marks) return txp_e_no_memory(env);
+    txp_e_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
+    for (size_t i = 0; i < edges->line_count && status == TXM_OK; i++) {
+        const texpatch_polyline *line = &edges->lines[i];
+        if (layer >= 0 && line->layer != layer) continue;
+        if (!txp_e_draw_line(edges, line, marks, width, height, &bar)) status = txp_e_stopped(env);
+    }
+    for (int y = 0; y < height && status == TXM_OK; y++) {
+        uint8_t *row = (uint8_t *)txm_image_row(image, y);
+        for (int x = 0; x < width; x++) {
+            const int mark = marks[(size_t)y * (size_t)width + (size_t)x];
+            for (int c = 0; c < channels && mark; c++)
+                row[x * channels + c] = txp_e_color(mark - 1, edges->levels, channels, c);
+        }
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- control: lines as rows of points ---------------------------------------------------- */
+
+typedef struct txp_e_point {
+    double x, y;
+} txp_e_point;
+
+static txp_e_point txp_e_between(txp_e_point a, txp_e_point b, double t) {
+    txp_e_point p;
+    p.x = a.x + (b.x - a.x) * t;
+    p.y = a.y + (b.y - a.y) * t;
+    return p;
+}
+
+static double txp_e_distance(txp_e_point a, txp_e_point b) {
+    const double dx = b.x - a.x, dy = b.y - a.y;
+    return sqrt(dx * dx + dy * dy);
+}
+
+/* Length of n points; closed: back to the first. Negative: cancelled. */
+static double txp_e_length(const txp_e_point *p, size_t n, int is_closed, txp_e_bar *bar) {
+    double sum = 0;
+    for (size_t i = 1; i < n + (is_closed != 0); i++) {
+        sum += txp_e_distance(p[i - 1], p[i < n ? i : 0]);
+        if (txp_e_tick(bar, 1)) return -1;
+    }
+    return sum;
+}
+
+/* m points at equal distances along a line of n points and this length: closed from the first point
+   on, open from the first to the last. 0 = cancelled. */
+static int txp_e_resample(const txp_e_point *p, size_t n, int is_closed, double length,
+                          txp_e_point *out, size_t m, txp_e_bar *bar) {
+    const size_t segments = is_closed ? n : n - 1;
+    const double step = length / (double)(is_closed ? m : m - 1);
+    size_t i = 0;
+    double from = 0, span = txp_e_distance(p[0], p[1]); /* of segment i */
+    for (size_t k = 0; k < m; k++) {
+        const double at = step * (double)k;
+        while (at > from + span && i + 1 < segments) {
+            from += span;
+            i++;
+            span = txp_e_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+        const double t = span > 0 ? (at - from) / span : 0;
+        out[k] = txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+/* Blur a line by the weights radius + 1 - |d|, whole numbers. Closed: around (n > radius); open:
+   near the ends with as small a radius as they need, so that they stay. 0 = cancelled. */
+static int txp_e_soften(const txp_e_point *p, size_t n, int is_closed, size_t radius,
+                        txp_e_point *out, txp_e_bar *bar) {
+    for (size_t i = 0; i < n; i++) {
+        size_t reach = radius;
+        if (!is_closed && reach > i) reach = i;
+        if (!is_closed && reach > n - 1 - i) reach = n - 1 - i;
+        double x = 0, y = 0;
+        for (size_t d = 1; d <= reach; d++) {
+            const txp_e_point a = p[i >= d ? i - d : i + n - d];
+            const txp_e_point b = p[i + d < n ? i + d : i + d - n];
+            const double weight = (double)(reach + 1 - d);
+            x += weight * (a.x + b.x);
+            y += weight * (a.y + b.y);
+        }
+        const double weight = (double)(reach + 1), sum = weight * weight;
+        out[i].x = (x + weight * p[i].x) / sum;
+        out[i].y = (y + weight * p[i].y) / sum;
+        if (txp_e_tick(bar, reach + 1)) return 0;
+    }
+    return 1;
+}
+
+/* The unit vector from a to b; if they are one point, as it was before. */
+static void txp_e_direction(txp_e_point a, txp_e_point b, txp_e_point *direction) {
+    const double length = txp_e_distance(a, b);
+    if (!(length > 1e-9)) return;
+    direction->x = (b.x - a.x) / length;
+    direction->y = (b.y - a.y) / length;
+}
+
+/* ---- control: the unrest of the exemplar's edges ----------------------------------------- */
+
+/* One sample of a line of the exemplar, a pixel of its length from the next: how far its smooth course
+   moves on meanwhile, and where the line lies from there, ahead and to the right. */
+typedef struct txp_e_sample {
+    double step, ahead, right;
+    double length; /* of the line to the next sample, tamed as it is                           */
+    int bin;       /* its direction against its course                                         */
+} txp_e_sample;
+
+/* The unrest of one layer: rows of samples one behind the other, and the places at which a piece of
+   TXP_E_PIECE + TXP_E_JOIN samples can begin. */
+typedef struct txp_e_unrest {
+    txp_e_sample *samples;
+    size_t *starts;
+    size_t count, start_count;
+    double amount;            /* by which the exemplar's is multiplied                          */
+    double step;              /* mean of all steps                                              */
+    double share[TXP_E_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
+} txp_e_unrest;
+
+/* Room for the work on one line of up to count points. */
+typedef struct txp_e_bench {
+    txp_e_point *a, *b, *c;
+} txp_e_bench;
+
+static int txp_e_bench_make(txp_e_bench *bench, txm_arena *arena, size_t count) {
+    bench->a = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
+    bench->b = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
+    bench->c = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
+    return bench->a && bench->b && bench->c;
+}
+
+/* The factor that makes a vector of this length no longer than TXP_E_STRAY: 1 up to TXP_E_LINEAR,
+   then the length grows slower and slower. */
+static double txp_e_tame(double length) {
+    const double room = TXP_E_STRAY - TXP_E_LINEAR, more = length - TXP_E_LINEAR;
+    return more > 0 ? (TXP_E_LINEAR + room * more / (more + room)) / length : 1;
+}
+
+/* The direction of (ahead, right), no matter which way: 0 = straight on, then every 16th of half a
+   turn to the right. The table: cosine and sine of 1/2, 3/2, ... of such a step. */
+static int txp_e_bin(double ahead, double right) {
+    static const double edge[TXP_E_BINS / 2][2] = {
+        {0.99518473, 0.09801714}, {0.95694034, 0.29028468}, {0.88192126, 0.47139674},
+        {0.77301045, 0.63439328}, {0.63439328, 0.77301045}, {0.47139674, 0.88192126},
+        {0.29028468, 0.95694034}, {0.09801714, 0.99518473}};
+    const double x = ahead < 0 ? -ahead : ahead, y = right < 0 ? -right : right;
+    int k = 0;
+    while (k < TXP_E_BINS / 2 && y * edge[k][0] > x * edge[k][1]) k++;
+    return (ahead < 0) != (right < 0) ? (TXP_E_BINS - k) % TXP_E_BINS : k % TXP_E_BINS;
+}
+
+/* The directions of a line of n points in bench->b against its course, its blur of radius
+   TXP_E_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as of
+   a line with `amount` times the unrest, or put into the samples of its points. 0 = cancelled. */
+static int txp_e_directions(const txp_e_bench *bench, size_t n, int is_closed, size_t light,
+                            double amount, double *share, txp_e_sample *samples, txp_e_bar *bar) {
+    const txp_e_point *line = bench->a, *course = bench->c;
+    const size_t trim = is_closed || !share ? 0 : TXP_E_COURSE; /* the ends of the course are bad */
+    if (!txp_e_soften(bench->b, n, is_closed, light, bench->a, bar) ||
+        !txp_e_soften(bench->b, n, is_closed, TXP_E_COURSE, bench->c, bar))
+        return 0;
+    for (size_t i = trim; i < n - trim; i++) {
+        size_t at[4]; /* the course from at[0] to at[3], the line from at[1] to at[2] */
+        for (int k = 0; k < 4; k++) {
+            const size_t off = k == 0 || k == 3 ? TXP_E_CHORD : 1;
+            if (k < 2) at[k] = i >= off ? i - off : is_closed ? i + n - off : 0;
+            else at[k] = i + off < n ? i + off : is_closed ? i + off - n : n - 1;
+        }
+        const double cx = course[at[3]].x - course[at[0]].x, cy = course[at[3]].y - course[at[0]].y;
+        const double dx = line[at[2]].x - line[at[1]].x, dy = line[at[2]].y - line[at[1]].y;
+        const int bin = txp_e_bin(cx * dx + cy * dy, amount * (cx * dy - cy * dx));
+        if (share) share[bin] += 1;
+        if (samples) {
+            samples[i].bin = bin;
+            samples[i].length = txp_e_distance(line[i], line[at[2]]);
+        }
+        if (txp_e_tick(bar, 4)) return 0;
+    }
+    return 1;
+}
+
+/* Take in one line: n points in bench->a, a pixel apart at most. With S the blur of radius
+   TXP_E_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone would
+   shrink. Ends of open lines are left out, where the course is bad. 0 = cancelled. */
+static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int is_closed,
+                        txp_e_bar *bar) {
+    txp_e_point *line = bench->b, *blurred = bench->a, *course = bench->c;
+    if (n < TXP_E_SHORT) return 1;
+    const double length = txp_e_length(bench->a, n, is_closed, bar);
+    if (length < 0) return 0;
+    const size_t m = (size_t)(length + 0.5) + !is_closed; /* at most n */
+    const size_t trim = is_closed ? 0 : TXP_E_SCALE;
+    if (m < TXP_E_SHORT + 2 * trim) return 1;
+    if (!txp_e_resample(bench->a, n, is_closed, length, line, m, bar) ||
+        !txp_e_soften(line, m, is_closed, TXP_E_SCALE, blurred, bar) ||
+        !txp_e_soften(blurred, m, is_closed, TXP_E_SCALE, course, bar))
+        return 0;
+    for (size_t i = 0; i < m; i++) {
+        course[i].x = 2 * blurred[i].x - course[i].x;
+        course[i].y = 2 * blurred[i].y - course[i].y;
+    }
+    /* a closed line goes on beyond its end, so that pieces can begin anywhere */
+    const size_t room = TXP_E_PIECE + TXP_E_JOIN, end = is_closed ? m + room : m - trim;
+    txp_e_sample *first = u->samples + u->count;
+    txp_e_point direction;
+    direction.x = 1;
+    direction.y = 0;
+    for (size_t i = trim; i < end; i++) {
+        const size_t at = i % m, back = (i + m - TXP_E_CHORD) % m, front = (i + TXP_E_CHORD) % m;
+        const double dx = line[at].x - course[at].x, dy = line[at].y - course[at].y;
+        txp_e_sample *s = &u->samples[u->count];
+        txp_e_direction(course[back], course[front], &direction);
+        s->step = txp_e_distance(course[at], course[(i + 1) % m]);
+        s->ahead = u->amount * (dx * direction.x + dy * direction.y);
+        s->right = u->amount * (dy * direction.x - dx * direction.y);
+        if (i + room <= end) {
+            u->starts[u->start_count++] = u->count;
+            u->step += s->step;
+        }
+        u->count++;
+        if (txp_e_tick(bar, 4)) return 0;
+    }
+    if (!txp_e_directions(bench, m, is_closed, TXP_E_LIGHT, u->amount, u->share, NULL, bar))
+        return 0;
+    /* Tame the unrest and count its directions once more, along a straight course; smoother than the
+       exemplar's, as a line loses some when it is drawn in pixels. So as much as the exemplar shows
+       will be seen in the end. */
+    double x = 0;
+    const size_t count = end - trim;
+    for (size_t i = 0; i < count; i++) {
+        txp_e_sample *s = first + i;
+        const double factor = txp_e_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
+        s->ahead *= factor;
+        s->right *= factor;
+        line[i].x = x + s->ahead;
+        line[i].y = s->right;
+        x += s->step;
+        if (txp_e_tick(bar, 2)) return 0;
+    }
+    return txp_e_directions(bench, count, 0, TXP_E_LIGHT + 1, 1, NULL, first, bar);
+}
+
+/* does the crack from p to q run along the picture's border? */
+static int txp_e_on_border(const texpatch_edges *e, txm_vec2 p, txm_vec2 q) {
+    return (p.x == q.x && (p.x == 0 || p.x == (float)e->width)) ||
+           (p.y == q.y && (p.y == 0 || p.y == (float)e->height));
+}
+
+/* Take in the parts of a line that lie inside the picture. 0 = cancelled. */
+static int txp_e_listen_line(txp_e_unrest *u, const txp_e_bench *bench, const texpatch_edges *e,
+                             const texpatch_polyline *line, txp_e_bar *bar) {
+    const txm_vec2 *p = e->points + line->first;
+    size_t start = line->count, n = 0;
+    for (size_t j = 0; j < line->count && start == line->count; j++) { /* the first on the border */
+        if (txp_e_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    const int is_closed = start == line->count;
+    for (size_t k = 0; k < line->count; k++) {
+        const size_t j = (start + k) % line->count, next = (j + 1) % line->count;
+        if (txp_e_on_border(e, p[j], p[next])) {
+            if (!txp_e_listen(u, bench, n, 0, bar)) return 0;
+            n = 0;
+        } else { /* the middle of the crack: so a slope of one pixel in one is a straight line */
+            bench->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
+            bench->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
+            n++;
+        }
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return txp_e_listen(u, bench, n, is_closed, bar);
+}
+
+/* The unrest of a layer, amount times that of the exemplar, with memory from the arena. */
+static txm_status txp_e_listen_layer(txp_e_unrest *u, const texpatch_edges *e, int layer,
+                                     double amount, txm_arena *arena, txp_e_bar *bar,
+                                     txm_env *env) {
+    const size_t room = TXP_E_PIECE + TXP_E_JOIN;
+    txp_e_bench bench;
+    size_t most = 0, longest = 0;
+    double sum = 0;
+    memset(u, 0, sizeof *u);
+    u->amount = amount;
+    for (size_t i = 0; i < e->line_count; i++) {
+        const texpatch_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
+        most += line->count + room;
+        if (line->count > longest) longest = line->count;
+    }
+    if (most == 0) return TXM_OK;
+    u->samples = (txp_e_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
+    u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
+    if (!u->samples || !u->starts || !txp_e_bench_make(&bench, arena, longest + room))
+        return txp_e_no_memory(env);
+    for (size_t i = 0; i < e->line_count; i++) {
+        const texpatch_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
+        if (!txp_e_listen_line(u, &bench, e, line, bar)) return txp_e_stopped(env);
+    }
+    for (int b = 0; b < TXP_E_BINS; b++) sum += u->share[b];
+    for (int b = 0; b < TXP_E_BINS && sum > 0; b++) u->share[b] /= sum;
+    if (u->start_count) u->step /= (double)u->start_count;
+    if (u->step < 0.125) u->step = 0.125; /* of a line that turns in place */
+    return TXM_OK;
+}
+
+/* ---- control: new unrest out of pieces --------------------------------------------------- */
+
+/* How badly TXP_E_JOIN samples go together: place and, as there are several, slope. */
+static double txp_e_gap(const txp_e_sample *a, const txp_e_sample *b) {
+    double sum = 0;
+    for (int j = 0; j < TXP_E_JOIN; j++) {
+        const double ahead = a[j].ahead - b[j].ahead, right = a[j].right - b[j].right;
+        sum += ahead * ahead + right * right;
+    }
+    return sum;
+}
+
+/* Let a piece begin where the tail of the last one is: the difference of their first samples is taken
+   back over TXP_E_JOIN samples. Fading from one to the other would even out both. */
+static void txp_e_join(const txp_e_sample *tail, txp_e_sample *piece) {
+    const double ahead = tail->ahead - piece->ahead, right = tail->right - piece->right;
+    for (int j = 0; j < TXP_E_JOIN; j++) {
+        const double part = 1 - j / (double)TXP_E_JOIN;
+        piece[j].ahead += ahead * part;
+        piece[j].right += right * part;
+    }
+}
+
+/* What the next piece of a row is chosen by. */
+typedef struct txp_e_row {
+    const txp_e_sample *tail; /* how the last piece would go on; NULL: there is none           */
+    double length;            /* of the line so far                                            */
+    double bins[TXP_E_BINS];  /* and of its parts by direction                                 */
+} txp_e_row;
+
+/* How far the directions are from their shares once a piece is there. */
+static double txp_e_deviation(const txp_e_row *row, const double *share, const txp_e_sample *piece,
+                              size_t length) {
+    double bins[TXP_E_BINS], total = row->length, sum = 0;
+    memcpy(bins, row->bins, sizeof bins);
+    for (size_t j = 0; j < length; j++) {
+        bins[piece[j].bin] += piece[j].length;
+        total += piece[j].length;
+    }
+    for (int b = 0; b < TXP_E_BINS; b++) {
+        const double off = bins[b] - share[b] * total;
+        sum += off * off / (share[b] + 0.01);
+    }
+    return sum;
+}
+
+/* Choose a piece of this length: of some taken at random those that join best, to the tail and at the
+   end to head (NULL: to nothing, one of the piece itself: to its own beginning); of these the one
+   that brings the directions nearest to their shares. */
+static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, const txp_e_row *row,
+                                        size_t length, int closes, const txp_e_sample *head) {
+    const txp_e_sample *good[TXP_E_GOOD + 1] = {NULL}, *best;
+    double gaps[TXP_E_GOOD + 1] = {0}, least;
+    int count = 0;
+    for (int i = 0; i < TXP_E_TRIES * (closes ? 4 : 1); i++) {
+        const size_t pick = (size_t)(txm_rng_double(rng) * (double)u->start_count);
+        const txp_e_sample *piece = u->samples + u->starts[pick];
+        double gap = row->tail ? txp_e_gap(row->tail, piece) : 0;
+        if (closes) gap += txp_e_gap(piece + length, head ? head : piece);
+        int at = count;
+        for (; at > 0 && gap < gaps[at - 1]; at--) {
+            gaps[at] = gaps[at - 1];
+            good[at] = good[at - 1];
+        }
+        gaps[at] = gap;
+        good[at] = piece;
+        if (count < TXP_E_GOOD) count++;
+    }
+    best = good[0];
+    least = closes ? 0 : txp_e_deviation(row, u->share, best, length);
+    for (int i = 1; i < count && !closes; i++) {
+        const double off = txp_e_deviation(row, u->share, good[i], length);
+        if (off >= least) continue;
+        best = good[i];
+        least = off;
+    }
+    return best;
+}
+
+/* String pieces together to a closed row of m samples, m >= TXP_E_PIECE / 3. 0 = cancelled. */
+static int txp_e_weave(const txp_e_unrest *u, txm_rng *rng, txp_e_sample *samples, size_t m,
+                       txp_e_bar *bar) {
+    const size_t shortest = TXP_E_PIECE / 3;
+    txp_e_row row;
+    memset(&row, 0, sizeof row);
+    for (size_t k = 0; k < m;) {
+        const size_t rest = m - k;
+        size_t length = rest;
+        if (rest > TXP_E_PIECE)
+            length = shortest + txm_rng_below(rng, TXP_E_PIECE - (uint32_t)shortest + 1);
+        if (length < rest && rest - length < shortest) length = rest - shortest;
+        const txp_e_sample *piece =
+            txp_e_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
+        memcpy(samples + k, piece, length * sizeof *samples);
+        if (row.tail) txp_e_join(row.tail, samples + k);
+        for (size_t j = 0; j < length; j++) {
+            row.bins[piece[j].bin] += piece[j].length;
+            row.length += piece[j].length;
+        }
+        row.tail = piece + length;
+        k += length;
+        if (txp_e_tick(bar, 64 * TXP_E_TRIES)) return 0;
+    }
+    txp_e_join(row.tail, samples);
+    return 1;
+}
+
+/* ---- control: disturbed strokes ---------------------------------------------------------- */
+
+/* Points of the outline of a stroke; with points NULL they are only counted. */
+typedef struct txp_e_outline {
+    txp_e_point *points;
+    size_t count;
+} txp_e_outline;
+
+static void txp_e_put(txp_e_outline *o, double x, double y) {
+    if (o->points) {
+        o->points[o->count].x = x;
+        o->points[o->count].y = y;
+    }
+    o->count++;
+}
+
+/* One side of a band around n points, to the left of the way (back: of the way back), and the round
+   end behind it. Where the line turns outwards the gap is filled in steps of a pixel or so. */
+static int txp_e_side(const txp_e_point *p, size_t n, int back, double half, txp_e_outline *o,
+                      txp_e_bar *bar) {
+    txp_e_point d, before;
+    d.x = 1;
+    d.y = 0;
+    for (size_t i = 1; i < n; i++) { /* a direction to begin with */
+        const size_t at = back ? n - i : i - 1, next = back ? at - 1 : at + 1;
+        if (txp_e_distance(p[at], p[next]) > 1e-9) {
+            txp_e_direction(p[at], p[next], &d);
+            break;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        const size_t at = back ? n - 1 - i : i;
+        const size_t low = at > 2 ? at - 2 : 0, high = at + 2 < n ? at + 2 : n - 1;
+        before = d;
+        txp_e_direction(p[back ? high : low], p[back ? low : high], &d);
+        const int turns = i ? (int)(half * txp_e_distance(before, d)) : 0;
+        for (int k = 1; k <= turns; k++) {
+            txp_e_point mid, zero;
+            zero.x = zero.y = 0;
+            mid = before;
+            txp_e_direction(zero, txp_e_between(before, d, (double)k / (turns + 1)), &mid);
+            txp_e_put(o, p[at].x + half * mid.y, p[at].y - half * mid.x);
+        }
+        txp_e_put(o, p[at].x + half * d.y, p[at].y - half * d.x);
+        if (txp_e_tick(bar, (size_t)turns + 1)) return 0;
+    }
+    /* half a circle, in two quarters ((1 - t^2) u + 2 t v) / (1 + t^2), from left over ahead to right */
+    const txp_e_point end = p[back ? 0 : n - 1];
+    const int steps = (int)(1.6 * half) + 1;
+    for (int k = 1; k < 2 * steps; k++) {
+        const double t = (double)(k < steps ? k : k - steps) / steps;
+        const double c = half * (1 - t * t) / (1 + t * t), s = half * 2 * t / (1 + t * t);
+        const double left = k < steps ? c : -s, ahead = k < steps ? s : c;
+        txp_e_put(o, end.x + left * d.y + ahead * d.x, end.y - left * d.x + ahead * d.y);
+    }
+    return !txp_e_tick(bar, 4 * (size_t)steps);
+}
+
+/* The outline of a stroke as a closed line, its inside to the right: of a closed one, its points in
+   the right order; of an open one, both sides of its band. */
+static txm_status txp_e_outline_make(const texpatch_stroke *s, txp_e_outline *o, txm_arena *arena,
+                                     txp_e_bar *bar, txm_env *env) {
+    const size_t n = (size_t)s->count;
+    txp_e_point *given = (txp_e_point *)txm_arena_alloc(arena, n, sizeof *given);
+    double area = 0;
+    if (!given) return txp_e_no_memory(env);
+    for (size_t i = 0; i < n; i++) {
+        const txm_vec2 p = s->points[i], q = s->points[i + 1 < n ? i + 1 : 0], p0 = s->points[0];
+        given[i].x = p.x;
+        given[i].y = p.y;
+        area += ((double)p.x - p0.x) * ((double)q.y - p0.y) -
+                ((double)q.x - p0.x) * ((double)p.y - p0.y);
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    if (s->is_closed) {
+        for (size_t i = 0, j = n - 1; i < j && area < 0; i++, j--) {
+            const txp_e_point p = given[i];
+            given[i] = given[j];
+            given[j] = p;
+        }
+        o->points = given;
+        o->count = n;
+        return TXM_OK;
+    }
+    const double length = txp_e_length(given, n, 0, bar);
+    if (length < 0) return txp_e_stopped(env);
+    const size_t m = (size_t)length + 2;
+    txp_e_point *even = (txp_e_point *)txm_arena_alloc(arena, 2 * m, sizeof *even);
+    if (!even) return txp_e_no_memory(env);
+    if (!txp_e_resample(given, n, 0, length, even, m, bar) ||
+        !txp_e_soften(even, m, 0, TXP_E_CORNER, even + m, bar))
+        return txp_e_stopped(env);
+    const double half = 0.5 * (s->width > 0 ? s->width : 8);
+    for (int pass = 0; pass < 2; pass++) { /* count, then keep */
+        o->points =
+            pass ? (txp_e_point *)txm_arena_alloc(arena, o->count, sizeof *o->points) : NULL;
+        if (pass && !o->points) return txp_e_no_memory(env);
+        o->count = 0;
+        if (!txp_e_side(even + m, m, 0, half, o, bar) || !txp_e_side(even + m, m, 1, half, o, bar))
+            return txp_e_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* The place at u on a closed line of n points. */
+static txp_e_point txp_e_at(const txp_e_point *p, size_t n, double u) {
+    const double wide = (double)n;
+    if (u < 0) u += wide;
+    if (u >= wide) u -= wide;
+    size_t i = (size_t)u;
+    if (i >= n) i = n - 1;
+    return txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], u - (double)i);
+}
+
+/* Do the segments a b and c d cross? Touching does not count. */
+static int txp_e_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 *at) {
+    if (txm_maxf(a.x, b.x) < txm_minf(c.x, d.x) || txm_maxf(c.x, d.x) < txm_minf(a.x, b.x) ||
+        txm_maxf(a.y, b.y) < txm_minf(c.y, d.y) || txm_maxf(c.y, d.y) < txm_minf(a.y, b.y))
+        return 0;
+    const double ux = (double)b.x - a.x, uy = (double)b.y - a.y;
+    const double vx = (double)d.x - c.x, vy = (double)d.y - c.y;
+    const double wx = (double)c.x - a.x, wy = (double)c.y - a.y;
+    const double c_side = ux * wy - uy * wx, d_side = c_side + (ux * vy - uy * vx);
+    const double a_side = vy * wx - vx * wy, b_side = a_side + (vx * uy - vy * ux);
+    if (!((c_side < 0 && d_side > 0) || (c_side > 0 && d_side < 0))) return 0;
+    if (!((a_side < 0 && b_side > 0) || (a_side > 0 && b_side < 0))) return 0;
+    const double t = a_side / (a_side - b_side);
+    *at = txm_v2(txm_float(a.x + ux * t), txm_float(a.y + uy * t));
+    return 1;
+}
+
+/* Cut loops of fewer than TXP_E_LOOP points off a closed line: points are put on a stack; where the
+   segment to the next one crosses an earlier one, the stack goes back to that and on from where they
+   cross. Then once more from another point, for loops through the first. Returns how many points
+   remain; 0 = cancelled.
+   scratch: room for n points */
+static size_t txp_e_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txp_e_bar *bar) {
+    for (int round = 0; round < 2; round++) {
+        const size_t turn = n / 2;
+        size_t top = 0;
+        for (size_t i = 0; i <= n; i++) { /* the last is the first again */
+            const txm_vec2 next = points[(turn + i) % n];
+            for (size_t k = 2; top > k && k <= TXP_E_LOOP; k++) { /* youngest first: small loops */
+                const txm_vec2 *old = scratch + top - k - 1;
+                txm_vec2 at;
+                if (i == n && old == scratch) break; /* these two meet in the first point */
+                if (!txp_e_cross(scratch[top - 1], next, old[0], old[1], &at)) continue;
+                top -= k;
+                scratch[top++] = at;
+                k = 1;
+            }
+            if (i < n) scratch[top++] = next;
+            if (txp_e_tick(bar, TXP_E_LOOP)) return 0;
+        }
+        n = top;
+        memcpy(points, scratch, n * sizeof *points);
+    }
+    return n;
+}
+
+/* The outline o disturbed by up to stray pixels, in memory from the arena. */
+static txm_status txp_e_shake(const txp_e_unrest *u, double stray, txm_rng *rng,
+                              const txp_e_outline *o, txm_vec2 **points, size_t *count,
+                              txm_arena *arena, txp_e_bar *bar, txm_env *env) {
+    const double length = txp_e_length(o->points, o->count, 1, bar);
+    if (length < 0) return txp_e_stopped(env);
+    if (stray > length / 16) stray = length / 16;
+    if (length > 4 * (double)TXP_E_LENGTH)
+        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "turn too often for their width");
+    const size_t n = length > 16 ? (size_t)(length + 0.5) : 16, shortest = TXP_E_PIECE / 3;
+    size_t m = (size_t)(length / u->step + 0.5);
+    if (m < shortest) m = shortest;
+    txp_e_point *even = (txp_e_point *)txm_arena_alloc(arena, n, 2 * sizeof *even);
+    txp_e_sample *row = (txp_e_sample *)txm_arena_alloc(arena, m, sizeof *row);
+    txm_vec2 *line = (txm_vec2 *)txm_arena_alloc(arena, m + 1, 2 * sizeof *line);
+    if (!even || !row || !line) return txp_e_no_memory(env);
+    const txp_e_point *soft = even + n;
+    const size_t corner = n < 8 * TXP_E_CORNER ? n / 8 : (size_t)TXP_E_CORNER;
+    if (!txp_e_resample(o->points, o->count, 1, length, even, n, bar) ||
+        !txp_e_soften(even, n, 1, corner, even + n, bar) || !txp_e_weave(u, rng, row, m, bar))
+        return txp_e_stopped(env);
+
+    double sum = 0, at = 0;
+    for (size_t k = 0; k < m; k++) sum += row[k].step;
+    const double stretch = sum > 0 ? (double)n / sum : 0; /* samples of the stroke for each step */
+    const double scale = stray / TXP_E_STRAY;
+    const double chord = n < 4 * TXP_E_CHORD ? (double)n / 4 : (double)TXP_E_CHORD;
+    txp_e_point direction;
+    direction.x = 1;
+    direction.y = 0;
+    for (size_t k = 0; k < m; k++) {
+        const txp_e_point p = txp_e_at(soft, n, at), given = txp_e_at(even, n, at);
+        txp_e_direction(txp_e_at(soft, n, at - chord), txp_e_at(soft, n, at + chord), &direction);
+        const double most = stray - txp_e_distance(p, given);
+        const double ahead = row[k].ahead * scale, right = row[k].right * scale;
+        const double off = sqrt(ahead * ahead + right * right);
+        const double factor = off <= most ? 1 : most > 0 ? most / off : 0;
+        line[k].x = txm_float(p.x + factor * (ahead * direction.x - right * direction.y));
+        line[k].y = txm_float(p.y + factor * (ahead * direction.y + right * direction.x));
+        at += row[k].step * stretch;
+        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+    }
+    *points = line;
+    *count = txp_e_unloop(line, m, line + m + 1, bar);
+    return *count ? TXM_OK : txp_e_stopped(env);
+}
+
+/* One stroke: its line, in memory from `lines`. */
+static txm_status txp_e_stroke(const texpatch_control *c, int i, const txp_e_unrest *u,
+                               txm_vec2 **points, size_t *count, txm_arena *lines, txp_e_bar *bar,
+                               txm_env *env) {
+    const texpatch_stroke *s = &c->strokes[i];
+    const double width = s->is_closed ? 256 : s->width > 0 ? s->width : 8; /* sides must not meet */
+    const double stray = width < 8 ? width * TXP_E_STRAY / 8 : TXP_E_STRAY;
+    txm_arena work;
+    txp_e_outline o;
+    txm_vec2 *made = NULL;
+    txm_rng rng = txm_rng_make(c->seed, (uint64_t)i);
+    txm_arena_init(&work, env);
+    memset(&o, 0, sizeof o);
+    txm_status status = txp_e_outline_make(s, &o, &work, bar, env);
+    const int is_still = c->disturb < 0 || u->start_count == 0;
+    *count = o.count;
+    if (status == TXM_OK && !is_still)
+        status = txp_e_shake(u, stray, &rng, &o, &made, count, &work, bar, env);
+    if (status == TXM_OK) {
+        *points = (txm_vec2 *)txm_arena_alloc(lines, *count, sizeof **points);
+        if (!*points) status = txp_e_no_memory(env);
+    }
+    for (size_t k = 0; k < *count && status == TXM_OK; k++) {
+        (*points)[k] =
+            is_still ? txm_v2(txm_float(o.points[k].x), txm_float(o.points[k].y)) : made[k];
+        if (txp_e_tick(bar, 1)) status = txp_e_stopped(env);
+    }
+    txm_arena_free(&work);
+    return status;
+}
+
+/* All strokes, layer by layer, so that the unrest of one layer at a time is held. */
+static txm_status txp_e_disturb(const texpatch_control *c, txp_e_bar *bar, txm_arena *lines,
+                                texpatch_edges *e, txm_env *env) {
+    const size_t n = (size_t)c->stroke_count;
+    txm_vec2 **points = (txm_vec2 **)txm_arena_alloc(lines, n, sizeof(txm_vec2 *));
+    e->lines = (texpatch_polyline *)txm_arena_zero(&e->memory, n, sizeof *e->lines);
+    if (n && (!points || !e->lines)) return txp_e_no_memory(env);
+    for (int layer = 0; layer < e->levels; layer++) {
+        txm_arena held;
+        txp_e_unrest u;
+        int is_used = 0;
+        txm_status status = TXM_OK;
+        memset(&u, 0, sizeof u);
+        for (int i = 0; i < c->stroke_count; i++) is_used |= c->strokes[i].layer == layer;
+        txm_arena_init(&held, env);
+        if (is_used && c->disturb >= 0)
+            status = txp_e_listen_layer(&u, c->edges, layer, c->disturb > 0 ? c->disturb : 1, &held,
+                                        bar, env);
+        for (int i = 0; i < c->stroke_count && status == TXM_OK && is_used; i++) {
+            if (c->strokes[i].layer != layer) continue;
+            e->lines[i].layer = layer;
+            status = txp_e_stroke(c, i, &u, &points[i], &e->lines[i].count, lines, bar, env);
+        }
+        txm_arena_free(&held);
+        if (status != TXM_OK) return status;
+    }
+    e->line_count = n;
+    for (size_t i = 0; i < n; i++) {
+        e->lines[i].first = e->point_count;
+        e->point_count += e->lines[i].count;
+    }
+    if (n == 0) return TXM_OK;
+    e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, e->point_count, sizeof *e->points);
+    if (!e->points) return txp_e_no_memory(env);
+    for (size_t i = 0; i < n; i++) {
+        memcpy(e->points + e->lines[i].first, points[i], e->lines[i].count * sizeof *e->points);
+        if (txp_e_tick(bar, e->lines[i].count)) return txp_e_stopped(env);
+    }
+    return TXM_OK;
+}
+
+TEXPATCH_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
+                                         txm_env *env, texpatch_edges *out) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    if (width < 1 || height < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
+    if (width > TXP_E_SIDE || height > TXP_E_SIDE)
+        return txm_fail(env, TXM_TOO_LARGE, "a side is longer than 2^20 pixels");
+    txp_e_stage(&bar, "edges", 0.1, txp_e_points_of(control));
+    txm_status status = txp_e_check_control(control, &bar, env);
+    if (status != TXM_OK) return status;
+
+    double work = 150 * (double)control->edges->point_count;
+    for (int i = 0; i < control->stroke_count; i++) {
+        const texpatch_stroke *s = &control->strokes[i];
+        for (int k = 1; k < s->count; k++) {
+            const txm_vec2 p = s->points[k - 1], q = s->points[k];
+            const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
+            work += 250 * sqrt(dx * dx + dy * dy);
+        }
+    }
+    txp_e_stage(&bar, "strokes", 1, work);
+    txm_arena lines;
+    texpatch_edges e;
+    memset(&e, 0, sizeof e);
+    e.levels = control->edges->levels;
+    e.width = width;
+    e.height = height;
+    memcpy(e.thresholds, control->edges->thresholds, sizeof e.thresholds);
+    memcpy(e.beside, control->edges->beside, sizeof e.beside);
+    txm_arena_init(&lines, env);
+    txm_arena_init(&e.memory, env);
+    status = txp_e_disturb(control, &bar, &lines, &e, env);
+    txm_arena_free(&lines);
+    if (status == TXM_OK) *out = e;
+    else txm_arena_free(&e.memory);
+    return status;
+}
+
+/* ---- control: the guide ------------------------------------------------------------------ */
+
+/* The map that a guide is drawn from: layer + 1 of each pixel, 0 = nothing. */
+typedef struct txp_e_guide {
+    int width, height;
+    uint8_t *at;
+} txp_e_guide;
+
+/* Coordinates in 256ths of a pixel, in which all that follows is exact. */
+static int64_t txp_e_fixed(float x) {
+    return (int64_t)floor((double)x * 256 + 0.5);
+}
+
+/* a / b rounded up, b > 0 */
+static int64_t txp_e_ceil(int64_t a, int64_t b) {
+    return a / b + (a % b > 0);
+}
+
+/* The rows whose centres a segment passes, in first..end-1, and where: its upper end counts, its
+   lower one does not, so that a corner counts once and a level segment not at all. */
+typedef struct txp_e_slope {
+    int64_t x, y, dx, dy; /* of the upper end, and from there to the lower one */
+    int first, end, down; /* down: 1 if the segment runs so, else 0             */
+} txp_e_slope;
+
+static txp_e_slope txp_e_slope_of(txm_vec2 p, txm_vec2 q, int height) {
+    const int64_t px = txp_e_fixed(p.x), py = txp_e_fixed(p.y);
+    const int64_t qx = txp_e_fixed(q.x), qy = txp_e_fixed(q.y);
+    txp_e_slope s;
+    s.down = py < qy;
+    s.x = s.down ? px : qx;
+    s.y = s.down ? py : qy;
+    s.dx = s.down ? qx - px : px - qx;
+    s.dy = s.down ? qy - py : py - qy;
+    const int64_t first = txp_e_ceil(s.y - 128, 256), end = txp_e_ceil(s.y + s.dy - 128, 256);
+    s.first = first < 0 ? 0 : first > height ? height : (int)first;
+    s.end = end < s.first ? s.first : end > height ? height : (int)end;
+    return s;
+}
+
+/* The first pixel of a row whose centre lies on the segment or to its right, 0..width. */
+static uint32_t txp_e_column(const txp_e_slope *s, int row, int width) {
+    const int64_t down = 256 * (int64_t)row + 128 - s->y;
+    const int64_t column = txp_e_ceil((s->x - 128) * s->dy + down * s->dx, 256 * s->dy);
+    return (uint32_t)(column < 0 ? 0 : column > width ? width : column);
+}
+
+/* Fill the inside of a line (winding number not 0) with value. The places where it passes the rows'
+   centres are listed by rows, each row is sorted by columns, and filled between them. */
+static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, int value,
+                             txm_arena *arena, txp_e_bar *bar, txm_env *env) {
+    int top = g->height, bottom = 0;
+    size_t total = 0, longest = 0;
+    for (size_t i = 0; i < n; i++) {
+        const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+        if (s.first < s.end && s.first < top) top = s.first;
+        if (s.first < s.end && s.end > bottom) bottom = s.end;
+        total += (size_t)(s.end - s.first);
+        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+    }
+    if (total == 0) return TXM_OK;
+    /* next[r]: where the next passage of row top + r goes; in the end, where the row ends */
+    const size_t rows = (size_t)(bottom - top);
+    size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
+    txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
+    if (!next || !list) return txp_e_no_memory(env);
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t i = 0; i < n; i++) {
+            const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+            for (int y = s.first; y < s.end; y++) {
+                size_t *at = &next[y - top];
+                if (pass) {
+                    list[*at].key = txp_e_column(&s, y, g->width);
+                    list[*at].value = (uint32_t)s.down;
+                }
+                ++*at;
+                if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+            }
+            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        }
+        for (size_t r = 0, sum = 0; r < rows && pass == 0; r++) { /* from how many to where */
+            const size_t count = next[r];
+            if (count > longest) longest = count;
+            next[r] = sum;
+            sum += count;
+        }
+    }
+    txm_pair *scratch = (txm_pair *)txm_arena_alloc(arena, longest, sizeof *scratch);
+    if (!scratch) return txp_e_no_memory(env);
+    for (size_t r = 0; r < rows; r++) {
+        const size_t from = r ? next[r - 1] : 0, count = next[r] - from;
+        uint8_t *row = g->at + (size_t)(top + (int)r) * (size_t)g->width;
+        int64_t winding = 0;
+        txm_sort_pairs(list + from, scratch, count);
+        for (size_t i = from; i + 1 < from + count; i++) {
+            winding += list[i].value ? 1 : -1;
+            if (winding) memset(row + list[i].key, value, list[i + 1].key - list[i].key);
+        }
+        if (txp_e_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txp_e_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* With a free background: around the strokes the layer that the nearest one borders on. Of each pixel
+   of a row first the distance to the nearest stroke in the row, then over the rows above and below
+   the least sum of squares; of several as near the left, then the upper one.
+   off, what: two bytes for each pixel. 0 = cancelled */
+static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uint8_t *what,
+                      txp_e_bar *bar) {
+    const size_t w = (size_t)g->width;
+    for (int y = 0; y < g->height; y++) {
+        const uint8_t *row = g->at + (size_t)y * w;
+        uint8_t *distance = off + (size_t)y * w, *mark = what + (size_t)y * w;
+        int since = TXP_E_RING + 1, last = 0; /* how far back, and what */
+        for (size_t x = 0; x < w; x++) {
+            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            if (row[x]) last = row[x];
+            distance[x] = (uint8_t)since;
+            mark[x] = (uint8_t)last;
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+        since = TXP_E_RING + 1;
+        for (size_t x = w; x-- > 0;) {
+            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            if (row[x]) last = row[x];
+            if (since < distance[x]) {
+                distance[x] = (uint8_t)since;
+                mark[x] = (uint8_t)last;
+            }
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+    }
+    for (int y = 0; y < g->height; y++) {
+        const int low = y > TXP_E_RING ? y - TXP_E_RING : 0;
+        const int high = y + TXP_E_RING < g->height ? y + TXP_E_RING : g->height - 1;
+        for (size_t x = 0; x < w; x++) {
+            uint8_t *at = g->at + (size_t)y * w + x;
+            int least = TXP_E_RING * TXP_E_RING + 1, mark = 0;
+            if (txp_e_tick(bar, 2)) return 0;
+            if (off[(size_t)y * w + x] == 0) continue; /* inside a stroke */
+            for (int v = low; v <= high; v++) {
+                const int dx = off[(size_t)v * w + x], dy = v - y;
+                if (dx * dx + dy * dy >= least) continue;
+                least = dx * dx + dy * dy;
+                mark = what[(size_t)v * w + x];
+            }
+            *at = (uint8_t)(mark ? beside[mark - 1] + 1 : 0);
+            if (txp_e_tick(bar, 8)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Draw all lines, and what is around them. mask, what: with a free background two more bytes for each
+   pixel, else NULL. In the end g holds grays, mask what there is to say. */
+static txm_status txp_e_guide_make(const texpatch_control *c, const texpatch_edges *lines,
+                                   const txp_e_guide *g, uint8_t *mask, uint8_t *what,
+                                   txp_e_bar *bar, txm_env *env) {
+    const size_t count = (size_t)g->width * (size_t)g->height;
+    for (size_t i = 0; i < lines->line_count; i++) {
+        const texpatch_polyline *line = &lines->lines[i];
+        txm_arena work;
+        txm_arena_init(&work, env);
+        const txm_status status = txp_e_fill(g, lines->points + line->first, line->count,
+                                             line->layer + 1, &work, bar, env);
+        txm_arena_free(&work);
+        if (status != TXM_OK) return status;
+    }
+    txp_e_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
+    if (mask) {
+        int beside[TEXPATCH_MAX_LEVELS];
+        for (int k = 0; k < lines->levels; k++) { /* a layer that borders on none: any other one */
+            beside[k] = c->edges->beside[k];
+            if (beside[k] < 0) beside[k] = k ? k - 1 : 1;
+        }
+        if (!txp_e_ring(g, beside, mask, what, bar)) return txp_e_stopped(env);
+    }
+    for (size_t i = 0; i < count; i++) {
+        const int layer = g->at[i] ? g->at[i] - 1 : mask ? 0 : c->background;
+        if (mask) mask[i] = g->at[i] ? 255 : 0;
+        g->at[i] = (uint8_t)layer;
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    return txp_e_show(g->at, count, lines->levels, bar) ? TXM_OK : txp_e_stopped(env);
+}
+
+TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
+                                               const texpatch_edges *disturbed, txm_env *env,
+                                               const txm_image *guide, const txm_image *mask) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_status status = txp_e_check_image(guide, "guide", 1, env);
+    if (status == TXM_OK) status = txp_e_check_image(mask, "mask", 1, env);
+    txp_e_stage(&bar, "edges", 0.2, txp_e_points_of(control));
+    if (status == TXM_OK) status = txp_e_check_control(control, &bar, env);
+    if (status == TXM_OK) status = txp_e_check_edges(disturbed, "disturbed", 0, &bar, env);
+    if (status != TXM_OK) return status;
+    if (guide->width != disturbed->width || guide->height != disturbed->height ||
+        mask->width != disturbed->width || mask->height != disturbed->height)
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "guide and mask must have the size that texpatch_disturb was given");
+    int same = disturbed->levels == control->edges->levels &&
+               disturbed->line_count == (size_t)control->stroke_count;
+    for (int i = 0; i < control->stroke_count && same; i++)
+        same = disturbed->lines[i].layer == control->strokes[i].layer;
+    if (!same)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturbed",
+                           "made of other strokes than control holds");
+
+    const size_t w = (size_t)guide->width, count = w * (size_t)guide->height;
+    const int is_free = control->background < 0;
+    txm_arena arena;
+    txp_e_guide g;
+    txp_e_stage(&bar, "strokes", 0.5, 30 * (double)disturbed->point_count);
+    txm_arena_init(&arena, env);
+    g.width = guide->width;
+    g.height = guide->height;
+    g.at = (uint8_t *)txm_arena_zero(&arena, count, is_free ? 3 : 1);
+    uint8_t *told = g.at && is_free ? g.at + count : NULL;
+    status =
+        g.at ? txp_e_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
+             : txp_e_no_memory(env);
+    for (int y = 0; y < g.height && status == TXM_OK; y++) {
+        uint8_t *row = (uint8_t *)txm_image_row(mask, y);
+        memcpy(txm_image_row(guide, y), g.at + (size_t)y * w, w);
+        if (told) memcpy(row, told + (size_t)y * w, w);
+        else memset(row, 255, w);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+#endif /* TEXPATCH_IMPLEMENTATION */
