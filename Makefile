@@ -17,7 +17,10 @@ LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o tiles.o retile.o command.o cli.o image_io.o mesh_io.o stb.o)
-EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%,$(wildcard examples/*.c))
+# examples/brush.c opens a window, which takes SDL 2: where that is not installed it is left out
+SDL     := $(shell sdl2-config --libs 2>/dev/null)
+EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%, \
+             $(filter-out $(if $(SDL),,examples/brush.c),$(wildcard examples/*.c)))
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
@@ -70,9 +73,12 @@ examples: $(EXAMPLES)
 
 $(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
-	$(COMPILE) $(filter %.c %.o,$^) -o $@ -lm
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
 $(BUILD)/examples/membrane: $(addprefix $(BUILD)/,mesh_io.o render.o image_io.o)
+$(BUILD)/examples/join: $(BUILD)/image_io.o
+$(BUILD)/examples/join: CPPFLAGS += -D_FILE_OFFSET_BITS=64
+$(BUILD)/examples/brush: LIBRARIES = $(SDL)
 
 # in reverse order: sand, a common case, comes first and is swept over all sizes
 bench: $(BENCHES) $(PLAIN) samples
@@ -85,7 +91,8 @@ $(BUILD)/bench/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(H
 # the same without SIMD, for comparison
 $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
-	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
+	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD \
+	    $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
 
 # ---- demo, tests, lint
 

@@ -36,6 +36,13 @@ case $profile in test | ci)
     need has_file "/usr/lib*/libOpenGL.so /usr/lib/*/libOpenGL.so" libopengl-dev
     need has_file "/usr/share/glvnd/egl_vendor.d/*mesa.json" libegl-mesa0
     need has_file "/usr/lib*/dri/swrast_dri.so /usr/lib/*/dri/swrast_dri.so" libgl1-mesa-dri
+    # a screen that nobody sees, for examples/brush.c; jobs of examples/plane.sh
+    need has_command xvfb-run xvfb
+    need has_command xauth xauth
+    need has_command parallel parallel
+esac
+case $profile in test | lint | ci)
+    need has_command sdl2-config libsdl2-dev # of examples/brush.c
 esac
 case $profile in lint | ci)
     need has_command cppcheck cppcheck
