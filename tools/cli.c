@@ -486,6 +486,7 @@ int cli_finish(cli *run, const void *bytes, size_t size) {
 }
 
 int cli_finish_folder(cli *run, const cli_file *files, int count) {
+    const char *folder = run->output, *slash = folder[0] ? "/" : ""; /* "": names are whole paths */
     output *outputs = (output *)calloc((size_t)count + 1, sizeof *outputs);
     char *paths = (char *)calloc((size_t)count, PATH_MAX);
     int status = CLI_DONE, made = 0;
@@ -495,17 +496,17 @@ int cli_finish_folder(cli *run, const cli_file *files, int count) {
         outputs[i].path = path;
         outputs[i].bytes = files[i].bytes;
         outputs[i].size = files[i].size;
-        if (snprintf(path, PATH_MAX, "%s/%s", run->output, files[i].name) >= PATH_MAX)
-            status = cli_fail(run, CLI_FAILED, "'%s': the path is too long", run->output);
+        if (snprintf(path, PATH_MAX, "%s%s%s", folder, slash, files[i].name) >= PATH_MAX)
+            status = cli_fail(run, CLI_FAILED, "'%s': the path is too long", files[i].name);
     }
-    if (!status) {
-        made = mkdir(run->output, 0777) == 0;
+    if (!status && folder[0]) {
+        made = mkdir(folder, 0777) == 0;
         if (!made && errno != EEXIST)
-            status = cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", run->output,
+            status = cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", folder,
                               strerror(errno));
     }
     if (!status) status = finish(run, outputs, count);
-    if (status && made) rmdir(run->output);
+    if (status && made) rmdir(folder);
     free(paths);
     free(outputs);
     return status;

@@ -3,6 +3,8 @@
 #include "command.h"
 #include "image_io.h"
 
+#include <ctype.h>
+
 int fail_library(cli *run, txm_status status, const char *what) {
     if (status == TXM_CANCELLED) return cli_fail(run, CLI_FAILED, "stopped; nothing was written");
     if (status == TXM_OUT_OF_MEMORY)
@@ -14,6 +16,40 @@ int read_image(cli *run, const char *path, int channels, txm_image *image) {
     const char *why;
     if (image_read(path, channels, image, &why)) return CLI_DONE;
     return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
+}
+
+int read_deep_image(cli *run, const char *path, int channels, txm_image *image) {
+    const char *why;
+    if (image_read_deep(path, channels, image, &why)) return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
+}
+
+/* One number; what strtod takes besides - blanks, 0x1p3, nan, infinity - is none. */
+static int parse_number(const char *text, char **end, double low, double high, double *value) {
+    if (!isdigit((unsigned char)text[text[0] == '-'])) return 0;
+    *value = strtod(text, end);
+    for (const char *c = text; c < *end; c++) {
+        if (*c == 'x' || *c == 'X') return 0;
+    }
+    return *value >= low && *value <= high;
+}
+
+int parse_numbers(cli *run, const char *option, const char *text, int most, double low, double high,
+                  double *values) {
+    const char *from = text;
+    for (int n = 0; n < most; n++) {
+        char *end;
+        if (!parse_number(from, &end, low, high, &values[n])) break;
+        if (*end == 0) return n + 1;
+        if (*end != ',') break;
+        from = end + 1;
+    }
+    if (most == 1)
+        cli_fail(run, CLI_USAGE, "%s '%s': give a number from %g to %g", option, text, low, high);
+    else
+        cli_fail(run, CLI_USAGE, "%s '%s': give at most %d numbers from %g to %g, commas between",
+                 option, text, most, low, high);
+    return 0;
 }
 
 int check_picture_path(cli *run, const char *path, int width, int height, int channels) {
@@ -36,5 +72,13 @@ int finish_with_picture(cli *run, const txm_image *image) {
     cli_figure(run, "file_bytes", (double)size);
     int status = cli_finish(run, bytes, size);
     free(bytes);
+    return status;
+}
+
+int finish_with_files(cli *run, const cli_file *files, int count) {
+    const char *output = run->output;
+    run->output = ""; /* names are whole paths */
+    const int status = cli_finish_folder(run, files, count);
+    run->output = output;
     return status;
 }

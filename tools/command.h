@@ -15,6 +15,8 @@ typedef struct command {
 extern const command learn_command, synth_command; /* texkit.c */
 extern const command tiles_command;                /* tiles.c  */
 extern const command retile_command;               /* retile.c */
+extern const command patch_command;                /* patch.c  */
+extern const command edges_command;                /* edges.c  */
 
 /* A call into the library failed: say so in its own words. */
 int fail_library(cli *run, txm_status status, const char *what);
@@ -22,10 +24,21 @@ int fail_library(cli *run, txm_status status, const char *what);
 /* Read a picture; channels 0 keeps what it has. An exit status. */
 int read_image(cli *run, const char *path, int channels, txm_image *image);
 
+/* The same keeping 16 bits a sample if it has them. */
+int read_deep_image(cli *run, const char *path, int channels, txm_image *image);
+
+/* Decimal numbers low..high with commas between them, such as "1,0.5". Returns how many, at most
+   most, or 0 after a message that names the option. */
+int parse_numbers(cli *run, const char *option, const char *text, int most, double low, double high,
+                  double *values);
+
 /* Refuse, before any work, an output path that cannot hold such a picture. 0: not known yet. */
 int check_picture_path(cli *run, const char *path, int width, int height, int channels);
 
 /* Encode the picture for the output's extension and write it. */
 int finish_with_picture(cli *run, const txm_image *image);
+
+/* As cli_finish for several files: each goes where its name says. */
+int finish_with_files(cli *run, const cli_file *files, int count);
 
 #endif /* COMMAND_H */

@@ -2,15 +2,16 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    Each command is a manual (cli_manual), a table of options and one function that calls the
-   library; the table at the end lists them. learn and synth are here, tiles is in tiles.c, retile in
-   retile.c. What commands share is in command.c and cli.c; image files are in image_io.c, mesh files
-   in mesh_io.c. Read run_learn first: it shows all there is to embedding a header.               */
+   library; the table at the end lists them. learn and synth are here, each of the others is in a
+   file of its name. What commands share is in command.c and cli.c; image files are in image_io.c,
+   mesh files in mesh_io.c. Read run_learn first: it shows all there is to embedding a header.    */
 #define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
 #include "command.h"
 #include "image_io.h"
 
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
+#include "texpatch.h"
 #include "textiles.h"
 #include "trimesh_relax.h"
 
@@ -20,7 +21,8 @@
 
 const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
-                   ", textiles " TEXTILES_VERSION ", trimesh_relax " TRIMESH_RELAX_VERSION ")";
+                   ", texpatch " TEXPATCH_VERSION ", textiles " TEXTILES_VERSION
+                   ", trimesh_relax " TRIMESH_RELAX_VERSION ")";
 
 enum { MAX_SIDE = 1 << 24 };
 
@@ -212,8 +214,8 @@ done:
 const command learn_command = {&learn_manual, run_learn};
 const command synth_command = {&synth_manual, run_synth};
 
-static const command *const commands[] = {&learn_command, &synth_command, &tiles_command,
-                                         &retile_command};
+static const command *const commands[] = {&learn_command, &synth_command, &patch_command,
+                                         &edges_command, &tiles_command, &retile_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
