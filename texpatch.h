@@ -67,7 +67,8 @@ typedef struct texpatch_desc {
                    size); -1 = none: patches, cuts and blending alone, four times as fast        */
     int turns;  /* 1, 2 or 4: pieces may be turned by half or quarter turns; 0 = 1               */
     int mirror; /* pieces may be mirrored left to right                                          */
-    float novelty; /* 0..1: how strongly to avoid long verbatim pieces of the exemplar           */
+    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 a piece may not
+                      go on farther than a neighbourhood, which costs detail and likeness        */
     int lattice;   /* 0 = find out whether the exemplar has a lattice and keep it; 1 = it has this
                       one; -1 = treat it as having none                                          */
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
@@ -147,9 +148,9 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 /* ---- levels of detail -------------------------------------------------------------------- */
 
 /* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
-   pixels, in linear light for 8- and 16-bit colours that are not data, normals renormalised, labels
-   picked. So all
-   levels agree with each other and with what a renderer makes of level 0.                    */
+   pixels, in linear light for 8- and 16-bit colours that are not data; normals are renormalised,
+   labels picked. So all levels agree with each other and with what a renderer makes of level 0.
+   map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT, TXM_TOO_LARGE */
 TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
                                       txm_env *env, const txm_image *half);
 
@@ -395,13 +396,21 @@ typedef struct txp_source {
     txp_stack stack[TXP_MAX_LEVELS];
 } txp_source;
 
+/* Room for a band of rows, per pixel. */
+typedef struct txp_band {
+    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
+    int32_t *nearest;      /* how near the best candidate is to the mean                       */
+    uint8_t *mean;
+} txp_band;
+
 /* The picture in the making at one resolution. pixels has a copy of the first columns and rows
    behind the end of an axis that wraps. */
 typedef struct txp_canvas {
     int width, height, wrap; /* wrap: bits as in texpatch_desc.tileable                        */
     size_t pitch;
     uint8_t *pixels;
-    txp_place *at;
+    txp_place *at, *next; /* next: where a pass puts what it chooses                           */
+    txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
     uint8_t *free_guide; /* 1 = the guide says nothing here; NULL: it always does, or is none  */
 } txp_canvas;
@@ -665,8 +674,8 @@ static double txp_det(const double *a, const double *b) {
 
 /* Find the lattice in a correlation. 1: there is one; *strongest: the highest peak. */
 static int txp_lattice_find(const txp_correlation *k, double out[4], double *strongest) {
-    int px[TXP_PEAKS], py[TXP_PEAKS], count = 0;
-    double pc[TXP_PEAKS], mean = 0;
+    int px[TXP_PEAKS] = {0}, py[TXP_PEAKS] = {0}, count = 0;
+    double pc[TXP_PEAKS] = {0}, mean = 0;
     const int wide = 2 * k->reach_x + 1;
     for (int i = 0; i < wide * (k->reach_y + 1); i++) mean += fabs((double)k->at[i]);
     mean /= wide * (k->reach_y + 1);
@@ -1114,7 +1123,9 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
 typedef struct txp_use {
     int columns, rows;
     uint32_t *count;
-    double mean; /* of the cells, once the canvas is full                                      */
+    uint32_t *sums; /* (columns + 1) x (rows + 1): of all cells above and left                  */
+    double mean;    /* of the cells, once the canvas is full                                    */
+    double share[(4 * TXP_BLOCK / TXP_CELL + 2) * (4 * TXP_BLOCK / TXP_CELL + 2)]; /* 1 / (mean n)     */
 } txp_use;
 
 typedef struct txp_quilt {
@@ -1184,17 +1195,32 @@ static void txp_quilt_put(txp_quilt *q, int x, int y, txp_place at) {
     }
 }
 
-/* mean use of the cells that a piece of size x size pixels at (x, y) covers, over the mean of all */
-static double txp_use_at(const txp_use *u, int x, int y, int size) {
-    const int x0 = x / TXP_CELL, y0 = y / TXP_CELL;
-    int x1 = (x + size - 1) / TXP_CELL, y1 = (y + size - 1) / TXP_CELL;
-    uint32_t sum = 0;
-    if (x1 >= u->columns) x1 = u->columns - 1;
-    if (y1 >= u->rows) y1 = u->rows - 1;
-    for (int j = y0; j <= y1; j++) {
-        for (int i = x0; i <= x1; i++) sum += u->count[j * u->columns + i];
+/* total: pixels of the full canvas */
+static void txp_use_mean(txp_use *u, double total) {
+    u->mean = total / (u->columns * u->rows);
+    for (size_t i = 1; i < sizeof u->share / sizeof *u->share; i++)
+        u->share[i] = 1 / (u->mean * (double)i);
+}
+
+/* Bring the sums up to date. */
+static void txp_use_sum(const txp_use *u) {
+    const int w = u->columns + 1;
+    for (int j = 0; j < u->rows; j++) {
+        uint32_t row = 0;
+        for (int i = 0; i < u->columns; i++) {
+            row += u->count[j * u->columns + i];
+            u->sums[(j + 1) * w + i + 1] = u->sums[j * w + i + 1] + row;
+        }
     }
-    return sum / (u->mean * (x1 - x0 + 1) * (y1 - y0 + 1));
+}
+
+/* mean use of the cells that a piece of size x size pixels at (x, y) covers, over the mean of all */
+static inline double txp_use_at(const txp_use *u, int x, int y, int size) {
+    const int x0 = x / TXP_CELL, y0 = y / TXP_CELL, w = u->columns + 1;
+    const int x1 = (x + size - 1) / TXP_CELL + 1, y1 = (y + size - 1) / TXP_CELL + 1;
+    const uint32_t sum = u->sums[y1 * w + x1] - u->sums[y1 * w + x0] - u->sums[y0 * w + x1] +
+                         u->sums[y0 * w + x0];
+    return sum * u->share[(x1 - x0) * (y1 - y0)];
 }
 
 /* The piece for the block at (bx, by). */
@@ -1205,6 +1231,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     const int size = q->block, bytes = size * s->bytes;
     int span[4 * TXP_BLOCK][2], count = 0;
     uint32_t known = 0;
+    txp_use_sum(&q->use);
     const uint8_t *a = txp_canvas_at(s, c, bx, by), *m = q->known + (a - c->pixels);
     for (int y = 0; y < size; y++) {
         const uint8_t *row = m + (size_t)y * c->pitch;
@@ -1223,7 +1250,9 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     double best = 1e30;
     const double tolerance = 1.02;
     const uint32_t start = txm_rng_next(&q->rng);
-    for (int n = 0; n < s->sheets; n++) {
+    /* a second turn without the lattice, if no place of the exemplar lies on it */
+    for (int n = 0, strict = s->has_lattice; n < s->sheets || (strict && !count); n++) {
+        if (n == s->sheets) n = strict = 0;
         const int rows = k->high[n] - size + 1, columns = k->wide[n] - size + 1;
         for (int j = 0; j < rows; j++) {
             for (int i = 0; i < columns; i++) {
@@ -1231,8 +1260,8 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 double extra = 0;
                 if (s->has_lattice) {
                     const double d = txp_off_lattice(k, x - bx - q->shift_x, y - by - q->shift_y);
-                    if (d > 9) continue;
-                    extra += q->lattice_weight * d;
+                    if (d > 9 && strict) continue;
+                    extra += q->lattice_weight * fmin(d, 9);
                 }
                 if (k->bad && !txp_fits(s, k, x, y, size, size)) continue;
                 if (!known) extra += (double)(txm_hash(start + (uint64_t)(y * k->width + x)) >> 40) * 1e-5;
@@ -1351,18 +1380,11 @@ static void txp_quilt_run(txp_quilt *q) {
 
 /* ---- second pass: optimisation ----------------------------------------------------------- */
 
-/* Room for a band of rows, per pixel. */
-typedef struct txp_band {
-    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
-    int32_t *nearest;      /* how near the best candidate is to the mean                       */
-    uint8_t *mean;
-} txp_band;
-
 /* The windows of one pass: those of a row lie side by side, `columns` of them, at xs[], ys[]. */
 typedef struct txp_pass {
     const txp_source *source;
     const txp_stack *stack;
-    txp_canvas *canvas;
+    const txp_canvas *canvas;
     int size, step;      /* of the neighbourhoods, and from one to the next                     */
     int columns, rows;
     int *xs, *ys;
@@ -1371,7 +1393,9 @@ typedef struct txp_pass {
     uint32_t *grain;     /* of each window: sum of differences of neighbours, its high frequencies */
     int32_t *weight;     /* of each window in the mean                                         */
     txp_use use;
-    double shift_x, shift_y, use_weight, lattice_weight, novelty;
+    double shift_x, shift_y, use_weight, lattice_weight;
+    int most_same; /* see txp_search */
+    int skip;      /* pixels from one place to the next where all are tried                       */
     uint64_t seed;
     int exhaustive, first_row, rows_done;
     txp_place *next;     /* the places that the pass chooses                                   */
@@ -1390,7 +1414,36 @@ typedef struct txp_search {
     uint32_t sad;
     txp_place seen[16];
     int seen_count;
+    int most_same; /* of 8 pixels around, as many at most may come from the same piece          */
+    txp_place around[8];
 } txp_search;
+
+/* Which pieces 8 pixels around the window come from: where these would put the window. */
+static void txp_look_around(txp_search *f) {
+    const txp_canvas *c = f->pass->canvas;
+    const int r = f->pass->size / 2 + 2, mid = f->pass->size / 2;
+    for (int d = 0, n = 0; d < 9; d++) {
+        const int dx = mid + (d % 3 - 1) * r, dy = mid + (d / 3 - 1) * r;
+        int cx = f->x + dx, cy = f->y + dy;
+        if (d == 4) continue;
+        if (c->wrap & TEXPATCH_TILE_X) cx = (cx + c->width) % c->width;
+        if (c->wrap & TEXPATCH_TILE_Y) cy = (cy + c->height) % c->height;
+        f->around[n].x = f->around[n].y = -1;
+        if (cx >= 0 && cy >= 0 && cx < c->width && cy < c->height) {
+            const txp_place at = c->at[txp_index(c, cx, cy)];
+            f->around[n].x = (int16_t)(at.x - dx);
+            f->around[n].y = (int16_t)(at.y - dy);
+        }
+        n++;
+    }
+}
+
+/* Would (x, y) go on with a piece farther than is wanted? */
+static int txp_goes_on(const txp_search *f, int x, int y) {
+    int same = 0;
+    for (int n = 0; n < 8; n++) same += f->around[n].x == x && f->around[n].y == y;
+    return same > f->most_same;
+}
 
 static void txp_try(txp_search *f, int x, int y) {
     const txp_pass *p = f->pass;
@@ -1408,7 +1461,8 @@ static void txp_try(txp_search *f, int x, int y) {
         if (d > 9) d = 9;
         extra += p->lattice_weight * d;
     }
-    if (p->use_weight > 0) extra += p->use_weight * txp_use_at(&p->use, x, y, size);
+    extra += p->use_weight * txp_use_at(&p->use, x, y, size);
+    if (f->most_same < 8 && txp_goes_on(f, x, y)) return;
     extra *= size * size;
     if (extra >= f->cost) return;
     const double limit = f->cost - extra;
@@ -1446,6 +1500,20 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     txp_try(f, x, y);
 }
 
+/* Try the pieces that the window shows now. */
+static void txp_try_shown(txp_search *f) {
+    const txp_canvas *c = f->pass->canvas;
+    const int size = f->pass->size;
+    for (int v = 0; v < 5; v++) {
+        for (int u = 0; u < 5; u++) {
+            const int dx = u * (size - 1) / 4, dy = v * (size - 1) / 4;
+            const txp_place at = c->at[txp_index(c, txp_wrap(f->x + dx, c->width),
+                                                 txp_wrap(f->y + dy, c->height))];
+            if (at.x >= 0) txp_try(f, at.x - dx, at.y - dy);
+        }
+    }
+}
+
 /* The match of window w. */
 static void txp_match(txp_pass *p, int i, int j) {
     const txp_source *s = p->source;
@@ -1461,6 +1529,8 @@ static void txp_match(txp_pass *p, int i, int j) {
     f.sad = UINT32_MAX;
     f.best = p->match[w];
     f.seen_count = 0;
+    f.most_same = p->most_same;
+    if (f.most_same < 8) txp_look_around(&f);
     if (c->fixed) { /* nothing to choose here? */
         int open = 0;
         for (int v = 0; v < size && !open; v++) {
@@ -1476,24 +1546,21 @@ static void txp_match(txp_pass *p, int i, int j) {
     p->grain[w] = txp_sad(f.target, c->pitch, f.target + s->bytes, c->pitch, size * s->bytes, size,
                           UINT32_MAX);
     if (f.best.x >= 0) txp_try(&f, f.best.x, f.best.y);
-    /* the pieces that the window shows now */
-    for (int v = 0; v < 5; v++) {
-        for (int u = 0; u < 5; u++) {
-            const int dx = u * (size - 1) / 4, dy = v * (size - 1) / 4;
-            const txp_place at = c->at[txp_index(c, txp_wrap(f.x + dx, c->width),
-                                                 txp_wrap(f.y + dy, c->height))];
-            if (at.x >= 0) txp_try(&f, at.x - dx, at.y - dy);
-        }
-    }
+    txp_try_shown(&f);
     if (f.sad == 0) {
         p->match[w] = f.best;
         p->sad[w] = 0;
         return;
     }
-    if (p->exhaustive || f.cost > 1e29) {
+    if (f.best.x < 0 && f.most_same < 8 && !p->exhaustive) { /* near what it shows, but not that */
+        const txp_place at = c->at[txp_index(c, txp_wrap(f.x + size / 2, c->width),
+                                             txp_wrap(f.y + size / 2, c->height))];
+        if (at.x >= 0) f.best = at;
+    }
+    if (p->exhaustive || f.best.x < 0) {
         for (int n = 0; n < s->sheets; n++) {
-            for (int y = k->first[n]; y + size <= k->first[n] + k->high[n]; y++) {
-                for (int x = 0; x + size <= k->wide[n]; x++) txp_try(&f, x, y);
+            for (int y = k->first[n]; y + size <= k->first[n] + k->high[n]; y += p->skip) {
+                for (int x = 0; x + size <= k->wide[n]; x += p->skip) txp_try(&f, x, y);
             }
         }
     } else {
@@ -1510,13 +1577,18 @@ static void txp_match(txp_pass *p, int i, int j) {
                 txp_try(&f, f.best.x + (int)floor(x + 0.5), f.best.y + (int)floor(y + 0.5));
             }
         }
-        for (int round = 0; round < 3; round++) {
-            const txp_place at = f.best;
-            for (int d = 0; d < 9; d++) {
-                if (d != 4) txp_try(&f, at.x + d % 3 - 1, at.y + d / 3 - 1);
-            }
-            if (at.x == f.best.x && at.y == f.best.y) break;
+    }
+    for (int round = 0; round < 3 && !(p->exhaustive && p->skip == 1); round++) {
+        const txp_place at = f.best;
+        for (int d = 0; d < 9; d++) {
+            if (d != 4) txp_try(&f, at.x + d % 3 - 1, at.y + d / 3 - 1);
         }
+        if (at.x == f.best.x && at.y == f.best.y) break;
+    }
+    if (f.sad == UINT32_MAX) { /* nothing else is near: it goes on */
+        f.most_same = 8;
+        f.seen_count = 0;
+        txp_try_shown(&f);
     }
     p->match[w] = f.best;
     p->sad[w] = f.sad;
@@ -1747,7 +1819,8 @@ static void txp_count_use(const txp_canvas *c, txp_use *u) {
         u->count[c->at[i].y / TXP_CELL * u->columns + c->at[i].x / TXP_CELL]++;
         total++;
     }
-    u->mean = (double)(total ? total : 1) / (u->columns * u->rows);
+    txp_use_mean(u, (double)(total ? total : 1));
+    txp_use_sum(u);
 }
 
 /* ---- coherence: single pixels at seams --------------------------------------------------- */
@@ -2050,16 +2123,14 @@ static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double s
 /* ---- jobs --------------------------------------------------------------------------------- */
 
 /* gray levels per pixel: what twice the mean use, or a squared pixel off the lattice, counts */
-#ifndef TXP_USE
 #define TXP_USE 16.0
-#endif
 #define TXP_LATTICE 20.0
 
 enum { TXP_MAX_STEPS = 2 * TXP_MAX_LEVELS * 16 + 8 };
 typedef enum txp_kind { TXP_STEP_QUILT, TXP_STEP_PASS, TXP_STEP_POLISH, TXP_STEP_FINISH } txp_kind;
 typedef struct txp_step {
     txp_kind kind;
-    int level, size, stride, round;
+    int level, size, stride, round, rounds;
     float cost; /* of the whole, about */
 } txp_step;
 
@@ -2115,6 +2186,7 @@ static void txp_setup_steps(texpatch_job *job) {
                 t->kind = TXP_STEP_PASS;
                 t->level = l;
                 t->round = i;
+                t->rounds = count;
                 t->size = TXP_WINDOW >> half;
                 t->stride = half && l < top ? 2 : 4;
                 t->cost = txm_float(1.0 / (double)(1 << 2 * l));
@@ -2163,10 +2235,21 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     c->pixels = (uint8_t *)txm_arena_zero(arena, (size_t)(c->height + TXP_PAD) + 1, c->pitch);
     c->at = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->at);
+    c->next = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->next);
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
-    if (!c->pixels || !c->at || (job->given.fixed && !c->fixed) || (job->given.free_guide && !c->free_guide))
+    if (!c->pixels || !c->at || !c->next || (job->given.fixed && !c->fixed) || (job->given.free_guide && !c->free_guide))
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+    for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
+        txp_band *b = &c->bands[i];
+        const size_t band = (size_t)c->width * TXP_BAND;
+        if (i * TXP_BAND >= c->height) break; /* there are fewer bands */
+        b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
+        b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
+        if (!b->sums || !b->mean) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+        b->total = b->sums + band * n;
+        b->nearest = b->total + band;
+    }
     memset(c->at, 255, pixels * sizeof *c->at);
     if (!job->given.pixels) return TXM_OK;
     for (int y = 0; y < c->height; y++) {
@@ -2213,8 +2296,9 @@ static int txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
     u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
     u->count = (uint32_t *)txm_arena_zero(arena, (size_t)u->columns * (size_t)u->rows,
                                           sizeof *u->count);
-    u->mean = 1;
-    return u->count != NULL;
+    u->sums = (uint32_t *)txm_arena_zero(arena, (size_t)(u->columns + 1) * (size_t)(u->rows + 1),
+                                         sizeof *u->sums);
+    return u->count && u->sums;
 }
 
 static void txp_quilt_one(void *context, int index) {
@@ -2275,7 +2359,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the first pass");
             goto done;
         }
-        t->use.mean = (double)pixels / (t->use.columns * t->use.rows);
+        txp_use_mean(&t->use, (double)pixels);
         memcpy(t->canvas.pixels, out->pixels, bytes);
         memcpy(t->canvas.at, out->at, pixels * sizeof(txp_place));
         const size_t n = (size_t)s->bytes, guide = (size_t)s->guide_at;
@@ -2350,10 +2434,8 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Room for a pass over c. */
+/* Room for a pass over c, the bands apart. */
 static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
-    const int n = p->source->bytes;
-    const size_t band = (size_t)c->width * TXP_BAND;
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
     if (!p->xs || !p->ys) return 0;
@@ -2366,19 +2448,11 @@ static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
     if (!p->match || !p->sad || !p->weight || !p->grain) return 0;
     memset(p->match, 255, windows * sizeof *p->match);
-    for (int i = 0; i < TXP_LANES; i++) {
-        txp_band *b = &p->bands[i];
-        b->sums = (int32_t *)txm_arena_alloc(scratch, band, (size_t)(n + 2) * sizeof(int32_t));
-        b->mean = (uint8_t *)txm_arena_alloc(scratch, band, (size_t)n);
-        if (!b->sums || !b->mean) return 0;
-        b->total = b->sums + band * (size_t)n;
-        b->nearest = b->total + band;
-    }
     return 1;
 }
 
-/* One pass of the optimisation over c; the places it chooses go into next. */
-static txm_status txp_run_pass(texpatch_job *job, const txp_step *t, txp_canvas *c, txp_place *next,
+/* One pass of the optimisation over c; the places it chooses go into c->next. */
+static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const txp_canvas *c,
                                txm_env *env) {
     const txp_source *s = job->source;
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
@@ -2392,13 +2466,21 @@ static txm_status txp_run_pass(texpatch_job *job, const txp_step *t, txp_canvas 
     p.canvas = c;
     p.size = t->size;
     p.step = t->stride;
-    p.next = next;
+    p.next = c->next;
+    memcpy(p.bands, c->bands, sizeof p.bands);
     p.shift_x = job->shift_x / (1 << t->level);
     p.shift_y = job->shift_y / (1 << t->level);
     p.use_weight = TXP_USE / 2;
     p.lattice_weight = TXP_LATTICE / 5;
-    p.novelty = t->level == 0 ? (double)job->setup.novelty : 0;
     p.exhaustive = t->level == s->levels - 1 && t->round == 0 && p.size == TXP_WINDOW;
+    p.most_same = 8;
+    p.skip = 1;
+    if (job->setup.novelty > 0 && t->level == (s->levels > 1 ? 1 : 0) && p.size < TXP_WINDOW &&
+        t->round == t->rounds - 1) {
+        p.most_same = (int)(7.5f - 3.5f * job->setup.novelty);
+        p.exhaustive = 1;
+        p.skip = 2;
+    }
     p.seed = txm_hash(job->seed + (uint64_t)(job->next_step + 1) * 7919);
     txp_bell(p.size, p.bell);
     if (!txp_pass_make(&p, c, &scratch) || !txp_use_make(p.stack, &p.use, &scratch)) {
@@ -2413,7 +2495,7 @@ static txm_status txp_run_pass(texpatch_job *job, const txp_step *t, txp_canvas 
                          &p);
     }
     txp_weigh(&p);
-    memcpy(next, c->at, (size_t)c->width * (size_t)c->height * sizeof *next);
+    memcpy(p.next, c->at, (size_t)c->width * (size_t)c->height * sizeof *p.next);
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
         if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
         txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
@@ -2427,12 +2509,12 @@ cancelled:
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
-static txm_status txp_run_polish(texpatch_job *job, txp_canvas *c, txp_place *next, txm_env *env) {
+static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, txm_env *env) {
     txp_polish p;
     p.source = job->source;
     p.stack = &job->source->stack[0];
     p.canvas = c;
-    p.next = next;
+    p.next = c->next;
     txp_canvas_close(p.source, c, c->pixels);
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
@@ -2519,6 +2601,8 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     for (int i = 0; i < 4 && d->lattice == 1; i++) {
         if (!txm_is_finite((double)d->lattice_vectors[i]))
             return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be finite");
+        if (fabs((double)d->lattice_vectors[i]) > TEXPATCH_MAX_SIDE)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 8192 pixels at most");
         u->lattice_vectors[i] = (double)d->lattice_vectors[i];
     }
     if (d->lattice == 1 && !(fabs(txp_det(u->lattice_vectors, u->lattice_vectors + 2)) >= 16))
@@ -2636,7 +2720,7 @@ static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const t
 /* ---- public: jobs ------------------------------------------------------------------------- */
 
 /* The lattice of a torus whose sides are multiples of it: the steps nearest to `lattice` of which
-   whole numbers lead along the sides that wrap. 0: none is within a tenth. */
+   whole numbers lead along the sides that wrap. 0: none is within a quarter. */
 static int txp_lattice_close(const double lattice[4], int tileable, double width, double height,
                              double out[4]) {
     const double *a = lattice, *b = lattice + 2;
@@ -2663,7 +2747,7 @@ static int txp_lattice_close(const double lattice[4], int tileable, double width
     }
     for (int k = 0; k < 4; k += 2) {
         const double dx = out[k] - lattice[k], dy = out[k + 1] - lattice[k + 1];
-        if (dx * dx + dy * dy > 0.01 * (lattice[k] * lattice[k] + lattice[k + 1] * lattice[k + 1]))
+        if (dx * dx + dy * dy > 0.0625 * (lattice[k] * lattice[k] + lattice[k + 1] * lattice[k + 1]))
             return 0;
     }
     return fabs(txp_det(out, out + 2)) > 0.5 * fabs(det);
@@ -2912,25 +2996,14 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     }
     const int is_new = level != job->level || t->kind == TXP_STEP_QUILT;
     if (status == TXM_OK && t->kind != TXP_STEP_QUILT && t->kind != TXP_STEP_FINISH) {
-        const size_t pixels = (size_t)canvas.width * (size_t)canvas.height;
-        if (!is_new) { /* a canvas of its own, so that a failure leaves the old one */
-            status = txp_canvas_make(job, level, &memory, &finer, env);
-            if (status == TXM_OK) {
-                memcpy(finer.at, canvas.at, pixels * sizeof *finer.at);
-                memcpy(finer.pixels, canvas.pixels,
-                       canvas.pitch * ((size_t)(canvas.height + TXP_PAD) + 1));
-                canvas = finer;
-            }
-        }
+        if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &canvas, env);
+        else status = txp_run_polish(job, &canvas, env);
         if (status == TXM_OK) {
-            txp_place *next = (txp_place *)txm_arena_alloc(&memory, pixels, sizeof *next);
-            if (!next) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
-            else if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &canvas, next, env);
-            else status = txp_run_polish(job, &canvas, next, env);
-            canvas.at = next;
-        }
-        if (status == TXM_OK)
+            txp_place *old = canvas.at;
+            canvas.at = canvas.next;
+            canvas.next = old;
             txp_canvas_show(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
+        }
     }
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
         txm_arena fields;
@@ -2943,11 +3016,9 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
         txm_arena_free(&memory);
         return status;
     }
-    if (t->kind != TXP_STEP_FINISH || is_new) {
+    if (is_new) {
         txm_arena_free(&job->canvas_memory);
         job->canvas_memory = memory;
-    } else {
-        txm_arena_free(&memory);
     }
     job->canvas = canvas;
     job->level = level;
@@ -3278,7 +3349,8 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     txm_arena memory;
     txp_given new_guide;
     txm_image mask, no_mask;
-    int low_x, low_y, high_x = -1, high_y = -1, x0, y0, wide, high;
+    int low_x, low_y, high_x = -1, high_y = -1;
+    int x0 = 0, y0 = 0, wide = 0, high = 0;
     if (!job || !again) return txm_fail(env, TXM_BAD_ARGUMENT, "job or again is NULL");
     const txp_source *s = job->source;
     const txp_setup *u = &job->setup;
