@@ -107,11 +107,43 @@ static void draw_weave(int x, int y, int rgb[3]) {
     rgb[2] = v + 10;
 }
 
+/* What a wall of bricks has at (x, y): how deep inside a brick, 0 for the joint, up to 256; tone: a
+   number 0..255 of the brick. Courses are 22 pixels high, bricks 44 long, every second course moved
+   by half of one; edges are a little uneven. */
+static int brick_at(int x, int y, int *tone) {
+    const int wide = 44, high = 22, joint = 4;
+    const int u = x + (noise(x, y, 7, 0) - 128) / 80, v = y + (noise(x, y, 9, 1) - 128) / 80;
+    const int course = v / high, along = u + course % 2 * (wide / 2);
+    const int i = along % wide, j = v % high;
+    const int from_end = i < wide - 1 - i ? i : wide - 1 - i;
+    const int from_bed = j < high - 1 - j ? j : high - 1 - j;
+    const int inside = (from_end < from_bed ? from_end : from_bed) - joint / 2 + 1;
+    *tone = at_random(along / wide, course, 2);
+    return inside < 0 ? 0 : inside > 4 ? 256 : 64 * inside;
+}
+
+/* a wall of bricks in running bond */
+static void draw_bricks(int x, int y, int rgb[3]) {
+    int tone, deep = brick_at(x, y, &tone);
+    int grain = at_random(x, y, 3) / 16 + noise(x, y, 3, 4) / 10 - 20;
+    int light = (256 - deep) / 12; /* the edges of a brick are worn */
+    rgb[0] = (deep * (118 + tone / 4 + light) + (256 - deep) * 190) / 256 + grain;
+    rgb[1] = (deep * (62 + tone / 5 + light) + (256 - deep) * 182) / 256 + grain;
+    rgb[2] = (deep * (50 + tone / 6 + light) + (256 - deep) * 168) / 256 + grain;
+}
+
+/* how far the same wall stands out: a height map in register with it */
+static void draw_bricks_height(int x, int y, int rgb[3]) {
+    int tone, deep = brick_at(x, y, &tone);
+    rgb[0] = rgb[1] = rgb[2] = 40 + deep * (160 + tone / 8) / 256 + noise(x, y, 3, 4) / 16;
+}
+
 static const struct {
     const char *name;
     drawing *draw;
 } kinds[] = {{"clouds", draw_clouds}, {"sand", draw_sand},     {"stripes", draw_stripes},
-             {"cells", draw_cells},   {"blades", draw_blades}, {"weave", draw_weave}};
+             {"cells", draw_cells},   {"blades", draw_blades}, {"weave", draw_weave},
+             {"bricks", draw_bricks}, {"bricks-height", draw_bricks_height}};
 
 static int fail(const char *path, const char *why) {
     fprintf(stderr, "draw: '%s': %s\n", path, why);

@@ -5,7 +5,7 @@
 # the package is downloaded and unpacked under build/packages/, never installed. With none of them
 # in reach the project draws exemplars of its own. build/samples/list.txt has a line for each: role,
 # path below build/samples/, title, where it comes from, licence, separated by tabs. Those of the
-# role "limit" lie in build/samples/limit/, out of the way of tests and benchmarks.
+# roles "limit" and "layout" lie in folders of these names, out of the way of tests and benchmarks.
 set -eu
 
 build=${BUILD:-build}
@@ -13,7 +13,7 @@ samples=$build/samples
 packages=$build/packages
 
 # role, name, title, package, path, licence, times to shrink before cutting the middle out. The role
-# "good": the method is made for it; "limit": it shows what the method cannot do.
+# "good": texsyn.h is made for it; "limit": it shows what texsyn.h cannot do; "layout": for texpatch.h.
 photographs="
 good  gravel  Gravel   python3-skimage      usr/lib/python3/dist-packages/skimage/data/gravel.png CC0-1.0 2
 good  pebbles Pebbles  extremetuxracer-data usr/share/games/etr/terrains/pebbles04.png            GPL-2+ 1
@@ -25,12 +25,13 @@ good  frost   Frost    extremetuxracer-data usr/share/games/etr/terrains/pebbles
 good  lichen  Lichen   extremetuxracer-data usr/share/games/etr/terrains/rock05.png               GPL-2+ 1
 limit grass   Blades   python3-skimage      usr/lib/python3/dist-packages/skimage/data/grass.png  CC0-1.0 1
 limit brick   Bricks   python3-skimage      usr/lib/python3/dist-packages/skimage/data/brick.png  CC0-1.0 1
+layout wall   Slates   extremetuxracer-data usr/share/games/etr/terrains/pave01.png               GPL-2+ 1
 "
 
 # nothing to do while the samples are there and this list of them is the same
 [ -s "$samples/list.txt" ] && [ -z "$(find "$0" -newer "$samples/list.txt")" ] && exit 0
 rm -rf "$samples"
-mkdir -p "$samples/limit" "$packages"
+mkdir -p "$samples/limit" "$samples/layout" "$packages"
 log=$packages/log.txt
 tab=$(printf '\t')
 
@@ -73,8 +74,13 @@ $package$tab$licence" >>"$samples/list.part"
 if [ ! -s "$samples/list.part" ]; then
     echo "samples: no photographs in reach; drawing exemplars instead (tools/draw.c)"
     for name in $("$build/draw" list); do
-        "$build/draw" "$name" "$samples/$name.png"
-        echo "good$tab$name$tab$name${tab}drawn by tools/draw.c, not a photograph${tab}\
+        case $name in
+        *-height) continue ;;
+        weave | bricks) role=layout file=layout/$name ;;
+        *) role=good file=$name ;;
+        esac
+        "$build/draw" "$name" "$samples/$file.png"
+        echo "$role$tab$file$tab$name${tab}drawn by tools/draw.c, not a photograph${tab}\
 as texkit" >>"$samples/list.part"
     done
 fi
