@@ -1,6 +1,6 @@
 #!/bin/sh
-# demo.sh - learn and synthesise every sample of build/samples/, cut tiles out of some, retile meshes
-# and cover them, show all in out/index.html
+# demo.sh - learn and synthesise every sample of build/samples/, lay pieces of some anew, cut tiles out
+# of some, retile meshes and cover them, show all in out/index.html
 set -eu
 
 build=${BUILD:-build}
@@ -9,7 +9,7 @@ tab=$(printf '\t')
 mkdir -p "$out"
 
 # figure NAME FILE: a number, or a list of them, out of a --stats file
-figure() { sed -n "s/^ *\"$1\": \[*\([0-9., ]*[0-9]\).*/\1/p" "$2"; }
+figure() { sed -n "s/^ *\"$1\": \[*\([-0-9., ]*[0-9]\).*/\1/p" "$2"; }
 seconds() { printf %.1f "$(figure "$1" "$2")"; }
 
 # pair SAMPLE TITLE SOURCE LICENCE NOTE: learn, synthesise, append both pictures to the page
@@ -45,6 +45,38 @@ pair() {
 <img src="$name-512.png" width="512" height="512" alt="synthesis: $2">
 </section>
 PAIR
+}
+
+# laid SAMPLE TITLE SOURCE LICENCE NOTE: new texture out of pieces of a sample, appended to the page
+laid() {
+    name=${1##*/} stats=$out/${1##*/}.patch.json
+    cp "$build/samples/$1.png" "$out/$name.png"
+    "$build/texkit" patch "$out/$name.png" -o "$out/$name-laid.png" --size 512x512 \
+        --stats "$stats" --quiet
+    total=$(seconds total "$stats")
+    whole=$(figure continuous "$stats" | awk '{ printf "%.0f", 100 * $1 }')
+    lattice=none
+    [ "$(figure lattice "$stats")" = 0 ] ||
+        lattice=$(for k in ax ay bx by; do figure lattice_$k "$stats"; done | awk '
+            { v[NR] = sprintf("%.0f", $1); if (v[NR] == "-0") v[NR] = 0 }
+            END { print "(" v[1] ", " v[2] ") and (" v[3] ", " v[4] ") pixels" }')
+    printf 'demo: %-8s laid anew in %4s s, lattice %s\n' "$name" "$total" "$lattice"
+    cat >>"$out/index.part" <<LAID
+<section class="pair">
+<div>
+<img src="$name.png" alt="exemplar: $2">
+<h3>$2</h3>
+<dl>
+<dt>lattice</dt><dd>$lattice</dd>
+<dt>as in the exemplar</dt><dd>$whole % <small>of all pairs of neighbours</small></dd>
+<dt>made in</dt><dd>$total s</dd>
+</dl>
+<p>${5:-}</p>
+<p class="source">Exemplar: $3; licence $4.</p>
+</div>
+<img src="$name-laid.png" width="512" height="512" alt="$2, laid anew">
+</section>
+LAID
 }
 
 # tile_set NAME KIND COLORS NOTE: cut tiles out of a sample, append them to the page
@@ -197,7 +229,7 @@ while IFS=$tab read -r role sample title source licence; do
         cat >>"$out/index.part" <<'LIMITS'
 <h2>What it cannot do</h2>
 <p>Statistics of pixels and their neighbours know nothing of long thin lines, closed contours and
-exact layouts.</p>
+exact layouts. The next section has a way to keep them.</p>
 LIMITS
     fi
     limits=$((limits + 1))
@@ -214,6 +246,62 @@ good=$(awk -F "$tab" '$1 == "good" { print $2 }' "$build/samples/list.txt")
 pick() { # NAME NUMBER
     echo "$good" | grep -x "$1" || echo "$good" | sed -n "$2p"
 }
+
+stones=$(pick pebbles 2) marked=$(pick frost 1) wall=
+cat >>"$out/index.part" <<'LAYOUT'
+<h2>With its layout</h2>
+<p>Here pieces of the exemplar are laid anew, and moved, cut and bent until they go on into each other.
+Away from the seams the pixels are those of the exemplar. What repeats on a lattice stays on it, and long
+things stay whole.</p>
+LAYOUT
+for wanted in layout good limit; do
+    while IFS=$tab read -r role sample title source licence; do
+        case $wanted:$role:$sample in
+        layout:layout:*) note= ;;
+        good:good:$stones) note="As sharp as the photograph. What stands out there, such
+as the few dark stones, is met again." ;;
+        limit:limit:*/grass) note="The blades keep their length." ;;
+        limit:limit:*/brick) note="Seen at an angle, so that no two bricks of the photograph are equally
+wide. Where pieces of different width meet, joints end." ;;
+        *) continue ;;
+        esac
+        laid "$sample" "$title" "$source" "$licence" "$note"
+        [ "$role" != layout ] || wall=$name
+    done <"$build/samples/list.txt"
+done
+[ -n "$wall" ] || wall=$stones
+
+"$build/texkit" patch "$out/$wall.png" -o "$out/$wall-laid-tile.png" --size 384x384 --tileable --quiet
+cat >"$out/strokes.json" <<'STROKES'
+{"smooth": 1.5, "least": 40, "strokes": [
+  {"layer": 0, "width": 26, "points": [[-10,430], [60,410], [120,360], [150,290], [165,210],
+    [200,150], [260,130], [310,165], [325,230], [335,300], [370,350], [430,350], [480,300],
+    [525,260]]},
+  {"layer": 3, "closed": true, "points": [[180,330], [230,290], [280,330], [285,400], [230,440],
+    [180,410]]}]}
+STROKES
+"$build/texkit" edges "$out/$marked.png" -o "$out/$marked-edges.png" --smooth 1.5 --least 40 --quiet
+"$build/texkit" patch "$out/$marked.png" -o "$out/$marked-strokes.png" --size 512x512 \
+    --control "$out/strokes.json" --quiet
+echo "demo: $wall tileable, $marked with its edges and along strokes"
+cat >>"$out/index.part" <<LAYOUT
+<h3>Without a seam</h3>
+<p>384 &times; 384 pixels of $wall, laid with <code>--tileable</code> and repeated 2 &times; 2.</p>
+<div class="repeated" role="img" aria-label="a tile of $wall, repeated"
+  style="background: url($wall-laid-tile.png) repeat"></div>
+<h3>Along strokes</h3>
+<section class="pair">
+<div>
+<img src="$marked.png" alt="exemplar: $marked">
+<img src="$marked-edges.png" alt="the edges of its gray layers">
+<p>The exemplar, and the edges of its gray layers as <code>texkit edges</code> finds them. To the right
+<a href="strokes.json">two strokes</a>, an open one of the darkest layer and a closed one of the
+lightest, have become edges of the texture, as restless as those of the exemplar.</p>
+</div>
+<img src="$marked-strokes.png" width="512" height="512" alt="$marked, laid along two strokes">
+</section>
+LAYOUT
+
 cat >>"$out/index.part" <<'TILES'
 <h2>Tiles that join</h2>
 <p>Here the photograph itself is cut, into sets of tiles that join wherever their colours match: an
@@ -267,7 +355,10 @@ fi
 cat >>"$out/index.part" <<TAIL
 <footer>Made by <code>make demo</code> with $("$build/texkit" --version) on $threads threads. Each
 pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
-<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Each set of tiles:
+<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Each one laid anew:
+<code>texkit patch NAME.png -o NAME-laid.png --size 512x512</code>; edges and strokes:
+<code>texkit edges NAME.png -o NAME-edges.png --smooth 1.5 --least 40</code> and
+<code>texkit patch NAME.png -o NAME-strokes.png --size 512x512 --control strokes.json</code>. Each set of tiles:
 <code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Each retiled
 mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>. Seconds are of this run.</footer>
 </body>
