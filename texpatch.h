@@ -331,8 +331,7 @@ typedef struct texpatch_edges_desc {
                         than so many pixels go to the surrounding layer that they share most of
                         it with, the shortest first; 0 = all are kept                          */
     const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
-                        have about the same area, at the emptiest gray near there                  
-                           */
+                        have about the same area, at the emptiest gray near there */
 } texpatch_edges_desc;
 
 /* Find the boundaries of all layers.
@@ -390,8 +389,7 @@ typedef struct texpatch_control {
     const texpatch_stroke *strokes;
     int stroke_count;  /* 0 or more                                                             */
     int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but
-                          next to a stroke not the stroke's own layer                              
-                              */
+                          next to a stroke not the stroke's own layer */
     float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
                           -1 = none                                                             */
     uint64_t seed;     /* another seed, another unrest                                          */
@@ -2426,7 +2424,7 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
                 }
             }
             uint8_t *out = txp_canvas_at(s, c, x, y);
-            for (size_t b = 0; b < n; b++)
+            for (size_t b = 0; b < n && count > 0; b++)
                 out[b] = (uint8_t)((sum[b] + (uint32_t)count / 2) / (uint32_t)count);
             if (c->free_guide) c->free_guide[i] = unbound * 2 > count;
             if (c->fixed && kept == count) {
@@ -5782,7 +5780,7 @@ TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
     status =
         g.at ? txp_e_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
              : txp_e_no_memory(env);
-    for (int y = 0; y < g.height && status == TXM_OK; y++) {
+    for (int y = 0; y < g.height && g.at && status == TXM_OK; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(mask, y);
         memcpy(txm_image_row(guide, y), g.at + (size_t)y * w, w);
         if (told) memcpy(row, told + (size_t)y * w, w);

@@ -4,8 +4,8 @@
 # Every tests/test_*.c is a cmocka program, built here with the address and undefined-behaviour
 # sanitizers, together with the files that its line "Built with:" names, if it has one; every
 # tests/test_*.sh is a script that prints "ok - what" or "not ok - what" for each of its tests. NAME
-# picks some of them (cli, texmath ...). --full widens what the scripts try, as CI does. The last
-# line counts everything.
+# picks some of them (cli, texmath ...). --full widens what the scripts try, as does naming some in
+# WIDE, as CI does. The last line counts everything.
 set -u
 
 cd "$(dirname "$0")/.." || exit 1
@@ -33,6 +33,7 @@ unit() {
 }
 # script NAME: run one script; its log and status stay in $OUT
 script() {
+    case " ${WIDE:-} " in *" $1 "*) FULL=1 ;; esac
     sh "tests/test_$1.sh" >"$OUT/$1.log" 2>&1
     echo $? >"$OUT/$1.status"
 }

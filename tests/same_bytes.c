@@ -1,4 +1,4 @@
-/* same_bytes.c - print one hash over models, pictures, tile sets and meshes: same_bytes THREADS
+/* same_bytes.c - print one hash over what all headers make: same_bytes THREADS
    SPDX-License-Identifier: MIT OR Unlicense
 
    test_same_bytes.sh builds this with each compiler and optimisation level and runs it on several
@@ -6,6 +6,8 @@
    lies between the pixels of an exemplar in triangles, repair, and meshes.                      */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
+#define TEXPATCH_IMPLEMENTATION
+#include "texpatch.h"
 #define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 #define TRIMESH_RELAX_IMPLEMENTATION
@@ -108,6 +110,38 @@ static uint64_t run_tiles(textiles_kind kind, int channels, txm_env *env, uint64
     return hash;
 }
 
+/* Hash over a texture made of pieces of the exemplar, and over a window of the endless plane. */
+static uint64_t run_patch(int channels, int tileable, int turns, txm_env *env, uint64_t hash) {
+    static uint8_t pixels[SIDE * SIDE * 4], out[WIDTH * HEIGHT * 4];
+    draw_exemplar(pixels, channels);
+    const txm_image map = {pixels, SIDE, SIDE, channels, TXM_U8, 0};
+    const txm_image image = {out, WIDTH, HEIGHT, channels, TXM_U8, 0};
+    const txm_image window = {out, 20, 30, channels, TXM_U8, 0};
+    texpatch_exemplar exemplar;
+    texpatch_desc desc;
+    texpatch_plane *plane = NULL;
+    memset(&exemplar, 0, sizeof exemplar);
+    memset(&desc, 0, sizeof desc);
+    exemplar.maps = &map;
+    desc.exemplars = &exemplar;
+    desc.exemplar_count = desc.map_count = 1;
+    desc.width = WIDTH;
+    desc.height = HEIGHT;
+    desc.tileable = tileable;
+    desc.turns = turns;
+    desc.mirror = turns > 1;
+    desc.seed = 3;
+    if (texpatch_make(&desc, env, &image) != TXM_OK) give_up("patch", env);
+    hash = tk_hash(hash, out, (size_t)WIDTH * HEIGHT * (size_t)channels);
+    if (tileable) return hash;
+    if (texpatch_plane_make(&desc, env, &plane) != TXM_OK ||
+        texpatch_plane_draw(plane, -70, 5, env, &window, NULL) != TXM_OK)
+        give_up("plane", env);
+    hash = tk_hash(hash, out, 20 * 30 * (size_t)channels);
+    texpatch_plane_free(plane);
+    return hash;
+}
+
 /* Hash over a retiled surface and the things that stand on it. The surface is a bumpy ring, or open:
    a bent sheet. Only integers and sqrt make it, so that libm has no part in it. */
 static uint64_t run_mesh(trimesh_method method, int open, txm_env *env, uint64_t hash) {
@@ -190,6 +224,8 @@ int main(int argc, char **argv) {
     hash = run(4, 0, &env, hash);
     hash = run_tiles(TEXTILES_WANG, 3, &env, hash);
     hash = run_tiles(TEXTILES_TRIANGLE, 1, &env, hash);
+    hash = run_patch(3, TEXPATCH_TILE_X | TEXPATCH_TILE_Y, 1, &env, hash);
+    hash = run_patch(1, 0, 4, &env, hash);
     for (int open = 0; open < 2; open++) {
         hash = run_mesh(TRIMESH_LATTICE, open, &env, hash);
         hash = run_mesh(TRIMESH_REPEL, open, &env, hash);
