@@ -258,8 +258,9 @@ for wanted in layout good limit; do
     while IFS=$tab read -r role sample title source licence; do
         case $wanted:$role:$sample in
         layout:layout:*) note= ;;
-        good:good:$stones) note="As sharp as the photograph. What stands out there, such
-as the few dark stones, is met again." ;;
+        good:good:pebbles) note="As sharp as the photograph. What stands out there, such as the few dark
+stones, is met again." ;;
+        good:good:$stones) note= ;;
         limit:limit:*/grass) note="The blades keep their length." ;;
         limit:limit:*/brick) note="Seen at an angle, so that no two bricks of the photograph are equally
 wide. Where pieces of different width meet, joints end." ;;
