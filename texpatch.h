@@ -174,7 +174,8 @@ typedef struct texpatch_desc {
     float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 a piece may not
                       go on farther than a neighbourhood, which costs detail and likeness        */
     int lattice;   /* 0 = find out whether the exemplar has a lattice and keep it; 1 = it has this
-                      one; -1 = treat it as having none                                          */
+                      one; -1 = treat it as having none. It is looked for in a single exemplar
+                      that is neither turned nor mirrored                                        */
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
     txm_image guide;    /* what the exemplars' guides should look like here: width x height,
                            channels and sample of theirs; pixels NULL: none                      */
@@ -496,6 +497,7 @@ typedef struct txp_stack {
 typedef struct txp_source {
     int sheets, levels, bytes, guide_at, guide_bytes;
     int has_lattice, is_random; /* is_random: no long order at all                              */
+    double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
     txp_sheet sheet[TXP_MAX_SHEETS];
     txp_stack stack[TXP_MAX_LEVELS];
 } txp_source;
@@ -1180,6 +1182,24 @@ static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena
     return status;
 }
 
+/* The contrast of the exemplars, from some thousand pairs of pixels. */
+static void txp_find_contrast(txp_source *s) {
+    const txp_stack *k = &s->stack[0];
+    txm_rng rng = txm_rng_make(1, 2);
+    uint64_t sum = 0;
+    for (int i = 0; i < 4096; i++) {
+        const uint8_t *p[2];
+        for (int j = 0; j < 2; j++) {
+            const int n = (int)txm_rng_below(&rng, (uint32_t)s->sheets);
+            const int x = (int)txm_rng_below(&rng, (uint32_t)k->wide[n]);
+            const int y = (int)txm_rng_below(&rng, (uint32_t)k->high[n]);
+            p[j] = txp_stack_at(s, k, x, k->first[n] + y);
+        }
+        for (int b = 0; b < s->guide_at; b++) sum += (uint64_t)abs(p[0][b] - p[1][b]);
+    }
+    s->contrast = (double)sum / 4096;
+}
+
 /* Look for a lattice at the coarsest level; sharpen its steps on finer ones. */
 static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
     txm_arena scratch;
@@ -1712,9 +1732,8 @@ static void txp_match_row(void *context, int index) {
     for (int i = 0; i < p->columns; i++) txp_match(p, i, p->first_row + index);
 }
 
-/* 2^-1.2 .. to the power of n / 8, in 16 bits */
 static double txp_power(double x) {
-    /* x^-1.2 for x >= 1, to 1 %: powers of two from a table, the rest by a parabola */
+    /* x^(r - 2) for r = 0.8 and x >= 1, to 1 %: powers of two from a table, the rest a parabola */
     static const double fifth[5] = {1.0, 0.870550563296124, 0.757858283255199, 0.659753955386447,
                                     0.574349177498518};
     int e = 0;
@@ -2277,8 +2296,9 @@ static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double s
 }
 /* ---- jobs --------------------------------------------------------------------------------- */
 
-/* gray levels per pixel: what twice the mean use, or a squared pixel off the lattice, counts */
-#define TXP_USE 16.0
+/* What the mean use counts in the first pass, of the contrast; what a squared pixel off the lattice
+   counts, in gray levels per pixel. */
+#define TXP_USE 0.4
 #define TXP_LATTICE 20.0
 
 enum { TXP_MAX_STEPS = 2 * TXP_MAX_LEVELS * 16 + 8 };
@@ -2500,7 +2520,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
                 t->block -= 4;
         }
         t->overlap = t->block / 2;
-        t->use_weight = TXP_USE;
+        t->use_weight = TXP_USE * s->contrast;
         t->lattice_weight = TXP_LATTICE;
         t->rng = txm_rng_make(job->seed, (uint64_t)(1000 + i));
         t->shift_x = job->shift_x / (1 << level);
@@ -2633,7 +2653,7 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     memcpy(p.bands, c->bands, sizeof p.bands);
     p.shift_x = job->shift_x / (1 << t->level);
     p.shift_y = job->shift_y / (1 << t->level);
-    p.use_weight = TXP_USE / 2;
+    p.use_weight = TXP_USE / 2 * s->contrast;
     p.lattice_weight = TXP_LATTICE / 5;
     p.exhaustive = t->level == s->levels - 1 && t->round == 0 && p.size == TXP_WINDOW;
     p.most_same = 8;
@@ -2956,6 +2976,7 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *
     for (int l = 0; l < s->levels && status == TXM_OK; l++)
         txp_lattice_set(&s->stack[l], closed, 1.0 / (1 << l));
 done:
+    if (status == TXM_OK) txp_find_contrast(s);
     if (status == TXM_OK) *memory = first;
     else txm_arena_free(&first);
     return status;
