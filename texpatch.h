@@ -2296,9 +2296,7 @@ static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double s
 }
 /* ---- jobs --------------------------------------------------------------------------------- */
 
-/* What the mean use counts in the first pass, of the contrast; what a squared pixel off the lattice
-   counts, in gray levels per pixel. */
-#define TXP_USE 0.4
+/* gray levels per pixel that a squared pixel off the lattice counts */
 #define TXP_LATTICE 20.0
 
 enum { TXP_MAX_STEPS = 2 * TXP_MAX_LEVELS * 16 + 8 };
@@ -2468,6 +2466,12 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     return TXM_OK;
 }
 
+/* What the mean use of a place counts in the first pass, in gray levels per pixel: half the contrast.
+   A torus, whose ends must meet besides, can afford less. */
+static double txp_use_weight(const texpatch_job *job) {
+    return fmin(0.5 * job->source->contrast, job->setup.tileable ? 16 : 32);
+}
+
 static int txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
     u->columns = (k->width + TXP_CELL - 1) / TXP_CELL;
     u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
@@ -2520,7 +2524,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
                 t->block -= 4;
         }
         t->overlap = t->block / 2;
-        t->use_weight = TXP_USE * s->contrast;
+        t->use_weight = txp_use_weight(job);
         t->lattice_weight = TXP_LATTICE;
         t->rng = txm_rng_make(job->seed, (uint64_t)(1000 + i));
         t->shift_x = job->shift_x / (1 << level);
@@ -2653,7 +2657,7 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     memcpy(p.bands, c->bands, sizeof p.bands);
     p.shift_x = job->shift_x / (1 << t->level);
     p.shift_y = job->shift_y / (1 << t->level);
-    p.use_weight = TXP_USE / 2 * s->contrast;
+    p.use_weight = txp_use_weight(job) / 2;
     p.lattice_weight = TXP_LATTICE / 5;
     p.exhaustive = t->level == s->levels - 1 && t->round == 0 && p.size == TXP_WINDOW;
     p.most_same = 8;
