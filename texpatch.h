@@ -2466,8 +2466,8 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     return TXM_OK;
 }
 
-/* What the mean use of a place counts in the first pass, in gray levels per pixel: half the contrast.
-   A torus, whose ends must meet besides, can afford less. */
+/* What the mean use of a place counts in the first pass, in gray levels per pixel: half the
+   contrast. A torus, whose ends must meet besides, can afford less. */
 static double txp_use_weight(const texpatch_job *job) {
     return fmin(0.5 * job->source->contrast, job->setup.tileable ? 16 : 32);
 }

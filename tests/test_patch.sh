@@ -465,6 +465,6 @@ starve() {
 check "out of memory: status 1, one line" starve
 if has script && script -qec true /dev/null >/dev/null 2>&1; then
     check "a progress bar on a terminal" sh -c "
-        script -qec \"'$released' patch bricks.png -o bar.png --size 700x700 --threads 1\" \
+        script -qec \"'$released' patch bricks.png -o bar.png --size 2000x2000 --threads 1\" \
             /dev/null | grep -q '##.*%'"
 fi
