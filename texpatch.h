@@ -440,7 +440,8 @@ TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
 #endif
 #endif /* TEXPATCH_H */
 
-#ifdef TEXPATCH_IMPLEMENTATION
+#if defined(TEXPATCH_IMPLEMENTATION) && !defined(TEXPATCH_IMPLEMENTED)
+#define TEXPATCH_IMPLEMENTED
 
 #if defined(__SSE2__) && !defined(TEXPATCH_NO_SIMD)
 #include <emmintrin.h>
@@ -2090,7 +2091,7 @@ static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *n
     float *own = f->value + i * (size_t)lanes;
     const int16_t *given = f->given + i * (size_t)lanes;
     const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
-    const float l = pull[0], r = pull[1], u = pull[2], d = pull[3], unit = 255.0f / TXP_GIVEN;
+    const float l = pull[0], r = pull[1], u = pull[2], d = pull[3], unit = 255.0f / (float)TXP_GIVEN;
     const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
     const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
     for (int k = 0; k < lanes; k++) {
@@ -2788,7 +2789,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     for (int i = 0; i < 4 && d->lattice == 1; i++) {
         if (!txm_is_finite((double)d->lattice_vectors[i]))
             return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be finite");
-        if (fabs((double)d->lattice_vectors[i]) > TEXPATCH_MAX_SIDE)
+        if (fabs((double)d->lattice_vectors[i]) > (double)TEXPATCH_MAX_SIDE)
             return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 8192 pixels at most");
         u->lattice_vectors[i] = (double)d->lattice_vectors[i];
     }
