@@ -2091,7 +2091,8 @@ static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *n
     float *own = f->value + i * (size_t)lanes;
     const int16_t *given = f->given + i * (size_t)lanes;
     const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
-    const float l = pull[0], r = pull[1], u = pull[2], d = pull[3], unit = 255.0f / (float)TXP_GIVEN;
+    const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
+    const float unit = 255.0f / (float)TXP_GIVEN;
     const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
     const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
     for (int k = 0; k < lanes; k++) {
