@@ -2520,6 +2520,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
             const int side = k->wide[n] < k->high[n] ? k->wide[n] : k->high[n];
             while (t->block > 8 && t->block > side * 2 / 3) t->block -= 4;
         }
+        while (t->block > 8 && (t->block > out->width || t->block > out->height)) t->block -= 4;
         if (out->wrap) {
             while (t->block > 8 && (t->block > out->width * 2 / 3 ||
                                     t->block > out->height * 2 / 3 || t->block > TXP_PAD))
