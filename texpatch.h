@@ -652,15 +652,34 @@ static void txp_canvas_close(const txp_source *s, const txp_canvas *c, uint8_t *
     }
 }
 
+/* May any pixel of the size x size ones at (x, y) be changed? */
+static int txp_is_open(const txp_canvas *c, int x, int y, int size) {
+    if (!c->fixed) return 1;
+    for (int v = 0; v < size; v++) {
+        for (int u = 0; u < size; u++) {
+            if (!c->fixed[txp_index(c, txp_wrap(x + u, c->width), txp_wrap(y + v, c->height))])
+                return 1;
+        }
+    }
+    return 0;
+}
+
 /* ---- the lattice ------------------------------------------------------------------------- */
 
-/* Squared distance in pixels of the offset (x, y) from the nearest point of the lattice. */
-static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
+/* From the nearest point of the lattice to the offset (x, y), in pixels. */
+static inline void txp_from_lattice(const txp_stack *k, double x, double y, double *dx,
+                                    double *dy) {
     double u = k->inverse[0] * x + k->inverse[1] * y, v = k->inverse[2] * x + k->inverse[3] * y;
     u -= floor(u + 0.5);
     v -= floor(v + 0.5);
-    const double dx = k->lattice[0] * u + k->lattice[2] * v;
-    const double dy = k->lattice[1] * u + k->lattice[3] * v;
+    *dx = k->lattice[0] * u + k->lattice[2] * v;
+    *dy = k->lattice[1] * u + k->lattice[3] * v;
+}
+
+/* The square of that distance. */
+static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
+    double dx, dy;
+    txp_from_lattice(k, x, y, &dx, &dy);
     return dx * dx + dy * dy;
 }
 
@@ -936,6 +955,7 @@ typedef struct txp_setup {
     txm_image kept[TEXPATCH_MAX_MAPS]; /* pixels NULL: nothing is kept                        */
     int exemplar_count, map_count, width, height, tileable, patch, passes, turns, mirror, lattice;
     int is_default; /* passes were not given                                                  */
+    float most_weight; /* of maps and guide: its differences use the whole range of a byte      */
     float novelty, guide_weight, low[TEXPATCH_MAX_MAPS], high[TEXPATCH_MAX_MAPS];
     float guide_low, guide_high;
     double lattice_vectors[4];
@@ -959,17 +979,10 @@ static int txp_feature(const txm_image *im, double x, double y, int whole, int i
     return im->channels;
 }
 
-/* the largest weight: its differences use the whole range of a byte */
-static double txp_most_weight(const txp_setup *u, const txp_source *s) {
-    double most = s->guide_bytes ? (double)u->guide_weight : 0;
-    for (int m = 0; m < u->map_count; m++) most = fmax(most, (double)u->kinds[m].weight);
-    return most;
-}
-
 /* The compared bytes of a pixel: maps with weight, padding, guide last. guide may be NULL. */
 static void txp_features(const txp_setup *u, const txp_source *s, const txm_image *maps,
                          const txm_image *guide, double x, double y, int whole, uint8_t *out) {
-    const double most = txp_most_weight(u, s);
+    const double most = (double)u->most_weight;
     int n = 0;
     memset(out, 0, (size_t)s->bytes);
     for (int m = 0; m < u->map_count && maps; m++) {
@@ -1254,9 +1267,8 @@ typedef struct txp_use {
     int columns, rows;
     uint32_t *count;
     uint32_t *sums; /* (columns + 1) x (rows + 1): of all cells above and left                  */
-    double mean;    /* of the cells, once the canvas is full                                    */
-    double share[(4 * TXP_BLOCK / TXP_CELL + 2) *
-                 (4 * TXP_BLOCK / TXP_CELL + 2)]; /* 1 / (mean n)     */
+    /* by the number of cells: 1 / (that number times their mean once the canvas is full) */
+    double share[(4 * TXP_BLOCK / TXP_CELL + 2) * (4 * TXP_BLOCK / TXP_CELL + 2)];
 } txp_use;
 
 typedef struct txp_quilt {
@@ -1329,9 +1341,9 @@ static void txp_quilt_put(txp_quilt *q, int x, int y, txp_place at) {
 
 /* total: pixels of the full canvas */
 static void txp_use_mean(txp_use *u, double total) {
-    u->mean = total / (u->columns * u->rows);
+    const double mean = total / (u->columns * u->rows);
     for (size_t i = 1; i < sizeof u->share / sizeof *u->share; i++)
-        u->share[i] = 1 / (u->mean * (double)i);
+        u->share[i] = 1 / (mean * (double)i);
 }
 
 /* Bring the sums up to date. */
@@ -1346,8 +1358,7 @@ static void txp_use_sum(const txp_use *u) {
     }
 }
 
-/* mean use of the cells that a piece of size x size pixels at (x, y) covers, over the mean of all
-   */
+/* Mean use of the cells that a piece of size x size pixels at (x, y) covers; 1: as of all. */
 static inline double txp_use_at(const txp_use *u, int x, int y, int size) {
     const int x0 = x / TXP_CELL, y0 = y / TXP_CELL, w = u->columns + 1;
     const int x1 = (x + size - 1) / TXP_CELL + 1, y1 = (y + size - 1) / TXP_CELL + 1;
@@ -1376,7 +1387,6 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
             if (span[y][0] == bytes) span[y][0] = i / 16 * 16;
             span[y][1] = i / 16 * 16 + 16;
         }
-        if (span[y][1] > bytes) span[y][1] = bytes; /* cannot be: bytes is a multiple of 16 */
     }
     /* Costs are gray levels summed over known bytes; a block without any compares nothing. */
     const double unit = known ? (double)known : 1;
@@ -1498,14 +1508,8 @@ static void txp_quilt_run(txp_quilt *q) {
         for (int i = 0; i < columns && !q->failed; i++) {
             int x = wx ? i * c->width / columns : i * step;
             txp_place at;
-            int open = 0;
             if (!wx && x > c->width - size) x = c->width - size;
-            for (int v = 0; v < size && !open && c->fixed; v++) {
-                for (int u = 0; u < size && !open; u++)
-                    open = !c->fixed[txp_index(c, txp_wrap(x + u, c->width),
-                                               txp_wrap(y + v, c->height))];
-            }
-            if (c->fixed && !open) continue;
+            if (!txp_is_open(c, x, y, size)) continue;
             if (!txp_quilt_find(q, x, y, &at)) q->failed = 1;
             else txp_quilt_lay(q, x, y, at);
         }
@@ -1531,10 +1535,8 @@ typedef struct txp_pass {
     int most_same; /* see txp_search */
     int skip;      /* pixels from one place to the next where all are tried                       */
     uint64_t seed;
-    int exhaustive, first_row, rows_done;
-    txp_place *next; /* the places that the pass chooses                                   */
+    int exhaustive, first_row;
     int32_t bell[TXP_WINDOW * TXP_WINDOW]; /* 1..256 over a neighbourhood                       */
-    txp_band bands[TXP_LANES];
     int first_band;
 } txp_pass;
 
@@ -1623,13 +1625,10 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     int x = txm_rng_range(rng, x0, x1 > x0 ? x1 : x0);
     int y = txm_rng_range(rng, y0, y1 > y0 ? y1 : y0);
     if (p->source->has_lattice) { /* onto the nearest point of the lattice */
-        const double ox = x - f->x - p->shift_x, oy = y - f->y - p->shift_y;
-        double u = k->inverse[0] * ox + k->inverse[1] * oy;
-        double v = k->inverse[2] * ox + k->inverse[3] * oy;
-        u -= floor(u + 0.5);
-        v -= floor(v + 0.5);
-        x -= (int)floor(k->lattice[0] * u + k->lattice[2] * v + 0.5);
-        y -= (int)floor(k->lattice[1] * u + k->lattice[3] * v + 0.5);
+        double dx, dy;
+        txp_from_lattice(k, x - f->x - p->shift_x, y - f->y - p->shift_y, &dx, &dy);
+        x -= (int)floor(dx + 0.5);
+        y -= (int)floor(dy + 0.5);
     }
     txp_try(f, x, y);
 }
@@ -1661,25 +1660,16 @@ static void txp_match(txp_pass *p, int i, int j) {
     f.target = txp_canvas_at(s, c, f.x, f.y);
     f.cost = 1e30;
     f.sad = UINT32_MAX;
-    f.best = p->match[w];
+    f.best.x = f.best.y = -1;
     f.seen_count = 0;
     f.most_same = p->most_same;
     if (f.most_same < 8) txp_look_around(&f);
-    if (c->fixed) { /* nothing to choose here? */
-        int open = 0;
-        for (int v = 0; v < size && !open; v++) {
-            for (int u = 0; u < size && !open; u++)
-                open = !c->fixed[txp_index(c, txp_wrap(f.x + u, c->width),
-                                           txp_wrap(f.y + v, c->height))];
-        }
-        if (!open) {
-            p->sad[w] = UINT32_MAX;
-            return;
-        }
+    if (!txp_is_open(c, f.x, f.y, size)) {
+        p->sad[w] = UINT32_MAX;
+        return;
     }
     p->grain[w] = txp_sad(f.target, c->pitch, f.target + s->bytes, c->pitch, size * s->bytes, size,
                           UINT32_MAX);
-    if (f.best.x >= 0) txp_try(&f, f.best.x, f.best.y);
     txp_try_shown(&f);
     if (f.sad == 0) {
         p->match[w] = f.best;
@@ -1868,7 +1858,7 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
             const __m128i zero = _mm_setzero_si128(), four = _mm_set1_epi32(4);
             const uint8_t *mean = band->mean + (line + (size_t)x0) * 4;
             int32_t *nearest = band->nearest + line + (size_t)x0;
-            txp_place *next = p->next + txp_index(c, x0, y), first[4];
+            txp_place *next = c->next + txp_index(c, x0, y), first[4];
             for (int i = 0; i < 4; i++) {
                 first[i].x = (int16_t)(m.x + i);
                 first[i].y = (int16_t)(m.y + v);
@@ -1904,7 +1894,7 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
             for (int b = 0; b < n; b++) d += (to[b] - in[b]) * (to[b] - in[b]);
             if (d >= band->nearest[line + (size_t)x]) continue;
             band->nearest[line + (size_t)x] = d;
-            txp_place *at = p->next + txp_index(c, x, y);
+            txp_place *at = c->next + txp_index(c, x, y);
             at->x = (int16_t)(m.x + u);
             at->y = (int16_t)(m.y + v);
         }
@@ -1918,7 +1908,7 @@ static void txp_choose_band(void *context, int lane) {
     const int top = (p->first_band + lane) * TXP_BAND, n = p->source->bytes;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
     const size_t pixels = (size_t)(bottom - top) * (size_t)c->width;
-    const txp_band *band = &p->bands[lane];
+    const txp_band *band = &c->bands[lane];
     memset(band->sums, 0, pixels * (size_t)n * sizeof *band->sums);
     memset(band->total, 0, pixels * sizeof *band->total);
     for (int turn = 0; turn < 2; turn++) {
@@ -1945,7 +1935,7 @@ static void txp_choose_band(void *context, int lane) {
     for (int y = top; y < bottom && c->fixed; y++) {
         for (int x = 0; x < c->width; x++) {
             const size_t i = txp_index(c, x, y);
-            if (c->fixed[i]) p->next[i] = c->at[i];
+            if (c->fixed[i]) c->next[i] = c->at[i];
         }
     }
 }
@@ -1968,7 +1958,6 @@ typedef struct txp_polish {
     const txp_source *source;
     const txp_stack *stack;
     const txp_canvas *canvas;
-    txp_place *next;
     int first_band;
 } txp_polish;
 
@@ -1988,7 +1977,7 @@ static void txp_polish_band(void *context, int index) {
             const txp_place own = c->at[i];
             txp_place tried[9], best = own;
             int count = 0;
-            p->next[i] = own;
+            c->next[i] = own;
             if (own.x < 0 || (c->fixed && c->fixed[i])) continue;
             tried[count++] = own;
             for (int d = 0; d < 9; d++) {
@@ -2027,7 +2016,7 @@ static void txp_polish_band(void *context, int index) {
                 least = sad;
                 best = tried[t];
             }
-            p->next[i] = best;
+            c->next[i] = best;
         }
     }
 }
@@ -2296,6 +2285,7 @@ static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double s
     f->busy = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
     return f->busy && f->value && f->given && f->pull[0] && f->pull[1];
 }
+
 /* ---- jobs --------------------------------------------------------------------------------- */
 
 /* gray levels per pixel that a squared pixel off the lattice counts */
@@ -2489,6 +2479,23 @@ static void txp_quilt_one(void *context, int index) {
     txp_quilt_run(q);
 }
 
+/* The side of a patch on the coarsest canvas: as the caller says or suits the exemplar, but such
+   that sheets and canvas hold it; a multiple of 4, 8 or more. */
+static int txp_block(const texpatch_job *job, const txp_canvas *c, int level) {
+    const txp_source *s = job->source;
+    const txp_stack *k = &s->stack[level];
+    const int wanted = job->setup.patch ? ((job->setup.patch >> level) + 2) / 4 * 4
+                       : s->is_random   ? TXP_SMALL_BLOCK
+                                        : TXP_BLOCK;
+    int most = c->width < c->height ? c->width : c->height;
+    if (c->wrap) most = most * 2 / 3 < TXP_PAD ? most * 2 / 3 : TXP_PAD;
+    for (int n = 0; n < s->sheets; n++) {
+        const int side = k->wide[n] < k->high[n] ? k->wide[n] : k->high[n];
+        if (most > side * 2 / 3) most = side * 2 / 3;
+    }
+    return txm_clampi(wanted < most ? wanted : most / 4 * 4, 8, 4 * TXP_BLOCK);
+}
+
 /* The first pass: some tries side by side on a small canvas, of which the one with the cheapest
    cuts stays. */
 static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canvas *out,
@@ -2505,6 +2512,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
     if (status != TXM_OK) return status;
     const size_t pixels = (size_t)out->width * (size_t)out->height;
     const size_t bytes = out->pitch * ((size_t)(out->height + TXP_PAD) + 1);
+    const int block = txp_block(job, out, level);
     txm_arena_init(&scratch, env);
     if (pixels > 300 * 300 || job->given.at) starts = 1;
     for (int i = 0; i < starts; i++) {
@@ -2512,20 +2520,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         t->source = s;
         t->stack = k;
         t->canvas = *out;
-        t->block = job->setup.patch
-                       ? txm_clampi(((job->setup.patch >> level) + 2) / 4 * 4, 8, 4 * TXP_BLOCK)
-                   : s->is_random ? TXP_SMALL_BLOCK
-                                  : TXP_BLOCK;
-        for (int n = 0; n < s->sheets; n++) {
-            const int side = k->wide[n] < k->high[n] ? k->wide[n] : k->high[n];
-            while (t->block > 8 && t->block > side * 2 / 3) t->block -= 4;
-        }
-        while (t->block > 8 && (t->block > out->width || t->block > out->height)) t->block -= 4;
-        if (out->wrap) {
-            while (t->block > 8 && (t->block > out->width * 2 / 3 ||
-                                    t->block > out->height * 2 / 3 || t->block > TXP_PAD))
-                t->block -= 4;
-        }
+        t->block = block;
         t->overlap = t->block / 2;
         t->use_weight = txp_use_weight(job);
         t->lattice_weight = TXP_LATTICE;
@@ -2637,7 +2632,6 @@ static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->weight = (int32_t *)txm_arena_alloc(scratch, windows, sizeof *p->weight);
     p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
     if (!p->match || !p->sad || !p->weight || !p->grain) return 0;
-    memset(p->match, 255, windows * sizeof *p->match);
     return 1;
 }
 
@@ -2656,8 +2650,6 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     p.canvas = c;
     p.size = t->size;
     p.step = t->stride;
-    p.next = c->next;
-    memcpy(p.bands, c->bands, sizeof p.bands);
     p.shift_x = job->shift_x / (1 << t->level);
     p.shift_y = job->shift_y / (1 << t->level);
     p.use_weight = txp_use_weight(job) / 2;
@@ -2685,7 +2677,7 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
                          &p);
     }
     txp_weigh(&p);
-    memcpy(p.next, c->at, (size_t)c->width * (size_t)c->height * sizeof *p.next);
+    memcpy(c->next, c->at, (size_t)c->width * (size_t)c->height * sizeof *c->next);
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
         if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
         txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
@@ -2704,7 +2696,6 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
     p.source = job->source;
     p.stack = &job->source->stack[0];
     p.canvas = c;
-    p.next = c->next;
     txp_canvas_close(p.source, c, c->pixels);
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
@@ -2860,6 +2851,9 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         return txm_fail(env, TXM_TOO_LARGE,
                         "the exemplars are too high together (32767 rows, each "
                         "turned form counted)");
+    u->most_weight = s->guide_bytes ? u->guide_weight : 0;
+    for (int m = 0; m < u->map_count; m++)
+        u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
     s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
     s->guide_at = s->guide_bytes ? bytes : s->bytes;
     return TXM_OK;
@@ -2989,6 +2983,13 @@ done:
     return status;
 }
 
+/* Where the lattice begins: anywhere, as the seed has it. */
+static void txp_first_shift(const txp_source *s, uint64_t seed, double *x, double *y) {
+    txm_rng rng = txm_rng_make(seed, 5);
+    *x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
+    *y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
+}
+
 /* A job on a source, with nothing given yet. It owns `memory`, in which it lies, on success. */
 static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, int height,
                                   uint64_t seed, txm_arena *memory, txm_env *env) {
@@ -3069,7 +3070,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     status = txp_source_make(&setup, &source, &source_memory, env);
     if (status != TXM_OK) return status;
 
-    txm_rng rng = txm_rng_make(desc->seed, 5);
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
     const int room = 2 * TXP_WINDOW << (source.levels - 1); /* a canvas must hold some patches */
     int width = desc->width + (wx ? 0 : 2 * TXP_MARGIN);
@@ -3084,8 +3084,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
     job->margin_y = wy ? 0 : TXP_MARGIN;
-    job->shift_x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
-    job->shift_y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
+    txp_first_shift(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
         if (!txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0,
                             &memory))
@@ -3117,6 +3116,7 @@ no_memory:
     txm_arena_free(&source_memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
 }
+
 /* The two fields of the finished canvas. */
 static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
                              float **toned, txm_env *env) {
@@ -3277,6 +3277,7 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {
     for (int i = 0; i < 4 && vectors; i++) vectors[i] = txm_float(job->source->stack[0].lattice[i]);
     return 1;
 }
+
 /* ---- public: what a pixel shows ----------------------------------------------------------- */
 
 /* A pixel of the output: from sheet `sheet` (-1: it is a kept one), place (x, y) of it; bent: not
@@ -3413,12 +3414,10 @@ static void txp_draw_row(void *context, int row) {
 }
 
 /* The checks of an output, and where the tone of a map is found. */
-static txm_status txp_draw_begin(const texpatch_job *job, int map, txm_env *env, txm_image out,
+static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_image out,
                                  txp_draw *d) {
-    const txp_setup *u = &job->setup;
     const txm_status status = txm_image_check(&out, "out", TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
-    d->job = job;
     d->map = map;
     d->out = txm_image_resolve(out);
     if (d->out.channels != u->maps[0][map].channels || d->out.sample != u->maps[0][map].sample)
@@ -3432,7 +3431,7 @@ static txm_status txp_draw_begin(const texpatch_job *job, int map, txm_env *env,
         d->tone_at = -1;
     else
         d->tone_scale = (double)(u->high[map] - u->low[map]) / 255 *
-                        txp_most_weight(u, job->source) / (double)u->kinds[map].weight;
+                        (double)u->most_weight / (double)u->kinds[map].weight;
     return TXM_OK;
 }
 
@@ -3458,8 +3457,9 @@ TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, i
     if (job->level < 0) return txm_fail(env, TXM_BAD_ARGUMENT, "take a step before drawing");
     if (map < 0 || map >= job->setup.map_count)
         return txm_fail(env, TXM_BAD_ARGUMENT, "there is no such map");
-    const txm_status status = txp_draw_begin(job, map, env, out, &d);
+    const txm_status status = txp_draw_begin(&job->setup, map, env, out, &d);
     if (status != TXM_OK) return status;
+    d.job = job;
     d.x = x;
     d.y = y;
     if (x < 0 || y < 0 || x > job->setup.width - d.out.width ||
@@ -3487,7 +3487,8 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
     txm_arena_init(&scratch, env);
     memset(draws, 0, sizeof draws);
     for (int m = 0; m < maps && status == TXM_OK; m++) {
-        status = txp_draw_begin(job, m, env, out[m], &draws[m]);
+        status = txp_draw_begin(&job->setup, m, env, out[m], &draws[m]);
+        draws[m].job = job;
         if (status == TXM_OK && (out[m].width != desc->width || out[m].height != desc->height))
             status = txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must be width x height pixels");
     }
@@ -3512,6 +3513,7 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
     texpatch_free(job);
     return status;
 }
+
 /* ---- public: a part anew ------------------------------------------------------------------ */
 
 /* Does the output's pixel under canvas pixel (x, y) belong to the part? */
@@ -3664,6 +3666,7 @@ no_memory:
     txm_arena_free(&memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a part");
 }
+
 /* An environment for a piece of a call: its progress is that of the whole, which rises piece by
    piece. */
 typedef struct txp_quiet {
@@ -3685,6 +3688,7 @@ static txm_env txp_quiet_env(txp_quiet *q) {
     env.progress_user = q;
     return env;
 }
+
 /* ---- public: the unbounded plane ---------------------------------------------------------- */
 
 struct texpatch_plane {
@@ -3931,9 +3935,7 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
     plane->half = TXP_WINDOW / 2 << (s->levels - 1);
     plane->cell = 16 * plane->half;
     plane->seed = desc->seed;
-    txm_rng rng = txm_rng_make(desc->seed, 5);
-    plane->shift_x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
-    plane->shift_y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
+    txp_first_shift(s, desc->seed, &plane->shift_x, &plane->shift_y);
     plane->memory = memory;
     plane->source_memory = source_memory;
     *out = plane;
@@ -3954,7 +3956,7 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
 /* The part of a window that lies on a done cell, its pixel (0, 0) at (cx, cy) of the window. */
 static txm_status txp_plane_show(const texpatch_job *job, int half, int cell, int64_t cx,
                                  int64_t cy, int width, int height, const txm_image *out,
-                                 texpatch_source *sources, float done, txm_env *env) {
+                                 texpatch_source *sources, txm_env *env) {
     const int x0 = cx < 0 ? 0 : (int)cx, y0 = cy < 0 ? 0 : (int)cy;
     const int x1 = cx + cell < width ? (int)(cx + cell) : width;
     const int y1 = cy + cell < height ? (int)(cy + cell) : height;
@@ -3966,10 +3968,11 @@ static txm_status txp_plane_show(const texpatch_job *job, int half, int cell, in
                     (size_t)x0 * (size_t)to.channels * txm_sample_bytes(to.sample);
         to.width = x1 - x0;
         to.height = y1 - y0;
-        txm_status status = txp_draw_begin(job, m, env, to, &d);
+        txm_status status = txp_draw_begin(&job->setup, m, env, to, &d);
+        d.job = job;
         d.x = sx;
         d.y = sy;
-        if (status == TXM_OK) status = txp_draw_rows(&d, done, env);
+        if (status == TXM_OK) status = txp_draw_rows(&d, 1, env);
         if (status != TXM_OK) return status;
     }
     for (int y = y0; y < y1 && sources; y++) {
@@ -3991,12 +3994,8 @@ TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t
     if (!plane || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "plane or out is NULL");
     if (x < -far_away || y < -far_away || x > far_away || y > far_away)
         return txm_fail(env, TXM_BAD_ARGUMENT, "x and y must be -2^40 to 2^40");
-    texpatch_job probe; /* for the checks of the maps */
-    memset(&probe, 0, sizeof probe);
-    probe.setup = plane->setup;
-    probe.source = plane->source;
     for (int m = 0; m < plane->setup.map_count; m++) {
-        status = txp_draw_begin(&probe, m, env, out[m], &d);
+        status = txp_draw_begin(&plane->setup, m, env, out[m], &d);
         if (status != TXM_OK) return status;
         if (out[m].width != out[0].width || out[m].height != out[0].height)
             return txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must be pictures of one size");
@@ -4029,7 +4028,7 @@ TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t
             status = txp_plane_cell_job(&cells, i, row, &quiet, &job);
             if (status == TXM_OK)
                 status = txp_plane_show(job, plane->half, cell, (cells.first + i) * cell - x,
-                                        row * cell - y, width, height, out, sources, 1, &quiet);
+                                        row * cell - y, width, height, out, sources, &quiet);
             texpatch_free(job);
             under.done += 1;
         }
@@ -4040,6 +4039,7 @@ TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t
     if (status != TXM_OK && env) memcpy(env->message, quiet.message, sizeof quiet.message);
     return status;
 }
+
 /* ---- public: levels of detail ------------------------------------------------------------- */
 
 typedef struct txp_halving {
@@ -4115,6 +4115,7 @@ TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map
     txm_parallel_for(env, to.height, txp_half_row, &h);
     return TXM_OK;
 }
+
 /* ---- edges: constants and progress ------------------------------------------------------- */
 
 enum {
@@ -4176,8 +4177,7 @@ static txm_status txp_e_stopped(txm_env *env) {
 
 /* ---- edges: checks of what the caller gives ---------------------------------------------- */
 
-/* A picture that edges can be found in, or that a guide can be drawn into (bytes: U8, 1 channel).
-   */
+/* A picture that edges can be found in, or (bytes: U8, 1 channel) a guide can be drawn into. */
 static txm_status txp_e_check_image(const txm_image *image, const char *name, int bytes,
                                     txm_env *env) {
     const size_t most = TEXPATCH_MAX_PIXELS < TXP_E_PIXELS ? TEXPATCH_MAX_PIXELS : TXP_E_PIXELS;
@@ -5003,8 +5003,8 @@ static int txp_e_bin(double ahead, double right) {
 
 /* The directions of a line of n points in bench->b against its course, its blur of radius
    TXP_E_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
-   of a line with `amount` times the unrest, or put into the samples of its points. 0 = cancelled.
-      */
+   of a line with `amount` times the unrest, or put into the samples of its points.
+   0 = cancelled. */
 static int txp_e_directions(const txp_e_bench *bench, size_t n, int is_closed, size_t light,
                             double amount, double *share, txp_e_sample *samples, txp_e_bar *bar) {
     const txp_e_point *line = bench->a, *course = bench->c;
