@@ -485,29 +485,40 @@ int cli_finish(cli *run, const void *bytes, size_t size) {
     return finish(run, outputs, 1);
 }
 
-int cli_finish_folder(cli *run, const cli_file *files, int count) {
-    const char *folder = run->output, *slash = folder[0] ? "/" : ""; /* "": names are whole paths */
+int cli_finish_files(cli *run, const cli_file *files, int count) {
     output *outputs = (output *)calloc((size_t)count + 1, sizeof *outputs);
-    char *paths = (char *)calloc((size_t)count, PATH_MAX);
-    int status = CLI_DONE, made = 0;
-    if (!outputs || !paths) status = cli_fail(run, CLI_FAILED, "out of memory");
-    for (int i = 0; i < count && !status; i++) {
-        char *path = paths + (size_t)i * PATH_MAX;
-        outputs[i].path = path;
+    if (!outputs) return cli_fail(run, CLI_FAILED, "out of memory");
+    for (int i = 0; i < count; i++) {
+        outputs[i].path = files[i].name;
         outputs[i].bytes = files[i].bytes;
         outputs[i].size = files[i].size;
-        if (snprintf(path, PATH_MAX, "%s%s%s", folder, slash, files[i].name) >= PATH_MAX)
+    }
+    const int status = finish(run, outputs, count);
+    free(outputs);
+    return status;
+}
+
+int cli_finish_folder(cli *run, const cli_file *files, int count) {
+    cli_file *inside = (cli_file *)calloc((size_t)count, sizeof *inside);
+    char *paths = (char *)calloc((size_t)count, PATH_MAX);
+    int status = CLI_DONE, made = 0;
+    if (!inside || !paths) status = cli_fail(run, CLI_FAILED, "out of memory");
+    for (int i = 0; i < count && !status; i++) {
+        char *path = paths + (size_t)i * PATH_MAX;
+        inside[i] = files[i];
+        inside[i].name = path;
+        if (snprintf(path, PATH_MAX, "%s/%s", run->output, files[i].name) >= PATH_MAX)
             status = cli_fail(run, CLI_FAILED, "'%s': the path is too long", files[i].name);
     }
-    if (!status && folder[0]) {
-        made = mkdir(folder, 0777) == 0;
+    if (!status) {
+        made = mkdir(run->output, 0777) == 0;
         if (!made && errno != EEXIST)
-            status = cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", folder,
+            status = cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", run->output,
                               strerror(errno));
     }
-    if (!status) status = finish(run, outputs, count);
-    if (status && made) rmdir(folder);
+    if (!status) status = cli_finish_files(run, inside, count);
+    if (status && made) rmdir(run->output);
     free(paths);
-    free(outputs);
+    free(inside);
     return status;
 }

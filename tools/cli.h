@@ -115,12 +115,15 @@ int cli_check_folder(cli *run, const char *path);
 /* Write the output and the statistics, both or neither; returns the exit status. */
 int cli_finish(cli *run, const void *bytes, size_t size);
 
-/* The same for several files in the output folder, which is made if it is not there: all or none. */
+/* The same for several files: all or none. */
 typedef struct cli_file {
-    const char *name; /* within the folder */
+    const char *name; /* its path; for cli_finish_folder, within the output folder */
     const void *bytes;
     size_t size;
 } cli_file;
+int cli_finish_files(cli *run, const cli_file *files, int count);
+
+/* The same for files in the output folder, which is made if it is not there. */
 int cli_finish_folder(cli *run, const cli_file *files, int count);
 
 #endif /* CLI_H */

@@ -74,11 +74,3 @@ int finish_with_picture(cli *run, const txm_image *image) {
     free(bytes);
     return status;
 }
-
-int finish_with_files(cli *run, const cli_file *files, int count) {
-    const char *output = run->output;
-    run->output = ""; /* names are whole paths */
-    const int status = cli_finish_folder(run, files, count);
-    run->output = output;
-    return status;
-}

@@ -38,7 +38,4 @@ int check_picture_path(cli *run, const char *path, int width, int height, int ch
 /* Encode the picture for the output's extension and write it. */
 int finish_with_picture(cli *run, const txm_image *image);
 
-/* As cli_finish for several files: each goes where its name says. */
-int finish_with_files(cli *run, const cli_file *files, int count);
-
 #endif /* COMMAND_H */

@@ -245,7 +245,7 @@ static int write_outputs(cli *run, const options *o, const texpatch_edges *e, in
     }
     for (int i = 0; i < 2; i++) files[i].bytes = bytes[i];
     cli_figure(run, "file_bytes", (double)(files[0].size + files[1].size));
-    if (!status) status = finish_with_files(run, files, o->layers ? 2 : 1);
+    if (!status) status = cli_finish_files(run, files, o->layers ? 2 : 1);
     for (int i = 0; i < 2; i++) free(bytes[i]);
     free(out.pixels);
     return status;

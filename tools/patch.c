@@ -895,7 +895,7 @@ static int write_outputs(job *j) {
     for (size_t i = 0; i < count && !status; i++) sum += (double)files[i].size;
     cli_figure(&j->run, "files", (double)count);
     cli_figure(&j->run, "file_bytes", sum);
-    if (!status) status = finish_with_files(&j->run, files, (int)count);
+    if (!status) status = cli_finish_files(&j->run, files, (int)count);
     for (size_t i = 0; i < count && bytes; i++) free(bytes[i]);
     free(bytes);
     free(files);
