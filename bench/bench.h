@@ -7,6 +7,7 @@
 
 #include <stdio.h>
 #include <time.h>
+#include <unistd.h>
 #ifdef _OPENMP
 #include <omp.h>
 #endif
@@ -73,6 +74,14 @@ static inline int all_threads(void) {
 #else
     return 1;
 #endif
+}
+
+/* Start the program again with threads of OpenMP that sleep while they wait: it reads this before
+   main. They would spin, which costs much where other programs run too, and count as CPU seconds. */
+static inline void wait_asleep(char **argv) {
+    if (getenv("OMP_WAIT_POLICY")) return;
+    setenv("OMP_WAIT_POLICY", "passive", 1);
+    execv(argv[0], argv);
 }
 
 static inline txm_env make_env(int *threads) {

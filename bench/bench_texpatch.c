@@ -15,7 +15,6 @@
 #include "bench.h"
 
 #include <stdio.h>
-#include <unistd.h>
 
 enum { COMPARED = 2, MAPS = 3, STROKE_WIDTH = 64, STROKE_LENGTH = 256 };
 
@@ -278,12 +277,7 @@ int main(int argc, char **argv) {
     const char *why;
     const int is_once = argc == 3 && !strcmp(argv[1], "--once");
     if (argc < 2) give_up("usage", "bench_texpatch [--once] EXEMPLAR...");
-    /* OpenMP reads this before main: its threads wait by spinning, which costs much where other
-       programs run too, and would count as CPU seconds */
-    if (!getenv("OMP_WAIT_POLICY")) {
-        setenv("OMP_WAIT_POLICY", "passive", 1);
-        execv(argv[0], argv);
-    }
+    wait_asleep(argv);
     for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the first table */
         const char *path = argv[i ? i : 1];
         txm_image picture;

@@ -15,7 +15,6 @@
 #include "bench.h"
 
 #include <stdio.h>
-#include <unistd.h>
 
 enum { RUNS = 2, MAX_OUT = 2048, COMPARED = 3 };
 
@@ -199,12 +198,7 @@ int main(int argc, char **argv) {
     void *pixels = malloc((size_t)MAX_OUT * MAX_OUT * 4);
     if (argc < 2) give_up("usage", "bench_texsyn [--once] EXEMPLAR...");
     if (!pixels) give_up("output", "out of memory");
-    /* OpenMP reads this before main: its threads wait by spinning, which costs much where other
-       programs run too, and would count as CPU seconds */
-    if (!getenv("OMP_WAIT_POLICY")) {
-        setenv("OMP_WAIT_POLICY", "passive", 1);
-        execv(argv[0], argv);
-    }
+    wait_asleep(argv);
     for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the sweep */
         const char *path = argv[i ? i : 1];
         txm_image picture;

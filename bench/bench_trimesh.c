@@ -8,7 +8,6 @@
 #define _XOPEN_SOURCE 700 /* clock_gettime, setenv */
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 
@@ -229,12 +228,7 @@ static void scattering(void) {
 }
 
 int main(int argc, char **argv) {
-    /* OpenMP reads this before main: its threads wait by spinning, which costs much where other
-       programs run too */
-    if (!getenv("OMP_WAIT_POLICY")) {
-        setenv("OMP_WAIT_POLICY", "passive", 1);
-        execv(argv[0], argv);
-    }
+    wait_asleep(argv);
     retiling(argc > 1 && !strcmp(argv[1], "--full"));
     scattering();
     return 0;
