@@ -24,54 +24,23 @@ import sys
 import xml.etree.ElementTree
 import zlib
 
-
-class Wrong(Exception):
-    pass
-
-
-def need(truth, *what):
-    if not truth:
-        raise Wrong(" ".join(str(w) for w in what))
+sys.dont_write_bytecode = True
+from png import Png, Wrong, need  # noqa: E402
 
 
 # ---- files
 
-class Picture:
-    """A PNG of 8 or 16 bits that is not interlaced; rows of tuples."""
+class Picture(Png):
+    """Rows of tuples."""
 
     def __init__(self, path):
-        with open(path, "rb") as file:
-            data = file.read()
-        need(data[:8] == b"\x89PNG\r\n\x1a\n", path, "is not PNG")
-        self.width, self.height, self.bits, colour, _, _, interlace = struct.unpack(
-            ">IIBBBBB", data[16:29])
-        need(self.bits in (8, 16) and not interlace and colour in (0, 2, 4, 6), path, "is another PNG")
-        self.channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]
+        super().__init__(path)
         self.most = 2 ** self.bits - 1
-        at, packed = 8, b""
-        while at < len(data):
-            length, name = struct.unpack(">I4s", data[at:at + 8])
-            if name == b"IDAT":
-                packed += data[at + 8:at + 8 + length]
-            at += 12 + length
         self.rows = []
-        data, step = zlib.decompress(packed), self.channels * self.bits // 8
-        size, above = self.width * step, bytes(self.width * step)
-        for y in range(self.height):
-            start = y * (size + 1)
-            above = self.unfilter(data[start], bytearray(data[start + 1:start + 1 + size]), above, step)
-            values = struct.unpack(">%d%s" % (size * 8 // self.bits, "BH"[self.bits // 16]), above)
+        for line in self.lines:
+            values = struct.unpack(">%d%s" % (self.width * self.channels, "BH"[self.bits // 16]), line)
             self.rows.append([values[i:i + self.channels]
                               for i in range(0, len(values), self.channels)])
-
-    @staticmethod
-    def unfilter(kind, row, above, step):
-        for i in range(len(row)):
-            a, b = row[i - step] if i >= step else 0, above[i]
-            c = above[i - step] if i >= step else 0
-            near = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
-            row[i] = row[i] + (0, a, b, (a + b) // 2, near)[kind] & 255
-        return bytes(row)
 
     def size(self):
         return self.width, self.height

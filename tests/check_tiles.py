@@ -11,11 +11,12 @@ along the joint, and the preview lays tiles of the atlas side by side that may l
 import copy
 import json
 import os
-import struct
 import sys
-import zlib
 
 import jsonschema
+
+sys.dont_write_bytecode = True
+from png import Png, Wrong, need  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 with open(os.path.join(HERE, "..", "docs", "tiles.schema.json")) as schema_file:
@@ -25,73 +26,21 @@ VALIDATOR = jsonschema.Draft7Validator(SCHEMA)
 LOCKED = 2  # pixels on either side of a joint that all tiles of its colour share
 
 
-class Wrong(Exception):
-    pass
-
-
-def need(truth, *what):
-    if not truth:
-        raise Wrong(" ".join(str(w) for w in what))
-
-
 # ---- pictures
 
-class Picture:
-    """An 8-bit PNG that is not interlaced; rows are bytes."""
+class Picture(Png):
+    """An 8-bit PNG."""
 
     def __init__(self, path):
-        with open(path, "rb") as file:
-            data = file.read()
-        need(data[:8] == b"\x89PNG\r\n\x1a\n", path, "is not PNG")
-        self.width, self.height, depth, colour, _, _, interlace = struct.unpack(
-            ">IIBBBBB", data[16:29])
-        need(depth == 8 and not interlace and colour in (0, 2, 4, 6), path, "is another PNG")
-        self.channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]
-        at, packed = 8, b""
-        while at < len(data):
-            length, name = struct.unpack(">I4s", data[at:at + 8])
-            if name == b"IDAT":
-                packed += data[at + 8:at + 8 + length]
-            at += 12 + length
-        self.packed, self.unpacked = packed, None
-
-    @property
-    def rows(self):
-        if self.unpacked is None:
-            self.unpacked = self.unpack(zlib.decompress(self.packed))
-        return self.unpacked
-
-    def unpack(self, raw):
-        c, n = self.channels, self.width * self.channels
-        need(len(raw) == (n + 1) * self.height, "a PNG of the wrong length")
-        rows, above = [], bytearray(n)
-        for y in range(self.height):
-            how = raw[y * (n + 1)]
-            row = bytearray(raw[y * (n + 1) + 1:(y + 1) * (n + 1)])
-            for i in range(n if how else 0):
-                a = row[i - c] if i >= c else 0
-                b = above[i]
-                if how == 1:
-                    guess = a
-                elif how == 2:
-                    guess = b
-                elif how == 3:
-                    guess = (a + b) // 2
-                else:
-                    d = above[i - c] if i >= c else 0
-                    pa, pb, pd = abs(b - d), abs(a - d), abs(a + b - 2 * d)
-                    guess = a if pa <= pb and pa <= pd else b if pb <= pd else d
-                row[i] = (row[i] + guess) & 255
-            rows.append(bytes(row))
-            above = row
-        return rows
+        super().__init__(path)
+        need(self.bits == 8, path, "is another PNG")
 
     def block(self, x, y, width, height):
         c = self.channels
-        return b"".join(self.rows[j][x * c:(x + width) * c] for j in range(y, y + height))
+        return b"".join(self.lines[j][x * c:(x + width) * c] for j in range(y, y + height))
 
     def pixel(self, x, y):
-        return self.rows[y][x * self.channels:(x + 1) * self.channels]
+        return self.lines[y][x * self.channels:(x + 1) * self.channels]
 
 
 # ---- what the colours say
