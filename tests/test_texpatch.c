@@ -1468,6 +1468,14 @@ static void test_passes(void **state) {
         d.height = 33;
         made(&d, NULL); /* patches become as small as the torus demands */
     }
+
+    /* a patch larger than the canvas is made as large as that */
+    const txm_image small = draw_gravel(64, 64, 1, 0);
+    const texpatch_exemplar only = exemplar_of(&small);
+    texpatch_desc tiny = desc_of(&only, 1, 1, 1, 1);
+    tiny.patch = 40;
+    tiny.passes = -1;
+    made(&tiny, NULL);
 }
 
 /* ---- levels of detail ------------------------------------------------------------------- */
