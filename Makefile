@@ -16,8 +16,8 @@ COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -I. -Ito
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 HEADERS := $(wildcard *.h)
-TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o command.o cli.o \
-             image_io.o mesh_io.o stb.o)
+TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
+             tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
 # examples/brush.c opens a window, which takes SDL 2: where that is not installed it is left out
 SDL     := $(shell sdl2-config --libs 2>/dev/null)
 EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%, \

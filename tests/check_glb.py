@@ -149,4 +149,5 @@ def main():
         need(found[name] == int(value), "%s is %d, not %s" % (name, found[name], value))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -3,7 +3,7 @@
 
    test_same_bytes.sh builds this with each compiler and optimisation level and runs it on several
    numbers of threads; all must print the same line. Everything here is in integers, but for what
-   lies between the pixels of an exemplar in triangles, repair, and meshes.                      */
+   lies between the pixels of an exemplar in triangles, repair, meshes, and trees.               */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 #define TEXPATCH_IMPLEMENTATION
@@ -12,6 +12,8 @@
 #include "textiles.h"
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
+#define TREEPIECES_IMPLEMENTATION
+#include "treepieces.h"
 #include "testkit.h"
 
 enum { SIDE = 64, WIDTH = 96, HEIGHT = 80 };
@@ -210,6 +212,83 @@ static uint64_t run_mesh(trimesh_method method, int open, txm_env *env, uint64_t
     return hash;
 }
 
+/* Hash over some trees of a species: how they grew, their bones in the wind, one as a mesh, its leaves. */
+static uint64_t run_trees(int preset, txm_env *env, uint64_t hash) {
+    enum { TREES = 5, PICTURE = 48 };
+    static uint8_t leaves[PICTURE * PICTURE * 4], color[PICTURE * PICTURE * 4];
+    static float depth[PICTURE * PICTURE];
+    static treepieces_card cards[256];
+    const char *text = treepieces_preset_text(preset);
+    const treepieces_wind wind = {0.3f, 9, 0.7f, 5};
+    const treepieces_lod lod = {{1, 2, 3}, 3, 4, 0};
+    treepieces_species species;
+    treepieces_kit *kit;
+    treepieces_forest *forest;
+    treepieces_mesh *mesh;
+    if (treepieces_species_parse(text, strlen(text), env, &species) != TXM_OK) give_up("species", env);
+    if (treepieces_kit_make(NULL, 0, env, &kit) != TXM_OK) give_up("kit", env);
+    treepieces_forest_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.kit = kit;
+    desc.species = &species;
+    desc.species_count = 1;
+    desc.tree_count = TREES;
+    desc.max_pieces = 250;
+    desc.seed = 11;
+    if (treepieces_forest_make(&desc, env, &forest) != TXM_OK) give_up("forest", env);
+    hash = tk_hash(hash, forest->nodes, forest->node_count * sizeof *forest->nodes);
+    hash = tk_hash(hash, forest->clusters, forest->cluster_count * sizeof *forest->clusters);
+    for (int t = 0; t < forest->type_count; t++) {
+        const treepieces_batch *b = &forest->batches[t];
+        if (b->count) hash = tk_hash(hash, b->words, (size_t)b->count * b->stride * 4);
+    }
+
+    float *bones = (float *)malloc(forest->node_count * TREEPIECES_BONE * sizeof(float));
+    float *sway = (float *)calloc(forest->node_count, 4 * sizeof(float));
+    if (!bones || !sway) give_up("bones", env);
+    for (int i = 0; i < 9; i++)
+        if (treepieces_sway(forest, &wind, 0.1 * i, 0.1, NULL, env, sway, bones) != TXM_OK)
+            give_up("sway", env);
+    hash = tk_hash(hash, bones, forest->node_count * TREEPIECES_BONE * sizeof(float));
+
+    treepieces_bake_desc bake;
+    memset(&bake, 0, sizeof bake);
+    bake.forest = forest;
+    bake.bones = bones;
+    bake.lod = &lod;
+    if (treepieces_bake(&bake, env, &mesh) != TXM_OK) give_up("bake", env);
+    hash = tk_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float));
+    hash = tk_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float));
+    hash = tk_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t));
+    hash = tk_hash(hash, mesh->uvs, 6 * mesh->triangle_count * sizeof(float));
+    treepieces_mesh_free(mesh);
+
+    const int count = treepieces_cloud(&species, 3, cards);
+    hash = tk_hash(hash, cards, (size_t)count * sizeof *cards);
+    if (count > 0) {
+        const txm_image picture = {leaves, PICTURE, PICTURE, 4, TXM_U8, 0};
+        const txm_image seen = {color, PICTURE, PICTURE, 4, TXM_U8, 0};
+        const txm_image far = {depth, PICTURE, PICTURE, 1, TXM_F32, 0};
+        treepieces_impostor_desc impostor;
+        memset(&impostor, 0, sizeof impostor);
+        if (treepieces_draw_leaves(&species, 1, env, picture) != TXM_OK) give_up("leaves", env);
+        impostor.cards = cards;
+        impostor.card_count = count;
+        impostor.leaves = picture;
+        impostor.right[0] = impostor.up[1] = impostor.light[1] = 1;
+        impostor.forward[2] = -1;
+        if (treepieces_impostor(&impostor, env, seen, far) != TXM_OK) give_up("impostor", env);
+        hash = tk_hash(hash, leaves, sizeof leaves);
+        hash = tk_hash(hash, color, sizeof color);
+        hash = tk_hash(hash, depth, sizeof depth);
+    }
+    free(bones);
+    free(sway);
+    treepieces_forest_free(forest);
+    treepieces_kit_free(kit);
+    return hash;
+}
+
 int main(int argc, char **argv) {
     int threads = argc > 1 ? atoi(argv[1]) : 1;
     txm_env env;
@@ -230,6 +309,7 @@ int main(int argc, char **argv) {
         hash = run_mesh(TRIMESH_LATTICE, open, &env, hash);
         hash = run_mesh(TRIMESH_REPEL, open, &env, hash);
     }
+    for (int preset = 0; preset < 2; preset++) hash = run_trees(preset, &env, hash);
     printf("%08lx%08lx\n", (unsigned long)(hash >> 32), (unsigned long)(hash & 0xffffffffu));
     return 0;
 }

@@ -35,14 +35,17 @@ size="--size 40x30"
 # ---- help and version
 check "--help" run 0 --help
 check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log && grep -q patch out.log &&
-    grep -q edges out.log && grep -q tiles out.log && grep -q retile out.log"
+    grep -q edges out.log && grep -q tiles out.log && grep -q retile out.log &&
+    grep -q tree out.log && grep -q forest out.log"
 check "--version" run 0 --version
 check "--version names the headers" \
-    grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*)$' out.log
-for command in learn synth patch edges tiles retile; do
+    grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, treepieces [0-9.]*)$' out.log
+for command in learn synth patch edges tiles retile tree forest; do
     check "$command --help" run 0 $command --help
     check "$command --help has an example" grep -q "  texkit $command .*-o" out.log
-    check "$command -h, behind other arguments" run 0 $command sand.png --seed 3 -h
+    input=sand.png
+    case $command in tree | forest) input= ;; esac
+    check "$command -h, behind other arguments" run 0 $command $input --seed 3 -h
     check "$command --version" run 0 $command --version
     check "no line of $command --help is wider than 100 columns" \
         sh -c "'$texkit' $command --help | awk 'length > 100 { exit 1 }'"

@@ -463,7 +463,7 @@ static void glb_is_made_of_whole_chunks(void **state) {
     (void)state;
     const mesh_data m = square();
     const float translations[] = {0, 0, 0, 5, 0, 0}, scales[] = {1, 1, 1, 2, 2, 2};
-    const mesh_instances copies = {&m, 2, translations, NULL, scales};
+    const mesh_instances copies = {&m, 2, translations, NULL, scales, NULL, NULL, NULL};
     mesh_scene scene = {0};
     unsigned char *out;
     size_t size;
@@ -492,12 +492,84 @@ static void glb_is_made_of_whole_chunks(void **state) {
     free(out);
 }
 
+/* Two surfaces with materials of their own. */
+static void obj_has_parts(void **state) {
+    (void)state;
+    const mesh_data m = square();
+    const mesh_material bark = {"bark", "b.png", NULL, 0, 1, 0};
+    const mesh_material leaves = {"leaves", "l.png", NULL, 0, 0, 1};
+    const mesh_part parts[] = {{&m, &bark}, {&m, &leaves}};
+    mesh_scene scene = {0};
+    mesh_data again;
+    unsigned char *out;
+    size_t size;
+    const char *why;
+    scene.parts = parts;
+    scene.part_count = 2;
+    scene.library = "a.mtl";
+    encode(".obj", &scene, &out, &size);
+    if (!decode(out, size, 0, &again, &why)) fail_msg("%s", why);
+    assert_int_equal(again.vertex_count, 8); /* numbers count on from part to part */
+    assert_int_equal(again.triangle_count, 4);
+    for (size_t c = 0; c < 6; c++) {
+        assert_int_equal(again.indices[6 + c], again.indices[c] + 4);
+        assert_memory_equal(again.uvs + 2 * (6 + c), again.uvs + 2 * c, 2 * sizeof(float));
+    }
+    mesh_free(&again);
+    free(out);
+    assert_true(mesh_encode_mtl(&scene, &out, &size, &why));
+    const char *end = "illum 1\nmap_Kd l.png\nmap_d l.png\n";
+    assert_memory_equal(out + size - strlen(end), end, strlen(end));
+    free(out);
+}
+
+/* A joint on another, and a clip that turns it. */
+static void glb_has_a_skeleton(void **state) {
+    (void)state;
+    static const float times[] = {0, 1}, turns[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0};
+    mesh_joint joints[2] = {
+        {"foot", -1, {0, 0, 0}, {0, 0, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}},
+        {"top", 0, {0, 2, 0}, {0, 0, 0, 1}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -2, 0, 1}}};
+    const mesh_skeleton skeleton = {"tree", joints, 2, "wind", 2, times, turns};
+    uint32_t bound[16] = {0, 1, 7, 0};
+    float weights[16] = {0.75f, 0.25f, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    const mesh_material bark = {"bark", NULL, NULL, 0, 0, 0};
+    mesh_data m = square();
+    const mesh_part part = {&m, &bark};
+    mesh_scene scene = {0};
+    unsigned char *out;
+    size_t size;
+    char json[8192];
+    m.uvs = NULL;
+    m.joints = bound;
+    m.weights = weights;
+    scene.parts = &part;
+    scene.part_count = 1;
+    scene.skeleton = &skeleton;
+    scene.extras = "{\"seed\":7}";
+    encode(".glb", &scene, &out, &size);
+    const size_t length = u32_at(out + 12);
+    assert_true(length < sizeof json);
+    memcpy(json, out + 20, length);
+    json[length] = 0;
+    assert_non_null(strstr(json, "\"scenes\":[{\"nodes\":[0,1],\"extras\":{\"seed\":7}}]"));
+    assert_non_null(strstr(json, "{\"name\":\"tree\",\"mesh\":0,\"skin\":0}"));
+    assert_non_null(strstr(json, "{\"name\":\"foot\",\"children\":[2],"));
+    assert_non_null(strstr(json, "\"joints\":[1,2]"));
+    assert_non_null(strstr(json, "\"min\":[0],\"max\":[1]"));
+    assert_non_null(strstr(json, "{\"sampler\":1,\"target\":{\"node\":2,\"path\":\"rotation\"}}"));
+    /* the joints of vertex 0, behind positions, normals, colors: without weight it is joint 0 */
+    static const unsigned char first[] = {0, 0, 1, 0, 0, 0, 0, 0};
+    assert_memory_equal(out + 28 + length + 4 * (12 + 12 + 8), first, sizeof first);
+    free(out);
+}
+
 static void copies_are_baked(void **state) {
     (void)state;
     const mesh_data m = square();
     const float translations[] = {0, 0, 0, 5, 0, 0}, scales[] = {1, 1, 1, 2, 2, 2};
     const float rotations[] = {0, 0, 0, 1, 0, 0, 0.70710678f, 0.70710678f};
-    const mesh_instances copies = {&m, 2, translations, rotations, scales};
+    const mesh_instances copies = {&m, 2, translations, rotations, scales, NULL, NULL, NULL};
     mesh_data baked;
     const char *why;
     assert_true(mesh_bake(&copies, 1, &baked, &why));
@@ -512,7 +584,7 @@ static void copies_are_baked(void **state) {
     assert_memory_equal(baked.uvs + 12, square_uvs, sizeof square_uvs);
     assert_memory_equal(baked.colors + 16, square_colors, sizeof square_colors);
     mesh_free(&baked);
-    const mesh_instances none = {&m, 0, translations, NULL, NULL};
+    const mesh_instances none = {&m, 0, translations, NULL, NULL, NULL, NULL, NULL};
     assert_false(mesh_bake(&none, 1, &baked, &why));
     assert_null(baked.positions);
 }
@@ -572,6 +644,8 @@ int main(void) {
         cmocka_unit_test(obj_and_ply_come_back),
         cmocka_unit_test(obj_refers_to_its_material),
         cmocka_unit_test(glb_is_made_of_whole_chunks),
+        cmocka_unit_test(obj_has_parts),
+        cmocka_unit_test(glb_has_a_skeleton),
         cmocka_unit_test(copies_are_baked),
         cmocka_unit_test(creases_keep_faces_apart),
         cmocka_unit_test(a_sphere_is_round_and_faces_outwards),

@@ -8,7 +8,7 @@ texkit=$root/$OUT/asan/texkit # with the sanitizers
 prefix=retile
 python=/usr/bin/python3
 check_glb="$python $root/tests/check_glb.py"
-glbs=$root/$OUT/glb # kept: .ci/run hands them to the Khronos validator
+glbs=$root/$OUT/glb/retile # kept: .ci/run hands them to the Khronos validator
 rm -rf "$glbs" && mkdir -p "$glbs"
 cd "$tmp" || exit 1
 

@@ -3,7 +3,10 @@
 #include "command.h"
 #include "image_io.h"
 
+#include <cjson/cJSON.h>
 #include <ctype.h>
+#include <errno.h>
+#include <stdio.h>
 
 int fail_library(cli *run, txm_status status, const char *what) {
     if (status == TXM_CANCELLED) return cli_fail(run, CLI_FAILED, "stopped; nothing was written");
@@ -73,4 +76,41 @@ int finish_with_picture(cli *run, const txm_image *image) {
     int status = cli_finish(run, bytes, size);
     free(bytes);
     return status;
+}
+
+int path_beside(cli *run, const char *ending, char path[MAX_PATH]) {
+    char extension[8];
+    file_extension(run->output, extension);
+    const size_t n = strlen(run->output) - strlen(extension);
+    if (n + strlen(ending) >= MAX_PATH)
+        return cli_fail(run, CLI_USAGE, "'%s': the path is too long", run->output);
+    memcpy(path, run->output, n);
+    snprintf(path + n, MAX_PATH - n, "%s", ending);
+    return cli_check_output(run, path);
+}
+
+const char *name_in(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+int read_tiles_json(cli *run, const char *folder, cJSON **json) {
+    char path[MAX_PATH];
+    size_t size;
+    if (snprintf(path, sizeof path, "%s/tiles.json", folder) >= (int)sizeof path)
+        return cli_fail(run, CLI_USAGE, "'%s': the path is too long", folder);
+    unsigned char *bytes = file_read(path, &size);
+    if (!bytes)
+        return cli_fail(run, CLI_FAILED, "cannot read '%s': %s; name a folder of 'texkit tiles'",
+                        path, strerror(errno));
+    *json = cJSON_ParseWithLength((const char *)bytes, size);
+    free(bytes);
+    return *json ? CLI_DONE : cli_fail(run, CLI_FAILED, "'%s': not a JSON file", path);
+}
+
+int json_int(const cJSON *from, const char *name, int low, int high, int *value) {
+    const cJSON *item = name ? cJSON_GetObjectItemCaseSensitive(from, name) : from;
+    if (!cJSON_IsNumber(item) || !(item->valuedouble >= low && item->valuedouble <= high)) return 0;
+    *value = (int)item->valuedouble;
+    return (double)*value == item->valuedouble;
 }

@@ -17,6 +17,7 @@ extern const command tiles_command;                /* tiles.c  */
 extern const command retile_command;               /* retile.c */
 extern const command patch_command;                /* patch.c  */
 extern const command edges_command;                /* edges.c  */
+extern const command tree_command, forest_command; /* tree.c   */
 
 /* A call into the library failed: say so in its own words. */
 int fail_library(cli *run, txm_status status, const char *what);
@@ -37,5 +38,20 @@ int check_picture_path(cli *run, const char *path, int width, int height, int ch
 
 /* Encode the picture for the output's extension and write it. */
 int finish_with_picture(cli *run, const txm_image *image);
+
+/* The output's path with another ending than its extension, for a file beside it; it can be written
+   there. An exit status. */
+enum { MAX_PATH = 4096 };
+int path_beside(cli *run, const char *ending, char path[MAX_PATH]);
+
+/* What follows the last '/'. */
+const char *name_in(const char *path);
+
+/* tiles.json of a folder of 'texkit tiles'; for cJSON_Delete. An exit status. */
+struct cJSON;
+int read_tiles_json(cli *run, const char *folder, struct cJSON **json);
+
+/* A whole number low..high of that name, or the item itself if name is NULL. 0: it is none. */
+int json_int(const struct cJSON *from, const char *name, int low, int high, int *value);
 
 #endif /* COMMAND_H */

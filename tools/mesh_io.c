@@ -928,6 +928,8 @@ void mesh_free(mesh_data *mesh) {
     free(mesh->indices);
     free(mesh->uvs);
     free(mesh->corner_normals);
+    free(mesh->joints);
+    free(mesh->weights);
     memset(mesh, 0, offsetof(mesh_data, message));
 }
 
@@ -1104,9 +1106,29 @@ static uint32_t flat_index(const flat_mesh *f, size_t corner_index) {
     return f->split.index ? f->split.index[corner_index] : f->mesh->indices[corner_index];
 }
 
-/* ---- writing: OBJ --------------------------------------------------------------------------- */
+/* ---- writing: what a scene holds -------------------------------------------------------------- */
 
-static const char material_name[] = "surface";
+/* The surface is a part as well, the first. */
+static int part_count(const mesh_scene *scene) {
+    return scene->part_count + (scene->surface != NULL);
+}
+
+/* Its material, if it is the surface, is made in *own. */
+static mesh_part part_at(const mesh_scene *scene, int i, mesh_material *own) {
+    mesh_part part;
+    if (!scene->surface) return scene->parts[i];
+    if (i > 0) return scene->parts[i - 1];
+    memset(own, 0, sizeof *own);
+    own->name = "surface";
+    own->texture = scene->texture;
+    own->png = scene->png;
+    own->png_size = scene->png_size;
+    part.mesh = scene->surface;
+    part.material = own;
+    return part;
+}
+
+/* ---- writing: OBJ --------------------------------------------------------------------------- */
 
 /* A name on a line of its own: no control characters. */
 static void print_name(sink *s, const char *name) {
@@ -1117,8 +1139,33 @@ static void print_name(sink *s, const char *name) {
     put(s, "\n", 1);
 }
 
-static int encode_obj(const mesh_scene *scene, sink *s) {
-    const mesh_data *m = scene->surface;
+/* How many positions, texture coordinates and normals the file has so far: it counts on. */
+typedef struct obj_counts {
+    size_t vertices, uvs, normals;
+} obj_counts;
+
+static void print_obj_vertices(sink *s, const mesh_data *m, const split *uvs, const split *normals,
+                               size_t normal_count) {
+    for (size_t i = 0; i < m->vertex_count; i++) {
+        const float *p = m->positions + 3 * i;
+        print(s, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
+        for (size_t k = 0; k < 3 && m->colors; k++) print(s, " %.4g", m->colors[4 * i + k] / 255.0);
+        put(s, "\n", 1);
+    }
+    for (size_t i = 0; i < uvs->count; i++) {
+        const float *uv = m->uvs + 2 * (size_t)uvs->first[i];
+        print(s, "vt %.9g %.9g\n", (double)uv[0], (double)turn_v(uv[1]));
+    }
+    for (size_t i = 0; i < normal_count; i++) {
+        const float *n = normals->index ? m->corner_normals + 3 * (size_t)normals->first[i]
+                                        : m->normals + 3 * i;
+        print(s, "vn %.6g %.6g %.6g\n", (double)n[0], (double)n[1], (double)n[2]);
+    }
+}
+
+static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_counts *counts,
+                           sink *s) {
+    const mesh_data *m = part->mesh;
     split uvs, normals; /* of normals per vertex, none */
     memset(&uvs, 0, sizeof uvs);
     memset(&normals, 0, sizeof normals);
@@ -1129,47 +1176,53 @@ static int encode_obj(const mesh_scene *scene, sink *s) {
     }
     const int has_normals = m->normals || m->corner_normals;
     const size_t normal_count = normals.index ? normals.count : m->normals ? m->vertex_count : 0;
+    if (scene->part_count) print(s, "o %.60s\n", part->material->name);
+    print_obj_vertices(s, m, &uvs, &normals, normal_count);
+    if (scene->library) print(s, "usemtl %.60s\n", part->material->name);
+    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
+        const size_t v = m->indices[c] + 1;
+        print(s, "%s%lu", c % 3 ? " " : "f ", (unsigned long)(counts->vertices + v));
+        if (uvs.index) print(s, "/%lu", (unsigned long)(counts->uvs + uvs.index[c] + 1));
+        if (has_normals)
+            print(s, uvs.index ? "/%lu" : "//%lu",
+                  (unsigned long)(counts->normals + (normals.index ? normals.index[c] + 1 : v)));
+        if (c % 3 == 2) put(s, "\n", 1);
+    }
+    counts->vertices += m->vertex_count;
+    counts->uvs += uvs.count;
+    counts->normals += normal_count;
+    split_free(&uvs);
+    split_free(&normals);
+    return 1;
+}
+
+static int encode_obj(const mesh_scene *scene, sink *s) {
+    obj_counts counts = {0, 0, 0};
+    mesh_material own;
     if (scene->library) {
         print(s, "mtllib ");
         print_name(s, scene->library);
     }
-    for (size_t i = 0; i < m->vertex_count; i++) {
-        const float *p = m->positions + 3 * i;
-        print(s, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
-        for (size_t k = 0; k < 3 && m->colors; k++) print(s, " %.4g", m->colors[4 * i + k] / 255.0);
-        put(s, "\n", 1);
+    for (int i = 0; i < part_count(scene); i++) {
+        const mesh_part part = part_at(scene, i, &own);
+        if (!encode_obj_part(scene, &part, &counts, s)) return 0;
     }
-    for (size_t i = 0; i < uvs.count; i++) {
-        const float *uv = m->uvs + 2 * (size_t)uvs.first[i];
-        print(s, "vt %.9g %.9g\n", (double)uv[0], (double)turn_v(uv[1]));
-    }
-    for (size_t i = 0; i < normal_count; i++) {
-        const float *n = normals.index ? m->corner_normals + 3 * (size_t)normals.first[i]
-                                       : m->normals + 3 * i;
-        print(s, "vn %.6g %.6g %.6g\n", (double)n[0], (double)n[1], (double)n[2]);
-    }
-    if (scene->library) print(s, "usemtl %s\n", material_name);
-    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
-        const unsigned long v = (unsigned long)m->indices[c] + 1;
-        print(s, "%s%lu", c % 3 ? " " : "f ", v);
-        if (uvs.index) print(s, "/%lu", (unsigned long)uvs.index[c] + 1);
-        if (has_normals)
-            print(s, uvs.index ? "/%lu" : "//%lu",
-                  normals.index ? (unsigned long)normals.index[c] + 1 : v);
-        if (c % 3 == 2) put(s, "\n", 1);
-    }
-    split_free(&uvs);
-    split_free(&normals);
     return 1;
 }
 
 int mesh_encode_mtl(const mesh_scene *scene, unsigned char **bytes, size_t *size,
                     const char **why) {
     sink s = new_sink();
-    print(&s, "newmtl %s\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n", material_name);
-    if (scene->texture) {
+    mesh_material own;
+    for (int i = 0; i < part_count(scene); i++) {
+        const mesh_material *m = part_at(scene, i, &own).material;
+        print(&s, "newmtl %.60s\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n", m->name);
+        if (!m->texture) continue;
         print(&s, "map_Kd ");
-        print_name(&s, scene->texture);
+        print_name(&s, m->texture);
+        if (!m->is_cut_out) continue;
+        print(&s, "map_d ");
+        print_name(&s, m->texture);
     }
     return finish_sink(&s, bytes, size, why);
 }
@@ -1210,14 +1263,19 @@ static int encode_ply(const mesh_data *m, sink *s) {
 
 /* ---- writing: GLB --------------------------------------------------------------------------- */
 
+enum { GL_UNSIGNED_SHORT = 5123, GL_UNSIGNED_INT = 5125, GL_FLOAT = 5126 };
+enum { NORMALIZED = 1 << 16 }; /* with a component type: 0..65535 means 0..1 */
+enum { GL_ARRAY = 34962, GL_ELEMENTS = 34963 };
+enum { MAX_MATERIALS = 64 };
+
 /* The parts of the document are written side by side and put together at the end. */
 typedef struct glb {
     sink binary, views, accessors, meshes, nodes;
-    int view_count, accessor_count, mesh_count;
+    sink more; /* skins and animations, each after a comma */
+    int view_count, accessor_count, mesh_count, node_count;
+    const mesh_material *materials[MAX_MATERIALS]; /* NULL: plain white */
+    int material_count;
 } glb;
-
-enum { GL_UNSIGNED_SHORT = 5123, GL_UNSIGNED_INT = 5125, GL_FLOAT = 5126 };
-enum { GL_ARRAY = 34962, GL_ELEMENTS = 34963 };
 
 /* The bytes since start become a view; target 0: none. Returns its number. */
 static int glb_view(glb *g, size_t start, int target) {
@@ -1231,21 +1289,36 @@ static int glb_view(glb *g, size_t start, int target) {
     return g->view_count++;
 }
 
-/* Close a view and describe what lies in it. bounds: 3 minima and 3 maxima, or NULL. Returns the
-   accessor's number. */
+static void print_list(sink *s, const char *name, const float *values, int count) {
+    print(s, ",\"%s\":[", name);
+    for (int i = 0; i < count; i++) print(s, "%s%.9g", i ? "," : "", (double)values[i]);
+    print(s, "]");
+}
+
+/* Close a view and describe what lies in it. bounds: minima and maxima of a SCALAR or VEC3, or NULL.
+   Returns the accessor's number. */
 static int glb_accessor(glb *g, size_t start, int target, int component, size_t count,
                         const char *type, const float *bounds) {
     sink *s = &g->accessors;
-    const int view = glb_view(g, start, target);
+    const int view = glb_view(g, start, target), width = type[0] == 'S' ? 1 : 3;
     print(s, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%lu,\"type\":\"%s\"",
-          g->accessor_count ? "," : "", view, component, (unsigned long)count, type);
-    if (component == GL_UNSIGNED_SHORT && target == GL_ARRAY) print(s, ",\"normalized\":true");
-    if (bounds)
-        print(s, ",\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]", (double)bounds[0],
-              (double)bounds[1], (double)bounds[2], (double)bounds[3], (double)bounds[4],
-              (double)bounds[5]);
+          g->accessor_count ? "," : "", view, component & ~NORMALIZED, (unsigned long)count, type);
+    if (component & NORMALIZED) print(s, ",\"normalized\":true");
+    if (bounds) {
+        print_list(s, "min", bounds, width);
+        print_list(s, "max", bounds + width, width);
+    }
     print(s, "}");
     return g->accessor_count++;
+}
+
+/* Its number among the materials of the document; past the last there is room for no more. */
+static int glb_material(glb *g, const mesh_material *material) {
+    int i = 0;
+    while (i < g->material_count && g->materials[i] != material) i++;
+    if (i == MAX_MATERIALS) return i - 1;
+    if (i == g->material_count) g->materials[g->material_count++] = material;
+    return i;
 }
 
 /* glTF wants unit normals, and finds fault with zero. */
@@ -1270,10 +1343,38 @@ static void put_color(sink *s, const unsigned char *c) {
     put_u16(s, (uint32_t)c[3] * 257);
 }
 
-static int glb_mesh(glb *g, const mesh_data *m) {
+/* Joints and weights. The rounded weights of a vertex need not sum up to 1: the largest takes up the
+   rest. A joint without weight is joint 0, lest validators warn. */
+static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
+    sink *bin = &g->binary, *s = &g->meshes;
+    size_t start = bin->bytes.count;
+    for (size_t i = 0; i < f->count; i++) {
+        const size_t v = 4 * flat_vertex(f, i);
+        for (size_t k = 0; k < 4; k++) put_u16(bin, m->weights[v + k] > 0 ? m->joints[v + k] : 0);
+    }
+    print(s, ",\"JOINTS_0\":%d",
+          glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT, f->count, "VEC4", NULL));
+    start = bin->bytes.count;
+    for (size_t i = 0; i < f->count; i++) {
+        const float *w = m->weights + 4 * flat_vertex(f, i);
+        float unit[4] = {w[0], w[1], w[2], w[3]};
+        int largest = 0;
+        for (int k = 1; k < 4; k++)
+            if (w[k] > w[largest]) largest = k;
+        unit[largest] = 1;
+        for (int k = 0; k < 4; k++)
+            if (k != largest) unit[largest] -= unit[k];
+        put_floats(bin, unit, 4);
+    }
+    print(s, ",\"WEIGHTS_0\":%d",
+          glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f->count, "VEC4", NULL));
+}
+
+/* A primitive of the mesh that is being written. */
+static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *material) {
     flat_mesh f;
     sink *bin = &g->binary, *s = &g->meshes;
-    float bounds[6];
+    float bounds[6] = {0, 0, 0, 0, 0, 0};
     size_t start = bin->bytes.count;
     if (!flat_make(m, 1, &f)) return 0;
 
@@ -1285,7 +1386,7 @@ static int glb_mesh(glb *g, const mesh_data *m) {
         }
         put_floats(bin, p, 3);
     }
-    print(s, "%s{\"primitives\":[{\"attributes\":{\"POSITION\":%d", g->mesh_count ? "," : "",
+    print(s, "{\"attributes\":{\"POSITION\":%d",
           glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
     if (m->normals || m->corner_normals) {
         start = bin->bytes.count;
@@ -1305,25 +1406,40 @@ static int glb_mesh(glb *g, const mesh_data *m) {
         start = bin->bytes.count;
         for (size_t i = 0; i < f.count; i++) put_color(bin, m->colors + 4 * flat_vertex(&f, i));
         print(s, ",\"COLOR_0\":%d",
-              glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT, f.count, "VEC4", NULL));
+              glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT | NORMALIZED, f.count, "VEC4",
+                           NULL));
     }
+    if (m->joints) glb_weights(g, m, &f);
     start = bin->bytes.count;
     const int is_short = f.count < 65535; /* 65535 itself is not an index */
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
         if (is_short) put_u16(bin, flat_index(&f, c));
         else put_u32(bin, flat_index(&f, c));
     }
-    print(s, "},\"indices\":%d,\"material\":%d}]}",
+    print(s, "},\"indices\":%d,\"material\":%d}",
           glb_accessor(g, start, GL_ELEMENTS, is_short ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT,
                        3 * m->triangle_count, "SCALAR", NULL),
-          g->mesh_count ? 1 : 0);
+          glb_material(g, material));
     split_free(&f.split);
-    g->mesh_count++;
     return 1;
 }
 
-/* A node with the copies of the mesh that was written last. */
-static void glb_instances(glb *g, const mesh_instances *t) {
+static void glb_open_mesh(glb *g) {
+    print(&g->meshes, "%s{\"primitives\":[", g->mesh_count++ ? "," : "");
+}
+
+static void glb_close_mesh(glb *g) {
+    print(&g->meshes, "]}");
+}
+
+/* Begin a node; what follows is more of its fields and the closing brace. */
+static void glb_node(glb *g, const char *name) {
+    print(&g->nodes, "%s{", g->node_count++ ? "," : "");
+    if (name) print(&g->nodes, "\"name\":\"%.60s\",", name);
+}
+
+/* A node with copies of a mesh of their own. */
+static int glb_instances(glb *g, const mesh_instances *t) {
     sink *s = &g->nodes, *bin = &g->binary;
     const struct {
         const char *name, *type;
@@ -1332,7 +1448,11 @@ static void glb_instances(glb *g, const mesh_instances *t) {
     } lists[] = {{"TRANSLATION", "VEC3", t->translations, 3},
                  {"ROTATION", "VEC4", t->rotations, 4},
                  {"SCALE", "VEC3", t->scales, 3}};
-    print(s, ",{\"mesh\":%d,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{",
+    glb_open_mesh(g);
+    if (!glb_primitive(g, t->mesh, t->material)) return 0;
+    glb_close_mesh(g);
+    glb_node(g, t->name);
+    print(s, "\"mesh\":%d,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{",
           g->mesh_count - 1);
     for (int k = 0, written = 0; k < 3; k++) {
         if (!lists[k].values) continue;
@@ -1341,7 +1461,77 @@ static void glb_instances(glb *g, const mesh_instances *t) {
         print(s, "%s\"%s\":%d", written++ ? "," : "", lists[k].name,
               glb_accessor(g, start, 0, GL_FLOAT, t->count, lists[k].type, NULL));
     }
+    if (t->colors) { /* three floats: what viewers that know it at all can read */
+        const size_t start = bin->bytes.count;
+        for (size_t i = 0; i < t->count; i++) {
+            float linear[3];
+            for (size_t k = 0; k < 3; k++)
+                linear[k] = txm_srgb_to_linear((float)t->colors[4 * i + k] / 255.0f);
+            put_floats(bin, linear, 3);
+        }
+        print(s, ",\"_COLOR_0\":%d", glb_accessor(g, start, 0, GL_FLOAT, t->count, "VEC3", NULL));
+    }
     print(s, "}}}}");
+    return 1;
+}
+
+/* The joints as nodes from the next one on, with their children; 0: no memory. */
+static int glb_joints(glb *g, const mesh_skeleton *k) {
+    sink *s = &g->nodes;
+    const int n = k->joint_count, first = g->node_count;
+    int *child = (int *)malloc(2 * sizeof(int) * ((size_t)n + 1));
+    if (!child) return 0;
+    int *sibling = child + n;
+    for (int i = 0; i < n; i++) child[i] = sibling[i] = -1;
+    for (int i = n - 1; i > 0; i--) { /* backwards, so that the lists run forwards */
+        sibling[i] = child[k->joints[i].parent];
+        child[k->joints[i].parent] = i;
+    }
+    for (int i = 0; i < n; i++) {
+        const mesh_joint *j = &k->joints[i];
+        glb_node(g, j->name);
+        if (child[i] >= 0) {
+            print(s, "\"children\":[");
+            for (int c = child[i]; c >= 0; c = sibling[c])
+                print(s, "%s%d", c == child[i] ? "" : ",", first + c);
+            print(s, "],");
+        }
+        print(s, "\"translation\":[%.9g,%.9g,%.9g]", (double)j->translation[0],
+              (double)j->translation[1], (double)j->translation[2]);
+        print_list(s, "rotation", j->rotation, 4);
+        print(s, "}");
+    }
+    free(child);
+    return 1;
+}
+
+/* The skin, and the animation if there is one; first: node of joint 0. */
+static void glb_skin(glb *g, const mesh_skeleton *k, int first) {
+    sink *s = &g->more, *bin = &g->binary;
+    size_t start = bin->bytes.count;
+    for (int i = 0; i < k->joint_count; i++) put_floats(bin, k->joints[i].bind, 16);
+    print(s, ",\"skins\":[{\"skeleton\":%d,\"inverseBindMatrices\":%d,\"joints\":[", first,
+          glb_accessor(g, start, 0, GL_FLOAT, (size_t)k->joint_count, "MAT4", NULL));
+    for (int i = 0; i < k->joint_count; i++) print(s, "%s%d", i ? "," : "", first + i);
+    print(s, "]}]");
+    if (k->key_count == 0) return;
+    const size_t keys = (size_t)k->key_count;
+    const float bounds[2] = {k->times[0], k->times[keys - 1]};
+    start = bin->bytes.count;
+    put_floats(bin, k->times, keys);
+    const int times = glb_accessor(g, start, 0, GL_FLOAT, keys, "SCALAR", bounds);
+    print(s, ",\"animations\":[{\"name\":\"%.60s\",\"samplers\":[", k->clip);
+    for (int i = 0; i < k->joint_count; i++) {
+        start = bin->bytes.count;
+        put_floats(bin, k->turns + 4 * keys * (size_t)i, 4 * keys);
+        print(s, "%s{\"input\":%d,\"output\":%d}", i ? "," : "", times,
+              glb_accessor(g, start, 0, GL_FLOAT, keys, "VEC4", NULL));
+    }
+    print(s, "],\"channels\":[");
+    for (int i = 0; i < k->joint_count; i++)
+        print(s, "%s{\"sampler\":%d,\"target\":{\"node\":%d,\"path\":\"rotation\"}}",
+              i ? "," : "", i, first + i);
+    print(s, "]}]");
 }
 
 /* A file name as a URI in a JSON string. */
@@ -1384,44 +1574,72 @@ static void append(sink *to, const sink *from) {
     to->failed |= from->failed;
 }
 
-static void print_document(const glb *g, const mesh_scene *scene, int png_view, sink *json) {
-    const int has_texture = scene->surface && (scene->png || scene->texture);
-    int node_count = scene->surface ? 1 : 0, instanced = 0;
-    for (int i = 0; i < scene->instance_count; i++) instanced += scene->instances[i].count > 0;
-    print(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"texkit\"},\"scene\":0,");
-    if (instanced)
-        print(json, "\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],"
-                    "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"],");
-    print(json, "\"scenes\":[{\"nodes\":[");
-    node_count += instanced;
-    for (int i = 0; i < node_count; i++) print(json, "%s%d", i ? "," : "", i);
-    print(json, "]}],\"nodes\":[");
-    if (scene->surface) {
-        print(json, "{\"mesh\":0}");
-        append(json, &g->nodes);
-    } else if (g->nodes.bytes.count) { /* its first character is a comma */
-        put(json, (const char *)g->nodes.bytes.items + 1, g->nodes.bytes.count - 1);
+static void print_materials(glb *g, sink *json) {
+    int textures = 0;
+    print(json, ",\"materials\":[");
+    for (int i = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i];
+        print(json, "%s{", i ? "," : "");
+        if (m && m->name) print(json, "\"name\":\"%.60s\",", m->name);
+        print(json, "\"pbrMetallicRoughness\":{");
+        if (m && (m->png || m->texture))
+            print(json, "\"baseColorTexture\":{\"index\":%d},", textures++);
+        print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}");
+        if (m && m->is_cut_out) print(json, ",\"alphaMode\":\"MASK\",\"doubleSided\":true");
+        print(json, "}");
     }
-    print(json, "],\"meshes\":[");
-    append(json, &g->meshes);
-    print(json, "],\"materials\":[{\"pbrMetallicRoughness\":{");
-    if (has_texture) print(json, "\"baseColorTexture\":{\"index\":0},");
-    print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}}");
-    if (g->mesh_count > 1)
-        print(json, ",{\"pbrMetallicRoughness\":{\"metallicFactor\":0,\"roughnessFactor\":1}}");
-    if (has_texture) {
-        print(json, "],\"textures\":[{\"sampler\":0,\"source\":0}],\"samplers\":[{"
-                    "\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":33071,\"wrapT\":33071}],"
-                    "\"images\":[{");
-        if (scene->png) {
-            print(json, "\"bufferView\":%d,\"mimeType\":\"image/png\"}", png_view);
+    print(json, "]");
+    if (!textures) return;
+    print(json, ",\"textures\":[");
+    for (int i = 0; i < textures; i++)
+        print(json, "%s{\"sampler\":%d,\"source\":%d}", i ? "," : "", i, i);
+    print(json, "],\"samplers\":[");
+    for (int i = 0, written = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i];
+        if (!m || !(m->png || m->texture)) continue;
+        print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":33071}",
+              written++ ? "," : "", m->repeats ? 10497 : 33071);
+    }
+    print(json, "],\"images\":[");
+    for (int i = 0, written = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i];
+        if (!m || !(m->png || m->texture)) continue;
+        print(json, "%s{", written++ ? "," : "");
+        if (m->png) {
+            const size_t start = g->binary.bytes.count;
+            put_png(&g->binary, m->png, m->png_size);
+            print(json, "\"bufferView\":%d,\"mimeType\":\"image/png\"}", glb_view(g, start, 0));
         } else {
             print(json, "\"uri\":\"");
-            print_uri(json, scene->texture);
+            print_uri(json, m->texture);
             print(json, "\"}");
         }
     }
-    print(json, "],\"accessors\":[");
+    print(json, "]");
+}
+
+/* joint: node of the skeleton's root, or 0 */
+static void print_document(glb *g, const mesh_scene *scene, int instanced, int joint, sink *json) {
+    const int roots = joint ? joint + 1 : g->node_count;
+    print(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"texkit\"},\"scene\":0");
+    if (instanced)
+        print(json, ",\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],"
+                    "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"]");
+    print(json, ",\"scenes\":[{\"nodes\":[");
+    for (int i = 0; i < roots; i++) print(json, "%s%d", i ? "," : "", i);
+    print(json, "]");
+    if (scene->extras) {
+        print(json, ",\"extras\":");
+        put(json, scene->extras, strlen(scene->extras));
+    }
+    print(json, "}],\"nodes\":[");
+    append(json, &g->nodes);
+    print(json, "],\"meshes\":[");
+    append(json, &g->meshes);
+    print(json, "]");
+    append(json, &g->more);
+    print_materials(g, json);
+    print(json, ",\"accessors\":[");
     append(json, &g->accessors);
     print(json, "],\"bufferViews\":[");
     append(json, &g->views);
@@ -1429,27 +1647,45 @@ static void print_document(const glb *g, const mesh_scene *scene, int png_view, 
     while (json->bytes.count % 4 && !json->failed) put(json, " ", 1);
 }
 
+/* All surfaces as one mesh, instances, joints: nodes in this order. Returns the first joint's node,
+   0 if there is none, -1 without memory. */
+static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
+    const mesh_skeleton *k = scene->skeleton;
+    int joint = 0;
+    for (int i = 0; i < part_count(scene); i++) {
+        const mesh_part part = part_at(scene, i, own);
+        if (i == 0) glb_open_mesh(g);
+        else print(&g->meshes, ",");
+        if (!glb_primitive(g, part.mesh, part.material)) return -1;
+    }
+    if (part_count(scene)) {
+        glb_close_mesh(g);
+        glb_node(g, k ? k->name : NULL);
+        print(&g->nodes, k ? "\"mesh\":0,\"skin\":0}" : "\"mesh\":0}");
+    }
+    for (int i = 0; i < scene->instance_count; i++) {
+        if (scene->instances[i].count && !glb_instances(g, &scene->instances[i])) return -1;
+    }
+    if (k) {
+        joint = g->node_count;
+        if (!glb_joints(g, k)) return -1;
+        glb_skin(g, k, joint);
+    }
+    return joint;
+}
+
 static int encode_glb(const mesh_scene *scene, sink *s) {
     glb g;
+    mesh_material own;
     sink json = new_sink();
-    int ok = 1, png_view = 0;
+    int instanced = 0;
     memset(&g, 0, sizeof g);
-    g.binary = g.views = g.accessors = g.meshes = g.nodes = new_sink();
-    if (scene->surface) ok = glb_mesh(&g, scene->surface);
-    for (int i = 0; i < scene->instance_count && ok; i++) {
-        const mesh_instances *t = &scene->instances[i];
-        if (t->count == 0) continue;
-        ok = glb_mesh(&g, t->mesh);
-        if (ok) glb_instances(&g, t);
-    }
-    if (scene->surface && scene->png) {
-        const size_t start = g.binary.bytes.count;
-        put_png(&g.binary, scene->png, scene->png_size);
-        png_view = glb_view(&g, start, 0);
-    }
-    if (g.binary.bytes.count > 0x7fffffff) ok = 0; /* lengths are 32 bits */
+    g.binary = g.views = g.accessors = g.meshes = g.nodes = g.more = new_sink();
+    const int joint = glb_scene(&g, scene, &own);
+    for (int i = 0; i < scene->instance_count; i++) instanced |= scene->instances[i].count > 0;
+    if (joint >= 0) print_document(&g, scene, instanced, joint, &json);
+    const int ok = joint >= 0 && g.binary.bytes.count <= 0x7fffffff; /* lengths are 32 bits */
     if (ok) {
-        print_document(&g, scene, png_view, &json);
         const size_t total = 12 + 8 + json.bytes.count + 8 + g.binary.bytes.count;
         put(s, "glTF", 4);
         put_u32(s, 2);
@@ -1467,6 +1703,7 @@ static int encode_glb(const mesh_scene *scene, sink *s) {
     list_free(&g.accessors.bytes);
     list_free(&g.meshes.bytes);
     list_free(&g.nodes.bytes);
+    list_free(&g.more.bytes);
     return ok;
 }
 
@@ -1481,12 +1718,13 @@ int mesh_can_write(const char *extension, const char **why) {
 int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
                 const char **why) {
     sink s = new_sink();
+    mesh_material own;
     const int is_glb = !strcmp(extension, ".glb");
     *bytes = NULL;
     if (!mesh_can_write(extension, why)) return 0;
-    if (!scene->surface && !is_glb) return *why = "there is no surface to write", 0;
+    if (!is_glb && !part_count(scene)) return *why = "there is no surface to write", 0;
     const int ok = is_glb                        ? encode_glb(scene, &s)
-                   : !strcmp(extension, ".ply") ? encode_ply(scene->surface, &s)
+                   : !strcmp(extension, ".ply") ? encode_ply(part_at(scene, 0, &own).mesh, &s)
                                                 : encode_obj(scene, &s);
     if (!ok) s.failed = 1;
     return finish_sink(&s, bytes, size, why);

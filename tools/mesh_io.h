@@ -25,8 +25,20 @@ typedef struct mesh_data {
     uint32_t *indices;                   /* 3 per triangle, each below vertex_count           */
     float *uvs;                          /* 2 per corner, so 6 per triangle, finite; or NULL  */
     float *corner_normals;               /* 3 per corner, or NULL; mesh_crease makes them     */
+    uint32_t *joints;                    /* 4 per vertex, into a mesh_skeleton, or NULL; only */
+    float *weights;                      /* 4 per vertex, sum 1           GLB files hold them */
     char message[120];
 } mesh_data;
+
+/* What a surface looks like. */
+typedef struct mesh_material {
+    const char *name;    /* letters and digits                                      */
+    const char *texture; /* as that of mesh_scene, and the next two as well         */
+    const unsigned char *png;
+    size_t png_size;
+    int repeats;    /* from left to right the picture goes on in itself                             */
+    int is_cut_out; /* where the picture's alpha is below 1/2 there is nothing; both sides are seen */
+} mesh_material;
 
 /* Many copies of a small mesh. */
 typedef struct mesh_instances {
@@ -35,11 +47,44 @@ typedef struct mesh_instances {
     const float *translations; /* 3 per copy                                          */
     const float *rotations;    /* 4 per copy, unit quaternions x y z w; NULL = none   */
     const float *scales;       /* 3 per copy; NULL = 1                                */
+    const unsigned char *colors;   /* 4 per copy, times those of the mesh; NULL = none */
+    const mesh_material *material; /* NULL = plain white                               */
+    const char *name;              /* of the node, or NULL                             */
 } mesh_instances;
+
+/* A surface among others. */
+typedef struct mesh_part {
+    const mesh_data *mesh;
+    const mesh_material *material;
+} mesh_part;
+
+/* A joint of a skeleton, moved and turned against its parent. */
+typedef struct mesh_joint {
+    char name[24];
+    int parent; /* number of an earlier joint; the first: -1 */
+    float translation[3], rotation[4]; /* x y z w */
+    float bind[16]; /* inverse bind matrix: from the mesh to the joint, column by column */
+} mesh_joint;
+
+/* What moves the vertices by their joints and weights. */
+typedef struct mesh_skeleton {
+    const char *name; /* of the mesh's node */
+    const mesh_joint *joints;
+    int joint_count;    /* at most 65535                                                 */
+    const char *clip;   /* name of the animation                                         */
+    int key_count;      /* of the animation; 0 = none                                    */
+    const float *times; /* seconds, rising from 0                                        */
+    const float *turns; /* key_count rotations x y z w per joint, joint after joint      */
+} mesh_skeleton;
 
 /* What goes into one file. */
 typedef struct mesh_scene {
     const mesh_data *surface;        /* or NULL                                                */
+    const mesh_part *parts;          /* more surfaces, each an object of its own. PLY: only if
+                                        there is no surface, and only the first                */
+    int part_count;
+    const mesh_skeleton *skeleton;   /* GLB: moves them, all have joints; NULL = none          */
+    const char *extras;              /* GLB: a JSON object for the user, or NULL               */
     const mesh_instances *instances; /* each with triangles; GLB only: mesh_bake for the others */
     int instance_count;
     const char *texture;      /* OBJ, GLB: name of the picture on the surface, '/' between folders;

@@ -14,7 +14,6 @@
 #include <stdio.h>
 
 enum {
-    MAX_PATH = 4096,
     MAX_NAMES = TEXPATCH_MAX_MAPS > TEXPATCH_MAX_EXEMPLARS ? TEXPATCH_MAX_MAPS
                                                            : TEXPATCH_MAX_EXEMPLARS,
     MAX_LEVELS = 28,         /* no picture has more coarser ones */

@@ -16,7 +16,6 @@
 #include <stdio.h>
 
 enum {
-    MAX_PATH = 4096,
     MAX_PROTOTYPES = 64, /* distinct colors of instanced points */
     SPHERE_STEPS = 3,    /* 72 triangles                        */
     CREASE = 50          /* degrees, where --crease is not given */
@@ -91,21 +90,7 @@ static void *new_array(size_t count, size_t size) {
     return txm_mul(count, size, 1, &bytes) && bytes ? malloc(bytes) : NULL;
 }
 
-static const char *name_in(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
-}
-
 /* ---- the command line ---------------------------------------------------------------------- */
-
-/* The output's path with another ending than its extension. */
-static int beside(job *j, const char *ending, char path[MAX_PATH]) {
-    const size_t n = strlen(j->run.output) - strlen(j->extension);
-    if (n + strlen(ending) >= MAX_PATH)
-        return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->run.output);
-    snprintf(path, MAX_PATH, "%.*s%s", (int)n, j->run.output, ending);
-    return cli_check_output(&j->run, path);
-}
 
 /* Refuse, before any work, what does not go together. */
 static int check_options(job *j, const char *method) {
@@ -129,9 +114,10 @@ static int check_options(job *j, const char *method) {
         return cli_fail(run, CLI_USAGE, "--instances with a texture needs an OUT in .glb; it holds "
                         "both");
     int status = CLI_DONE;
-    if (has_picture) status = beside(j, j->texture ? "-texture.png" : "-atlas.png", j->png_path);
+    if (has_picture)
+        status = path_beside(run, j->texture ? "-texture.png" : "-atlas.png", j->png_path);
     if (!status && has_picture && !strcmp(j->extension, ".obj"))
-        status = beside(j, ".mtl", j->mtl_path);
+        status = path_beside(run, ".mtl", j->mtl_path);
     return status;
 }
 
@@ -256,18 +242,10 @@ typedef struct tile_file {
     int count;
 } tile_file;
 
-/* A whole number low..high of that name, or of an array's item if name is NULL. */
-static int get_int(const cJSON *from, const char *name, int low, int high, int *value) {
-    const cJSON *item = name ? cJSON_GetObjectItemCaseSensitive(from, name) : from;
-    if (!cJSON_IsNumber(item) || !(item->valuedouble >= low && item->valuedouble <= high)) return 0;
-    *value = (int)item->valuedouble;
-    return (double)*value == item->valuedouble;
-}
-
 static int get_three(const cJSON *tile, const char *name, int low, int high, int values[3]) {
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(tile, name);
     for (int k = 0; k < 3; k++) {
-        if (!get_int(cJSON_GetArrayItem(list, k), NULL, low, high, &values[k])) return 0;
+        if (!json_int(cJSON_GetArrayItem(list, k), NULL, low, high, &values[k])) return 0;
     }
     return cJSON_GetArraySize(list) == 3;
 }
@@ -282,7 +260,7 @@ static int get_tile(const cJSON *json, int colors, textiles_tile *tile, float uv
     }
     return get_three(json, "edges", 0, colors - 1, tile->edges) &&
            get_three(json, "directions", -1, 1, tile->directions) &&
-           get_int(json, "variant", 0, TEXTILES_MAX_VARIANTS - 1, &tile->variant);
+           json_int(json, "variant", 0, TEXTILES_MAX_VARIANTS - 1, &tile->variant);
 }
 
 /* 0 with *why if this is no triangle set */
@@ -299,8 +277,8 @@ static int parse_tiles(const cJSON *json, tile_file *f, const char **why) {
     if (strcmp(packing->valuestring, "packed") != 0)
         return *why = "not packed into one picture; make the set with --packing packed", 0;
     *why = "a field is missing or out of range; make the set again";
-    if (!get_int(json, "colors", 2, TEXTILES_MAX_COLORS, &d->colors) ||
-        !get_int(json, "variants", 1, TEXTILES_MAX_VARIANTS, &d->variants))
+    if (!json_int(json, "colors", 2, TEXTILES_MAX_COLORS, &d->colors) ||
+        !json_int(json, "variants", 1, TEXTILES_MAX_VARIANTS, &d->variants))
         return 0;
     const int c = d->colors, reduced = 2 * c * c * c * d->variants;
     const int whole = (8 * c * c * c + 4 * c) / 3 * d->variants;
@@ -352,20 +330,14 @@ static int same_tiles(const textiles_set *set, const tile_file *f) {
 /* tiles.json and atlas.png of the folder. */
 static int read_tiles(job *j, tile_file *f, textiles_set **set) {
     char path[MAX_PATH];
-    const char *why = "not a JSON file";
-    size_t size;
+    const char *why = "";
     txm_image atlas;
-    if (snprintf(path, sizeof path, "%s/tiles.json", j->tiles) >= (int)sizeof path)
-        return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->tiles);
-    unsigned char *bytes = file_read(path, &size);
-    if (!bytes)
-        return cli_fail(&j->run, CLI_FAILED,
-                        "cannot read '%s': %s; name a folder of 'texkit tiles'", path,
-                        strerror(errno));
-    cJSON *json = cJSON_ParseWithLength((const char *)bytes, size);
-    free(bytes);
-    const int ok = json && parse_tiles(json, f, &why);
+    cJSON *json;
+    int status = read_tiles_json(&j->run, j->tiles, &json);
+    if (status) return status;
+    const int ok = parse_tiles(json, f, &why);
     cJSON_Delete(json);
+    snprintf(path, sizeof path, "%s/tiles.json", j->tiles);
     if (!ok) return cli_fail(&j->run, CLI_FAILED, "'%s': %s", path, why);
     const txm_status result = import_tiles(j, f, set);
     if (result != TXM_OK) return fail_library(&j->run, result, path);
@@ -373,7 +345,7 @@ static int read_tiles(job *j, tile_file *f, textiles_set **set) {
         return cli_fail(&j->run, CLI_FAILED, "'%s': its tiles are not in their order; make the set "
                         "again", path);
     snprintf(path, sizeof path, "%s/atlas.png", j->tiles);
-    const int status = read_png(j, path, &atlas);
+    status = read_png(j, path, &atlas);
     if (!status) image_free(&atlas);
     return status;
 }

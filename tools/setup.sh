@@ -40,6 +40,7 @@ case $profile in test | ci)
     need has_command xvfb-run xvfb
     need has_command xauth xauth
     need has_command parallel parallel
+    need has_command assimp assimp-utils # reads what texkit tree writes
 esac
 case $profile in test | lint | ci)
     need has_command sdl2-config libsdl2-dev # of examples/brush.c
@@ -53,6 +54,7 @@ case $profile in ci)
     need has_command clang++ clang
     need has_command llvm-symbolizer llvm
     need has_command pkg-config pkg-config
+    need has_command chromium chromium # runs three.js
 esac
 [ -n "$missing" ] || exit 0
 

@@ -13,6 +13,7 @@
 #include "texsyn.h"
 #include "texpatch.h"
 #include "textiles.h"
+#include "treepieces.h"
 #include "trimesh_relax.h"
 
 #include <errno.h>
@@ -22,7 +23,8 @@
 const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
                    ", texpatch " TEXPATCH_VERSION ", textiles " TEXTILES_VERSION
-                   ", trimesh_relax " TRIMESH_RELAX_VERSION ")";
+                   ", trimesh_relax " TRIMESH_RELAX_VERSION
+                   ", treepieces " TREEPIECES_VERSION ")";
 
 enum { MAX_SIDE = 1 << 24 };
 
@@ -215,7 +217,8 @@ const command learn_command = {&learn_manual, run_learn};
 const command synth_command = {&synth_manual, run_synth};
 
 static const command *const commands[] = {&learn_command, &synth_command, &patch_command,
-                                         &edges_command, &tiles_command, &retile_command};
+                                         &edges_command, &tiles_command, &retile_command,
+                                         &tree_command,  &forest_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 

@@ -1,0 +1,407 @@
+#!/usr/bin/env python3
+# check_tree.py KIND FILE [NAME=VALUE...] - does a file of 'texkit tree' or 'forest' hold what it should?
+# SPDX-License-Identifier: MIT OR Unlicense
+#
+# KIND is
+#   skin     a GLB with a skeleton. Reads it by itself, does the skinning itself: weights, hierarchy,
+#            inverse bind matrices, the welded bark (see obj), the clip: keys without jumps, the last
+#            like the first, vertices finite and within reach at several times
+#   forest   a GLB of copies: instanced nodes, their attributes
+#   obj      an OBJ: the bark is one surface, manifold, oriented, open at the root rim or nowhere
+#   assimp   FILE is what 'assimp export x.glb y.assjson' made; expect=JSON names what 'skin' wrote
+# NAME=VALUE asks for more: joints, keys, seconds, components, rims (border loops of the bark), trees,
+# pieces, materials, images, nodes. posed=1: the joints do not stand as the mesh was bound. expect=FILE
+# (of skin): write vertices and where they are at two times of the clip, for other programs to compare.
+import json
+import math
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from check_glb import Glb, need  # noqa: E402
+
+SAMPLES = 60  # vertices of a primitive that other programs compare
+
+
+# ---- rotations and matrices (rows of a 3 x 4 matrix)
+
+def matrix(t, q, s=(1, 1, 1)):
+    x, y, z, w = q
+    r = ((1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)))
+    return tuple(tuple(r[i][k] * s[k] for k in range(3)) + (t[i],) for i in range(3))
+
+
+def product(a, b):
+    return tuple(tuple(sum(a[i][m] * b[m][k] for m in range(3)) + (a[i][3] if k == 3 else 0)
+                       for k in range(4)) for i in range(3))
+
+
+def apply(m, p):
+    return tuple(m[i][0] * p[0] + m[i][1] * p[1] + m[i][2] * p[2] + m[i][3] for i in range(3))
+
+
+def slerp(a, b, t):
+    dot = sum(x * y for x, y in zip(a, b))
+    if dot < 0:
+        b, dot = tuple(-x for x in b), -dot
+    if dot > 0.9999999:
+        q = tuple(x + t * (y - x) for x, y in zip(a, b))
+    else:
+        angle = math.acos(min(dot, 1))
+        u, v = math.sin((1 - t) * angle), math.sin(t * angle)
+        q = tuple((u * x + v * y) / math.sin(angle) for x, y in zip(a, b))
+    n = math.sqrt(sum(x * x for x in q))
+    return tuple(x / n for x in q)
+
+
+def distance(a, b):
+    return math.sqrt(sum((x - y) ** 2 for x, y in zip(a, b)))
+
+
+# ---- surfaces
+
+def find(parent, i):
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+def audit(faces, want):
+    """Is this welded surface whole? Its components and border loops must be as many as wanted."""
+    sides, parent = {}, {}
+    for f in faces:
+        need(len(set(f)) == 3, "a face with two corners in one place")
+        for k in range(3):
+            a, b = f[k], f[(k + 1) % 3]
+            need((a, b) not in sides, "a side of two faces that are not oriented alike")
+            sides[a, b] = True
+            parent.setdefault(a, a)
+            parent.setdefault(b, b)
+            parent[find(parent, a)] = find(parent, b)
+    components = len(set(find(parent, i) for i in parent))
+    border = {}
+    for a, b in sides:
+        if (b, a) in sides:
+            continue
+        need(a not in border, "a border that crosses itself")
+        border[a] = b
+    loops = 0
+    left = set(border)
+    while left:
+        start = at = left.pop()
+        loops += 1
+        while border.get(at) != start:
+            at = border.get(at)
+            need(at in left, "a border that does not close")
+            left.discard(at)
+    need(components == int(want.pop("components", 1)), "%d components" % components)
+    need(loops == int(want.pop("rims", 1)), "%d border loops" % loops)
+    return len(parent), len(border)
+
+
+# ---- a skinned tree
+
+class Tree(Glb):
+    def __init__(self, path):
+        super().__init__(path)
+        g = self.json
+        need(len(g.get("skins", [])) == 1, "not one skin")
+        skin = g["skins"][0]
+        self.joints = skin["joints"]
+        self.nodes = g["nodes"]
+        self.parent = {}
+        for i, n in enumerate(self.nodes):
+            for c in n.get("children", []):
+                need(c not in self.parent, "node %d has two parents" % c)
+                self.parent[c] = i
+        roots = [i for i in self.joints if i not in self.parent]
+        need(len(roots) == 1, "%d joints without a parent" % len(roots))
+        need(set(self.parent) == set(self.joints) - set(roots), "a node below a joint is none")
+        for i in self.joints:
+            n = self.nodes[i]
+            need("scale" not in n and "matrix" not in n, "joint %d has a scale" % i)
+            need(abs(sum(x * x for x in n["rotation"]) - 1) < 1e-5, "rotation of joint %d" % i)
+        self.bind = [tuple(tuple(m[4 * c + r] for c in range(4)) for r in range(3))
+                     for m in self.matrices(skin["inverseBindMatrices"])]
+        need(len(self.bind) == len(self.joints), "inverse bind matrices")
+        meshes = [n for n in self.nodes if "mesh" in n]
+        need(len(meshes) == 1 and meshes[0].get("skin") == 0, "not one skinned node")
+        self.primitives = g["meshes"][meshes[0]["mesh"]]["primitives"]
+        self.read_clip()
+
+    def matrices(self, index):
+        a = self.json["accessors"][index]
+        a["type"], count = "SCALAR", a["count"]
+        need("byteStride" not in self.json["bufferViews"][a["bufferView"]], "stride of matrices")
+        a["count"] = 16 * count
+        flat = [v for v, in self.values(index)]
+        a["type"], a["count"] = "MAT4", count
+        for i in range(count):
+            need(flat[16 * i + 3:16 * i + 16:4] == [0, 0, 0, 1], "last row of a bind matrix")
+        return [flat[16 * i:16 * i + 16] for i in range(count)]
+
+    def read_clip(self):
+        clips = self.json.get("animations", [])
+        self.times, self.turns = [], {}
+        need(len(clips) <= 1, "more than one clip")
+        for clip in clips:
+            for ch in clip["channels"]:
+                s = clip["samplers"][ch["sampler"]]
+                need(ch["target"]["path"] == "rotation", "a channel that is no rotation")
+                need(s.get("interpolation", "LINEAR") == "LINEAR", "interpolation")
+                times = self.times or [t for t, in self.values(s["input"])]
+                node = ch["target"]["node"]
+                need(node not in self.turns, "two channels of one joint")
+                self.turns[node] = self.values(s["output"])
+                need(len(self.turns[node]) == len(times), "keys of joint %d" % node)
+                self.times = times
+            need(set(self.turns) <= set(self.joints), "a channel of what is no joint")
+            need(self.times[0] == 0 and all(a < b for a, b in zip(self.times, self.times[1:])),
+                 "times of keys")
+
+    def check_keys(self):
+        for node, turns in self.turns.items():
+            for q in turns:
+                need(abs(sum(x * x for x in q) - 1) < 1e-5, "a key of %d is no unit quaternion" % node)
+            steps = [distance(a, b) for a, b in zip(turns, turns[1:])]
+            need(turns[0] == turns[-1], "the last key of %d is not the first" % node)
+            need(max(steps) < 0.3, "the keys of %d jump" % node)
+            bends = [max(abs(a[k] - 2 * b[k] + c[k]) for k in range(4))
+                     for a, b, c in zip(turns, turns[1:], turns[2:])]
+            seam = max(abs(turns[-2][k] - 2 * turns[0][k] + turns[1][k]) for k in range(4))
+            need(seam <= 2 * max(bends) + 1e-5, "the clip of %d goes on with a jerk" % node)
+
+    def pose(self, time=None):
+        """Skin matrices, of the joints as they stand or at a time of the clip."""
+        world = {}
+
+        def place(i):
+            if i not in world:
+                n = self.nodes[i]
+                q = n["rotation"]
+                if time is not None and i in self.turns:
+                    k = max(j for j in range(len(self.times) - 1) if self.times[j] <= time)
+                    t = (time - self.times[k]) / (self.times[k + 1] - self.times[k])
+                    q = slerp(self.turns[i][k], self.turns[i][k + 1], t)
+                own = matrix(n["translation"], q)
+                p = self.parent.get(i)
+                world[i] = product(place(p), own) if p is not None else own
+            return world[i]
+        order = []  # parents first, lest the recursion run deep
+        stack = [i for i in self.joints if i not in self.parent]
+        while stack:
+            i = stack.pop()
+            order.append(i)
+            stack += self.nodes[i].get("children", [])
+        for i in order:
+            place(i)
+        return [product(world[j], b) for j, b in zip(self.joints, self.bind)]
+
+
+def skinned(positions, joints, weights, pose):
+    out = []
+    for p, j, w in zip(positions, joints, weights):
+        q = [0, 0, 0]
+        for k in range(4):
+            if w[k] > 0:
+                r = apply(pose[j[k]], p)
+                for a in range(3):
+                    q[a] += w[k] * r[a]
+        out.append(tuple(q))
+    return out
+
+
+def check_skin(path, want):
+    tree = Tree(path)
+    g = tree.json
+    rest = tree.pose()
+    posed = int(want.pop("posed", 0))
+    size = 0
+    expect = {"joints": len(tree.joints), "seconds": tree.times[-1] if tree.times else 0,
+              "primitives": []}
+    if tree.times:
+        expect["times"] = [0.37 * tree.times[-1], 0.71 * tree.times[-1]]
+        tree.check_keys()
+    poses = [tree.pose(t) for t in expect.get("times", [])]
+    for number, p in enumerate(tree.primitives):
+        at = p["attributes"]
+        for name in ("POSITION", "NORMAL", "TEXCOORD_0", "JOINTS_0", "WEIGHTS_0"):
+            need(name in at, "no " + name)
+        a = g["accessors"]
+        need(a[at["JOINTS_0"]]["componentType"] == 5123 and a[at["WEIGHTS_0"]]["componentType"] == 5126,
+             "kind of joints or weights")
+        tree.primitive(p)
+        positions, joints, weights = (tree.values(at[n]) for n in ("POSITION", "JOINTS_0", "WEIGHTS_0"))
+        bound = {}
+        for x, j, w in zip(positions, joints, weights):
+            need(min(w) >= 0 and abs(sum(w) - 1) < 1e-6, "weights")
+            for k in range(4):
+                need(j[k] < len(tree.joints) and (w[k] > 0 or j[k] == 0), "joints")
+            one = bound.setdefault(x, (j, w))
+            need(number > 0 or one == (j, w), "vertices in one place that move apart")
+        size = max([size] + [max(abs(c) for c in x) for x in positions])
+        if not posed:
+            for x, y in zip(positions, skinned(positions, joints, weights, rest)):
+                need(distance(x, y) < 1e-4 * (1 + size), "the bind matrices do not fit the joints")
+        indices = [i for i, in tree.values(p["indices"])]
+        if number == 0:
+            ids = {}
+            places = [ids.setdefault(x, len(ids)) for x in positions]
+            vertices, border = audit([tuple(places[i] for i in indices[t:t + 3])
+                                      for t in range(0, len(indices), 3)], want)
+            print("%d vertices of the bark, %d border edges" % (vertices, border))
+        moved = [skinned(positions, joints, weights, m) for m in poses]
+        for m in moved:
+            far = [distance(x, y) for x, y in zip(positions, m)]
+            need(all(math.isfinite(d) for d in far), "a vertex is not finite")
+            need(max(far) < 0.5 * size or posed, "a vertex goes far astray")
+            need(max(far) > 1e-4 * size, "nothing moves")
+        step = max(1, len(positions) // SAMPLES)
+        expect["primitives"].append({
+            "vertices": len(positions), "triangles": len(indices) // 3,
+            "samples": [{"index": i, "at": [m[i] for m in moved]}
+                        for i in range(0, len(positions), step)]})
+    materials = g["materials"]
+    need("baseColorTexture" in materials[0]["pbrMetallicRoughness"], "bark without a picture")
+    for m in materials[1:]:
+        need(m.get("alphaMode") == "MASK" and m.get("doubleSided"), "material of leaves")
+    extras = g["scenes"][0].get("extras", {})
+    need({"species", "seed", "pieces"} <= set(extras), "extras")
+    if "expect" in want:
+        with open(want.pop("expect"), "w") as f:
+            json.dump(expect, f)
+    return {"joints": len(tree.joints), "keys": len(tree.times), "seconds": expect["seconds"],
+            "pieces": extras["pieces"], "materials": len(materials),
+            "images": len(g.get("images", []))}
+
+
+# ---- a forest of copies
+
+def check_forest(path, want):
+    glb = Glb(path)
+    g = glb.json
+    copies = leaves = 0
+    for n in g["nodes"]:
+        at = n["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]
+        lists = {name: glb.values(i) for name, i in at.items()}
+        need(len(set(len(v) for v in lists.values())) == 1, "attributes of different length")
+        for q in lists["ROTATION"]:
+            need(abs(sum(x * x for x in q) - 1) < 1e-5, "a rotation")
+        need(all(min(s) > 0 for s in lists["SCALE"]), "a scale")
+        mesh = g["meshes"][n["mesh"]]
+        need(len(mesh["primitives"]) == 1, "primitives")
+        glb.primitive(mesh["primitives"][0])
+        if g["materials"][mesh["primitives"][0]["material"]].get("alphaMode") == "MASK":
+            leaves += len(lists["SCALE"])
+        else:
+            copies += len(lists["SCALE"])
+            need(all(s[0] == s[2] for s in lists["SCALE"]), "a piece that is not round")
+    extras = g["scenes"][0]["extras"]
+    need(copies == extras["pieces"], "%d copies of %d pieces" % (copies, extras["pieces"]))
+    need(len(set(n["mesh"] for n in g["nodes"])) == len(g["nodes"]), "two nodes of one mesh")
+    if "expect" in want:
+        with open(want.pop("expect"), "w") as f:
+            json.dump({"nodes": len(g["nodes"]), "copies": copies + leaves}, f)
+    return {"nodes": len(g["nodes"]), "trees": extras["trees"], "pieces": copies, "clouds": leaves,
+            "materials": len(g["materials"]), "images": len(g.get("images", []))}
+
+
+# ---- OBJ
+
+def check_obj(path, want):
+    faces, vertices, material, counts = {}, [], None, {"vt": 0, "vn": 0}
+    with open(path) as f:
+        for line in f:
+            words = line.split()
+            if not words:
+                continue
+            if words[0] == "v":
+                vertices.append(tuple(float(x) for x in words[1:4]))
+            elif words[0] in counts:
+                counts[words[0]] += 1
+            elif words[0] == "usemtl":
+                material = words[1]
+            elif words[0] == "f":
+                corner = [tuple(int(x) for x in w.split("/")) for w in words[1:]]
+                for v, vt, vn in corner:
+                    need(v <= len(vertices) and vt <= counts["vt"] and vn <= counts["vn"], "a face")
+                faces.setdefault(material, []).append(tuple(c[0] for c in corner))
+    bark = [f for name, list in faces.items() if name.startswith("bark") for f in list]
+    used = [vertices[i - 1] for i in set(i for f in bark for i in f)]
+    need(len(set(used)) == len(used), "vertices of the bark in one place")
+    audit(bark, want)
+    return {"materials": len(faces), "triangles": sum(len(f) for f in faces.values()),
+            "bark": len(bark)}
+
+
+# ---- what assimp has read
+
+def check_assimp(path, want):
+    with open(path) as f:
+        scene = json.load(f)
+    with open(want.pop("expect")) as f:
+        expect = json.load(f)
+    need(len(scene["meshes"]) == len(expect["primitives"]), "%d meshes" % len(scene["meshes"]))
+    clip = scene["animations"][0]
+    rate = clip.get("tickspersecond") or 1000
+    channels = {c["name"]: c["rotationkeys"] for c in clip["channels"]}
+    worst = 0
+    size = max(abs(x) for m in scene["meshes"] for x in m["vertices"])
+    for which, time in enumerate(expect["times"]):
+        world = {}
+        stack = [(scene["rootnode"], ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0)))]
+        while stack:
+            node, above = stack.pop()
+            m = node["transformation"]
+            own = tuple(tuple(m[4 * r:4 * r + 4]) for r in range(3))
+            keys = channels.get(node["name"])
+            if keys:
+                ticks = time * rate
+                k = max(i for i in range(len(keys) - 1) if keys[i][0] <= ticks)
+                t = (ticks - keys[k][0]) / (keys[k + 1][0] - keys[k][0])
+                a, b = (tuple(q[1:] + q[:1]) for q in (keys[k][1], keys[k + 1][1]))  # w x y z
+                own = matrix([row[3] for row in own], slerp(a, b, t))
+            world[node["name"]] = product(above, own)
+            stack += [(c, world[node["name"]]) for c in node.get("children", [])]
+        for mesh, primitive in zip(scene["meshes"], expect["primitives"]):
+            count = len(mesh["vertices"]) // 3
+            need(count == primitive["vertices"], "%d vertices" % count)
+            need(len(mesh["faces"]) == primitive["triangles"], "%d faces" % len(mesh["faces"]))
+            wanted = {s["index"]: s["at"][which] for s in primitive["samples"]}
+            got = {i: [0, 0, 0] for i in wanted}
+            names = set()
+            for bone in mesh["bones"]:
+                names.add(bone["name"])
+                m = bone["offsetmatrix"]
+                skin = product(world[bone["name"]], tuple(tuple(m[4 * r:4 * r + 4]) for r in range(3)))
+                for i, w in bone["weights"]:
+                    if i in got:
+                        p = apply(skin, mesh["vertices"][3 * i:3 * i + 3])
+                        got[i] = [x + w * y for x, y in zip(got[i], p)]
+            need(names <= set(world), "a bone that is no node")
+            need(len(names) <= expect["joints"], "%d bones" % len(names))
+            worst = max([worst] + [distance(got[i], wanted[i]) for i in got])
+    need(worst < 1e-4 * size, "vertices %g from where they should be" % worst)
+    print("vertices at most %.2g from ours" % worst)
+    return {"joints": len(channels)}
+
+
+def main():
+    need(len(sys.argv) > 2, "KIND FILE [NAME=VALUE...]")
+    want = dict(a.split("=", 1) for a in sys.argv[3:])
+    kinds = {"skin": check_skin, "forest": check_forest, "obj": check_obj, "assimp": check_assimp}
+    figures = kinds[sys.argv[1]](sys.argv[2], want)
+    for name, value in figures.items():
+        print("%s=%s" % (name, value))
+    for name, value in want.items():
+        most = name.startswith("most_")
+        have = figures[name[5:] if most else name]
+        need(have <= float(value) if most else have == float(value),
+             "%s is %s, not %s" % (name, have, value))
+
+
+if __name__ == "__main__":
+    main()

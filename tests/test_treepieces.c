@@ -1,0 +1,665 @@
+/* test_treepieces.c - trees: how they grow, their records, poses, wind and skin
+   SPDX-License-Identifier: MIT OR Unlicense                                                    */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#define TREEPIECES_IMPLEMENTATION
+#include "treepieces.h"
+#include "testkit.h"
+
+static treepieces_kit *kit;
+static treepieces_species oak;
+
+static int set_up(void **state) {
+    (void)state;
+    return treepieces_kit_make(NULL, 0, NULL, &kit) != TXM_OK ||
+           treepieces_preset("oak", NULL, &oak) != TXM_OK;
+}
+static int tear_down(void **state) {
+    (void)state;
+    treepieces_kit_free(kit);
+    return 0;
+}
+
+static treepieces_forest_desc describe(int trees, int pieces) {
+    treepieces_forest_desc d;
+    memset(&d, 0, sizeof d);
+    d.kit = kit;
+    d.species = &oak;
+    d.species_count = 1;
+    d.tree_count = trees;
+    d.max_pieces = pieces;
+    d.seed = 5;
+    return d;
+}
+
+static treepieces_forest *grow(const treepieces_forest_desc *d) {
+    txm_env env = tk_env(NULL, NULL);
+    treepieces_forest *f;
+    if (treepieces_forest_make(d, &env, &f) != TXM_OK) fail_msg("%s", env.message);
+    return f;
+}
+
+static void *room(size_t count, size_t size) {
+    void *p = calloc(count, size);
+    assert_non_null(p);
+    return p;
+}
+
+static float *make_bones(const treepieces_forest *f, const treepieces_pose *pose) {
+    float *bones = (float *)room(f->node_count, TREEPIECES_BONE * sizeof(float));
+    assert_int_equal(treepieces_bones(f, pose, NULL, bones), TXM_OK);
+    return bones;
+}
+
+/* Any piece on any rim, in any direction: own_rule of the tests that look at all pairs. */
+static void any_piece(void *user, const treepieces_site *site, txm_rng *rng,
+                      treepieces_choice *choice) {
+    (void)user;
+    /* not only tips after a tip-less beginning */
+    choice->type = (int)txm_rng_below(rng, TREEPIECES_BUILTIN);
+    choice->turn = (int)txm_rng_below(rng, TREEPIECES_RIM);
+    for (int k = 0; k < 3; k++) {
+        choice->direction[k] = site->direction[k] + txm_rng_float(rng) - 0.5f;
+        choice->ratios[k] = 0.3f + 0.7f * txm_rng_float(rng);
+    }
+    choice->length = site->radius * (0.5f + 3 * txm_rng_float(rng));
+}
+
+/* ---- rims -------------------------------------------------------------------------------- */
+
+enum { ALL_TYPES = TREEPIECES_BUILTIN, MOST_RIMS = 3 };
+
+/* All vertices of all instances of a forest: first vertex of each node. */
+typedef struct skinned {
+    float *positions, *normals;
+    size_t *first; /* by node */
+} skinned;
+
+static skinned skin_all(const treepieces_forest *f, const float *bones) {
+    skinned s;
+    size_t vertices = 0;
+    s.first = (size_t *)room(f->node_count, sizeof *s.first);
+    for (uint32_t i = 0; i < f->node_count; i++) {
+        s.first[i] = vertices;
+        vertices += (size_t)treepieces_kit_piece(f->kit, f->nodes[i].type)->vertex_count;
+    }
+    s.positions = (float *)room(vertices, 3 * sizeof(float));
+    s.normals = (float *)room(vertices, 3 * sizeof(float));
+    for (int t = 0; t < f->type_count; t++) {
+        const treepieces_batch *b = &f->batches[t];
+        for (uint32_t i = 0; i < b->count; i++) {
+            const size_t at = 3 * s.first[b->words[(size_t)i * b->stride]];
+            treepieces_skin(f, bones, t, i, s.positions + at, s.normals + at);
+        }
+    }
+    return s;
+}
+
+static void free_skinned(skinned *s) {
+    free(s->positions);
+    free(s->normals);
+    free(s->first);
+}
+
+/* The rims of children and parents in a skinned tree: equal to the bit. Marks the pairs met. */
+static void compare_rims(const treepieces_forest *f, const skinned *s,
+                         int met[ALL_TYPES][MOST_RIMS][ALL_TYPES]) {
+    for (uint32_t i = 0; i < f->node_count; i++) {
+        const treepieces_node *n = &f->nodes[i], *up = n - i + n->parent;
+        if (n->parent < 0) continue;
+        const treepieces_piece *below = treepieces_kit_piece(f->kit, up->type);
+        const treepieces_piece *above = treepieces_kit_piece(f->kit, n->type);
+        const int rim = n->joint >> 3, turn = n->joint & 7;
+        met[up->type][rim][n->type]++;
+        for (int j = 0; j < TREEPIECES_RIM; j++) {
+            const size_t a = s->first[n->parent] + (size_t)below->leaf_rims[rim][j];
+            const size_t b = s->first[i] + (size_t)above->root_rim[(j + 6 - turn) % 6];
+            assert_memory_equal(s->positions + 3 * a, s->positions + 3 * b, 12);
+            assert_memory_equal(s->normals + 3 * a, s->normals + 3 * b, 12);
+        }
+    }
+}
+
+/* 1,000 random poses, all pairs of pieces: no gap at all, and no step of the normals. */
+static void test_rims(void **state) {
+    (void)state;
+    static int met[ALL_TYPES][MOST_RIMS][ALL_TYPES];
+    treepieces_forest_desc d = describe(1, 60);
+    d.own_rule = any_piece;
+    for (int p = 0; p < 1000; p++) {
+        treepieces_pose pose;
+        memset(&pose, 0, sizeof pose);
+        d.seed = (uint64_t)p;
+        pose.seed = (uint64_t)p * 77;
+        pose.amount = 0.6f;
+        treepieces_forest *f = grow(&d);
+        float *bones = make_bones(f, &pose);
+        skinned s = skin_all(f, bones);
+        compare_rims(f, &s, met);
+        for (size_t i = 0; i < 3 * s.first[f->node_count - 1]; i++)
+            assert_true(fabsf(s.positions[i]) < 1e4f && fabsf(s.normals[i]) <= 1.0001f);
+        free_skinned(&s);
+        free(bones);
+        treepieces_forest_free(f);
+    }
+    for (int a = 0; a < ALL_TYPES; a++)
+        for (int r = 0; r < treepieces_kit_piece(kit, a)->leaf_count; r++)
+            for (int b = 0; b < ALL_TYPES; b++) assert_true(met[a][r][b] > 0);
+}
+
+/* Wind too leaves the rims closed. */
+static void test_rims_in_wind(void **state) {
+    (void)state;
+    static int met[ALL_TYPES][MOST_RIMS][ALL_TYPES];
+    treepieces_forest_desc d = describe(1, 400);
+    treepieces_forest *f = grow(&d);
+    float *bones = make_bones(f, NULL), *sway = (float *)room(f->node_count, 16);
+    const treepieces_wind wind = {0.4f, 14, 0.8f, 3};
+    for (int i = 0; i < 20; i++) {
+        assert_int_equal(treepieces_sway(f, &wind, i * 0.13, 0.13, NULL, NULL, sway, bones), TXM_OK);
+        skinned s = skin_all(f, bones);
+        compare_rims(f, &s, met);
+        free_skinned(&s);
+    }
+    free(sway);
+    free(bones);
+    treepieces_forest_free(f);
+}
+
+/* ---- records ------------------------------------------------------------------------------- */
+
+static void test_records(void **state) {
+    (void)state;
+    treepieces_forest_desc d = describe(20, 300);
+    treepieces_forest *f = grow(&d);
+    uint32_t pieces = 0;
+    uint8_t *seen = (uint8_t *)room(f->node_count, 1);
+    for (int t = 0; t < f->type_count; t++) {
+        const treepieces_batch *b = &f->batches[t];
+        const treepieces_piece *p = treepieces_kit_piece(kit, t);
+        pieces += b->count;
+        assert_int_equal(b->quad_count, p->quad_count);
+        for (uint32_t i = 0; i < b->count; i++) {
+            const uint32_t *w = b->words + (size_t)i * b->stride;
+            assert_true(w[0] < f->node_count && !seen[w[0]]++);
+            assert_int_equal(f->nodes[w[0]].type, t);
+            if (i) assert_true(w[0] > w[0 - (ptrdiff_t)b->stride]);
+            const uint32_t child[3] = {w[1] & 0xffff, w[1] >> 16, w[2] & 0xffff};
+            for (int k = 0; k < 3; k++) {
+                assert_int_equal(child[k] != 0, k < p->leaf_count);
+                if (!child[k]) continue;
+                const treepieces_node *n = &f->nodes[w[0] + child[k]];
+                assert_int_equal(n->joint, k * 8 + (int)(w[2] >> (16 + 4 * k) & 15));
+            }
+            for (int q = 0; q < p->quad_count; q++) {
+                const int cell = (int)(w[4 + q / 4] >> (8 * (q % 4)) & 255);
+                const uint32_t band = w[3] >> (8 * p->quads[q].band) & 255;
+                const int across = 1 << (band & 7), along = 1 << (band >> 3 & 3);
+                assert_true((cell & 7) + across <= (across > 8 ? 16 : TREEPIECES_SHEET));
+                assert_true((cell >> 3) + along <= TREEPIECES_SHEET);
+                if (p->quads[q].tile_class != TREEPIECES_BARK || (band & 32))
+                    assert_int_equal((cell >> 3) + along, TREEPIECES_SHEET);
+            }
+        }
+    }
+    assert_int_equal(pieces, f->node_count);
+    for (int t = 0; t < f->tree_count; t++) {
+        const treepieces_tree *tree = &f->trees[t];
+        for (uint32_t i = 0; i < tree->node_count; i++) {
+            const treepieces_node *n = &f->nodes[tree->first_node + i];
+            assert_true(i ? n->parent >= 0 && n->parent < (int32_t)i : n->parent == TREEPIECES_NONE);
+            assert_true(n->radius > 0 && n->length > 0);
+        }
+        for (uint32_t i = 0; i < tree->cluster_count; i++) {
+            const uint32_t node = f->clusters[tree->first_cluster + i].node - tree->first_node;
+            assert_true(node < tree->node_count);
+        }
+    }
+    free(seen);
+    treepieces_forest_free(f);
+}
+
+/* Where two pieces meet, as many tiles lie on both sides of the rim. */
+static void test_bark_continues(void **state) {
+    (void)state;
+    treepieces_forest_desc d = describe(5, 500);
+    treepieces_forest *f = grow(&d);
+    uint32_t *bands = (uint32_t *)room(f->node_count, 4);
+    int halved = 0;
+    for (int t = 0; t < f->type_count; t++)
+        for (uint32_t i = 0; i < f->batches[t].count; i++) {
+            const uint32_t *w = f->batches[t].words + (size_t)i * f->batches[t].stride;
+            bands[w[0]] = w[3];
+        }
+    for (int t = 0; t < f->tree_count; t++) {
+        const treepieces_tree *tree = &f->trees[t];
+        for (uint32_t i = 1; i < tree->node_count; i++) {
+            const treepieces_node *n = &f->nodes[tree->first_node + i];
+            const treepieces_node *up = &f->nodes[tree->first_node + (uint32_t)n->parent];
+            const uint32_t above = bands[tree->first_node + i];
+            const uint32_t below = bands[tree->first_node + (uint32_t)n->parent] >>
+                                   (8 * ((n->joint >> 3) + 1));
+            const uint32_t foot = (above & 7) + (above >> 5 & 1); /* halving: twice at the foot */
+            assert_int_equal(foot, below & 7);
+            halved += (above >> 5 & 1) != 0;
+            (void)up;
+        }
+    }
+    assert_true(halved > 0);
+    free(bands);
+    treepieces_forest_free(f);
+}
+
+/* ---- growing ------------------------------------------------------------------------------- */
+
+static uint64_t hash_tree(const treepieces_forest *f, int tree) {
+    const treepieces_tree *t = &f->trees[tree];
+    uint64_t h = tk_hash(0, f->nodes + t->first_node, t->node_count * sizeof *f->nodes);
+    for (uint32_t i = 0; i < t->cluster_count; i++)
+        h = tk_hash(h, &f->clusters[t->first_cluster + i].along, 12);
+    return h;
+}
+
+/* The same from the same seed, in any company and on threads; others from other seeds. */
+static void test_seeds(void **state) {
+    (void)state;
+    treepieces_place places[70];
+    treepieces_forest_desc d = describe(70, 200);
+    memset(places, 0, sizeof places);
+    for (int i = 0; i < 70; i++) {
+        places[i].position[0] = (float)i;
+        places[i].seed = (uint64_t)(i % 35);
+    }
+    d.places = places;
+    treepieces_forest *f = grow(&d), *threaded;
+    txm_env env = tk_env(NULL, NULL);
+    env.parallel_for = tk_parallel_threads;
+    assert_int_equal(treepieces_forest_make(&d, &env, &threaded), TXM_OK);
+    for (int i = 0; i < 70; i++) {
+        assert_true(hash_tree(f, i) == hash_tree(threaded, i));
+        if (i >= 35) assert_int_equal(f->trees[i].node_count, f->trees[i - 35].node_count);
+        for (int j = 0; j < i && i < 35; j++) assert_true(hash_tree(f, i) != hash_tree(f, j));
+    }
+    d.places = places + 9;
+    d.tree_count = 1;
+    treepieces_forest *alone = grow(&d);
+    assert_true(hash_tree(alone, 0) == hash_tree(f, 9));
+    for (int t = 0; t < f->type_count; t++) {
+        const size_t bytes = (size_t)f->batches[t].count * f->batches[t].stride * 4;
+        assert_int_equal(f->batches[t].count, threaded->batches[t].count);
+        if (bytes) assert_memory_equal(f->batches[t].words, threaded->batches[t].words, bytes);
+    }
+    treepieces_forest_free(alone);
+    treepieces_forest_free(threaded);
+    treepieces_forest_free(f);
+}
+
+/* Fewer pieces: no more than asked for, all ends closed, the thick parts still there. */
+static void test_budget(void **state) {
+    (void)state;
+    for (int most = 8; most <= 3000; most = most * 3 / 2) {
+        treepieces_forest_desc d = describe(3, most);
+        treepieces_forest *f = grow(&d);
+        for (int i = 0; i < 3; i++) assert_true((int)f->trees[i].node_count <= most);
+        if (most > 300) assert_true((int)f->trees[0].node_count > most / 3);
+        treepieces_forest_free(f);
+    }
+}
+
+/* The paper's rules: I and Y in turn, and by chance. */
+static void test_rules(void **state) {
+    (void)state;
+    treepieces_forest_desc d = describe(1, 300);
+    d.rule = TREEPIECES_ALTERNATE;
+    treepieces_forest *f = grow(&d);
+    for (uint32_t i = 2; i < f->node_count; i++) {
+        const int type = f->nodes[i].type, up = f->nodes[f->nodes[i].parent].type;
+        if (type == TREEPIECES_TIP) continue;
+        assert_true(type == TREEPIECES_I || type == TREEPIECES_Y);
+        if (up != TREEPIECES_FLARE) assert_int_not_equal(type, up);
+    }
+    assert_true(f->batches[TREEPIECES_Y].count > 10);
+    treepieces_forest_free(f);
+    d.rule = TREEPIECES_RANDOM;
+    f = grow(&d);
+    const uint32_t i = f->batches[TREEPIECES_I].count, y = f->batches[TREEPIECES_Y].count;
+    assert_true(i > 20 && y > 20 && i < 3 * y && y < 3 * i);
+    assert_int_equal(f->batches[TREEPIECES_SIDE].count, 0);
+    treepieces_forest_free(f);
+}
+
+/* Nothing grows out of its envelope by more than a piece, or where it is dark. */
+static void test_pruning(void **state) {
+    (void)state;
+    treepieces_species s = oak;
+    s.envelope = TREEPIECES_CYLINDER;
+    s.crown_base = 0.2f;
+    s.crown_top = 0.7f;
+    s.crown_width = 0.3f;
+    treepieces_forest_desc d = describe(1, 2000);
+    d.species = &s;
+    treepieces_forest *f = grow(&d), *free_form, *dark;
+    float *bones = make_bones(f, NULL);
+    const float trunk = 0.45f * s.orders[0].length; /* at least half of it, pieces included */
+    for (uint32_t i = 0; i < f->node_count; i++) {
+        const float *b = bones + TREEPIECES_BONE * (size_t)i;
+        if (f->nodes[i].order == 0) continue;
+        assert_true(b[3] * b[3] + b[11] * b[11] < trunk * trunk);
+    }
+    s = oak;
+    s.envelope = TREEPIECES_FREE;
+    s.shade = 0;
+    free_form = grow(&d);
+    s.shade = 0.5f;
+    dark = grow(&d);
+    assert_true(dark->node_count < free_form->node_count);
+    free(bones);
+    treepieces_forest_free(f);
+    treepieces_forest_free(free_form);
+    treepieces_forest_free(dark);
+}
+
+/* ---- poses and wind ------------------------------------------------------------------------ */
+
+/* A bone is a rotation times diag(radius, length, radius), and stands where the parent's says. */
+static void test_bones(void **state) {
+    (void)state;
+    treepieces_forest_desc d = describe(3, 400);
+    treepieces_forest *f = grow(&d);
+    treepieces_pose pose;
+    memset(&pose, 0, sizeof pose);
+    pose.amount = 0.2f;
+    float *rest = make_bones(f, NULL), *posed = make_bones(f, &pose);
+    float *joints = (float *)room(f->node_count, 16);
+    for (uint32_t i = 0; i < f->node_count; i++) joints[4 * i + 3] = 1;
+    pose.amount = 0;
+    pose.joints = joints;
+    float *same = make_bones(f, &pose);
+    assert_memory_equal(rest, same, f->node_count * TREEPIECES_BONE * sizeof(float));
+    int moved = 0;
+    for (uint32_t i = 0; i < f->node_count; i++) {
+        const float *b = posed + TREEPIECES_BONE * (size_t)i;
+        const float want[3] = {f->nodes[i].radius, f->nodes[i].length, f->nodes[i].radius};
+        for (int c = 0; c < 3; c++) {
+            const float *x = b + c, *y = b + (c + 1) % 3;
+            const float dot = x[0] * y[0] + x[4] * y[4] + x[8] * y[8];
+            const float length = sqrtf(x[0] * x[0] + x[4] * x[4] + x[8] * x[8]);
+            assert_true(fabsf(length - want[c]) <= 1e-4f * want[c]);
+            assert_true(fabsf(dot) <= 1e-4f * want[c] * want[(c + 1) % 3]);
+        }
+        moved += memcmp(b, rest + TREEPIECES_BONE * (size_t)i, 48) != 0;
+    }
+    assert_true(moved > (int)f->node_count * 9 / 10);
+    free(joints);
+    free(same);
+    free(posed);
+    free(rest);
+    treepieces_forest_free(f);
+}
+
+static float farthest(const float *a, const float *b, uint32_t nodes) {
+    float most = 0;
+    for (uint32_t i = 0; i < nodes; i++)
+        for (int k = 0; k < 3; k++)
+            most = txm_maxf(most, fabsf(a[12 * (size_t)i + (size_t)(4 * k + 3)] -
+                                        b[12 * (size_t)i + (size_t)(4 * k + 3)]));
+    return most;
+}
+
+/* In steady wind trees lean and come to rest there, by steps of any length; without they stand up. */
+static void test_wind(void **state) {
+    (void)state;
+    treepieces_forest_desc d = describe(2, 300);
+    treepieces_forest *f = grow(&d);
+    float *rest = make_bones(f, NULL), *lean = make_bones(f, NULL), *bones = make_bones(f, NULL);
+    float *sway = (float *)room(f->node_count, 16);
+    treepieces_wind wind = {0, 10, 0, 1};
+    assert_int_equal(treepieces_sway(f, &wind, 1e4, 1e4, NULL, NULL, sway, lean), TXM_OK);
+    assert_true(farthest(rest, lean, f->node_count) > 0.02f);
+    const float *tip = lean + 12 * (size_t)(f->trees[0].node_count - 1);
+    assert_true(tip[3] > rest[12 * (size_t)(f->trees[0].node_count - 1) + 3]); /* to +x */
+    for (int i = 0; i < 5; i++) {
+        const double steps[5] = {1e-4, 0.5, 3, 1e3, 1e8};
+        memset(sway, 0, f->node_count * 16);
+        double time = 0;
+        for (int k = 0; k < (i < 2 ? 4000 : 40); k++) {
+            assert_int_equal(treepieces_sway(f, &wind, time, steps[i], NULL, NULL, sway, bones),
+                             TXM_OK);
+            time += steps[i] < 1e6 ? steps[i] : 0;
+            if (k % 16 == 0) /* never farther than a swing past where it comes to rest */
+                assert_true(farthest(rest, bones, f->node_count) <
+                            2.2f * farthest(rest, lean, f->node_count));
+        }
+        if (i) assert_true(farthest(lean, bones, f->node_count) < 0.01f);
+    }
+    wind.speed = 0;
+    for (int k = 0; k < 10; k++) treepieces_sway(f, &wind, 0, 100, NULL, NULL, sway, bones);
+    assert_true(farthest(rest, bones, f->node_count) < 1e-3f);
+    /* two steps are one */
+    wind.speed = 10;
+    float *twice = (float *)room(f->node_count, 16);
+    memset(sway, 0, f->node_count * 16);
+    treepieces_sway(f, &wind, 0.2, 0.2, NULL, NULL, sway, lean);
+    treepieces_sway(f, &wind, 0.1, 0.1, NULL, NULL, twice, bones);
+    treepieces_sway(f, &wind, 0.2, 0.1, NULL, NULL, twice, bones);
+    const float way = farthest(rest, lean, f->node_count); /* where it rests changes as it leans */
+    assert_true(way > 0.01f && farthest(lean, bones, f->node_count) < 0.1f * way);
+    free(twice);
+    free(sway);
+    free(rest);
+    free(lean);
+    free(bones);
+    treepieces_forest_free(f);
+}
+
+/* Trees of one seed in different places do not sway alike: the correlation of their tops' way. */
+static void test_no_unison(void **state) {
+    (void)state;
+    enum { TREES = 8, STEPS = 400 };
+    static double way[TREES][STEPS];
+    treepieces_place places[TREES];
+    treepieces_forest_desc d = describe(TREES, 150);
+    memset(places, 0, sizeof places);
+    for (int i = 0; i < TREES; i++) {
+        places[i].position[0] = 9.0f * (float)i;
+        places[i].position[2] = 5.0f * (float)(i % 3);
+        places[i].seed = (uint64_t)i;
+    }
+    d.places = places;
+    treepieces_forest *f = grow(&d);
+    float *bones = make_bones(f, NULL), *sway = (float *)room(f->node_count, 16);
+    const treepieces_wind wind = {0, 8, 0.7f, 2};
+    for (int s = -60; s < STEPS; s++) {
+        assert_int_equal(treepieces_sway(f, &wind, s * 0.1, 0.1, NULL, NULL, sway, bones), TXM_OK);
+        for (int i = 0; i < TREES && s >= 0; i++) {
+            const treepieces_tree *t = &f->trees[i];
+            double sum = 0; /* of all its joints, along the wind */
+            for (uint32_t n = 0; n < t->node_count; n++)
+                sum += (double)bones[12 * (size_t)(t->first_node + n) + 3];
+            way[i][s] = sum / t->node_count;
+        }
+    }
+    for (int i = 0; i < TREES; i++)
+        for (int j = 0; j < i; j++) {
+            double mi = 0, mj = 0, ii = 0, jj = 0, ij = 0;
+            for (int s = 0; s < STEPS; s++) {
+                mi += way[i][s] / STEPS;
+                mj += way[j][s] / STEPS;
+            }
+            for (int s = 0; s < STEPS; s++) {
+                ii += (way[i][s] - mi) * (way[i][s] - mi);
+                jj += (way[j][s] - mj) * (way[j][s] - mj);
+                ij += (way[i][s] - mi) * (way[j][s] - mj);
+            }
+            assert_true(ij / sqrt(ii * jj) < 0.95);
+        }
+    free(sway);
+    free(bones);
+    treepieces_forest_free(f);
+}
+
+/* Gusts travel with the wind: what is here now is downwind later, changed a little. */
+static void test_gusts(void **state) {
+    (void)state;
+    const treepieces_wind wind = {0, 10, 1, 4};
+    double here = 0, there = 0, still = 0;
+    for (int i = 0; i < 400; i++) {
+        const float x = 3.0f * (float)i, a[3] = {x, 0, 0}, b[3] = {x + 10, 0, 0};
+        const double p = (double)treepieces_gust(&wind, a, 5);
+        assert_true(p >= 0);
+        here += p;
+        there += fabs(p - (double)treepieces_gust(&wind, b, 6));
+        still += fabs(p - (double)treepieces_gust(&wind, a, 6));
+    }
+    assert_true(fabs(here / 400 - 1) < 0.35);
+    assert_true(there < 0.5 * still);
+}
+
+/* ---- faults -------------------------------------------------------------------------------- */
+
+static void bad_rule(void *user, const treepieces_site *site, txm_rng *rng,
+                     treepieces_choice *choice) {
+    (void)site;
+    (void)rng;
+    switch (*(const int *)user) {
+    case 0: choice->type = 99; break;
+    case 1: choice->turn = 6; break;
+    case 2: choice->length = 0; break;
+    case 3: choice->direction[1] = (float)INFINITY; break;
+    default: choice->ratios[0] = 2; break;
+    }
+}
+
+static void test_arguments(void **state) {
+    (void)state;
+    treepieces_forest *f = NULL;
+    txm_env env = tk_env(NULL, NULL);
+    for (int i = 0; i < 12; i++) {
+        treepieces_place place;
+        treepieces_forest_desc d = describe(1, 100);
+        memset(&place, 0, sizeof place);
+        switch (i) {
+        case 0: d.kit = NULL; break;
+        case 1: d.species = NULL; break;
+        case 2: d.species_count = 0; break;
+        case 3: d.tree_count = 0; break;
+        case 4: d.max_pieces = 7; break;
+        case 5: d.max_pieces = 65536; break;
+        case 6: d.rule = 3; break;
+        case 7: d.spacing = -1; break;
+        case 8: place.position[1] = (float)NAN; break;
+        case 9: place.scale = -1; break;
+        case 10: place.species = 1; break;
+        default: place.turn = (float)INFINITY; break;
+        }
+        if (i >= 8) d.places = &place;
+        env.message[0] = 0;
+        f = (treepieces_forest *)1;
+        assert_int_equal(treepieces_forest_make(&d, &env, &f), TXM_BAD_ARGUMENT);
+        assert_null(f);
+        assert_true(strlen(env.message) > 8);
+    }
+    for (int i = 0; i < 5; i++) {
+        treepieces_forest_desc d = describe(2, 100);
+        d.own_rule = bad_rule;
+        d.own_user = &i;
+        assert_int_equal(treepieces_forest_make(&d, &env, &f), TXM_BAD_ARGUMENT);
+        assert_non_null(strstr(env.message, "own_rule"));
+    }
+    treepieces_forest_desc d = describe(1, 50);
+    f = grow(&d);
+    float *bones = make_bones(f, NULL), *sway = (float *)room(f->node_count, 16);
+    treepieces_wind wind = {0, 5, 0.5f, 0};
+    treepieces_pose pose;
+    memset(&pose, 0, sizeof pose);
+    pose.amount = -1;
+    assert_int_equal(treepieces_bones(f, &pose, &env, bones), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_bones(f, NULL, &env, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_sway(f, NULL, 0, 0, NULL, &env, sway, bones), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_sway(f, &wind, 0, -1, NULL, &env, sway, bones), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_sway(f, &wind, NAN, 0, NULL, &env, sway, bones), TXM_BAD_ARGUMENT);
+    wind.speed = -1;
+    assert_int_equal(treepieces_sway(f, &wind, 0, 0, NULL, &env, sway, bones), TXM_BAD_ARGUMENT);
+    free(sway);
+    free(bones);
+    treepieces_forest_free(f);
+    treepieces_forest_free(NULL);
+}
+
+/* Every allocation in turn fails, every report cancels: nothing leaks, nothing is made. */
+static void test_faults(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        for (long k = 1;; k++) {
+            tk_memory memory;
+            tk_progress progress;
+            memset(&memory, 0, sizeof memory);
+            memset(&progress, 0, sizeof progress);
+            if (kind < 2) memory.fail_at = k;
+            memory.fail_onward = kind;
+            if (kind == 2) progress.cancel_at = k;
+            txm_env env = tk_env(&memory, &progress);
+            treepieces_forest_desc d = describe(65, 60); /* in blocks of 64 */
+            treepieces_species small = oak;
+            small.order_count = 1;
+            d.species = &small;
+            treepieces_forest *f = (treepieces_forest *)1;
+            const txm_status status = treepieces_forest_make(&d, &env, &f);
+            assert_int_equal(progress.errors, 0);
+            const int past = kind < 2 ? memory.calls < k : progress.calls < k;
+            if (past) {
+                assert_int_equal(status, TXM_OK);
+                treepieces_forest_free(f);
+                assert_int_equal(tk_leaks(&memory), 0);
+                break;
+            }
+            assert_int_equal(status, kind < 2 ? TXM_OUT_OF_MEMORY : TXM_CANCELLED);
+            assert_null(f);
+            assert_int_equal(progress.late, 0);
+            assert_int_equal(tk_leaks(&memory), 0);
+        }
+    }
+}
+
+/* What a forest says it takes is what it takes, and 1,000 trees of 4,000 triangles stay below 24 KB
+   each, bones and sway included. */
+static void test_memory(void **state) {
+    (void)state;
+    tk_memory memory;
+    memset(&memory, 0, sizeof memory);
+    txm_env env = tk_env(&memory, NULL);
+    treepieces_forest_desc d = describe(1000, 165);
+    treepieces_forest *f;
+    assert_int_equal(treepieces_forest_make(&d, &env, &f), TXM_OK);
+    size_t triangles = 0;
+    for (int t = 0; t < f->type_count; t++)
+        triangles += 2 * (size_t)f->batches[t].count * (size_t)f->batches[t].quad_count;
+    assert_true(triangles >= 4000 * 1000);
+    assert_true(memory.live_bytes <= f->bytes + 4096 && memory.live_bytes + 4096 >= f->bytes);
+    assert_true(f->bytes + f->node_count * (48 + 16) <= 24 * 1024 * (size_t)1000);
+    treepieces_forest_free(f);
+}
+
+/* The quick start of the head comment, built and run. */
+static void test_quick_start(void **state) {
+    (void)state;
+    assert_int_equal(tk_quick_start("treepieces.h", "treepieces"), 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_rims),      cmocka_unit_test(test_rims_in_wind),
+        cmocka_unit_test(test_records),   cmocka_unit_test(test_bark_continues),
+        cmocka_unit_test(test_seeds),     cmocka_unit_test(test_budget),
+        cmocka_unit_test(test_rules),     cmocka_unit_test(test_pruning),
+        cmocka_unit_test(test_bones),     cmocka_unit_test(test_wind),
+        cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
+        cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_memory),    cmocka_unit_test(test_quick_start),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

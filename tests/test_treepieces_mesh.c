@@ -1,0 +1,470 @@
+/* test_treepieces_mesh.c - trees: levels of detail, the tessellator, baked meshes and their bark
+   SPDX-License-Identifier: MIT OR Unlicense                                                    */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#define TREEPIECES_IMPLEMENTATION
+#include "treepieces.h"
+#include "testkit.h"
+
+enum { MOST_POINTS = 4 * 64 + 63 * 63, MOST_TRIANGLES = 2 * 64 * 64 + 4 * 64, SHEET = 512 };
+
+static treepieces_kit *kit;
+
+static int set_up(void **state) {
+    (void)state;
+    return treepieces_kit_make(NULL, 0, NULL, &kit) != TXM_OK;
+}
+static int tear_down(void **state) {
+    (void)state;
+    treepieces_kit_free(kit);
+    return 0;
+}
+
+static void *room(size_t count, size_t size) {
+    void *p = calloc(count + 1, size);
+    assert_non_null(p);
+    return p;
+}
+
+/* A tree of a preset, with its bones. */
+typedef struct grown {
+    treepieces_species species;
+    treepieces_forest *forest;
+    float *bones;
+} grown;
+
+static grown grow(int preset, int pieces, float pose_amount, uint64_t seed) {
+    grown g;
+    treepieces_forest_desc d;
+    treepieces_pose pose;
+    const char *text = treepieces_preset_text(preset);
+    memset(&d, 0, sizeof d);
+    memset(&pose, 0, sizeof pose);
+    assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &g.species), TXM_OK);
+    d.kit = kit;
+    d.species = &g.species;
+    d.species_count = 1;
+    d.tree_count = 1;
+    d.max_pieces = pieces;
+    d.seed = seed;
+    pose.amount = pose_amount;
+    assert_int_equal(treepieces_forest_make(&d, NULL, &g.forest), TXM_OK);
+    g.bones = (float *)room(g.forest->node_count, TREEPIECES_BONE * sizeof(float));
+    assert_int_equal(treepieces_bones(g.forest, &pose, NULL, g.bones), TXM_OK);
+    return g;
+}
+
+static void free_grown(grown *g) {
+    treepieces_forest_free(g->forest);
+    free(g->bones);
+}
+
+static int compare_keys(const void *a, const void *b) {
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Sides of triangles as sorted keys from << 32 | to. */
+static uint64_t *sort_sides(const uint32_t *indices, size_t corners) {
+    uint64_t *sides = (uint64_t *)room(corners, sizeof *sides);
+    for (size_t i = 0; i < corners; i++)
+        sides[i] = (uint64_t)indices[i] << 32 | indices[i % 3 == 2 ? i - 2 : i + 1];
+    qsort(sides, corners, sizeof *sides, compare_keys);
+    return sides;
+}
+
+static int has_side(const uint64_t *sides, size_t count, uint32_t from, uint32_t to) {
+    const uint64_t key = (uint64_t)from << 32 | to;
+    return bsearch(&key, sides, count, sizeof key, compare_keys) != NULL;
+}
+
+/* ---- the pattern --------------------------------------------------------------------------- */
+
+/* One pattern: the points lie where they should, triangles face one way, fill the square and have no
+   crack: every side but those of the border is met from both sides. */
+static void check_pattern(const int edges[4], int inner) {
+    static float coords[2 * MOST_POINTS];
+    static uint16_t indices[3 * MOST_TRIANGLES];
+    static uint32_t wide[3 * MOST_TRIANGLES];
+    int triangles, counted;
+    const int points = treepieces_pattern(edges, inner, coords, indices, &triangles);
+    assert_int_equal(treepieces_pattern(edges, inner, NULL, NULL, &counted), points);
+    assert_int_equal(triangles, counted);
+    assert_true(points <= MOST_POINTS && triangles <= MOST_TRIANGLES);
+    double area = 0;
+    for (int t = 0; t < triangles; t++) {
+        const float *p[3];
+        for (int k = 0; k < 3; k++) {
+            assert_true(indices[3 * t + k] < points);
+            p[k] = coords + 2 * indices[3 * t + k];
+            wide[3 * t + k] = indices[3 * t + k];
+        }
+        /* (0, 0), (0, 1), (1, 1) is counter-clockwise from outside: v points down */
+        const double twice = (double)(p[1][1] - p[0][1]) * (double)(p[2][0] - p[0][0]) -
+                             (double)(p[1][0] - p[0][0]) * (double)(p[2][1] - p[0][1]);
+        assert_true(twice > 0);
+        area += twice / 2;
+    }
+    assert_true(fabs(area - 1) < 1e-6);
+    uint64_t *sides = sort_sides(wide, 3 * (size_t)triangles);
+    int border = 0;
+    for (int i = 0; i < 3 * triangles; i++) {
+        if (i) assert_true(sides[i] != sides[i - 1]);
+        const uint32_t a = (uint32_t)(sides[i] >> 32), b = (uint32_t)sides[i];
+        if (has_side(sides, 3 * (size_t)triangles, b, a)) continue;
+        const float *p = coords + 2 * a, *q = coords + 2 * b;
+        assert_true((p[0] == q[0] && (p[0] == 0 || p[0] == 1)) ||
+                    (p[1] == q[1] && (p[1] == 0 || p[1] == 1)));
+        border++;
+    }
+    assert_int_equal(border, edges[0] + edges[1] + edges[2] + edges[3]);
+    free(sides);
+    for (int k = 0, first = 0; k < 4; first += edges[k++]) /* places along sides, symmetric */
+        for (int i = 1; i < edges[k]; i++) {
+            const float *a = coords + 2 * (first + i), *b = coords + 2 * (first + edges[k] - i);
+            const int axis = k == 0 || k == 2;
+            assert_true(a[axis] == 1 - b[axis] && b[axis] == 1 - a[axis]);
+            assert_true(fabsf((k < 2 ? a[axis] : 1 - a[axis]) - (float)i / (float)edges[k]) < 1e-5f);
+        }
+}
+
+static void test_pattern(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(3, 0);
+    for (int a = 1; a <= 10; a++)
+        for (int b = 1; b <= 10; b++)
+            for (int inner = 1; inner <= 10; inner += 3) {
+                const int edges[4] = {a, b, 11 - a, 1 + (a + b) % 10};
+                check_pattern(edges, inner);
+            }
+    for (int i = 0; i < 60; i++) {
+        int edges[4];
+        for (int k = 0; k < 4; k++) edges[k] = txm_rng_range(&rng, 1, 64);
+        check_pattern(edges, txm_rng_range(&rng, 1, 64));
+    }
+    const int one[4] = {1, 1, 1, 1};
+    int triangles;
+    assert_int_equal(treepieces_pattern(one, 1, NULL, NULL, &triangles), 4);
+    assert_int_equal(triangles, 2);
+}
+
+/* Two quads at one edge, in all orientations: the same level, and the same points to the bit. */
+static void test_shared_edges(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(8, 0);
+    const treepieces_lod lod = {{0.3f, -0.2f, 0.1f}, 10, 0.8f, 0};
+    static float coords[2][2 * MOST_POINTS];
+    static const int other_inner[4] = {1, 3, 6, 9};
+    for (int trial = 0; trial < 400; trial++) {
+        float p[2][12], n[2][12];
+        const int side[2] = {trial & 3, trial >> 2 & 3};
+        for (int i = 0; i < 12; i++)
+            for (int q = 0; q < 2; q++) {
+                p[q][i] = 2 * txm_rng_float(&rng) - 1;
+                n[q][i] = 2 * txm_rng_float(&rng) - 1;
+            }
+        for (int q = 0; q < 2; q++)
+            for (int c = 0; c < 4; c++) tpc_unit(n[q] + 3 * c);
+        for (int e = 0; e < 2; e++) { /* the second meets the edge the other way round */
+            const int from = 3 * ((side[0] + e) % 4), to = 3 * ((side[1] + 1 - e) % 4);
+            memcpy(p[1] + to, p[0] + from, 12);
+            memcpy(n[1] + to, n[0] + from, 12);
+        }
+        int level[2], edges[2][4], first[2];
+        for (int q = 0; q < 2; q++) {
+            for (int k = 0; k < 4; k++)
+                edges[q][k] = treepieces_edge_level(&lod, p[q] + 3 * k, p[q] + 3 * ((k + 1) % 4));
+            level[q] = edges[q][side[q]];
+            first[q] = 0;
+            for (int k = 0; k < side[q]; k++) first[q] += edges[q][k];
+            treepieces_pattern(edges[q], other_inner[(trial + q) % 4], coords[q], NULL, NULL);
+        }
+        assert_int_equal(level[0], level[1]);
+        for (int i = 0; i <= level[0]; i++) {
+            float a[2][3], b[2][3];
+            for (int q = 0; q < 2; q++) {
+                const int at = q ? level[1] - i : i;
+                const int corner = side[q] == 3 ? 0 : first[q] + level[q];
+                const float *uv = coords[q] + 2 * (at == level[q] ? corner : first[q] + at);
+                treepieces_patch_point(p[q], n[q], i % 3 ? 0 : 0.9f, uv[0], uv[1], a[q], b[q]);
+            }
+            for (int k = 0; k < 3; k++) assert_true(a[0][k] == a[1][k] && b[0][k] == b[1][k]);
+        }
+    }
+}
+
+/* Levels fall by half with every half_distance and are those of the formula. */
+static void test_levels(void **state) {
+    (void)state;
+    treepieces_lod lod = {{0, 0, 0}, 10, 5, 0};
+    for (int i = 0; i < 400; i++) {
+        const float d = 0.1f * (float)i, a[3] = {d - 1, 0, 0}, b[3] = {d + 1, 0, 0};
+        const double exact = 10 * pow(2, -(double)d / 5);
+        const int level = treepieces_edge_level(&lod, a, b);
+        assert_true(level >= 1 && (double)level >= exact - 1e-4 && (level == 1 || level - 1 < exact + 1e-4));
+        const float corners[12] = {d - 1, 0, 0, d + 1, 0, 0, d, 1, 0, d, -1, 0};
+        assert_int_equal(treepieces_inner_level(&lod, corners), level);
+        assert_int_equal(treepieces_edge_level(&lod, b, a), level);
+    }
+    lod.max_level = 0;
+    const float here[3] = {0, 0, 0};
+    assert_int_equal(treepieces_edge_level(&lod, here, here), 1);
+}
+
+/* Six flat sides become nearly round: shape 0 stands for 0.6. */
+static void test_phong(void **state) {
+    (void)state;
+    const float c = 0.5f, s = 0.8660254f; /* a side of a hexagonal tube of radius 1 */
+    const float p[12] = {1, 1, 0, 1, 0, 0, c, 0, -s, c, 1, -s};
+    const float n[12] = {1, 0, 0, 1, 0, 0, c, 0, -s, c, 0, -s};
+    for (int i = 0; i <= 20; i++) {
+        float at[3], up[3], flat[3];
+        treepieces_patch_point(p, n, 0, (float)i / 20, 0.3f, at, up);
+        treepieces_patch_point(p, n, -1, (float)i / 20, 0.3f, flat, NULL);
+        assert_true(fabsf(at[0] * at[0] + at[2] * at[2] - 1) < 0.03f);
+        assert_true(flat[0] * flat[0] + flat[2] * flat[2] <= 1.000001f);
+        assert_true(fabsf(tpc_dot(up, up) - 1) < 1e-5f);
+        assert_true(fabsf(at[1] - 0.7f) < 1e-6f);
+    }
+}
+
+/* ---- baked trees ---------------------------------------------------------------------------- */
+
+static uint32_t find_root(uint32_t *root, uint32_t i) {
+    while (root[i] != i) i = root[i] = root[root[i]];
+    return i;
+}
+
+/* One component, oriented, no side met twice, borders only where expected; joints in range. */
+static void audit(const treepieces_mesh *m, uint32_t nodes, size_t borders) {
+    const size_t corners = 3 * m->triangle_count;
+    uint64_t *sides = sort_sides(m->indices, corners);
+    uint32_t *root = (uint32_t *)room(m->vertex_count, sizeof *root);
+    size_t open = 0, components = 0;
+    for (size_t i = 0; i < m->vertex_count; i++) root[i] = (uint32_t)i;
+    for (size_t i = 0; i < corners; i++) {
+        const uint32_t a = (uint32_t)(sides[i] >> 32), b = (uint32_t)sides[i];
+        assert_true(a != b);
+        if (i) assert_true(sides[i] != sides[i - 1]);
+        open += !has_side(sides, corners, b, a);
+        root[find_root(root, a)] = find_root(root, b);
+    }
+    for (size_t i = 0; i < m->vertex_count; i++) components += root[i] == i;
+    assert_int_equal(components, 1);
+    assert_int_equal(open, borders);
+    for (size_t i = 0; i < m->vertex_count; i++) {
+        float sum = 0;
+        for (int k = 0; k < 4; k++) {
+            const float w = m->weights[4 * i + (size_t)k];
+            assert_true(m->joints[4 * i + (size_t)k] < nodes && w >= 0);
+            if (w == 0) assert_int_equal(m->joints[4 * i + (size_t)k], 0);
+            sum += w;
+        }
+        assert_true(fabsf(sum - 1) < 1e-4f);
+        assert_true(fabsf(tpc_dot(m->normals + 3 * i, m->normals + 3 * i) - 1) < 1e-3f);
+    }
+    free(root);
+    free(sides);
+}
+
+/* Every species, without tessellation, with levels from 10 to 1, and capped. */
+static void test_species_meshes(void **state) {
+    (void)state;
+    for (int preset = 0; preset < treepieces_preset_count(); preset++) {
+        for (int kind = 0; kind < 3; kind++) {
+            grown g = grow(preset, kind ? 60 : 500, kind ? 0.1f : 0, (uint64_t)preset + 40);
+            const treepieces_lod lod = {{0.8f, 1, 0.5f}, 10, 1.2f, 0};
+            treepieces_bake_desc d;
+            treepieces_mesh *m;
+            memset(&d, 0, sizeof d);
+            d.forest = g.forest;
+            d.bones = g.bones;
+            d.lod = kind ? &lod : NULL;
+            assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
+            size_t borders = 6;
+            if (kind) { /* as the levels of the root rim say */
+                const treepieces_node *n = &g.forest->nodes[0];
+                const treepieces_piece *piece = treepieces_kit_piece(kit, n->type);
+                float p[3 * TREEPIECES_MAX_VERTICES];
+                treepieces_skin(g.forest, g.bones, n->type, 0, p, NULL);
+                borders = 0;
+                for (int j = 0; j < 6; j++)
+                    borders += (size_t)treepieces_edge_level(&lod, p + 3 * piece->root_rim[j],
+                                                             p + 3 * piece->root_rim[(j + 1) % 6]);
+                assert_true(borders > 6);
+            }
+            audit(m, g.forest->node_count, borders);
+            treepieces_mesh_free(m);
+            if (kind == 2) {
+                d.capped = 1;
+                assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
+                audit(m, g.forest->node_count, 0);
+                treepieces_mesh_free(m);
+            }
+            free_grown(&g);
+        }
+    }
+}
+
+/* A value and the area that has it. */
+typedef struct share {
+    double value, area;
+} share;
+
+static int compare_shares(const void *a, const void *b) {
+    const double x = ((const share *)a)->value, y = ((const share *)b)->value;
+    return x < y ? -1 : x > y;
+}
+
+/* The value below which so much of the area lies; shares sorted. */
+static double quantile(share *shares, size_t count, double part) {
+    double all = 0, sum = 0;
+    qsort(shares, count, sizeof *shares, compare_shares);
+    for (size_t i = 0; i < count; i++) all += shares[i].area;
+    for (size_t i = 0; i < count; i++) {
+        sum += shares[i].area;
+        if (sum >= part * all) return shares[i].value;
+    }
+    return 0;
+}
+
+/* Texels per metre, and how much more of them one way than the other (the ratio of the singular values
+   of the map from the surface to texels), of one triangle. Returns its area. */
+static double measure_texels(const treepieces_mesh *m, size_t t, double *density, double *ratio) {
+    const float *p[3], *uv = m->uvs + 6 * t;
+    double a[3], b[3], n[3];
+    for (int k = 0; k < 3; k++) p[k] = m->positions + 3 * (size_t)m->indices[3 * t + (size_t)k];
+    for (int k = 0; k < 3; k++) {
+        a[k] = (double)(p[1][k] - p[0][k]);
+        b[k] = (double)(p[2][k] - p[0][k]);
+    }
+    n[0] = a[1] * b[2] - a[2] * b[1];
+    n[1] = a[2] * b[0] - a[0] * b[2];
+    n[2] = a[0] * b[1] - a[1] * b[0];
+    const double area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / 2;
+    const double high = SHEET * (double)TREEPIECES_OWN; /* the sheet's layers */
+    const double u1 = (double)(uv[2] - uv[0]) * SHEET, v1 = (double)(uv[3] - uv[1]) * high;
+    const double u2 = (double)(uv[4] - uv[0]) * SHEET, v2 = (double)(uv[5] - uv[1]) * high;
+    const double x1 = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+    const double x2 = (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / x1, y2 = 2 * area / x1;
+    const double m00 = u1 / x1, m01 = (u2 - u1 * x2 / x1) / y2;
+    const double m10 = v1 / x1, m11 = (v2 - v1 * x2 / x1) / y2;
+    const double q = sqrt((m00 + m11) * (m00 + m11) + (m10 - m01) * (m10 - m01));
+    const double r = sqrt((m00 - m11) * (m00 - m11) + (m10 + m01) * (m10 + m01));
+    *density = sqrt(fabs(m00 * m11 - m01 * m10));
+    *ratio = (q + r) / fabs(q - r);
+    return area;
+}
+
+/* Bark is about as fine everywhere and not drawn out. Faces look where their vertices' normals do. */
+static void test_bark_on_species(void **state) {
+    (void)state;
+    for (int preset = 0; preset < treepieces_preset_count(); preset++) {
+        for (int pieces = 165; pieces <= 1320; pieces *= 2) {
+            grown g = grow(preset, pieces, 0, 9);
+            treepieces_bake_desc d;
+            treepieces_mesh *m;
+            size_t away = 0;
+            memset(&d, 0, sizeof d);
+            d.forest = g.forest;
+            d.bones = g.bones;
+            assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
+            share *density = (share *)room(m->triangle_count, sizeof *density);
+            share *ratio = (share *)room(m->triangle_count, sizeof *ratio);
+            for (size_t t = 0; t < m->triangle_count; t++) {
+                density[t].area = ratio[t].area =
+                    measure_texels(m, t, &density[t].value, &ratio[t].value);
+                const float *p[3];
+                float sum[12];
+                for (int k = 0; k < 3; k++) {
+                    const size_t v = m->indices[3 * t + (size_t)k];
+                    p[k] = m->positions + 3 * v;
+                    memcpy(sum + 3 * k, m->normals + 3 * v, 12);
+                }
+                memset(sum + 9, 0, 12);
+                away += tpc_facing(p[0], p[1], p[2], sum) < 0;
+            }
+            const double spread = quantile(density, m->triangle_count, 0.99) /
+                                  quantile(density, m->triangle_count, 0.01);
+            const double drawn = quantile(ratio, m->triangle_count, 0.99);
+            if (spread > 6 || drawn > 6 || away * 1000 > m->triangle_count)
+                fail_msg("%s, %d pieces: density p99/p1 %.2f, anisotropy p99 %.2f, %d of %d faces away",
+                         g.species.name, pieces, spread, drawn, (int)away, (int)m->triangle_count);
+            free(density);
+            free(ratio);
+            treepieces_mesh_free(m);
+            free_grown(&g);
+        }
+    }
+}
+
+/* Every allocation in turn fails, every report cancels. */
+static void test_faults(void **state) {
+    (void)state;
+    grown g = grow(0, 200, 0, 1);
+    const treepieces_lod lod = {{0, 1, 0}, 3, 2, 0};
+    treepieces_bake_desc d;
+    memset(&d, 0, sizeof d);
+    d.forest = g.forest;
+    d.bones = g.bones;
+    d.lod = &lod;
+    for (int kind = 0; kind < 3; kind++) {
+        for (long k = 1;; k++) {
+            tk_memory memory;
+            tk_progress progress;
+            memset(&memory, 0, sizeof memory);
+            memset(&progress, 0, sizeof progress);
+            if (kind < 2) memory.fail_at = k;
+            memory.fail_onward = kind;
+            if (kind == 2) progress.cancel_at = k;
+            txm_env env = tk_env(&memory, &progress);
+            treepieces_mesh *m = (treepieces_mesh *)1;
+            const txm_status status = treepieces_bake(&d, &env, &m);
+            assert_int_equal(progress.errors, 0);
+            if (kind < 2 ? memory.calls < k : progress.calls < k) {
+                assert_int_equal(status, TXM_OK);
+                treepieces_mesh_free(m);
+                assert_int_equal(tk_leaks(&memory), 0);
+                break;
+            }
+            assert_int_equal(status, kind < 2 ? TXM_OUT_OF_MEMORY : TXM_CANCELLED);
+            assert_null(m);
+            assert_int_equal(progress.late, 0);
+            assert_int_equal(tk_leaks(&memory), 0);
+        }
+    }
+    for (int i = 0; i < 8; i++) {
+        treepieces_bake_desc bad = d;
+        treepieces_lod far = lod;
+        treepieces_mesh *m = (treepieces_mesh *)1;
+        switch (i) {
+        case 0: bad.forest = NULL; break;
+        case 1: bad.tree = 1; break;
+        case 2: bad.bones = NULL; break;
+        case 3: bad.sheet_layers = 65; break;
+        case 4: bad.sheet_size = -1; break;
+        case 5: far.max_level = 65; break;
+        case 6: far.shape = 2; break;
+        default: far.half_distance = (float)NAN; break;
+        }
+        bad.lod = &far;
+        assert_int_equal(treepieces_bake(&bad, NULL, &m), TXM_BAD_ARGUMENT);
+        assert_null(m);
+    }
+    treepieces_mesh_free(NULL);
+    free_grown(&g);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_pattern),         cmocka_unit_test(test_shared_edges),
+        cmocka_unit_test(test_levels),          cmocka_unit_test(test_phong),
+        cmocka_unit_test(test_species_meshes),  cmocka_unit_test(test_bark_on_species),
+        cmocka_unit_test(test_faults),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,659 @@
+/* tree.c - texkit tree and texkit forest: a species in, trees out
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   Read the species, grow, pose, dress (bark, leaves), build, write: grow_trees and run_job at the
+   end tell the story. What is built is a baked mesh, a mesh with a skeleton, or copies.          */
+#include "tree.h"
+#include "image_io.h"
+
+#define TREEPIECES_IMPLEMENTATION
+#include "treepieces.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <stdio.h>
+
+enum { MAX_LEVEL = 16, BAKED_LOOKS = 8 };
+
+static const cli_manual tree_manual = {
+    "tree", "-o OUT [options]", "grow a tree from interlocking pieces",
+    "OUT ends in\n"
+    "  .glb  one mesh on a skeleton, a joint for every piece, and with --wind a clip of it\n"
+    "        swaying that goes round without a step\n"
+    "  .obj  a mesh with its pictures beside it; the bark is one closed surface\n"
+    "  .ply  the same mesh with colors, without pictures\n"
+    "  .txt  the species itself, to be changed and given to --species (docs/trees.md)\n"
+    "Species: oak, beech, maple, birch, poplar, willow, almond, pine, spruce, dead.\n"
+    "Another --seed, another tree. --bones leaves thin twigs without joints of their own,\n"
+    "for games that take few. --pose bends every joint a little at random: the skeleton\n"
+    "of a .glb, the mesh of the others. --wind bends the mesh of the others as it is at\n"
+    "one moment. Where no --tiles and --leaf are given, bark and leaves are drawn.\n",
+    "  texkit tree -o oak.glb --species oak --wind 8\n"
+    "  texkit tree -o mine.txt --species birch\n"
+    "  texkit tree -o mine.obj --species mine.txt --tiles bark-tiles --level 3\n",
+    0, NULL, 0};
+
+static const cli_manual forest_manual = {
+    "forest", "--count N -o OUT [options]", "grow many trees, no two alike, from the same pieces",
+    "OUT ends in\n"
+    "  .glb  copies of some pieces and leaf clouds (EXT_mesh_gpu_instancing): 10 nodes at\n"
+    "        most, one more for each species with leaves beyond three, however many trees\n"
+    "  .obj  every tree as a mesh, with the pictures beside it\n"
+    "  .ply  the same with colors, without pictures\n"
+    "glTF does not let copies have skeletons: those of a .glb are rigid, and where a branch\n"
+    "bends its pieces overlap a little. 'texkit tree' writes one tree that can move. All\n"
+    "copies of a piece show the same tiles of bark.\n",
+    "  texkit forest --count 1000 -o forest.glb --species oak,birch,spruce\n"
+    "  texkit forest --count 20 -o grove.obj --species poplar --spacing 6 --pieces 200\n",
+    0, NULL, 0};
+
+void *tree_array(size_t count, size_t size) {
+    size_t bytes;
+    return txm_mul(count, size, 1, &bytes) ? calloc(1, bytes ? bytes : 1) : NULL;
+}
+
+int tree_fail_memory(tree_job *j) {
+    return cli_fail(&j->run, CLI_FAILED, "out of memory; take fewer --pieces%s",
+                    j->is_forest ? " or trees" : "");
+}
+
+static int check_result(tree_job *j, txm_status result, const char *what) {
+    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, what);
+}
+
+static int is_glb(const tree_job *j) {
+    return !strcmp(j->extension, ".glb");
+}
+
+/* ---- species ------------------------------------------------------------------------------- */
+
+/* A built-in species, or one from a file: names with a dot or a slash are files. */
+static int read_species(tree_job *j, const char *name, treepieces_species *species) {
+    size_t size;
+    if (!strpbrk(name, "./"))
+        return check_result(j, treepieces_preset(name, &j->run.env, species), name);
+    unsigned char *text = file_read(name, &size);
+    if (!text) return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", name, strerror(errno));
+    const txm_status result =
+        treepieces_species_parse((const char *)text, size, &j->run.env, species);
+    free(text);
+    return check_result(j, result, name);
+}
+
+static int read_all_species(tree_job *j) {
+    char name[MAX_PATH];
+    const char *list = j->species_list;
+    while (list) {
+        const char *comma = j->is_forest ? strchr(list, ',') : NULL;
+        const size_t length = comma ? (size_t)(comma - list) : strlen(list);
+        if (j->species_count == MAX_SPECIES)
+            return cli_fail(&j->run, CLI_USAGE, "--species: at most %d", MAX_SPECIES);
+        if (length == 0 || length >= sizeof name)
+            return cli_fail(&j->run, CLI_USAGE, "--species: a name is empty or too long");
+        memcpy(name, list, length);
+        name[length] = 0;
+        const int status = read_species(j, name, &j->species[j->species_count]);
+        if (status) return status;
+        if (j->bare) j->species[j->species_count].leaf_count = 0;
+        j->species_count++;
+        list = comma ? comma + 1 : NULL;
+    }
+    return CLI_DONE;
+}
+
+/* The species as text. */
+static int write_species(tree_job *j) {
+    const size_t size = treepieces_species_print(&j->species[0], NULL, 0);
+    char *text = (char *)tree_array(size + 1, 1);
+    if (!text) return tree_fail_memory(j);
+    treepieces_species_print(&j->species[0], text, size + 1);
+    cli_figure(&j->run, "file_bytes", (double)size);
+    const int status = cli_finish(&j->run, text, size);
+    free(text);
+    if (!status && !j->run.quiet)
+        printf("%s: the species %s\n", j->run.output, j->species[0].name);
+    return status;
+}
+
+/* ---- growing ------------------------------------------------------------------------------- */
+
+treepieces_wind tree_wind(const tree_job *j) {
+    treepieces_wind wind = {0, 0, 0.6f, 0};
+    wind.speed = (float)j->wind;
+    wind.seed = (uint32_t)j->run.seed;
+    return wind;
+}
+
+static int grow(tree_job *j) {
+    const treepieces_place place = {{0, 0, 0}, 0, 1, 0, j->run.seed};
+    treepieces_forest_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.kit = j->kit;
+    desc.species = j->species;
+    desc.species_count = j->species_count;
+    desc.places = j->is_forest ? NULL : &place;
+    desc.tree_count = j->count;
+    desc.spacing = (float)j->spacing;
+    desc.max_pieces = j->pieces;
+    desc.seed = j->run.seed;
+    return check_result(j, treepieces_forest_make(&desc, &j->run.env, &j->forest),
+                        j->species[0].name);
+}
+
+/* Bones at rest, and as the trees are to be seen: posed, and in the wind unless that is a clip. */
+static int pose(tree_job *j) {
+    const treepieces_pose bent = {j->run.seed, (float)j->pose, NULL};
+    const size_t nodes = j->forest->node_count;
+    const treepieces_wind wind = tree_wind(j);
+    j->rest = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
+    j->posed = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
+    if (!j->rest || !j->posed) return tree_fail_memory(j);
+    txm_status result = treepieces_bones(j->forest, NULL, &j->run.env, j->rest);
+    if (result == TXM_OK) result = treepieces_bones(j->forest, &bent, &j->run.env, j->posed);
+    if (result == TXM_OK && j->wind > 0 && (j->is_forest || !is_glb(j))) {
+        float *state = (float *)tree_array(nodes, 4 * sizeof(float));
+        if (!state) return tree_fail_memory(j);
+        for (int i = WARM_UP - 1; i >= 0 && result == TXM_OK; i--)
+            result = treepieces_sway(j->forest, &wind, -0.1 * i, 0.1, &bent, &j->run.env, state,
+                                     j->posed);
+        free(state);
+    }
+    return check_result(j, result, j->species[0].name);
+}
+
+static void grown_figures(tree_job *j) {
+    const treepieces_forest *f = j->forest;
+    float height = 0;
+    for (int t = 0; t < f->tree_count; t++)
+        if (f->trees[t].height > height) height = f->trees[t].height;
+    cli_figure(&j->run, "trees", f->tree_count);
+    cli_figure(&j->run, "pieces", f->node_count);
+    cli_figure(&j->run, "clusters", f->cluster_count);
+    cli_figure(&j->run, "height", (double)height);
+    cli_figure(&j->run, "bytes_per_tree", (double)f->bytes / f->tree_count);
+}
+
+/* ---- looks --------------------------------------------------------------------------------- */
+
+/* Of all species the brightest bark in each channel: what copies darken each to its own. */
+static void brightest_bark(const tree_job *j, float color[3]) {
+    memcpy(color, j->species[0].bark_color, 3 * sizeof(float));
+    for (int s = 1; s < j->species_count; s++)
+        for (int k = 0; k < 3; k++)
+            if (j->species[s].bark_color[k] > color[k]) color[k] = j->species[s].bark_color[k];
+}
+
+static int has_one_bark(const tree_job *j) {
+    return j->tiles || is_glb(j);
+}
+
+static void set_material(const tree_job *j, const picture *p, int is_cut_out, mesh_material *m) {
+    m->name = p->name;
+    m->is_cut_out = is_cut_out;
+    m->repeats = !is_cut_out;
+    m->texture = name_in(p->path);
+    if (!is_glb(j)) return;
+    m->png = p->png;
+    m->png_size = p->size;
+}
+
+/* Bark and leaves, but for a .ply, which shows none. */
+static int dress(tree_job *j, float tint[3]) {
+    int status = CLI_DONE;
+    brightest_bark(j, tint);
+    if (!strcmp(j->extension, ".ply")) return CLI_DONE;
+    for (int s = 0; s < j->species_count && !status; s++) {
+        if (s == 0 || !has_one_bark(j))
+            status = make_bark(j, s, has_one_bark(j) ? tint : j->species[s].bark_color);
+        if (!status) status = make_leaves(j, s);
+        set_material(j, &j->bark[s], 0, &j->bark_materials[s]);
+        set_material(j, &j->leaves[s], 1, &j->leaf_materials[s]);
+    }
+    return status;
+}
+
+/* ---- baked meshes -------------------------------------------------------------------------- */
+
+static void *more(void *block, size_t count, size_t size) {
+    size_t bytes;
+    return txm_mul(count, size, 1, &bytes) ? realloc(block, bytes ? bytes : 1) : NULL;
+}
+
+/* Room at the end for so many vertices and triangles; 0: no memory. */
+static int extend(mesh_data *m, size_t vertices, size_t triangles, int with_uvs, int with_colors) {
+    const size_t v = m->vertex_count + vertices, t = m->triangle_count + triangles;
+    void *block;
+    if (v > 0x7fffffff || t > 0x7fffffff) return 0;
+    if (!(block = more(m->positions, v, 3 * sizeof(float)))) return 0;
+    m->positions = (float *)block;
+    if (!(block = more(m->normals, v, 3 * sizeof(float)))) return 0;
+    m->normals = (float *)block;
+    if (!(block = more(m->indices, t, 3 * sizeof(uint32_t)))) return 0;
+    m->indices = (uint32_t *)block;
+    if (with_uvs && !(block = more(m->uvs, t, 6 * sizeof(float)))) return 0;
+    if (with_uvs) m->uvs = (float *)block;
+    if (with_colors && !(block = more(m->colors, v, 4))) return 0;
+    if (with_colors) m->colors = (unsigned char *)block;
+    return 1;
+}
+
+/* Add a tree's bark or leaves to what is to be written. color: sRGB, in place of uvs. */
+static int append(tree_job *j, const treepieces_mesh *from, const float *color, mesh_data *to) {
+    const size_t base = to->vertex_count, first = 3 * to->triangle_count;
+    if (!extend(to, from->vertex_count, from->triangle_count, !color, color != NULL))
+        return tree_fail_memory(j);
+    memcpy(to->positions + 3 * base, from->positions, 3 * from->vertex_count * sizeof(float));
+    memcpy(to->normals + 3 * base, from->normals, 3 * from->vertex_count * sizeof(float));
+    for (size_t c = 0; c < 3 * from->triangle_count; c++)
+        to->indices[first + c] = (uint32_t)(base + from->indices[c]);
+    if (!color)
+        memcpy(to->uvs + 2 * first, from->uvs, 6 * from->triangle_count * sizeof(float));
+    for (size_t i = 0; i < from->vertex_count && color; i++) {
+        for (size_t k = 0; k < 3; k++)
+            to->colors[4 * (base + i) + k] =
+                (unsigned char)(255 * txm_clampf(color[k], 0, 1) + 0.5f);
+        to->colors[4 * (base + i) + 3] = 255;
+    }
+    to->vertex_count += from->vertex_count;
+    to->triangle_count += from->triangle_count;
+    return CLI_DONE;
+}
+
+/* Bark and leaves of a tree; *leaves stays NULL if it has none. */
+static int bake_tree(tree_job *j, int tree, const float *bones, treepieces_mesh **bark,
+                     treepieces_mesh **leaves) {
+    const treepieces_tree *t = &j->forest->trees[tree];
+    treepieces_lod lod = {{0, 0, 0}, 0, 1e30f, 0}; /* levels that do not halve within sight */
+    treepieces_bake_desc desc;
+    memset(&desc, 0, sizeof desc);
+    lod.max_level = (float)j->level;
+    desc.forest = j->forest;
+    desc.tree = tree;
+    desc.bones = bones;
+    desc.lod = j->level > 1 ? &lod : NULL;
+    desc.capped = j->capped;
+    desc.sheet_size = j->bark[0].width;
+    txm_status result = treepieces_bake(&desc, &j->run.env, bark);
+    if (result == TXM_OK && t->cluster_count && j->species[t->species].leaf_count)
+        result = treepieces_bake_leaves(j->forest, tree, bones, BAKED_LOOKS, &j->run.env, leaves);
+    return check_result(j, result, j->species[t->species].name);
+}
+
+/* ---- what is built ------------------------------------------------------------------------- */
+
+typedef struct built {
+    mesh_scene scene;
+    mesh_data wood[MAX_SPECIES], foliage[MAX_SPECIES];
+    mesh_part parts[2 * MAX_SPECIES];
+    treepieces_mesh *bark, *leaves; /* of a tree with a rig, whose meshes are views of these */
+    tree_rig rig;
+    tree_copies copies;
+    char *extras;
+} built;
+
+static void free_built(built *b) {
+    for (int s = 0; s < MAX_SPECIES; s++) {
+        if (b->bark) { /* all but joints and weights is the library's */
+            free(b->wood[s].joints);
+            free(b->wood[s].weights);
+            free(b->foliage[s].joints);
+            free(b->foliage[s].weights);
+            continue;
+        }
+        mesh_free(&b->wood[s]);
+        mesh_free(&b->foliage[s]);
+    }
+    treepieces_mesh_free(b->bark);
+    treepieces_mesh_free(b->leaves);
+    free_rig(&b->rig);
+    free_copies(&b->copies);
+    cJSON_free(b->extras);
+}
+
+static void add_part(built *b, const mesh_data *mesh, const mesh_material *material) {
+    if (mesh->triangle_count == 0) return;
+    b->parts[b->scene.part_count].mesh = mesh;
+    b->parts[b->scene.part_count++].material = material;
+}
+
+/* All trees as they are to be seen; a .ply has all in one mesh. */
+static int build_baked(tree_job *j, built *b) {
+    const int is_ply = !strcmp(j->extension, ".ply");
+    int status = CLI_DONE;
+    for (int t = 0; t < j->forest->tree_count && !status; t++) {
+        treepieces_mesh *bark = NULL, *leaves = NULL;
+        const int species = j->forest->trees[t].species;
+        const treepieces_species *s = &j->species[species];
+        const int to_wood = is_ply || has_one_bark(j) ? 0 : species;
+        status = bake_tree(j, t, j->posed, &bark, &leaves);
+        if (!status) status = append(j, bark, is_ply ? s->bark_color : NULL, &b->wood[to_wood]);
+        if (!status && leaves)
+            status = append(j, leaves, is_ply ? s->leaf_color : NULL,
+                            is_ply ? &b->wood[0] : &b->foliage[species]);
+        treepieces_mesh_free(bark);
+        treepieces_mesh_free(leaves);
+    }
+    for (int s = 0; s < j->species_count; s++) {
+        add_part(b, &b->wood[s], &j->bark_materials[s]);
+        add_part(b, &b->foliage[s], &j->leaf_materials[s]);
+    }
+    return status;
+}
+
+/* A mesh of the library as one to be written; the arrays stay its own. */
+static int rigged_view(tree_job *j, const tree_rig *rig, const treepieces_mesh *from,
+                       mesh_data *to) {
+    to->vertex_count = from->vertex_count;
+    to->triangle_count = from->triangle_count;
+    to->positions = from->positions;
+    to->normals = from->normals;
+    to->indices = from->indices;
+    to->uvs = from->uvs;
+    return bind_mesh(j, rig, from, to);
+}
+
+static int build_rigged(tree_job *j, built *b) {
+    int status = make_rig(j, &b->rig);
+    if (!status) status = bake_tree(j, 0, j->rest, &b->bark, &b->leaves);
+    if (!status) status = rigged_view(j, &b->rig, b->bark, &b->wood[0]);
+    if (!status && b->leaves) status = rigged_view(j, &b->rig, b->leaves, &b->foliage[0]);
+    add_part(b, &b->wood[0], &j->bark_materials[0]);
+    add_part(b, &b->foliage[0], &j->leaf_materials[0]);
+    b->scene.skeleton = &b->rig.skeleton;
+    cli_figure(&j->run, "joints", b->rig.skeleton.joint_count);
+    cli_figure(&j->run, "keys", b->rig.skeleton.key_count);
+    return status;
+}
+
+static int build_copies(tree_job *j, const float tint[3], built *b) {
+    const int status = make_copies(j, tint, &b->copies);
+    b->scene.instances = b->copies.list;
+    b->scene.instance_count = b->copies.count;
+    cli_figure(&j->run, "nodes", b->copies.count);
+    return status;
+}
+
+/* What a program that reads a .glb may want to know. */
+static int make_extras(tree_job *j, built *b) {
+    const treepieces_forest *f = j->forest;
+    char seed[24];
+    cJSON *json = cJSON_CreateObject();
+    cJSON *names = cJSON_AddArrayToObject(json, "species");
+    for (int s = 0; s < j->species_count; s++)
+        cJSON_AddItemToArray(names, cJSON_CreateString(j->species[s].name));
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)j->run.seed);
+    cJSON_AddRawToObject(json, "seed", seed); /* a double has not room for all of them */
+    cJSON_AddNumberToObject(json, "trees", f->tree_count);
+    cJSON_AddNumberToObject(json, "pieces", f->node_count);
+    b->extras = cJSON_PrintUnformatted(json);
+    cJSON_Delete(json);
+    b->scene.extras = b->extras;
+    return b->extras ? CLI_DONE : tree_fail_memory(j);
+}
+
+static size_t count_triangles(const built *b) {
+    size_t sum = 0;
+    for (int i = 0; i < b->scene.part_count; i++) sum += b->parts[i].mesh->triangle_count;
+    for (int i = 0; i < b->scene.instance_count; i++)
+        sum += b->copies.list[i].count * b->copies.list[i].mesh->triangle_count;
+    return sum;
+}
+
+static size_t count_vertices(const built *b) {
+    size_t sum = 0;
+    for (int i = 0; i < b->scene.part_count; i++) sum += b->parts[i].mesh->vertex_count;
+    for (int i = 0; i < b->scene.instance_count; i++)
+        sum += b->copies.list[i].count * b->copies.list[i].mesh->vertex_count;
+    return sum;
+}
+
+/* ---- writing ------------------------------------------------------------------------------- */
+
+static int write_output(tree_job *j, built *b) {
+    cli *run = &j->run;
+    cli_file files[2 + 2 * MAX_SPECIES];
+    unsigned char *bytes = NULL, *mtl = NULL;
+    char mtl_path[MAX_PATH];
+    const char *why;
+    int status = CLI_DONE, count = 1;
+    const int is_obj = !strcmp(j->extension, ".obj");
+    memset(files, 0, sizeof files);
+
+    b->scene.parts = b->parts;
+    if (is_obj) {
+        status = path_beside(run, ".mtl", mtl_path);
+        b->scene.library = name_in(mtl_path);
+    }
+    if (!status && !mesh_encode(j->extension, &b->scene, &bytes, &files[0].size, &why))
+        status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
+    files[0].name = run->output;
+    files[0].bytes = bytes;
+    if (!status && is_obj) {
+        if (!mesh_encode_mtl(&b->scene, &mtl, &files[1].size, &why))
+            status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", mtl_path, why);
+        files[1].name = mtl_path;
+        files[1].bytes = mtl;
+        count = 2;
+        for (int s = 0; s < 2 * j->species_count; s++) {
+            const picture *p = s % 2 ? &j->leaves[s / 2] : &j->bark[s / 2];
+            if (!p->png) continue;
+            files[count].name = p->path;
+            files[count].bytes = p->png;
+            files[count++].size = p->size;
+        }
+    }
+    cli_figure(run, "file_bytes", (double)files[0].size);
+    if (!status) status = cli_finish_files(run, files, count);
+    free(bytes);
+    free(mtl);
+    return status;
+}
+
+static void print_summary(const tree_job *j, const built *b, size_t triangles) {
+    const treepieces_forest *f = j->forest;
+    printf("%s: ", j->run.output);
+    if (j->is_forest) printf("%d trees, ", f->tree_count);
+    else printf("%s, %.1f m high, ", j->species[0].name, (double)f->trees[0].height);
+    printf("%lu pieces, %lu triangles", (unsigned long)f->node_count, (unsigned long)triangles);
+    if (b->scene.skeleton) printf(", %d joints", b->rig.skeleton.joint_count);
+    if (b->rig.skeleton.key_count) printf(", %d keys", b->rig.skeleton.key_count);
+    if (b->scene.instance_count) printf(" in %d nodes", b->scene.instance_count);
+    printf(", %.1f s\n", cli_seconds(&j->run));
+}
+
+/* ---- the commands -------------------------------------------------------------------------- */
+
+/* Grow, pose, dress and write. */
+static int grow_trees(tree_job *j, built *b) {
+    float tint[3];
+    cli_stage(&j->run, "grow");
+    int status = check_result(j, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
+    if (!status) status = grow(j);
+    if (!status) {
+        grown_figures(j);
+        cli_stage(&j->run, "pose");
+        status = pose(j);
+    }
+    if (status) return status;
+    cli_stage(&j->run, "dress");
+    status = dress(j, tint);
+    if (status) return status;
+    cli_stage(&j->run, "build");
+    if (!is_glb(j)) status = build_baked(j, b);
+    else status = j->is_forest ? build_copies(j, tint, b) : build_rigged(j, b);
+    if (!status) status = make_extras(j, b);
+    if (status) return status;
+    const size_t triangles = count_triangles(b);
+    cli_figure(&j->run, "vertices", (double)count_vertices(b));
+    cli_figure(&j->run, "triangles", (double)triangles);
+    cli_stage(&j->run, "encode");
+    status = write_output(j, b);
+    if (!status && !j->run.quiet) print_summary(j, b, triangles);
+    return status;
+}
+
+/* Where the pictures go; refused before any work. */
+static int name_pictures(tree_job *j) {
+    int status = CLI_DONE;
+    char ending[32];
+    if (strcmp(j->extension, ".obj") != 0) return CLI_DONE;
+    for (int s = 0; s < j->species_count && !status; s++) {
+        char number[12] = "";
+        if (s > 0) snprintf(number, sizeof number, "-%d", s + 1);
+        snprintf(ending, sizeof ending, "-bark%s.png", number);
+        status = path_beside(&j->run, ending, j->bark[s].path);
+        snprintf(ending, sizeof ending, "-leaves%s.png", number);
+        if (!status) status = path_beside(&j->run, ending, j->leaves[s].path);
+    }
+    return status;
+}
+
+/* A number option that was given as text; its target stays if it was not. */
+static int number(tree_job *j, const char *option, const char *text, double low, double high,
+                  double *value) {
+    if (!text || parse_numbers(&j->run, option, text, 1, low, high, value)) return CLI_DONE;
+    return CLI_USAGE;
+}
+
+static int check_output_kind(tree_job *j) {
+    const char *why;
+    file_extension(j->run.output, j->extension);
+    if (!j->is_forest && !strcmp(j->extension, ".txt")) return CLI_DONE;
+    if (mesh_can_write(j->extension, &why)) return CLI_DONE;
+    return cli_fail(&j->run, CLI_USAGE, "cannot write '%s': %s%s", j->run.output, why,
+                    j->is_forest ? "" : ", or in .txt for the species");
+}
+
+/* Everything after the command line has been read. */
+static int run_job(tree_job *j, int needs_glb) {
+    built *b;
+    int status = check_output_kind(j);
+    if (status) return status;
+    if (needs_glb && !is_glb(j))
+        return cli_fail(&j->run, CLI_USAGE, "--bones, --seconds and --rate go with an OUT in .glb");
+    if (j->level > 1 && j->is_forest && is_glb(j))
+        return cli_fail(&j->run, CLI_USAGE, "--level does not go with a forest in .glb");
+    cli_stage(&j->run, "read");
+    status = read_all_species(j);
+    if (status) return status;
+    if (!strcmp(j->extension, ".txt")) return write_species(j);
+    status = name_pictures(j);
+    if (status) return status;
+    b = (built *)tree_array(1, sizeof *b); /* too large for a small stack, as the job */
+    if (!b) return tree_fail_memory(j);
+    status = grow_trees(j, b);
+    free_built(b);
+    free(b);
+    return status;
+}
+
+static void free_job(tree_job *j) {
+    for (int s = 0; s < MAX_SPECIES; s++) {
+        free(j->bark[s].png);
+        free(j->leaves[s].png);
+    }
+    free(j->rest);
+    free(j->posed);
+    treepieces_forest_free(j->forest);
+    treepieces_kit_free(j->kit);
+    free(j);
+}
+
+static tree_job *new_job(int is_forest) {
+    tree_job *j = (tree_job *)calloc(1, sizeof *j);
+    if (!j) {
+        fprintf(stderr, "texkit %s: out of memory\n", is_forest ? "forest" : "tree");
+        return NULL;
+    }
+    j->is_forest = is_forest;
+    j->species_list = "oak";
+    j->count = is_forest ? 0 : 1;
+    j->level = 1;
+    j->seconds = 4;
+    j->sheet = 512;
+    return j;
+}
+
+static int run_tree(int argc, char **argv) {
+    tree_job *j = new_job(0);
+    const char *wind = NULL, *seconds = NULL, *bend = NULL;
+    int status;
+    if (!j) return CLI_FAILED;
+    const cli_option options[] = {
+        {CLI_TEXT, "--species", "NAME|FILE", "a built-in species or a file of one; default oak",
+         &j->species_list, 0, 0},
+        {CLI_TEXT, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
+        {CLI_TEXT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
+        {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
+         &j->sheet, 128, 8192},
+        {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
+        {CLI_INT, "--pieces", "N", "at most so many, 8 to 65535; default 600", &j->pieces, 8, 65535},
+        {CLI_INT, "--level", "N", "divide each side of the quads, 1 to 16; default 1", &j->level, 1,
+         MAX_LEVEL},
+        {CLI_FLAG, "--capped", NULL, "close the foot of the trunk as well", &j->capped, 0, 0},
+        {CLI_TEXT, "--wind", "SPEED", "metres a second, up to 50; default 0", &wind, 0, 0},
+        {CLI_TEXT, "--seconds", "S", "length of the clip, 1 to 60; default 4", &seconds, 0, 0},
+        {CLI_INT, "--rate", "FPS", "keys a second, 1 to 60; default 12", &j->rate, 1, 60},
+        {CLI_TEXT, "--pose", "AMOUNT",
+         "bend the joints at random by up to so many radians, 0 to 1", &bend, 0, 0},
+        {CLI_INT, "--bones", "N", "at most so many joints; default: one per piece", &j->bones, 1,
+         65535},
+        {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
+    };
+    if (!cli_begin(&j->run, &tree_manual, options, argc, argv, &status)) {
+        const int needs_glb = j->bones || seconds || j->rate;
+        const int needs_wind = seconds || j->rate;
+        if (!j->rate) j->rate = 12;
+        status = number(j, "--wind", wind, 0, 50, &j->wind);
+        if (!status) status = number(j, "--seconds", seconds, 1, 60, &j->seconds);
+        if (!status) status = number(j, "--pose", bend, 0, 1, &j->pose);
+        if (!status && needs_wind && j->wind <= 0)
+            status = cli_fail(&j->run, CLI_USAGE, "--seconds and --rate go with --wind SPEED");
+        if (!status) status = run_job(j, needs_glb);
+    }
+    free_job(j);
+    return status;
+}
+
+static int run_forest(int argc, char **argv) {
+    tree_job *j = new_job(1);
+    const char *wind = NULL, *spacing = NULL, *bend = NULL;
+    int status;
+    if (!j) return CLI_FAILED;
+    const cli_option options[] = {
+        {CLI_INT, "--count", "N", "how many trees, 1 to 1000000", &j->count, 1, 1000000},
+        {CLI_TEXT, "--species", "A,B,...", "built-in species or files, at most 8; default oak",
+         &j->species_list, 0, 0},
+        {CLI_TEXT, "--spacing", "M", "metres between trees, 0.1 to 1000; default: by their height",
+         &spacing, 0, 0},
+        {CLI_INT, "--pieces", "N", "at most so many a tree, 8 to 65535; default 600", &j->pieces, 8,
+         65535},
+        {CLI_TEXT, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
+        {CLI_TEXT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
+        {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
+         &j->sheet, 128, 8192},
+        {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
+        {CLI_INT, "--level", "N", ".obj, .ply: divide each side of the quads, 1 to 16; default 1",
+         &j->level, 1, MAX_LEVEL},
+        {CLI_FLAG, "--capped", NULL, ".obj, .ply: close the feet of the trunks as well", &j->capped,
+         0, 0},
+        {CLI_TEXT, "--wind", "SPEED", "bent as by wind, metres a second, up to 50; default 0", &wind,
+         0, 0},
+        {CLI_TEXT, "--pose", "AMOUNT", "bend the joints at random by up to so many radians, 0 to 1",
+         &bend, 0, 0},
+        {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
+    };
+    if (!cli_begin(&j->run, &forest_manual, options, argc, argv, &status)) {
+        status = number(j, "--wind", wind, 0, 50, &j->wind);
+        if (!status) status = number(j, "--spacing", spacing, 0.1, 1000, &j->spacing);
+        if (!status) status = number(j, "--pose", bend, 0, 1, &j->pose);
+        if (!status && j->count == 0)
+            status = cli_fail(&j->run, CLI_USAGE, "no number of trees given; add --count N");
+        if (!status) status = run_job(j, 0);
+    }
+    free_job(j);
+    return status;
+}
+
+const command tree_command = {&tree_manual, run_tree};
+const command forest_command = {&forest_manual, run_forest};

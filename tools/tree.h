@@ -1,0 +1,102 @@
+/* tree.h - what the files of 'texkit tree' and 'texkit forest' share
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   tree.c holds the commands, tree_looks.c the pictures of bark and leaves, tree_rig.c the skeleton
+   and its animation, tree_copies.c the instances of a forest.                                   */
+#ifndef TREE_H
+#define TREE_H
+
+#include "command.h"
+#include "mesh_io.h"
+#include "treepieces.h"
+
+enum {
+    MAX_SPECIES = 8, /* of a forest                                                         */
+    CLOUDS = 3,      /* different leaf clouds of a forest of one species                    */
+    BARK_TILES = 8,  /* that are drawn where the user has none                              */
+    WARM_UP = 300    /* tenths of a second: then the sway has forgotten that all stood still */
+};
+
+/* A picture that goes with the mesh, as PNG. */
+typedef struct picture {
+    unsigned char *png;
+    size_t size;
+    int width;
+    char name[32];       /* of the material              */
+    char path[MAX_PATH]; /* of the file beside the mesh  */
+} picture;
+
+typedef struct tree_job {
+    cli run;
+    char extension[8];
+
+    /* options */
+    const char *species_list, *tiles, *leaf;
+    int count, pieces, bare, level, capped, bones, rate, sheet;
+    int is_forest;
+    double wind, seconds, pose, spacing;
+
+    treepieces_species species[MAX_SPECIES];
+    int species_count;
+    treepieces_kit *kit;
+    treepieces_forest *forest;
+    float *rest, *posed; /* bones; posed: by --pose, and if baked by --wind */
+
+    /* one bark of all species, or one of each */
+    picture bark[MAX_SPECIES], leaves[MAX_SPECIES]; /* png NULL: none */
+    mesh_material bark_materials[MAX_SPECIES], leaf_materials[MAX_SPECIES];
+} tree_job;
+
+/* count items, 0 bytes all; NULL without memory */
+void *tree_array(size_t count, size_t size);
+
+int tree_fail_memory(tree_job *j);
+
+/* The steady and the gusty part of --wind. */
+treepieces_wind tree_wind(const tree_job *j);
+
+/* ---- tree_looks.c ---- */
+
+/* Draw or read the bark of species s, tinted by the color given; an exit status. */
+int make_bark(tree_job *j, int s, const float color[3]);
+
+/* The same for its leaves, if it has any. */
+int make_leaves(tree_job *j, int s);
+
+/* ---- tree_rig.c ---- */
+
+/* The joints of a tree and how the wind moves them. */
+typedef struct tree_rig {
+    mesh_skeleton skeleton;
+    char name[64];
+    mesh_joint *joints;
+    float *times, *turns;
+    uint32_t *joint_of; /* per node: the joint that moves it */
+} tree_rig;
+
+/* Rotation of a bone as a unit quaternion. */
+void bone_rotation(const float *bone, double q[4]);
+
+int make_rig(tree_job *j, tree_rig *rig);
+void free_rig(tree_rig *rig);
+
+/* Joints and weights of a baked mesh in the rig's numbers. */
+int bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to);
+
+/* ---- tree_copies.c ---- */
+
+/* A forest as copies of pieces and of leaf clouds. */
+typedef struct tree_copies {
+    mesh_instances list[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS];
+    mesh_data meshes[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS];
+    char names[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS][40];
+    float *blocks[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS]; /* translations and so on */
+    unsigned char *colors[TREEPIECES_MAX_TYPES];
+    int count;
+} tree_copies;
+
+/* tint: sRGB 0..1, the color that the bark's picture was drawn with */
+int make_copies(tree_job *j, const float tint[3], tree_copies *copies);
+void free_copies(tree_copies *copies);
+
+#endif /* TREE_H */

@@ -1,0 +1,195 @@
+/* tree_looks.c - the pictures of 'texkit tree': bark out of tiles, leaves
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "tree.h"
+#include "image_io.h"
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+
+enum { DRAWN_LEAVES = 256, MAX_TILES = 64 };
+
+static int new_image(tree_job *j, txm_image *image, int width, int height, int channels) {
+    memset(image, 0, sizeof *image);
+    image->width = width;
+    image->height = height;
+    image->channels = channels;
+    image->pixels = calloc((size_t)width * (size_t)height, (size_t)channels);
+    return image->pixels ? CLI_DONE : tree_fail_memory(j);
+}
+
+static int encode(tree_job *j, const txm_image *image, const char *kind, int s, picture *p) {
+    const char *why;
+    if (!image_encode(".png", image, &p->png, &p->size, &why))
+        return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->run.output, why);
+    p->width = image->width;
+    if (s == 0) snprintf(p->name, sizeof p->name, "%s", kind);
+    else snprintf(p->name, sizeof p->name, "%s-%d", kind, s + 1);
+    return CLI_DONE;
+}
+
+/* So many square pictures in one block, for free(), or NULL. */
+static unsigned char *new_tiles(tree_job *j, txm_image *tiles, int count, int side, int channels) {
+    const size_t size = (size_t)side * (size_t)side * (size_t)channels;
+    unsigned char *block = (unsigned char *)tree_array((size_t)count, size);
+    if (!block) tree_fail_memory(j);
+    for (int i = 0; i < count && block; i++) {
+        memset(&tiles[i], 0, sizeof tiles[i]);
+        tiles[i].pixels = block + (size_t)i * size;
+        tiles[i].width = tiles[i].height = side;
+        tiles[i].channels = channels;
+    }
+    return block;
+}
+
+/* ---- tiles of the user -------------------------------------------------------------------- */
+
+typedef struct tile_list {
+    int x[MAX_TILES], y[MAX_TILES], count, size;
+} tile_list;
+
+/* All tiles with the edges of the first. 0 with *why if these are none for bark. */
+static int list_tiles(const cJSON *json, const txm_image *atlas, tile_list *t, const char **why) {
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(json, "kind");
+    const cJSON *tiles = cJSON_GetObjectItemCaseSensitive(json, "tiles"), *tile;
+    int first[4] = {0, 0, 0, 0};
+    t->count = 0;
+    if (!cJSON_IsString(kind) || strcmp(kind->valuestring, "frame") != 0)
+        return *why = "not a set of framed tiles; make one with 'texkit tiles --kind frame'", 0;
+    *why = "a field is missing or out of range; make the set again, with --packing packed";
+    if (!json_int(json, "size", 16, 1024, &t->size)) return 0;
+    cJSON_ArrayForEach(tile, tiles) {
+        const cJSON *list = cJSON_GetObjectItemCaseSensitive(tile, "edges");
+        int x, y, edges[4];
+        if (!json_int(tile, "x", 0, atlas->width - t->size, &x) ||
+            !json_int(tile, "y", 0, atlas->height - t->size, &y))
+            return 0;
+        for (int k = 0; k < 4; k++)
+            if (!json_int(cJSON_GetArrayItem(list, k), NULL, 0, 255, &edges[k])) return 0;
+        if (t->count == 0) memcpy(first, edges, sizeof first);
+        if (memcmp(first, edges, sizeof first) != 0 || t->count == MAX_TILES) continue;
+        t->x[t->count] = x;
+        t->y[t->count++] = y;
+    }
+    if (t->count == 0) return 0;
+    if (first[0] != first[2] || first[1] != first[3])
+        return *why = "the first tile does not go on in itself; make the set without --classes", 0;
+    return 1;
+}
+
+/* A square of the atlas, made smaller by averages. */
+static void reduce_tile(const txm_image *atlas, int x0, int y0, int size, const txm_image *out) {
+    const int channels = out->channels;
+    const double step = (double)size / out->width;
+    for (int y = 0; y < out->height; y++) {
+        unsigned char *to = (unsigned char *)txm_image_row(out, y);
+        for (int x = 0; x < out->width; x++) {
+            double sum[4] = {0, 0, 0, 0}, weights = 0;
+            const double left = x * step, right = left + step, top = y * step, bottom = top + step;
+            for (int v = (int)top; v < size && v < bottom; v++) {
+                const double high = (v + 1 < bottom ? v + 1 : bottom) - (v > top ? v : top);
+                const unsigned char *row =
+                    (const unsigned char *)txm_image_row_const(atlas, y0 + v);
+                for (int u = (int)left; u < size && u < right; u++) {
+                    const double wide = (u + 1 < right ? u + 1 : right) - (u > left ? u : left);
+                    for (int c = 0; c < channels; c++)
+                        sum[c] += high * wide * row[(x0 + u) * channels + c];
+                    weights += high * wide;
+                }
+            }
+            for (int c = 0; c < channels; c++)
+                *to++ = (unsigned char)(sum[c] / weights + 0.5);
+        }
+    }
+}
+
+/* The tiles of --tiles, at most `side` pixels a side, in *block for free(). */
+static int read_tiles(tree_job *j, int side, txm_image *tiles, int *count, unsigned char **block) {
+    char path[MAX_PATH];
+    const char *why = "";
+    txm_image atlas;
+    tile_list list;
+    cJSON *json;
+    int status = read_tiles_json(&j->run, j->tiles, &json);
+    if (status) return status;
+    if (snprintf(path, sizeof path, "%s/atlas.png", j->tiles) >= (int)sizeof path)
+        status = cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->tiles);
+    if (!status) status = read_image(&j->run, path, 0, &atlas);
+    if (status) {
+        cJSON_Delete(json);
+        return status;
+    }
+    if (!list_tiles(json, &atlas, &list, &why)) {
+        status = cli_fail(&j->run, CLI_FAILED, "'%s/tiles.json': %s", j->tiles, why);
+    } else {
+        *count = list.count;
+        const int size = list.size < side ? list.size & ~1 : side; /* must be even */
+        *block = new_tiles(j, tiles, list.count, size, atlas.channels);
+        if (!*block) status = CLI_FAILED;
+        for (int i = 0; i < list.count && *block; i++)
+            reduce_tile(&atlas, list.x[i], list.y[i], list.size, &tiles[i]);
+    }
+    image_free(&atlas);
+    cJSON_Delete(json);
+    return status;
+}
+
+/* Tiles that are drawn, in *block for free(). */
+static int draw_tiles(tree_job *j, const treepieces_species *species, int side, txm_image *tiles,
+                      unsigned char **block) {
+    *block = new_tiles(j, tiles, BARK_TILES, side, 3);
+    if (!*block) return CLI_FAILED;
+    const txm_status result =
+        treepieces_draw_bark(species, j->run.seed, &j->run.env, tiles, BARK_TILES);
+    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, species->name);
+}
+
+/* ---- the sheet ----------------------------------------------------------------------------- */
+
+int make_bark(tree_job *j, int s, const float color[3]) {
+    txm_image tiles[MAX_TILES], sheet = {0};
+    treepieces_bark_desc desc = {0};
+    treepieces_species species = j->species[s];
+    unsigned char *block = NULL;
+    const int side = j->sheet / (2 * TREEPIECES_SHEET) * 2;
+    int status;
+    memset(tiles, 0, sizeof tiles);
+    memcpy(species.bark_color, color, sizeof species.bark_color);
+    desc.tiles = tiles;
+    desc.tile_count = BARK_TILES;
+    desc.seed = j->run.seed;
+    if (j->tiles) status = read_tiles(j, side, tiles, &desc.tile_count, &block);
+    else status = draw_tiles(j, &species, side, tiles, &block);
+    if (!status) {
+        const int width = TREEPIECES_SHEET * tiles[0].width;
+        status = new_image(j, &sheet, width, width * treepieces_bark_layers(&desc),
+                           tiles[0].channels);
+    }
+    if (!status) {
+        const txm_status result = treepieces_bark(&desc, &j->run.env, sheet);
+        if (result != TXM_OK)
+            status = fail_library(&j->run, result, j->tiles ? j->tiles : species.name);
+    }
+    if (!status) status = encode(j, &sheet, "bark", s, &j->bark[s]);
+    free(block);
+    free(sheet.pixels);
+    return status;
+}
+
+int make_leaves(tree_job *j, int s) {
+    txm_image image = {0};
+    int status;
+    if (j->species[s].leaf_count == 0) return CLI_DONE;
+    if (j->leaf) {
+        status = read_image(&j->run, j->leaf, 4, &image);
+    } else {
+        status = new_image(j, &image, DRAWN_LEAVES, DRAWN_LEAVES, 4);
+        if (!status) {
+            const txm_status result =
+                treepieces_draw_leaves(&j->species[s], j->run.seed, &j->run.env, image);
+            if (result != TXM_OK) status = fail_library(&j->run, result, j->species[s].name);
+        }
+    }
+    if (!status) status = encode(j, &image, "leaves", s, &j->leaves[s]);
+    free(image.pixels);
+    return status;
+}

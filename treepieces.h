@@ -1,0 +1,5523 @@
+/* treepieces.h - v0.1.0 - animated trees out of interlocking pieces
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
+
+   WHAT IT DOES
+     Grows trees by a small grammar out of a handful of pieces - tube, forks, side branches, tip, root
+     flare - that meet in hexagonal rims. A tree is no mesh but a list of pieces on one connected
+     skeleton: a thousand distinct trees are drawn by one instanced call per kind of piece, sway in the
+     wind joint by joint, are tessellated without cracks where the eye is near, and carry bark that
+     goes on across every joint. Those who want a mesh get one, welded, with skin and leaves.
+
+   QUICK START                                 (tests build and run this very block)
+     // Grow an oak, let the wind blow, write it as OBJ. cc -std=c99 quick.c -lm
+     #define TREEPIECES_IMPLEMENTATION        // in exactly one .c or .cpp file
+     #include "treepieces.h"                  // texmath.h must lie beside it
+     #include <stdio.h>
+
+     int main(void) {
+         treepieces_forest_desc desc = {0};   // zero = the default, for every field
+         treepieces_bake_desc bake = {0};
+         treepieces_wind wind = {0};
+         treepieces_species oak;
+         treepieces_kit *kit;
+         treepieces_forest *tree;
+         treepieces_mesh *mesh;
+         txm_env env = {0};                   // malloc, silent, serial; receives the message
+         float *bones, *sway;                 // the caller owns what changes from frame to frame
+         if (treepieces_kit_make(NULL, 0, &env, &kit) != TXM_OK ||
+             treepieces_preset("oak", &env, &oak) != TXM_OK)
+             return 1;
+         desc.kit = kit;
+         desc.species = &oak;
+         desc.species_count = 1;
+         desc.tree_count = 1;                 // or 10000; each differs
+         desc.seed = 7;
+         if (treepieces_forest_make(&desc, &env, &tree) != TXM_OK) {
+             fprintf(stderr, "tree: %s\n", env.message);
+             return 1;
+         }
+         bones = malloc(tree->node_count * TREEPIECES_BONE * sizeof *bones);
+         sway = calloc(tree->node_count, 4 * sizeof *sway);
+         if (!bones || !sway) return 1;
+         wind.speed = 8;
+         wind.gusts = 0.6f;
+         for (int i = 0; i < 60; i++)         // a second at 60 frames; upload bones, draw batches
+             treepieces_sway(tree, &wind, i / 60.0, 1 / 60.0, NULL, &env, sway, bones);
+         bake.forest = tree;
+         bake.bones = bones;
+         if (treepieces_bake(&bake, &env, &mesh) != TXM_OK) {
+             fprintf(stderr, "mesh: %s\n", env.message);
+             return 1;
+         }
+         for (size_t i = 0; i < mesh->vertex_count; i++)
+             printf("v %g %g %g\n", mesh->positions[3 * i], mesh->positions[3 * i + 1],
+                    mesh->positions[3 * i + 2]);
+         for (size_t i = 0; i < 3 * mesh->triangle_count; i += 3)
+             printf("f %d %d %d\n", (int)mesh->indices[i] + 1, (int)mesh->indices[i + 1] + 1,
+                    (int)mesh->indices[i + 2] + 1);
+         treepieces_mesh_free(mesh);
+         treepieces_forest_free(tree);
+         treepieces_kit_free(kit);
+         free(bones);
+         free(sway);
+         return 0;
+     }
+
+   HOW IT WORKS
+     Pieces are quad meshes whose borders are rims: one hexagon, with one set of normals, at the root and
+     one at each leaf rim, moved there by a building transform. A rim belongs to one bone alone, and a
+     parent keeps the vertices of its leaf rims in the frame of the child: so both compute the same
+     numbers, and no pose opens a gap or shows a crease. A child fits in six rotations. Each piece
+     has one bone of its own, which scales it across and along; its leaf rims follow the bones of its
+     children, all in one buffer [1, 4.1 to 4.3].
+     The thickest rims that wait are served first, so a limit on the pieces of a tree thins out its twigs
+     and leaves its shape: it is the coarse level of detail. The fine one is tessellation by distance,
+     symmetric along each edge [1, 4.4]. Wind is a sum of gusts that travel over the land; every joint
+     answers as a damped oscillator, the thinner the faster, solved exactly over each step.
+     Bark: all tiles of a set share one frame, so any of them fits beside any other, and rectangles of
+     them fit too. A quad shows 1 to 8 of them a side, as its size asks for, and blended ones in the
+     crotches, where the directions of growth meet [1, 5].
+
+   CONFIGURATION   (define before the include that has _IMPLEMENTATION)
+     TREEPIECES_STATIC     every function static to the including file (set it everywhere)
+
+   MEMORY
+     A forest takes some 60 bytes a piece, and its bones and sway, which the caller owns, 64 more:
+     20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. While it grows: 300 bytes
+     for each piece of 64 trees.
+
+   TIME   (one core of 2023; make bench measures yours)
+     About 0.2 microseconds to grow a piece in memory that is already there (fresh memory may cost as much
+     again), 0.06 to move its bone in the wind. The parallel-for hook spreads trees.
+
+   THREADS
+     No global state. Calls with different env and outputs may overlap; a kit and a forest may be used by
+     many.
+
+   SAME BYTES
+     All that shapes a tree is sums, products, quotients and square roots in a fixed order: the same
+     bytes on any number of threads and on any compiler that keeps to IEEE 754 (see texmath.h), built
+     with -ffp-contract=off. Bones, skin and tessellation as well.
+
+   LIMITS
+     Up to 3 leaf rims, 255 vertices and 255 quads a piece, 16 kinds of pieces, 65,535 pieces a tree,
+     2^31 a forest. Branches do not avoid each other. Wind bends joints and does not push leaves by
+     themselves. Thick limbs should bend by less than 60 degrees from piece to piece, which is the most
+     that is done.
+
+   REFERENCES
+     [1] V. Burkus, A. Karpati, L. Szecsi. Animated trees with interlocking pieces.
+     [2] T. Boubekeur, M. Alexa. Phong tessellation. ACM Transactions on Graphics 27(5), 2008.
+     [3] G. Szijarto, J. Koloszar. Real-time hardware accelerated rendering of forests at human scale.
+         Journal of WSCG 12(1-3), 2004 (impostors of 2.5 dimensions).                            */
+#ifndef TREEPIECES_H
+#define TREEPIECES_H
+
+#include "texmath.h"
+
+#include <stdio.h>
+
+#define TREEPIECES_VERSION "0.1.0"
+
+#if defined(TREEPIECES_STATIC) && defined(__GNUC__)
+#define TREEPIECES_API __attribute__((unused)) static
+#elif defined(TREEPIECES_STATIC)
+#define TREEPIECES_API static
+#else
+#define TREEPIECES_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- pieces ------------------------------------------------------------------------------ */
+
+enum {
+    TREEPIECES_RIM = 6,            /* vertices of a rim                                          */
+    TREEPIECES_MAX_LEAVES = 3,     /* leaf rims of a piece                                       */
+    TREEPIECES_MAX_VERTICES = 255, /* of a piece                                                 */
+    TREEPIECES_MAX_QUADS = 255,    /* of a piece                                                 */
+    TREEPIECES_MAX_TYPES = 16,     /* of a kit, the built-in ones included                       */
+    TREEPIECES_BANDS = 4,          /* groups of quads of a piece that are textured alike         */
+    TREEPIECES_BONE = 12           /* floats of a bone: three rows of four, see treepieces_bones */
+};
+
+/* The built-in pieces; those registered by the user follow. */
+typedef enum treepieces_type {
+    TREEPIECES_I = 0,   /* a tube                                                    1 leaf rim  */
+    TREEPIECES_Y,       /* a symmetric fork                                          2 leaf rims */
+    TREEPIECES_SIDE,    /* a tube (rim 0) with a branch (rim 1)                      2           */
+    TREEPIECES_PLANAR,  /* a tube (rim 0) with two branches across from each other   3           */
+    TREEPIECES_SPATIAL, /* a fork in three                                           3           */
+    TREEPIECES_TIP,     /* a closed end                                              none        */
+    TREEPIECES_FLARE,   /* the foot of a trunk, with the beginnings of roots         1           */
+    TREEPIECES_BUILTIN  /* how many these are                                                    */
+} treepieces_type;
+
+/* What lies on a quad. The library derives 1 to 4 from tiles of class 0; see treepieces_bark. */
+typedef enum treepieces_class {
+    TREEPIECES_BARK = 0,   /* neighbours match on all four sides                                 */
+    TREEPIECES_FOLD,       /* its south side meets the south side of a quad that is folded too   */
+    TREEPIECES_TURN_LEFT,  /* its south side meets the east side of a plain quad                 */
+    TREEPIECES_TURN_RIGHT, /* its south side meets the west side of a plain quad                 */
+    TREEPIECES_HALVING,    /* half as many tiles across its north side as across its south side;
+                              set by the assembly, not by pieces                                 */
+    TREEPIECES_OWN         /* and up: own classes of user pieces                                 */
+} treepieces_class;
+
+/* A vertex of a piece, 48 bytes, as the GPU gets it. Model space: the root rim has radius 1 about
+   the origin in the plane y = 0, the stem goes up (+y). */
+typedef struct treepieces_vertex {
+    float position[3];
+    int32_t rim;      /* out: 6 leaf + place if on a leaf rim, else -1                           */
+    float normal[3];  /* unit length                                                             */
+    float reserved;   /* 0                                                                       */
+    float weights[4]; /* of the piece's own bone (the root joint), then of the terminal joints at
+                         leaf rims 0, 1, 2; each >= 0, sum 1. Root rim: 1 0 0 0; leaf rim k: 1 at
+                         place 1 + k                                                             */
+} treepieces_vertex;
+
+/* A quad, seen from outside: corners nw, sw, se, ne of its tile, that is counter-clockwise. North is
+   towards the leaves. */
+typedef struct treepieces_quad {
+    uint8_t corners[4];
+    uint8_t tile_class; /* treepieces_class                                                      */
+    uint8_t band;       /* 0..TREEPIECES_BANDS-1: quads of one band have as many tiles each. Band 0
+                           touches the root rim, band 1 + k leaf rim k (an I: 0 below, 1 above)  */
+} treepieces_quad;
+
+/* A similarity: p -> translation + scale * rotate(rotation, p). */
+typedef struct treepieces_similarity {
+    float translation[3];
+    float rotation[4]; /* unit quaternion x y z w */
+    float scale;       /* > 0                     */
+} treepieces_similarity;
+
+/* A piece [1, 4.1 to 4.3]: a quad mesh whose boundary is its rims. Place k of a rim lies at
+   (cos 60k, 0, -sin 60k) of the rim's frame, with the normal (10 cos 60k, 1, -10 sin 60k) / sqrt(101):
+   all rims are the mouths of cones of one aperture. Seen from outside with y up, k + 1 is to the
+   right of k. building maps the root rim's frame to that of a leaf rim (section 4.2). */
+typedef struct treepieces_piece {
+    const char *name;
+    const treepieces_vertex *vertices;
+    const treepieces_quad *quads;
+    int vertex_count, quad_count, leaf_count;
+    int root_rim[TREEPIECES_RIM]; /* vertex numbers */
+    int leaf_rims[TREEPIECES_MAX_LEAVES][TREEPIECES_RIM];
+    treepieces_similarity building[TREEPIECES_MAX_LEAVES];
+} treepieces_piece;
+
+/* A set of pieces; never changed after it is made. */
+typedef struct treepieces_kit treepieces_kit;
+
+/* The built-in pieces and, numbered from TREEPIECES_BUILTIN, own ones. Everything is copied.
+
+   pieces  count own pieces, or NULL. What a piece must be is checked: counts and numbers in range;
+           rims where the canonical hexagon says, to 1e-4 of their radius (they are then moved onto
+           it), with its normals; weights; a surface of one component, oriented, manifold, its only
+           borders the rims, no vertex unused; a building transform of each leaf rim
+   out     receives the kit, or NULL on any error; release it with treepieces_kit_free
+   return  TXM_OK; TXM_BAD_ARGUMENT, the message naming piece and vertex; TXM_TOO_LARGE;
+           TXM_OUT_OF_MEMORY                                                                     */
+TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, int count,
+                                              txm_env *env, treepieces_kit **out);
+
+/* Release a kit by the allocator it was made with; NULL is allowed. No forest may use it any more. */
+TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit);
+
+TREEPIECES_API int treepieces_kit_count(const treepieces_kit *kit);
+
+/* Piece `type` as the kit has it; NULL for a bad number. Valid as long as the kit. */
+TREEPIECES_API const treepieces_piece *treepieces_kit_piece(const treepieces_kit *kit, int type);
+
+/* ---- species ----------------------------------------------------------------------------- */
+
+enum {
+    TREEPIECES_MAX_ORDERS = 5,
+    TREEPIECES_MAX_NAME = 32
+};
+
+/* The axes of one order: 0 the trunk, 1 the branches on it, 2 those on them, ... An axis is a chain
+   of pieces; a fork splits it into axes of the same order. */
+typedef struct treepieces_order {
+    float length;         /* order 0: metres; else as a ratio to the length of the parent axis     */
+    float length_spread;  /* 0..1: uniform within length * (1 -+ spread)                           */
+    float radius;         /* at its foot: order 0 as a ratio to its length; else to the radius of the
+                             stem there                                                            */
+    float taper;          /* radius at its end over that at its foot, 0.02..1                      */
+    float segments;       /* pieces along an axis of full length, 1..64                            */
+    float start;          /* 0..1: how much of the axis is bare of branches                        */
+    float side, pair;     /* probabilities of a piece beyond start to bear one or two branches     */
+    float fork, triple;   /* ... to split the axis in two or three                                 */
+    float fork_angle;     /* degrees between a fork's arm and the axis below                       */
+    float fork_ratio;     /* how much of the remaining length an arm has, 0.1..1                   */
+    float angle_base, angle_top; /* degrees between a branch of this order and its stem, at the foot
+                             and at the end of the stem                                            */
+    float angle_spread;   /* degrees, uniform -+                                                   */
+    float profile[3];     /* length of a branch of this order that stands at the start, in the middle
+                             or at the end of its stem, times `length`; parabola through the three */
+    float roll;           /* degrees about the stem from one branch on it to the next; pieces turn by
+                             60, the rest is twist                                                 */
+    float wander;         /* degrees, by which the axis turns at random from piece to piece        */
+    float tropism;        /* -1..1: share by which a piece turns to the sky (> 0) or the ground    */
+    float sag;            /* degrees that the axis's end would hang below its foot's direction if it
+                             were level: weight; < 0 lifts the end                                 */
+    float gravimorphism;  /* -1..1: branches of this order on the upper (> 0) or lower side of a
+                             slanting stem grow longer                                             */
+    float flatten;        /* 0..1: how far branches of this order keep to the horizontal plane     */
+    float leaves;         /* 0..1: probability of a piece to bear a leaf cloud                     */
+    float leaves_start;   /* 0..1: how much of the axis is bare of leaves                          */
+} treepieces_order;
+
+typedef enum treepieces_envelope {
+    TREEPIECES_FREE = 0,
+    TREEPIECES_ELLIPSOID, /* of crown_width, between crown_base and crown_top */
+    TREEPIECES_CONE,
+    TREEPIECES_CYLINDER
+} treepieces_envelope;
+
+typedef enum treepieces_leaf_shape {
+    TREEPIECES_LEAF_OVAL = 0,
+    TREEPIECES_LEAF_LOBED,  /* oak       */
+    TREEPIECES_LEAF_LANCE,  /* willow    */
+    TREEPIECES_LEAF_HEART,  /* poplar    */
+    TREEPIECES_LEAF_NEEDLE, /* conifers  */
+    TREEPIECES_LEAF_BLOSSOM /* almond    */
+} treepieces_leaf_shape;
+
+/* A kind of tree. The text form is documented at treepieces_species_parse. */
+typedef struct treepieces_species {
+    char name[TREEPIECES_MAX_NAME];
+    int order_count; /* 1..TREEPIECES_MAX_ORDERS */
+    treepieces_order orders[TREEPIECES_MAX_ORDERS];
+    float flare;      /* radius at the ground over that of the trunk, 1..4                         */
+    int envelope;     /* treepieces_envelope: axes end where they leave it                         */
+    float crown_base, crown_top, crown_width; /* of the trunk's length; the width as a diameter    */
+    float shade;      /* 0 = none; else axes end at places with more than so much foliage and wood
+                         above them, in pieces per m^2 of sky: pruning by light                    */
+    float stiffness;  /* 1 = as most trees; wind bends by its inverse                              */
+    int leaf_shape;   /* treepieces_leaf_shape                                                     */
+    int leaf_count;   /* cards of a leaf cloud, 1..256; 0 = bare                                   */
+    float leaf_size;  /* side of a card, in radii of the cloud                                     */
+    float cloud;      /* radius of a leaf cloud, metres                                            */
+    float cloud_flat; /* height of a cloud over its width, 0.1..2                                  */
+    float leaf_color[3], bark_color[3]; /* sRGB 0..1: the built-in pictures are tinted so          */
+} treepieces_species;
+
+/* Built-in species: 0..treepieces_preset_count()-1. The text is in the form that
+   treepieces_species_parse reads; NULL for a bad number. */
+TREEPIECES_API int treepieces_preset_count(void);
+TREEPIECES_API const char *treepieces_preset_text(int index);
+
+/* The built-in species of that name. TXM_BAD_ARGUMENT (message: the names) if there is none. */
+TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
+                                            treepieces_species *species);
+
+/* Read a species from text: lines "key value ..."; "order N" begins the keys of that order; "like
+   NAME" starts from a built-in species; # begins a comment. Keys are the fields' names.
+   return TXM_OK; TXM_BAD_DATA, the message with line and key; *species untouched then          */
+TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size, txm_env *env,
+                                                   treepieces_species *species);
+
+/* The text of a species, with a 0 at the end if it fits; returns its length without. */
+TREEPIECES_API size_t treepieces_species_print(const treepieces_species *species, char *text,
+                                               size_t capacity);
+
+/* ---- growing ----------------------------------------------------------------------------- */
+
+/* A rim that waits for a piece. */
+typedef struct treepieces_site {
+    int depth;               /* pieces between it and the ground                                    */
+    int order;               /* of the axis                                                         */
+    int parent, rim;         /* type of the piece that it belongs to (-1: the ground) and leaf rim  */
+    int tree;                /* number of the tree                                                  */
+    float position[3], direction[3]; /* metres, as the tree stands; unit length                     */
+    float radius;            /* metres                                                              */
+    float along;             /* 0..1: how much of its axis lies behind it                           */
+    float length;            /* of its axis, metres                                                 */
+} treepieces_site;
+
+/* What is put on it. */
+typedef struct treepieces_choice {
+    int type;         /* of the kit; one without leaf rims ends the axis                            */
+    int turn;         /* 0..5: the piece turned by so many sixths about its stem; -1: as the roll of
+                         the branches wants it                                                      */
+    float direction[3]; /* of the stem, as the tree stands; need not have unit length. Held within 60
+                         degrees of the site's                                                      */
+    float length;     /* of the piece, metres                                                       */
+    float ratios[TREEPIECES_MAX_LEAVES]; /* radius at leaf rim k over that of the site, 0.02..1     */
+    int leaves;       /* 1: bears a leaf cloud                                                      */
+} treepieces_choice;
+
+/* A rule of the user: fill *choice, which holds that of the grammar, or leave it. Must depend on its
+   arguments and rng alone, which is the tree's; is called for different trees at once if env has
+   threads. */
+typedef void treepieces_rule_function(void *user, const treepieces_site *site, txm_rng *rng,
+                                      treepieces_choice *choice);
+
+typedef enum treepieces_rule {
+    TREEPIECES_GRAMMAR = 0, /* the species' probabilities                                           */
+    TREEPIECES_ALTERNATE,   /* I and Y in turn [1, 8]                                               */
+    TREEPIECES_RANDOM       /* I and Y with equal chances [1, 8]                                    */
+} treepieces_rule;
+
+/* Where a tree stands. */
+typedef struct treepieces_place {
+    float position[3]; /* metres                                                                    */
+    float turn;        /* radians about y                                                           */
+    float scale;       /* 0 = 1                                                                     */
+    int species;
+    uint64_t seed;
+} treepieces_place;
+
+typedef struct treepieces_forest_desc {
+    const treepieces_kit *kit;         /* must outlive the forest                                   */
+    const treepieces_species *species; /* species_count of them; copied                             */
+    int species_count;
+    const treepieces_place *places; /* tree_count of them; NULL = on a jittered grid about the origin,
+                                       species in turn by the seed                                  */
+    int tree_count;
+    float spacing;  /* of that grid, metres; 0 = 0.6 times the height of the tallest species        */
+    int max_pieces; /* of a tree, 8..65535; 0 = 600. The thickest grow first, so that fewer pieces
+                       make a sparser tree of the same shape                                        */
+    int rule;       /* treepieces_rule                                                              */
+    treepieces_rule_function *own_rule; /* NULL, or is asked at every site                          */
+    void *own_user;
+    uint64_t seed;
+} treepieces_forest_desc;
+
+enum { TREEPIECES_NONE = -1 };
+
+/* One piece of a tree: a joint of its skeleton, 32 bytes. Its bone is
+
+       B = T(position) R diag(radius, length, radius),
+       position = B_parent * translation of the parent's building transform,
+       R = R_parent * rotation, rotation = building rotation * turn * joint transform  [1, 4.2, 4.3]
+
+   so that neither radius nor length of a piece pass on to its children. Of the first node position and
+   rotation are the tree's. */
+typedef struct treepieces_node {
+    float rotation[4];     /* from the parent's frame, unit quaternion                              */
+    float radius, length;  /* metres                                                                */
+    int32_t parent;        /* node number in its tree, less than its own; the first: TREEPIECES_NONE */
+    uint8_t type;
+    uint8_t joint;         /* leaf rim of the parent * 8 + turn                                     */
+    uint8_t order;         /* of its axis                                                           */
+    uint8_t sway;          /* class of its oscillator, see treepieces_sway                          */
+} treepieces_node;
+
+/* A leaf cloud: a sphere of foliage about a point of a piece's axis, 16 bytes. */
+typedef struct treepieces_cluster {
+    uint32_t node; /* of the forest, as the bones are numbered                                      */
+    float along;   /* 0..1 of the piece's length                                                    */
+    float radius;  /* metres                                                                        */
+    uint32_t look; /* random bits: which of the clouds is shown and how it is turned                */
+} treepieces_cluster;
+
+typedef struct treepieces_tree {
+    uint32_t first_node, node_count;
+    uint32_t first_cluster, cluster_count;
+    float position[3], turn, scale;
+    int species;
+    uint32_t seed;
+    float height; /* of its highest joint above its foot, metres                                    */
+} treepieces_tree;
+
+/* All pieces of one type: `count` records of `stride` 32-bit words each. A record:
+
+       word 0    number of the piece's own bone
+       word 1    bone of the child at leaf rim 0, less the own; that of rim 1 << 16
+       word 2    bone at rim 2, less the own; turns of the children << 16, 4 bits each
+       word 3    one byte per band, band 0 lowest: bits 0..2 log2 of the tiles across a quad (0..4),
+                 3..4 log2 of those along it, 5: halving
+       word 4... one byte per quad, lowest first: column + 8 row of its first tile in the sheet     */
+typedef struct treepieces_batch {
+    const uint32_t *words;
+    uint32_t count, stride;
+    int quad_count;
+} treepieces_batch;
+
+/* A forest, or a single tree: arrays ready for the GPU. Read only. */
+typedef struct treepieces_forest {
+    const treepieces_kit *kit;
+    const treepieces_species *species;
+    const treepieces_tree *trees;
+    const treepieces_node *nodes;       /* tree after tree, parents before children                 */
+    const treepieces_cluster *clusters; /* tree after tree                                          */
+    treepieces_batch batches[TREEPIECES_MAX_TYPES]; /* by type                                      */
+    int species_count, tree_count, type_count;
+    uint32_t node_count, cluster_count;
+    size_t bytes; /* memory of all this                                                             */
+} treepieces_forest;
+
+/* Grow trees. Each from its own seed, so that a tree is the same in any company and on any number of
+   threads.
+
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range (the message names it), or a choice of
+          own_rule that cannot be; TXM_TOO_LARGE above 2^31 pieces; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(pieces); about 130 bytes a piece with its bone and sway                              */
+TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
+                                                 treepieces_forest **out);
+TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
+
+/* ---- poses and wind ---------------------------------------------------------------------- */
+
+/* A pose: every joint turned further. All zero is the tree as it grew. */
+typedef struct treepieces_pose {
+    uint64_t seed;
+    float amount;        /* radians: each joint turns by up to so much about a random level axis    */
+    const float *joints; /* NULL, or a unit quaternion per node that turns it further               */
+} treepieces_pose;
+
+/* The bones of all trees: TREEPIECES_BONE floats for each node of the forest, the rows of the 3 x 4
+   matrix [X Y Z T] from the frame of the piece's root rim to the world (std430: vec4[3]).
+   return TXM_OK; TXM_BAD_ARGUMENT                                                               */
+TREEPIECES_API txm_status treepieces_bones(const treepieces_forest *forest,
+                                           const treepieces_pose *pose, txm_env *env, float *bones);
+
+/* Wind: a mean and gusts, waves that travel over the land with it. */
+typedef struct treepieces_wind {
+    float direction; /* radians from +x towards -z, where it blows to                               */
+    float speed;     /* metres a second; bends by its square                                        */
+    float gusts;     /* 0..1: how much it rises and falls; 0 = steady                               */
+    uint32_t seed;
+} treepieces_wind;
+
+/* The pressure of the wind, 1 = that of 10 m/s, at a place and time (seconds): the sum of travelling
+   gusts. */
+TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float position[3],
+                                     double time);
+
+/* One step of the trees' sway: each joint is a damped oscillator in two directions that the wind
+   drives, solved exactly over the step, so that any step is stable; then the bones.
+
+   time   seconds at the end of the step; dt: its length, >= 0
+   state  4 floats per node, all 0 at the start; in and out
+   bones  as treepieces_bones; pose (may be NULL) is what the trees sway about                   */
+TREEPIECES_API txm_status treepieces_sway(const treepieces_forest *forest,
+                                          const treepieces_wind *wind, double time, double dt,
+                                          const treepieces_pose *pose, txm_env *env, float *state,
+                                          float *bones);
+
+/* ---- skinning ---------------------------------------------------------------------------- */
+
+/* The vertices of one instance in the world, by linear blend skinning; the reference for shaders. A
+   vertex at place j of leaf rim k is place (j - turn) mod 6 of the child's own rim, moved by the
+   child's bone alone: the same expression of the same numbers as the child's, so that both are equal
+   to the bit. Others blend: their position in model space by the own bone, and their position in the
+   frame of terminal joint k by the child's bone with the own piece's stretch.
+
+   positions, normals  3 floats per vertex of the piece; normals (may be NULL) of unit length     */
+TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
+                                    uint32_t instance, float *positions, float *normals);
+
+/* ---- level of detail --------------------------------------------------------------------- */
+
+typedef struct treepieces_lod {
+    float eye[3];
+    float max_level;     /* at the eye, 1..64; 0 = 1: no tessellation                               */
+    float half_distance; /* metres over which levels halve; 0 = 10                                  */
+    float shape;         /* of Phong tessellation, 0..1; 0 = 0.6, which rounds hexagons; < 0: flat  */
+} treepieces_lod;
+
+/* ceil(max_level * 2^(-d / half_distance)), at least 1, with d from the eye to the middle of the edge:
+   symmetric in a and b to the bit [1, 4.4]; and the same for the middle of a quad, corner after
+   corner. */
+TREEPIECES_API int treepieces_edge_level(const treepieces_lod *lod, const float a[3],
+                                         const float b[3]);
+TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float corners[12]);
+
+/* The pattern of a quad with levels 1..64 for the edges from corner 0 to 1, 1 to 2, 2 to 3, 3 to 0 and
+   the inside, as OpenGL's equal_spacing has it. coords: u v pairs, corner 0 (0, 0), 1 (0, 1), 2 (1, 1),
+   3 (1, 0); both may be NULL to count only.
+   return the vertices; *triangles receives how many there are                                    */
+TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coords,
+                                      uint16_t *indices, int *triangles);
+
+/* Phong tessellation of a quad [2, here bilinear]: p = sum w_i p_i with w = (1-u)(1-v), (1-u)v, uv,
+   u(1-v), moved towards the mean of its projections onto the corners' tangent planes:
+   (1 - shape) p + shape * sum w_i (p - n_i . (p - p_i) n_i). Corner after corner; normal may be NULL. */
+TREEPIECES_API void treepieces_patch_point(const float positions[12], const float normals[12],
+                                           float shape, float u, float v, float position[3],
+                                           float normal[3]);
+
+/* ---- baked meshes ------------------------------------------------------------------------ */
+
+/* Plain triangles. Vertices are welded: those of neighbouring quads and pieces are the same. */
+typedef struct treepieces_mesh {
+    size_t vertex_count, triangle_count;
+    float *positions, *normals; /* 3 per vertex                                                     */
+    uint32_t *joints;           /* 4 per vertex: node numbers in the tree; weight 0: joint 0        */
+    float *weights;             /* 4 per vertex, sum 1                                              */
+    uint32_t *indices;          /* 3 per triangle, counter-clockwise from outside                   */
+    float *uvs;                 /* 2 per corner, so 6 per triangle; v downwards. Into the sheet of
+                                   treepieces_bark, or into the leaf picture                        */
+} treepieces_mesh;
+
+typedef struct treepieces_bake_desc {
+    const treepieces_forest *forest;
+    int tree;
+    const float *bones;       /* of the forest                                                      */
+    const treepieces_lod *lod; /* NULL = no tessellation                                            */
+    int capped;               /* close the foot as well                                             */
+    int sheet_size;           /* pixels across the sheet, which uvs keep half a pixel inside of; 0 = 512 */
+    int sheet_layers;         /* 0 = TREEPIECES_OWN                                                 */
+} treepieces_bake_desc;
+
+TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
+                                          treepieces_mesh **out);
+TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh);
+
+/* ---- bark -------------------------------------------------------------------------------- */
+
+enum { TREEPIECES_SHEET = 8 }; /* tiles across and down a layer of the sheet */
+
+/* Sheets of bark out of framed tiles [1, 5]: as all tiles of class 0 have one frame, any rectangle of
+   tiles laid side by side fits any other. Layer 0 is 8 x 8 of them, without end in both directions;
+   a quad shows a rectangle of 1 to 16 tiles across, round the sheet twice if need be, and 1 to 8
+   along, so that texels are about as large on the trunk as on twigs. The lowest rows of layers FOLD to HALVING are blended so that they meet what
+   their names say; quads on them lie on the bottom. Layers from OWN have one class each: 4 x 4 tiles, each in
+   the middle of 2 x 2 cells and continued around it by its own border; a quad shows one of them. */
+typedef struct treepieces_bark_desc {
+    const txm_image *tiles; /* square, one size, sample type and number of channels                 */
+    const int *classes;     /* of each: 0, or from TREEPIECES_OWN; NULL = all 0                     */
+    int tile_count;         /* one of class 0 at least                                              */
+    uint64_t seed;
+} treepieces_bark_desc;
+
+/* Layers of the sheet: TREEPIECES_OWN and one for each own class, up to the highest. */
+TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc);
+
+/* Draw the sheet: out is 8 tiles wide and 8 per layer high, layers one under the other, of the tiles'
+   channels and sample type. */
+TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
+                                          txm_image out);
+
+/* Where a quad's corner (0..3) lies in its layer, 0..1, v downwards; returns the layer. bands: word 3
+   of its record, cell: its byte, pixels: across the sheet, of which half a one is kept away. */
+TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,
+                                      int pixels, int corner, float uv[2]);
+
+/* A bark of our own, for those who have no photograph: `tile_count` tiles that share a frame. */
+TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species, uint64_t seed,
+                                               txm_env *env, const txm_image *tiles,
+                                               int tile_count);
+
+/* ---- foliage ----------------------------------------------------------------------------- */
+
+/* A leaf card of a cloud whose sphere has radius 1 about the origin. */
+typedef struct treepieces_card {
+    float center[3];
+    float right[3], up[3]; /* half the card's width and height                                      */
+    float normal[3];       /* for shading: mostly away from the cloud's middle                      */
+} treepieces_card;
+
+/* The leaf cloud number `look` of a species: species->leaf_count cards. Returns how many; cards may be
+   NULL. */
+TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t look,
+                                    treepieces_card *cards);
+
+/* A picture of a spray of leaves for the cards, RGBA, drawn for those who have none. out: any size,
+   4 channels of 8 bits. */
+TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
+                                                 txm_env *env, txm_image out);
+
+/* 2.5D impostor [1, 6]: a leaf cloud as seen along a direction, by parallel rays.
+
+   cards      card_count of them
+   leaves     their picture, RGBA, 8 bits; alpha below 1/2 is not there
+   right, up, forward  unit vectors of the view, at right angles; forward away from the eye
+   color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255. Its
+              square shows -1..1 along right and up
+   depth      float, 1 channel, size of color: along -forward, that is towards the eye, from the
+              cloud's middle in its radii; -2 where there is nothing                               */
+typedef struct treepieces_impostor_desc {
+    const treepieces_card *cards;
+    int card_count;
+    txm_image leaves;
+    float right[3], up[3], forward[3];
+    float light[3];
+} treepieces_impostor_desc;
+TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *desc, txm_env *env,
+                                              txm_image color, txm_image depth);
+
+/* Plain leaf cards for those without impostors: the clouds of a tree as a mesh of two triangles a card,
+   each bound to its cluster's bone. joints and weights as in bake. looks: how many different clouds
+   are in use, 1..64; cluster.look mod looks chooses. */
+TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
+                                                 const float *bones, int looks, txm_env *env,
+                                                 treepieces_mesh **out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TREEPIECES_H */
+
+#if defined(TREEPIECES_IMPLEMENTATION) && !defined(TREEPIECES_IMPLEMENTED)
+#define TREEPIECES_IMPLEMENTED
+
+/* ---- numbers ----------------------------------------------------------------------------- */
+
+/* All that decides is sums, products, quotients and square roots, so that it is the same everywhere;
+   libm's sine and exponential are not. */
+
+/* sine and cosine of any moderate angle, to 1e-10: reduced to -pi/4..pi/4, then Taylor */
+static void tpc_sincos(double angle, double *sine, double *cosine) {
+    const double turns = angle * (2 / TXM_PI);
+    const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
+    const double x = angle - quarter * (TXM_PI / 2), xx = x * x;
+    const double s = x * (1 - xx / 6 * (1 - xx / 20 * (1 - xx / 42 * (1 - xx / 72 * (1 - xx / 110)))));
+    const double c = 1 - xx / 2 * (1 - xx / 12 * (1 - xx / 30 * (1 - xx / 56 * (1 - xx / 90 *
+                     (1 - xx / 132)))));
+    const int q = quarter & 3;
+    *sine = q == 0 ? s : q == 1 ? c : q == 2 ? -s : -c;
+    *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
+}
+
+/* 2^x, x from -1000 to 1000, to 1e-11: the whole part into the exponent, the rest by Taylor */
+static double tpc_exp2(double x) {
+    const int whole = (int)(x + 1024.5) - 1024; /* rounded to nearest */
+    const double y = (x - whole) * 0.69314718055994530942;
+    const uint64_t bits = (uint64_t)(whole + 1023) << 52;
+    double sum = 1, power;
+    for (int k = 11; k > 0; k--) sum = 1 + sum * y / k;
+    memcpy(&power, &bits, sizeof power);
+    return sum * power;
+}
+
+/* q v q* for a unit quaternion q = x y z w; out may be v */
+static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
+    const float tx = 2 * (q[1] * v[2] - q[2] * v[1]), ty = 2 * (q[2] * v[0] - q[0] * v[2]);
+    const float tz = 2 * (q[0] * v[1] - q[1] * v[0]);
+    const float x = v[0] + q[3] * tx + (q[1] * tz - q[2] * ty);
+    const float y = v[1] + q[3] * ty + (q[2] * tx - q[0] * tz);
+    const float z = v[2] + q[3] * tz + (q[0] * ty - q[1] * tx);
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+}
+
+/* out = a b: b first, then a; out may be one of them */
+static void tpc_multiply(const float a[4], const float b[4], float out[4]) {
+    const float x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1];
+    const float y = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0];
+    const float z = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3];
+    const float w = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2];
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+    out[3] = w;
+}
+
+static float tpc_dot(const float a[3], const float b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* ---- the canonical rim ------------------------------------------------------------------- */
+
+/* cos and sin of 60 k degrees */
+static const float tpc_cos6[TREEPIECES_RIM] = {1.0f, 0.5f, -0.5f, -1.0f, -0.5f, 0.5f};
+static const float tpc_sin6[TREEPIECES_RIM] = {0.0f,  0.86602540378f,  0.86602540378f,
+                                               0.0f, -0.86602540378f, -0.86602540378f};
+
+static const float tpc_cone_out = 0.99503719021f; /* 10 / sqrt(101): of the normal at a rim */
+static const float tpc_cone_up = 0.09950371902f;  /* 1 / sqrt(101)                          */
+
+static void tpc_rim_vertex(int place, float position[3], float normal[3]) {
+    position[0] = tpc_cos6[place];
+    position[1] = 0;
+    position[2] = -tpc_sin6[place];
+    normal[0] = tpc_cone_out * tpc_cos6[place];
+    normal[1] = tpc_cone_up;
+    normal[2] = -tpc_cone_out * tpc_sin6[place];
+}
+
+/* v turned about y by 60 k degrees, which takes place j of a rim to place j + k */
+static void tpc_turn(int k, const float v[3], float out[3]) {
+    const float c = tpc_cos6[k], s = tpc_sin6[k], x = v[0], z = v[2];
+    out[0] = c * x + s * z;
+    out[1] = v[1];
+    out[2] = c * z - s * x;
+}
+
+static void tpc_building_point(const treepieces_similarity *b, const float p[3], float out[3]) {
+    tpc_rotate(b->rotation, p, out);
+    for (int i = 0; i < 3; i++) out[i] = b->translation[i] + b->scale * out[i];
+}
+
+/* ---- the kit ----------------------------------------------------------------------------- */
+
+/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
+typedef struct tpc_seen {
+    float position[3], normal[3];
+} tpc_seen;
+
+/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
+typedef struct tpc_band {
+    float rise, spread;
+} tpc_band;
+
+/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
+   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
+typedef struct tpc_cells {
+    uint32_t bands[TREEPIECES_BANDS], bottom, own;
+    int first, last;
+} tpc_cells;
+
+struct treepieces_kit {
+    txm_arena arena; /* holds the kit itself and all it points to */
+    int count;
+    treepieces_piece pieces[TREEPIECES_MAX_TYPES];
+    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
+    tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
+    int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
+    float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
+    tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
+};
+
+/* ---- the built-in pieces ----------------------------------------------------------------- */
+
+/* A piece while it is put together. */
+typedef struct tpc_shape {
+    treepieces_piece piece;
+    treepieces_vertex vertices[64];
+    treepieces_quad quads[64];
+} tpc_shape;
+
+/* A vertex bound to the own bone and evenly to the leaf rims of a mask, by own : 1 - own. */
+static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, int leaves) {
+    treepieces_vertex *v = &s->vertices[s->piece.vertex_count];
+    const int count = (leaves & 1) + (leaves >> 1 & 1) + (leaves >> 2 & 1);
+    memset(v, 0, sizeof *v);
+    v->position[0] = x;
+    v->position[1] = y;
+    v->position[2] = z;
+    v->weights[0] = count ? own : 1;
+    for (int k = 0; k < TREEPIECES_MAX_LEAVES; k++)
+        if (leaves >> k & 1) v->weights[1 + k] = (1 - own) / (float)count;
+    return s->piece.vertex_count++;
+}
+
+/* Six vertices about the axis, of radius even at places 0, 2, 4 and odd at the others. */
+static void tpc_add_ring(tpc_shape *s, float y, float even, float odd, float own, int leaves,
+                         int ring[TREEPIECES_RIM]) {
+    for (int k = 0; k < TREEPIECES_RIM; k++) {
+        const float r = k & 1 ? odd : even;
+        ring[k] = tpc_add_vertex(s, r * tpc_cos6[k], y, -r * tpc_sin6[k], own, leaves);
+    }
+}
+
+static void tpc_begin(tpc_shape *s, const char *name) {
+    memset(s, 0, sizeof *s);
+    s->piece.name = name;
+    tpc_add_ring(s, 0, 1, 1, 1, 0, s->piece.root_rim);
+}
+
+/* A leaf rim at `at`, its axis leaning by `lean` degrees towards azimuth `turn` (degrees about y from
+   +x to -z) and its place 0 on that azimuth. */
+static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double turn, double lean,
+                               float scale) {
+    treepieces_piece *p = &s->piece;
+    const int k = p->leaf_count++;
+    treepieces_similarity *b = &p->building[k];
+    const double degree = TXM_PI / 180;
+    double st, ct, sl, cl;
+    tpc_sincos(turn * degree / 2, &st, &ct);
+    tpc_sincos(lean * degree / 2, &sl, &cl);
+    b->translation[0] = x;
+    b->translation[1] = y;
+    b->translation[2] = z;
+    b->rotation[0] = txm_float(-st * sl); /* about y by turn, after about z by -lean */
+    b->rotation[1] = txm_float(st * cl);
+    b->rotation[2] = txm_float(-ct * sl);
+    b->rotation[3] = txm_float(ct * cl);
+    b->scale = scale;
+    for (int j = 0; j < TREEPIECES_RIM; j++) {
+        float position[3], normal[3];
+        tpc_rim_vertex(j, position, normal);
+        tpc_building_point(b, position, position);
+        p->leaf_rims[k][j] =
+            tpc_add_vertex(s, position[0], position[1], position[2], 0, 1 << k);
+    }
+    return p->leaf_rims[k];
+}
+
+static void tpc_add_quad(tpc_shape *s, int nw, int sw, int se, int ne, treepieces_class c,
+                         int band) {
+    treepieces_quad *q = &s->quads[s->piece.quad_count++];
+    q->corners[0] = (uint8_t)nw;
+    q->corners[1] = (uint8_t)sw;
+    q->corners[2] = (uint8_t)se;
+    q->corners[3] = (uint8_t)ne;
+    q->tile_class = (uint8_t)c;
+    q->band = (uint8_t)band;
+}
+
+/* The quads between two loops, from place `first` on, `count` of them. */
+static void tpc_add_row(tpc_shape *s, const int *below, const int *above, int first, int count,
+                        treepieces_class c, int band) {
+    for (int i = first; i < first + count; i++) {
+        const int k = i % TREEPIECES_RIM, n = (i + 1) % TREEPIECES_RIM;
+        tpc_add_quad(s, above[k], below[k], below[n], above[n], c, band);
+    }
+}
+
+static void tpc_make_i(tpc_shape *s) {
+    int middle[TREEPIECES_RIM];
+    tpc_begin(s, "I");
+    tpc_add_ring(s, 0.5f, 0.95f, 0.95f, 0.5f, 1, middle);
+    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.9f);
+    tpc_add_row(s, s->piece.root_rim, middle, 0, 6, TREEPIECES_BARK, 0);
+    tpc_add_row(s, middle, top, 0, 6, TREEPIECES_BARK, 1);
+}
+
+/* The crotch runs from place 0 over m1 and m2 to place 3; arm 0 leans to -z, arm 1 to +z:
+
+        2 - 1          each arm's loop: half the ring and the crotch
+       /     \
+      3-m2-m1-0  --> x                                                                       */
+static void tpc_make_y(tpc_shape *s) {
+    int a[TREEPIECES_RIM];
+    tpc_begin(s, "Y");
+    for (int k = 0; k < TREEPIECES_RIM; k++) {
+        const int side = k % 3 == 0; /* where the crotch begins and ends */
+        const int leaves = side ? 3 : k < 3 ? 1 : 2;
+        a[k] = tpc_add_vertex(s, (side ? 0.97f : 0.98f) * tpc_cos6[k], side ? 0.66f : 0.5f,
+                              -1.08f * tpc_sin6[k], 0.6f, leaves);
+    }
+    const int m1 = tpc_add_vertex(s, 0.4f, 0.94f, 0, 0.5f, 3);
+    const int m2 = tpc_add_vertex(s, -0.4f, 0.94f, 0, 0.5f, 3);
+    /* leaning about x keeps place 0 at +x: a turn by 90, the lean, and back by 90 */
+    for (int arm = 0; arm < 2; arm++) {
+        const float to = arm ? 1.0f : -1.0f;
+        double sine, cosine;
+        const int k = s->piece.leaf_count++;
+        treepieces_similarity *b = &s->piece.building[k];
+        tpc_sincos(13 * TXM_PI / 180, &sine, &cosine);
+        b->translation[1] = 1.3f;
+        b->translation[2] = 0.7f * to;
+        b->rotation[0] = txm_float(to * sine);
+        b->rotation[3] = txm_float(cosine);
+        b->scale = 0.75f;
+        for (int j = 0; j < TREEPIECES_RIM; j++) {
+            float p[3], n[3];
+            tpc_rim_vertex(j, p, n);
+            tpc_building_point(b, p, p);
+            s->piece.leaf_rims[k][j] = tpc_add_vertex(s, p[0], p[1], p[2], 0, 1 << k);
+        }
+    }
+    const int loop0[TREEPIECES_RIM] = {a[0], a[1], a[2], a[3], m2, m1};
+    const int loop1[TREEPIECES_RIM] = {a[0], m1, m2, a[3], a[4], a[5]};
+    tpc_add_row(s, s->piece.root_rim, a, 0, 6, TREEPIECES_BARK, 0);
+    tpc_add_row(s, loop0, s->piece.leaf_rims[0], 0, 3, TREEPIECES_BARK, 1);
+    tpc_add_row(s, loop0, s->piece.leaf_rims[0], 3, 3, TREEPIECES_FOLD, 1);
+    tpc_add_row(s, loop1, s->piece.leaf_rims[1], 3, 3, TREEPIECES_BARK, 2);
+    tpc_add_row(s, loop1, s->piece.leaf_rims[1], 0, 3, TREEPIECES_FOLD, 2);
+}
+
+/* A tube of three rows; a branch takes the place of two quads of the middle row, those left and right
+   of place v = 0 (and 3). The hole's loop, as the branch sees it: bottom, bottom right, top right, top,
+   top left, bottom left. */
+static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
+    int b[TREEPIECES_RIM], c[TREEPIECES_RIM];
+    tpc_begin(s, name);
+    tpc_add_ring(s, 0.28f, 0.99f, 0.99f, 0.8f, 1, b);
+    tpc_add_ring(s, 0.74f, 0.96f, 0.96f, 0.4f, 1, c);
+    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.93f);
+    tpc_add_row(s, s->piece.root_rim, b, 0, 6, TREEPIECES_BARK, 0);
+    for (int k = 0; k < TREEPIECES_RIM; k++) {
+        const int at_first = k == 5 || k == 0, at_second = branches > 1 && (k == 2 || k == 3);
+        const int open = at_first || at_second;
+        if (!open) tpc_add_row(s, b, c, k, 1, TREEPIECES_BARK, 1);
+        tpc_add_row(s, c, top, k, 1, open ? TREEPIECES_FOLD : TREEPIECES_BARK, 1);
+    }
+    for (int i = 0; i < branches; i++) {
+        const int v = 3 * i, left = (v + 5) % 6, right = v + 1;
+        const float side = i ? -1.0f : 1.0f;
+        const int loop[TREEPIECES_RIM] = {b[v], b[right], c[right], c[v], c[left], b[left]};
+        const int *rim = tpc_add_leaf(s, 1.4f * side, 0.55f, 0, 180 * i, 60, 0.45f);
+        tpc_add_row(s, loop, rim, 0, 1, TREEPIECES_BARK, 2 + i);
+        tpc_add_row(s, loop, rim, 1, 1, TREEPIECES_TURN_RIGHT, 2 + i);
+        tpc_add_row(s, loop, rim, 2, 2, TREEPIECES_FOLD, 2 + i);
+        tpc_add_row(s, loop, rim, 4, 1, TREEPIECES_TURN_LEFT, 2 + i);
+        tpc_add_row(s, loop, rim, 5, 1, TREEPIECES_BARK, 2 + i);
+    }
+}
+
+/* Three crotches meet in the middle; arm k leans to place 1 + 2 k. */
+static void tpc_make_spatial(tpc_shape *s) {
+    int a[TREEPIECES_RIM], p[TREEPIECES_RIM];
+    tpc_begin(s, "spatial trifurcation");
+    for (int k = 0; k < TREEPIECES_RIM; k++) {
+        const int arm = k / 2, before = (arm + 2) % 3; /* even places lie between two arms */
+        const int leaves = k & 1 ? 1 << arm : 1 << arm | 1 << before;
+        const float r = k & 1 ? 1.06f : 0.97f;
+        a[k] = tpc_add_vertex(s, r * tpc_cos6[k], k & 1 ? 0.5f : 0.64f, -r * tpc_sin6[k], 0.6f,
+                              leaves);
+        p[k] = 0;
+        if (!(k & 1))
+            p[k] = tpc_add_vertex(s, 0.5f * tpc_cos6[k], 0.88f, -0.5f * tpc_sin6[k], 0.5f, leaves);
+    }
+    const int middle = tpc_add_vertex(s, 0, 1, 0, 0.4f, 7);
+    tpc_add_row(s, s->piece.root_rim, a, 0, 6, TREEPIECES_BARK, 0);
+    for (int arm = 0; arm < 3; arm++) {
+        const int to = 1 + 2 * arm, next = (to + 1) % 6, before = to - 1;
+        const int loop[TREEPIECES_RIM] = {a[to], a[next], p[next], middle, p[before], a[before]};
+        const int *rim = tpc_add_leaf(s, 0.78f * tpc_cos6[to], 1.3f, -0.78f * tpc_sin6[to],
+                                      60 * to, 32, 0.62f);
+        tpc_add_row(s, loop, rim, 5, 2, TREEPIECES_BARK, 1 + arm);
+        tpc_add_row(s, loop, rim, 1, 4, TREEPIECES_FOLD, 1 + arm);
+    }
+}
+
+static void tpc_make_tip(tpc_shape *s) {
+    int ring[TREEPIECES_RIM];
+    tpc_begin(s, "tip");
+    tpc_add_ring(s, 0.92f, 0.5f, 0.5f, 1, 0, ring);
+    const int end = tpc_add_vertex(s, 0, 1, 0, 1, 0);
+    tpc_add_row(s, s->piece.root_rim, ring, 0, 6, TREEPIECES_BARK, 0);
+    for (int k = 0; k < TREEPIECES_RIM; k += 2)
+        tpc_add_quad(s, end, ring[k], ring[k + 1], ring[(k + 2) % 6], TREEPIECES_BARK, 1);
+}
+
+static void tpc_make_flare(tpc_shape *s) {
+    int low[TREEPIECES_RIM], high[TREEPIECES_RIM];
+    tpc_begin(s, "root flare");
+    tpc_add_ring(s, 0.2f, 0.92f, 0.7f, 1, 0, low);
+    tpc_add_ring(s, 0.55f, 0.74f, 0.64f, 0.6f, 1, high);
+    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.62f);
+    tpc_add_row(s, s->piece.root_rim, low, 0, 6, TREEPIECES_BARK, 0);
+    tpc_add_row(s, low, high, 0, 6, TREEPIECES_BARK, 0);
+    tpc_add_row(s, high, top, 0, 6, TREEPIECES_BARK, 1);
+}
+
+/* Normals of all vertices: the mean of the quads about them, as large as they are. Those of rims are
+   replaced when the piece is taken in. */
+static void tpc_smooth(tpc_shape *s) {
+    float sums[64][3];
+    memset(sums, 0, sizeof sums);
+    for (int i = 0; i < s->piece.quad_count; i++) {
+        const uint8_t *c = s->quads[i].corners;
+        const float *p[4];
+        float d[2][3];
+        for (int k = 0; k < 4; k++) p[k] = s->vertices[c[k]].position;
+        for (int k = 0; k < 3; k++) {
+            d[0][k] = p[2][k] - p[0][k];
+            d[1][k] = p[3][k] - p[1][k];
+        }
+        for (int k = 0; k < 4; k++) {
+            sums[c[k]][0] += d[0][1] * d[1][2] - d[0][2] * d[1][1];
+            sums[c[k]][1] += d[0][2] * d[1][0] - d[0][0] * d[1][2];
+            sums[c[k]][2] += d[0][0] * d[1][1] - d[0][1] * d[1][0];
+        }
+    }
+    for (int i = 0; i < s->piece.vertex_count; i++) {
+        const float length = sqrtf(tpc_dot(sums[i], sums[i]));
+        for (int k = 0; k < 3; k++) s->vertices[i].normal[k] = sums[i][k] / length;
+    }
+    s->piece.vertices = s->vertices;
+    s->piece.quads = s->quads;
+}
+
+static void tpc_make_builtin(int type, tpc_shape *s) {
+    switch (type) {
+    case TREEPIECES_I: tpc_make_i(s); break;
+    case TREEPIECES_Y: tpc_make_y(s); break;
+    case TREEPIECES_SIDE: tpc_make_branched(s, "side branch", 1); break;
+    case TREEPIECES_PLANAR: tpc_make_branched(s, "planar trifurcation", 2); break;
+    case TREEPIECES_SPATIAL: tpc_make_spatial(s); break;
+    case TREEPIECES_TIP: tpc_make_tip(s); break;
+    default: tpc_make_flare(s); break;
+    }
+    tpc_smooth(s);
+    const treepieces_piece *p = &s->piece;
+    for (int j = 0; j < TREEPIECES_RIM; j++) {
+        float position[3], normal[3];
+        tpc_rim_vertex(j, position, normal);
+        memcpy(s->vertices[p->root_rim[j]].normal, normal, sizeof normal);
+        for (int k = 0; k < p->leaf_count; k++)
+            tpc_rotate(p->building[k].rotation, normal, s->vertices[p->leaf_rims[k][j]].normal);
+    }
+}
+
+/* ---- what a piece must be ---------------------------------------------------------------- */
+
+/* Refuse a piece; number < 0: the fault is not that of one vertex. */
+static txm_status tpc_refuse(txm_env *env, const treepieces_piece *p, int index, const char *what,
+                             int number, const char *fault) {
+    char line[160];
+    if (number < 0)
+        snprintf(line, sizeof line, "piece %d (%.40s): %s", index, p->name ? p->name : "", fault);
+    else
+        snprintf(line, sizeof line, "piece %d (%.40s), %s %d: %s", index, p->name ? p->name : "",
+                 what, number, fault);
+    return txm_fail(env, TXM_BAD_ARGUMENT, line);
+}
+
+static int tpc_is_near(const float *a, const float *b, int n, float tolerance) {
+    for (int i = 0; i < n; i++)
+        if (!(fabsf(a[i] - b[i]) <= tolerance)) return 0;
+    return 1;
+}
+
+/* Counts and numbers, so that the rest can index. */
+static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_env *env) {
+    if (!p->vertices || p->vertex_count < 7 || p->vertex_count > TREEPIECES_MAX_VERTICES)
+        return tpc_refuse(env, p, index, "", -1, "needs 7 to 255 vertices");
+    if (!p->quads || p->quad_count < 6 || p->quad_count > TREEPIECES_MAX_QUADS)
+        return tpc_refuse(env, p, index, "", -1, "needs 6 to 255 quads");
+    if (p->leaf_count < 0 || p->leaf_count > TREEPIECES_MAX_LEAVES)
+        return tpc_refuse(env, p, index, "", -1, "leaf_count must be 0 to 3");
+    for (int i = 0; i < p->quad_count; i++) {
+        const treepieces_quad *q = &p->quads[i];
+        for (int k = 0; k < 4; k++) {
+            if (q->corners[k] >= p->vertex_count)
+                return tpc_refuse(env, p, index, "quad", i, "a corner is no vertex");
+            for (int j = 0; j < k; j++)
+                if (q->corners[j] == q->corners[k])
+                    return tpc_refuse(env, p, index, "quad", i, "two corners are one vertex");
+        }
+        if (q->band >= TREEPIECES_BANDS)
+            return tpc_refuse(env, p, index, "quad", i, "band must be 0 to 3");
+        if (q->tile_class == TREEPIECES_HALVING || q->tile_class >= 64)
+            return tpc_refuse(env, p, index, "quad", i, "tile_class must be 0 to 3 or 5 to 63");
+    }
+    for (int k = -1; k < p->leaf_count; k++) {
+        const int *rim = k < 0 ? p->root_rim : p->leaf_rims[k];
+        for (int j = 0; j < TREEPIECES_RIM; j++)
+            if (rim[j] < 0 || rim[j] >= p->vertex_count)
+                return tpc_refuse(env, p, index, "place", j, "of a rim is no vertex");
+    }
+    return TXM_OK;
+}
+
+/* Finite, unit normals, weights. */
+static txm_status tpc_check_vertices(const treepieces_piece *p, int index, txm_env *env) {
+    for (int i = 0; i < p->vertex_count; i++) {
+        const treepieces_vertex *v = &p->vertices[i];
+        float sum = 0;
+        for (int k = 0; k < 3; k++)
+            if (!txm_is_finite((double)v->position[k]) || !txm_is_finite((double)v->normal[k]))
+                return tpc_refuse(env, p, index, "vertex", i, "is not finite");
+        if (!(fabsf(tpc_dot(v->normal, v->normal) - 1) <= 1e-3f))
+            return tpc_refuse(env, p, index, "vertex", i, "the normal's length is not 1");
+        for (int k = 0; k < 4; k++) {
+            if (!(v->weights[k] >= 0) || (k > p->leaf_count && v->weights[k] != 0))
+                return tpc_refuse(env, p, index, "vertex", i,
+                                  "a weight is negative, or of a joint that is not there");
+            sum += v->weights[k];
+        }
+        if (!(fabsf(sum - 1) <= 1e-4f))
+            return tpc_refuse(env, p, index, "vertex", i, "the weights' sum is not 1");
+    }
+    return TXM_OK;
+}
+
+/* Rim k (-1: the root rim) is the canonical one, bound to its joint alone. */
+static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm_env *env) {
+    const treepieces_similarity root = {{0, 0, 0}, {0, 0, 0, 1}, 1};
+    const treepieces_similarity *b = k < 0 ? &root : &p->building[k];
+    const int *rim = k < 0 ? p->root_rim : p->leaf_rims[k];
+    float length = 0;
+    for (int i = 0; i < 4; i++) length += b->rotation[i] * b->rotation[i];
+    if (!(fabsf(length - 1) <= 1e-4f))
+        return tpc_refuse(env, p, index, "leaf rim", k, "the building rotation is no unit quaternion");
+    if (!(b->scale > 0) || !txm_is_finite((double)b->scale))
+        return tpc_refuse(env, p, index, "leaf rim", k, "the building scale is not above 0");
+    for (int j = 0; j < TREEPIECES_RIM; j++) {
+        const treepieces_vertex *v = &p->vertices[rim[j]];
+        float position[3], normal[3];
+        tpc_rim_vertex(j, position, normal);
+        tpc_building_point(b, position, position);
+        tpc_rotate(b->rotation, normal, normal);
+        if (!tpc_is_near(v->position, position, 3, 1e-4f * b->scale))
+            return tpc_refuse(env, p, index, "vertex", rim[j],
+                              k < 0 ? "is not at its place of the root rim"
+                                    : "is not at its place of a leaf rim, moved by the building "
+                                      "transform");
+        if (!tpc_is_near(v->normal, normal, 3, 1e-3f))
+            return tpc_refuse(env, p, index, "vertex", rim[j],
+                              "the normal is not that of the rim's cone");
+        if (!(v->weights[1 + k] >= 1 - 1e-4f))
+            return tpc_refuse(env, p, index, "vertex", rim[j],
+                              k < 0 ? "on the root rim, is not bound to the own bone alone"
+                                    : "on a leaf rim, is not bound to its terminal joint alone");
+        for (int i = -1; i < k; i++) {
+            const int *other = i < 0 ? p->root_rim : p->leaf_rims[i];
+            for (int m = 0; m < TREEPIECES_RIM; m++)
+                if (other[m] == rim[j])
+                    return tpc_refuse(env, p, index, "vertex", rim[j], "is on two rims");
+        }
+    }
+    return TXM_OK;
+}
+
+/* side[a * n + b]: how many quads have the side from a to b */
+static int tpc_has_side(const uint8_t *side, int n, int a, int b) {
+    return side[(size_t)a * (size_t)n + (size_t)b];
+}
+
+/* The quads about every vertex are one fan: walking from one over shared sides meets them all. */
+static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *env) {
+    for (int v = 0; v < p->vertex_count; v++) {
+        int from[TREEPIECES_MAX_QUADS], to[TREEPIECES_MAX_QUADS], count = 0, met = 1;
+        for (int i = 0; i < p->quad_count; i++) {
+            const uint8_t *c = p->quads[i].corners;
+            for (int k = 0; k < 4; k++) {
+                if (c[k] != v) continue;
+                from[count] = c[(k + 1) % 4];
+                to[count++] = c[(k + 3) % 4];
+            }
+        }
+        if (!count) return tpc_refuse(env, p, index, "vertex", v, "is unused");
+        int first = from[0], last = to[0];
+        for (int grown = 1; grown;) {
+            grown = 0;
+            for (int i = 1; i < count; i++) {
+                if (from[i] < 0 || (from[i] != last && to[i] != first)) continue;
+                if (from[i] == last) last = to[i];
+                else first = from[i];
+                from[i] = -1;
+                met++;
+                grown = 1;
+            }
+        }
+        if (met < count)
+            return tpc_refuse(env, p, index, "vertex", v, "the surface touches itself there");
+    }
+    return TXM_OK;
+}
+
+/* Oriented, manifold, in one piece, its borders the rims. */
+static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_t *side,
+                                    txm_env *env) {
+    const int n = p->vertex_count;
+    int root[TREEPIECES_MAX_VERTICES], borders = 0;
+    memset(side, 0, (size_t)n * (size_t)n);
+    for (int i = 0; i < n; i++) root[i] = i;
+    for (int i = 0; i < p->quad_count; i++) {
+        for (int k = 0; k < 4; k++) {
+            const int a = p->quads[i].corners[k], b = p->quads[i].corners[(k + 1) % 4];
+            if (side[(size_t)a * (size_t)n + (size_t)b]++)
+                return tpc_refuse(env, p, index, "vertex", a,
+                                  "a side from it is that of two quads that are not oriented alike");
+            int low = a, high = b;
+            while (root[low] != low) low = root[low];
+            while (root[high] != high) high = root[high];
+            root[low] = high;
+        }
+    }
+    for (int k = -1; k < p->leaf_count; k++) {
+        const int *rim = k < 0 ? p->root_rim : p->leaf_rims[k];
+        for (int j = 0; j < TREEPIECES_RIM; j++) {
+            const int a = rim[j], b = rim[(j + 1) % TREEPIECES_RIM];
+            const int ahead = tpc_has_side(side, n, a, b), back = tpc_has_side(side, n, b, a);
+            if (ahead != (k < 0) || back != (k >= 0))
+                return tpc_refuse(env, p, index, "vertex", a,
+                                  "the rim from it on is no border, or runs the wrong way round");
+        }
+    }
+    for (int a = 0; a < n; a++) {
+        for (int b = 0; b < n; b++) {
+            if (!tpc_has_side(side, n, a, b) || tpc_has_side(side, n, b, a)) continue;
+            if (++borders > TREEPIECES_RIM * (1 + p->leaf_count))
+                return tpc_refuse(env, p, index, "", -1, "has a border that is no rim");
+        }
+    }
+    const txm_status status = tpc_check_fans(p, index, env);
+    if (status != TXM_OK) return status;
+    for (int i = 1; i < n; i++) {
+        int a = i, b = 0;
+        while (root[a] != a) a = root[a];
+        while (root[b] != b) b = root[b];
+        if (a != b) return tpc_refuse(env, p, index, "vertex", i, "does not hang together with vertex 0");
+    }
+    return TXM_OK;
+}
+
+static txm_status tpc_check_piece(const treepieces_piece *p, int index, uint8_t *side, txm_env *env) {
+    txm_status status = tpc_check_numbers(p, index, env);
+    if (status == TXM_OK) status = tpc_check_vertices(p, index, env);
+    for (int k = -1; status == TXM_OK && k < p->leaf_count; k++)
+        status = tpc_check_rim(p, index, k, env);
+    if (status == TXM_OK) status = tpc_check_surface(p, index, side, env);
+    return status;
+}
+
+static void tpc_measure_bands(const treepieces_piece *p, tpc_band bands[TREEPIECES_BANDS]) {
+    int counts[TREEPIECES_BANDS] = {0, 0, 0, 0};
+    for (int i = 0; i < p->quad_count; i++) {
+        const treepieces_quad *q = &p->quads[i];
+        float side[3] = {0, 0, 0};
+        for (int k = 0; k < 3; k++)
+            for (int c = 0; c < 2; c++) /* west, then east */
+                side[k] += 0.5f * (p->vertices[q->corners[3 * c]].position[k] -
+                                   p->vertices[q->corners[1 + c]].position[k]);
+        bands[q->band].rise += fabsf(side[1]);
+        bands[q->band].spread += sqrtf(side[0] * side[0] + side[2] * side[2]);
+        counts[q->band]++;
+    }
+    for (int b = 0; b < TREEPIECES_BANDS; b++) {
+        if (!counts[b]) continue;
+        bands[b].rise /= (float)counts[b];
+        bands[b].spread /= (float)counts[b];
+    }
+}
+
+static void tpc_sort_cells(const treepieces_piece *p, tpc_cells *cells) {
+    for (int i = 0; i < p->quad_count; i++) {
+        const treepieces_quad *q = &p->quads[i];
+        tpc_cells *c = &cells[i / 4];
+        const uint32_t byte = 255u << (8 * (i & 3));
+        if ((i & 3) == 0) c->first = c->last = q->band;
+        if (q->band < c->first) c->first = q->band;
+        if (q->band > c->last) c->last = q->band;
+        c->bands[q->band] |= byte;
+        if (q->tile_class != TREEPIECES_BARK && q->tile_class < TREEPIECES_OWN) c->bottom |= byte;
+        if (q->tile_class >= TREEPIECES_OWN) c->own |= byte;
+    }
+}
+
+/* Copy a piece into the kit, its rims moved to where they belong to the bit. */
+static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
+    const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
+    const size_t name = from->name ? strlen(from->name) : 0;
+    treepieces_vertex *v =
+        (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
+    treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
+    char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
+    tpc_seen *seen = (tpc_seen *)txm_arena_alloc(
+        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *seen);
+    tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
+    if (!v || !q || !text || !seen || !cells)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
+    treepieces_piece *p = &kit->pieces[kit->count];
+    *p = *from;
+    memcpy(v, from->vertices, vertices * sizeof *v);
+    memcpy(q, from->quads, quads * sizeof *q);
+    if (name) memcpy(text, from->name, name);
+    text[name] = 0;
+    for (size_t i = 0; i < vertices; i++) {
+        v[i].rim = -1;
+        v[i].reserved = 0;
+    }
+    for (int j = 0; j < TREEPIECES_RIM; j++) {
+        treepieces_vertex *r = &v[p->root_rim[j]];
+        const float own[4] = {1, 0, 0, 0};
+        tpc_rim_vertex(j, r->position, r->normal);
+        memcpy(r->weights, own, sizeof own);
+        for (int k = 0; k < p->leaf_count; k++) {
+            treepieces_vertex *l = &v[p->leaf_rims[k][j]];
+            tpc_rim_vertex(j, l->position, l->normal);
+            tpc_building_point(&p->building[k], l->position, l->position);
+            tpc_rotate(p->building[k].rotation, l->normal, l->normal);
+            memset(l->weights, 0, sizeof l->weights);
+            l->weights[1 + k] = 1;
+            l->rim = TREEPIECES_RIM * k + j;
+        }
+    }
+    for (int k = 0; k < p->leaf_count; k++) {
+        const treepieces_similarity *b = &p->building[k];
+        kit->offsets[kit->count][k] = sqrtf(b->translation[0] * b->translation[0] +
+                                            b->translation[2] * b->translation[2]);
+        const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
+        for (size_t i = 0; i < vertices; i++) {
+            tpc_seen *at = &seen[(size_t)k * vertices + i];
+            float moved[3];
+            for (int c = 0; c < 3; c++)
+                moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
+            tpc_rotate(back, moved, at->position);
+            tpc_rotate(back, v[i].normal, at->normal);
+        }
+    }
+    p->vertices = v;
+    p->quads = q;
+    p->name = text;
+    tpc_measure_bands(p, kit->bands[kit->count]);
+    tpc_sort_cells(p, cells);
+    for (size_t i = 0; i < quads; i++)
+        if (q[i].band >= kit->band_counts[kit->count]) kit->band_counts[kit->count] = q[i].band + 1;
+    kit->cells[kit->count] = cells;
+    kit->seen[kit->count++] = seen;
+    return TXM_OK;
+}
+
+TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, int count,
+                                              txm_env *env, treepieces_kit **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (count < 0 || (count > 0 && !pieces))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "pieces is NULL, or count below 0");
+    if (count > TREEPIECES_MAX_TYPES - (int)TREEPIECES_BUILTIN)
+        return txm_fail(env, TXM_TOO_LARGE, "more pieces than TREEPIECES_MAX_TYPES");
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    treepieces_kit *kit = (treepieces_kit *)txm_arena_zero(&arena, 1, sizeof *kit);
+    tpc_shape *shape = (tpc_shape *)txm_alloc(env, sizeof *shape);
+    uint8_t *side = (uint8_t *)txm_alloc(env, TREEPIECES_MAX_VERTICES * TREEPIECES_MAX_VERTICES);
+    txm_status status = TXM_OK;
+    if (!kit || !shape || !side) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the kit");
+    } else {
+        kit->arena = arena;
+        for (int i = 0; status == TXM_OK && i < TREEPIECES_BUILTIN; i++) {
+            tpc_make_builtin(i, shape);
+            status = tpc_take(kit, &shape->piece, env);
+        }
+        for (int i = 0; status == TXM_OK && i < count; i++) {
+            status = tpc_check_piece(&pieces[i], i, side, env);
+            if (status == TXM_OK) status = tpc_take(kit, &pieces[i], env);
+        }
+        arena = kit->arena;
+    }
+    txm_free(env, shape);
+    txm_free(env, side);
+    if (status == TXM_OK) *out = kit;
+    else txm_arena_free(&arena);
+    return status;
+}
+
+TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit) {
+    if (!kit) return;
+    txm_arena arena = kit->arena;
+    txm_arena_free(&arena);
+}
+
+TREEPIECES_API int treepieces_kit_count(const treepieces_kit *kit) {
+    return kit ? kit->count : 0;
+}
+
+TREEPIECES_API const treepieces_piece *treepieces_kit_piece(const treepieces_kit *kit, int type) {
+    return kit && type >= 0 && type < kit->count ? &kit->pieces[type] : NULL;
+}
+
+/* ---- species: fields --------------------------------------------------------------------- */
+
+/* One table drives reading, printing and checking. */
+typedef enum tpc_kind { TPC_REAL, TPC_WHOLE, TPC_ENVELOPE, TPC_LEAF } tpc_kind;
+
+typedef struct tpc_field {
+    const char *key;
+    size_t offset;
+    tpc_kind kind;
+    int count; /* of values */
+    float low, high;
+} tpc_field;
+
+#define TPC_FIELD(key, kind, count, low, high) \
+    { #key, offsetof(treepieces_species, key), kind, count, low, high }
+#define TPC_ORDER(key, count, low, high) \
+    { #key, offsetof(treepieces_order, key), TPC_REAL, count, low, high }
+
+/* name and orders are read apart */
+static const tpc_field tpc_fields[] = {
+    TPC_FIELD(order_count, TPC_WHOLE, 1, 1, TREEPIECES_MAX_ORDERS),
+    TPC_FIELD(flare, TPC_REAL, 1, 1, 4),
+    TPC_FIELD(envelope, TPC_ENVELOPE, 1, 0, TREEPIECES_CYLINDER),
+    TPC_FIELD(crown_base, TPC_REAL, 1, 0, 2),
+    TPC_FIELD(crown_top, TPC_REAL, 1, 0.01f, 3),
+    TPC_FIELD(crown_width, TPC_REAL, 1, 0.01f, 10),
+    TPC_FIELD(shade, TPC_REAL, 1, 0, 1e6f),
+    TPC_FIELD(stiffness, TPC_REAL, 1, 0.01f, 100),
+    TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_BLOSSOM),
+    TPC_FIELD(leaf_count, TPC_WHOLE, 1, 0, 256),
+    TPC_FIELD(leaf_size, TPC_REAL, 1, 0.01f, 4),
+    TPC_FIELD(cloud, TPC_REAL, 1, 0.001f, 20),
+    TPC_FIELD(cloud_flat, TPC_REAL, 1, 0.1f, 2),
+    TPC_FIELD(leaf_color, TPC_REAL, 3, 0, 1),
+    TPC_FIELD(bark_color, TPC_REAL, 3, 0, 1),
+};
+
+static const tpc_field tpc_order_fields[] = {
+    TPC_ORDER(length, 1, 0.01f, 200),
+    TPC_ORDER(length_spread, 1, 0, 1),
+    TPC_ORDER(radius, 1, 0.001f, 1),
+    TPC_ORDER(taper, 1, 0.02f, 1),
+    TPC_ORDER(segments, 1, 1, 64),
+    TPC_ORDER(start, 1, 0, 1),
+    TPC_ORDER(side, 1, 0, 1),
+    TPC_ORDER(pair, 1, 0, 1),
+    TPC_ORDER(fork, 1, 0, 1),
+    TPC_ORDER(triple, 1, 0, 1),
+    TPC_ORDER(fork_angle, 1, 0, 90),
+    TPC_ORDER(fork_ratio, 1, 0.1f, 1),
+    TPC_ORDER(angle_base, 1, 0, 180),
+    TPC_ORDER(angle_top, 1, 0, 180),
+    TPC_ORDER(angle_spread, 1, 0, 180),
+    TPC_ORDER(profile, 3, 0, 10),
+    TPC_ORDER(roll, 1, -360, 360),
+    TPC_ORDER(wander, 1, 0, 90),
+    TPC_ORDER(tropism, 1, -1, 1),
+    TPC_ORDER(sag, 1, -360, 360),
+    TPC_ORDER(gravimorphism, 1, -1, 1),
+    TPC_ORDER(flatten, 1, 0, 1),
+    TPC_ORDER(leaves, 1, 0, 1),
+    TPC_ORDER(leaves_start, 1, 0, 1),
+};
+
+#undef TPC_FIELD
+#undef TPC_ORDER
+
+enum {
+    TPC_FIELDS = (int)(sizeof tpc_fields / sizeof tpc_fields[0]),
+    TPC_ORDER_FIELDS = (int)(sizeof tpc_order_fields / sizeof tpc_order_fields[0]),
+    TPC_NUMBER = 24 /* room for a number as text */
+};
+
+/* by treepieces_envelope and treepieces_leaf_shape */
+static const char *const tpc_envelope_names[] = {"free", "ellipsoid", "cone", "cylinder", NULL};
+static const char *const tpc_leaf_names[] = {"oval",  "lobed",  "lance", "heart",
+                                             "needle", "blossom", NULL};
+
+/* The words that a field's values are called by; NULL: they are numbers. */
+static const char *const *tpc_names_of(const tpc_field *f) {
+    return f->kind == TPC_ENVELOPE ? tpc_envelope_names
+           : f->kind == TPC_LEAF   ? tpc_leaf_names
+                                   : NULL;
+}
+
+static float tpc_get(const tpc_field *f, const void *base, int i) {
+    const char *at = (const char *)base + f->offset;
+    float x;
+    int n;
+    if (f->kind != TPC_REAL) {
+        memcpy(&n, at, sizeof n);
+        return (float)n;
+    }
+    memcpy(&x, at + (size_t)i * sizeof x, sizeof x);
+    return x;
+}
+
+static void tpc_set(const tpc_field *f, void *base, int i, float x) {
+    char *at = (char *)base + f->offset;
+    const int n = (int)x;
+    if (f->kind == TPC_REAL) memcpy(at + (size_t)i * sizeof x, &x, sizeof x);
+    else memcpy(at, &n, sizeof n);
+}
+
+/* ---- species: numbers as text ------------------------------------------------------------ */
+
+/* x * 10^e, the powers up to 10^22 exact */
+static double tpc_scale10(double x, int e) {
+    for (; e >= 22; e -= 22) x *= 1e22;
+    for (; e <= -22; e += 22) x /= 1e22;
+    double power = 1;
+    for (int k = e < 0 ? -e : e; k > 0; k--) power *= 10;
+    return e < 0 ? x / power : x * power;
+}
+
+/* Digits from *at on into *sum, as many as it holds exactly; returns how many there are, and in
+   *dropped how many of them went nowhere. */
+static int tpc_read_digits(const char **at, const char *end, double *sum, int *dropped) {
+    int count = 0;
+    for (; *at < end && **at >= '0' && **at <= '9'; ++*at, count++) {
+        if (*sum < 1e14) *sum = *sum * 10 + (**at - '0');
+        else ++*dropped;
+    }
+    return count;
+}
+
+/* A decimal number, whatever the locale says; 0 if the text is none. */
+static int tpc_read_number(const char *at, const char *end, double *value) {
+    const int negative = at < end && *at == '-';
+    double sum = 0, exponent = 0;
+    int dropped = 0, lost = 0, past = 0;
+    if (at < end && (*at == '-' || *at == '+')) at++;
+    int digits = tpc_read_digits(&at, end, &sum, &dropped);
+    if (at < end && *at == '.') {
+        at++;
+        const int before = dropped;
+        past = tpc_read_digits(&at, end, &sum, &dropped);
+        digits += past;
+        past -= dropped - before;
+        dropped = before;
+    }
+    if (!digits) return 0;
+    if (at < end && (*at == 'e' || *at == 'E')) {
+        at++;
+        const int down = at < end && *at == '-';
+        if (at < end && (*at == '-' || *at == '+')) at++;
+        if (!tpc_read_digits(&at, end, &exponent, &lost)) return 0;
+        if (exponent > 9999) exponent = 9999;
+        if (down) exponent = -exponent;
+    }
+    if (at != end) return 0;
+    const double scaled = sum > 0 ? tpc_scale10(sum, (int)exponent + dropped - past) : 0;
+    *value = negative ? -scaled : scaled;
+    return 1;
+}
+
+/* `count` significant digits of x > 0, and the power of ten of the first. */
+static int tpc_write_digits(double x, int count, char *digits) {
+    int power = 0;
+    while (tpc_scale10(x, -power) >= 10) power++;
+    while (tpc_scale10(x, -power) < 1) power--;
+    double whole = floor(tpc_scale10(x, count - 1 - power) + 0.5);
+    if (whole >= tpc_scale10(1, count)) {
+        whole = tpc_scale10(1, count - 1);
+        power++;
+    }
+    uint64_t n = (uint64_t)whole;
+    for (int i = count; i-- > 0; n /= 10) digits[i] = (char)('0' + n % 10);
+    return power;
+}
+
+/* x to `count` significant digits: 0.05, 12, 1.5e-7 */
+static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
+    char digits[16], *to = text;
+    const int power = tpc_write_digits(fabs((double)x), count, digits);
+    const int plain = power >= -5 && power < 9;
+    int at = plain ? power : 0; /* of the next digit */
+    if (x < 0) *to++ = '-';
+    if (at < 0) {
+        *to++ = '0';
+        *to++ = '.';
+        for (int i = -1; i > at; i--) *to++ = '0';
+    }
+    for (int i = 0; i < count || at >= 0; i++, at--) {
+        if (at == -1 && i) *to++ = '.';
+        *to++ = i < count ? digits[i] : '0';
+    }
+    *to = 0;
+    if (!plain) snprintf(to, (size_t)(text + TPC_NUMBER - to), "e%d", power);
+}
+
+/* The shortest text that reads back as x. */
+static void tpc_write_number(float x, char text[TPC_NUMBER]) {
+    if (!txm_is_finite((double)x) || x == 0) {
+        snprintf(text, TPC_NUMBER, "%s", x == 0 ? "0" : x > 0 ? "inf" : x < 0 ? "-inf" : "nan");
+        return;
+    }
+    for (int count = 1; count <= 9; count++) {
+        double back = 0;
+        tpc_write_rounded(x, count, text);
+        tpc_read_number(text, text + strlen(text), &back);
+        if (txm_float(back) == x) return;
+    }
+}
+
+/* ---- species: checking ------------------------------------------------------------------- */
+
+/* What a field's value must be, for a message. */
+static void tpc_tell_range(const tpc_field *f, char *text, size_t capacity) {
+    const char *const *names = tpc_names_of(f);
+    char low[TPC_NUMBER], high[TPC_NUMBER];
+    if (!names) {
+        tpc_write_number(f->low, low);
+        tpc_write_number(f->high, high);
+        snprintf(text, capacity, "%s must be %s%s to %s", f->key,
+                 f->kind == TPC_WHOLE ? "a whole number of " : "", low, high);
+        return;
+    }
+    int n = snprintf(text, capacity, "%s must be one of", f->key);
+    for (; *names && n > 0 && (size_t)n < capacity; names++)
+        n += snprintf(text + n, capacity - (size_t)n, " %s", *names);
+}
+
+/* NULL, or the first of the fields that is not within its range */
+static const tpc_field *tpc_find_fault(const tpc_field *fields, int count, const void *base) {
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < fields[i].count; k++) {
+            const float x = tpc_get(&fields[i], base, k);
+            if (!(x >= fields[i].low && x <= fields[i].high)) return &fields[i];
+        }
+    }
+    return NULL;
+}
+
+/* A name can be written on a line: printable, no comment, no blanks about it. */
+static int tpc_is_name(const char name[TREEPIECES_MAX_NAME]) {
+    int n = 0;
+    while (n < TREEPIECES_MAX_NAME && name[n]) {
+        const unsigned char c = (unsigned char)name[n++];
+        if (c < ' ' || c == '#' || c == 127) return 0;
+    }
+    return n < TREEPIECES_MAX_NAME && (!n || (name[0] != ' ' && name[n - 1] != ' '));
+}
+
+static txm_status tpc_species_check(const treepieces_species *s, txm_env *env) {
+    char line[200], range[120];
+    if (!tpc_is_name(s->name))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "a species' name is too long, begins or ends blank, or holds # or controls");
+    const char *name = s->name[0] ? s->name : "without a name";
+    const tpc_field *fault = tpc_find_fault(tpc_fields, TPC_FIELDS, s);
+    if (fault) {
+        tpc_tell_range(fault, range, sizeof range);
+        snprintf(line, sizeof line, "species %s: %s", name, range);
+        return txm_fail(env, TXM_BAD_ARGUMENT, line);
+    }
+    for (int k = 0; k < s->order_count; k++) {
+        fault = tpc_find_fault(tpc_order_fields, TPC_ORDER_FIELDS, &s->orders[k]);
+        if (!fault) continue;
+        tpc_tell_range(fault, range, sizeof range);
+        snprintf(line, sizeof line, "species %s, order %d: %s", name, k, range);
+        return txm_fail(env, TXM_BAD_ARGUMENT, line);
+    }
+    if (!(s->crown_base < s->crown_top)) {
+        snprintf(line, sizeof line, "species %s: crown_top must be above crown_base", name);
+        return txm_fail(env, TXM_BAD_ARGUMENT, line);
+    }
+    return TXM_OK;
+}
+
+/* ---- species: presets -------------------------------------------------------------------- */
+
+/* What a species has that is not in its text: a small round tree. */
+static const char tpc_fresh[] =
+    "flare 1.6\n"
+    "envelope free\n"
+    "crown_base 0\n"
+    "crown_top 1\n"
+    "crown_width 1\n"
+    "shade 0\n"
+    "stiffness 1\n"
+    "leaf_shape oval\n"
+    "leaf_count 24\n"
+    "leaf_size 0.3\n"
+    "cloud 0.5\n"
+    "cloud_flat 0.8\n"
+    "leaf_color 0.3 0.45 0.15\n"
+    "bark_color 0.4 0.35 0.3\n"
+    "order 0\n"
+    "length 8\n"
+    "length_spread 0.1\n"
+    "radius 0.025\n"
+    "taper 0.25\n"
+    "segments 12\n"
+    "start 0.25\n"
+    "side 0.45\n"
+    "pair 0.1\n"
+    "fork 0.12\n"
+    "triple 0\n"
+    "fork_angle 25\n"
+    "fork_ratio 0.9\n"
+    "angle_base 0\n"
+    "angle_top 0\n"
+    "angle_spread 0\n"
+    "profile 1 1 1\n"
+    "roll 0\n"
+    "wander 6\n"
+    "tropism 0.05\n"
+    "sag 0\n"
+    "gravimorphism 0\n"
+    "flatten 0\n"
+    "leaves 0\n"
+    "leaves_start 0.8\n"
+    "order 1\n"
+    "length 0.5\n"
+    "length_spread 0.2\n"
+    "radius 0.5\n"
+    "taper 0.2\n"
+    "segments 7\n"
+    "start 0.2\n"
+    "side 0.5\n"
+    "pair 0.1\n"
+    "fork 0.06\n"
+    "triple 0\n"
+    "fork_angle 25\n"
+    "fork_ratio 0.9\n"
+    "angle_base 65\n"
+    "angle_top 40\n"
+    "angle_spread 10\n"
+    "profile 1 0.9 0.5\n"
+    "roll 137.5\n"
+    "wander 9\n"
+    "tropism 0.05\n"
+    "sag 0\n"
+    "gravimorphism 0\n"
+    "flatten 0\n"
+    "leaves 0.5\n"
+    "leaves_start 0.5\n"
+    "order 2\n"
+    "length 0.45\n"
+    "length_spread 0.25\n"
+    "radius 0.55\n"
+    "taper 0.3\n"
+    "segments 4\n"
+    "start 0.2\n"
+    "side 0.5\n"
+    "pair 0\n"
+    "fork 0\n"
+    "triple 0\n"
+    "fork_angle 25\n"
+    "fork_ratio 0.9\n"
+    "angle_base 55\n"
+    "angle_top 40\n"
+    "angle_spread 12\n"
+    "profile 1 0.9 0.6\n"
+    "roll 137.5\n"
+    "wander 12\n"
+    "tropism 0.03\n"
+    "sag 0\n"
+    "gravimorphism 0\n"
+    "flatten 0\n"
+    "leaves 0.8\n"
+    "leaves_start 0.2\n";
+
+static const char tpc_oak[] =
+    "name oak\n"
+    "flare 1.7\n"
+    "stiffness 1.4\n"
+    "envelope ellipsoid\n"
+    "crown_base 0.08\n"
+    "crown_top 1.12\n"
+    "crown_width 1.35\n"
+    "leaf_shape lobed\n"
+    "leaf_count 40\n"
+    "leaf_size 0.4\n"
+    "cloud 0.85\n"
+    "cloud_flat 0.8\n"
+    "leaf_color 0.29 0.4 0.13\n"
+    "bark_color 0.4 0.35 0.29\n"
+    "order 0\n"
+    "length 15\n"
+    "radius 0.034\n"
+    "taper 0.05\n"
+    "segments 15\n"
+    "start 0.2\n"
+    "side 0.5\n"
+    "pair 0.05\n"
+    "fork 0.35\n"
+    "fork_angle 30\n"
+    "fork_ratio 0.95\n"
+    "wander 9\n"
+    "tropism 0.03\n"
+    "leaves 0.9\n"
+    "leaves_start 0.85\n"
+    "order 1\n"
+    "length 0.6\n"
+    "length_spread 0.2\n"
+    "radius 0.55\n"
+    "taper 0.06\n"
+    "segments 11\n"
+    "start 0.15\n"
+    "side 0.5\n"
+    "pair 0.05\n"
+    "fork 0.22\n"
+    "fork_angle 28\n"
+    "angle_base 78\n"
+    "angle_top 45\n"
+    "angle_spread 10\n"
+    "profile 1.1 1 0.6\n"
+    "roll 137.5\n"
+    "wander 15\n"
+    "tropism 0.06\n"
+    "leaves 0.7\n"
+    "leaves_start 0.5\n"
+    "order 2\n"
+    "gravimorphism 0.5\n"
+    "length 0.45\n"
+    "radius 0.5\n"
+    "taper 0.1\n"
+    "segments 7\n"
+    "start 0.1\n"
+    "side 0.55\n"
+    "fork 0.15\n"
+    "angle_base 65\n"
+    "angle_top 45\n"
+    "angle_spread 15\n"
+    "profile 1 0.9 0.5\n"
+    "wander 17\n"
+    "tropism 0.1\n"
+    "leaves 0.6\n"
+    "leaves_start 0.3\n"
+    "order 3\n"
+    "gravimorphism 0.5\n"
+    "length 0.5\n"
+    "radius 0.5\n"
+    "taper 0.2\n"
+    "segments 4\n"
+    "side 0.4\n"
+    "angle_base 55\n"
+    "angle_top 45\n"
+    "wander 18\n"
+    "tropism 0.08\n"
+    "leaves 0.6\n"
+    "leaves_start 0.2\n"
+    "order 4\n"
+    "gravimorphism 0.3\n"
+    "length 0.5\n"
+    "radius 0.55\n"
+    "segments 3\n"
+    "wander 16\n"
+    "leaves 0.5\n";
+
+static const char tpc_beech[] =
+    "name beech\n"
+    "flare 1.8\n"
+    "stiffness 1.2\n"
+    "leaf_shape oval\n"
+    "leaf_count 44\n"
+    "leaf_size 0.36\n"
+    "cloud 1\n"
+    "cloud_flat 0.6\n"
+    "leaf_color 0.28 0.39 0.14\n"
+    "bark_color 0.52 0.51 0.47\n"
+    "order 0\n"
+    "length 20\n"
+    "radius 0.024\n"
+    "taper 0.04\n"
+    "segments 26\n"
+    "start 0.14\n"
+    "side 0.8\n"
+    "pair 0.05\n"
+    "fork 0.08\n"
+    "fork_angle 20\n"
+    "fork_ratio 0.95\n"
+    "wander 4\n"
+    "tropism 0.08\n"
+    "leaves 0.9\n"
+    "leaves_start 0.9\n"
+    "order 1\n"
+    "length 0.55\n"
+    "radius 0.42\n"
+    "taper 0.05\n"
+    "segments 13\n"
+    "start 0.12\n"
+    "side 0.7\n"
+    "pair 0.05\n"
+    "fork 0.1\n"
+    "fork_angle 22\n"
+    "angle_base 66\n"
+    "angle_top 28\n"
+    "angle_spread 8\n"
+    "profile 1 1 0.4\n"
+    "wander 8\n"
+    "tropism 0.05\n"
+    "leaves 0.8\n"
+    "leaves_start 0.5\n"
+    "order 2\n"
+    "length 0.42\n"
+    "radius 0.45\n"
+    "taper 0.08\n"
+    "segments 7\n"
+    "start 0.1\n"
+    "side 0.6\n"
+    "fork 0.06\n"
+    "angle_base 60\n"
+    "angle_top 40\n"
+    "profile 1 0.9 0.4\n"
+    "wander 9\n"
+    "tropism 0.02\n"
+    "flatten 0.4\n"
+    "leaves 0.8\n"
+    "leaves_start 0.3\n"
+    "order 3\n"
+    "length 0.45\n"
+    "radius 0.45\n"
+    "taper 0.15\n"
+    "segments 5\n"
+    "side 0.4\n"
+    "angle_base 50\n"
+    "angle_top 40\n"
+    "wander 10\n"
+    "sag 15\n"
+    "flatten 0.5\n"
+    "leaves 0.6\n"
+    "leaves_start 0.2\n";
+
+static const char tpc_maple[] =
+    "name maple\n"
+    "flare 1.5\n"
+    "leaf_shape lobed\n"
+    "leaf_count 44\n"
+    "leaf_size 0.42\n"
+    "cloud 0.8\n"
+    "cloud_flat 0.8\n"
+    "leaf_color 0.74 0.4 0.12\n"
+    "bark_color 0.42 0.38 0.33\n"
+    "order 0\n"
+    "length 15\n"
+    "radius 0.02\n"
+    "taper 0.05\n"
+    "segments 20\n"
+    "start 0.16\n"
+    "side 0.1\n"
+    "pair 0.5\n"
+    "fork 0.14\n"
+    "fork_angle 20\n"
+    "fork_ratio 0.95\n"
+    "wander 4\n"
+    "tropism 0.1\n"
+    "leaves 0.9\n"
+    "leaves_start 0.85\n"
+    "order 1\n"
+    "length 0.5\n"
+    "radius 0.42\n"
+    "taper 0.05\n"
+    "segments 11\n"
+    "start 0.2\n"
+    "side 0.15\n"
+    "pair 0.4\n"
+    "fork 0.12\n"
+    "angle_base 55\n"
+    "angle_top 30\n"
+    "profile 0.9 1 0.5\n"
+    "roll 90\n"
+    "wander 7\n"
+    "tropism 0.08\n"
+    "leaves 0.8\n"
+    "leaves_start 0.4\n"
+    "order 2\n"
+    "length 0.42\n"
+    "radius 0.42\n"
+    "taper 0.1\n"
+    "segments 7\n"
+    "start 0.15\n"
+    "side 0.1\n"
+    "pair 0.4\n"
+    "fork 0.06\n"
+    "angle_base 50\n"
+    "angle_top 40\n"
+    "profile 1 0.9 0.5\n"
+    "roll 90\n"
+    "wander 8\n"
+    "tropism 0.08\n"
+    "leaves 0.7\n"
+    "leaves_start 0.3\n"
+    "order 3\n"
+    "length 0.5\n"
+    "radius 0.45\n"
+    "taper 0.2\n"
+    "segments 4\n"
+    "side 0.1\n"
+    "pair 0.25\n"
+    "angle_base 45\n"
+    "angle_top 40\n"
+    "roll 90\n"
+    "wander 10\n"
+    "tropism 0.08\n"
+    "leaves 0.7\n"
+    "leaves_start 0.2\n";
+
+static const char tpc_birch[] =
+    "name birch\n"
+    "flare 1.3\n"
+    "stiffness 0.7\n"
+    "leaf_shape heart\n"
+    "leaf_count 30\n"
+    "leaf_size 0.34\n"
+    "cloud 0.55\n"
+    "cloud_flat 1.1\n"
+    "leaf_color 0.4 0.52 0.16\n"
+    "bark_color 0.85 0.83 0.79\n"
+    "order 0\n"
+    "length 18\n"
+    "radius 0.01\n"
+    "taper 0.03\n"
+    "segments 38\n"
+    "start 0.14\n"
+    "side 0.85\n"
+    "pair 0.05\n"
+    "fork 0.01\n"
+    "fork_angle 14\n"
+    "wander 3\n"
+    "tropism 0.12\n"
+    "leaves 0.9\n"
+    "leaves_start 0.9\n"
+    "order 1\n"
+    "length 0.34\n"
+    "radius 0.36\n"
+    "taper 0.06\n"
+    "segments 11\n"
+    "start 0.1\n"
+    "side 0.9\n"
+    "fork 0.02\n"
+    "angle_base 52\n"
+    "angle_top 26\n"
+    "angle_spread 7\n"
+    "profile 0.85 0.95 0.3\n"
+    "wander 7\n"
+    "tropism 0.06\n"
+    "sag 30\n"
+    "leaves 0.6\n"
+    "leaves_start 0.5\n"
+    "order 2\n"
+    "length 0.42\n"
+    "radius 0.38\n"
+    "taper 0.12\n"
+    "segments 6\n"
+    "start 0.05\n"
+    "side 0.8\n"
+    "angle_base 50\n"
+    "angle_top 35\n"
+    "profile 1 1 0.6\n"
+    "wander 10\n"
+    "sag 100\n"
+    "tropism -0.06\n"
+    "leaves 0.5\n"
+    "leaves_start 0.3\n"
+    "order 3\n"
+    "length 0.7\n"
+    "radius 0.45\n"
+    "taper 0.3\n"
+    "segments 5\n"
+    "side 0\n"
+    "angle_base 45\n"
+    "angle_top 35\n"
+    "profile 1 1 0.7\n"
+    "wander 9\n"
+    "sag 110\n"
+    "tropism -0.14\n"
+    "leaves 0.6\n"
+    "leaves_start 0.2\n";
+
+static const char tpc_poplar[] =
+    "name poplar\n"
+    "flare 1.5\n"
+    "stiffness 0.9\n"
+    "leaf_shape heart\n"
+    "leaf_count 36\n"
+    "leaf_size 0.36\n"
+    "cloud 0.6\n"
+    "cloud_flat 1.3\n"
+    "leaf_color 0.3 0.44 0.14\n"
+    "bark_color 0.45 0.42 0.36\n"
+    "order 0\n"
+    "length 24\n"
+    "radius 0.013\n"
+    "taper 0.03\n"
+    "segments 50\n"
+    "start 0.04\n"
+    "side 0.6\n"
+    "pair 0.4\n"
+    "fork 0\n"
+    "wander 1.5\n"
+    "tropism 0.25\n"
+    "leaves 0.9\n"
+    "leaves_start 0.9\n"
+    "order 1\n"
+    "length_spread 0.12\n"
+    "length 0.26\n"
+    "radius 0.32\n"
+    "taper 0.06\n"
+    "segments 10\n"
+    "start 0.15\n"
+    "side 0.6\n"
+    "fork 0\n"
+    "angle_base 30\n"
+    "angle_top 18\n"
+    "angle_spread 5\n"
+    "profile 0.8 1 0.14\n"
+    "wander 4\n"
+    "tropism 0.16\n"
+    "leaves 0.7\n"
+    "leaves_start 0.12\n"
+    "order 2\n"
+    "length 0.4\n"
+    "radius 0.42\n"
+    "taper 0.12\n"
+    "segments 6\n"
+    "start 0.1\n"
+    "side 0.4\n"
+    "angle_base 32\n"
+    "angle_top 25\n"
+    "profile 1 0.9 0.5\n"
+    "wander 6\n"
+    "tropism 0.14\n"
+    "leaves 0.7\n"
+    "leaves_start 0.3\n"
+    "order 3\n"
+    "length 0.4\n"
+    "radius 0.5\n"
+    "taper 0.3\n"
+    "segments 3\n"
+    "angle_base 32\n"
+    "angle_top 25\n"
+    "wander 7\n"
+    "tropism 0.12\n"
+    "leaves 0.6\n";
+
+static const char tpc_willow[] =
+    "name willow\n"
+    "flare 1.6\n"
+    "stiffness 0.6\n"
+    "leaf_shape lance\n"
+    "leaf_count 26\n"
+    "leaf_size 0.7\n"
+    "cloud 0.38\n"
+    "cloud_flat 1.4\n"
+    "leaf_color 0.42 0.5 0.18\n"
+    "bark_color 0.42 0.37 0.29\n"
+    "order 0\n"
+    "length 10\n"
+    "radius 0.042\n"
+    "taper 0.08\n"
+    "segments 13\n"
+    "start 0.2\n"
+    "side 0.5\n"
+    "pair 0.05\n"
+    "fork 0.4\n"
+    "fork_angle 30\n"
+    "fork_ratio 0.95\n"
+    "wander 8\n"
+    "tropism 0.03\n"
+    "order 1\n"
+    "length 0.62\n"
+    "radius 0.5\n"
+    "taper 0.1\n"
+    "segments 10\n"
+    "start 0.15\n"
+    "side 0.65\n"
+    "pair 0.3\n"
+    "fork 0.06\n"
+    "angle_base 60\n"
+    "angle_top 40\n"
+    "profile 1 1 0.7\n"
+    "wander 9\n"
+    "tropism 0.05\n"
+    "sag 50\n"
+    "leaves 0.3\n"
+    "leaves_start 0.4\n"
+    "order 2\n"
+    "length 0.8\n"
+    "radius 0.4\n"
+    "taper 0.12\n"
+    "segments 7\n"
+    "start 0.3\n"
+    "side 0.08\n"
+    "angle_base 60\n"
+    "angle_top 40\n"
+    "profile 1 1 0.8\n"
+    "wander 5\n"
+    "tropism -0.16\n"
+    "sag 70\n"
+    "gravimorphism 0.3\n"
+    "leaves 0.85\n"
+    "leaves_start 0.15\n"
+    "order 3\n"
+    "length 0.6\n"
+    "radius 0.5\n"
+    "taper 0.3\n"
+    "segments 5\n"
+    "angle_base 30\n"
+    "angle_top 30\n"
+    "wander 5\n"
+    "tropism -0.3\n"
+    "leaves 0.85\n"
+    "leaves_start 0\n";
+
+static const char tpc_almond[] =
+    "name almond\n"
+    "flare 1.4\n"
+    "leaf_shape blossom\n"
+    "leaf_count 34\n"
+    "leaf_size 0.3\n"
+    "cloud 0.38\n"
+    "cloud_flat 0.9\n"
+    "leaf_color 0.94 0.76 0.8\n"
+    "bark_color 0.3 0.25 0.22\n"
+    "order 0\n"
+    "length 5.5\n"
+    "radius 0.026\n"
+    "taper 0.06\n"
+    "segments 14\n"
+    "start 0.2\n"
+    "side 0.35\n"
+    "fork 0.42\n"
+    "triple 0.1\n"
+    "fork_angle 32\n"
+    "fork_ratio 0.95\n"
+    "wander 8\n"
+    "tropism 0.1\n"
+    "leaves 0.7\n"
+    "leaves_start 0.6\n"
+    "order 1\n"
+    "length 0.5\n"
+    "radius 0.45\n"
+    "taper 0.1\n"
+    "segments 9\n"
+    "start 0.1\n"
+    "side 0.6\n"
+    "fork 0.15\n"
+    "fork_angle 28\n"
+    "angle_base 55\n"
+    "angle_top 40\n"
+    "profile 1 1 0.6\n"
+    "wander 11\n"
+    "tropism 0.08\n"
+    "leaves 0.7\n"
+    "leaves_start 0.3\n"
+    "order 2\n"
+    "length 0.45\n"
+    "radius 0.5\n"
+    "taper 0.15\n"
+    "segments 5\n"
+    "side 0.55\n"
+    "fork 0.05\n"
+    "angle_base 50\n"
+    "angle_top 40\n"
+    "profile 1 0.9 0.5\n"
+    "wander 12\n"
+    "tropism 0.08\n"
+    "leaves 0.7\n"
+    "leaves_start 0.2\n"
+    "order 3\n"
+    "length 0.5\n"
+    "radius 0.55\n"
+    "taper 0.3\n"
+    "segments 3\n"
+    "angle_base 45\n"
+    "angle_top 40\n"
+    "wander 12\n"
+    "tropism 0.06\n"
+    "leaves 0.6\n";
+
+static const char tpc_pine[] =
+    "name pine\n"
+    "flare 1.4\n"
+    "leaf_shape needle\n"
+    "leaf_count 40\n"
+    "leaf_size 0.5\n"
+    "cloud 0.8\n"
+    "cloud_flat 0.4\n"
+    "leaf_color 0.24 0.35 0.19\n"
+    "bark_color 0.55 0.36 0.24\n"
+    "order 0\n"
+    "length 19\n"
+    "radius 0.0155\n"
+    "taper 0.06\n"
+    "segments 30\n"
+    "start 0.42\n"
+    "side 0.3\n"
+    "pair 0.6\n"
+    "fork 0.05\n"
+    "fork_angle 22\n"
+    "wander 4\n"
+    "tropism 0.08\n"
+    "leaves 0.9\n"
+    "leaves_start 0.9\n"
+    "order 1\n"
+    "length 0.3\n"
+    "radius 0.42\n"
+    "taper 0.1\n"
+    "segments 9\n"
+    "start 0.3\n"
+    "side 0.3\n"
+    "pair 0.25\n"
+    "fork 0.12\n"
+    "fork_angle 28\n"
+    "angle_base 90\n"
+    "angle_top 40\n"
+    "angle_spread 10\n"
+    "profile 0.75 1 0.5\n"
+    "wander 14\n"
+    "tropism 0.06\n"
+    "flatten 0.2\n"
+    "leaves 0.5\n"
+    "leaves_start 0.6\n"
+    "order 2\n"
+    "length 0.42\n"
+    "radius 0.45\n"
+    "taper 0.15\n"
+    "segments 5\n"
+    "start 0.2\n"
+    "side 0.3\n"
+    "pair 0.15\n"
+    "angle_base 60\n"
+    "angle_top 45\n"
+    "profile 1 0.9 0.5\n"
+    "wander 14\n"
+    "tropism 0.1\n"
+    "flatten 0.5\n"
+    "leaves 0.7\n"
+    "leaves_start 0.5\n"
+    "order 3\n"
+    "length 0.5\n"
+    "radius 0.5\n"
+    "taper 0.3\n"
+    "segments 3\n"
+    "angle_base 50\n"
+    "angle_top 40\n"
+    "wander 12\n"
+    "tropism 0.12\n"
+    "leaves 0.7\n"
+    "leaves_start 0.4\n";
+
+static const char tpc_spruce[] =
+    "name spruce\n"
+    "flare 1.4\n"
+    "leaf_shape needle\n"
+    "leaf_count 16\n"
+    "leaf_size 0.8\n"
+    "cloud 0.46\n"
+    "cloud_flat 0.55\n"
+    "leaf_color 0.2 0.31 0.19\n"
+    "bark_color 0.38 0.3 0.25\n"
+    "order 0\n"
+    "length 22\n"
+    "radius 0.014\n"
+    "taper 0.03\n"
+    "segments 64\n"
+    "start 0.04\n"
+    "side 0.05\n"
+    "pair 0.95\n"
+    "fork 0\n"
+    "wander 1\n"
+    "tropism 0.3\n"
+    "leaves 1\n"
+    "leaves_start 0.96\n"
+    "order 1\n"
+    "length 0.2\n"
+    "radius 0.34\n"
+    "taper 0.12\n"
+    "segments 9\n"
+    "start 0.05\n"
+    "side 0.1\n"
+    "pair 0.8\n"
+    "fork 0\n"
+    "angle_base 98\n"
+    "angle_top 55\n"
+    "angle_spread 6\n"
+    "profile 1 0.56 0.04\n"
+    "roll 80\n"
+    "wander 4\n"
+    "sag -22\n"
+    "leaves 0.9\n"
+    "leaves_start 0\n"
+    "order 2\n"
+    "length 0.38\n"
+    "radius 0.4\n"
+    "taper 0.3\n"
+    "segments 3\n"
+    "side 0\n"
+    "pair 0\n"
+    "angle_base 60\n"
+    "angle_top 50\n"
+    "profile 1 0.8 0.3\n"
+    "roll 15\n"
+    "wander 6\n"
+    "sag 25\n"
+    "flatten 0.7\n"
+    "leaves 0.8\n"
+    "leaves_start 0.1\n";
+
+static const char tpc_dead[] =
+    "name dead\n"
+    "flare 1.7\n"
+    "stiffness 2\n"
+    "leaf_count 0\n"
+    "bark_color 0.5 0.47 0.43\n"
+    "order 0\n"
+    "length 9\n"
+    "radius 0.036\n"
+    "taper 0.3\n"
+    "segments 12\n"
+    "start 0.3\n"
+    "side 0.55\n"
+    "fork 0.18\n"
+    "fork_angle 28\n"
+    "fork_ratio 0.85\n"
+    "wander 12\n"
+    "tropism 0.02\n"
+    "order 1\n"
+    "length 0.42\n"
+    "length_spread 0.6\n"
+    "radius 0.45\n"
+    "taper 0.3\n"
+    "segments 7\n"
+    "start 0.3\n"
+    "side 0.35\n"
+    "fork 0.12\n"
+    "angle_base 80\n"
+    "angle_top 40\n"
+    "angle_spread 18\n"
+    "profile 1 1 0.6\n"
+    "wander 20\n"
+    "tropism 0.03\n"
+    "order 2\n"
+    "length 0.4\n"
+    "length_spread 0.6\n"
+    "radius 0.45\n"
+    "taper 0.4\n"
+    "segments 4\n"
+    "side 0.25\n"
+    "angle_base 60\n"
+    "angle_top 45\n"
+    "angle_spread 20\n"
+    "wander 22\n"
+    "order 3\n"
+    "length 0.4\n"
+    "radius 0.5\n"
+    "taper 0.4\n"
+    "segments 3\n"
+    "wander 20\n";
+
+static const struct {
+    const char *name, *text;
+} tpc_presets[] = {
+    {"oak", tpc_oak},
+    {"beech", tpc_beech},
+    {"maple", tpc_maple},
+    {"birch", tpc_birch},
+    {"poplar", tpc_poplar},
+    {"willow", tpc_willow},
+    {"almond", tpc_almond},
+    {"pine", tpc_pine},
+    {"spruce", tpc_spruce},
+    {"dead", tpc_dead},
+};
+
+/* ---- species: reading -------------------------------------------------------------------- */
+
+typedef struct tpc_reader {
+    const char *at, *end; /* what is left of the line */
+    int line, order;      /* order -1: none begun     */
+    int keys, crown_line; /* keys so far; line of the last one of the crown */
+    treepieces_species species;
+    txm_env *env;
+} tpc_reader;
+
+typedef struct tpc_word {
+    const char *at, *end;
+} tpc_word;
+
+static int tpc_is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\r';
+}
+
+static int tpc_is_word(const tpc_word *w, const char *text) {
+    const size_t n = strlen(text);
+    return (size_t)(w->end - w->at) == n && !memcmp(w->at, text, n);
+}
+
+/* The next word of the line, 0 if there is none. */
+static int tpc_next_word(tpc_reader *r, tpc_word *w) {
+    while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
+    w->at = r->at;
+    while (r->at < r->end && !tpc_is_blank(*r->at)) r->at++;
+    w->end = r->at;
+    return w->at < w->end;
+}
+
+/* "line 7: WORD: fault"; the word may hold anything, and be NULL. */
+static txm_status tpc_misread(const tpc_reader *r, const tpc_word *w, const char *fault) {
+    char line[220], shown[28];
+    size_t n = 0;
+    for (const char *p = w ? w->at : NULL; p && p < w->end; p++) {
+        if (n + 4 >= sizeof shown) {
+            memcpy(shown + n, "...", 3);
+            n += 3;
+            break;
+        }
+        shown[n++] = *p > ' ' && *p < 127 ? *p : '?';
+    }
+    shown[n] = 0;
+    snprintf(line, sizeof line, "line %d: %s%s%s", r->line, shown, n ? ": " : "", fault);
+    return txm_fail(r->env, TXM_BAD_DATA, line);
+}
+
+/* One value of a field; the key is for messages. */
+static txm_status tpc_read_value(tpc_reader *r, const tpc_word *key, const tpc_field *f, void *base,
+                                 int i) {
+    char range[120];
+    tpc_word w;
+    double x = -1;
+    const char *const *names = tpc_names_of(f);
+    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
+    for (int k = 0; names && names[k]; k++)
+        if (tpc_is_word(&w, names[k])) x = k;
+    if (!names && !tpc_read_number(w.at, w.end, &x)) return tpc_misread(r, &w, "is no number");
+    const float value = x > -1e9 && x < 1e9 ? txm_float(x) : x < 0 ? -1e9f : 1e9f;
+    if (!(value >= f->low && value <= f->high) ||
+        (f->kind != TPC_REAL && value != (float)(int)value)) {
+        tpc_tell_range(f, range, sizeof range);
+        return tpc_misread(r, &w, range);
+    }
+    tpc_set(f, base, i, value == 0 ? 0 : value); /* no -0 */
+    return TXM_OK;
+}
+
+static txm_status tpc_read_name(tpc_reader *r, const tpc_word *key) {
+    char *name = r->species.name;
+    while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
+    while (r->at < r->end && tpc_is_blank(r->end[-1])) r->end--;
+    const size_t size = (size_t)(r->end - r->at);
+    if (!size) return tpc_misread(r, key, "a value is missing");
+    if (size >= TREEPIECES_MAX_NAME)
+        return tpc_misread(r, key, "longer than 31 characters");
+    memset(name, 0, TREEPIECES_MAX_NAME);
+    memcpy(name, r->at, size);
+    if (strlen(name) != size || !tpc_is_name(name))
+        return tpc_misread(r, key, "holds a control character");
+    r->at = r->end;
+    return TXM_OK;
+}
+
+/* "order N" begins an order; there are at least as many then. */
+static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
+    static const tpc_field field = {"order", 0, TPC_WHOLE, 1, 0, TREEPIECES_MAX_ORDERS - 1};
+    const txm_status status = tpc_read_value(r, key, &field, &r->order, 0);
+    if (status != TXM_OK) return status;
+    if (r->species.order_count <= r->order) r->species.order_count = r->order + 1;
+    return TXM_OK;
+}
+
+static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
+                                treepieces_species *species);
+
+/* "like NAME": the orders beyond those of that species keep what a fresh one has. */
+static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
+    tpc_word w;
+    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
+    if (r->keys) return tpc_misread(r, key, "must come before all other keys");
+    for (int i = 0; i < treepieces_preset_count(); i++) {
+        if (!tpc_is_word(&w, tpc_presets[i].name)) continue;
+        return tpc_read_text(tpc_presets[i].text, strlen(tpc_presets[i].text), r->env, &r->species);
+    }
+    return tpc_misread(r, &w, "is none of the built-in species");
+}
+
+static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
+    if (tpc_is_word(key, "like")) return tpc_begin_like(r, key);
+    if (tpc_is_word(key, "order")) return tpc_begin_order(r, key);
+    if (tpc_is_word(key, "name")) return tpc_read_name(r, key);
+    const tpc_field *field = NULL;
+    void *base = &r->species;
+    for (int i = 0; i < TPC_FIELDS; i++)
+        if (tpc_is_word(key, tpc_fields[i].key)) field = &tpc_fields[i];
+    for (int i = 0; i < TPC_ORDER_FIELDS && !field; i++) {
+        if (!tpc_is_word(key, tpc_order_fields[i].key)) continue;
+        if (r->order < 0) return tpc_misread(r, key, "needs a line \"order N\" before it");
+        field = &tpc_order_fields[i];
+        base = &r->species.orders[r->order];
+    }
+    if (!field) return tpc_misread(r, key, "is no key");
+    if (!strncmp(field->key, "crown_", 6)) r->crown_line = r->line;
+    for (int i = 0; i < field->count; i++) {
+        const txm_status status = tpc_read_value(r, key, field, base, i);
+        if (status != TXM_OK) return status;
+    }
+    return TXM_OK;
+}
+
+/* The line from r->at on: a key and its values, a comment, or nothing. */
+static txm_status tpc_read_line(tpc_reader *r) {
+    tpc_word key, rest;
+    const char *comment = (const char *)memchr(r->at, '#', (size_t)(r->end - r->at));
+    if (comment) r->end = comment;
+    if (!tpc_next_word(r, &key)) return TXM_OK;
+    const txm_status status = tpc_read_key(r, &key);
+    if (status != TXM_OK) return status;
+    if (tpc_next_word(r, &rest)) return tpc_misread(r, &key, "has too many values");
+    r->keys++;
+    return TXM_OK;
+}
+
+/* Read on top of what *species is. */
+static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
+                                treepieces_species *species) {
+    const char *at = text, *end = text + size;
+    tpc_reader r;
+    memset(&r, 0, sizeof r);
+    r.order = -1;
+    r.species = *species;
+    r.env = env;
+    while (at < end) {
+        const char *newline = (const char *)memchr(at, '\n', (size_t)(end - at));
+        r.at = at;
+        r.end = newline ? newline : end;
+        r.line++;
+        const txm_status status = tpc_read_line(&r);
+        if (status != TXM_OK) return status;
+        if (!newline) break;
+        at = newline + 1;
+    }
+    if (!(r.species.crown_base < r.species.crown_top)) {
+        r.line = r.crown_line;
+        return tpc_misread(&r, NULL, "crown_top must be above crown_base");
+    }
+    *species = r.species;
+    return TXM_OK;
+}
+
+TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size, txm_env *env,
+                                                   treepieces_species *species) {
+    treepieces_species fresh;
+    if (!species || (!text && size))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "text or species is NULL");
+    memset(&fresh, 0, sizeof fresh);
+    fresh.crown_top = 1; /* until it is read */
+    txm_status status = tpc_read_text(tpc_fresh, strlen(tpc_fresh), env, &fresh);
+    for (int k = fresh.order_count; k < TREEPIECES_MAX_ORDERS && k > 0; k++)
+        fresh.orders[k] = fresh.orders[k - 1];
+    if (status == TXM_OK && size) status = tpc_read_text(text, size, env, &fresh);
+    if (status != TXM_OK) return status;
+    for (int k = fresh.order_count; k < TREEPIECES_MAX_ORDERS; k++)
+        memset(&fresh.orders[k], 0, sizeof fresh.orders[k]);
+    *species = fresh;
+    return TXM_OK;
+}
+
+/* ---- species: printing ------------------------------------------------------------------- */
+
+typedef struct tpc_writer {
+    char *text;
+    size_t capacity, length;
+} tpc_writer;
+
+static void tpc_write(tpc_writer *w, const char *text) {
+    for (; *text; text++, w->length++)
+        if (w->length + 1 < w->capacity) w->text[w->length] = *text;
+}
+
+static void tpc_write_fields(tpc_writer *w, const tpc_field *fields, int count, const void *base) {
+    char number[TPC_NUMBER];
+    for (int i = 0; i < count; i++) {
+        const tpc_field *f = &fields[i];
+        const char *const *names = tpc_names_of(f);
+        tpc_write(w, f->key);
+        for (int k = 0; k < f->count; k++) {
+            const float x = tpc_get(f, base, k);
+            tpc_write(w, " ");
+            if (!names || !(x >= f->low && x <= f->high)) tpc_write_number(x, number);
+            tpc_write(w, names && x >= f->low && x <= f->high ? names[(int)x] : number);
+        }
+        tpc_write(w, "\n");
+    }
+}
+
+TREEPIECES_API size_t treepieces_species_print(const treepieces_species *species, char *text,
+                                               size_t capacity) {
+    tpc_writer w;
+    char name[TREEPIECES_MAX_NAME + 1], order[32];
+    if (!species) return 0;
+    w.text = text;
+    w.capacity = text ? capacity : 0;
+    w.length = 0;
+    memcpy(name, species->name, TREEPIECES_MAX_NAME);
+    name[TREEPIECES_MAX_NAME] = 0;
+    if (name[0]) {
+        tpc_write(&w, "name ");
+        tpc_write(&w, name);
+        tpc_write(&w, "\n");
+    }
+    tpc_write_fields(&w, tpc_fields, TPC_FIELDS, species);
+    for (int k = 0; k < species->order_count && k < TREEPIECES_MAX_ORDERS; k++) {
+        snprintf(order, sizeof order, "\norder %d\n", k);
+        tpc_write(&w, order);
+        tpc_write_fields(&w, tpc_order_fields, TPC_ORDER_FIELDS, &species->orders[k]);
+    }
+    if (w.capacity) w.text[w.length < w.capacity ? w.length : w.capacity - 1] = 0;
+    return w.length;
+}
+
+TREEPIECES_API int treepieces_preset_count(void) {
+    return (int)(sizeof tpc_presets / sizeof tpc_presets[0]);
+}
+
+TREEPIECES_API const char *treepieces_preset_text(int index) {
+    return index >= 0 && index < treepieces_preset_count() ? tpc_presets[index].text : NULL;
+}
+
+TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
+                                            treepieces_species *species) {
+    char line[240];
+    if (!name || !species) return txm_fail(env, TXM_BAD_ARGUMENT, "name or species is NULL");
+    for (int i = 0; i < treepieces_preset_count(); i++) {
+        if (strcmp(name, tpc_presets[i].name)) continue;
+        const char *text = tpc_presets[i].text;
+        return treepieces_species_parse(text, strlen(text), env, species);
+    }
+    int n = snprintf(line, sizeof line, "no species \"%.24s\"; there are", name);
+    for (int i = 0; i < treepieces_preset_count() && n > 0 && (size_t)n < sizeof line; i++)
+        n += snprintf(line + n, sizeof line - (size_t)n, "%s %s", i ? "," : "",
+                      tpc_presets[i].name);
+    return txm_fail(env, TXM_BAD_ARGUMENT, line);
+}
+
+/* ---- growing: what a tree is made of ------------------------------------------------------ */
+
+enum {
+    TPC_BUCKETS = 160,     /* of rims that wait, by the logarithm of their radius                 */
+    TPC_GRID = 16,         /* cells a side of the grid of shade                                   */
+    TPC_CLASSES = 16,      /* of oscillators                                                      */
+    TPC_BLOCK_TREES = 64,  /* trees that grow at once ...                                         */
+    TPC_BLOCK_PIECES = 1 << 18, /* ... as long as they have no more than so many pieces           */
+    TPC_MAX_BRANCH = 60    /* percent: radius of a side branch over that of its stem at most      */
+};
+
+/* A rim that waits for a piece. */
+typedef struct tpc_bud {
+    int32_t next;      /* in its bucket */
+    int32_t parent;    /* node, or TREEPIECES_NONE */
+    uint8_t rim, order, across;       /* across: log2 of the tiles across an edge of the rim      */
+    uint8_t is_forked, is_aimed;      /* behind a fork, where start no longer counts; aim says
+                                         where the piece after this one goes                      */
+    uint16_t depth;
+    float position[3], rotation[4], heading[3]; /* rotation: of the rim; heading: where it grows  */
+    float aim[3];
+    float radius, end_radius;                   /* here and at the end of the axis                */
+    float rest; /* of its step, which a short branching piece left for a plain one */
+    float along, length, step;                  /* of the axis; step: length of a piece           */
+    float roll;     /* degrees about the axis, for the next branch, as the rim's frame counts them */
+} tpc_bud;
+
+/* One tree as it grows. */
+typedef struct tpc_growth {
+    const treepieces_forest_desc *desc;
+    const treepieces_kit *kit;
+    const treepieces_species *species;
+    treepieces_place place;
+    txm_rng rng;
+    txm_status status;
+    const char *fault;
+    int index; /* of the tree */
+    treepieces_node *nodes;
+    uint32_t *bands;   /* by node: word 3 of its record        */
+    uint32_t *records; /* by node: where its record is, filled last */
+    treepieces_cluster *clusters;
+    tpc_bud *buds;
+    int node_count, cluster_count, bud_count, waiting, most, bucket;
+    int32_t first[TPC_BUCKETS], last[TPC_BUCKETS];
+    uint32_t type_counts[TREEPIECES_MAX_TYPES];
+    float scale, trunk, foot; /* metres: scale of the place, length and radius of the trunk       */
+    float height;
+    uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above it    */
+} tpc_growth;
+
+static float tpc_uniform(tpc_growth *g, float low, float high) {
+    return low + (high - low) * txm_rng_float(&g->rng);
+}
+
+/* ---- growing: rims in order of their radius ------------------------------------------------ */
+
+/* Eight buckets an octave, the thickest first: the bits of a float rise with its logarithm. */
+static uint32_t tpc_bits(float x) {
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+static int tpc_bucket(float radius) {
+    return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
+}
+
+/* The bud behind the last one now waits. */
+static void tpc_push(tpc_growth *g) {
+    const int i = g->bud_count++, b = tpc_bucket(g->buds[i].radius);
+    g->buds[i].next = -1;
+    if (g->first[b] < 0) g->first[b] = i;
+    else g->buds[g->last[b]].next = i;
+    g->last[b] = i;
+    g->waiting++;
+    if (b < g->bucket) g->bucket = b; /* a rule may let a stem grow thicker */
+}
+
+/* The thickest rim that waits; there must be one. */
+static tpc_bud *tpc_pop(tpc_growth *g) {
+    while (g->first[g->bucket] < 0) g->bucket++;
+    tpc_bud *bud = &g->buds[g->first[g->bucket]];
+    g->first[g->bucket] = bud->next;
+    g->waiting--;
+    return bud;
+}
+
+/* ---- growing: pruning ---------------------------------------------------------------------- */
+
+static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
+    const treepieces_species *s = g->species;
+    if (s->envelope == TREEPIECES_FREE) return 0;
+    const float x = bud->position[0] - g->place.position[0];
+    const float z = bud->position[2] - g->place.position[2];
+    const float y = (bud->position[1] - g->place.position[1]) / g->trunk;
+    const float h = (y - s->crown_base) / (s->crown_top - s->crown_base);
+    if (h > 1) return 1;
+    if (bud->order == 0) return 0;
+    if (h < 0) return 1;
+    float r = 0.5f * s->crown_width * g->trunk;
+    if (s->envelope == TREEPIECES_CONE) r *= 1 - h;
+    if (s->envelope == TREEPIECES_ELLIPSOID) r *= sqrtf(1 - (2 * h - 1) * (2 * h - 1));
+    return x * x + z * z > r * r;
+}
+
+/* the cell of a place, and the side of a cell: the grid is as wide as 1.6 trunks */
+static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
+    const float side = 1.6f * g->trunk / (float)TPC_GRID;
+    for (int k = 0; k < 3; k++) {
+        const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
+        const float at = (position[k] - g->place.position[k]) / side + middle;
+        cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
+    }
+    return side;
+}
+
+static int tpc_is_shaded(const tpc_growth *g, const tpc_bud *bud) {
+    if (!(g->species->shade > 0) || bud->order == 0) return 0;
+    int c[3];
+    const float side = tpc_cell(g, bud->position, c) / g->scale;
+    if (c[1] + 1 >= TPC_GRID) return 0;
+    return (float)g->shade[c[0]][c[2]][c[1] + 1] > g->species->shade * side * side;
+}
+
+static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
+    int c[3];
+    if (!(g->species->shade > 0)) return;
+    tpc_cell(g, position, c);
+    for (int y = 0; y <= c[1]; y++) g->shade[c[0]][c[2]][y]++;
+}
+
+/* ---- growing: the grammar ------------------------------------------------------------------ */
+
+static void tpc_normalize(float v[3]) {
+    const float square = tpc_dot(v, v), scale = 1 / sqrtf(square);
+    if (square > 0)
+        for (int k = 0; k < 3; k++) v[k] *= scale;
+    else v[1] = 1;
+}
+
+static const treepieces_order *tpc_order(const tpc_growth *g, int order) {
+    return &g->species->orders[order < g->species->order_count ? order : g->species->order_count - 1];
+}
+
+/* Which piece comes next. */
+static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, bud->order);
+    if (bud->depth == 0 && g->species->flare > 1) return TREEPIECES_FLARE;
+    if ((1 - bud->along) * bud->length < 0.5f * bud->step || tpc_is_outside(g, bud) ||
+        tpc_is_shaded(g, bud))
+        return TREEPIECES_TIP;
+    /* what hangs down ends before it lies on the ground */
+    if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < 0.04f * g->trunk)
+        return TREEPIECES_TIP;
+    if (g->desc->rule == TREEPIECES_ALTERNATE) return bud->depth & 1 ? TREEPIECES_Y : TREEPIECES_I;
+    if (g->desc->rule == TREEPIECES_RANDOM)
+        return txm_rng_next(&g->rng) >> 31 ? TREEPIECES_Y : TREEPIECES_I;
+    float dice = txm_rng_float(&g->rng);
+    if ((!bud->is_forked && bud->along < o->start) || (bud->along == 0 && bud->order > 0))
+        return TREEPIECES_I; /* a branch's first piece does not twist */
+    if (bud->rest > 0) return TREEPIECES_I;
+    if (bud->order + 1 < g->species->order_count) {
+        if ((dice -= o->side) < 0) return TREEPIECES_SIDE;
+        if ((dice -= o->pair) < 0) return TREEPIECES_PLANAR;
+    }
+    if ((dice -= o->fork) < 0) return TREEPIECES_Y;
+    if ((dice -= o->triple) < 0) return TREEPIECES_SPATIAL;
+    return TREEPIECES_I;
+}
+
+/* Twigs do not get thinner than this, so that texels are not much smaller on them than on the trunk. */
+static float tpc_thinnest(const tpc_growth *g) {
+    return 0.03f * g->foot;
+}
+
+/* How long it is, so that its proportions stay those of its kind: between so many radii. */
+static float tpc_choose_length(const tpc_bud *bud, int type) {
+    static const float low[TREEPIECES_BUILTIN] = {1, 1, 2, 2, 1, 1.2f, 1};
+    static const float high[TREEPIECES_BUILTIN] = {40, 2.5f, 3, 3, 2.5f, 18, 1.4f};
+    const float left = (1 - bud->along) * bud->length;
+    const float step = bud->rest > 0 ? bud->rest : bud->step;
+    float length = step < left ? step : left;
+    if (type == TREEPIECES_TIP && length < 0.7f * bud->step) length = 0.7f * bud->step;
+    /* no more than 8 tiles lie along a quad, so one with many across must not be long */
+    const float most = txm_minf(high[type], (type == TREEPIECES_I ? 64.0f : 20.0f) / (float)(1 << bud->across));
+    return txm_clampf(length, low[type] * bud->radius, txm_maxf(most, low[type]) * bud->radius);
+}
+
+static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
+    const treepieces_order *o = tpc_order(g, bud->order);
+    const int type = tpc_choose_type(g, bud);
+    memset(c, 0, sizeof *c);
+    c->type = type;
+    memcpy(c->direction, bud->heading, sizeof c->direction);
+    c->length = tpc_choose_length(bud, type);
+    c->turn = type == TREEPIECES_I ? (int)txm_rng_below(&g->rng, TREEPIECES_RIM) : -1;
+    const float left = (1 - bud->along) * bud->length;
+    const float share = left > c->length ? c->length / left : 1;
+    const float on = 1 + (bud->end_radius / bud->radius - 1) * share; /* the stem's own taper */
+    c->ratios[0] = txm_clampf(on, 0.3f, 1);
+    if (type == TREEPIECES_FLARE) c->ratios[0] = 1 / g->species->flare;
+    if (type == TREEPIECES_Y) {
+        const float uneven = tpc_uniform(g, -0.14f, 0.14f);
+        c->ratios[0] = 0.76f + uneven;
+        c->ratios[1] = 0.76f - uneven;
+    } else if (type == TREEPIECES_SPATIAL) {
+        for (int k = 0; k < 3; k++) c->ratios[k] = tpc_uniform(g, 0.54f, 0.72f);
+    }
+    if (type == TREEPIECES_Y || type == TREEPIECES_SPATIAL) {
+        const float least = txm_minf(1, tpc_thinnest(g) / bud->radius);
+        for (int k = 0; k < 3; k++) c->ratios[k] = txm_maxf(c->ratios[k], least);
+    } else if (type == TREEPIECES_SIDE || type == TREEPIECES_PLANAR) {
+        const float ratio = tpc_order(g, bud->order + 1)->radius, thinnest = tpc_thinnest(g);
+        for (int k = 1; k < 3; k++)
+            c->ratios[k] = txm_clampf(txm_maxf(ratio * tpc_uniform(g, 0.85f, 1.15f), thinnest / bud->radius),
+                                      0.05f, (float)TPC_MAX_BRANCH / 100);
+    }
+    c->leaves = g->species->leaf_count > 0 && bud->along >= o->leaves_start && o->leaves > 0 &&
+                txm_rng_float(&g->rng) < o->leaves;
+}
+
+/* Turn the axis a little: at random, to the light, by its weight. */
+static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
+    const treepieces_order *o = tpc_order(g, bud->order);
+    float *h = bud->heading;
+    const float degree = 0.0174532925f;
+    if (o->wander > 0) {
+        float aside[3] = {tpc_uniform(g, -1, 1) * o->wander * degree, 0, 0};
+        aside[2] = tpc_uniform(g, -1, 1) * o->wander * degree;
+        tpc_rotate(bud->rotation, aside, aside);
+        for (int k = 0; k < 3; k++) h[k] += aside[k];
+    }
+    /* the part of "up" at a right angle to the heading is the sine of the angle between them */
+    const float up = o->tropism, rise = h[1];
+    h[0] -= up * rise * h[0];
+    h[1] += up * (1 - rise * rise);
+    h[2] -= up * rise * h[2];
+    if (o->sag != 0) {
+        const float at = bud->along + 0.5f * length / bud->length;
+        const float fall = o->sag * degree * 2 * at * (length / bud->length);
+        h[1] -= fall * sqrtf(h[0] * h[0] + h[2] * h[2] + 0.02f);
+    }
+    tpc_normalize(h);
+}
+
+/* ---- growing: a piece on a rim ------------------------------------------------------------- */
+
+static const float tpc_turns[TREEPIECES_RIM][4] = {
+    {0, 0, 0, 1},           {0, 0.5f, 0, 0.86602540378f},  {0, 0.86602540378f, 0, 0.5f},
+    {0, 1, 0, 0},           {0, 0.86602540378f, 0, -0.5f}, {0, 0.5f, 0, -0.86602540378f},
+};
+
+/* out = a b where one, the building rotation, is mostly none */
+static void tpc_after(const float building[4], const float b[4], float out[4]) {
+    if (building[3] < 1) tpc_multiply(building, b, out);
+    else memcpy(out, b, 4 * sizeof *b);
+}
+static void tpc_before(const float a[4], const float building[4], float out[4]) {
+    if (building[3] < 1) tpc_multiply(a, building, out);
+    else memcpy(out, a, 4 * sizeof *a);
+}
+
+/* Degrees to the nearest sixth of a turn and what is left, -30..30. */
+static int tpc_sixth(float degrees, float *rest) {
+    const float turns = degrees / 60;
+    const int whole = (int)(turns + (turns < 0 ? -0.5f : 0.5f));
+    *rest = degrees - 60 * (float)whole;
+    return (whole % TREEPIECES_RIM + TREEPIECES_RIM) % TREEPIECES_RIM;
+}
+
+/* The joint that lets the stem grow along `heading` (world) from a rim's frame turned by `turn`, with a
+   twist in degrees: the shortest swing of y, after the twist. */
+static void tpc_joint(const float rim[4], int turn, const float heading[3], float twist,
+                      float joint[4]) {
+    const float back[4] = {-rim[0], -rim[1], -rim[2], rim[3]};
+    float h[3];
+    tpc_rotate(back, heading, h);
+    tpc_turn((TREEPIECES_RIM - turn) % TREEPIECES_RIM, h, h);
+    if (h[1] < 0.5f) { /* held within 60 degrees */
+        const float level = sqrtf(h[0] * h[0] + h[2] * h[2]);
+        const float shrink = level > 0 ? 0.86602540378f / level : 0;
+        h[0] *= shrink;
+        h[2] *= shrink;
+        h[1] = level > 0 ? 0.5f : 1;
+    }
+    const float scale = 1 / sqrtf(h[2] * h[2] + h[0] * h[0] + (1 + h[1]) * (1 + h[1]));
+    joint[0] = h[2] * scale;
+    joint[1] = 0;
+    joint[2] = -h[0] * scale;
+    joint[3] = (1 + h[1]) * scale;
+    if (twist != 0) { /* the tangent of its half: 15 degrees at most */
+        const float x = twist * 0.00872664626f, t = x * (1 + x * x * (0.33333333f + 0.13333333f * x * x));
+        const float shorter = 1 / sqrtf(1 + t * t), about[4] = {0, t * shorter, 0, shorter};
+        tpc_multiply(joint, about, joint);
+    }
+}
+
+/* log2 of how many tiles lie along and across the quads of each band. Tiles are to be a tenth of the
+   foot's radius wide; where they would be narrower than 0.58 of that their number is halved. */
+static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                          int across[TREEPIECES_MAX_LEAVES]) {
+    static const uint8_t halvable[TREEPIECES_BUILTIN] = {3, 1, 1, 1, 1, 0, 2};
+    const float tile = 0.1f * g->foot;
+    const tpc_band *band = g->kit->bands[c->type];
+    const int may = c->type < TREEPIECES_BUILTIN ? halvable[c->type] : 0;
+    const int leaves = g->kit->pieces[c->type].leaf_count;
+    int now = bud->across;
+    uint32_t word = 0;
+    for (int b = 0; b < g->kit->band_counts[c->type]; b++) {
+        /* the stem's radius above the band; bands of branches begin as wide as band 0 ends */
+        const float part = c->type == TREEPIECES_I && b == 0 ? 0.5f : 1;
+        const float radius = bud->radius * (1 + (c->ratios[0] - 1) * part);
+        int halve = 0;
+        if (b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE) { /* keeps band 0's */
+        } else if ((may >> b & 1) && now > 0 && radius < 0.58f * tile * (float)(1 << now)) {
+            halve = 1;
+            now--;
+        }
+        const float width = bud->radius / (float)(1 << now);
+        const float dy = band[b].rise * c->length, dr = band[b].spread * bud->radius;
+        const float height = sqrtf(dy * dy + dr * dr);
+        int along = 0;
+        while (along < 3 && height > 1.41f * width * (float)(1 << along)) along++;
+        word |= (uint32_t)(now | along << 3 | halve << 5) << (8 * b);
+    }
+    for (int k = 0; k < leaves; k++) across[k] = now;
+    return word;
+}
+
+/* A thick branch that keeps close to its stem would have its rim in there, and a steep one a pocket above
+   it: the first piece stands off as far as it must, the next one takes the direction that was meant. */
+static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3], float ratio,
+                          float offset) {
+    const float most = txm_minf((offset - 1) / ratio, 0.75f), cosine = tpc_dot(bud->heading, stem);
+    bud->is_aimed = cosine > most;
+    if (!bud->is_aimed) return;
+    memcpy(bud->aim, bud->heading, sizeof bud->aim);
+    const float sine = sqrtf(1 - most * most);
+    for (int i = 0; i < 3; i++) bud->heading[i] = most * stem[i] + sine * out[i];
+}
+
+/* The axis that begins or goes on at leaf rim k of the piece just placed; bud is a copy of from. */
+static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+                        const float rotation[4], tpc_bud *bud) {
+    const treepieces_similarity *b = &g->kit->pieces[c->type].building[k];
+    const float offset = g->kit->offsets[c->type][k];
+    const float local[3] = {b->translation[0] * from->radius, b->translation[1] * c->length,
+                            b->translation[2] * from->radius};
+    const int is_fork = c->type == TREEPIECES_Y || c->type == TREEPIECES_SPATIAL;
+    const float up[3] = {0, 1, 0};
+    float stem[3], out[3];
+    bud->rim = (uint8_t)k;
+    bud->parent = g->node_count - 1;
+    bud->depth = (uint16_t)(from->depth + 1);
+    bud->radius = from->radius * c->ratios[k];
+    tpc_before(rotation, b->rotation, bud->rotation);
+    tpc_rotate(rotation, up, stem);
+    for (int i = 0; i < 3; i++) bud->position[i] = stem[i] * local[1];
+    if (offset > 0) tpc_rotate(rotation, local, bud->position);
+    for (int i = 0; i < 3; i++) bud->position[i] += from->position[i];
+    memcpy(bud->heading, stem, sizeof stem);
+    bud->along = from->along + local[1] / from->length;
+    if (bud->along > 1) bud->along = 1;
+    bud->rest = c->type == TREEPIECES_I ? 0 : from->step - c->length;
+    if (bud->rest < bud->radius) bud->rest = 0;
+    if (offset < 0.3f) { /* the stem itself */
+        if (from->is_aimed) memcpy(bud->heading, from->aim, sizeof from->aim);
+        bud->is_aimed = 0;
+        tpc_steer(g, bud, local[1]);
+        return;
+    }
+    const float radial[3] = {b->translation[0] / offset, 0, b->translation[2] / offset};
+    tpc_rotate(rotation, radial, out);
+    double sine, cosine;
+    if (is_fork) {
+        bud->roll = tpc_uniform(g, 60, 120); /* the next fork across this one */
+        const treepieces_order *o = tpc_order(g, from->order);
+        float mean = 0;
+        const int arms = g->kit->pieces[c->type].leaf_count;
+        for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
+        /* the thicker arm goes straighter on */
+        const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
+        tpc_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
+        for (int i = 0; i < 3; i++)
+            bud->heading[i] = (float)cosine * stem[i] + (float)sine * out[i];
+        bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
+        bud->end_radius = txm_maxf(bud->end_radius * c->ratios[k],
+                                   txm_minf(bud->radius, tpc_thinnest(g)));
+        bud->is_forked = 1;
+        bud->is_aimed = 0;
+        return;
+    }
+    const treepieces_order *o = tpc_order(g, from->order + 1), *parent = tpc_order(g, from->order);
+    if (from->order + 1 < g->species->order_count) bud->order++;
+    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
+                        tpc_uniform(g, -1, 1) * o->angle_spread;
+    tpc_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
+    for (int i = 0; i < 3; i++) bud->heading[i] = (float)cosine * stem[i] + (float)sine * out[i];
+    bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
+    tpc_normalize(bud->heading);
+    tpc_stand_off(bud, stem, out, c->ratios[k], offset);
+    const float t = from->is_forked || parent->start >= 1
+                        ? from->along
+                        : txm_clampf((from->along - parent->start) / (1 - parent->start), 0, 1);
+    float longer = o->profile[0] * (1 - t) * (1 - 2 * t) + o->profile[1] * 4 * t * (1 - t) +
+                   o->profile[2] * t * (2 * t - 1);
+    longer *= 1 + o->gravimorphism * out[1];
+    bud->length = from->length * o->length * txm_clampf(longer, 0.02f, 10) *
+                  tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
+    bud->step = from->length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
+    if (bud->step < 1.5f * bud->radius) bud->step = 1.5f * bud->radius;
+    bud->end_radius = txm_maxf(bud->radius * o->taper, txm_minf(bud->radius, tpc_thinnest(g)));
+    bud->along = 0;
+    bud->is_forked = 0;
+    bud->rest = 0;
+    bud->roll = tpc_uniform(g, 0, 360);
+}
+
+static void tpc_add_cluster(tpc_growth *g, int type) {
+    treepieces_cluster *c = &g->clusters[g->cluster_count++];
+    c->node = (uint32_t)(g->node_count - 1);
+    c->along = type == TREEPIECES_TIP ? 0.7f : tpc_uniform(g, 0.2f, 1);
+    c->radius = g->species->cloud * g->scale * tpc_uniform(g, 0.75f, 1.2f);
+    c->look = txm_rng_next(&g->rng);
+}
+
+/* Put what was chosen on the rim; its own rims wait from now on. */
+static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c) {
+    const treepieces_piece *p = &g->kit->pieces[c->type];
+    treepieces_node *node = &g->nodes[g->node_count];
+    int across[TREEPIECES_MAX_LEAVES] = {0, 0, 0}, turn = c->turn;
+    float heading[3] = {c->direction[0], c->direction[1], c->direction[2]}, twist = 0, rotation[4];
+    float joint[4];
+    float after = bud->roll;
+    tpc_normalize(heading);
+    if (turn < 0) turn = tpc_sixth(bud->roll, &twist); /* a branch where the roll wants it */
+    after -= 60 * (float)turn + twist;
+    tpc_joint(bud->rotation, turn, heading, twist, joint);
+    if (turn) tpc_multiply(tpc_turns[turn], joint, joint);
+    tpc_multiply(bud->rotation, joint, rotation);
+    /* from the parent's frame, which the rim's is the building rotation away from */
+    if (bud->parent >= 0) {
+        const int type = g->nodes[bud->parent].type;
+        tpc_after(g->kit->pieces[type].building[bud->rim].rotation, joint, node->rotation);
+    } else {
+        memcpy(node->rotation, rotation, sizeof rotation);
+    }
+    node->radius = bud->radius;
+    node->length = c->length;
+    node->parent = bud->parent;
+    node->type = (uint8_t)c->type;
+    node->joint = (uint8_t)(bud->rim * 8 + turn);
+    node->order = bud->order;
+    /* the thinner, the faster: two classes an octave, give or take one. The bits of a float rise about
+       as its logarithm, 2^23 an octave. */
+    const int sway = (int)(tpc_bits(g->foot) >> 22) - (int)(tpc_bits(bud->radius) >> 22) +
+                     (int)(txm_rng_next(&g->rng) >> 31);
+    node->sway = (uint8_t)txm_clampi(sway, 0, TPC_CLASSES - 1);
+    g->bands[g->node_count] = tpc_bands(g, bud, c, across);
+    g->type_counts[c->type]++;
+    g->node_count++;
+    if (c->leaves) tpc_add_cluster(g, c->type);
+    tpc_cast_shade(g, bud->position);
+    if (bud->position[1] - g->place.position[1] > g->height)
+        g->height = bud->position[1] - g->place.position[1];
+    if (!p->leaf_count) return;
+
+    for (int k = 0; k < p->leaf_count; k++) {
+        tpc_bud *next = &g->buds[g->bud_count];
+        *next = *bud;
+        next->roll = after;
+        next->across = (uint8_t)across[k];
+        tpc_grow_on(g, bud, c, k, rotation, next);
+        if (k == 0 && (c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR))
+            next->roll = after + tpc_order(g, bud->order + 1)->roll; /* the next branch's turn */
+        tpc_push(g);
+    }
+}
+
+/* ---- growing: one tree --------------------------------------------------------------------- */
+
+/* Ask the user, and check what he says. */
+static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
+    treepieces_site site;
+    site.depth = bud->depth;
+    site.order = bud->order;
+    site.parent = bud->parent < 0 ? -1 : g->nodes[bud->parent].type;
+    site.rim = bud->rim;
+    site.tree = g->index;
+    memcpy(site.position, bud->position, sizeof site.position);
+    memcpy(site.direction, bud->heading, sizeof site.direction);
+    site.radius = bud->radius;
+    site.along = bud->along;
+    site.length = bud->length;
+    g->desc->own_rule(g->desc->own_user, &site, &g->rng, c);
+    g->fault = NULL;
+    if (c->type < 0 || c->type >= g->kit->count) g->fault = "own_rule chose no type of the kit";
+    else if (c->turn < -1 || c->turn >= TREEPIECES_RIM) g->fault = "own_rule chose no turn of 0 to 5";
+    else if (!(c->length > 0) || !txm_is_finite((double)c->length))
+        g->fault = "own_rule chose a length that is not above 0";
+    else if (!txm_is_finite((double)c->direction[0] + (double)c->direction[1] + (double)c->direction[2]))
+        g->fault = "own_rule chose a direction that is not finite";
+    else
+        for (int k = 0; k < g->kit->pieces[c->type].leaf_count; k++)
+            if (!(c->ratios[k] >= 0.02f && c->ratios[k] <= 1))
+                g->fault = "own_rule chose a ratio that is not 0.02 to 1";
+    if (g->fault) g->status = TXM_BAD_ARGUMENT;
+    return g->status == TXM_OK;
+}
+
+static void tpc_sprout(tpc_growth *g) {
+    const treepieces_order *o = &g->species->orders[0];
+    tpc_bud *bud = &g->buds[0];
+    memset(bud, 0, sizeof *bud);
+    g->node_count = g->cluster_count = g->bud_count = g->waiting = 0;
+    g->bucket = 0;
+    g->height = 0;
+    g->status = TXM_OK;
+    memset(g->type_counts, 0, sizeof g->type_counts);
+    for (int b = 0; b < TPC_BUCKETS; b++) g->first[b] = g->last[b] = -1;
+    if (g->species->shade > 0) memset(g->shade, 0, sizeof g->shade);
+    g->rng = txm_rng_make(g->place.seed, 0x7265657069656365u);
+    g->scale = g->place.scale > 0 ? g->place.scale : 1;
+    g->trunk = o->length * g->scale * tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
+    g->foot = g->trunk * o->radius;
+    bud->parent = TREEPIECES_NONE;
+    memcpy(bud->position, g->place.position, sizeof bud->position);
+    double sine, cosine;
+    tpc_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
+    bud->rotation[1] = txm_float(sine);
+    bud->rotation[3] = txm_float(cosine);
+    bud->heading[1] = 1;
+    bud->radius = g->foot * (g->species->flare > 1 ? g->species->flare : 1);
+    bud->end_radius = txm_maxf(g->foot * o->taper, tpc_thinnest(g));
+    bud->length = g->trunk;
+    bud->step = g->trunk / o->segments;
+    bud->across = 4;
+    bud->roll = tpc_uniform(g, 0, 360);
+    tpc_push(g);
+}
+
+/* Every rim that waits needs a piece at least, so the last of them get tips. */
+static void tpc_grow(tpc_growth *g) {
+    tpc_sprout(g);
+    while (g->waiting && g->status == TXM_OK) {
+        const tpc_bud *bud = tpc_pop(g);
+        treepieces_choice choice;
+        tpc_choose(g, bud, &choice);
+        if (g->desc->own_rule && !tpc_ask(g, bud, &choice)) return;
+        const int leaves = g->kit->pieces[choice.type].leaf_count;
+        if (leaves && g->node_count + 1 + g->waiting + leaves > g->most) {
+            choice.type = TREEPIECES_TIP;
+            choice.turn = 0;
+            choice.length = tpc_choose_length(bud, TREEPIECES_TIP);
+            choice.leaves = g->species->leaf_count > 0 && bud->order > 0;
+        }
+        const int pruned = leaves && choice.type == TREEPIECES_TIP && choice.leaves;
+        const float left = (1 - bud->along) * bud->length;
+        tpc_place(g, bud, &choice);
+        if (pruned) /* stands for all that would have grown */
+            g->clusters[g->cluster_count - 1].radius *=
+                txm_clampf(0.35f * left / (g->species->cloud * g->scale), 1, 1.8f);
+    }
+}
+
+/* ---- a forest ------------------------------------------------------------------------------ */
+
+/* A forest with its memory. */
+typedef struct tpc_forest {
+    treepieces_forest forest; /* first: the one is the other */
+    txm_arena arena;          /* itself, species, trees and records */
+    txm_arena node_arena, cluster_arena;
+} tpc_forest;
+
+/* Everything while a forest is made. */
+typedef struct tpc_planting {
+    const treepieces_forest_desc *desc;
+    tpc_forest *made;
+    txm_arena scratch, band_arena;
+    tpc_growth *slots;
+    int slot_count, first; /* tree of slot 0 */
+    float spacing;
+    treepieces_tree *trees;
+    uint32_t (*offsets)[TREEPIECES_MAX_TYPES]; /* by tree: its first record of each type */
+    uint32_t type_counts[TREEPIECES_MAX_TYPES];
+    uint32_t *words[TREEPIECES_MAX_TYPES];
+    /* these grow with the trees */
+    treepieces_node *nodes;
+    uint32_t *bands;
+    treepieces_cluster *clusters;
+    size_t node_count, cluster_count, node_capacity, band_capacity, cluster_capacity;
+} tpc_planting;
+
+/* Where tree i stands if the user does not say. */
+static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
+    treepieces_place place;
+    int side = 1;
+    txm_rng rng = txm_rng_make(p->desc->seed, 0x666f7265u + ((uint64_t)i << 32));
+    while (side < 46340 && side * side < p->desc->tree_count) side++;
+    memset(&place, 0, sizeof place);
+    if (p->desc->tree_count > 1) {
+        const float x = (float)(i % side) + 0.5f - 0.5f * (float)side;
+        const float z = (float)(i / side) + 0.5f - 0.5f * (float)side;
+        place.position[0] = p->spacing * (x + 0.6f * (txm_rng_float(&rng) - 0.5f));
+        place.position[2] = p->spacing * (z + 0.6f * (txm_rng_float(&rng) - 0.5f));
+        place.scale = 0.8f + 0.4f * txm_rng_float(&rng);
+        place.species = (int)txm_rng_below(&rng, (uint32_t)p->desc->species_count);
+    }
+    place.turn = 6.2831853f * txm_rng_float(&rng);
+    place.seed = (uint64_t)txm_rng_next(&rng) << 32 | txm_rng_next(&rng);
+    return place;
+}
+
+static void tpc_grow_slot(void *context, int i) {
+    tpc_planting *p = (tpc_planting *)context;
+    tpc_growth *g = &p->slots[i];
+    g->index = p->first + i;
+    g->place = p->desc->places ? p->desc->places[g->index] : tpc_scatter(p, g->index);
+    g->species = &p->desc->species[g->place.species];
+    tpc_grow(g);
+}
+
+static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
+    const int most = p->desc->max_pieces ? p->desc->max_pieces : 600;
+    int count = TPC_BLOCK_PIECES / most;
+    count = txm_clampi(count, 4, TPC_BLOCK_TREES);
+    if (count > p->desc->tree_count) count = p->desc->tree_count;
+    p->slots = (tpc_growth *)txm_arena_zero(&p->scratch, (size_t)count, sizeof *p->slots);
+    if (!p->slots) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+    for (p->slot_count = 0; p->slot_count < count; p->slot_count++) {
+        tpc_growth *g = &p->slots[p->slot_count];
+        g->desc = p->desc;
+        g->kit = p->desc->kit;
+        g->most = most;
+        g->nodes = (treepieces_node *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->nodes);
+        g->bands = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->bands);
+        g->records = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->records);
+        g->buds = (tpc_bud *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->buds);
+        g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
+                                                            sizeof *g->clusters);
+        if (!g->bands || !g->records)
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+        if (!g->nodes || !g->buds || !g->clusters)
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+    }
+    return TXM_OK;
+}
+
+/* Make room for `more` items behind the `count` that a block holds. The first time room is made for
+   all trees if they are like those so far. Returns the block, or NULL if there is no memory. */
+static void *tpc_reserve(const tpc_planting *p, int done, txm_arena *arena, void *block, size_t count,
+                         size_t more, size_t size, size_t *capacity) {
+    size_t wanted = count + more;
+    if (block && wanted <= *capacity) return block;
+    const double all = 1.05 * (double)wanted / done * p->desc->tree_count + 64;
+    if (all < 4e9 && (size_t)all > wanted) wanted = (size_t)all;
+    txm_arena roomier = *arena;
+    roomier.blocks = NULL;
+    void *larger = txm_arena_alloc(&roomier, wanted, size);
+    if (!larger) return NULL;
+    if (block) memcpy(larger, block, count * size);
+    txm_arena_free(arena);
+    *arena = roomier;
+    *capacity = wanted;
+    return larger;
+}
+
+/* Keep what grew in the slots. */
+static txm_status tpc_keep(tpc_planting *p, int count, txm_env *env) {
+    size_t nodes = 0, clusters = 0;
+    for (int i = 0; i < count; i++) {
+        if (p->slots[i].status != TXM_OK) return txm_fail(env, p->slots[i].status, p->slots[i].fault);
+        nodes += (size_t)p->slots[i].node_count;
+        clusters += (size_t)p->slots[i].cluster_count;
+    }
+    if (nodes > 0x7fffffffu - p->node_count)
+        return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 pieces");
+    const int done = p->first + count;
+    void *n = tpc_reserve(p, done, &p->made->node_arena, p->nodes, p->node_count, nodes,
+                          sizeof *p->nodes, &p->node_capacity);
+    if (n) p->nodes = (treepieces_node *)n;
+    void *b = tpc_reserve(p, done, &p->band_arena, p->bands, p->node_count, nodes, sizeof *p->bands,
+                          &p->band_capacity);
+    if (b) p->bands = (uint32_t *)b;
+    void *c = tpc_reserve(p, done, &p->made->cluster_arena, p->clusters, p->cluster_count, clusters,
+                          sizeof *p->clusters, &p->cluster_capacity);
+    if (c) p->clusters = (treepieces_cluster *)c;
+    if (!n || !b || !c) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
+    for (int i = 0; i < count; i++) {
+        const tpc_growth *g = &p->slots[i];
+        treepieces_tree *t = &p->trees[p->first + i];
+        memcpy(p->nodes + p->node_count, g->nodes, (size_t)g->node_count * sizeof *p->nodes);
+        memcpy(p->bands + p->node_count, g->bands, (size_t)g->node_count * sizeof *p->bands);
+        for (int k = 0; k < g->cluster_count; k++) {
+            p->clusters[p->cluster_count + (size_t)k] = g->clusters[k];
+            p->clusters[p->cluster_count + (size_t)k].node += (uint32_t)p->node_count;
+        }
+        t->first_node = (uint32_t)p->node_count;
+        t->node_count = (uint32_t)g->node_count;
+        t->first_cluster = (uint32_t)p->cluster_count;
+        t->cluster_count = (uint32_t)g->cluster_count;
+        memcpy(t->position, g->place.position, sizeof t->position);
+        t->turn = g->place.turn;
+        t->scale = g->scale;
+        t->species = g->place.species;
+        t->seed = (uint32_t)txm_hash(g->place.seed);
+        t->height = g->height;
+        p->node_count += t->node_count;
+        p->cluster_count += t->cluster_count;
+        for (int k = 0; k < TREEPIECES_MAX_TYPES; k++) {
+            p->offsets[p->first + i][k] = p->type_counts[k];
+            p->type_counts[k] += g->type_counts[k];
+        }
+    }
+    return TXM_OK;
+}
+
+/* A random tile for every quad, four at a time: column (r (9 - tiles across)) / 16 for r of 0..15 (0
+   for 16 tiles), the row likewise; quads that lie on the bottom of their layer have the last row. */
+static void tpc_fill_cells(const tpc_cells *cells, int words, uint32_t bands, txm_rng *rng,
+                           uint32_t *word) {
+    const uint32_t low = 0x0f0f0f0fu;
+    for (int i = 0; i < words; i++) {
+        const tpc_cells *c = &cells[i];
+        const uint32_t bits = txm_rng_next(rng), across = bits & low, down = bits >> 4 & low;
+        word[i] = 0;
+        for (int b = c->first; b <= c->last; b++) {
+            const uint32_t band = bands >> (8 * b) & 255u, last = 8u - (1u << (band >> 3 & 3));
+            const uint32_t columns = band & 4 ? 1 : 9u - (1u << (band & 3)), rows = last + 1;
+            const uint32_t bottom = band & 32 ? ~0u : c->bottom;
+            const uint32_t column = across * columns >> 4 & low, row = down * rows >> 4 & low;
+            const uint32_t chosen = (row & ~bottom) | (last * 0x01010101u & bottom);
+            word[i] |= (column | chosen << 3) & c->bands[b];
+        }
+        word[i] &= ~c->own | 0x36363636u; /* those lie on 2 x 2 cells */
+    }
+}
+
+/* The records of tree p->first + i; those of its children go into the parent's as they are met. */
+static void tpc_fill_tree(void *context, int i) {
+    tpc_planting *p = (tpc_planting *)context;
+    const treepieces_kit *kit = p->desc->kit;
+    const treepieces_tree *t = &p->trees[p->first + i];
+    uint32_t *records = p->slots[i].records, next[TREEPIECES_MAX_TYPES];
+    txm_rng rng = txm_rng_make(t->seed, 0x63656c6cu);
+    memcpy(next, p->offsets[p->first + i], sizeof next);
+    for (uint32_t n = 0; n < t->node_count; n++) {
+        const treepieces_node *node = &p->nodes[t->first_node + n];
+        const uint32_t stride = p->made->forest.batches[node->type].stride;
+        uint32_t *w = p->words[node->type] + (size_t)(records[n] = next[node->type]++) * stride;
+        w[0] = t->first_node + n;
+        w[1] = w[2] = 0;
+        w[3] = p->bands[t->first_node + n];
+        tpc_fill_cells(kit->cells[node->type], (int)stride - 4, w[3], &rng, w + 4);
+        if (node->parent < 0) continue;
+        const int type = p->nodes[t->first_node + (uint32_t)node->parent].type, rim = node->joint >> 3;
+        uint32_t *up = p->words[type] +
+                       (size_t)records[node->parent] * p->made->forest.batches[type].stride;
+        up[1 + rim / 2] |= (n - (uint32_t)node->parent) << (16 * (rim & 1));
+        up[2] |= (uint32_t)(node->joint & 7) << (16 + 4 * rim);
+    }
+}
+
+/* The records' arrays, of the sizes that are known now. */
+static txm_status tpc_make_arrays(tpc_planting *p, txm_env *env) {
+    treepieces_forest *out = &p->made->forest;
+    size_t bytes = sizeof *p->made + (size_t)out->tree_count * sizeof *p->trees +
+                   (size_t)out->species_count * sizeof *out->species +
+                   p->node_capacity * sizeof *p->nodes + p->cluster_capacity * sizeof *p->clusters;
+    for (int k = 0; k < out->type_count; k++) {
+        treepieces_batch *b = &out->batches[k];
+        b->quad_count = out->kit->pieces[k].quad_count;
+        b->stride = 4 + ((uint32_t)b->quad_count + 3) / 4;
+        b->count = p->type_counts[k];
+        if (!b->count) continue;
+        p->words[k] = (uint32_t *)txm_arena_alloc(&p->made->arena, b->count,
+                                                  b->stride * sizeof(uint32_t));
+        if (!p->words[k]) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
+        b->words = p->words[k];
+        bytes += (size_t)b->count * b->stride * sizeof(uint32_t);
+    }
+    out->nodes = p->nodes;
+    out->clusters = p->clusters;
+    out->node_count = (uint32_t)p->node_count;
+    out->cluster_count = (uint32_t)p->cluster_count;
+    out->bytes = bytes;
+    return TXM_OK;
+}
+
+static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
+    const int trees = p->desc->tree_count;
+    p->trees = (treepieces_tree *)txm_arena_zero(&p->made->arena, (size_t)trees, sizeof *p->trees);
+    p->offsets = (uint32_t(*)[TREEPIECES_MAX_TYPES])txm_arena_alloc(&p->scratch, (size_t)trees,
+                                                                   sizeof *p->offsets);
+    if (!p->trees || !p->offsets)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
+    p->made->forest.trees = p->trees;
+    txm_status status = tpc_make_slots(p, env);
+    for (int pass = 0; pass < 2 && status == TXM_OK; pass++) {
+        if (pass) status = tpc_make_arrays(p, env);
+        for (p->first = 0; status == TXM_OK && p->first < trees; p->first += p->slot_count) {
+            const int left = trees - p->first, count = left < p->slot_count ? left : p->slot_count;
+            if (txm_progress(env, 0.7f * (float)pass + (pass ? 0.3f : 0.7f) * (float)p->first / (float)trees,
+                             pass ? "assemble" : "grow"))
+                return txm_fail(env, TXM_CANCELLED, "cancelled");
+            txm_parallel_for(env, count, pass ? tpc_fill_tree : tpc_grow_slot, p);
+            if (!pass) status = tpc_keep(p, count, env);
+        }
+    }
+    return status;
+}
+
+static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env) {
+    if (!d || !d->kit) return txm_fail(env, TXM_BAD_ARGUMENT, "desc or kit is NULL");
+    if (!d->species || d->species_count < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "species: one at least is needed");
+    if (d->tree_count < 1) return txm_fail(env, TXM_BAD_ARGUMENT, "tree_count must be 1 or more");
+    if (d->max_pieces && (d->max_pieces < 8 || d->max_pieces > 65535))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "max_pieces must be 8 to 65535, or 0 for 600");
+    if (d->rule < TREEPIECES_GRAMMAR || d->rule > TREEPIECES_RANDOM)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "rule is none of treepieces_rule");
+    if (!(d->spacing >= 0) || !txm_is_finite((double)d->spacing))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "spacing must be 0 or more");
+    for (int i = 0; i < d->species_count; i++) {
+        const txm_status status = tpc_species_check(&d->species[i], env);
+        if (status != TXM_OK) return status;
+    }
+    for (int i = 0; d->places && i < d->tree_count; i++) {
+        const treepieces_place *p = &d->places[i];
+        for (int k = 0; k < 3; k++)
+            if (!(fabsf(p->position[k]) <= 1e6f))
+                return txm_fail(env, TXM_BAD_ARGUMENT, "places: a position is beyond 1000 km");
+        if (!(fabsf(p->turn) <= 1e4f) || !(p->scale >= 0 && p->scale <= 1000))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "places: a turn or scale is out of range");
+        if (p->species < 0 || p->species >= d->species_count)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species is none of species");
+    }
+    return TXM_OK;
+}
+
+TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
+                                                 treepieces_forest **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    txm_status status = tpc_check_forest(desc, env);
+    if (status != TXM_OK) return status;
+    txm_arena arena;
+    tpc_planting p;
+    memset(&p, 0, sizeof p);
+    p.desc = desc;
+    p.spacing = desc->spacing;
+    for (int i = 0; i < desc->species_count && !(desc->spacing > 0); i++)
+        p.spacing = txm_maxf(p.spacing, 0.6f * desc->species[i].orders[0].length);
+    txm_arena_init(&p.scratch, env);
+    txm_arena_init(&p.band_arena, env);
+    txm_arena_init(&arena, env);
+    tpc_forest *f = (tpc_forest *)txm_arena_zero(&arena, 1, sizeof *f);
+    treepieces_species *species = (treepieces_species *)txm_arena_alloc(
+        &arena, (size_t)desc->species_count, sizeof *species);
+    if (f) {
+        f->arena = arena;
+        txm_arena_init(&f->node_arena, env);
+        txm_arena_init(&f->cluster_arena, env);
+    }
+    if (!f || !species) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
+    } else {
+        memcpy(species, desc->species, (size_t)desc->species_count * sizeof *species);
+        f->forest.kit = desc->kit;
+        f->forest.species = species;
+        f->forest.species_count = desc->species_count;
+        f->forest.tree_count = desc->tree_count;
+        f->forest.type_count = desc->kit->count;
+        p.made = f;
+        status = tpc_plant(&p, env);
+    }
+    txm_arena_free(&p.scratch);
+    txm_arena_free(&p.band_arena);
+    if (status == TXM_OK) *out = &f->forest;
+    else if (f) treepieces_forest_free(&f->forest);
+    else txm_arena_free(&arena);
+    return status;
+}
+
+TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest) {
+    if (!forest) return;
+    tpc_forest *f = (tpc_forest *)forest;
+    txm_arena arena = f->arena;
+    txm_arena_free(&f->node_arena);
+    txm_arena_free(&f->cluster_arena);
+    txm_arena_free(&arena);
+}
+
+/* ---- wind -------------------------------------------------------------------------------- */
+
+enum {
+    TPC_WAVES = 4,
+    TPC_PHASES = 8 /* of the flutter within a class of oscillators */
+};
+
+/* A gust that travels over the land: weight sin(2 pi (along . (x, z) - rate t + phase)) */
+typedef struct tpc_wave {
+    double along[2], rate, phase, weight;
+} tpc_wave;
+
+/* The wind of one moment, and the step of the oscillators that ends there. */
+typedef struct tpc_air {
+    float direction[3], pressure, gusts;
+    tpc_wave waves[TPC_WAVES];
+    double time;
+    struct {
+        float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from where it rests */
+        float give;           /* radians at pressure 1                                       */
+        float flutter[TPC_PHASES];
+    } classes[TPC_CLASSES];
+} tpc_air;
+
+/* sine of so many turns, however many */
+static double tpc_sine_of_turns(double turns) {
+    double sine, cosine;
+    tpc_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
+    return sine;
+}
+
+/* Waves of 90, 41, 19 and 9 m that run with the wind, a little to its sides, at about its speed. */
+static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
+    static const double lengths[TPC_WAVES] = {90, 41, 19, 9};
+    static const double weights[TPC_WAVES] = {0.4, 0.3, 0.2, 0.1};
+    txm_rng rng = txm_rng_make(wind->seed, 0x77696e64u);
+    double sine, cosine;
+    tpc_sincos((double)wind->direction, &sine, &cosine);
+    air->direction[0] = txm_float(cosine);
+    air->direction[1] = 0;
+    air->direction[2] = txm_float(-sine);
+    air->pressure = wind->speed * wind->speed * 0.01f;
+    air->gusts = wind->gusts;
+    for (int i = 0; i < TPC_WAVES; i++) {
+        tpc_wave *w = &air->waves[i];
+        const double aside = 0.7 * ((double)txm_rng_float(&rng) - 0.5);
+        tpc_sincos((double)wind->direction + aside, &sine, &cosine);
+        w->along[0] = cosine / lengths[i];
+        w->along[1] = -sine / lengths[i];
+        w->rate = (double)wind->speed * (0.8 + 0.4 * (double)txm_rng_float(&rng)) / lengths[i];
+        w->phase = (double)txm_rng_float(&rng);
+        w->weight = weights[i];
+    }
+}
+
+static float tpc_pressure(const tpc_air *air, const float position[3], double time) {
+    double sum = 0;
+    for (int i = 0; i < TPC_WAVES; i++) {
+        const tpc_wave *w = &air->waves[i];
+        sum += w->weight * tpc_sine_of_turns(w->along[0] * (double)position[0] +
+                                             w->along[1] * (double)position[2] - w->rate * time +
+                                             w->phase);
+    }
+    const float pressure = air->pressure * (1 + air->gusts * 1.5f * txm_float(sum));
+    return pressure > 0 ? pressure : 0;
+}
+
+static int tpc_is_wind(const treepieces_wind *w) {
+    return w && fabsf(w->direction) <= 1e4f && w->speed >= 0 && w->speed <= 100 && w->gusts >= 0 &&
+           w->gusts <= 1;
+}
+
+TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float position[3],
+                                     double time) {
+    tpc_air air;
+    if (!tpc_is_wind(wind) || !position || !txm_is_finite(time)) return 0;
+    tpc_make_waves(wind, &air);
+    return tpc_pressure(&air, position, time);
+}
+
+/* Class c swings 0.3 * 2^(c / 4) times a second, damped by a fifth. The step over dt is that of
+
+       x'' + 2 d w x' + w^2 x = 0,   x = e^(-d w t) (a cos(k t) + b sin(k t)),  k = w sqrt(1 - d^2)
+
+   so that it is right however long it is; nothing can grow. Thin branches give more, and flutter. */
+static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
+    const double damping = 0.2, part = sqrt(1 - damping * damping);
+    for (int c = 0; c < TPC_CLASSES; c++) {
+        const double frequency = 0.3 * tpc_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
+        const double fade = damping * omega * dt;
+        double e = 0, sine = 0, cosine = 0;
+        if (fade < 60) { /* beyond that nothing of the old swing is left */
+            e = tpc_exp2(-fade * 1.44269504088896340736);
+            tpc_sincos(omega * part * dt, &sine, &cosine);
+        }
+        air->classes[c].xx = txm_float(e * (cosine + damping / part * sine));
+        air->classes[c].xv = txm_float(e * sine / (omega * part));
+        air->classes[c].vx = txm_float(-e * omega / part * sine);
+        air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
+        air->classes[c].give = txm_float(0.006 * tpc_exp2(c / 5.0));
+        for (int k = 0; k < TPC_PHASES; k++)
+            air->classes[c].flutter[k] =
+                wind->gusts * txm_float(0.5 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
+                                        0.35 * tpc_sine_of_turns(1.618 * frequency * air->time +
+                                                                 k * 0.723607));
+    }
+}
+
+/* ---- bones ------------------------------------------------------------------------------- */
+
+typedef struct tpc_posing {
+    const treepieces_forest *forest;
+    const treepieces_pose *pose;
+    const tpc_air *air; /* NULL: no wind */
+    float *state, *bones;
+} tpc_posing;
+
+/* q = q p, with p the rotation about the level axis (x, 0, z) by about its length, in radians */
+static void tpc_bend(float q[4], float x, float z) {
+    const float a = 0.5f * x, c = 0.5f * z, w = 1 / sqrtf(1 + a * a + c * c);
+    const float p[4] = {w * a, 0, w * c, w};
+    tpc_multiply(q, p, q);
+}
+
+/* A random bend of the pose, the same for this node at any time. */
+static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4]) {
+    if (pose->amount > 0) {
+        const uint64_t h = txm_hash(pose->seed ^ ((uint64_t)node + 1) * 0x9e3779b97f4a7c15u);
+        const float u = (float)(h & 0xffffff) * 1.1920929e-7f - 1, v = (float)(h >> 40) * 1.1920929e-7f - 1;
+        tpc_bend(q, 0.7f * pose->amount * u, 0.7f * pose->amount * v);
+    }
+    if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
+}
+
+/* The wind on a joint, seen in its frame (x and z across the stem), and one step of its swing. */
+static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_t look,
+                           const float wind[3], float stiffness, float *state, float q[4]) {
+    const float back[4] = {-q[0], -q[1], -q[2], q[3]};
+    float w[3];
+    tpc_rotate(back, wind, w);
+    const float flutter = air->classes[n->sway].flutter[look & (TPC_PHASES - 1)];
+    const float other = air->classes[n->sway].flutter[look >> 3 & (TPC_PHASES - 1)];
+    const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
+    const float give = air->classes[n->sway].give / stiffness;
+    /* the stem leans with the wind: towards +z about +x, towards +x about -z */
+    const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
+                           txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
+    for (int k = 0; k < 2; k++) {
+        const float x = state[2 * k] - rest[k], v = state[2 * k + 1];
+        state[2 * k] = rest[k] + (air->classes[n->sway].xx * x + air->classes[n->sway].xv * v);
+        state[2 * k + 1] = air->classes[n->sway].vx * x + air->classes[n->sway].vv * v;
+    }
+    tpc_bend(q, state[0], state[2]);
+}
+
+/* The bones of a tree, from its foot on. */
+static void tpc_pose_tree(void *context, int index) {
+    const tpc_posing *p = (const tpc_posing *)context;
+    const treepieces_tree *t = &p->forest->trees[index];
+    const float stiffness = p->forest->species[t->species].stiffness;
+    float pressure = 0;
+    if (p->air) pressure = tpc_pressure(p->air, t->position, p->air->time);
+    for (uint32_t i = 0; i < t->node_count; i++) {
+        const uint32_t number = t->first_node + i;
+        const treepieces_node *n = &p->forest->nodes[number];
+        float *b = p->bones + TREEPIECES_BONE * (size_t)number;
+        float q[4] = {n->rotation[0], n->rotation[1], n->rotation[2], n->rotation[3]};
+        float r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}; /* rows of the parent's rotation */
+        float at[3] = {t->position[0], t->position[1], t->position[2]};
+        if (n->parent >= 0) {
+            const treepieces_node *up = n - i + n->parent;
+            const float *a = p->bones + TREEPIECES_BONE * (size_t)(t->first_node + (uint32_t)n->parent);
+            const float *to = p->forest->kit->pieces[up->type].building[n->joint >> 3].translation;
+            const float by_radius = 1 / up->radius, by_length = 1 / up->length;
+            for (int k = 0; k < 3; k++) {
+                r[3 * k] = a[4 * k] * by_radius;
+                r[3 * k + 1] = a[4 * k + 1] * by_length;
+                r[3 * k + 2] = a[4 * k + 2] * by_radius;
+                at[k] = ((a[4 * k] * to[0] + a[4 * k + 1] * to[1]) + a[4 * k + 2] * to[2]) + a[4 * k + 3];
+            }
+        }
+        if (p->pose) tpc_pose_joint(p->pose, number, q);
+        if (p->air) {
+            const float *d = p->air->direction;
+            const float wind[3] = {pressure * (r[0] * d[0] + r[6] * d[2]),
+                                   pressure * (r[1] * d[0] + r[7] * d[2]),
+                                   pressure * (r[2] * d[0] + r[8] * d[2])};
+            tpc_sway_joint(p->air, n, (i * 0x9e3779b9u + t->seed) >> 16, wind, stiffness,
+                           p->state + 4 * (size_t)number, q);
+        }
+        const float x2 = q[0] + q[0], y2 = q[1] + q[1], z2 = q[2] + q[2];
+        const float m[9] = {1 - (q[1] * y2 + q[2] * z2), q[0] * y2 - q[3] * z2, q[0] * z2 + q[3] * y2,
+                            q[0] * y2 + q[3] * z2, 1 - (q[0] * x2 + q[2] * z2), q[1] * z2 - q[3] * x2,
+                            q[0] * z2 - q[3] * y2, q[1] * z2 + q[3] * x2, 1 - (q[0] * x2 + q[1] * y2)};
+        for (int k = 0; k < 3; k++) {
+            const float *row = r + 3 * k;
+            b[4 * k] = n->radius * ((row[0] * m[0] + row[1] * m[3]) + row[2] * m[6]);
+            b[4 * k + 1] = n->length * ((row[0] * m[1] + row[1] * m[4]) + row[2] * m[7]);
+            b[4 * k + 2] = n->radius * ((row[0] * m[2] + row[1] * m[5]) + row[2] * m[8]);
+            b[4 * k + 3] = at[k];
+        }
+    }
+}
+
+static txm_status tpc_check_pose(const treepieces_pose *pose, txm_env *env) {
+    if (pose && !(pose->amount >= 0 && pose->amount <= 2))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "amount must be 0 to 2 radians");
+    return TXM_OK;
+}
+
+TREEPIECES_API txm_status treepieces_bones(const treepieces_forest *forest,
+                                           const treepieces_pose *pose, txm_env *env, float *bones) {
+    if (!forest || !bones) return txm_fail(env, TXM_BAD_ARGUMENT, "forest or bones is NULL");
+    const txm_status status = tpc_check_pose(pose, env);
+    if (status != TXM_OK) return status;
+    tpc_posing p;
+    memset(&p, 0, sizeof p);
+    p.forest = forest;
+    p.pose = pose;
+    p.bones = bones;
+    txm_parallel_for(env, forest->tree_count, tpc_pose_tree, &p);
+    return TXM_OK;
+}
+
+TREEPIECES_API txm_status treepieces_sway(const treepieces_forest *forest,
+                                          const treepieces_wind *wind, double time, double dt,
+                                          const treepieces_pose *pose, txm_env *env, float *state,
+                                          float *bones) {
+    if (!forest || !state || !bones)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "forest, state or bones is NULL");
+    if (!tpc_is_wind(wind))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "wind is NULL, or a field of it out of range");
+    if (!(fabs(time) <= 1e9) || !(dt >= 0 && dt <= 1e9))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "time and dt must be finite, dt not below 0");
+    const txm_status status = tpc_check_pose(pose, env);
+    if (status != TXM_OK) return status;
+    tpc_air air;
+    tpc_posing p;
+    memset(&p, 0, sizeof p);
+    tpc_make_waves(wind, &air);
+    air.time = time;
+    tpc_make_classes(wind, dt, &air);
+    p.forest = forest;
+    p.pose = pose;
+    p.air = &air;
+    p.state = state;
+    p.bones = bones;
+    txm_parallel_for(env, forest->tree_count, tpc_pose_tree, &p);
+    return TXM_OK;
+}
+
+/* ---- skinning ---------------------------------------------------------------------------- */
+
+static void tpc_move_point(const float *bone, const float p[3], float out[3]) {
+    for (int k = 0; k < 3; k++)
+        out[k] = ((bone[4 * k] * p[0] + bone[4 * k + 1] * p[1]) + bone[4 * k + 2] * p[2]) +
+                 bone[4 * k + 3];
+}
+
+/* squares of the lengths of a bone's columns */
+static void tpc_columns(const float *bone, float squares[3]) {
+    for (int k = 0; k < 3; k++)
+        squares[k] = (bone[k] * bone[k] + bone[4 + k] * bone[4 + k]) + bone[8 + k] * bone[8 + k];
+}
+
+/* n by the inverse transpose: columns at right angles are divided by their squares */
+static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
+    float squares[3];
+    tpc_columns(bone, squares);
+    const float m[3] = {n[0] / squares[0], n[1] / squares[1], n[2] / squares[2]};
+    for (int k = 0; k < 3; k++)
+        out[k] = (bone[4 * k] * m[0] + bone[4 * k + 1] * m[1]) + bone[4 * k + 2] * m[2];
+}
+
+static void tpc_unit(float n[3]) {
+    const float length = sqrtf((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
+    for (int k = 0; k < 3; k++) n[k] /= length;
+}
+
+TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
+                                    uint32_t instance, float *positions, float *normals) {
+    const treepieces_piece *piece = &forest->kit->pieces[type];
+    const treepieces_batch *batch = &forest->batches[type];
+    const uint32_t *word = batch->words + (size_t)instance * batch->stride;
+    const uint32_t difference[3] = {word[1] & 0xffffu, word[1] >> 16, word[2] & 0xffffu};
+    const float *own = bones + TREEPIECES_BONE * (size_t)word[0];
+    const float *child[TREEPIECES_MAX_LEAVES];
+    float stretch[TREEPIECES_MAX_LEAVES], own_squares[3];
+    int turn[TREEPIECES_MAX_LEAVES];
+    tpc_columns(own, own_squares);
+    for (int k = 0; k < piece->leaf_count; k++) {
+        float squares[3];
+        child[k] = own + TREEPIECES_BONE * (size_t)difference[k];
+        turn[k] = (int)(word[2] >> (16 + 4 * k) & 15u);
+        tpc_columns(child[k], squares);
+        stretch[k] = sqrtf(squares[0] * own_squares[1] / (own_squares[0] * squares[1]));
+    }
+    for (int i = 0; i < piece->vertex_count; i++) {
+        const treepieces_vertex *v = &piece->vertices[i];
+        float *position = positions + 3 * i, p[3], n[3], moved[3], sum[3] = {0, 0, 0};
+        if (v->rim >= 0) {
+            const int k = v->rim / TREEPIECES_RIM;
+            tpc_rim_vertex((v->rim + TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, p, n);
+            tpc_move_point(child[k], p, position);
+            if (!normals) continue;
+            tpc_move_normal(child[k], n, sum);
+        } else {
+            const float w = v->weights[0];
+            tpc_move_point(own, v->position, position);
+            tpc_move_normal(own, v->normal, sum);
+            for (int c = 0; c < 3 && w < 1; c++) position[c] *= w;
+            for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
+            for (int k = 0; k < piece->leaf_count; k++) {
+                const float wk = v->weights[1 + k];
+                const tpc_seen *at = &forest->kit->seen[type][k * piece->vertex_count + i];
+                if (!(wk > 0)) continue;
+                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
+                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);
+                p[1] *= stretch[k];
+                n[1] /= stretch[k];
+                tpc_move_point(child[k], p, moved);
+                for (int c = 0; c < 3; c++) position[c] += wk * moved[c];
+                float squares[3];
+                tpc_columns(child[k], squares);
+                tpc_move_normal(child[k], n, moved);
+                for (int c = 0; c < 3; c++) sum[c] += wk * sqrtf(squares[0]) * moved[c];
+            }
+            if (!normals) continue;
+        }
+        tpc_unit(sum);
+        memcpy(normals + 3 * i, sum, sizeof sum);
+    }
+}
+
+/* ---- level of detail --------------------------------------------------------------------- */
+
+/* The level at a place, which is given as a sum of `count` points. */
+static int tpc_level(const treepieces_lod *lod, const float sum[3], float count) {
+    const float half = lod->half_distance > 0 ? lod->half_distance : 10;
+    const float most = txm_clampf(lod->max_level, 1, 64);
+    double squares = 0;
+    for (int k = 0; k < 3; k++) {
+        const double d = (double)(sum[k] / count - lod->eye[k]);
+        squares += d * d;
+    }
+    const float halvings = txm_clampf(txm_float(sqrt(squares) / half), 0, 100);
+    const double level = (double)most * tpc_exp2(-halvings);
+    const int whole = (int)level;
+    return whole < 1 ? 1 : whole + (level > whole);
+}
+
+TREEPIECES_API int treepieces_edge_level(const treepieces_lod *lod, const float a[3],
+                                         const float b[3]) {
+    const float sum[3] = {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+    return tpc_level(lod, sum, 2);
+}
+
+TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float corners[12]) {
+    float sum[3];
+    for (int k = 0; k < 3; k++)
+        sum[k] = (corners[k] + corners[3 + k]) + (corners[6 + k] + corners[9 + k]);
+    return tpc_level(lod, sum, 4);
+}
+
+/* Place i of 0..n along a side: multiples of 2^-16, so that place n - i is exactly 1 - place i. */
+static float tpc_place_along(int i, int n) {
+    if (2 * i > n) return 1 - tpc_place_along(n - i, n);
+    return (float)((i * 65536 * 2 + n) / (2 * n)) / 65536.0f;
+}
+
+/* The vertices of a pattern: the sides' first, side k from corner k up to the one before corner
+   k + 1, then the inner grid, column by column. */
+typedef struct tpc_pattern {
+    int edges[4], first[4], inner, outer_count;
+} tpc_pattern;
+
+static int tpc_side_vertex(const tpc_pattern *p, int side, int i) {
+    return i < p->edges[side] ? p->first[side] + i : p->first[(side + 1) % 4];
+}
+
+/* Vertex i of 0..inner - 2 of the inner grid's border along a side, in the side's direction. */
+static int tpc_inner_vertex(const tpc_pattern *p, int side, int i) {
+    const int n = p->inner - 1, far = n - 1 - i;
+    const int u = side == 0 ? 0 : side == 1 ? i : side == 2 ? n - 1 : far;
+    const int v = side == 0 ? i : side == 1 ? n - 1 : side == 2 ? far : 0;
+    return p->outer_count + u * n + v;
+}
+
+static void tpc_add_triangle(uint16_t *indices, int *count, int a, int b, int c) {
+    if (indices) {
+        indices[3 * *count] = (uint16_t)a;
+        indices[3 * *count + 1] = (uint16_t)b;
+        indices[3 * *count + 2] = (uint16_t)c;
+    }
+    ++*count;
+}
+
+/* The strip between a side and the inner grid: always the next step that is the less far along. */
+static void tpc_stitch(const tpc_pattern *p, int side, uint16_t *indices, int *count) {
+    const int outer = p->edges[side], inner = p->inner - 2;
+    int i = 0, j = 0;
+    while (i < outer || j < inner) {
+        /* middles of the next outer and inner step; inner place j lies at (j + 1) / (inner + 2) */
+        const int a = (2 * i + 1) * (inner + 2), b = (2 * j + 3) * outer;
+        if (j == inner || (i < outer && a <= b)) {
+            tpc_add_triangle(indices, count, tpc_side_vertex(p, side, i),
+                             tpc_side_vertex(p, side, i + 1), tpc_inner_vertex(p, side, j));
+            i++;
+        } else {
+            tpc_add_triangle(indices, count, tpc_side_vertex(p, side, i),
+                             tpc_inner_vertex(p, side, j + 1), tpc_inner_vertex(p, side, j));
+            j++;
+        }
+    }
+}
+
+TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coords,
+                                      uint16_t *indices, int *triangles) {
+    static const int corner_u[4] = {0, 0, 1, 1}, corner_v[4] = {0, 1, 1, 0};
+    tpc_pattern p;
+    int count = 0;
+    p.outer_count = 0;
+    p.inner = txm_clampi(inner, 1, 64);
+    for (int k = 0; k < 4; k++) {
+        p.edges[k] = txm_clampi(edges[k], 1, 64);
+        p.first[k] = p.outer_count;
+        p.outer_count += p.edges[k];
+    }
+    if (p.inner == 1 && p.outer_count > 4) p.inner = 2;
+    const int n = p.inner - 1;
+    if (!coords && !indices) { /* the strips, and the grid within */
+        count = n == 0 ? 2 : p.outer_count + 4 * (n - 1) + 2 * (n - 1) * (n - 1);
+        if (triangles) *triangles = count;
+        return p.outer_count + n * n;
+    }
+    for (int k = 0; k < 4 && coords; k++) {
+        for (int i = 0; i < p.edges[k]; i++) {
+            const float t = tpc_place_along(i, p.edges[k]), back = 1 - t;
+            float *at = coords + 2 * (p.first[k] + i);
+            const int u = corner_u[k], v = corner_v[k], next = (k + 1) % 4;
+            at[0] = u == corner_u[next] ? (float)u : u ? back : t;
+            at[1] = v == corner_v[next] ? (float)v : v ? back : t;
+        }
+    }
+    for (int u = 0; u < n; u++) {
+        for (int v = 0; v < n; v++) {
+            float *at = coords + 2 * (p.outer_count + u * n + v);
+            if (coords) {
+                at[0] = tpc_place_along(u + 1, p.inner);
+                at[1] = tpc_place_along(v + 1, p.inner);
+            }
+            if (u + 1 == n || v + 1 == n) continue;
+            const int a = p.outer_count + u * n + v;
+            tpc_add_triangle(indices, &count, a, a + 1, a + n + 1);
+            tpc_add_triangle(indices, &count, a, a + n + 1, a + n);
+        }
+    }
+    if (n == 0) {
+        tpc_add_triangle(indices, &count, 0, 1, 2);
+        tpc_add_triangle(indices, &count, 0, 2, 3);
+    }
+    for (int k = 0; k < 4 && n > 0; k++) tpc_stitch(&p, k, indices, &count);
+    if (triangles) *triangles = count;
+    return p.outer_count + n * n;
+}
+
+/* A weighted sum of four numbers, the same to the bit whatever the order of the corners as long as
+   two weights at most are not 0: opposite corners are added first, and x + 0 is x. */
+static float tpc_mix(const float w[4], float a, float b, float c, float d) {
+    return (w[0] * a + w[2] * c) + (w[1] * b + w[3] * d);
+}
+
+TREEPIECES_API void treepieces_patch_point(const float positions[12], const float normals[12],
+                                           float shape, float u, float v, float position[3],
+                                           float normal[3]) {
+    const float w[4] = {(1 - u) * (1 - v), (1 - u) * v, u * v, u * (1 - v)};
+    const float alpha = shape < 0 ? 0 : shape > 0 ? shape : 0.6f;
+    float p[3], n[3], depth[4];
+    for (int k = 0; k < 3; k++) {
+        p[k] = tpc_mix(w, positions[k], positions[3 + k], positions[6 + k], positions[9 + k]);
+        n[k] = tpc_mix(w, normals[k], normals[3 + k], normals[6 + k], normals[9 + k]);
+    }
+    for (int i = 0; i < 4; i++) { /* above the corner's tangent plane */
+        const float *corner = positions + 3 * i, *up = normals + 3 * i;
+        depth[i] = (up[0] * (p[0] - corner[0]) + up[1] * (p[1] - corner[1])) +
+                   up[2] * (p[2] - corner[2]);
+    }
+    for (int k = 0; k < 3; k++)
+        position[k] = p[k] - alpha * tpc_mix(w, depth[0] * normals[k], depth[1] * normals[3 + k],
+                                             depth[2] * normals[6 + k], depth[3] * normals[9 + k]);
+    if (!normal) return;
+    tpc_unit(n);
+    memcpy(normal, n, sizeof n);
+}
+
+/* ---- baked meshes ------------------------------------------------------------------------ */
+
+enum {
+    TPC_PATTERN_VERTICES = 4 * 64 + 63 * 63,
+    TPC_PATTERN_TRIANGLES = 2 * 64 * 64 + 4 * 64,
+    TPC_MESH_TRIANGLES = 0x7fffffff / 3 /* corners fit 31 bits */
+};
+
+/* A mesh with its memory. */
+typedef struct tpc_mesh {
+    treepieces_mesh mesh; /* first: the one is the other */
+    txm_arena arena;
+} tpc_mesh;
+
+/* One corner of a quad as it is baked: a skinned vertex. */
+typedef struct tpc_corner {
+    float position[3], normal[3], weights[4]; /* weights: of the four joints of the piece */
+} tpc_corner;
+
+/* A mesh while it is baked. */
+typedef struct tpc_baking {
+    const treepieces_bake_desc *desc;
+    const treepieces_forest *forest;
+    const treepieces_tree *tree;
+    treepieces_lod lod;
+    int sheet_size, layers;
+    treepieces_mesh *out;
+    int is_broken; /* met a position that is no number */
+    uint32_t *table; /* vertex + 1 by hash of its position; 0 = free */
+    size_t table_mask;
+    /* the quad at work */
+    float coords[2 * TPC_PATTERN_VERTICES];
+    uint16_t indices[3 * TPC_PATTERN_TRIANGLES];
+    uint32_t numbers[TPC_PATTERN_VERTICES]; /* in the mesh */
+    /* the piece at work */
+    float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
+    uint32_t joints[4];
+} tpc_baking;
+
+static int tpc_is_tessellated(const tpc_baking *b) {
+    return b->lod.max_level > 1;
+}
+
+/* Levels of a quad whose corners are given. */
+static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int edges[4]) {
+    for (int k = 0; k < 4; k++) edges[k] = 1;
+    if (!tpc_is_tessellated(b)) return 1;
+    for (int k = 0; k < 4; k++)
+        edges[k] = treepieces_edge_level(&b->lod, positions + 3 * k, positions + 3 * ((k + 1) % 4));
+    return treepieces_inner_level(&b->lod, positions);
+}
+
+/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out: its
+   bits are nobody's promise, so there might come more vertices than were counted. */
+static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
+                         const float weights[4]) {
+    treepieces_mesh *m = b->out;
+    uint32_t bits[3];
+    for (int k = 0; k < 3; k++) {
+        const float x = position[k] + 0.0f; /* -0 is 0 */
+        memcpy(&bits[k], &x, sizeof x);
+        if (!txm_is_finite((double)x)) b->is_broken = 1;
+    }
+    if (b->is_broken) return 0;
+    size_t slot = (size_t)txm_hash(bits[0] ^ (uint64_t)bits[1] << 32 ^ (uint64_t)bits[2] << 16);
+    for (;; slot++) {
+        const uint32_t found = b->table[slot & b->table_mask];
+        if (!found) break;
+        if (memcmp(m->positions + 3 * (size_t)(found - 1), bits, sizeof bits) == 0)
+            return found - 1;
+    }
+    const size_t i = m->vertex_count++;
+    b->table[slot & b->table_mask] = (uint32_t)i + 1;
+    memcpy(m->positions + 3 * i, bits, sizeof bits);
+    memcpy(m->normals + 3 * i, normal, 3 * sizeof *normal);
+    for (int k = 0; k < 4; k++) {
+        m->joints[4 * i + (size_t)k] = weights[k] > 0 ? b->joints[k] : 0;
+        m->weights[4 * i + (size_t)k] = weights[k];
+    }
+    return (uint32_t)i;
+}
+
+/* How well a triangle faces where its corners' normals point; below 0: away from there. */
+static float tpc_facing(const float *a, const float *b, const float *c, const float normals[12]) {
+    float u[3], v[3], n[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = b[k] - a[k];
+        v[k] = c[k] - a[k];
+        n[k] = (normals[k] + normals[3 + k]) + (normals[6 + k] + normals[9 + k]);
+    }
+    const float cross[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                            u[0] * v[1] - u[1] * v[0]};
+    const float length = sqrtf(tpc_dot(cross, cross));
+    return length > 0 ? tpc_dot(cross, n) / length : 0;
+}
+
+/* Split a quad of level 1 along the diagonal that leaves the worse of its triangles the better. */
+static void tpc_choose_diagonal(const float p[12], const float n[12], uint16_t indices[6]) {
+    static const uint16_t other[6] = {1, 2, 3, 1, 3, 0};
+    const float kept = txm_minf(tpc_facing(p, p + 3, p + 6, n), tpc_facing(p, p + 6, p + 9, n));
+    const float turned =
+        txm_minf(tpc_facing(p + 3, p + 6, p + 9, n), tpc_facing(p + 3, p + 9, p, n));
+    if (turned > kept) memcpy(indices, other, sizeof other);
+}
+
+static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const uint32_t *record,
+                          int index) {
+    const treepieces_quad *q = &piece->quads[index];
+    const int cell = (int)(record[4 + index / 4] >> (8 * (index & 3)) & 255u);
+    float positions[12], normals[12], uv[4][2];
+    int edges[4], triangles, layer = 0;
+    for (int k = 0; k < 4; k++) {
+        memcpy(positions + 3 * k, b->positions + 3 * q->corners[k], 3 * sizeof(float));
+        memcpy(normals + 3 * k, b->normals + 3 * q->corners[k], 3 * sizeof(float));
+        layer = treepieces_quad_uv(q, record[3], cell, b->sheet_size, k, uv[k]);
+    }
+    const int inner = tpc_quad_levels(b, positions, edges);
+    const int vertices = treepieces_pattern(edges, inner, b->coords, b->indices, &triangles);
+    if (triangles == 2) tpc_choose_diagonal(positions, normals, b->indices);
+    for (int i = 0; i < vertices; i++) {
+        const float u = b->coords[2 * i], v = b->coords[2 * i + 1];
+        const float w[4] = {(1 - u) * (1 - v), (1 - u) * v, u * v, u * (1 - v)};
+        float position[3], normal[3], weights[4], sum = 0;
+        treepieces_patch_point(positions, normals, b->lod.shape, u, v, position, normal);
+        for (int k = 0; k < 4; k++) {
+            const treepieces_vertex *c = piece->vertices;
+            weights[k] = tpc_mix(w, c[q->corners[0]].weights[k], c[q->corners[1]].weights[k],
+                                 c[q->corners[2]].weights[k], c[q->corners[3]].weights[k]);
+            sum += weights[k];
+        }
+        for (int k = 0; k < 4; k++) weights[k] /= sum;
+        b->numbers[i] = tpc_weld(b, position, normal, weights);
+    }
+    for (int i = 0; i < 3 * triangles; i++) {
+        const size_t at = 3 * b->out->triangle_count + (size_t)i;
+        const float u = b->coords[2 * b->indices[i]], v = b->coords[2 * b->indices[i] + 1];
+        const float w[4] = {(1 - u) * (1 - v), (1 - u) * v, u * v, u * (1 - v)};
+        b->out->indices[at] = b->numbers[b->indices[i]];
+        b->out->uvs[2 * at] = tpc_mix(w, uv[0][0], uv[1][0], uv[2][0], uv[3][0]);
+        b->out->uvs[2 * at + 1] =
+            ((float)layer + tpc_mix(w, uv[0][1], uv[1][1], uv[2][1], uv[3][1])) / (float)b->layers;
+    }
+    b->out->triangle_count += (size_t)triangles;
+}
+
+/* The records of a tree lie together, of each type; *count receives how many. */
+static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces_tree *tree,
+                                 uint32_t *count) {
+    uint32_t ends[2];
+    for (int e = 0; e < 2; e++) { /* the first with a bone of at least ... */
+        const uint32_t bone = tree->first_node + (e ? tree->node_count : 0);
+        uint32_t low = 0, high = batch->count;
+        while (low < high) {
+            const uint32_t middle = low + (high - low) / 2;
+            if (batch->words[(size_t)middle * batch->stride] < bone) low = middle + 1;
+            else high = middle;
+        }
+        ends[e] = low;
+    }
+    *count = ends[1] - ends[0];
+    return ends[0];
+}
+
+/* Visit all quads: count what they need (out NULL), or bake them. */
+static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, size_t *triangles) {
+    uint32_t done = 0;
+    for (int t = 0; t < b->forest->type_count; t++) {
+        const treepieces_piece *piece = &b->forest->kit->pieces[t];
+        const treepieces_batch *batch = &b->forest->batches[t];
+        uint32_t count;
+        const uint32_t first = tpc_first_record(batch, b->tree, &count);
+        for (uint32_t i = first; i < first + count; i++, done++) {
+            const uint32_t *record = batch->words + (size_t)i * batch->stride;
+            const uint32_t own = record[0] - b->tree->first_node;
+            if ((done & 63) == 0 &&
+                txm_progress(env, (b->out ? 0.3f : 0) + (b->out ? 0.7f : 0.3f) * (float)done /
+                                      (float)b->tree->node_count, "bake"))
+                return txm_fail(env, TXM_CANCELLED, "cancelled");
+            if (*triangles > TPC_MESH_TRIANGLES)
+                return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
+            if (!b->out && !tpc_is_tessellated(b)) {
+                *vertices += (size_t)piece->vertex_count;
+                *triangles += 2 * (size_t)piece->quad_count;
+                continue;
+            }
+            treepieces_skin(b->forest, b->desc->bones, t, i, b->positions, b->normals);
+            b->joints[0] = own;
+            b->joints[1] = own + (record[1] & 0xffffu);
+            b->joints[2] = own + (record[1] >> 16);
+            b->joints[3] = own + (record[2] & 0xffffu);
+            for (int k = 0; k < piece->quad_count; k++) {
+                float positions[12];
+                int edges[4], more;
+                if (b->out) {
+                    tpc_bake_quad(b, piece, record, k);
+                    continue;
+                }
+                for (int c = 0; c < 4; c++)
+                    memcpy(positions + 3 * c, b->positions + 3 * piece->quads[k].corners[c],
+                           3 * sizeof(float));
+                const int inner = tpc_quad_levels(b, positions, edges);
+                *vertices += (size_t)treepieces_pattern(edges, inner, NULL, NULL, &more);
+                *triangles += (size_t)more;
+            }
+            if (b->is_broken)
+                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are infinite, flat or no numbers");
+        }
+    }
+    return TXM_OK;
+}
+
+/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and where
+   they lie in the circle about the rim. */
+typedef struct tpc_cap {
+    uint32_t numbers[TREEPIECES_RIM * 64 + 1];
+    float places[TREEPIECES_RIM * 64 + 1][2];
+    int count; /* without the middle */
+} tpc_cap;
+
+static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *cap) {
+    const float own[4] = {1, 0, 0, 0};
+    cap->count = 0;
+    for (int j = 0; j < TREEPIECES_RIM; j++) { /* side j as the edge from corner 0 to 1 of a quad */
+        float p[12], normals[12], from[3], to[3], at[3], normal[3];
+        for (int k = 0; k < 4; k++) {
+            const int vertex = piece->root_rim[(j + (k == 1)) % TREEPIECES_RIM];
+            memcpy(p + 3 * k, b->positions + 3 * vertex, 3 * sizeof(float));
+            memcpy(normals + 3 * k, b->normals + 3 * vertex, 3 * sizeof(float));
+        }
+        tpc_rim_vertex(j, from, normal);
+        tpc_rim_vertex((j + 1) % TREEPIECES_RIM, to, normal);
+        const int level = tpc_is_tessellated(b) ? treepieces_edge_level(&b->lod, p, p + 3) : 1;
+        for (int i = 0; i < level; i++, cap->count++) {
+            const float t = tpc_place_along(i, level);
+            treepieces_patch_point(p, normals, b->lod.shape, 0, t, at, normal);
+            cap->numbers[cap->count] = tpc_weld(b, at, normal, own);
+            cap->places[cap->count][0] = (1 - t) * from[0] + t * to[0];
+            cap->places[cap->count][1] = (1 - t) * from[2] + t * to[2];
+        }
+    }
+}
+
+/* Close the foot: a hexagon by a fan of four; a finer rim, which need be neither convex nor bent at
+   all, by one about its middle. */
+static void tpc_bake_cap(tpc_baking *b) {
+    const float own[4] = {1, 0, 0, 0}, middle[3] = {0, 0, 0}, down[3] = {0, -1, 0};
+    const int type = b->forest->nodes[b->tree->first_node].type;
+    const float *bone = b->desc->bones + TREEPIECES_BONE * (size_t)b->tree->first_node;
+    treepieces_mesh *m = b->out;
+    uint32_t records;
+    tpc_cap cap;
+    const uint32_t first = tpc_first_record(&b->forest->batches[type], b->tree, &records);
+    treepieces_skin(b->forest, b->desc->bones, type, first, b->positions, b->normals);
+    b->joints[0] = 0;
+    tpc_find_cap(b, &b->forest->kit->pieces[type], &cap);
+    const int is_fine = cap.count > TREEPIECES_RIM, hub = is_fine ? cap.count : 0;
+    if (is_fine) {
+        float at[3], normal[3];
+        tpc_move_point(bone, middle, at);
+        tpc_move_normal(bone, down, normal);
+        tpc_unit(normal);
+        cap.numbers[hub] = tpc_weld(b, at, normal, own);
+        memset(cap.places[hub], 0, sizeof cap.places[hub]);
+    }
+    for (int i = !is_fine; i < cap.count - !is_fine; i++) {
+        const int corners[3] = {hub, (i + 1) % cap.count, i}; /* seen from below */
+        for (int k = 0; k < 3; k++) {
+            const size_t at = 3 * m->triangle_count + (size_t)k;
+            const float *place = cap.places[corners[k]]; /* on all of layer 0 */
+            m->indices[at] = cap.numbers[corners[k]];
+            m->uvs[2 * at] = 0.5f + 0.49f * place[0];
+            m->uvs[2 * at + 1] = (0.5f - 0.49f * place[1]) / (float)b->layers;
+        }
+        m->triangle_count++;
+    }
+}
+
+static txm_status tpc_bake_into(tpc_baking *b, tpc_mesh *made, txm_env *env) {
+    size_t vertices = 0, triangles = 0, slots = 64;
+    txm_status status = tpc_bake_tree(b, env, &vertices, &triangles);
+    if (status != TXM_OK) return status;
+    if (b->desc->capped) {
+        vertices++;
+        triangles += TREEPIECES_RIM * 64;
+    }
+    if (triangles > TPC_MESH_TRIANGLES)
+        return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
+    while (slots < 2 * vertices) slots *= 2;
+    treepieces_mesh *m = &made->mesh;
+    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
+    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
+    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
+    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
+    b->table = (uint32_t *)txm_alloc(env, slots * sizeof(uint32_t));
+    if (!m->positions || !m->normals || !m->joints || !m->weights || !m->indices || !m->uvs ||
+        !b->table)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    memset(b->table, 0, slots * sizeof(uint32_t));
+    b->table_mask = slots - 1;
+    b->out = m;
+    status = tpc_bake_tree(b, env, &vertices, &triangles);
+    if (status == TXM_OK && b->desc->capped) tpc_bake_cap(b);
+    return status;
+}
+
+static int tpc_has_tree(const treepieces_forest *forest, int tree) {
+    return forest && tree >= 0 && tree < forest->tree_count;
+}
+
+TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
+                                          treepieces_mesh **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!desc || !desc->bones || !tpc_has_tree(desc->forest, desc->tree))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "desc or bones is NULL, or there is no such tree");
+    if (desc->sheet_size < 0 || desc->sheet_layers < 0 || desc->sheet_layers > 64)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "sheet_size or sheet_layers is out of range");
+    if (desc->lod && (!(desc->lod->max_level >= 0 && desc->lod->max_level <= 64) ||
+                      !(desc->lod->half_distance >= 0) || !(desc->lod->shape <= 1)))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "lod: a field is out of range");
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    tpc_baking *b = (tpc_baking *)txm_alloc(env, sizeof *b);
+    txm_status status = TXM_OK;
+    if (!made || !b) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    } else {
+        made->arena = arena;
+        memset(b, 0, sizeof *b);
+        b->desc = desc;
+        b->forest = desc->forest;
+        b->tree = &desc->forest->trees[desc->tree];
+        if (desc->lod) b->lod = *desc->lod;
+        b->sheet_size = desc->sheet_size ? desc->sheet_size : 512;
+        b->layers = desc->sheet_layers ? desc->sheet_layers : TREEPIECES_OWN;
+        status = tpc_bake_into(b, made, env);
+        txm_free(env, b->table);
+        arena = made->arena;
+    }
+    txm_free(env, b);
+    if (status == TXM_OK) *out = &made->mesh;
+    else txm_arena_free(&arena);
+    return status;
+}
+
+TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
+    if (!mesh) return;
+    txm_arena arena = ((tpc_mesh *)mesh)->arena;
+    txm_arena_free(&arena);
+}
+
+/* ---- bark: sheets out of framed tiles ------------------------------------------------------ */
+
+TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc) {
+    int layers = TREEPIECES_OWN;
+    for (int i = 0; desc && desc->classes && i < desc->tile_count; i++)
+        if (desc->classes[i] >= layers) layers = desc->classes[i] + 1;
+    return layers;
+}
+
+static txm_status tpc_check_bark(const treepieces_bark_desc *d, const txm_image *out,
+                                 txm_env *env) {
+    if (!d || !d->tiles) return txm_fail(env, TXM_BAD_ARGUMENT, "desc or tiles is NULL");
+    if (d->tile_count < 1 || d->tile_count > 4096)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "tile_count must be 1 to 4096");
+    int plain = 0;
+    for (int i = 0; i < d->tile_count; i++) {
+        const txm_status status = txm_image_check(&d->tiles[i], "a tile", 0, env);
+        const int c = d->classes ? d->classes[i] : TREEPIECES_BARK;
+        if (status != TXM_OK) return status;
+        const txm_image t = txm_image_resolve(d->tiles[i]), first = txm_image_resolve(d->tiles[0]);
+        if (t.width != t.height || t.width != first.width || t.channels != first.channels ||
+            t.sample != first.sample)
+            return txm_fail(env, TXM_BAD_ARGUMENT,
+                            "tiles must be square, of one size, sample type and channel count");
+        if (t.width < 4 || t.width > 4096 || t.width % 2)
+            return txm_fail(env, TXM_BAD_ARGUMENT,
+                            "tiles must be 4 to 4096 pixels wide, an even number");
+        if (c != TREEPIECES_BARK && (c < TREEPIECES_OWN || c > 63))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "classes must be 0 or 5 to 63");
+        plain += c == TREEPIECES_BARK;
+    }
+    if (!plain) return txm_fail(env, TXM_BAD_ARGUMENT, "no tile is of class 0");
+    const txm_status status = txm_image_check(out, "out", 0, env);
+    if (status != TXM_OK) return status;
+    const txm_image o = txm_image_resolve(*out), t = txm_image_resolve(d->tiles[0]);
+    if (o.width != TREEPIECES_SHEET * t.width || o.channels != t.channels || o.sample != t.sample ||
+        o.height != TREEPIECES_SHEET * t.width * treepieces_bark_layers(d))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "out must be 8 tiles wide, 8 a layer high, of the tiles' channels and samples");
+    return TXM_OK;
+}
+
+/* A number of a tile of that class, at random; -1: there is none. */
+static int tpc_pick_tile(const treepieces_bark_desc *d, int tile_class, txm_rng *rng, int unlike,
+                         int unlike_too) {
+    int best = -1;
+    uint32_t most = 0;
+    for (int i = 0; i < d->tile_count; i++) {
+        if ((d->classes ? d->classes[i] : TREEPIECES_BARK) != tile_class) continue;
+        /* not like its neighbours as long as there is another */
+        const uint32_t preferred = i != unlike && i != unlike_too ? 1u << 31 : 1;
+        const uint32_t ticket = (txm_rng_next(rng) >> 1) | preferred;
+        if (ticket > most) {
+            most = ticket;
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* 1 at x = 0 falling smoothly to 0 at x = 1 and beyond */
+static float tpc_fade(float x) {
+    const float t = txm_clampf(1 - x, 0, 1);
+    return t * t * (3 - 2 * t);
+}
+
+/* A cell of the lowest row: (x, y) of its tile blended with what its class wants at the south side.
+   lower: four tiles of half the size for HALVING. */
+static float tpc_blend_texel(const txm_image *tile, const txm_image *const lower[4], int layer,
+                             int x, int y, int c) {
+    const int last = tile->width - 1, size = tile->width;
+    const float plain = txm_image_get(tile, x, y, c);
+    const float rise = (float)(last - y) / (float)size; /* from the south side, in tiles */
+    float other = plain, weight = 0;
+    if (layer == TREEPIECES_FOLD) { /* as much of itself mirrored: then both sides are the same */
+        weight = 0.5f * tpc_fade(4 * rise);
+        other = txm_image_get(tile, last - x, y, c);
+    } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side lies at the south */
+        weight = tpc_fade(2 * rise);
+        other = txm_image_get(tile, last - y, x, c);
+    } else if (layer == TREEPIECES_TURN_RIGHT) { /* its east side */
+        weight = tpc_fade(2 * rise);
+        other = txm_image_get(tile, y, last - x, c);
+    } else if (layer == TREEPIECES_HALVING) {
+        const txm_image *half = lower[(2 * x >= size) + 2 * (2 * y >= size)];
+        const int u = 2 * x % size, v = 2 * y % size;
+        weight = tpc_fade(rise);
+        other = 0.25f * ((txm_image_get(half, u, v, c) + txm_image_get(half, u + 1, v, c)) +
+                         (txm_image_get(half, u, v + 1, c) + txm_image_get(half, u + 1, v + 1, c)));
+    }
+    return txm_lerpf(plain, other, weight);
+}
+
+static void tpc_draw_cell(const txm_image *out, int column, int top, const txm_image *tile,
+                          const txm_image *const lower[4], int layer, int is_lowest) {
+    const size_t texel = (size_t)tile->channels * txm_sample_bytes(tile->sample);
+    for (int y = 0; y < tile->width; y++) {
+        char *row = (char *)txm_image_row(out, top + y) + (size_t)(column * tile->width) * texel;
+        if (!is_lowest || layer == TREEPIECES_BARK) {
+            memcpy(row, txm_image_row_const(tile, y), (size_t)tile->width * texel);
+            continue;
+        }
+        for (int x = 0; x < tile->width; x++)
+            for (int c = 0; c < tile->channels; c++)
+                txm_image_set(out, column * tile->width + x, top + y, c,
+                              tpc_blend_texel(tile, lower, layer, x, y, c));
+    }
+}
+
+/* Tiles of an own class: each on 2 x 2 cells, continued by its border. */
+static void tpc_draw_own(const treepieces_bark_desc *d, const txm_image *out, int layer,
+                         txm_rng *rng) {
+    const int size = txm_image_resolve(d->tiles[0]).width, first = layer * TREEPIECES_SHEET * size;
+    for (int b = 0; b < 16; b++) {
+        const int number = tpc_pick_tile(d, layer, rng, -1, -1);
+        const txm_image tile = txm_image_resolve(d->tiles[number < 0 ? 0 : number]);
+        for (int y = 0; y < 2 * size; y++)
+            for (int x = 0; x < 2 * size; x++)
+                for (int c = 0; c < tile.channels; c++) {
+                    const int from_x = txm_clampi(x - size / 2, 0, size - 1);
+                    const int from_y = txm_clampi(y - size / 2, 0, size - 1);
+                    txm_image_set(out, b % 4 * 2 * size + x, first + b / 4 * 2 * size + y, c,
+                                  txm_image_get(&tile, from_x, from_y, c));
+                }
+    }
+}
+
+static void tpc_draw_layer(const treepieces_bark_desc *d, const txm_image *out, int layer) {
+    enum { SIDE = TREEPIECES_SHEET };
+    int chosen[SIDE][SIDE];
+    txm_rng rng = txm_rng_make(d->seed, (uint64_t)layer);
+    if (layer >= TREEPIECES_OWN) {
+        tpc_draw_own(d, out, layer, &rng);
+        return;
+    }
+    for (int y = 0; y < SIDE; y++) {
+        for (int x = 0; x < SIDE; x++) {
+            const int left = x ? chosen[y][x - 1] : -1, above = y ? chosen[y - 1][x] : -1;
+            const txm_image *lower[4];
+            txm_image halves[4];
+            chosen[y][x] = tpc_pick_tile(d, TREEPIECES_BARK, &rng, left, above);
+            for (int k = 0; k < 4; k++) {
+                const int number = tpc_pick_tile(d, TREEPIECES_BARK, &rng, chosen[y][x], -1);
+                halves[k] = txm_image_resolve(d->tiles[number]);
+                lower[k] = &halves[k];
+            }
+            const txm_image tile = txm_image_resolve(d->tiles[chosen[y][x]]);
+            tpc_draw_cell(out, x, (layer * SIDE + y) * tile.width, &tile, lower, layer,
+                          y == SIDE - 1);
+        }
+    }
+}
+
+TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
+                                          txm_image out) {
+    const txm_status status = tpc_check_bark(desc, &out, env);
+    if (status != TXM_OK) return status;
+    const txm_image o = txm_image_resolve(out);
+    const int layers = treepieces_bark_layers(desc);
+    for (int layer = 0; layer < layers; layer++) tpc_draw_layer(desc, &o, layer);
+    return TXM_OK;
+}
+
+TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,
+                                      int pixels, int corner, float uv[2]) {
+    const uint32_t band = bands >> (8 * quad->band) & 255u;
+    const int is_own = quad->tile_class >= TREEPIECES_OWN;
+    const int across = is_own ? 1 : 1 << (band & 7), along = is_own ? 1 : 1 << (band >> 3 & 3);
+    const int east = corner >= 2, south = corner == 1 || corner == 2;
+    const float shift = is_own ? 0.5f : 0, half = 0.5f / (float)pixels;
+    uv[0] = ((float)((cell & 7) + (east ? across : 0)) + shift) / (float)TREEPIECES_SHEET;
+    uv[1] = ((float)((cell >> 3) + (south ? along : 0)) + shift) / (float)TREEPIECES_SHEET;
+    uv[1] += south ? -half : half; /* layers lie one under the other */
+    if (quad->tile_class == TREEPIECES_BARK && (band & 32)) return TREEPIECES_HALVING;
+    return quad->tile_class;
+}
+
+/* ---- bark: drawn ---------------------------------------------------------------------------- */
+
+/* Smooth noise of 0..1 on the unit torus with columns x rows cells. */
+static float tpc_noise(float x, float y, int columns, int rows, uint64_t seed) {
+    const float u = x * (float)columns, v = y * (float)rows;
+    const int i = (int)u, j = (int)v;
+    const float s = tpc_fade(1 - (u - (float)i)), t = tpc_fade(1 - (v - (float)j));
+    float corner[4];
+    for (int k = 0; k < 4; k++) {
+        const uint64_t a = (uint64_t)((i + (k & 1)) % columns);
+        const uint64_t b = (uint64_t)((j + (k >> 1)) % rows);
+        corner[k] = (float)(txm_hash(seed ^ (a << 40) ^ (b << 20)) >> 40) / 16777216.0f;
+    }
+    return txm_lerpf(txm_lerpf(corner[0], corner[1], s), txm_lerpf(corner[2], corner[3], s), t);
+}
+
+/* The noise of tile `number`: all tiles have that of number 0 at their border. The sum of two is
+   brought back to the contrast of one. */
+static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t seed, int number) {
+    const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
+    const float inside = 1 - tpc_fade((border - 0.03f) * 5), outside = 1 - inside;
+    if (!(inside > 0)) return tpc_noise(x, y, columns, rows, seed);
+    const float frame = outside > 0 ? tpc_noise(x, y, columns, rows, seed) - 0.5f : 0;
+    const float own = tpc_noise(x, y, columns, rows, seed + 1 + (uint64_t)number) - 0.5f;
+    return 0.5f + (outside * frame + inside * own) / sqrtf(inside * inside + outside * outside);
+}
+
+/* How light bark is at a place, about 1: plates between fissures along the stem. The fissures meet
+   the frame at the same places in all tiles and wander in between; so no frame shows. */
+static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
+    enum { PLATES = 3, CRACKS = 2 }; /* across and along a tile */
+    const float slow = tpc_framed_noise(x, y, 4, 3, seed + 1000, number) - 0.5f;
+    const float quick = tpc_framed_noise(x, y, 9, 7, seed + 2000, number) - 0.5f;
+    const float grain = tpc_framed_noise(x, y, 32, 11, seed + 3000, number) - 0.5f;
+    const float across = (float)PLATES * (1 + x) + 0.9f * slow + 0.25f * quick + 0.25f * grain;
+    const int plate = (int)across;
+    const float f = across - (float)plate, edge = txm_minf(f, 1 - f);
+    const float gap = 0.1f + 0.3f * tpc_framed_noise(x, y, 6, 3, seed + 4000, number);
+    /* cracks across a plate, at a height of its own */
+    const uint64_t own = txm_hash(seed + 9000 + (uint64_t)(plate % PLATES));
+    const float bend = tpc_framed_noise(x, y, 3, 4, seed + 5000, number) - 0.5f;
+    const float along = (float)CRACKS * (1 + y) + (float)(own >> 60) / 16 + 0.9f * bend;
+    const float g = along - (float)(int)along;
+    const float open = 2.4f * (tpc_framed_noise(x, y, 5, 4, seed + 6000, number) - 0.42f);
+    const float crack = tpc_fade(txm_minf(g, 1 - g) / 0.09f) * txm_clampf(open, 0, 1);
+    const float depth = txm_maxf(tpc_fade(edge / gap), 0.75f * crack);
+    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick; /* lit aslant */
+    return 0.46f + top * (1 - depth) + (0.4f - 0.2f * depth) * grain;
+}
+
+/* Smooth pale bark with dark lenticels across it, as birches have; none lie on the frame, where
+   they would be seen again and again. */
+static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
+    const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
+    const float inside = 1 - tpc_fade(border * 5);
+    const uint64_t own = seed + 5000 + (uint64_t)number;
+    const float mark = tpc_noise(x, y, 3, 17, own), wide = tpc_noise(x, y, 2, 5, own + 1000);
+    const float shade = tpc_framed_noise(x, y, 3, 6, seed + 6000, number) - 0.5f;
+    const float grain = tpc_framed_noise(x, y, 20, 40, seed + 7000, number) - 0.5f;
+    const float dark = 0.55f * tpc_fade((0.9f - mark) * 9) + 0.4f * tpc_fade((0.97f - wide) * 9);
+    return 1 - inside * dark + 0.1f * grain + 0.1f * shade;
+}
+
+TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species, uint64_t seed,
+                                               txm_env *env, const txm_image *tiles,
+                                               int tile_count) {
+    if (!species || !tiles || tile_count < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "species or tiles is NULL, or tile_count below 1");
+    for (int i = 0; i < tile_count; i++) {
+        const txm_status status = txm_image_check(&tiles[i], "a tile", 0, env);
+        if (status != TXM_OK) return status;
+        if (tiles[i].width != tiles[i].height || txm_image_resolve(tiles[i]).channels < 3)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "tiles must be square, of 3 or 4 channels");
+    }
+    const float *color = species->bark_color;
+    const int is_pale = color[0] + color[1] + color[2] > 2;
+    for (int i = 0; i < tile_count; i++) {
+        const txm_image t = txm_image_resolve(tiles[i]);
+        for (int y = 0; y < t.height; y++) {
+            for (int x = 0; x < t.width; x++) {
+                const float u = ((float)x + 0.5f) / (float)t.width;
+                const float v = ((float)y + 0.5f) / (float)t.height;
+                const float relief =
+                    is_pale ? tpc_birch_relief(u, v, seed, i) : tpc_bark_relief(u, v, seed, i);
+                const float moss = tpc_framed_noise(u, v, 4, 4, seed + 8000, i) - 0.5f;
+                const float tint[4] = {1 - 0.08f * moss, 1 + 0.05f * moss, 1 - 0.1f * moss, 1};
+                for (int c = 0; c < t.channels; c++)
+                    txm_image_set(&t, x, y, c,
+                                  c == 3 ? 1 : txm_clampf(color[c] * relief * tint[c], 0, 1));
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- foliage: leaf clouds ------------------------------------------------------------------ */
+
+/* -1..1 */
+static float tpc_signed(txm_rng *rng) {
+    return 2 * txm_rng_float(rng) - 1;
+}
+
+/* v to unit length; spare if it has none */
+static void tpc_to_unit(float v[3], float spare_x, float spare_y, float spare_z) {
+    const float length = sqrtf(tpc_dot(v, v));
+    const float spare[3] = {spare_x, spare_y, spare_z};
+    for (int k = 0; k < 3; k++) v[k] = length > 1e-6f ? v[k] / length : spare[k];
+}
+
+/* Turn a card so that its picture grows along `along` and shows its face to `facing` as well as it
+   then can; outward: where the cloud's surface looks to. */
+static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
+                         const float outward[3], float half) {
+    tpc_to_unit(along, 1, 0, 0);
+    const float share = tpc_dot(facing, along);
+    for (int k = 0; k < 3; k++) facing[k] -= share * along[k];
+    if (tpc_dot(facing, facing) < 1e-6f) { /* anything across will do */
+        facing[0] = along[1];
+        facing[1] = -along[0];
+        facing[2] = 0;
+    }
+    tpc_to_unit(facing, 1, 0, 0);
+    const float right[3] = {along[1] * facing[2] - along[2] * facing[1],
+                            along[2] * facing[0] - along[0] * facing[2],
+                            along[0] * facing[1] - along[1] * facing[0]};
+    for (int k = 0; k < 3; k++) {
+        card->right[k] = half * right[k];
+        card->up[k] = half * along[k];
+        card->normal[k] = outward[k] + 0.6f * facing[k];
+    }
+    tpc_to_unit(card->normal, outward[0], outward[1], outward[2]);
+}
+
+/* Impostors show no more than the sphere: draw a card's center in until its corners lie inside. */
+static void tpc_keep_inside(treepieces_card *card) {
+    for (int step = 0; step < 64; step++) {
+        float most = 0;
+        for (int corner = 0; corner < 4; corner++) {
+            float p[3];
+            for (int k = 0; k < 3; k++)
+                p[k] = card->center[k] + (corner & 1 ? card->right[k] : -card->right[k]) +
+                       (corner & 2 ? card->up[k] : -card->up[k]);
+            most = txm_maxf(most, tpc_dot(p, p));
+        }
+        if (!(most > 1)) return;
+        for (int k = 0; k < 3; k++) card->center[k] *= 0.93f;
+    }
+}
+
+/* Direction `index` of `count` spread evenly over the sphere, each a little off its place. */
+static void tpc_spread(int index, int count, float phase, txm_rng *rng, float direction[3]) {
+    double sine, cosine;
+    const float jitter = 0.6f * tpc_signed(rng), off = 0.3f * tpc_signed(rng);
+    const float y = txm_clampf(1 - (2 * (float)index + 1 + jitter) / (float)count, -1, 1);
+    const float ring = sqrtf(1 - y * y);
+    tpc_sincos((double)phase + 2.399963229728653 * index + (double)off, &sine, &cosine);
+    direction[0] = ring * (float)cosine;
+    direction[1] = y;
+    direction[2] = ring * (float)sine;
+}
+
+/* Sprays of leaves: most of them near the surface, spread out and hanging as their kind does. */
+static void tpc_leafy_card(const treepieces_species *species, int index, int count, float phase,
+                           const float scale[3], float half, txm_rng *rng, treepieces_card *card) {
+    const int is_lance = species->leaf_shape == TREEPIECES_LEAF_LANCE;
+    const int is_blossom = species->leaf_shape == TREEPIECES_LEAF_BLOSSOM;
+    const float droop = is_lance ? 1.2f : is_blossom ? 0 : 0.35f, loose = is_lance ? 0.3f : 0.8f;
+    const float reach = txm_maxf(1 - half, 0);
+    float outward[3], along[3], facing[3];
+    tpc_spread(index, count, phase, rng, outward);
+    const float depth = sqrtf(0.02f + 0.98f * txm_rng_float(rng));
+    for (int k = 0; k < 3; k++) {
+        card->center[k] = reach * depth * scale[k] * outward[k];
+        outward[k] /= scale[k];
+    }
+    tpc_to_unit(outward, 0, 1, 0);
+    for (int k = 0; k < 3; k++) {
+        along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
+        facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
+    }
+    tpc_aim_card(card, along, facing, outward, half);
+}
+
+/* Needles: cards one behind the other along twigs that radiate, crossed about them. */
+static void tpc_needle_card(int index, int count, float phase, const float scale[3], float half,
+                            txm_rng *rng, treepieces_card *card) {
+    const int twigs = (count + 3) / 4, steps = (count + twigs - 1) / twigs, step = index / twigs;
+    const float place = ((float)step + 0.5f + 0.5f * txm_rng_float(rng)) / (float)steps;
+    const float reach = txm_maxf(1 - half, 0), roll = (float)((index % twigs + step) % 3 - 1);
+    float along[3], facing[3], outward[3];
+    tpc_spread(index % twigs, twigs, phase, rng, along);
+    const float at = reach * (0.3f + 0.7f * place);
+    for (int k = 0; k < 3; k++) along[k] *= scale[k];
+    tpc_to_unit(along, 1, 0, 0);
+    for (int k = 0; k < 3; k++) {
+        card->center[k] = at * along[k];
+        outward[k] = along[k] + (k == 1 ? 0.35f : 0);
+    }
+    tpc_to_unit(outward, 0, 1, 0);
+    for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(rng);
+    /* across the twig, level */
+    facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(rng);
+    facing[1] = 1;
+    facing[2] = 1.2f * roll * along[0] + 0.2f * tpc_signed(rng);
+    tpc_aim_card(card, along, facing, outward, half);
+}
+
+TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t look,
+                                    treepieces_card *cards) {
+    const int count = species ? txm_clampi(species->leaf_count, 0, 256) : 0;
+    if (!cards || !count) return count;
+    txm_rng rng = txm_rng_make(look, 0x1eaf);
+    const float phase = 6.2831853f * txm_rng_float(&rng);
+    const float flat = txm_clampf(species->cloud_flat, 0.1f, 2);
+    const float half = 0.5f * txm_clampf(species->leaf_size, 0.01f, 4);
+    const float wide = txm_minf(1, 1 / flat), scale[3] = {wide, txm_minf(1, flat), wide};
+    for (int i = 0; i < count; i++) {
+        if (species->leaf_shape == TREEPIECES_LEAF_NEEDLE)
+            tpc_needle_card(i, count, phase, scale, half, &rng, &cards[i]);
+        else tpc_leafy_card(species, i, count, phase, scale, half, &rng, &cards[i]);
+        tpc_keep_inside(&cards[i]);
+    }
+    return count;
+}
+
+/* ---- foliage: drawn leaves ----------------------------------------------------------------- */
+
+/* A spray is a list of marks, later ones over earlier ones. A sample of the picture asks them from
+   the last to the first who has it; so edges are smoothed without seams, and rows do not wait for
+   each other. Lengths are in sides of the picture, y goes down. */
+enum {
+    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* a tapering stroke; else treepieces_leaf_shape */
+    TPC_MARKS = 1024,
+    TPC_SAMPLES = 4 /* across and down a pixel */
+};
+
+typedef struct tpc_mark {
+    int shape;
+    float from[2], along[2]; /* its foot, and from there to its tip */
+    float width;             /* half of it over the length */
+    float taper;             /* of a twig: width at its tip over that at its foot */
+    float bend;              /* of the midrib, over the length */
+    float fold;              /* how much one half is lighter than the other */
+    float low[2], high[2];   /* the box around it */
+    float color[3], tip[3];
+} tpc_mark;
+
+typedef struct tpc_spray {
+    const treepieces_species *species;
+    tpc_mark *marks;
+    int count, shape;
+    txm_rng rng;
+    txm_image out;
+    int first_row;
+} tpc_spray;
+
+/* What a leaf shape's spray is like. */
+typedef struct tpc_habit {
+    int leaves, twigs, twig_leaves; /* on the stem; side twigs; leaves on each */
+    float length, width;            /* of a leaf; half the width over the length */
+    float petiole, angle, bend;     /* angle: degrees between leaf and stem */
+} tpc_habit;
+
+/* by treepieces_leaf_shape */
+static const tpc_habit tpc_habits[] = {
+    {9, 6, 6, 0.23f, 0.31f, 0.02f, 58, 0.10f},   {7, 5, 4, 0.31f, 0.34f, 0.01f, 55, 0.06f},
+    {15, 6, 9, 0.32f, 0.085f, 0.02f, 38, 0.14f}, {8, 6, 6, 0.20f, 0.44f, 0.05f, 62, 0.06f},
+    {0, 9, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.105f, 0.42f, 0.06f, 75, 0},
+};
+
+/* Half the width of a leaf at u of its length over the most it has; side: 0..1 how far across. */
+static float tpc_outline(int shape, float u, float side) {
+    const float arc = 4 * u * (1 - u);
+    float v, phase;
+    switch (shape) {
+    case TREEPIECES_LEAF_LOBED: /* lobes point forwards */
+        phase = 4.3f * (u - 0.14f * side) + 0.1f;
+        v = 2 * (phase - floorf(phase)) - 1;
+        return arc * (0.52f + 0.75f * u) * (0.4f + 0.64f * sqrtf(txm_maxf(0, 1 - v * v)));
+    case TREEPIECES_LEAF_LANCE: return arc * (1.15f - 0.3f * u);
+    case TREEPIECES_LEAF_HEART: /* toothed */
+        phase = 13 * u;
+        return sqrtf(u) * (1 - u) * (2.9f - 1.1f * u) * (1 + 0.05f * (phase - floorf(phase)));
+    case TREEPIECES_LEAF_NEEDLE: return txm_minf(1, 5 * (1 - u));
+    case TREEPIECES_LEAF_BLOSSOM: /* a petal, notched */
+        if (u > 0.93f + 0.14f * side) return 0;
+        v = u * (0.45f + 0.55f * u);
+        return 2 * sqrtf(v * (1 - v)) * txm_minf(1, 0.4f + 1.2f * u);
+    default:
+        v = u * (0.75f + 0.25f * u);
+        phase = 16 * u;
+        return 2.6f * sqrtf(v) * (1 - v) * (1 + 0.04f * (phase - floorf(phase)));
+    }
+}
+
+/* The color of a leaf at u of its length and x across it, half the width being `half`. */
+static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, float color[3]) {
+    static const float veins[] = {9, 6, 11, 7}; /* by shape */
+    const float across = x < 0 ? -x : x, edge = half > 0 ? across / half : 0;
+    float shade = (x < 0 ? 1 - m->fold : 1 + m->fold) * (0.86f + 0.1f * u + 0.1f * edge), light = 0;
+    if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the blade bulging between them */
+        const float phase = (u - 0.7f * across) * veins[m->shape] + 100;
+        const float between = phase - floorf(phase), off = between < 0.5f ? between : 1 - between;
+        shade *= 0.96f + 0.1f * between;
+        light = txm_maxf(0.3f * tpc_fade(9 * off) * (1 - edge),
+                         0.6f * tpc_fade(across / (0.03f * (1.15f - u))));
+    } else if (m->shape == TREEPIECES_LEAF_NEEDLE) {
+        light = 0.35f * tpc_fade(2 * edge);
+    } else if (m->shape == TREEPIECES_LEAF_BLOSSOM) {
+        const float phase = 5 * edge + 0.5f;
+        shade = (x < 0 ? 1 - m->fold : 1 + m->fold) * (0.97f + 0.03f * (phase - floorf(phase)));
+    }
+    for (int k = 0; k < 3; k++) {
+        const float own = txm_lerpf(m->color[k], m->tip[k], u) * shade;
+        color[k] = txm_lerpf(own, 1.25f * own + 0.07f, light);
+    }
+}
+
+/* Does the mark have that place? Its color there then. color may be NULL. */
+static int tpc_mark_at(const tpc_mark *m, float x, float y, float color[3]) {
+    if (x < m->low[0] || y < m->low[1] || x > m->high[0] || y > m->high[1]) return 0;
+    const float dx = x - m->from[0], dy = y - m->from[1];
+    const float square = m->along[0] * m->along[0] + m->along[1] * m->along[1];
+    const float u = (dx * m->along[0] + dy * m->along[1]) / square;
+    if (!(u > 0 && u < 1)) return 0;
+    const float off = (m->along[0] * dy - m->along[1] * dx) / square - m->bend * 4 * u * (1 - u);
+    const float across = off < 0 ? -off : off;
+    if (m->shape == TPC_TWIG) {
+        const float half = m->width * (1 + u * (m->taper - 1));
+        if (across > half) return 0;
+        for (int k = 0; color && k < 3; k++)
+            color[k] = txm_lerpf(m->color[k], m->tip[k], u) * (1 - 0.35f * off / half);
+        return 1;
+    }
+    if (across > 1.3f * m->width) return 0;
+    const float half = m->width * tpc_outline(m->shape, u, across / m->width);
+    if (across > half) return 0;
+    if (color) tpc_leaf_color(m, u, off, half, color);
+    return 1;
+}
+
+/* Color of the picture at a place, in the shadow of marks that lie higher; 0: it is transparent
+   there. Of the marks, those listed can be there. */
+static int tpc_spray_at(const tpc_spray *s, const uint16_t *listed, int count, float x, float y,
+                        float color[3]) {
+    int is_shaded = 0;
+    for (int i = count; i-- > 0;) {
+        const tpc_mark *m = &s->marks[listed[i]];
+        if (tpc_mark_at(m, x, y, color)) {
+            for (int k = 0; k < 3; k++) color[k] *= is_shaded ? 0.66f : 1;
+            return 1;
+        }
+        is_shaded = is_shaded || tpc_mark_at(m, x - 0.008f, y - 0.014f, NULL);
+    }
+    return 0;
+}
+
+/* Those of the marks in `from` that reach low..high along an axis, with the shadows they throw. */
+static int tpc_list_marks(const tpc_spray *s, const uint16_t *from, int count, int axis, float low,
+                          float high, uint16_t *listed) {
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        const tpc_mark *m = &s->marks[from[i]];
+        if (m->low[axis] <= high && m->high[axis] + 0.02f >= low) listed[kept++] = from[i];
+    }
+    return kept;
+}
+
+static void tpc_draw_row(void *context, int index) {
+    enum { BLOCK = 16 }; /* pixels */
+    const tpc_spray *s = (const tpc_spray *)context;
+    const int y = s->first_row + index;
+    const float step = 1.0f / (float)TPC_SAMPLES;
+    const float width = (float)s->out.width, height = (float)s->out.height;
+    uint16_t in_row[TPC_MARKS], listed[TPC_MARKS];
+    int count = 0;
+    for (int i = 0; i < s->count; i++) in_row[i] = (uint16_t)i;
+    const int row_count = tpc_list_marks(s, in_row, s->count, 1, (float)y / height,
+                                         (float)(y + 1) / height, in_row);
+    for (int x = 0; x < s->out.width; x++) {
+        if (x % BLOCK == 0)
+            count = tpc_list_marks(s, in_row, row_count, 0, (float)x / width,
+                                   (float)(x + BLOCK) / width, listed);
+        float sum[3] = {0, 0, 0}, color[3];
+        int covered = 0;
+        for (int k = 0; k < TPC_SAMPLES * TPC_SAMPLES; k++) {
+            const float at_x = ((float)x + ((float)(k % TPC_SAMPLES) + 0.5f) * step) / width;
+            const float at_y = ((float)y + ((float)(k / TPC_SAMPLES) + 0.5f) * step) / height;
+            if (!tpc_spray_at(s, listed, count, at_x, at_y, color)) continue;
+            for (int c = 0; c < 3; c++) sum[c] += color[c];
+            covered++;
+        }
+        for (int c = 0; c < 3; c++) /* what is transparent too: filtering leaves no dark fringe */
+            txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered
+                                                    : 0.85f * s->species->leaf_color[c]);
+        txm_image_set(&s->out, x, y, 3, (float)covered / (TPC_SAMPLES * TPC_SAMPLES));
+    }
+}
+
+/* A mark from a to b, `half` a width to either side; NULL: there are too many, or it has no
+   length. */
+static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const float b[2],
+                              float half, float bend, const float color[3]) {
+    const float dx = b[0] - a[0], dy = b[1] - a[1], length = sqrtf(dx * dx + dy * dy);
+    if (s->count == TPC_MARKS || !(length > 1e-4f)) return NULL;
+    tpc_mark *m = &s->marks[s->count++];
+    const float room = 1.3f * half + (bend < 0 ? -bend : bend) * length;
+    memset(m, 0, sizeof *m);
+    m->shape = shape;
+    m->width = half / length;
+    m->taper = 1;
+    m->bend = bend;
+    for (int k = 0; k < 2; k++) {
+        m->from[k] = a[k];
+        m->along[k] = b[k] - a[k];
+        m->low[k] = txm_minf(a[k], b[k]) - room;
+        m->high[k] = txm_maxf(a[k], b[k]) + room;
+    }
+    for (int k = 0; k < 3; k++) m->color[k] = m->tip[k] = color[k];
+    return m;
+}
+
+/* A place `length` from a, turned by so many degrees from `heading` (a unit vector), kept off the
+   border by `margin`. */
+static void tpc_go(const float a[2], const float heading[2], float degrees, float length,
+                   float margin, float b[2]) {
+    double sine, cosine;
+    tpc_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
+    const float x = heading[0] * (float)cosine - heading[1] * (float)sine;
+    const float y = heading[0] * (float)sine + heading[1] * (float)cosine;
+    b[0] = txm_clampf(a[0] + length * x, margin, 1 - margin);
+    b[1] = txm_clampf(a[1] + length * y, margin, 1 - margin);
+}
+
+/* The leaf color, a bit lighter or darker, yellower or bluer. */
+static void tpc_vary_color(tpc_spray *s, const float base[3], float color[3]) {
+    const float light = 1 + 0.13f * tpc_signed(&s->rng), warm = 0.09f * tpc_signed(&s->rng);
+    color[0] = base[0] * light * (1 + warm);
+    color[1] = base[1] * light;
+    color[2] = base[2] * light * (1 - 1.5f * warm);
+}
+
+/* A bent stem or twig. */
+typedef struct tpc_stem {
+    float from[2], to[2], bend;
+} tpc_stem;
+
+static void tpc_stem_at(const tpc_stem *t, float s, float at[2], float heading[2]) {
+    const float dx = t->to[0] - t->from[0], dy = t->to[1] - t->from[1];
+    const float arc = t->bend * 4 * s * (1 - s), slope = t->bend * 4 * (1 - 2 * s);
+    at[0] = t->from[0] + s * dx - arc * dy;
+    at[1] = t->from[1] + s * dy + arc * dx;
+    heading[0] = dx - slope * dy;
+    heading[1] = dy + slope * dx;
+    const float length = txm_maxf(sqrtf(heading[0] * heading[0] + heading[1] * heading[1]), 1e-6f);
+    heading[0] /= length;
+    heading[1] /= length;
+}
+
+static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float half_at_end) {
+    const int parts = 8, is_blossom = s->shape == TREEPIECES_LEAF_BLOSSOM;
+    float color[3], green[3];
+    for (int k = 0; k < 3; k++) {
+        const float leaf = is_blossom ? 0.35f : 0.75f * s->species->leaf_color[k];
+        color[k] = 0.85f * s->species->bark_color[k];
+        if (s->species->bark_color[0] > 0.6f) color[k] *= 0.55f; /* twigs of birches are brown */
+        green[k] = 0.5f * color[k] + 0.5f * leaf;
+    }
+    for (int i = 0; i < parts; i++) {
+        float a[2], b[2], heading[2];
+        const float u = (float)i / (float)parts, v = u + 1.15f / (float)parts; /* overlap */
+        tpc_stem_at(stem, u, a, heading);
+        tpc_stem_at(stem, txm_minf(v, 1), b, heading);
+        const float foot = txm_lerpf(half, half_at_end, u), top = txm_lerpf(half, half_at_end, v);
+        tpc_mark *m = tpc_add_mark(s, TPC_TWIG, a, b, foot, 0, color);
+        if (!m) return;
+        m->taper = top / foot;
+        for (int k = 0; k < 3; k++) {
+            m->color[k] = txm_lerpf(color[k], green[k], u);
+            m->tip[k] = txm_lerpf(color[k], green[k], txm_minf(v, 1));
+        }
+    }
+}
+
+/* A leaf on its stalk, seen more or less from above. */
+static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
+                         float degrees, float size, const float base[3]) {
+    const tpc_habit *habit = &tpc_habits[shape];
+    float foot[2], tip[2], color[3];
+    const float length = habit->length * size * (0.88f + 0.24f * txm_rng_float(&s->rng));
+    const float half = length * habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
+    const float bend = habit->bend * tpc_signed(&s->rng), margin = 0.015f + 0.75f * half;
+    tpc_vary_color(s, base, color);
+    tpc_go(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
+    tpc_go(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
+    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.004f, 0, color);
+    if (stalk) stalk->taper = 0.7f;
+    tpc_mark *leaf = tpc_add_mark(s, shape, foot, tip, half, bend, color);
+    if (!leaf) return;
+    leaf->fold = 0.09f * tpc_signed(&s->rng);
+    for (int k = 0; k < 3; k++) leaf->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
+}
+
+/* Five petals about a middle with stamens, seen askew. */
+static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
+    static const float white[3] = {1, 0.97f, 0.975f}, anther[3] = {0.85f, 0.62f, 0.25f};
+    static const float up[2] = {0, -1};
+    const float turn = 72 * txm_rng_float(&s->rng), lean = 180 * txm_rng_float(&s->rng);
+    const float *tint = s->species->leaf_color;
+    const float deep[3] = {0.9f * tint[0], 0.66f * tint[1], 0.76f * tint[2]};
+    const float squash = 0.35f * txm_rng_float(&s->rng);
+    for (int i = 0; i < 5; i++) {
+        double sine, cosine;
+        float tip[2], foot[2];
+        const float angle = turn + 72 * (float)i + 5 * tpc_signed(&s->rng);
+        tpc_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
+        const float length = radius * (1 - squash * (float)(cosine * cosine));
+        const float half = 0.46f * radius * (1 - squash * (float)(sine * sine));
+        tpc_go(at, up, angle, 0.08f * radius, 0.01f, foot);
+        tpc_go(at, up, angle, length, 0.01f, tip);
+        tpc_mark *petal = tpc_add_mark(s, TREEPIECES_LEAF_BLOSSOM, foot, tip, half, 0, deep);
+        if (!petal) return;
+        const float paler = 0.45f + 0.35f * txm_rng_float(&s->rng);
+        petal->fold = 0.03f * tpc_signed(&s->rng);
+        for (int k = 0; k < 3; k++) {
+            petal->tip[k] = txm_lerpf(tint[k], white[k], paler);
+            petal->color[k] = txm_lerpf(deep[k], petal->tip[k], 0.4f);
+        }
+    }
+    for (int i = 0; i < 9; i++) {
+        const float angle = 40 * (float)i + 15 * tpc_signed(&s->rng);
+        float tip[2], top[2];
+        tpc_go(at, up, angle, radius * (0.2f + 0.2f * txm_rng_float(&s->rng)), 0.01f, tip);
+        tpc_go(tip, up, angle, 0.07f * radius, 0.01f, top);
+        tpc_add_mark(s, TPC_TWIG, at, tip, 0.014f * radius, 0, deep);
+        tpc_add_mark(s, TPC_TWIG, tip, top, 0.04f * radius, 0, anther);
+    }
+}
+
+/* What grows on a twig: leaves to both sides in turn and one at the end. */
+static void tpc_dress(tpc_spray *s, const tpc_stem *stem, int count, float first, float size) {
+    static const float young[3] = {0.42f, 0.55f, 0.2f};
+    const tpc_habit *habit = &tpc_habits[s->shape];
+    float side = txm_rng_float(&s->rng) < 0.5f ? -1.0f : 1.0f;
+    for (int i = 0; i < count; i++, side = -side) {
+        const int is_last = i == count - 1;
+        const float along = count > 1 ? first + (1 - first) * (float)i / (float)(count - 1) : 1;
+        const float turn = is_last ? 0 : side * habit->angle * (1.1f - 0.4f * along);
+        const float angle = turn + 8 * tpc_signed(&s->rng);
+        float at[2], heading[2], middle[2];
+        tpc_stem_at(stem, along, at, heading);
+        if (s->shape != TREEPIECES_LEAF_BLOSSOM) {
+            tpc_put_leaf(s, s->shape, at, heading, angle, size * (1.05f - 0.3f * along * along),
+                         s->species->leaf_color);
+            continue;
+        }
+        if (is_last || txm_rng_float(&s->rng) < 0.35f)
+            tpc_put_leaf(s, TREEPIECES_LEAF_LANCE, at, heading, -0.6f * angle, 0.4f, young);
+        tpc_go(at, heading, angle, habit->petiole, 0.13f, middle);
+        tpc_add_flower(s, middle, habit->length * (0.85f + 0.25f * txm_rng_float(&s->rng)));
+    }
+}
+
+/* Needles on both sides of a twig and towards the eye. */
+static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
+    const tpc_habit *habit = &tpc_habits[TREEPIECES_LEAF_NEEDLE];
+    const float dx = stem->to[0] - stem->from[0], dy = stem->to[1] - stem->from[1];
+    const int count = (int)((1 - first) * sqrtf(dx * dx + dy * dy) / 0.0085f) + 4;
+    for (int i = 0; i < count; i++) {
+        const float along = first + (1 - first) * (float)i / (float)(count - 1);
+        const float spread = i % 5 == 4 ? 0.35f * tpc_signed(&s->rng) : i % 2 ? 1.0f : -1.0f;
+        const float angle = spread * habit->angle * (1.15f - 0.75f * along * along);
+        const float length = habit->length * (0.7f + 0.45f * txm_rng_float(&s->rng));
+        float at[2], heading[2], tip[2], color[3];
+        tpc_stem_at(stem, along, at, heading);
+        tpc_vary_color(s, s->species->leaf_color, color);
+        tpc_go(at, heading, angle + 12 * tpc_signed(&s->rng), length, 0.01f, tip);
+        tpc_mark *m = tpc_add_mark(s, TREEPIECES_LEAF_NEEDLE, at, tip, habit->width * habit->length,
+                                   habit->bend * tpc_signed(&s->rng), color);
+        for (int k = 0; m && k < 3; k++) {
+            m->color[k] = color[k];
+            m->tip[k] = 1.3f * color[k] + 0.04f;
+        }
+    }
+}
+
+/* The whole spray: a stem from the middle of the lower side upwards, twigs to both sides. */
+static void tpc_compose(tpc_spray *s) {
+    const tpc_habit *habit = &tpc_habits[s->shape];
+    const int is_needle = s->shape == TREEPIECES_LEAF_NEEDLE;
+    const float top = is_needle ? 0.12f : 0.97f * habit->length + 0.03f;
+    tpc_stem stem = {{0.5f, 1}, {0.5f, 0}, 0};
+    stem.to[0] += 0.06f * tpc_signed(&s->rng);
+    stem.to[1] = top;
+    stem.bend = 0.05f * tpc_signed(&s->rng);
+    tpc_add_stem(s, &stem, 0.011f, 0.004f);
+    for (int i = 0; i < habit->twigs; i++) {
+        const float along = 0.05f + 0.7f * (float)i / (float)habit->twigs;
+        const float side = i % 2 ? -1.0f : 1.0f, length = 0.5f * (1.05f - 0.6f * along);
+        const float angle = side * (66 - 24 * along) + 5 * tpc_signed(&s->rng);
+        tpc_stem twig;
+        float heading[2];
+        tpc_stem_at(&stem, along, twig.from, heading);
+        tpc_go(twig.from, heading, angle, length, 0.12f, twig.to);
+        twig.bend = -0.08f * side;
+        tpc_add_stem(s, &twig, 0.007f, 0.003f);
+        if (is_needle) tpc_add_needles(s, &twig, 0.08f);
+        else tpc_dress(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
+    }
+    if (is_needle) tpc_add_needles(s, &stem, 0.03f);
+    else tpc_dress(s, &stem, habit->leaves, 0.14f, 1);
+}
+
+TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
+                                                 txm_env *env, txm_image out) {
+    enum { ROWS = 64 }; /* between two reports */
+    tpc_spray spray;
+    if (!species) return txm_fail(env, TXM_BAD_ARGUMENT, "species is NULL");
+    const txm_status status = txm_image_check(&out, "out", 0, env);
+    if (status != TXM_OK) return status;
+    if (out.channels != 4 || out.sample != TXM_U8)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out must have 4 channels of 8 bits");
+    memset(&spray, 0, sizeof spray);
+    spray.marks = (tpc_mark *)txm_alloc(env, TPC_MARKS * sizeof *spray.marks);
+    if (!spray.marks) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
+    spray.species = species;
+    spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
+    spray.rng = txm_rng_make(seed, 0x59a7);
+    spray.out = txm_image_resolve(out);
+    tpc_compose(&spray);
+    for (int y = 0; y < out.height; y += ROWS) {
+        spray.first_row = y;
+        txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
+    }
+    txm_free(env, spray.marks);
+    return TXM_OK;
+}
+
+/* ---- foliage: impostors -------------------------------------------------------------------- */
+
+/* The color of a point p of a card is that of its texel, times
+
+       (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.65 + 0.35 min(1, p.p))
+
+   with the card's normal n, l towards the light and f the view's forward: light that wraps around,
+   light that shines through when the sun stands behind, and shade in the cloud's middle. Texels are
+   the nearest, numbers sRGB as they are: a shader does the same in three lines. Cards whose plane
+   is seen at a sine below 0.1 are left out: they would be rows of dots. */
+static float tpc_card_light(const treepieces_impostor_desc *d, const treepieces_card *card) {
+    const float direct = txm_clampf(0.35f + 0.65f * tpc_dot(card->normal, d->light), 0, 1);
+    return 0.7f + 0.6f * direct + 0.2f * txm_maxf(0, tpc_dot(d->forward, d->light));
+}
+
+/* First and last pixel, of count, whose middles lie in low..high of -1..1. */
+static void tpc_pixels(float low, float high, int count, int *first, int *last) {
+    const float n = (float)count;
+    *first = (int)txm_clampf((low + 1) * 0.5f * n - 0.5f, 0, n);
+    *last = (int)txm_clampf((high + 1) * 0.5f * n + 0.5f, -1, n - 1);
+}
+
+/* The texel at s, t of a card, -1..1 to the right and up. */
+static const uint8_t *tpc_texel(const txm_image *leaves, float s, float t) {
+    const int x = (int)((s + 1) * 0.5f * (float)leaves->width);
+    const int y = (int)((1 - t) * 0.5f * (float)leaves->height);
+    const void *row = txm_image_row_const(leaves, txm_clampi(y, 0, leaves->height - 1));
+    return (const uint8_t *)row + 4 * txm_clampi(x, 0, leaves->width - 1);
+}
+
+static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_card *card,
+                          const txm_image *leaves, const txm_image *color, const txm_image *depth) {
+    const float c[3] = {tpc_dot(card->center, d->right), tpc_dot(card->center, d->up),
+                        -tpc_dot(card->center, d->forward)};
+    const float r[3] = {tpc_dot(card->right, d->right), tpc_dot(card->right, d->up),
+                        -tpc_dot(card->right, d->forward)};
+    const float u[3] = {tpc_dot(card->up, d->right), tpc_dot(card->up, d->up),
+                        -tpc_dot(card->up, d->forward)};
+    const float det = r[0] * u[1] - r[1] * u[0], light = tpc_card_light(d, card);
+    const float wide = fabsf(r[0]) + fabsf(u[0]), high = fabsf(r[1]) + fabsf(u[1]);
+    const float area = tpc_dot(card->right, card->right) * tpc_dot(card->up, card->up);
+    int left, right, top, bottom;
+    if (!(det * det > 0.01f * area)) return; /* seen edge on */
+    tpc_pixels(c[0] - wide, c[0] + wide, color->width, &left, &right);
+    tpc_pixels(-c[1] - high, high - c[1], color->height, &top, &bottom);
+    for (int row = top; row <= bottom; row++) {
+        const float y = 1 - (2 * (float)row + 1) / (float)color->height;
+        uint8_t *colors = (uint8_t *)txm_image_row(color, row);
+        float *depths = (float *)txm_image_row(depth, row);
+        for (int column = left; column <= right; column++) {
+            const float x = (2 * (float)column + 1) / (float)color->width - 1;
+            const float s = ((x - c[0]) * u[1] - (y - c[1]) * u[0]) / det;
+            const float t = ((y - c[1]) * r[0] - (x - c[0]) * r[1]) / det;
+            if (!(s >= -1 && s < 1 && t > -1 && t <= 1)) continue;
+            const float z = c[2] + s * r[2] + t * u[2];
+            if (!(z > depths[column])) continue;
+            const uint8_t *texel = tpc_texel(leaves, s, t);
+            if (texel[3] < 128) continue;
+            const float shade = light * (0.65f + 0.35f * txm_minf(1, x * x + y * y + z * z));
+            for (int k = 0; k < 3; k++) {
+                const float lit = txm_clampf((float)texel[k] * shade, 0, 255);
+                colors[4 * column + k] = (uint8_t)(lit + 0.5f);
+            }
+            colors[4 * column + 3] = 255;
+            depths[column] = z;
+        }
+    }
+}
+
+/* Unit vectors at right angles? */
+static int tpc_is_view(const treepieces_impostor_desc *d) {
+    const float *v[4] = {d->right, d->up, d->forward, d->light};
+    for (int i = 0; i < 4; i++) {
+        if (!(fabsf(tpc_dot(v[i], v[i]) - 1) < 1e-3f)) return 0;
+        if (i < 3 && !(fabsf(tpc_dot(v[i], v[(i + 1) % 3])) < 1e-3f)) return 0;
+    }
+    return 1;
+}
+
+TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *desc, txm_env *env,
+                                              txm_image color, txm_image depth) {
+    if (!desc || (desc->card_count && !desc->cards) || desc->card_count < 0)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "desc or cards is NULL, or card_count below 0");
+    txm_status status = txm_image_check(&desc->leaves, "leaves", 0, env);
+    if (status == TXM_OK) status = txm_image_check(&color, "color", 0, env);
+    if (status == TXM_OK) status = txm_image_check(&depth, "depth", 0, env);
+    if (status != TXM_OK) return status;
+    const txm_image leaves = txm_image_resolve(desc->leaves);
+    const txm_image c = txm_image_resolve(color), d = txm_image_resolve(depth);
+    if (leaves.channels != 4 || leaves.sample != TXM_U8 || c.channels != 4 || c.sample != TXM_U8)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "leaves and color must have 4 channels of 8 bits");
+    if (d.channels != 1 || d.sample != TXM_F32 || d.width != c.width || d.height != c.height)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "depth must be float, 1 channel, of color's size");
+    if (!tpc_is_view(desc))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "right, up, forward and light must be unit vectors, the first three at "
+                        "right angles");
+    for (int y = 0; y < c.height; y++) {
+        float *depths = (float *)txm_image_row(&d, y);
+        memset(txm_image_row(&c, y), 0, 4 * (size_t)c.width);
+        for (int x = 0; x < d.width; x++) depths[x] = -2;
+    }
+    for (int i = 0; i < desc->card_count; i++)
+        tpc_draw_card(desc, &desc->cards[i], &leaves, &c, &d);
+    return TXM_OK;
+}
+
+/* ---- foliage: baked leaf cards ------------------------------------------------------------- */
+
+static txm_status tpc_alloc_cards(tpc_mesh *made, size_t cards, txm_env *env) {
+    treepieces_mesh *m = &made->mesh;
+    if (!cards) return TXM_OK;
+    m->positions = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
+    m->normals = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
+    m->joints = (uint32_t *)txm_arena_zero(&made->arena, cards, 16 * sizeof(uint32_t));
+    m->weights = (float *)txm_arena_zero(&made->arena, cards, 16 * sizeof(float));
+    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, cards, 6 * sizeof(uint32_t));
+    m->uvs = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
+    if (!m->positions || !m->normals || !m->joints || !m->weights || !m->indices || !m->uvs)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    m->vertex_count = 4 * cards;
+    m->triangle_count = 2 * cards;
+    return TXM_OK;
+}
+
+/* Card number `index` of the mesh, of a cloud about `center`. */
+static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
+                          const float center[3], float radius, uint32_t joint) {
+    static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
+    static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
+    for (size_t k = 0; k < 4; k++) {
+        const size_t vertex = 4 * index + k;
+        for (size_t a = 0; a < 3; a++) {
+            const float across = sides[k][0] * card->right[a] + sides[k][1] * card->up[a];
+            m->positions[3 * vertex + a] = center[a] + radius * (card->center[a] + across);
+            m->normals[3 * vertex + a] = card->normal[a];
+        }
+        m->joints[4 * vertex] = joint;
+        m->weights[4 * vertex] = 1;
+    }
+    for (size_t k = 0; k < 6; k++) {
+        m->indices[6 * index + k] = (uint32_t)(4 * index) + corners[k];
+        m->uvs[12 * index + 2 * k] = sides[corners[k]][0] > 0 ? 1.0f : 0.0f;
+        m->uvs[12 * index + 2 * k + 1] = sides[corners[k]][1] > 0 ? 0.0f : 1.0f;
+    }
+}
+
+TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
+                                                 const float *bones, int looks, txm_env *env,
+                                                 treepieces_mesh **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!bones || !tpc_has_tree(forest, tree))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "forest or bones is NULL, or there is no such tree");
+    if (looks < 1 || looks > 64) return txm_fail(env, TXM_BAD_ARGUMENT, "looks must be 1 to 64");
+    const treepieces_tree *t = &forest->trees[tree];
+    const treepieces_species *species = &forest->species[t->species];
+    const size_t count = (size_t)treepieces_cloud(species, 0, NULL);
+    if (count * t->cluster_count > 0x7fffffffu / 6)
+        return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
+    txm_arena arena, scratch;
+    txm_arena_init(&arena, env);
+    txm_arena_init(&scratch, env);
+    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    treepieces_card *cards =
+        (treepieces_card *)txm_arena_alloc(&scratch, (size_t)looks * (count + 1), sizeof *cards);
+    txm_status status = TXM_OK;
+    if (!made || !cards) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    } else {
+        made->arena = arena;
+        status = tpc_alloc_cards(made, count * t->cluster_count, env);
+        arena = made->arena;
+    }
+    for (int k = 0; k < looks && status == TXM_OK; k++)
+        treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
+    for (uint32_t i = 0; i < t->cluster_count && status == TXM_OK; i++) {
+        const treepieces_cluster *c = &forest->clusters[t->first_cluster + i];
+        const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
+        const treepieces_card *look = cards + (size_t)(c->look % (uint32_t)looks) * count;
+        const float center[3] = {bone[3] + c->along * bone[1], bone[7] + c->along * bone[5],
+                                 bone[11] + c->along * bone[9]};
+        for (size_t k = 0; k < count; k++)
+            tpc_bake_card(&made->mesh, count * i + k, &look[k], center, c->radius,
+                          c->node - t->first_node);
+    }
+    txm_arena_free(&scratch);
+    if (status == TXM_OK) *out = &made->mesh;
+    else txm_arena_free(&arena);
+    return status;
+}
+#endif /* TREEPIECES_IMPLEMENTATION */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/
