@@ -2135,10 +2135,10 @@ static const char tpc_willow[] =
     "flare 1.6\n"
     "stiffness 0.6\n"
     "leaf_shape lance\n"
-    "leaf_count 26\n"
-    "leaf_size 0.7\n"
-    "cloud 0.38\n"
-    "cloud_flat 1.4\n"
+    "leaf_count 36\n"
+    "leaf_size 0.42\n"
+    "cloud 0.9\n"
+    "cloud_flat 2\n"
     "leaf_color 0.42 0.5 0.18\n"
     "bark_color 0.42 0.37 0.29\n"
     "order 0\n"
@@ -2361,14 +2361,14 @@ static const char tpc_spruce[] =
     "leaves_start 0.96\n"
     "order 1\n"
     "length 0.2\n"
-    "radius 0.34\n"
+    "radius 0.38\n"
     "taper 0.12\n"
     "segments 9\n"
     "start 0.05\n"
     "side 0.1\n"
     "pair 0.8\n"
     "fork 0\n"
-    "angle_base 98\n"
+    "angle_base 95\n"
     "angle_top 55\n"
     "angle_spread 6\n"
     "profile 1 0.56 0.04\n"
@@ -2641,8 +2641,8 @@ TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size
     memset(&fresh, 0, sizeof fresh);
     fresh.crown_top = 1; /* until it is read */
     txm_status status = tpc_read_text(tpc_fresh, strlen(tpc_fresh), env, &fresh);
-    for (int k = fresh.order_count; k < TREEPIECES_MAX_ORDERS && k > 0; k++)
-        fresh.orders[k] = fresh.orders[k - 1];
+    for (int k = 1; k < TREEPIECES_MAX_ORDERS; k++)
+        if (k >= fresh.order_count) fresh.orders[k] = fresh.orders[k - 1];
     if (status == TXM_OK && size) status = tpc_read_text(text, size, env, &fresh);
     if (status != TXM_OK) return status;
     for (int k = fresh.order_count; k < TREEPIECES_MAX_ORDERS; k++)
@@ -2900,7 +2900,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
 
 /* Twigs do not get thinner than this, so that texels are not much smaller on them than on the trunk. */
 static float tpc_thinnest(const tpc_growth *g) {
-    return 0.03f * g->foot;
+    return 0.033f * g->foot;
 }
 
 /* How long it is, so that its proportions stay those of its kind: between so many radii. */
@@ -3061,7 +3061,7 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
    it: the first piece stands off as far as it must, the next one takes the direction that was meant. */
 static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3], float ratio,
                           float offset) {
-    const float most = txm_minf((offset - 1) / ratio, 0.75f), cosine = tpc_dot(bud->heading, stem);
+    const float most = txm_minf((offset - 1.1f) / ratio, 0.68f), cosine = tpc_dot(bud->heading, stem);
     bud->is_aimed = cosine > most;
     if (!bud->is_aimed) return;
     memcpy(bud->aim, bud->heading, sizeof bud->aim);
@@ -4067,8 +4067,8 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
     }
     for (int u = 0; u < n; u++) {
         for (int v = 0; v < n; v++) {
-            float *at = coords + 2 * (p.outer_count + u * n + v);
             if (coords) {
+                float *at = coords + 2 * (p.outer_count + u * n + v);
                 at[0] = tpc_place_along(u + 1, p.inner);
                 at[1] = tpc_place_along(v + 1, p.inner);
             }
@@ -4168,8 +4168,8 @@ static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int e
     return treepieces_inner_level(&b->lod, positions);
 }
 
-/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out: its
-   bits are nobody's promise, so there might come more vertices than were counted. */
+/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out:
+   its bits are nobody's promise, so there might come more vertices than were counted. */
 static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
                          const float weights[4]) {
     treepieces_mesh *m = b->out;
@@ -4327,8 +4327,8 @@ static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, s
     return TXM_OK;
 }
 
-/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and where
-   they lie in the circle about the rim. */
+/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and
+   where they lie in the circle about the rim. */
 typedef struct tpc_cap {
     uint32_t numbers[TREEPIECES_RIM * 64 + 1];
     float places[TREEPIECES_RIM * 64 + 1][2];
@@ -4508,7 +4508,8 @@ static txm_status tpc_check_bark(const treepieces_bark_desc *d, const txm_image 
     if (o.width != TREEPIECES_SHEET * t.width || o.channels != t.channels || o.sample != t.sample ||
         o.height != TREEPIECES_SHEET * t.width * treepieces_bark_layers(d))
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "out must be 8 tiles wide, 8 a layer high, of the tiles' channels and samples");
+                        "out must be 8 tiles wide, 8 a layer high, of the tiles' channels and "
+                        "samples");
     return TXM_OK;
 }
 
@@ -4701,7 +4702,7 @@ static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
    they would be seen again and again. */
 static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
     const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
-    const float inside = 1 - tpc_fade(border * 5);
+    const float inside = 1 - tpc_fade((border - 0.03f) * 5);
     const uint64_t own = seed + 5000 + (uint64_t)number;
     const float mark = tpc_noise(x, y, 3, 17, own), wide = tpc_noise(x, y, 2, 5, own + 1000);
     const float shade = tpc_framed_noise(x, y, 3, 6, seed + 6000, number) - 0.5f;

@@ -84,8 +84,8 @@ static int has_side(const uint64_t *sides, size_t count, uint32_t from, uint32_t
 
 /* ---- the pattern --------------------------------------------------------------------------- */
 
-/* One pattern: the points lie where they should, triangles face one way, fill the square and have no
-   crack: every side but those of the border is met from both sides. */
+/* One pattern: the points lie where they should, triangles face one way, fill the square and have
+   no crack: every side but those of the border is met from both sides. */
 static void check_pattern(const int edges[4], int inner) {
     static float coords[2 * MOST_POINTS];
     static uint16_t indices[3 * MOST_TRIANGLES];
@@ -121,26 +121,33 @@ static void check_pattern(const int edges[4], int inner) {
                     (p[1] == q[1] && (p[1] == 0 || p[1] == 1)));
         border++;
     }
-    assert_int_equal(border, edges[0] + edges[1] + edges[2] + edges[3]);
+    const int outer = edges[0] + edges[1] + edges[2] + edges[3];
+    const int inside = inner == 1 && outer > 4 ? 2 : inner; /* as OpenGL has it */
+    assert_int_equal(border, outer);
+    assert_int_equal(points, outer + (inside - 1) * (inside - 1));
     free(sides);
+    for (int i = outer; i < points; i++) /* the grid, column by column */
+        for (int axis = 0; axis < 2; axis++) {
+            const int step = 1 + (axis ? (i - outer) % (inside - 1) : (i - outer) / (inside - 1));
+            assert_true(fabsf(coords[2 * i + axis] - (float)step / (float)inside) < 1e-5f);
+        }
     for (int k = 0, first = 0; k < 4; first += edges[k++]) /* places along sides, symmetric */
         for (int i = 1; i < edges[k]; i++) {
             const float *a = coords + 2 * (first + i), *b = coords + 2 * (first + edges[k] - i);
             const int axis = k == 0 || k == 2;
             assert_true(a[axis] == 1 - b[axis] && b[axis] == 1 - a[axis]);
-            assert_true(fabsf((k < 2 ? a[axis] : 1 - a[axis]) - (float)i / (float)edges[k]) < 1e-5f);
+            const float along = k < 2 ? a[axis] : 1 - a[axis];
+            assert_true(fabsf(along - (float)i / (float)edges[k]) < 1e-5f);
         }
 }
 
 static void test_pattern(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(3, 0);
-    for (int a = 1; a <= 10; a++)
-        for (int b = 1; b <= 10; b++)
-            for (int inner = 1; inner <= 10; inner += 3) {
-                const int edges[4] = {a, b, 11 - a, 1 + (a + b) % 10};
-                check_pattern(edges, inner);
-            }
+    for (int i = 0; i < 10000; i++) { /* all levels of edges, each with one inside */
+        const int edges[4] = {1 + i % 10, 1 + i / 10 % 10, 1 + i / 100 % 10, 1 + i / 1000};
+        check_pattern(edges, 1 + (i + i / 10 + i / 100 + i / 1000) % 10);
+    }
     for (int i = 0; i < 60; i++) {
         int edges[4];
         for (int k = 0; k < 4; k++) edges[k] = txm_rng_range(&rng, 1, 64);
@@ -205,10 +212,18 @@ static void test_levels(void **state) {
         const float d = 0.1f * (float)i, a[3] = {d - 1, 0, 0}, b[3] = {d + 1, 0, 0};
         const double exact = 10 * pow(2, -(double)d / 5);
         const int level = treepieces_edge_level(&lod, a, b);
-        assert_true(level >= 1 && (double)level >= exact - 1e-4 && (level == 1 || level - 1 < exact + 1e-4));
+        assert_true(level >= 1 && (double)level >= exact - 1e-4);
+        assert_true(level == 1 || level - 1 < exact + 1e-4);
         const float corners[12] = {d - 1, 0, 0, d + 1, 0, 0, d, 1, 0, d, -1, 0};
         assert_int_equal(treepieces_inner_level(&lod, corners), level);
         assert_int_equal(treepieces_edge_level(&lod, b, a), level);
+    }
+    txm_rng rng = txm_rng_make(5, 0);
+    for (int i = 0; i < 200000; i++) { /* from either end the same */
+        float ends[6];
+        for (int k = 0; k < 6; k++) ends[k] = 20 * txm_rng_float(&rng) - 10;
+        assert_int_equal(treepieces_edge_level(&lod, ends, ends + 3),
+                         treepieces_edge_level(&lod, ends + 3, ends));
     }
     lod.max_level = 0;
     const float here[3] = {0, 0, 0};
@@ -310,6 +325,190 @@ static void test_species_meshes(void **state) {
     }
 }
 
+/* Which way a triangle looks, the longer the rounder it is: 0 if it is a line. */
+static void face_direction(const treepieces_mesh *m, size_t t, double out[3]) {
+    double a[3], b[3], longest = 0;
+    const float *p[3];
+    for (int k = 0; k < 3; k++) p[k] = m->positions + 3 * (size_t)m->indices[3 * t + (size_t)k];
+    for (int k = 0; k < 3; k++) {
+        a[k] = (double)(p[1][k] - p[0][k]);
+        b[k] = (double)(p[2][k] - p[0][k]);
+        longest += a[k] * a[k] + b[k] * b[k];
+    }
+    for (int k = 0; k < 3; k++)
+        out[k] = (a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]) / longest;
+}
+
+/* The foot is closed by faces that look down, whatever the levels and the shape of the rim. */
+static void test_cap(void **state) {
+    (void)state;
+    grown g = grow(0, 20, 0.1f, 5);
+    static const float shapes[4] = {-1, 0.1f, 0, 1};
+    for (int kind = 0; kind < 9; kind++) {
+        const treepieces_lod lod = {
+            {0.5f, 0.2f, 0.3f}, kind & 1 ? 10.0f : 3.0f, 0.6f, shapes[kind / 2 % 4]};
+        treepieces_bake_desc d;
+        treepieces_mesh *open, *closed;
+        memset(&d, 0, sizeof d);
+        d.forest = g.forest;
+        d.bones = g.bones;
+        d.lod = kind == 8 ? NULL : &lod;
+        assert_int_equal(treepieces_bake(&d, NULL, &open), TXM_OK);
+        d.capped = 1;
+        assert_int_equal(treepieces_bake(&d, NULL, &closed), TXM_OK);
+        audit(closed, g.forest->node_count, 0);
+        const size_t n = open->triangle_count, more = closed->triangle_count - n;
+        if (kind == 8) assert_int_equal(more, 4);
+        assert_int_equal(closed->vertex_count - open->vertex_count, kind < 8); /* the middle */
+        assert_memory_equal(open->indices, closed->indices, n * 12);
+        assert_memory_equal(open->uvs, closed->uvs, n * 24);
+        for (size_t t = n; t < n + more; t++) {
+            double face[3], down = 0;
+            face_direction(closed, t, face);
+            for (int k = 0; k < 3; k++)
+                down -= face[k] * (double)(g.bones[4 * k + 1] / g.forest->nodes[0].length);
+            assert_true(down > 0.005);
+            for (int k = 0; k < 3; k++) {
+                const float *uv = closed->uvs + 6 * t + 2 * k;
+                assert_true(uv[0] > 0 && uv[0] < 1 && uv[1] > 0 && uv[1] < 1.0f / TREEPIECES_OWN);
+            }
+        }
+        treepieces_mesh_free(open);
+        treepieces_mesh_free(closed);
+    }
+    free_grown(&g);
+}
+
+/* The weight of a joint at a vertex. */
+static float weight_of(const treepieces_mesh *m, size_t i, uint32_t joint) {
+    float sum = 0;
+    for (size_t k = 4 * i; k < 4 * i + 4; k++)
+        if (m->joints[k] == joint) sum += m->weights[k];
+    return sum;
+}
+
+/* The two triangles of a quad have its corners, and its place in the sheet there. */
+static void check_quad(const treepieces_mesh *m, size_t t, const treepieces_quad *quad,
+                       const float *p, uint32_t bands, int cell) {
+    for (size_t i = 3 * t; i < 3 * t + 6; i++) {
+        const float *at = m->positions + 3 * (size_t)m->indices[i];
+        float uv[2];
+        int corner = 0;
+        while (corner < 4 && (at[0] != p[3 * quad->corners[corner]] ||
+                              at[1] != p[3 * quad->corners[corner] + 1] ||
+                              at[2] != p[3 * quad->corners[corner] + 2]))
+            corner++;
+        assert_true(corner < 4);
+        const int layer = treepieces_quad_uv(quad, bands, cell, SHEET, corner, uv);
+        assert_true(fabsf(m->uvs[2 * i] - uv[0]) < 1e-6f);
+        assert_true(fabsf(m->uvs[2 * i + 1] * TREEPIECES_OWN - (float)layer - uv[1]) < 1e-5f);
+    }
+}
+
+/* A mesh holds what skinning gives, to the bit, with the weights of the pieces: those of a rim hang
+   on one joint, that of the piece above it. Triangles come piece after piece, quad after quad. */
+static void test_mesh_is_skin(void **state) {
+    (void)state;
+    grown g = grow(5, 80, 0.1f, 3);
+    treepieces_bake_desc d;
+    treepieces_mesh *m;
+    memset(&d, 0, sizeof d);
+    d.forest = g.forest;
+    d.bones = g.bones;
+    assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
+    char *seen = (char *)room(m->vertex_count, 1);
+    size_t triangles = 0;
+    for (int type = 0; type < g.forest->type_count; type++) {
+        const treepieces_batch *batch = &g.forest->batches[type];
+        const treepieces_piece *piece = treepieces_kit_piece(kit, type);
+        for (uint32_t i = 0; i < batch->count; i++) {
+            const uint32_t *words = batch->words + (size_t)i * batch->stride;
+            const uint32_t more[4] = {0, words[1] & 0xffffu, words[1] >> 16, words[2] & 0xffffu};
+            float p[3 * TREEPIECES_MAX_VERTICES], n[3 * TREEPIECES_MAX_VERTICES];
+            treepieces_skin(g.forest, g.bones, type, i, p, n);
+            for (int q = 0; q < piece->quad_count; q++, triangles += 2)
+                check_quad(m, triangles, &piece->quads[q], p, words[3],
+                           (int)(words[4 + q / 4] >> (8 * (q & 3)) & 255u));
+            for (int v = 0; v < piece->vertex_count; v++) {
+                const treepieces_vertex *from = &piece->vertices[v];
+                size_t at = 0;
+                while (at < m->vertex_count && (m->positions[3 * at] != p[3 * v] ||
+                                                m->positions[3 * at + 1] != p[3 * v + 1] ||
+                                                m->positions[3 * at + 2] != p[3 * v + 2]))
+                    at++;
+                assert_true(at < m->vertex_count);
+                seen[at] = 1;
+                for (int k = 0; k < 3; k++)
+                    assert_true(fabsf(m->normals[3 * at + (size_t)k] - n[3 * v + k]) < 1e-6f);
+                for (int k = 0; k <= piece->leaf_count; k++) {
+                    const float weight = weight_of(m, at, words[0] + more[k]);
+                    assert_true(fabsf(weight - from->weights[k]) < 1e-6f);
+                    if (from->rim >= 0 && k == 1 + from->rim / TREEPIECES_RIM)
+                        assert_true(weight == 1);
+                }
+            }
+        }
+    }
+    assert_int_equal(triangles, m->triangle_count);
+    for (size_t i = 0; i < m->vertex_count; i++) assert_true(seen[i]);
+    free(seen);
+    treepieces_mesh_free(m);
+    free_grown(&g);
+}
+
+/* A tree among others is baked as if it stood alone. */
+static void test_company(void **state) {
+    (void)state;
+    treepieces_species species[2];
+    treepieces_place places[3];
+    treepieces_mesh *mesh[2];
+    const treepieces_lod lod = {{4, 1, 0}, 6, 2, 0};
+    for (int i = 0; i < 2; i++) {
+        const char *text = treepieces_preset_text(i);
+        assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &species[i]), TXM_OK);
+    }
+    memset(places, 0, sizeof places);
+    for (int i = 0; i < 3; i++) {
+        places[i].position[0] = 4 * (float)i;
+        places[i].species = i & 1;
+        places[i].seed = 77 + (uint64_t)i;
+    }
+    for (int alone = 0; alone < 2; alone++) {
+        treepieces_forest_desc d;
+        treepieces_bake_desc b;
+        treepieces_forest *forest;
+        memset(&d, 0, sizeof d);
+        memset(&b, 0, sizeof b);
+        d.kit = kit;
+        d.species = species;
+        d.species_count = 2;
+        d.places = places + alone;
+        d.tree_count = alone ? 1 : 3;
+        d.max_pieces = 90;
+        assert_int_equal(treepieces_forest_make(&d, NULL, &forest), TXM_OK);
+        float *bones = (float *)room(forest->node_count, TREEPIECES_BONE * sizeof(float));
+        assert_int_equal(treepieces_bones(forest, NULL, NULL, bones), TXM_OK);
+        b.forest = forest;
+        b.tree = alone ? 0 : 1;
+        b.bones = bones;
+        b.lod = &lod;
+        b.capped = 1;
+        assert_int_equal(treepieces_bake(&b, NULL, &mesh[alone]), TXM_OK);
+        treepieces_forest_free(forest);
+        free(bones);
+    }
+    const size_t n = mesh[0]->vertex_count, t = mesh[0]->triangle_count;
+    assert_int_equal(n, mesh[1]->vertex_count);
+    assert_int_equal(t, mesh[1]->triangle_count);
+    assert_memory_equal(mesh[0]->positions, mesh[1]->positions, 12 * n);
+    assert_memory_equal(mesh[0]->normals, mesh[1]->normals, 12 * n);
+    assert_memory_equal(mesh[0]->joints, mesh[1]->joints, 16 * n);
+    assert_memory_equal(mesh[0]->weights, mesh[1]->weights, 16 * n);
+    assert_memory_equal(mesh[0]->indices, mesh[1]->indices, 12 * t);
+    assert_memory_equal(mesh[0]->uvs, mesh[1]->uvs, 24 * t);
+    for (int i = 0; i < 2; i++) treepieces_mesh_free(mesh[i]);
+}
+
 /* A value and the area that has it. */
 typedef struct share {
     double value, area;
@@ -332,8 +531,8 @@ static double quantile(share *shares, size_t count, double part) {
     return 0;
 }
 
-/* Texels per metre, and how much more of them one way than the other (the ratio of the singular values
-   of the map from the surface to texels), of one triangle. Returns its area. */
+/* Texels per metre, and how much more of them one way than the other (the ratio of the singular
+   values of the map from the surface to texels), of one triangle. Returns its area. */
 static double measure_texels(const treepieces_mesh *m, size_t t, double *density, double *ratio) {
     const float *p[3], *uv = m->uvs + 6 * t;
     double a[3], b[3], n[3];
@@ -360,7 +559,7 @@ static double measure_texels(const treepieces_mesh *m, size_t t, double *density
     return area;
 }
 
-/* Bark is about as fine everywhere and not drawn out. Faces look where their vertices' normals do. */
+/* Bark is about as fine everywhere and not drawn out. Faces look as their corners' normals do. */
 static void test_bark_on_species(void **state) {
     (void)state;
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
@@ -392,8 +591,9 @@ static void test_bark_on_species(void **state) {
                                   quantile(density, m->triangle_count, 0.01);
             const double drawn = quantile(ratio, m->triangle_count, 0.99);
             if (spread > 6 || drawn > 6 || away * 1000 > m->triangle_count)
-                fail_msg("%s, %d pieces: density p99/p1 %.2f, anisotropy p99 %.2f, %d of %d faces away",
-                         g.species.name, pieces, spread, drawn, (int)away, (int)m->triangle_count);
+                fail_msg("%s, %d pieces: density p99/p1 %.2f, anisotropy p99 %.2f, %d of %d faces "
+                         "away", g.species.name, pieces, spread, drawn, (int)away,
+                         (int)m->triangle_count);
             free(density);
             free(ratio);
             treepieces_mesh_free(m);
@@ -459,12 +659,57 @@ static void test_faults(void **state) {
     free_grown(&g);
 }
 
+/* Bones that are no numbers and meshes that are too large are refused; nothing is left. */
+static void test_refusals(void **state) {
+    (void)state;
+    static const float bad[4] = {(float)NAN, (float)INFINITY, -3e38f, 0};
+    for (int kind = 0; kind < 8; kind++) {
+        grown g = grow(1, 60, 0, 2);
+        const treepieces_lod lod = {{0, 1, 0}, 4, 2, 0};
+        tk_memory memory;
+        treepieces_bake_desc d;
+        treepieces_mesh *m = (treepieces_mesh *)1;
+        memset(&memory, 0, sizeof memory);
+        memset(&d, 0, sizeof d);
+        txm_env env = tk_env(&memory, NULL);
+        d.forest = g.forest;
+        d.bones = g.bones;
+        d.capped = 1;
+        d.lod = kind & 4 ? &lod : NULL;
+        for (int i = 0; i < TREEPIECES_BONE; i++)
+            g.bones[TREEPIECES_BONE * (g.forest->node_count / 2) + (uint32_t)i] = bad[kind & 3];
+        assert_int_equal(treepieces_bake(&d, &env, &m), TXM_BAD_ARGUMENT);
+        assert_null(m);
+        assert_non_null(strstr(env.message, "bones"));
+        assert_int_equal(tk_leaks(&memory), 0);
+        free_grown(&g);
+    }
+    grown g = grow(0, 12000, 0, 2);
+    const treepieces_lod fine = {{0, 0, 0}, 64, 1e30f, 0};
+    tk_memory memory;
+    treepieces_bake_desc d;
+    treepieces_mesh *m = (treepieces_mesh *)1;
+    memset(&memory, 0, sizeof memory);
+    memset(&d, 0, sizeof d);
+    txm_env env = tk_env(&memory, NULL);
+    d.forest = g.forest;
+    d.bones = g.bones;
+    d.lod = &fine;
+    assert_int_equal(treepieces_bake(&d, &env, &m), TXM_TOO_LARGE);
+    assert_null(m);
+    assert_int_equal(tk_leaks(&memory), 0);
+    assert_true(memory.peak_bytes < 1 << 20);
+    free_grown(&g);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pattern),         cmocka_unit_test(test_shared_edges),
         cmocka_unit_test(test_levels),          cmocka_unit_test(test_phong),
         cmocka_unit_test(test_species_meshes),  cmocka_unit_test(test_bark_on_species),
-        cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_cap),             cmocka_unit_test(test_mesh_is_skin),
+        cmocka_unit_test(test_company),         cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

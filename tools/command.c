@@ -84,7 +84,7 @@ int path_beside(cli *run, const char *ending, char path[MAX_PATH]) {
     const size_t n = strlen(run->output) - strlen(extension);
     if (n + strlen(ending) >= MAX_PATH)
         return cli_fail(run, CLI_USAGE, "'%s': the path is too long", run->output);
-    memcpy(path, run->output, n);
+    snprintf(path, n + 1, "%s", run->output); /* without its extension */
     snprintf(path + n, MAX_PATH - n, "%s", ending);
     return cli_check_output(run, path);
 }
