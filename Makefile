@@ -18,10 +18,15 @@ LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
              tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
-# examples/brush.c opens a window, which takes SDL 2: where that is not installed it is left out
+# examples/brush.c opens a window, which takes SDL 2; examples/forest_gl.c takes OpenGL, and opens a
+# window if it can. Where that is not installed they are left out
 SDL     := $(shell sdl2-config --libs 2>/dev/null)
+GL      := $(shell printf '\043include <%s>\n' EGL/egl.h EGL/eglext.h GL/gl.h GL/glext.h | \
+             sed '$$aint main(void) { return 0; }' | \
+             $(CC) -xc - -o /dev/null -lEGL -lOpenGL 2>/dev/null && echo -lEGL -lOpenGL)
+LEFT_OUT = $(if $(SDL),,examples/brush.c) $(if $(GL),,examples/forest_gl.c)
 EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%, \
-             $(filter-out $(if $(SDL),,examples/brush.c),$(wildcard examples/*.c)))
+             $(filter-out $(LEFT_OUT),$(wildcard examples/*.c)))
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
@@ -80,6 +85,9 @@ $(BUILD)/examples/membrane: $(addprefix $(BUILD)/,mesh_io.o render.o image_io.o)
 $(BUILD)/examples/join: $(BUILD)/image_io.o
 $(BUILD)/examples/join: CPPFLAGS += -D_FILE_OFFSET_BITS=64
 $(BUILD)/examples/brush: LIBRARIES = $(SDL)
+$(BUILD)/examples/forest_gl: LIBRARIES = $(GL) $(SDL) -lcjson
+$(BUILD)/examples/forest_gl: CPPFLAGS += $(if $(SDL),-DFOREST_WINDOW) \
+    -DFOREST_SHADERS='"$(PREFIX)/share/texkit/shaders"'
 
 # in reverse order: sand, a common case, comes first and is swept over all sizes
 bench: $(BENCHES) $(PLAIN) samples
@@ -100,7 +108,10 @@ $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb
 samples: helpers
 	@BUILD=$(BUILD) tools/samples.sh
 
-demo: all samples examples
+# which examples there are is known when make starts, so it starts again behind the set-up
+demo:
+	@CC="$(CC)" tools/setup.sh demo || echo "demo: without OpenGL no trees are drawn"
+	@$(MAKE) --no-print-directory all samples examples
 	@BUILD=$(BUILD) tools/demo.sh
 
 test:

@@ -3640,7 +3640,7 @@ typedef struct tpc_air {
     double time;
     struct {
         float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from where it rests */
-        float give;           /* radians at pressure 1                                       */
+        float give;           /* radians at pressure 1 for a sixteenth of the tree's height  */
         float flutter[TPC_PHASES];
     } classes[TPC_CLASSES];
 } tpc_air;
@@ -3720,7 +3720,7 @@ static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *ai
         air->classes[c].xv = txm_float(e * sine / (omega * part));
         air->classes[c].vx = txm_float(-e * omega / part * sine);
         air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
-        air->classes[c].give = txm_float(0.006 * tpc_exp2(c / 5.0));
+        air->classes[c].give = txm_float(0.0065 * tpc_exp2(c / 5.0));
         for (int k = 0; k < TPC_PHASES; k++)
             air->classes[c].flutter[k] =
                 wind->gusts * txm_float(0.5 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
@@ -3757,14 +3757,14 @@ static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4
 
 /* The wind on a joint, seen in its frame (x and z across the stem), and one step of its swing. */
 static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_t look,
-                           const float wind[3], float stiffness, float *state, float q[4]) {
+                           const float wind[3], float yield, float *state, float q[4]) {
     const float back[4] = {-q[0], -q[1], -q[2], q[3]};
     float w[3];
     tpc_rotate(back, wind, w);
     const float flutter = air->classes[n->sway].flutter[look & (TPC_PHASES - 1)];
     const float other = air->classes[n->sway].flutter[look >> 3 & (TPC_PHASES - 1)];
     const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
-    const float give = air->classes[n->sway].give / stiffness;
+    const float give = air->classes[n->sway].give * txm_clampf(yield * n->length, 0.2f, 3);
     /* the stem leans with the wind: towards +z about +x, towards +x about -z */
     const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
                            txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
@@ -3781,6 +3781,7 @@ static void tpc_pose_tree(void *context, int index) {
     const tpc_posing *p = (const tpc_posing *)context;
     const treepieces_tree *t = &p->forest->trees[index];
     const float stiffness = p->forest->species[t->species].stiffness;
+    const float yield = 16 / (stiffness * txm_maxf(t->height, 0.1f)); /* of a metre of stem */
     float pressure = 0;
     if (p->air) pressure = tpc_pressure(p->air, t->position, p->air->time);
     for (uint32_t i = 0; i < t->node_count; i++) {
@@ -3808,7 +3809,7 @@ static void tpc_pose_tree(void *context, int index) {
             const float wind[3] = {pressure * (r[0] * d[0] + r[6] * d[2]),
                                    pressure * (r[1] * d[0] + r[7] * d[2]),
                                    pressure * (r[2] * d[0] + r[8] * d[2])};
-            tpc_sway_joint(p->air, n, (i * 0x9e3779b9u + t->seed) >> 16, wind, stiffness,
+            tpc_sway_joint(p->air, n, (i * 0x9e3779b9u + t->seed) >> 16, wind, yield,
                            p->state + 4 * (size_t)number, q);
         }
         const float x2 = q[0] + q[0], y2 = q[1] + q[1], z2 = q[2] + q[2];
@@ -3985,10 +3986,12 @@ TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float
     return tpc_level(lod, sum, 4);
 }
 
-/* Place i of 0..n along a side: multiples of 2^-16, so that place n - i is exactly 1 - place i. */
+/* Place i of 0..n along a side: multiples of 2^-16, so that place n - i is exactly 1 - place i. Steps
+   of n-ths that are rounded once, then multiplied, are what tessellation units take. */
 static float tpc_place_along(int i, int n) {
     if (2 * i > n) return 1 - tpc_place_along(n - i, n);
-    return (float)((i * 65536 * 2 + n) / (2 * n)) / 65536.0f;
+    if (2 * i == n) return 0.5f;
+    return (float)(i * ((65536 * 2 + n) / (2 * n))) / 65536.0f;
 }
 
 /* The vertices of a pattern: the sides' first, side k from corner k up to the one before corner

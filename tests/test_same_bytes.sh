@@ -5,7 +5,7 @@
 . tests/tap.sh
 
 levels="-O0 -O3"
-[ "$FULL" = 1 ] && levels="-O0 -O1 -O2 -O3 -Os"
+[ "$FULL" = 1 ] && levels="-O0 -O1 -O2 -O3"
 grep -q '^flags.*\<fma\>' /proc/cpuinfo 2>/dev/null && levels="$levels -O3_-mfma_-mavx2"
 
 expected=

@@ -1,6 +1,6 @@
 #!/bin/sh
 # demo.sh - learn and synthesise every sample of build/samples/, lay pieces of some anew, cut tiles out
-# of some, retile meshes and cover them, show all in out/index.html
+# of some, retile meshes and cover them, grow trees, show all in out/index.html
 set -eu
 
 build=${BUILD:-build}
@@ -166,6 +166,26 @@ bilayer() {
 BILAYER
 }
 
+# drawn OUT OPTIONS...: a picture by examples/forest_gl.c, no window
+drawn() {
+    picture=$1
+    shift
+    "$build/examples/forest_gl" --shaders shaders --headless "$out/$picture" "$@" >"$out/$picture.txt"
+}
+
+# species NAME: a tree bare and in leaf
+species() {
+    drawn "tree-$1-bare.png" --species "$1" --count 1 --pieces 2500 --size 300x360 --bare
+    drawn "tree-$1.png" --species "$1" --count 1 --pieces 2500 --size 300x360
+    cat >>"$out/index.part" <<SPECIES
+<figure>
+<img src="tree-$1-bare.png" width="300" height="360" alt="$1, bare">
+<img src="tree-$1.png" width="300" height="360" alt="$1, in leaf">
+<figcaption>$1</figcaption>
+</figure>
+SPECIES
+}
+
 cat >"$out/index.part" <<'HEAD'
 <!DOCTYPE html>
 <html lang="en">
@@ -193,6 +213,10 @@ p { margin: 0.5rem 0; }
 .couple { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; margin: 1rem 0 3rem; }
 .wide { margin: 1.5rem 0 0.5rem; }
 .source { margin-bottom: 2.5rem; }
+.trees { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; margin: 1.5rem 0; }
+figure { display: grid; grid-template-columns: 1fr 1fr; margin: 0; }
+figcaption { grid-column: 1 / 3; font-size: 0.9rem; color: #666; }
+.frames { display: grid; grid-template-columns: repeat(4, 1fr); gap: 0.5rem; margin: 1rem 0 2rem; }
 footer { margin-top: 4rem; border-top: 1px solid #ddd; padding-top: 1rem; }
 a { color: #15558a; }
 @media (max-width: 50rem) { .pair, .couple { grid-template-columns: minmax(0, 1fr); } }
@@ -353,6 +377,66 @@ MEMBRANE
     bilayer capsule
 fi
 
+# trees: as files by the tool; as pictures by the example, where there is OpenGL
+bark=$(pick lichen 3)
+"$build/texkit" tiles "$out/$bark.png" -o "$out/$bark-tiles-bark" --kind frame --colors 1 --variants 8 \
+    --size 64 --quiet
+"$build/texkit" tree -o "$out/oak.glb" --species oak --wind 9 --seed 2 --quiet \
+    --stats "$out/oak.json"
+"$build/texkit" tree -o "$out/willow-barked.glb" --species willow --tiles "$out/$bark-tiles-bark" --quiet
+"$build/texkit" forest --count 60 -o "$out/forest.glb" --species oak,birch,spruce --pieces 165 --quiet \
+    --stats "$out/forest.json"
+printf 'demo: an oak of %s pieces in %s s, a forest of %s trees in %s s\n' \
+    "$(figure pieces "$out/oak.json")" "$(seconds total "$out/oak.json")" \
+    "$(figure trees "$out/forest.json")" "$(seconds total "$out/forest.json")"
+cat >>"$out/index.part" <<TREES
+<h2>Trees from pieces</h2>
+<p>Seven kinds of pieces - tube, forks, side branches, tip, root flare - meet in hexagonal rims; a small grammar
+puts them together, on one skeleton. As files: <a href="oak.glb">an oak</a> of
+$(figure pieces "$out/oak.json") pieces with a clip of wind, <a href="willow-barked.glb">a willow</a> whose bark
+is cut from the photograph $bark, and <a href="forest.glb">a forest</a> of $(figure trees "$out/forest.json")
+different trees as copies of the pieces.</p>
+TREES
+if [ -x "$build/examples/forest_gl" ] &&
+    drawn forest.png --count 1 --pieces 8 --size 64x64 2>"$out/forest.txt"; then
+    cat >>"$out/index.part" <<'SPECIES'
+<p>Each species bare and in leaf, as <code>examples/forest_gl.c</code> draws them: tessellated where the eye is
+near, leaves as impostors with depth. Bark and leaves are drawn by the library.</p>
+<div class="trees">
+SPECIES
+    for name in oak beech maple birch poplar willow almond pine spruce dead; do species $name; done
+    drawn forest.png --species oak,beech,birch,spruce,maple,pine --count 160 --pieces 300 \
+        --size 1200x600 --orbit 20,7,72
+    drawn levels.png --species oak,beech --count 16 --pieces 300 --size 1200x500 --wire \
+        --level 8 --half 9 --bare --orbit 20,8,24
+    for frame in 0 1 2 3; do
+        drawn wind-$frame.png --species birch --count 1 --pieces 1200 --size 300x360 --wind 14 \
+            --time "$((frame * 6 / 10)).$((frame * 6 % 10))"
+    done
+    cat >>"$out/index.part" <<'FOREST'
+</div>
+<h3>A forest</h3>
+<p>160 trees, no two alike, in $DRAWS draw calls, which is what ten thousand take.</p>
+<img class="wide" src="forest.png" width="1200" height="600" alt="a forest of six species">
+<p>Levels of detail by distance, green for the coarsest to red for the finest: quads have more
+triangles near the eye, and edges that two quads share always agree.</p>
+<img class="wide" src="levels.png" width="1200" height="500" alt="trees coloured by level of tessellation">
+<p>A birch in the wind, at intervals of 0.6 seconds.</p>
+<div class="frames">
+<img src="wind-0.png" width="300" height="360" alt="a birch in the wind">
+<img src="wind-1.png" width="300" height="360" alt="0.6 seconds later">
+<img src="wind-2.png" width="300" height="360" alt="1.2 seconds later">
+<img src="wind-3.png" width="300" height="360" alt="1.8 seconds later">
+</div>
+FOREST
+    draws=$(sed -n 's/^draws \([0-9]*\).*/\1/p' "$out/forest.png.txt" | tail -n 1)
+    sed -i "s/\$DRAWS/${draws:-10}/" "$out/index.part"
+    rm -f "$out"/*.png.txt "$out/forest.txt"
+    printf 'demo: ten species, a forest, levels and wind drawn\n'
+else
+    echo "demo: trees are not drawn: no OpenGL$(sed 's/^/: /' "$out/forest.txt" 2>/dev/null)"
+fi
+
 cat >>"$out/index.part" <<TAIL
 <footer>Made by <code>make demo</code> with $("$build/texkit" --version) on $threads threads. Each
 pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
@@ -361,9 +445,10 @@ pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
 <code>texkit edges NAME.png -o NAME-edges.png --smooth 1.5 --least 40</code> and
 <code>texkit patch NAME.png -o NAME-strokes.png --size 512x512 --control strokes.json</code>. Each set of tiles:
 <code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Each retiled
-mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>. Seconds are of this run.</footer>
+mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>; trees:
+<code>texkit tree -o oak.glb --species oak --wind 9 --seed 2</code>. Seconds are of this run.</footer>
 </body>
 </html>
 TAIL
 mv "$out/index.part" "$out/index.html"
-echo "demo: $((count + limits)) pairs, 3 tile sets, 2 meshes; open $out/index.html"
+echo "demo: $((count + limits)) pairs, 3 tile sets, 2 meshes, trees; open $out/index.html"

@@ -1,12 +1,12 @@
 #!/bin/sh
 # setup.sh PROFILE - make sure that what a make target needs is installed
 #
-# PROFILE is tool, test, lint or ci (ci holds all the others). What is missing is installed by
+# PROFILE is tool, demo, test, lint or ci (ci holds all the others). What is missing is installed by
 # apt-get, with sudo if need be; without apt-get the script says what to install and fails. With
 # everything in place it only looks, which takes a few hundredths of a second.
 set -eu
 
-profile=${1:?usage: setup.sh tool|test|lint|ci}
+profile=${1:?usage: setup.sh tool|demo|test|lint|ci}
 missing=
 
 has_header() { echo "#include <$1>" | ${CC:-cc} -E -xc - >/dev/null 2>&1; }
@@ -30,12 +30,6 @@ case $profile in test | ci)
     need has_header cmocka.h libcmocka-dev
     need has_cxx_header OpenImageIO/imagebuf.h libopenimageio-dev
     need has_python jsonschema python3-jsonschema
-    # OpenGL without a window and without a graphics card
-    need has_header EGL/egl.h libegl-dev
-    need has_header GL/glext.h libgl-dev
-    need has_file "/usr/lib*/libOpenGL.so /usr/lib/*/libOpenGL.so" libopengl-dev
-    need has_file "/usr/share/glvnd/egl_vendor.d/*mesa.json" libegl-mesa0
-    need has_file "/usr/lib*/dri/swrast_dri.so /usr/lib/*/dri/swrast_dri.so" libgl1-mesa-dri
     # a screen that nobody sees, for examples/brush.c; jobs of examples/plane.sh
     need has_command xvfb-run xvfb
     need has_command xauth xauth
@@ -44,6 +38,16 @@ case $profile in test | ci)
 esac
 case $profile in test | lint | ci)
     need has_command sdl2-config libsdl2-dev # of examples/brush.c
+esac
+# of examples/forest_gl.c and of tests of shaders: OpenGL without a window, nor a graphics card
+case $profile in demo | test | lint | ci)
+    need has_header EGL/egl.h libegl-dev
+    need has_header GL/glext.h libgl-dev
+esac
+case $profile in demo | test | ci)
+    need has_file "/usr/lib*/libOpenGL.so /usr/lib/*/libOpenGL.so" libopengl-dev
+    need has_file "/usr/share/glvnd/egl_vendor.d/*mesa.json" libegl-mesa0
+    need has_file "/usr/lib*/dri/swrast_dri.so /usr/lib/*/dri/swrast_dri.so" libgl1-mesa-dri
 esac
 case $profile in lint | ci)
     need has_command cppcheck cppcheck

@@ -1,0 +1,418 @@
+/* forest.glsl - the shaders of examples/forest_gl.c
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   Each stage is compiled from "#version 430 core", a define that chooses it, treepieces.glsl and this
+   file:
+
+     PIECE_VERTEX, PIECE_CONTROL, PIECE_EVALUATION, PIECE_WIRE (only with --wire), PIECE_FRAGMENT
+                       one instanced draw of each type of piece: skin, tessellate, light the bark
+     CARD_VERTEX, CARD_GEOMETRY, CARD_FRAGMENT
+                       all leaf clouds as seen along the view, each into its layer: impostors
+     CLOUD_VERTEX, CLOUD_FRAGMENT
+                       one instanced draw of all clusters of leaves, with the impostors' depth
+     LAND_VERTEX, LAND_FRAGMENT
+                       ground and sky: one triangle over the picture                             */
+
+layout(std140, binding = 0) uniform frame_block {
+    mat4 view_projection;
+    vec4 eye;
+    vec4 right;   /* and the tangent of half the angle of view across */
+    vec4 up;      /* and up */
+    vec4 forward; /* and the clouds that each species has */
+    vec4 sun;     /* towards it */
+    vec4 box_low; /* of the light's texture, and its cells' size */
+    vec4 box_scale; /* 1 / its size, and the fog in 1 / m */
+    vec4 lod;     /* greatest level, half distance, shape of Phong tessellation, pixels of the sheet */
+} frame;
+
+/* a word for each node: species, and from bit 8 on a random number of the tree */
+layout(std430, binding = 4) readonly buffer look_buffer { uint looks[]; };
+/* as treepieces_cluster: node, along, radius, look; floats by their bits */
+layout(std430, binding = 5) readonly buffer cluster_buffer { uvec4 clusters[]; };
+
+layout(binding = 0) uniform sampler2DArray bark;
+layout(binding = 1) uniform sampler2DArray leaves;
+layout(binding = 2) uniform sampler2DArray impostors;
+layout(binding = 3) uniform sampler2DArray depths;
+layout(binding = 4) uniform sampler3D light; /* what comes through the crowns: from sun, from sky */
+
+uniform int kind;
+
+/* ---- light, for all fragment shaders ---- */
+
+const vec3 sun_color = vec3(1.0, 0.85, 0.62) * 3.0;
+const vec3 sky_color = vec3(0.48, 0.66, 1.0) * 0.75;
+const vec3 land_color = vec3(0.25, 0.26, 0.12);
+
+vec2 light_at(vec3 place) {
+    vec2 open = texture(light, (place - frame.box_low.xyz) * frame.box_scale.xyz).rg;
+    return max(open, vec2(0.03, 0.2)); /* light that crowns hand on */
+}
+
+vec3 sky_towards(vec3 way) {
+    float height = max(way.y, 0.0), glow = max(dot(way, frame.sun.xyz), 0.0);
+    vec3 zenith = vec3(0.07, 0.20, 0.55), horizon = vec3(0.60, 0.74, 0.88);
+    vec3 color = mix(horizon, zenith, 1.0 - exp(-4.0 * height));
+    return color + vec3(1.0, 0.8, 0.5) * (0.10 * pow(glow, 6.0) + 0.25 * pow(glow, 48.0));
+}
+
+/* to the eye: fog, then the curve of film, then sRGB */
+vec4 seen(vec3 color, vec3 place) {
+    vec3 way = place - frame.eye.xyz;
+    float clear = exp(-frame.box_scale.w * length(way));
+    color = mix(sky_towards(normalize(vec3(way.x, 0.0, way.z))), color, clear);
+    color *= 0.82;
+    color = color * (2.51 * color + 0.03) / (color * (2.43 * color + 0.59) + 0.14);
+    return vec4(pow(clamp(color, 0.0, 1.0), vec3(1.0 / 2.2)), 1.0);
+}
+
+float hash(vec2 at) {
+    uvec2 p = uvec2(ivec2(floor(at)));
+    uint h = p.x * 0x9e3779b9u ^ p.y * 0x85ebca6bu;
+    h = (h ^ h >> 15) * 0x2c1b3c6du;
+    h = (h ^ h >> 12) * 0x297a2d39u;
+    return float((h ^ h >> 15) & 0xffffu) / 65535.0;
+}
+
+float noise(vec2 at) {
+    vec2 f = fract(at), t = f * f * (3.0 - 2.0 * f);
+    return mix(mix(hash(at), hash(at + vec2(1, 0)), t.x),
+               mix(hash(at + vec2(0, 1)), hash(at + vec2(1, 1)), t.x), t.y);
+}
+
+/* ---- pieces ---- */
+
+#ifdef PIECE_VERTEX
+layout(location = 0) in vec3 position;
+layout(location = 1) in int rim;
+layout(location = 2) in vec3 normal;
+layout(location = 3) in vec4 weights;
+out vec3 vertex_place, vertex_normal;
+out int vertex_instance;
+
+void main() {
+    treepieces_instance it = treepieces_find(kind, gl_InstanceID);
+    treepieces_skin(kind, it, rim, position, normal, weights, vertex_place, vertex_normal);
+    vertex_instance = gl_InstanceID;
+}
+#endif
+
+#ifdef PIECE_CONTROL
+layout(vertices = 4) out;
+in vec3 vertex_place[], vertex_normal[];
+in int vertex_instance[];
+out vec3 corner_place[], corner_normal[];
+patch out vec4 tile_box;
+patch out int tile_layer, patch_instance, patch_quad;
+patch out float patch_level;
+
+void main() {
+    corner_place[gl_InvocationID] = vertex_place[gl_InvocationID];
+    corner_normal[gl_InvocationID] = vertex_normal[gl_InvocationID];
+    if (gl_InvocationID == 0) {
+        treepieces_lod lod = treepieces_lod(frame.eye.xyz, frame.lod.x, frame.lod.y);
+        vec3 a = vertex_place[0], b = vertex_place[1], c = vertex_place[2], d = vertex_place[3];
+        bool is_outside = treepieces_is_outside(frame.view_projection, a, b, c, d);
+        gl_TessLevelOuter[0] = is_outside ? 0.0 : treepieces_edge_level(lod, a, b);
+        gl_TessLevelOuter[1] = is_outside ? 0.0 : treepieces_edge_level(lod, d, a);
+        gl_TessLevelOuter[2] = is_outside ? 0.0 : treepieces_edge_level(lod, c, d);
+        gl_TessLevelOuter[3] = is_outside ? 0.0 : treepieces_edge_level(lod, b, c);
+        patch_level = treepieces_inner_level(lod, a, b, c, d);
+        gl_TessLevelInner[0] = gl_TessLevelInner[1] = patch_level;
+        treepieces_tile tile =
+            treepieces_find_tile(kind, vertex_instance[0], gl_PrimitiveID, frame.lod.w);
+        uint own = treepieces_records[treepieces_kinds[kind].first +
+                                      uint(vertex_instance[0]) * treepieces_kinds[kind].stride];
+        tile_box = tile.box;
+        tile_layer = tile.layer + 5 * int(looks[own] & 255u); /* a sheet has 5 layers */
+        patch_instance = vertex_instance[0];
+        patch_quad = gl_PrimitiveID;
+    }
+}
+#endif
+
+#ifdef PIECE_EVALUATION
+layout(quads, equal_spacing, cw) in;
+in vec3 corner_place[], corner_normal[];
+patch in vec4 tile_box;
+patch in int tile_layer, patch_instance, patch_quad;
+patch in float patch_level;
+precise out vec3 place, normal;
+out vec2 tile_at;
+flat out int layer;
+flat out float level;
+#ifdef FEEDBACK
+flat out int instance, quad;
+out vec2 patch_at;
+#endif
+
+void main() {
+    vec3 p[4] = vec3[4](corner_place[0], corner_place[1], corner_place[2], corner_place[3]);
+    vec3 n[4] = vec3[4](corner_normal[0], corner_normal[1], corner_normal[2], corner_normal[3]);
+    treepieces_patch_point(p, n, frame.lod.z, gl_TessCoord.xy, place, normal);
+    gl_Position = frame.view_projection * vec4(place, 1.0);
+    tile_at = mix(tile_box.xy, tile_box.zw, gl_TessCoord.xy);
+    layer = tile_layer;
+    level = patch_level;
+#ifdef FEEDBACK
+    instance = patch_instance;
+    quad = patch_quad;
+    patch_at = gl_TessCoord.xy;
+#endif
+}
+#endif
+
+#ifdef PIECE_WIRE
+layout(triangles) in;
+layout(triangle_strip, max_vertices = 3) out;
+in vec3 place[], normal[];
+in vec2 tile_at[];
+flat in int layer[];
+flat in float level[];
+out vec3 wire_place, wire_normal, wire_corner;
+out vec2 wire_tile_at;
+flat out int wire_layer;
+flat out float wire_level;
+
+void main() {
+    for (int k = 0; k < 3; k++) {
+        gl_Position = gl_in[k].gl_Position;
+        wire_place = place[k];
+        wire_normal = normal[k];
+        wire_tile_at = tile_at[k];
+        wire_layer = layer[k];
+        wire_level = level[k];
+        wire_corner = vec3(k == 0, k == 1, k == 2);
+        EmitVertex();
+    }
+}
+#endif
+
+#ifdef PIECE_FRAGMENT
+#ifdef WIRE
+#define place wire_place
+#define normal wire_normal
+#define tile_at wire_tile_at
+#define layer wire_layer
+#define level wire_level
+in vec3 wire_corner;
+#endif
+in vec3 place, normal;
+in vec2 tile_at;
+flat in int layer;
+flat in float level;
+out vec4 color;
+
+void main() {
+    vec3 n = normalize(normal), albedo = texture(bark, vec3(tile_at, layer)).rgb;
+    /* the bark's brightness as relief, a tenth of a tile deep: turn the normal away from where it rises */
+    float height = sqrt(dot(albedo, vec3(0.3, 0.6, 0.1)));
+    vec3 across = dFdx(place), along = dFdy(place), a = cross(along, n), b = cross(n, across);
+    vec2 tile_across = dFdx(tile_at), tile_along = dFdy(tile_at);
+    float area = dot(across, a);
+    float tile_area = 64.0 * abs(tile_across.x * tile_along.y - tile_across.y * tile_along.x);
+    vec3 slope = (dFdx(height) * a + dFdy(height) * b) / (abs(area) + 1e-20) * sign(area);
+    slope *= 0.1 * sqrt(abs(area) / (tile_area + 1e-20));
+    n = normalize(n - slope * min(1.0, 0.8 / (length(slope) + 1e-6)));
+
+    vec2 open = light_at(place + n * frame.box_low.w);
+    float facing = max(dot(n, frame.sun.xyz), 0.0), skywards = 0.5 + 0.5 * n.y;
+    vec3 arriving = sun_color * facing * open.r + sky_color * mix(0.35, 1.0, skywards) * open.g +
+                    land_color * (1.0 - skywards) * (0.4 + 0.6 * open.r);
+    arriving *= 0.55 + 0.45 * smoothstep(-0.1, 0.9, place.y); /* the corner with the ground */
+#ifdef WIRE
+    float fine = (level - 1.0) / max(ceil(frame.lod.x) - 1.0, 1.0); /* green, yellow, red */
+    vec3 rings = pow(clamp(vec3(2.2 * fine, 1.8 - 1.8 * fine, 0.12), 0.0, 0.85), vec3(2.2));
+    vec3 width = fwidth(wire_corner), edge = smoothstep(0.5 * width, 1.5 * width, wire_corner);
+    albedo = rings * mix(0.25, 1.0, min(edge.x, min(edge.y, edge.z)));
+    arriving = vec3(0.7 + 0.9 * max(dot(normalize(normal), frame.sun.xyz), 0.0));
+#endif
+    color = seen(albedo * arriving, place);
+}
+#endif
+
+/* ---- impostors: leaf clouds along the view ---- */
+
+#ifdef CARD_VERTEX
+struct card_data {
+    vec4 center, right, up, normal; /* w: layer, species, -, - */
+};
+layout(std430, binding = 6) readonly buffer card_buffer { card_data cards[]; };
+out vec3 card_at;
+out vec2 card_leaf;
+flat out ivec2 card_what; /* layer, species */
+flat out float card_light;
+
+void main() {
+    card_data c = cards[gl_InstanceID];
+    mat3 view = mat3(frame.right.xyz, frame.up.xyz, -frame.forward.xyz);
+    vec3 center = c.center.xyz * view, right = c.right.xyz * view, up = c.up.xyz * view;
+    vec2 side = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+    float seen_area = right.x * up.y - right.y * up.x;
+    bool is_edge_on = seen_area * seen_area <= 0.01 * dot(right, right) * dot(up, up);
+    card_at = center + side.x * right + side.y * up;
+    card_leaf = vec2(side.x, -side.y) * 0.5 + 0.5;
+    card_what = ivec2(c.center.w, c.right.w);
+    card_light = 0.7 + 0.6 * clamp(0.35 + 0.65 * dot(c.normal.xyz, frame.sun.xyz), 0.0, 1.0) +
+                 0.2 * max(0.0, dot(frame.forward.xyz, frame.sun.xyz));
+    gl_Position = is_edge_on ? vec4(2.0) : vec4(card_at.xy, -card_at.z * 0.5, 1.0);
+}
+#endif
+
+#ifdef CARD_GEOMETRY
+layout(triangles) in;
+layout(triangle_strip, max_vertices = 3) out;
+in vec3 card_at[];
+in vec2 card_leaf[];
+flat in ivec2 card_what[];
+flat in float card_light[];
+out vec3 at;
+out vec2 leaf;
+flat out int species;
+flat out float lit;
+
+void main() {
+    for (int k = 0; k < 3; k++) {
+        gl_Layer = card_what[k].x;
+        gl_Position = gl_in[k].gl_Position;
+        at = card_at[k];
+        leaf = card_leaf[k];
+        species = card_what[k].y;
+        lit = card_light[k];
+        EmitVertex();
+    }
+}
+#endif
+
+#ifdef CARD_FRAGMENT
+in vec3 at;
+in vec2 leaf;
+flat in int species;
+flat in float lit;
+layout(location = 0) out vec4 color;
+layout(location = 1) out float depth;
+
+void main() {
+    vec4 texel = texelFetch(leaves, ivec3(leaf * vec2(textureSize(leaves, 0).xy), species), 0);
+    if (texel.a < 0.5) discard;
+    color = vec4(min(texel.rgb * lit * (0.65 + 0.35 * min(1.0, dot(at, at))), 1.0), 1.0);
+    depth = at.z;
+}
+#endif
+
+/* ---- clusters of leaves ---- */
+
+#ifdef CLOUD_VERTEX
+out vec2 at;
+flat out vec4 sphere;
+flat out int layer;
+flat out vec3 tint;
+
+void main() {
+    uvec4 c = clusters[gl_InstanceID];
+    float along = uintBitsToFloat(c.y), radius = uintBitsToFloat(c.z);
+    uint look = looks[c.x], clouds = uint(frame.forward.w);
+    vec3 center = treepieces_move_point(c.x, vec3(0.0, along, 0.0));
+    at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+    sphere = vec4(center, radius);
+    layer = int((look & 255u) * clouds + c.w % clouds);
+    /* trees differ in colour, clouds a little more */
+    float warm = float(look >> 8 & 255u) / 255.0 - 0.5, other = float(c.w >> 8 & 255u) / 255.0 - 0.5;
+    float bright = float(look >> 16 & 255u) / 255.0 - 0.5;
+    tint = vec3(1.0 + 0.20 * warm + 0.10 * other, 1.0, 1.0 - 0.25 * warm) *
+           (1.0 + 0.20 * bright + 0.20 * other);
+    gl_Position = frame.view_projection *
+                  vec4(center + radius * (at.x * frame.right.xyz + at.y * frame.up.xyz), 1.0);
+}
+#endif
+
+#ifdef CLOUD_FRAGMENT
+in vec2 at;
+flat in vec4 sphere;
+flat in int layer;
+flat in vec3 tint;
+out vec4 color;
+
+void main() {
+    vec3 texel = vec3(at * 0.5 + 0.5, layer);
+    vec4 leaf = texture(impostors, texel);
+    if (leaf.a < 0.4) discard;
+    vec4 near = textureGather(depths, texel);
+    float depth = max(max(near.x, near.y), max(near.z, near.w));
+    if (depth < -1.5) discard;
+    mat3 view = mat3(frame.right.xyz, frame.up.xyz, frame.forward.xyz);
+    gl_FragDepth = treepieces_impostor_depth(frame.view_projection, sphere.xyz, sphere.w, view,
+                                             vec3(at, depth));
+
+    /* the impostor is shaded by the sun on its own; here: what comes through the crown, how the
+       cloud's surface faces, light through leaves from behind */
+    vec3 from_middle = view * vec3(at, -depth), place = sphere.xyz + sphere.w * from_middle;
+    vec3 albedo = pow(leaf.rgb / leaf.a, vec3(2.2)) * tint;
+    vec2 open = light_at(place + frame.sun.xyz * frame.box_low.w);
+    vec3 n = normalize(from_middle + vec3(0.0, 0.3, 0.0));
+    float facing = 0.5 + 0.5 * dot(n, frame.sun.xyz), skywards = 0.5 + 0.5 * n.y;
+    float through = pow(max(dot(frame.forward.xyz, frame.sun.xyz), 0.0), 2.0);
+    vec3 arriving = sun_color * open.r * (0.75 * facing + 0.5 * through * vec3(0.9, 1.0, 0.3)) +
+                    sky_color * mix(0.4, 1.0, skywards) * open.g +
+                    land_color * 0.6 * (1.0 - skywards) * open.r;
+    color = seen(albedo * arriving, place);
+}
+#endif
+
+/* ---- ground and sky ---- */
+
+#ifdef LAND_VERTEX
+out vec2 at;
+
+void main() {
+    at = vec2(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1);
+    gl_Position = vec4(at, 1.0, 1.0);
+}
+#endif
+
+#ifdef LAND_FRAGMENT
+in vec2 at;
+out vec4 color;
+
+void main() {
+    vec3 way = normalize(frame.forward.xyz + at.x * frame.right.w * frame.right.xyz +
+                         at.y * frame.up.w * frame.up.xyz);
+    gl_FragDepth = 1.0;
+    if (way.y > -1e-4) { /* wooded hills under the sky, the farther ones paler */
+        vec3 sky = sky_towards(way), haze = sky_towards(vec3(way.x, 0.0, way.z));
+        vec2 round = way.xz / length(way.xz) * 4.0;
+        for (float k = 0.0; k < 3.0; k++) {
+            float ridge = 0.034 - 0.011 * k +
+                          0.03 * (noise(round * (1.2 + 0.5 * k) + 9.0 * k + 40.0) - 0.5) +
+                          0.005 * (noise(round * 9.0 + k) - 0.5) +
+                          0.0016 * (noise(round * 61.0) - 0.5);
+            float soft = smoothstep(ridge - 0.0006, ridge + 0.0006, way.y);
+            sky = mix(mix(haze, vec3(0.06, 0.11, 0.07),
+                          (0.22 + 0.16 * k) * smoothstep(0.0, 0.02, way.y)),
+                      sky, soft);
+        }
+        color = seen(sky, frame.eye.xyz);
+        return;
+    }
+    float far = frame.eye.y / -way.y;
+    vec3 place = frame.eye.xyz + far * way;
+    vec4 clip = frame.view_projection * vec4(place, 1.0);
+    gl_FragDepth = min(0.5 + 0.5 * clip.z / clip.w, 1.0);
+
+    /* meadow: octaves of noise, each left out where a pixel is larger than its waves */
+    float pixel = sqrt(abs(determinant(mat2(dFdx(place.xz), dFdy(place.xz)))));
+    float sum = 0.0, weight = 0.30;
+    for (float size = 9.0; size > 0.008; size *= 0.45, weight *= 0.97) {
+        float wave = noise(place.xz / size + size * 37.0) - 0.5;
+        sum += weight * wave * clamp(0.5 * size / pixel - 1.0, 0.0, 1.0);
+    }
+    float patches = noise(place.xz / 13.0) * 0.6 + noise(place.xz / 3.1 + 7.0) * 0.4;
+    vec3 grass = mix(vec3(0.045, 0.085, 0.016), vec3(0.115, 0.130, 0.035), patches);
+    vec2 open = light_at(place + vec3(0.0, 0.5 * frame.box_low.w, 0.0));
+    vec3 litter = vec3(0.075, 0.056, 0.030);
+    vec3 albedo = mix(litter, grass, smoothstep(0.35, 0.65, open.g + 0.5 * sum + 0.05));
+    albedo *= max(1.0 + 1.1 * sum, 0.25);
+    vec3 arriving = sun_color * frame.sun.y * open.r + sky_color * open.g;
+    color = seen(albedo * arriving, place);
+}
+#endif
