@@ -37,7 +37,7 @@ all: $(BUILD)/texkit
 
 help:
 	@echo "make            build $(BUILD)/texkit, the command line tool"
-	@echo "make demo       texture, tiles and meshes from sample photographs, write out/index.html"
+	@echo "make demo       texture, tiles, meshes, trees from sample photographs, write out/index.html"
 	@echo "make test       run all tests, with the sanitizers on"
 	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
 	@echo "make bench      print a table of timings"

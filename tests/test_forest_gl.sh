@@ -62,6 +62,16 @@ frames() {
 }
 check "forest_gl: frames of the wind" frames
 
+# on a screen that nobody sees; SDL takes the signal for a click on the window's close button
+window() {
+    xvfb-run -a -s "-screen 0 640x480x24" sh -c '"$0" --size 160x120 --pieces 8 >out.log 2>err.log &
+        sleep 6; kill $!; wait $!' "$forest" || { cat err.log; return 1; }
+    [ ! -s err.log ]
+}
+if has xvfb-run && has sdl2-config; then
+    check "forest_gl opens a window and closes it" window
+fi
+
 bad() {
     refuses "preset\|species" --species fern && refuses "cannot\|species" --species ./none.txt &&
         refuses "no set of tiles" --bark . && refuses "cannot read" --leaf none.png &&
