@@ -619,7 +619,7 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
                                     treepieces_card *cards);
 
 /* A picture of a spray of leaves for the cards, RGBA, drawn for those who have none. out: any size,
-   4 channels of 8 bits. */
+   4 channels of 8 bits; partly drawn after TXM_CANCELLED. */
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out);
 
@@ -698,12 +698,15 @@ static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
     out[2] = z;
 }
 
-/* out = a b: b first, then a; out may be one of them */
+/* out = a b: b first, then a; out may be one of them. All terms are added, some with the other sign:
+   gcc 12 makes one instruction that rounds once of neighbouring a - b c and a + b c, contraction off or
+   not. */
 static void tpc_multiply(const float a[4], const float b[4], float out[4]) {
-    const float x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1];
-    const float y = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0];
-    const float z = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3];
-    const float w = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2];
+    const float back[3] = {-a[0], -a[1], -a[2]};
+    const float x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] + back[2] * b[1];
+    const float y = a[3] * b[1] + back[0] * b[2] + a[1] * b[3] + a[2] * b[0];
+    const float z = a[3] * b[2] + a[0] * b[1] + back[1] * b[0] + a[2] * b[3];
+    const float w = a[3] * b[3] + back[0] * b[0] + back[1] * b[1] + back[2] * b[2];
     out[0] = x;
     out[1] = y;
     out[2] = z;
@@ -3111,8 +3114,8 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
         /* the thicker arm goes straighter on */
         const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
         tpc_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
-        for (int i = 0; i < 3; i++)
-            bud->heading[i] = (float)cosine * stem[i] + (float)sine * out[i];
+        const float ahead = txm_float(cosine), aside = txm_float(sine);
+        for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
         bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
         bud->end_radius = txm_maxf(bud->end_radius * c->ratios[k],
                                    txm_minf(bud->radius, tpc_thinnest(g)));
@@ -3125,7 +3128,8 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
                         tpc_uniform(g, -1, 1) * o->angle_spread;
     tpc_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
-    for (int i = 0; i < 3; i++) bud->heading[i] = (float)cosine * stem[i] + (float)sine * out[i];
+    const float ahead = txm_float(cosine), aside = txm_float(sine);
+    for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
     bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
     tpc_normalize(bud->heading);
     tpc_stand_off(bud, stem, out, c->ratios[k], offset);
@@ -4812,34 +4816,60 @@ static void tpc_spread(int index, int count, float phase, txm_rng *rng, float di
     direction[2] = ring * (float)sine;
 }
 
-/* Sprays of leaves: most of them near the surface, spread out and hanging as their kind does. */
-static void tpc_leafy_card(const treepieces_species *species, int index, int count, float phase,
-                           const float scale[3], float half, txm_rng *rng, treepieces_card *card) {
+/* A place in the unit ball far from those that are taken: of some tries the best. So there are
+   neither heaps nor holes, and most places lie towards the surface. */
+static void tpc_far_place(const treepieces_card *cards, int taken, const float size[3],
+                          txm_rng *rng, float place[3]) {
+    enum { TRIES = 6 };
+    float best = -1;
+    for (int t = 0; t < TRIES;) {
+        float p[3], room = 8;
+        for (int k = 0; k < 3; k++) p[k] = tpc_signed(rng);
+        if (tpc_dot(p, p) > 1) continue;
+        t++;
+        for (int i = 0; i < taken; i++) {
+            float off[3];
+            for (int k = 0; k < 3; k++) off[k] = cards[i].center[k] / size[k] - p[k];
+            room = txm_minf(room, tpc_dot(off, off));
+        }
+        if (room <= best) continue;
+        best = room;
+        memcpy(place, p, sizeof p);
+    }
+}
+
+/* Sprays of leaves, spread out and hanging as their kind does. */
+static void tpc_leafy_card(const treepieces_species *species, treepieces_card *cards, int index,
+                           const float scale[3], float half, txm_rng *rng) {
     const int is_lance = species->leaf_shape == TREEPIECES_LEAF_LANCE;
     const int is_blossom = species->leaf_shape == TREEPIECES_LEAF_BLOSSOM;
     const float droop = is_lance ? 1.2f : is_blossom ? 0 : 0.35f, loose = is_lance ? 0.3f : 0.8f;
-    const float reach = txm_maxf(1 - half, 0);
-    float outward[3], along[3], facing[3];
-    tpc_spread(index, count, phase, rng, outward);
-    const float depth = sqrtf(0.02f + 0.98f * txm_rng_float(rng));
+    const float reach = txm_maxf(1 - half, 0.05f);
+    const float size[3] = {reach * scale[0], reach * scale[1], reach * scale[2]};
+    float place[3] = {0, 0, 0}, outward[3], along[3], facing[3];
+    tpc_far_place(cards, index, size, rng, place);
     for (int k = 0; k < 3; k++) {
-        card->center[k] = reach * depth * scale[k] * outward[k];
-        outward[k] /= scale[k];
+        cards[index].center[k] = size[k] * place[k];
+        outward[k] = place[k] / scale[k];
     }
     tpc_to_unit(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) {
         along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
         facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
     }
-    tpc_aim_card(card, along, facing, outward, half);
+    tpc_aim_card(&cards[index], along, facing, outward, half);
 }
 
 /* Needles: cards one behind the other along twigs that radiate, crossed about them. */
 static void tpc_needle_card(int index, int count, float phase, const float scale[3], float half,
                             txm_rng *rng, treepieces_card *card) {
-    const int twigs = (count + 3) / 4, steps = (count + twigs - 1) / twigs, step = index / twigs;
+    const float reach = txm_maxf(1 - half, 0);
+    const float fit = 0.7f * reach / txm_maxf(half, 0.01f) + 0.95f; /* half overlapping */
+    const int most = txm_clampi((int)txm_minf(fit, 4), 1, 4);
+    const int twigs = (count + most - 1) / most, steps = (count + twigs - 1) / twigs;
+    const int step = index / twigs;
     const float place = ((float)step + 0.5f + 0.5f * txm_rng_float(rng)) / (float)steps;
-    const float reach = txm_maxf(1 - half, 0), roll = (float)((index % twigs + step) % 3 - 1);
+    const float roll = (float)((index % twigs + step) % 3 - 1);
     float along[3], facing[3], outward[3];
     tpc_spread(index % twigs, twigs, phase, rng, along);
     const float at = reach * (0.3f + 0.7f * place);
@@ -4870,7 +4900,7 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
     for (int i = 0; i < count; i++) {
         if (species->leaf_shape == TREEPIECES_LEAF_NEEDLE)
             tpc_needle_card(i, count, phase, scale, half, &rng, &cards[i]);
-        else tpc_leafy_card(species, i, count, phase, scale, half, &rng, &cards[i]);
+        else tpc_leafy_card(species, cards, i, scale, half, &rng);
         tpc_keep_inside(&cards[i]);
     }
     return count;
@@ -5269,7 +5299,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     enum { ROWS = 64 }; /* between two reports */
     tpc_spray spray;
     if (!species) return txm_fail(env, TXM_BAD_ARGUMENT, "species is NULL");
-    const txm_status status = txm_image_check(&out, "out", 0, env);
+    txm_status status = txm_image_check(&out, "out", 0, env);
     if (status != TXM_OK) return status;
     if (out.channels != 4 || out.sample != TXM_U8)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out must have 4 channels of 8 bits");
@@ -5281,12 +5311,14 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     spray.rng = txm_rng_make(seed, 0x59a7);
     spray.out = txm_image_resolve(out);
     tpc_compose(&spray);
-    for (int y = 0; y < out.height; y += ROWS) {
+    for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
-        txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
+        if (txm_progress(env, (float)y / (float)out.height, "leaves"))
+            status = txm_fail(env, TXM_CANCELLED, "cancelled");
+        else txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
     }
     txm_free(env, spray.marks);
-    return TXM_OK;
+    return status;
 }
 
 /* ---- foliage: impostors -------------------------------------------------------------------- */
@@ -5332,6 +5364,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     const float area = tpc_dot(card->right, card->right) * tpc_dot(card->up, card->up);
     int left, right, top, bottom;
     if (!(det * det > 0.01f * area)) return; /* seen edge on */
+    if (!(fabsf(c[0]) + fabsf(c[1]) + wide + high < 1e6f)) return; /* not of this world */
     tpc_pixels(c[0] - wide, c[0] + wide, color->width, &left, &right);
     tpc_pixels(-c[1] - high, high - c[1], color->height, &top, &bottom);
     for (int row = top; row <= bottom; row++) {

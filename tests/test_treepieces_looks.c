@@ -1,4 +1,4 @@
-/* test_treepieces_looks.c - trees: bark sheets, drawn bark and leaves, leaf clouds, impostors, cards
+/* test_treepieces_looks.c - trees: leaf clouds, drawn leaves, impostors, baked cards and bark
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -10,18 +10,33 @@
 #include "treepieces.h"
 #include "testkit.h"
 
-enum { TILE = 16, TILES = 5, SIDE = 8 * TILE, LEAF = 96, VIEW = 64 };
+enum { SHAPES = TREEPIECES_LEAF_BLOSSOM + 1, SIDE = 96, VIEW = 72, MOST_CARDS = 256 };
 
-static treepieces_species species(const char *name) {
-    treepieces_species s;
-    assert_int_equal(treepieces_preset(name, NULL, &s), TXM_OK);
-    return s;
+static treepieces_kit *kit;
+static treepieces_species oak;
+
+static int set_up(void **state) {
+    (void)state;
+    return treepieces_kit_make(NULL, 0, NULL, &kit) != TXM_OK ||
+           treepieces_preset("oak", NULL, &oak) != TXM_OK;
+}
+static int tear_down(void **state) {
+    (void)state;
+    treepieces_kit_free(kit);
+    return 0;
 }
 
-static txm_image picture(void *pixels, int width, int height, int channels, txm_sample sample) {
+static void *room(size_t count, size_t size) {
+    void *p = calloc(count, size);
+    assert_non_null(p);
+    return p;
+}
+
+static txm_image make_image(int width, int height, int channels, txm_sample sample) {
     txm_image image;
     memset(&image, 0, sizeof image);
-    image.pixels = pixels;
+    const size_t pixel = (size_t)channels * txm_sample_bytes(sample);
+    image.pixels = room((size_t)width * (size_t)height, pixel);
     image.width = width;
     image.height = height;
     image.channels = channels;
@@ -29,372 +44,871 @@ static txm_image picture(void *pixels, int width, int height, int channels, txm_
     return image;
 }
 
-/* ---- bark ----------------------------------------------------------------------------------- */
+static size_t image_bytes(const txm_image *i) {
+    return (size_t)i->width * (size_t)i->height * (size_t)i->channels * txm_sample_bytes(i->sample);
+}
 
-static uint8_t tile_pixels[TILES + 1][TILE * TILE * 3];
-static txm_image tiles[TILES + 1];
+static uint64_t hash_image(const txm_image *i) {
+    return tk_hash(0, i->pixels, image_bytes(i));
+}
 
-/* Random tiles whose outermost pixels are those of the first. */
-static void make_tiles(void) {
-    txm_rng rng = txm_rng_make(6, 0);
-    for (int t = 0; t <= TILES; t++) {
-        tiles[t] = picture(tile_pixels[t], TILE, TILE, 3, TXM_U8);
-        for (int i = 0; i < TILE * TILE * 3; i++) {
-            const int x = i / 3 % TILE, y = i / 3 / TILE;
-            const int is_frame = x == 0 || y == 0 || x == TILE - 1 || y == TILE - 1;
-            tile_pixels[t][i] = (uint8_t)txm_rng_below(&rng, 256);
-            if (is_frame && t) tile_pixels[t][i] = tile_pixels[0][i];
-        }
+static const uint8_t *rgba(const txm_image *i, int x, int y) {
+    return (const uint8_t *)txm_image_row_const(i, y) + 4 * x;
+}
+
+static treepieces_species shaped(int shape) {
+    treepieces_species s = oak;
+    s.leaf_shape = shape;
+    return s;
+}
+
+static txm_image draw_shape(int shape, uint64_t seed) {
+    const treepieces_species s = shaped(shape);
+    txm_image image = make_image(SIDE, SIDE, 4, TXM_U8);
+    assert_int_equal(treepieces_draw_leaves(&s, seed, NULL, image), TXM_OK);
+    return image;
+}
+
+/* ---- leaf clouds ------------------------------------------------------------------------- */
+
+static void check_card(const treepieces_card *c) {
+    const float width = tpc_dot(c->right, c->right), height = tpc_dot(c->up, c->up);
+    assert_true(width > 0 && height > 0);
+    assert_true(fabsf(tpc_dot(c->right, c->up)) < 1e-5f * (width + height));
+    assert_true(fabsf(tpc_dot(c->normal, c->normal) - 1) < 1e-4f);
+    for (int k = 0; k < 4; k++) { /* all of it lies in the sphere, where impostors see it */
+        float p[3];
+        for (int a = 0; a < 3; a++)
+            p[a] = c->center[a] + (k & 1 ? c->right[a] : -c->right[a]) +
+                   (k & 2 ? c->up[a] : -c->up[a]);
+        assert_true(tpc_dot(p, p) < 1.0001f);
     }
 }
 
-static const uint8_t *texel(const uint8_t *sheet, int layer, int x, int y) {
-    return sheet + 3 * ((size_t)(layer * SIDE + y) * SIDE + (size_t)x);
-}
-
-/* Every layer has whole tiles but for its lowest row, whose south sides meet what they should. */
-static void test_sheet(void **state) {
+static void test_cloud(void **state) {
     (void)state;
-    const int classes[TILES + 1] = {0, 0, 0, 0, 0, TREEPIECES_OWN + 1};
-    treepieces_bark_desc d;
-    make_tiles();
-    memset(&d, 0, sizeof d);
-    d.tiles = tiles;
-    d.classes = classes;
-    d.tile_count = TILES + 1;
-    const int layers = treepieces_bark_layers(&d);
-    assert_int_equal(layers, TREEPIECES_OWN + 2);
-    uint8_t *sheet = (uint8_t *)calloc((size_t)(SIDE * SIDE * layers), 3);
-    assert_non_null(sheet);
-    const txm_image out = picture(sheet, SIDE, SIDE * layers, 3, TXM_U8);
-    assert_int_equal(treepieces_bark(&d, NULL, out), TXM_OK);
-
-    for (int layer = 0; layer < TREEPIECES_OWN; layer++)
-        for (int cell = 0; cell < 64 - (layer ? 8 : 0); cell++) { /* each is one of the tiles */
-            int like = 0;
-            for (int t = 0; t < TILES; t++) {
-                int same = 1;
-                for (int y = 0; y < TILE; y++)
-                    same &= !memcmp(texel(sheet, layer, cell % 8 * TILE, cell / 8 * TILE + y),
-                                    tile_pixels[t] + 3 * TILE * y, 3 * TILE);
-                like += same;
+    static const float sizes[] = {0.05f, 0.3f, 0.9f};
+    static const float flats[] = {0.1f, 0.5f, 1, 2};
+    static const int counts[] = {1, 2, 5, 40, MOST_CARDS};
+    treepieces_card cards[MOST_CARDS];
+    for (int i = 0; i < SHAPES * 3 * 4 * 5; i++) {
+        treepieces_species s = shaped(i % SHAPES);
+        s.leaf_size = sizes[i / SHAPES % 3];
+        s.cloud_flat = flats[i / SHAPES / 3 % 4];
+        s.leaf_count = counts[i / SHAPES / 12];
+        for (uint32_t look = 0; look < 3; look++) {
+            assert_int_equal(treepieces_cloud(&s, look, NULL), s.leaf_count);
+            assert_int_equal(treepieces_cloud(&s, look, cards), s.leaf_count);
+            for (int k = 0; k < s.leaf_count; k++) {
+                check_card(&cards[k]);
+                /* the cards' size is what the species says */
+                assert_true(fabsf(sqrtf(tpc_dot(cards[k].up, cards[k].up)) - s.leaf_size / 2) <
+                            0.26f * s.leaf_size);
             }
-            assert_int_equal(like, 1);
         }
-    const int bottom = SIDE - 1;
-    for (int x = 0; x < SIDE; x++)
-        for (int c = 0; c < 3; c++) {
-            const int in = x % TILE;
-            /* folded: its own mirror, so two of them meet */
-            assert_int_equal(texel(sheet, TREEPIECES_FOLD, x, bottom)[c],
-                             texel(sheet, TREEPIECES_FOLD, x - in + TILE - 1 - in, bottom)[c]);
-            /* turned: the west side of the frame from top to bottom, the east side upwards */
-            assert_true(abs(texel(sheet, TREEPIECES_TURN_LEFT, x, bottom)[c] -
-                            tile_pixels[0][3 * TILE * in + c]) <= 1);
-            assert_true(abs(texel(sheet, TREEPIECES_TURN_RIGHT, x, bottom)[c] -
-                            tile_pixels[0][3 * (TILE * (TILE - 1 - in) + TILE - 1) + c]) <= 1);
-        }
-    /* halving: the lowest row means over 2 x 2 texels, twice along a cell */
-    for (int x = 0; x < TILE; x++) {
-        const int a = texel(sheet, TREEPIECES_HALVING, x, bottom)[0];
-        int like = 0;
-        for (int t = 0; t < TILES; t++) {
-            const uint8_t *p = tile_pixels[t] + 3 * (TILE * (TILE - 2) + 2 * x % TILE);
-            like += abs((p[0] + p[3] + p[3 * TILE] + p[3 * TILE + 3]) / 4 - a) <= 1;
-        }
-        assert_true(like > 0);
     }
-    /* an own class: its tile in the middle of 2 x 2 cells; a class without tiles shows another */
-    for (int y = 0; y < TILE; y++)
-        assert_memory_equal(texel(sheet, TREEPIECES_OWN + 1, TILE / 2, TILE / 2 + y),
-                            tile_pixels[TILES] + 3 * TILE * y, 3 * TILE);
-    free(sheet);
+    treepieces_species bare = oak;
+    bare.leaf_count = 0;
+    assert_int_equal(treepieces_cloud(&bare, 1, cards), 0);
+    assert_int_equal(treepieces_cloud(NULL, 1, cards), 0);
 }
 
-static void test_sheet_refuses(void **state) {
+/* A look is always the same, and no two are alike. */
+static void test_looks(void **state) {
     (void)state;
-    static uint8_t sheet[SIDE * SIDE * TREEPIECES_OWN * 3], keep[sizeof sheet];
-    static const int bad_class = 3;
-    make_tiles();
-    for (int i = 0; i < 8; i++) {
-        treepieces_bark_desc d;
-        txm_env env = tk_env(NULL, NULL);
-        txm_image out = picture(sheet, SIDE, SIDE * TREEPIECES_OWN, 3, TXM_U8);
-        memset(&d, 0, sizeof d);
-        d.tiles = tiles;
-        d.tile_count = TILES;
-        switch (i) {
-        case 0: d.tiles = NULL; break;
-        case 1: d.tile_count = 0; break;
-        case 2: out.height--; break;
-        case 3: out.channels = 1; break;
-        case 4: out.pixels = NULL; break;
-        case 5: tiles[1].width--; break;
-        case 6:
-            d.classes = &bad_class;
-            d.tile_count = 1;
-            break;
-        default: tiles[2].sample = TXM_U16; break;
+    enum { LOOKS = 16 };
+    treepieces_card cards[MOST_CARDS];
+    for (int shape = 0; shape < SHAPES; shape++) {
+        const treepieces_species s = shaped(shape);
+        const size_t bytes = (size_t)s.leaf_count * sizeof *cards;
+        uint64_t hashes[LOOKS];
+        for (uint32_t look = 0; look < LOOKS; look++) {
+            memset(cards, 0x55, sizeof cards);
+            treepieces_cloud(&s, look, cards);
+            hashes[look] = tk_hash(0, cards, bytes);
+            memset(cards, 0xaa, sizeof cards);
+            treepieces_cloud(&s, look, cards);
+            assert_true(tk_hash(0, cards, bytes) == hashes[look]);
+            for (uint32_t k = 0; k < look; k++) assert_true(hashes[k] != hashes[look]);
         }
-        assert_int_equal(treepieces_bark(&d, &env, out), TXM_BAD_ARGUMENT);
-        assert_true(strlen(env.message) > 8);
-        assert_memory_equal(sheet, keep, sizeof sheet);
-        make_tiles();
     }
 }
 
-/* Drawn tiles share their border, and differ inside. */
-static void test_drawn_bark(void **state) {
+/* Over many looks: as much on one side as on the other, most of it outside, normals outwards; and
+   flat clouds are flat. */
+static void test_cloud_spread(void **state) {
     (void)state;
-    for (int preset = 0; preset < treepieces_preset_count(); preset++) {
-        const char *text = treepieces_preset_text(preset);
-        treepieces_species s;
-        assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &s), TXM_OK);
-        make_tiles();
-        assert_int_equal(treepieces_draw_bark(&s, 4, NULL, tiles, TILES), TXM_OK);
-        int differ = 0;
-        for (int t = 1; t < TILES; t++)
-            for (int i = 0; i < TILE * TILE * 3; i++) {
-                const int x = i / 3 % TILE, y = i / 3 / TILE;
-                if (x == 0 || y == 0 || x == TILE - 1 || y == TILE - 1)
-                    assert_true(abs(tile_pixels[t][i] - tile_pixels[0][i]) <= 1);
-                differ += tile_pixels[t][i] != tile_pixels[0][i];
+    enum { LOOKS = 64 };
+    treepieces_card cards[MOST_CARDS];
+    for (int shape = 0; shape < SHAPES; shape++) {
+        treepieces_species s = shaped(shape);
+        s.cloud_flat = 0.5f;
+        s.leaf_size = 0.3f;
+        double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
+        long outwards = 0, outside = 0, all = 0;
+        for (uint32_t look = 0; look < LOOKS; look++) {
+            const int count = treepieces_cloud(&s, look, cards);
+            for (int k = 0; k < count; k++, all++) {
+                for (int a = 0; a < 3; a++) {
+                    sum[a] += (double)cards[k].center[a];
+                    square[a] += (double)(cards[k].center[a] * cards[k].center[a]);
+                }
+                const float *c = cards[k].center;
+                outside += c[0] * c[0] + 4 * c[1] * c[1] + c[2] * c[2] > 0.16f;
+                outwards += tpc_dot(cards[k].normal, c) > 0;
             }
-        assert_true(differ > TILE * TILE);
+        }
+        for (int a = 0; a < 3; a++) assert_true(fabs(sum[a]) < 0.06 * (double)all);
+        assert_true(outside > all / 2);
+        assert_true(outwards > all * 3 / 4);
+        assert_true(square[1] < 0.5 * square[0] && square[1] < 0.5 * square[2]);
+        assert_true(square[0] < 1.3 * square[2] && square[2] < 1.3 * square[0]);
     }
-    treepieces_species s = species("oak");
-    assert_int_equal(treepieces_draw_bark(NULL, 0, NULL, tiles, 1), TXM_BAD_ARGUMENT);
-    assert_int_equal(treepieces_draw_bark(&s, 0, NULL, tiles, 0), TXM_BAD_ARGUMENT);
 }
 
-/* ---- leaves --------------------------------------------------------------------------------- */
-
-static uint8_t leaf_pixels[6][LEAF * LEAF * 4];
+/* ---- drawn leaves ------------------------------------------------------------------------ */
 
 static void test_leaves(void **state) {
     (void)state;
-    treepieces_species s = species("oak");
-    for (int shape = 0; shape < 6; shape++) {
-        const txm_image out = picture(leaf_pixels[shape], LEAF, LEAF, 4, TXM_U8);
-        s.leaf_shape = shape;
-        assert_int_equal(treepieces_draw_leaves(&s, 3, NULL, out), TXM_OK);
-        int solid = 0, clear = 0;
-        for (int i = 0; i < LEAF * LEAF; i++) {
-            const uint8_t *p = leaf_pixels[shape] + 4 * i;
-            solid += p[3] == 255;
-            clear += p[3] == 0;
-            assert_true(p[0] + p[1] + p[2] > 0); /* colour under what is clear too */
+    txm_image shapes[SHAPES];
+    for (int shape = 0; shape < SHAPES; shape++) {
+        long opaque = 0, clear = 0, dark = 0;
+        double mean[3] = {0, 0, 0};
+        shapes[shape] = draw_shape(shape, 3);
+        for (int y = 0; y < SIDE; y++)
+            for (int x = 0; x < SIDE; x++) {
+                const uint8_t *p = rgba(&shapes[shape], x, y);
+                opaque += p[3] == 255;
+                clear += p[3] == 0;
+                /* what cannot be seen is no darker than leaves: filters mix it in */
+                dark += p[3] == 0 && (float)p[1] < 0.5f * 255 * oak.leaf_color[1];
+                for (int c = 0; c < 3; c++) mean[c] += p[3] == 255 ? (double)p[c] / 255 : 0;
+            }
+        assert_in_range(opaque, SIDE * SIDE / 20, SIDE * SIDE * 3 / 4);
+        assert_in_range(clear, SIDE * SIDE / 8, SIDE * SIDE * 9 / 10);
+        assert_int_equal(dark, 0);
+        for (int c = 0; c < 3 && shape != TREEPIECES_LEAF_BLOSSOM; c++) /* tinted */
+            assert_true(fabs(mean[c] / (double)opaque - (double)oak.leaf_color[c]) < 0.15);
+        for (int other = 0; other < shape; other++) {
+            long unlike = 0;
+            for (int i = 0; i < SIDE * SIDE; i++)
+                unlike += (rgba(&shapes[shape], i % SIDE, i / SIDE)[3] ^
+                           rgba(&shapes[other], i % SIDE, i / SIDE)[3]) >> 7;
+            assert_true(unlike > SIDE * SIDE / 25);
         }
-        assert_true(solid > LEAF * LEAF / 20 && clear > LEAF * LEAF / 5);
-        for (int other = 0; other < shape; other++)
-            assert_true(memcmp(leaf_pixels[other], leaf_pixels[shape], sizeof leaf_pixels[0]) != 0);
     }
-    txm_image bad = picture(leaf_pixels[0], LEAF, LEAF, 3, TXM_U8);
-    assert_int_equal(treepieces_draw_leaves(&s, 3, NULL, bad), TXM_BAD_ARGUMENT);
-    assert_int_equal(treepieces_draw_leaves(NULL, 3, NULL, bad), TXM_BAD_ARGUMENT);
-    for (long k = 1;; k++) { /* every allocation in turn fails */
+    for (int shape = 0; shape < SHAPES; shape++) free(shapes[shape].pixels);
+}
+
+/* The same bytes on any number of threads and in any rows; others with another seed. */
+static void test_leaves_repeat(void **state) {
+    (void)state;
+    enum { WIDTH = 50, HEIGHT = 150, STRIDE = 256 };
+    for (int shape = 0; shape < SHAPES; shape++) {
+        const treepieces_species s = shaped(shape);
+        txm_image plain = make_image(WIDTH, HEIGHT, 4, TXM_U8), other = plain, wide = plain;
+        assert_int_equal(treepieces_draw_leaves(&s, 9, NULL, plain), TXM_OK);
+        const uint64_t hash = hash_image(&plain);
+        other.pixels = room(WIDTH * HEIGHT, 4);
+        for (int kind = 0; kind < 2; kind++) {
+            txm_env env = tk_env(NULL, NULL);
+            env.parallel_for = kind ? tk_parallel_threads : tk_parallel_reverse;
+            memset(other.pixels, 0x77, image_bytes(&other));
+            assert_int_equal(treepieces_draw_leaves(&s, 9, &env, other), TXM_OK);
+            assert_true(hash_image(&other) == hash);
+        }
+        uint8_t *bytes = (uint8_t *)room(HEIGHT, STRIDE);
+        memset(bytes, 0x11, HEIGHT * STRIDE);
+        wide.pixels = bytes;
+        wide.stride = STRIDE;
+        assert_int_equal(treepieces_draw_leaves(&s, 9, NULL, wide), TXM_OK);
+        for (int y = 0; y < HEIGHT; y++) {
+            assert_memory_equal(bytes + y * STRIDE, rgba(&plain, 0, y), 4 * WIDTH);
+            for (int k = 4 * WIDTH; k < STRIDE; k++) assert_int_equal(bytes[y * STRIDE + k], 0x11);
+        }
+        assert_int_equal(treepieces_draw_leaves(&s, 10, NULL, other), TXM_OK);
+        assert_true(hash_image(&other) != hash);
+        free(bytes);
+        free(other.pixels);
+        free(plain.pixels);
+    }
+}
+
+/* However small or long the picture. */
+static void test_leaves_sizes(void **state) {
+    (void)state;
+    static const int sizes[][2] = {{1, 1}, {16, 16}, {1, 200}, {200, 1}, {17, 31}, {130, 65}};
+    for (int i = 0; i < 6 * SHAPES; i++) {
+        const treepieces_species s = shaped(i / 6);
+        txm_image image = make_image(sizes[i % 6][0], sizes[i % 6][1], 4, TXM_U8);
+        long covered = 0;
+        assert_int_equal(treepieces_draw_leaves(&s, (uint64_t)i, NULL, image), TXM_OK);
+        for (int k = 0; k < image.width * image.height; k++)
+            covered += rgba(&image, k % image.width, k / image.width)[3];
+        assert_true(covered > 0);
+        free(image.pixels);
+    }
+}
+
+static void test_leaves_refusals(void **state) {
+    (void)state;
+    txm_image good = make_image(32, 32, 4, TXM_U8);
+    const uint64_t hash = hash_image(&good);
+    for (int kind = 0; kind < 7; kind++) {
+        txm_image bad = good;
         tk_memory memory;
         memset(&memory, 0, sizeof memory);
-        memory.fail_at = k;
         txm_env env = tk_env(&memory, NULL);
-        const txm_image out = picture(leaf_pixels[0], LEAF, LEAF, 4, TXM_U8);
-        const txm_status status = treepieces_draw_leaves(&s, 3, &env, out);
-        assert_int_equal(tk_leaks(&memory), 0);
-        if (memory.calls < k) {
-            assert_int_equal(status, TXM_OK);
-            break;
+        if (kind == 0) bad.pixels = NULL;
+        if (kind == 1) bad.width = 0;
+        if (kind == 2) bad.height = -3;
+        if (kind == 3) bad.channels = 3;
+        if (kind == 4) bad.channels = 1;
+        if (kind == 5) bad.sample = TXM_U16;
+        bad.width = kind == 5 ? 8 : bad.width;
+        assert_int_equal(treepieces_draw_leaves(kind == 6 ? NULL : &oak, 1, &env, bad),
+                         TXM_BAD_ARGUMENT);
+        assert_true(env.message[0] != 0);
+        assert_int_equal(memory.blocks, 0);
+        assert_true(hash_image(&good) == hash);
+    }
+    for (int kind = 0; kind < 2; kind++) { /* out of memory, cancelled */
+        for (long k = 1;; k++) {
+            tk_memory memory;
+            tk_progress progress;
+            memset(&memory, 0, sizeof memory);
+            memset(&progress, 0, sizeof progress);
+            if (kind) progress.cancel_at = k;
+            else memory.fail_at = k;
+            txm_env env = tk_env(&memory, &progress);
+            const txm_status status = treepieces_draw_leaves(&oak, 1, &env, good);
+            assert_int_equal(tk_leaks(&memory), 0);
+            assert_int_equal(progress.errors, 0);
+            assert_int_equal(progress.late, 0);
+            if ((kind ? progress.calls : memory.calls) < k) {
+                assert_int_equal(status, TXM_OK);
+                assert_true(k > 1);
+                break;
+            }
+            assert_int_equal(status, kind ? TXM_CANCELLED : TXM_OUT_OF_MEMORY);
         }
-        assert_int_equal(status, TXM_OUT_OF_MEMORY);
+    }
+    free(good.pixels);
+}
+
+/* ---- impostors --------------------------------------------------------------------------- */
+
+/* A view along forward: right is made level. */
+static void set_view(treepieces_impostor_desc *d, float x, float y, float z) {
+    const float length = sqrtf(x * x + y * y + z * z), level = sqrtf(x * x + z * z);
+    const float f[3] = {x / length, y / length, z / length};
+    d->right[0] = level > 0 ? -z / level : 1;
+    d->right[1] = 0;
+    d->right[2] = level > 0 ? x / level : 0;
+    for (int k = 0; k < 3; k++) {
+        const int a = (k + 1) % 3, b = (k + 2) % 3;
+        d->forward[k] = f[k];
+        d->up[k] = d->right[a] * f[b] - d->right[b] * f[a];
     }
 }
 
-static void test_clouds(void **state) {
-    (void)state;
-    static treepieces_card cards[256], again[256], other[256];
-    for (int preset = 0; preset < treepieces_preset_count(); preset++) {
-        const char *text = treepieces_preset_text(preset);
-        treepieces_species s;
-        assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &s), TXM_OK);
-        const int count = treepieces_cloud(&s, 7, cards);
-        assert_int_equal(count, s.leaf_count);
-        assert_int_equal(treepieces_cloud(&s, 7, NULL), count);
-        treepieces_cloud(&s, 7, again);
-        treepieces_cloud(&s, 8, other);
-        if (count) assert_memory_equal(cards, again, (size_t)count * sizeof *cards);
-        if (count) assert_true(memcmp(cards, other, (size_t)count * sizeof *cards) != 0);
-        for (int i = 0; i < count; i++) {
-            const treepieces_card *c = &cards[i];
-            assert_true(tpc_dot(c->center, c->center) <= 1.0001f);
-            assert_true(fabsf(tpc_dot(c->normal, c->normal) - 1) < 1e-3f);
-            assert_true(fabsf(tpc_dot(c->right, c->up)) < 1e-3f * tpc_dot(c->up, c->up) + 1e-6f);
-        }
-    }
-    assert_int_equal(treepieces_cloud(NULL, 0, NULL), 0);
-}
-
-/* ---- impostors ------------------------------------------------------------------------------ */
-
-static uint8_t seen[VIEW * VIEW * 4];
-static float depths[VIEW * VIEW];
-
-static treepieces_impostor_desc look(const treepieces_species *s, treepieces_card *cards, int back) {
+static treepieces_impostor_desc describe(const treepieces_card *cards, int count,
+                                         txm_image leaves) {
     treepieces_impostor_desc d;
-    const float turn = back ? -1.0f : 1.0f;
     memset(&d, 0, sizeof d);
-    d.leaves = picture(leaf_pixels[0], LEAF, LEAF, 4, TXM_U8);
-    assert_int_equal(treepieces_draw_leaves(s, 3, NULL, d.leaves), TXM_OK);
-    d.card_count = treepieces_cloud(s, 1, cards);
     d.cards = cards;
-    d.right[0] = 0.8f * turn;
-    d.right[2] = 0.6f * turn;
-    d.up[1] = 1;
-    d.forward[0] = 0.6f * turn;
-    d.forward[2] = -0.8f * turn;
-    d.light[1] = 1;
+    d.card_count = count;
+    d.leaves = leaves;
+    d.light[0] = 0.48f;
+    d.light[1] = 0.8f;
+    d.light[2] = 0.36f;
+    set_view(&d, 0, 0, -1);
     return d;
 }
 
-/* Each pixel against all cards, one after the other. */
-static void test_impostor(void **state) {
-    (void)state;
-    static treepieces_card cards[256];
-    static uint8_t front[VIEW * VIEW];
-    const treepieces_species s = species("beech");
-    const txm_image color = picture(seen, VIEW, VIEW, 4, TXM_U8);
-    const txm_image depth = picture(depths, VIEW, VIEW, 1, TXM_F32);
-    treepieces_impostor_desc d = look(&s, cards, 0);
-    assert_int_equal(treepieces_impostor(&d, NULL, color, depth), TXM_OK);
-    int covered = 0, wrong = 0;
-    for (int i = 0; i < VIEW * VIEW; i++) {
-        const double sx = (i % VIEW + 0.5) / (VIEW / 2) - 1, sy = 1 - (i / VIEW + 0.5) / (VIEW / 2);
-        double nearest = -2;
-        for (int k = 0; k < d.card_count; k++) {
-            double c[3], r[3], u[3];
-            const float *axes[3] = {d.right, d.up, d.forward};
-            for (int a = 0; a < 3; a++) {
-                c[a] = (double)tpc_dot(cards[k].center, axes[a]);
-                r[a] = (double)tpc_dot(cards[k].right, axes[a]);
-                u[a] = (double)tpc_dot(cards[k].up, axes[a]);
-            }
-            const double det = r[0] * u[1] - r[1] * u[0];
-            const double size = (double)tpc_dot(cards[k].right, cards[k].right) *
-                                (double)tpc_dot(cards[k].up, cards[k].up);
-            if (det * det <= 0.01 * size) continue; /* seen from the edge: not shown */
-            const double a = ((sx - c[0]) * u[1] - (sy - c[1]) * u[0]) / det;
-            const double b = (r[0] * (sy - c[1]) - r[1] * (sx - c[0])) / det;
-            if (fabs(a) >= 1 || fabs(b) >= 1) continue;
-            const int tx = (int)((0.5 + 0.5 * a) * LEAF), ty = (int)((0.5 - 0.5 * b) * LEAF);
-            const double z = -(c[2] + a * r[2] + b * u[2]);
-            if (leaf_pixels[0][4 * (ty * LEAF + tx) + 3] >= 128 && z > nearest) nearest = z;
-        }
-        const int is_there = seen[4 * i + 3] == 255;
-        assert_true(is_there || seen[4 * i + 3] == 0);
-        assert_true(is_there ? fabsf(depths[i]) <= 1.001f : depths[i] == -2);
-        covered += front[i] = (uint8_t)is_there;
-        wrong += (nearest > -2) != is_there || (is_there && fabs(nearest - (double)depths[i]) > 1e-3);
-    }
-    assert_true(covered > VIEW * VIEW / 10);
-    assert_true(wrong * 200 < VIEW * VIEW);
-    /* from behind the same outline, mirrored */
-    d = look(&s, cards, 1);
-    assert_int_equal(treepieces_impostor(&d, NULL, color, depth), TXM_OK);
-    wrong = 0;
-    for (int i = 0; i < VIEW * VIEW; i++)
-        wrong += (seen[4 * i + 3] == 255) != front[i / VIEW * VIEW + VIEW - 1 - i % VIEW];
-    assert_true(wrong * 100 < VIEW * VIEW);
-
-    for (int i = 0; i < 6; i++) {
-        treepieces_impostor_desc bad = d;
-        txm_image far = depth, to = color;
-        switch (i) {
-        case 0: bad.cards = NULL; break;
-        case 1: bad.right[0] = 2; break;
-        case 2: bad.forward[1] = (float)NAN; break;
-        case 3: far.width--; break;
-        case 4: to.channels = 3; break;
-        default: bad.leaves.pixels = NULL; break;
-        }
-        assert_int_equal(treepieces_impostor(&bad, NULL, to, far), TXM_BAD_ARGUMENT);
-    }
+static float depth_at(const txm_image *depth, int x, int y) {
+    return ((const float *)txm_image_row_const(depth, y))[x];
 }
 
-/* ---- cards ----------------------------------------------------------------------------------- */
+/* The texel where a ray meets a card, or NULL; *z: how far towards the eye. In three dimensions, by
+   doubles. */
+static const uint8_t *cast_ray(const treepieces_impostor_desc *d, const treepieces_card *card,
+                               double x, double y, double *z) {
+    double n[3], st[2], facing = 0, size = 0, away = 0;
+    for (int k = 0; k < 3; k++) {
+        const int a = (k + 1) % 3, b = (k + 2) % 3;
+        n[k] = (double)card->right[a] * (double)card->up[b] -
+               (double)card->right[b] * (double)card->up[a];
+        size += n[k] * n[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        n[k] /= sqrt(size);
+        facing += n[k] * (double)d->forward[k];
+        away += n[k] * ((double)card->center[k] - x * (double)d->right[k] - y * (double)d->up[k]);
+    }
+    if (fabs(facing) < 0.1) return NULL;
+    *z = -away / facing;
+    for (int side = 0; side < 2; side++) {
+        const float *v = side ? card->up : card->right;
+        double along = 0, square = 0;
+        for (int k = 0; k < 3; k++) {
+            const double p = x * (double)d->right[k] + y * (double)d->up[k] -
+                             *z * (double)d->forward[k];
+            along += (p - (double)card->center[k]) * (double)v[k];
+            square += (double)v[k] * (double)v[k];
+        }
+        st[side] = along / square;
+    }
+    if (fabs(st[0]) >= 1 || fabs(st[1]) >= 1) return NULL;
+    const uint8_t *texel = rgba(&d->leaves, (int)((st[0] + 1) / 2 * d->leaves.width),
+                                (int)((1 - st[1]) / 2 * d->leaves.height));
+    return texel[3] < 128 ? NULL : texel;
+}
 
-static void test_baked_leaves(void **state) {
+/* How light a card is, as the header says. */
+static double light_of(const treepieces_impostor_desc *d, const treepieces_card *card) {
+    double lit = 0, through = 0;
+    for (int k = 0; k < 3; k++) {
+        lit += (double)card->normal[k] * (double)d->light[k];
+        through += (double)d->forward[k] * (double)d->light[k];
+    }
+    lit = 0.35 + 0.65 * lit;
+    lit = lit < 0 ? 0 : lit > 1 ? 1 : lit;
+    return 0.7 + 0.6 * lit + 0.2 * (through > 0 ? through : 0);
+}
+
+static int agrees(const treepieces_impostor_desc *d, const txm_image *color,
+                  const txm_image *depth, int column, int row) {
+    const double x = (2 * column + 1.0) / color->width - 1;
+    const double y = 1 - (2 * row + 1.0) / color->height;
+    double best = -2, shade = 0;
+    const uint8_t *seen = NULL, *p = rgba(color, column, row);
+    for (int i = 0; i < d->card_count; i++) {
+        double z;
+        const uint8_t *texel = cast_ray(d, &d->cards[i], x, y, &z);
+        if (!texel || z <= best) continue;
+        best = z;
+        seen = texel;
+        const double square = x * x + y * y + z * z;
+        shade = light_of(d, &d->cards[i]) * (0.65 + 0.35 * (square < 1 ? square : 1));
+    }
+    if (!seen) return p[3] == 0;
+    if (p[3] != 255 || fabs((double)depth_at(depth, column, row) - best) > 1e-3) return 0;
+    for (int c = 0; c < 3; c++) {
+        const double lit = seen[c] * shade < 255 ? seen[c] * shade : 255;
+        if (fabs(p[c] - lit) > 1.01) return 0;
+    }
+    return 1;
+}
+
+static void test_impostor(void **state) {
     (void)state;
-    const treepieces_species s = species("birch");
-    treepieces_kit *kit;
-    treepieces_forest *f;
-    treepieces_mesh *m;
+    static const float views[][3] = {
+        {0, 0, -1}, {1, 0, 0}, {0.3f, -1, 0.2f}, {-1, 2, 3}, {0, -1, 0}};
+    treepieces_card cards[MOST_CARDS];
+    txm_image color = make_image(VIEW, VIEW, 4, TXM_U8), depth = make_image(VIEW, VIEW, 1, TXM_F32);
+    for (int i = 0; i < 5 * SHAPES; i++) {
+        const treepieces_species s = shaped(i / 5);
+        txm_image leaves = draw_shape(i / 5, 1);
+        treepieces_impostor_desc d =
+            describe(cards, treepieces_cloud(&s, (uint32_t)i, cards), leaves);
+        set_view(&d, views[i % 5][0], views[i % 5][1], views[i % 5][2]);
+        memset(color.pixels, 0x33, image_bytes(&color));
+        memset(depth.pixels, 0x33, image_bytes(&depth));
+        assert_int_equal(treepieces_impostor(&d, NULL, color, depth), TXM_OK);
+        long good = 0, covered = 0;
+        for (int y = 0; y < VIEW; y++)
+            for (int x = 0; x < VIEW; x++) {
+                const int alpha = rgba(&color, x, y)[3];
+                const float z = depth_at(&depth, x, y);
+                assert_true(alpha == 0 || alpha == 255);
+                assert_true(alpha ? z >= -1 && z <= 1 : z == -2);
+                covered += alpha == 255;
+                good += agrees(&d, &color, &depth, x, y);
+            }
+        assert_true(covered > VIEW * VIEW / 20);
+        assert_true((double)good >= 0.995 * VIEW * VIEW);
+        free(leaves.pixels);
+    }
+    free(color.pixels);
+    free(depth.pixels);
+}
+
+/* From the other side the silhouette is the mirror image. */
+static void test_impostor_behind(void **state) {
+    (void)state;
+    treepieces_card cards[MOST_CARDS];
+    txm_image color[2], depth[2], leaves = draw_shape(TREEPIECES_LEAF_LOBED, 1);
+    treepieces_impostor_desc d = describe(cards, treepieces_cloud(&oak, 7, cards), leaves);
+    for (int side = 0; side < 2; side++) {
+        color[side] = make_image(VIEW, VIEW, 4, TXM_U8);
+        depth[side] = make_image(VIEW, VIEW, 1, TXM_F32);
+        set_view(&d, side ? -0.4f : 0.4f, 0, side ? 0.7f : -0.7f);
+        assert_int_equal(treepieces_impostor(&d, NULL, color[side], depth[side]), TXM_OK);
+    }
+    long unlike = 0, inside_out = 0;
+    for (int i = 0; i < VIEW * VIEW; i++) {
+        const int x = i % VIEW, y = i / VIEW, mirrored = VIEW - 1 - x;
+        const int is_there = rgba(&color[0], x, y)[3] > 0;
+        unlike += is_there != (rgba(&color[1], mirrored, y)[3] > 0);
+        /* the nearest from behind lies no nearer to the front than the nearest from there */
+        inside_out += is_there && rgba(&color[1], mirrored, y)[3] > 0 &&
+                      -depth_at(&depth[1], mirrored, y) > depth_at(&depth[0], x, y) + 1e-3f;
+    }
+    assert_true(unlike <= VIEW * VIEW / 500);
+    assert_int_equal(inside_out, 0);
+    for (int side = 0; side < 2; side++) {
+        free(color[side].pixels);
+        free(depth[side].pixels);
+    }
+    free(leaves.pixels);
+}
+
+/* One card that faces the eye: where it lies, which way up, what hides what. */
+static void test_impostor_card(void **state) {
+    (void)state;
+    static const treepieces_card pair[2] = {
+        {{0.5f, 0.25f, 0.5f}, {0.25f, 0, 0}, {0, 0.25f, 0}, {0, 0, 1}},
+        {{0.5f, 0.25f, -0.5f}, {0.25f, 0, 0}, {0, 0.25f, 0}, {0, 0, 1}},
+    };
+    uint8_t texels[4][4] = {{200, 0, 0, 255}, {0, 200, 0, 255}, {0, 0, 200, 128}, {9, 9, 9, 127}};
+    txm_image leaves, color = make_image(16, 8, 4, TXM_U8), depth = make_image(16, 8, 1, TXM_F32);
+    memset(&leaves, 0, sizeof leaves);
+    leaves.pixels = texels;
+    leaves.width = leaves.height = 2;
+    leaves.channels = 4;
+    treepieces_impostor_desc d = describe(pair, 2, leaves);
+    assert_int_equal(treepieces_impostor(&d, NULL, color, depth), TXM_OK);
+    for (int y = 0; y < 8; y++)
+        for (int x = 0; x < 16; x++) { /* it covers 0.25..0.75 by 0..0.5 of -1..1 */
+            const uint8_t *p = rgba(&color, x, y);
+            const int column = x < 10 || x > 13 ? -1 : (x - 10) / 2;
+            const int row = y < 2 || y > 3 ? -1 : y - 2;
+            const int is_there = column >= 0 && row >= 0 && column + row < 2;
+            assert_int_equal(p[3], is_there ? 255 : 0);
+            assert_true(depth_at(&depth, x, y) == (is_there ? 0.5f : -2.0f));
+            for (int c = 0; c < 3; c++)
+                assert_int_equal(p[c] > 0, is_there && c == column + 2 * row);
+        }
+    d.card_count = 0; /* an empty cloud is an empty picture */
+    d.cards = NULL;
+    assert_int_equal(treepieces_impostor(&d, NULL, color, depth), TXM_OK);
+    for (int i = 0; i < 128; i++) {
+        assert_int_equal(rgba(&color, i % 16, i / 16)[3], 0);
+        assert_true(depth_at(&depth, i % 16, i / 16) == -2);
+    }
+    free(color.pixels);
+    free(depth.pixels);
+}
+
+static void test_impostor_refusals(void **state) {
+    (void)state;
+    treepieces_card cards[MOST_CARDS];
+    txm_image leaves = draw_shape(0, 1), color = make_image(8, 8, 4, TXM_U8);
+    txm_image depth = make_image(8, 8, 1, TXM_F32);
+    const treepieces_impostor_desc good = describe(cards, treepieces_cloud(&oak, 0, cards), leaves);
+    for (int kind = 0; kind < 13; kind++) {
+        treepieces_impostor_desc d = good;
+        txm_image c = color, z = depth;
+        txm_env env = tk_env(NULL, NULL);
+        if (kind == 0) d.cards = NULL;
+        if (kind == 1) d.card_count = -1;
+        if (kind == 2) d.leaves.pixels = NULL;
+        if (kind == 3) d.leaves.channels = 3;
+        if (kind == 4) c.channels = 3;
+        if (kind == 5) c.sample = TXM_U16;
+        if (kind == 6) z.sample = TXM_U8;
+        if (kind == 7) z.width = 7;
+        if (kind == 8) d.right[0] = 0.5f;
+        if (kind == 9) memcpy(d.up, d.right, sizeof d.up);
+        if (kind == 10) d.light[1] = (float)NAN;
+        if (kind == 11) c.width = 0;
+        assert_int_equal(treepieces_impostor(kind == 12 ? NULL : &d, &env, c, z), TXM_BAD_ARGUMENT);
+        assert_true(env.message[0] != 0);
+        assert_int_equal(rgba(&color, 4, 4)[3], 0);
+    }
+    /* cards of anything else are simply not seen */
+    for (int k = 0; k < good.card_count; k++) {
+        cards[k].center[k % 3] = k & 1 ? (float)NAN : (float)INFINITY;
+        if (k & 2) cards[k].right[k % 3] = 1e38f;
+    }
+    assert_int_equal(treepieces_impostor(&good, NULL, color, depth), TXM_OK);
+    free(leaves.pixels);
+    free(color.pixels);
+    free(depth.pixels);
+}
+
+/* ---- baked cards ------------------------------------------------------------------------- */
+
+typedef struct grown {
+    treepieces_forest *forest;
+    float *bones;
+} grown;
+
+static grown grow(const treepieces_species *species) {
+    grown g;
     treepieces_forest_desc d;
-    assert_int_equal(treepieces_kit_make(NULL, 0, NULL, &kit), TXM_OK);
+    const treepieces_pose pose = {4, 0.1f, NULL};
+    txm_env env = tk_env(NULL, NULL);
     memset(&d, 0, sizeof d);
     d.kit = kit;
-    d.species = &s;
+    d.species = species;
     d.species_count = 1;
     d.tree_count = 3;
-    d.max_pieces = 120;
-    assert_int_equal(treepieces_forest_make(&d, NULL, &f), TXM_OK);
-    float *bones = (float *)malloc(f->node_count * TREEPIECES_BONE * sizeof(float));
-    assert_non_null(bones);
-    assert_int_equal(treepieces_bones(f, NULL, NULL, bones), TXM_OK);
-    for (int tree = 0; tree < 3; tree++) {
-        const treepieces_tree *t = &f->trees[tree];
-        assert_true(t->cluster_count > 0);
-        assert_int_equal(treepieces_bake_leaves(f, tree, bones, 4, NULL, &m), TXM_OK);
-        const size_t cards = (size_t)t->cluster_count * (size_t)s.leaf_count;
-        assert_int_equal(m->vertex_count, 4 * cards);
-        assert_int_equal(m->triangle_count, 2 * cards);
-        for (size_t v = 0; v < m->vertex_count; v++) {
-            assert_true(m->joints[4 * v] < t->node_count && m->weights[4 * v] == 1);
-            float far = 1e9f; /* every card lies in a cloud of its joint */
-            for (uint32_t i = 0; i < t->cluster_count; i++) {
-                const treepieces_cluster *c = &f->clusters[t->first_cluster + i];
-                const float *b = bones + TREEPIECES_BONE * (size_t)c->node;
-                float off[3];
-                if (c->node - t->first_node != m->joints[4 * v]) continue;
-                for (int k = 0; k < 3; k++)
-                    off[k] = m->positions[3 * v + (size_t)k] - (b[4 * k + 3] + c->along * b[4 * k + 1]);
-                far = txm_minf(far, sqrtf(tpc_dot(off, off)) / c->radius);
-            }
-            assert_true(far <= 1.01f);
+    d.max_pieces = 200;
+    d.seed = 5;
+    if (treepieces_forest_make(&d, &env, &g.forest) != TXM_OK) fail_msg("%s", env.message);
+    g.bones = (float *)room(g.forest->node_count, TREEPIECES_BONE * sizeof(float));
+    assert_int_equal(treepieces_bones(g.forest, &pose, NULL, g.bones), TXM_OK);
+    return g;
+}
+
+static void free_grown(grown *g) {
+    treepieces_forest_free(g->forest);
+    free(g->bones);
+}
+
+/* Card `card` of the cluster, as vertices 4 i.. of the mesh. */
+static void check_baked(const grown *g, const treepieces_tree *tree,
+                        const treepieces_cluster *cluster, const treepieces_card *card,
+                        const treepieces_mesh *m, size_t i) {
+    const float *bone = g->bones + TREEPIECES_BONE * (size_t)cluster->node;
+    int seen = 0;
+    for (size_t v = 4 * i; v < 4 * i + 4; v++) {
+        assert_int_equal(m->joints[4 * v], cluster->node - tree->first_node);
+        assert_true(m->weights[4 * v] == 1);
+        for (size_t k = 1; k < 4; k++) assert_true(m->weights[4 * v + k] == 0);
+        for (size_t k = 1; k < 4; k++) assert_int_equal(m->joints[4 * v + k], 0);
+        assert_memory_equal(m->normals + 3 * v, card->normal, sizeof card->normal);
+    }
+    for (size_t c = 6 * i; c < 6 * i + 6; c++) { /* where the picture's corner says */
+        const float s = 2 * m->uvs[2 * c] - 1, t = 1 - 2 * m->uvs[2 * c + 1];
+        const uint32_t v = m->indices[c];
+        assert_true(fabsf(s) == 1 && fabsf(t) == 1);
+        assert_true(v / 4 == i);
+        seen |= 1 << (v % 4);
+        for (int a = 0; a < 3; a++) {
+            const float center = bone[4 * a + 3] + cluster->along * bone[4 * a + 1];
+            const float off = card->center[a] + s * card->right[a] + t * card->up[a];
+            assert_true(fabsf(m->positions[3 * v + (uint32_t)a] - center - cluster->radius * off) <
+                        1e-4f * (1 + fabsf(center)));
         }
-        for (size_t i = 0; i < 3 * m->triangle_count; i++) {
-            assert_true(m->indices[i] < m->vertex_count);
-            assert_true(m->uvs[2 * i] >= 0 && m->uvs[2 * i + 1] <= 1);
+    }
+    assert_int_equal(seen, 15);
+}
+
+static void test_bake_leaves(void **state) {
+    (void)state;
+    static const int looks[] = {1, 5, 64};
+    treepieces_card cards[MOST_CARDS];
+    grown g = grow(&oak);
+    for (int tree = 0; tree < 3; tree++) {
+        const treepieces_tree *t = &g.forest->trees[tree];
+        treepieces_mesh *m;
+        assert_true(t->cluster_count > 0);
+        assert_int_equal(treepieces_bake_leaves(g.forest, tree, g.bones, looks[tree], NULL, &m),
+                         TXM_OK);
+        assert_int_equal(m->vertex_count, 4 * (size_t)oak.leaf_count * t->cluster_count);
+        assert_int_equal(m->triangle_count, 2 * (size_t)oak.leaf_count * t->cluster_count);
+        for (uint32_t i = 0; i < t->cluster_count; i++) {
+            const treepieces_cluster *cluster = &g.forest->clusters[t->first_cluster + i];
+            const int count =
+                treepieces_cloud(&oak, cluster->look % (uint32_t)looks[tree], cards);
+            for (int k = 0; k < count; k++)
+                check_baked(&g, t, cluster, &cards[k], m, (size_t)i * (size_t)count + (size_t)k);
         }
         treepieces_mesh_free(m);
     }
-    for (long k = 1;; k++) {
-        tk_memory memory;
-        memset(&memory, 0, sizeof memory);
-        memory.fail_at = k;
-        txm_env env = tk_env(&memory, NULL);
-        const txm_status status = treepieces_bake_leaves(f, 0, bones, 4, &env, &m);
-        if (memory.calls < k) {
-            assert_int_equal(status, TXM_OK);
-            treepieces_mesh_free(m);
+    free_grown(&g);
+    treepieces_species bare = oak;
+    treepieces_mesh *m;
+    bare.leaf_count = 0;
+    g = grow(&bare);
+    assert_int_equal(treepieces_bake_leaves(g.forest, 1, g.bones, 4, NULL, &m), TXM_OK);
+    assert_int_equal(m->triangle_count, 0);
+    assert_int_equal(m->vertex_count, 0);
+    treepieces_mesh_free(m);
+    free_grown(&g);
+}
+
+static void test_bake_leaves_faults(void **state) {
+    (void)state;
+    grown g = grow(&oak);
+    for (int onward = 0; onward < 2; onward++) {
+        for (long k = 1;; k++) {
+            tk_memory memory;
+            treepieces_mesh *m = (treepieces_mesh *)1;
+            memset(&memory, 0, sizeof memory);
+            memory.fail_at = k;
+            memory.fail_onward = onward;
+            txm_env env = tk_env(&memory, NULL);
+            const txm_status status = treepieces_bake_leaves(g.forest, 0, g.bones, 8, &env, &m);
+            if (memory.calls < k) {
+                assert_int_equal(status, TXM_OK);
+                treepieces_mesh_free(m);
+                assert_int_equal(tk_leaks(&memory), 0);
+                assert_true(k > 2);
+                break;
+            }
+            assert_int_equal(status, TXM_OUT_OF_MEMORY);
+            assert_null(m);
             assert_int_equal(tk_leaks(&memory), 0);
-            break;
         }
-        assert_int_equal(status, TXM_OUT_OF_MEMORY);
-        assert_null(m);
-        assert_int_equal(tk_leaks(&memory), 0);
     }
-    assert_int_equal(treepieces_bake_leaves(f, 3, bones, 4, NULL, &m), TXM_BAD_ARGUMENT);
-    assert_int_equal(treepieces_bake_leaves(f, 0, NULL, 4, NULL, &m), TXM_BAD_ARGUMENT);
-    assert_int_equal(treepieces_bake_leaves(f, 0, bones, 0, NULL, &m), TXM_BAD_ARGUMENT);
-    free(bones);
-    treepieces_forest_free(f);
-    treepieces_kit_free(kit);
+    for (int kind = 0; kind < 7; kind++) {
+        treepieces_mesh *m = (treepieces_mesh *)1;
+        txm_env env = tk_env(NULL, NULL);
+        assert_int_equal(
+            treepieces_bake_leaves(kind == 0 ? NULL : g.forest, kind == 1 ? -1 : kind == 2 ? 3 : 0,
+                                   kind == 3 ? NULL : g.bones, kind == 4 ? 0 : kind == 5 ? 65 : 8,
+                                   &env, kind == 6 ? NULL : &m),
+            TXM_BAD_ARGUMENT);
+        assert_true(env.message[0] != 0);
+        if (kind < 6) assert_null(m);
+    }
+    free_grown(&g);
+}
+
+/* ---- bark -------------------------------------------------------------------------------- */
+
+enum { TILES = 6, TILE = 32, SHEET = TREEPIECES_SHEET * TILE };
+
+static void draw_tiles(txm_image *tiles, int count, const char *species, int channels,
+                       txm_sample sample) {
+    treepieces_species s;
+    assert_int_equal(treepieces_preset(species, NULL, &s), TXM_OK);
+    for (int i = 0; i < count; i++) tiles[i] = make_image(TILE, TILE, channels, sample);
+    assert_int_equal(treepieces_draw_bark(&s, 3, NULL, tiles, count), TXM_OK);
+}
+
+static void free_tiles(txm_image *tiles, int count) {
+    for (int i = 0; i < count; i++) free(tiles[i].pixels);
+}
+
+static txm_image make_sheet(const txm_image *tiles, int count, const int *classes, uint64_t seed) {
+    treepieces_bark_desc d;
+    memset(&d, 0, sizeof d);
+    d.tiles = tiles;
+    d.classes = classes;
+    d.tile_count = count;
+    d.seed = seed;
+    txm_image sheet = make_image(SHEET, SHEET * treepieces_bark_layers(&d), tiles[0].channels,
+                                 tiles[0].sample);
+    assert_int_equal(treepieces_bark(&d, NULL, sheet), TXM_OK);
+    return sheet;
+}
+
+static float at(const txm_image *image, int x, int y, int c) {
+    return txm_image_get(image, x, y, c);
+}
+
+/* All tiles have the same border, and their insides differ; the same again for the same seed. */
+static void test_draw_bark(void **state) {
+    (void)state;
+    static const char *const names[] = {"oak", "birch"};
+    for (int i = 0; i < 2; i++) {
+        txm_image tiles[TILES], again[TILES];
+        draw_tiles(tiles, TILES, names[i], 3, TXM_U8);
+        draw_tiles(again, TILES, names[i], 3, TXM_U8);
+        for (int t = 0; t < TILES; t++) {
+            assert_true(hash_image(&tiles[t]) == hash_image(&again[t]));
+            for (int other = 0; other < t; other++)
+                assert_true(hash_image(&tiles[t]) != hash_image(&tiles[other]));
+            for (int k = 0; k < TILE * 3; k++) {
+                const int last = TILE - 1, a = k / 3, c = k % 3;
+                assert_true(at(&tiles[t], a, 0, c) == at(&tiles[0], a, 0, c));
+                assert_true(at(&tiles[t], a, last, c) == at(&tiles[0], a, last, c));
+                assert_true(at(&tiles[t], 0, a, c) == at(&tiles[0], 0, a, c));
+                assert_true(at(&tiles[t], last, a, c) == at(&tiles[0], last, a, c));
+            }
+        }
+        free_tiles(tiles, TILES);
+        free_tiles(again, TILES);
+    }
+}
+
+/* Root mean square difference between two lines of a sheet, rows or columns. */
+static double line_difference(const txm_image *sheet, int a, int b, int is_column) {
+    double sum = 0;
+    for (int k = 0; k < SHEET; k++)
+        for (int c = 0; c < 3; c++) {
+            const double d = is_column ? (double)(at(sheet, a, k, c) - at(sheet, b, k, c))
+                                       : (double)(at(sheet, k, a, c) - at(sheet, k, b, c));
+            sum += d * d;
+        }
+    return sqrt(sum / (3 * SHEET));
+}
+
+/* Layer 0 goes on without end: no seam between tiles, nor round the sheet, is more than what lies
+   side by side anyhow. */
+static void test_bark_plain(void **state) {
+    (void)state;
+    txm_image tiles[TILES];
+    draw_tiles(tiles, TILES, "oak", 3, TXM_F32);
+    txm_image sheet = make_sheet(tiles, TILES, NULL, 1);
+    assert_int_equal(sheet.height, TREEPIECES_OWN * SHEET);
+    for (int is_column = 0; is_column < 2; is_column++) {
+        double inside = 0, most = 0;
+        for (int k = 0; k < SHEET; k++) {
+            const double d = line_difference(&sheet, k, (k + 1) % SHEET, is_column);
+            if (k % TILE != TILE - 1) inside = d > inside ? d : inside;
+            else most = d > most ? d : most;
+        }
+        assert_true(most < 1.1 * inside);
+    }
+    long first = 0; /* every place shows one of the tiles */
+    for (int cell = 0; cell < 64; cell++) {
+        const int x = cell % 8 * TILE, y = cell / 8 * TILE;
+        int found = -1;
+        for (int t = 0; t < TILES && found < 0; t++) {
+            int same = 1;
+            for (int k = 0; k < TILE * TILE && same; k++)
+                same = at(&sheet, x + k % TILE, y + k / TILE, 0) ==
+                       at(&tiles[t], k % TILE, k / TILE, 0);
+            if (same) found = t;
+        }
+        assert_true(found >= 0);
+        first += found == 0;
+    }
+    assert_in_range(first, 1, 40);
+    txm_image again = make_sheet(tiles, TILES, NULL, 1), other = make_sheet(tiles, TILES, NULL, 2);
+    assert_true(hash_image(&again) == hash_image(&sheet));
+    assert_true(hash_image(&other) != hash_image(&sheet));
+    free(again.pixels);
+    free(other.pixels);
+    free(sheet.pixels);
+    free_tiles(tiles, TILES);
+}
+
+/* The lowest row of pixels of the layers that are blended. */
+static void test_bark_layers(void **state) {
+    (void)state;
+    txm_image tiles[TILES];
+    draw_tiles(tiles, TILES, "oak", 3, TXM_F32);
+    txm_image sheet = make_sheet(tiles, TILES, NULL, 4);
+    const int fold = (TREEPIECES_FOLD + 1) * SHEET - 1;
+    const int left = (TREEPIECES_TURN_LEFT + 1) * SHEET - 1;
+    const int right = (TREEPIECES_TURN_RIGHT + 1) * SHEET - 1;
+    for (int k = 0; k < 3 * SHEET; k++) {
+        const int x = k / 3, c = k % 3, u = x % TILE, last = TILE - 1;
+        /* two folded quads lie head to head: what one has at x the other has at the mirrored place,
+           whichever cells they show, as all tiles have one frame */
+        for (int cell = 0; cell < 8; cell++)
+            assert_true(fabsf(at(&sheet, x, fold, c) -
+                              at(&sheet, cell * TILE + last - u, fold, c)) < 1e-5f);
+        /* beyond the east side of a plain quad comes the west side of any, downwards */
+        assert_true(fabsf(at(&sheet, x, left, c) - at(&tiles[0], 0, u, c)) < 1e-5f);
+        /* beyond its west side the east side, upwards */
+        assert_true(fabsf(at(&sheet, x, right, c) - at(&tiles[0], last, last - u, c)) < 1e-5f);
+    }
+    for (int layer = TREEPIECES_FOLD; layer <= TREEPIECES_HALVING; layer++)
+        for (int k = 0; k < 3 * SHEET; k++) { /* they join plain bark to the north */
+            const int x = k / 3, c = k % 3, top = layer * SHEET + SHEET - TILE;
+            assert_true(fabsf(at(&sheet, x, top, c) - at(&tiles[0], x % TILE, 0, c)) < 0.005f);
+        }
+    free(sheet.pixels);
+    free_tiles(tiles, TILES);
+}
+
+/* A halving cell ends in two tiles of half the size, each half a pixel of the next. */
+static void test_bark_halving(void **state) {
+    (void)state;
+    txm_image tile;
+    draw_tiles(&tile, 1, "oak", 3, TXM_F32);
+    txm_image sheet = make_sheet(&tile, 1, NULL, 4);
+    const int bottom = (TREEPIECES_HALVING + 1) * SHEET - 1;
+    for (int k = 0; k < 3 * SHEET; k++) {
+        const int x = k / 3, c = k % 3, u = 2 * (x % TILE) % TILE;
+        float sum = 0;
+        for (int p = 0; p < 4; p++) sum += at(&tile, u + (p & 1), TILE - 2 + (p >> 1), c);
+        assert_true(fabsf(at(&sheet, x, bottom, c) - sum / 4) < 1e-5f);
+    }
+    free(sheet.pixels);
+    free_tiles(&tile, 1);
+}
+
+/* Own classes: their tiles whole, in the middle of 2 x 2 cells, where quads look for them. */
+static void test_bark_own(void **state) {
+    (void)state;
+    static const int classes[TILES] = {0, 0, 0, 5, 7, 0};
+    txm_image tiles[TILES];
+    draw_tiles(tiles, TILES, "oak", 4, TXM_U8);
+    txm_image sheet = make_sheet(tiles, TILES, classes, 4);
+    assert_int_equal(sheet.height, 8 * SHEET);
+    for (int i = 0; i < 16; i++) {
+        treepieces_quad quad;
+        float nw[2], se[2];
+        memset(&quad, 0, sizeof quad);
+        quad.tile_class = i & 1 ? 7 : 5;
+        const int cell = i % 4 * 2 + i / 4 * 16, t = i & 1 ? 4 : 3;
+        assert_int_equal(treepieces_quad_uv(&quad, 0, cell, SHEET, 0, nw), quad.tile_class);
+        assert_int_equal(treepieces_quad_uv(&quad, 0, cell, SHEET, 2, se), quad.tile_class);
+        const int x = (int)(nw[0] * SHEET + 0.5f), y = (int)(nw[1] * SHEET);
+        assert_true(fabsf((se[0] - nw[0]) * SHEET - TILE) < 1.01f);
+        for (int row = 0; row < TILE; row++)
+            assert_memory_equal(rgba(&sheet, x, quad.tile_class * SHEET + y + row),
+                                rgba(&tiles[t], 0, row), 4 * TILE);
+    }
+    free(sheet.pixels);
+    free_tiles(tiles, TILES);
+}
+
+static void test_bark_refusals(void **state) {
+    (void)state;
+    static const int no_plain[TILES] = {5, 5, 5, 5, 5, 5}, odd[TILES] = {0, 1, 0, 0, 0, 0};
+    static const int too_high[TILES] = {0, 64, 0, 0, 0, 0};
+    txm_image tiles[TILES], sheet = make_image(SHEET, 5 * SHEET, 3, TXM_U8);
+    draw_tiles(tiles, TILES, "oak", 3, TXM_U8);
+    const uint64_t hash = hash_image(&sheet);
+    for (int kind = 0; kind < 13; kind++) {
+        txm_image bad[TILES], out = sheet;
+        treepieces_bark_desc d;
+        txm_env env = tk_env(NULL, NULL);
+        memset(&d, 0, sizeof d);
+        memcpy(bad, tiles, sizeof bad);
+        d.tiles = bad;
+        d.tile_count = TILES;
+        if (kind == 0) d.tiles = NULL;
+        if (kind == 1) d.tile_count = 0;
+        if (kind == 2) bad[2].pixels = NULL;
+        if (kind == 3) bad[2].height--;
+        if (kind == 4) bad[2].width = bad[2].height = TILE / 2;
+        if (kind == 5) bad[2].channels = 1;
+        if (kind == 6) d.classes = no_plain;
+        if (kind == 7) d.classes = odd;
+        if (kind == 8) d.classes = too_high;
+        if (kind == 9) out.height -= TILE;
+        if (kind == 10) out.channels = 1;
+        if (kind == 11) out.pixels = NULL;
+        assert_int_equal(treepieces_bark(kind == 12 ? NULL : &d, &env, out), TXM_BAD_ARGUMENT);
+        assert_true(env.message[0] != 0);
+        assert_true(hash_image(&sheet) == hash);
+    }
+    for (int kind = 0; kind < 4; kind++) {
+        txm_image bad = tiles[0];
+        txm_env env = tk_env(NULL, NULL);
+        if (kind == 0) bad.height--;
+        if (kind == 1) bad.channels = 1;
+        assert_int_equal(treepieces_draw_bark(kind == 2 ? NULL : &oak, 1, &env, &bad, kind != 3),
+                         TXM_BAD_ARGUMENT);
+        assert_true(env.message[0] != 0);
+    }
+    free(sheet.pixels);
+    free_tiles(tiles, TILES);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sheet),    cmocka_unit_test(test_sheet_refuses),
-        cmocka_unit_test(test_drawn_bark), cmocka_unit_test(test_leaves),
-        cmocka_unit_test(test_clouds),   cmocka_unit_test(test_impostor),
-        cmocka_unit_test(test_baked_leaves),
+        cmocka_unit_test(test_cloud),           cmocka_unit_test(test_looks),
+        cmocka_unit_test(test_cloud_spread),    cmocka_unit_test(test_leaves),
+        cmocka_unit_test(test_leaves_repeat),   cmocka_unit_test(test_leaves_sizes),
+        cmocka_unit_test(test_leaves_refusals), cmocka_unit_test(test_impostor),
+        cmocka_unit_test(test_impostor_behind), cmocka_unit_test(test_impostor_card),
+        cmocka_unit_test(test_impostor_refusals), cmocka_unit_test(test_bake_leaves),
+        cmocka_unit_test(test_bake_leaves_faults), cmocka_unit_test(test_draw_bark),
+        cmocka_unit_test(test_bark_plain),      cmocka_unit_test(test_bark_layers),
+        cmocka_unit_test(test_bark_halving),    cmocka_unit_test(test_bark_own),
+        cmocka_unit_test(test_bark_refusals),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -184,7 +184,7 @@ static float extent_of(const mesh_data *m) {
 /* A sphere for each point, in one mesh. */
 static int make_spheres(const mesh_data *points, float radius, mesh_data *spheres) {
     mesh_data one;
-    mesh_instances copies = {&one, points->vertex_count, points->positions, NULL, NULL};
+    mesh_instances copies = {&one, points->vertex_count, points->positions, NULL, NULL, NULL, NULL, NULL};
     const char *why;
     if (!mesh_sphere(3, &one)) return 0;
     for (size_t i = 0; i < 3 * one.vertex_count; i++) one.positions[i] *= radius;
@@ -216,7 +216,7 @@ static int draw(options *o, mesh_data *mesh, mesh_data *points, mesh_data *spher
                 txm_image *texture, txm_image *picture) {
     static const float nowhere[3] = {0, 0, 0};
     mesh_scene scene = {0};
-    mesh_instances copy = {spheres, 1, nowhere, NULL, NULL};
+    mesh_instances copy = {spheres, 1, nowhere, NULL, NULL, NULL, NULL, NULL};
     const char *why = "out of memory";
     if (!mesh_read(o->mesh, 1, mesh, &why)) return fail(o->mesh, why);
     if (o->points && !mesh_read(o->points, 1, points, &why)) return fail(o->points, why);
