@@ -184,7 +184,8 @@ static float extent_of(const mesh_data *m) {
 /* A sphere for each point, in one mesh. */
 static int make_spheres(const mesh_data *points, float radius, mesh_data *spheres) {
     mesh_data one;
-    mesh_instances copies = {&one, points->vertex_count, points->positions, NULL, NULL, NULL, NULL, NULL};
+    mesh_instances copies = {&one, points->vertex_count, points->positions,
+                             NULL, NULL, NULL, NULL, NULL};
     const char *why;
     if (!mesh_sphere(3, &one)) return 0;
     for (size_t i = 0; i < 3 * one.vertex_count; i++) one.positions[i] *= radius;
