@@ -717,6 +717,17 @@ static float tpc_dot(const float a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+static void tpc_cross(const float a[3], const float b[3], float out[3]) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void tpc_unit(float v[3]) {
+    const float length = sqrtf(tpc_dot(v, v));
+    for (int k = 0; k < 3; k++) v[k] /= length;
+}
+
 /* ---- the canonical rim ------------------------------------------------------------------- */
 
 /* cos and sin of 60 k degrees */
@@ -747,6 +758,19 @@ static void tpc_turn(int k, const float v[3], float out[3]) {
 static void tpc_building_point(const treepieces_similarity *b, const float p[3], float out[3]) {
     tpc_rotate(b->rotation, p, out);
     for (int i = 0; i < 3; i++) out[i] = b->translation[i] + b->scale * out[i];
+}
+
+/* Place j of a leaf rim in the piece's model space. */
+static void tpc_leaf_vertex(const treepieces_similarity *b, int place, float position[3],
+                            float normal[3]) {
+    tpc_rim_vertex(place, position, normal);
+    tpc_building_point(b, position, position);
+    tpc_rotate(b->rotation, normal, normal);
+}
+
+/* The vertex numbers of leaf rim k, of the root rim for k = -1. */
+static const int *tpc_rim_of(const treepieces_piece *p, int k) {
+    return k < 0 ? p->root_rim : p->leaf_rims[k];
 }
 
 /* ---- the kit ----------------------------------------------------------------------------- */
@@ -817,13 +841,23 @@ static void tpc_begin(tpc_shape *s, const char *name) {
     tpc_add_ring(s, 0, 1, 1, 1, 0, s->piece.root_rim);
 }
 
-/* A leaf rim at `at`, its axis leaning by `lean` degrees towards azimuth `turn` (degrees about y from
+/* The vertices of the leaf rim behind the last one, whose building transform is there. */
+static const int *tpc_add_rim(tpc_shape *s) {
+    treepieces_piece *p = &s->piece;
+    const int k = p->leaf_count++;
+    for (int j = 0; j < TREEPIECES_RIM; j++) {
+        float at[3], normal[3];
+        tpc_leaf_vertex(&p->building[k], j, at, normal);
+        p->leaf_rims[k][j] = tpc_add_vertex(s, at[0], at[1], at[2], 0, 1 << k);
+    }
+    return p->leaf_rims[k];
+}
+
+/* A leaf rim at (x, y, z), its axis leaning by `lean` degrees towards azimuth `turn` (degrees about y from
    +x to -z) and its place 0 on that azimuth. */
 static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double turn, double lean,
                                float scale) {
-    treepieces_piece *p = &s->piece;
-    const int k = p->leaf_count++;
-    treepieces_similarity *b = &p->building[k];
+    treepieces_similarity *b = &s->piece.building[s->piece.leaf_count];
     const double degree = TXM_PI / 180;
     double st, ct, sl, cl;
     tpc_sincos(turn * degree / 2, &st, &ct);
@@ -836,14 +870,7 @@ static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double t
     b->rotation[2] = txm_float(-ct * sl);
     b->rotation[3] = txm_float(ct * cl);
     b->scale = scale;
-    for (int j = 0; j < TREEPIECES_RIM; j++) {
-        float position[3], normal[3];
-        tpc_rim_vertex(j, position, normal);
-        tpc_building_point(b, position, position);
-        p->leaf_rims[k][j] =
-            tpc_add_vertex(s, position[0], position[1], position[2], 0, 1 << k);
-    }
-    return p->leaf_rims[k];
+    return tpc_add_rim(s);
 }
 
 static void tpc_add_quad(tpc_shape *s, int nw, int sw, int se, int ne, treepieces_class c,
@@ -895,20 +922,14 @@ static void tpc_make_y(tpc_shape *s) {
     for (int arm = 0; arm < 2; arm++) {
         const float to = arm ? 1.0f : -1.0f;
         double sine, cosine;
-        const int k = s->piece.leaf_count++;
-        treepieces_similarity *b = &s->piece.building[k];
+        treepieces_similarity *b = &s->piece.building[arm];
         tpc_sincos(13 * TXM_PI / 180, &sine, &cosine);
         b->translation[1] = 1.3f;
         b->translation[2] = 0.7f * to;
         b->rotation[0] = txm_float(to * sine);
         b->rotation[3] = txm_float(cosine);
         b->scale = 0.75f;
-        for (int j = 0; j < TREEPIECES_RIM; j++) {
-            float p[3], n[3];
-            tpc_rim_vertex(j, p, n);
-            tpc_building_point(b, p, p);
-            s->piece.leaf_rims[k][j] = tpc_add_vertex(s, p[0], p[1], p[2], 0, 1 << k);
-        }
+        tpc_add_rim(s);
     }
     const int loop0[TREEPIECES_RIM] = {a[0], a[1], a[2], a[3], m2, m1};
     const int loop1[TREEPIECES_RIM] = {a[0], m1, m2, a[3], a[4], a[5]};
@@ -1003,21 +1024,19 @@ static void tpc_smooth(tpc_shape *s) {
     for (int i = 0; i < s->piece.quad_count; i++) {
         const uint8_t *c = s->quads[i].corners;
         const float *p[4];
-        float d[2][3];
+        float d[2][3], normal[3];
         for (int k = 0; k < 4; k++) p[k] = s->vertices[c[k]].position;
         for (int k = 0; k < 3; k++) {
             d[0][k] = p[2][k] - p[0][k];
             d[1][k] = p[3][k] - p[1][k];
         }
-        for (int k = 0; k < 4; k++) {
-            sums[c[k]][0] += d[0][1] * d[1][2] - d[0][2] * d[1][1];
-            sums[c[k]][1] += d[0][2] * d[1][0] - d[0][0] * d[1][2];
-            sums[c[k]][2] += d[0][0] * d[1][1] - d[0][1] * d[1][0];
-        }
+        tpc_cross(d[0], d[1], normal);
+        for (int k = 0; k < 4; k++)
+            for (int a = 0; a < 3; a++) sums[c[k]][a] += normal[a];
     }
     for (int i = 0; i < s->piece.vertex_count; i++) {
-        const float length = sqrtf(tpc_dot(sums[i], sums[i]));
-        for (int k = 0; k < 3; k++) s->vertices[i].normal[k] = sums[i][k] / length;
+        tpc_unit(sums[i]);
+        memcpy(s->vertices[i].normal, sums[i], sizeof sums[i]);
     }
     s->piece.vertices = s->vertices;
     s->piece.quads = s->quads;
@@ -1034,14 +1053,6 @@ static void tpc_make_builtin(int type, tpc_shape *s) {
     default: tpc_make_flare(s); break;
     }
     tpc_smooth(s);
-    const treepieces_piece *p = &s->piece;
-    for (int j = 0; j < TREEPIECES_RIM; j++) {
-        float position[3], normal[3];
-        tpc_rim_vertex(j, position, normal);
-        memcpy(s->vertices[p->root_rim[j]].normal, normal, sizeof normal);
-        for (int k = 0; k < p->leaf_count; k++)
-            tpc_rotate(p->building[k].rotation, normal, s->vertices[p->leaf_rims[k][j]].normal);
-    }
 }
 
 /* ---- what a piece must be ---------------------------------------------------------------- */
@@ -1087,7 +1098,7 @@ static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_en
             return tpc_refuse(env, p, index, "quad", i, "tile_class must be 0 to 3 or 5 to 63");
     }
     for (int k = -1; k < p->leaf_count; k++) {
-        const int *rim = k < 0 ? p->root_rim : p->leaf_rims[k];
+        const int *rim = tpc_rim_of(p, k);
         for (int j = 0; j < TREEPIECES_RIM; j++)
             if (rim[j] < 0 || rim[j] >= p->vertex_count)
                 return tpc_refuse(env, p, index, "place", j, "of a rim is no vertex");
@@ -1121,7 +1132,7 @@ static txm_status tpc_check_vertices(const treepieces_piece *p, int index, txm_e
 static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm_env *env) {
     const treepieces_similarity root = {{0, 0, 0}, {0, 0, 0, 1}, 1};
     const treepieces_similarity *b = k < 0 ? &root : &p->building[k];
-    const int *rim = k < 0 ? p->root_rim : p->leaf_rims[k];
+    const int *rim = tpc_rim_of(p, k);
     float length = 0;
     for (int i = 0; i < 4; i++) length += b->rotation[i] * b->rotation[i];
     if (!(fabsf(length - 1) <= 1e-4f))
@@ -1131,9 +1142,7 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
     for (int j = 0; j < TREEPIECES_RIM; j++) {
         const treepieces_vertex *v = &p->vertices[rim[j]];
         float position[3], normal[3];
-        tpc_rim_vertex(j, position, normal);
-        tpc_building_point(b, position, position);
-        tpc_rotate(b->rotation, normal, normal);
+        tpc_leaf_vertex(b, j, position, normal);
         if (!tpc_is_near(v->position, position, 3, 1e-4f * b->scale))
             return tpc_refuse(env, p, index, "vertex", rim[j],
                               k < 0 ? "is not at its place of the root rim"
@@ -1147,7 +1156,7 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
                               k < 0 ? "on the root rim, is not bound to the own bone alone"
                                     : "on a leaf rim, is not bound to its terminal joint alone");
         for (int i = -1; i < k; i++) {
-            const int *other = i < 0 ? p->root_rim : p->leaf_rims[i];
+            const int *other = tpc_rim_of(p, i);
             for (int m = 0; m < TREEPIECES_RIM; m++)
                 if (other[m] == rim[j])
                     return tpc_refuse(env, p, index, "vertex", rim[j], "is on two rims");
@@ -1192,6 +1201,12 @@ static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *
     return TXM_OK;
 }
 
+/* Which of the vertices that hang together with this one stands for all of them. */
+static int tpc_find_root(const int *root, int vertex) {
+    while (root[vertex] != vertex) vertex = root[vertex];
+    return vertex;
+}
+
 /* Oriented, manifold, in one piece, its borders the rims. */
 static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_t *side,
                                     txm_env *env) {
@@ -1205,14 +1220,11 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
             if (side[(size_t)a * (size_t)n + (size_t)b]++)
                 return tpc_refuse(env, p, index, "vertex", a,
                                   "a side from it is that of two quads that are not oriented alike");
-            int low = a, high = b;
-            while (root[low] != low) low = root[low];
-            while (root[high] != high) high = root[high];
-            root[low] = high;
+            root[tpc_find_root(root, a)] = tpc_find_root(root, b);
         }
     }
     for (int k = -1; k < p->leaf_count; k++) {
-        const int *rim = k < 0 ? p->root_rim : p->leaf_rims[k];
+        const int *rim = tpc_rim_of(p, k);
         for (int j = 0; j < TREEPIECES_RIM; j++) {
             const int a = rim[j], b = rim[(j + 1) % TREEPIECES_RIM];
             const int ahead = tpc_has_side(side, n, a, b), back = tpc_has_side(side, n, b, a);
@@ -1230,12 +1242,9 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
     }
     const txm_status status = tpc_check_fans(p, index, env);
     if (status != TXM_OK) return status;
-    for (int i = 1; i < n; i++) {
-        int a = i, b = 0;
-        while (root[a] != a) a = root[a];
-        while (root[b] != b) b = root[b];
-        if (a != b) return tpc_refuse(env, p, index, "vertex", i, "does not hang together with vertex 0");
-    }
+    for (int i = 1; i < n; i++)
+        if (tpc_find_root(root, i) != tpc_find_root(root, 0))
+            return tpc_refuse(env, p, index, "vertex", i, "does not hang together with vertex 0");
     return TXM_OK;
 }
 
@@ -1312,9 +1321,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
         memcpy(r->weights, own, sizeof own);
         for (int k = 0; k < p->leaf_count; k++) {
             treepieces_vertex *l = &v[p->leaf_rims[k][j]];
-            tpc_rim_vertex(j, l->position, l->normal);
-            tpc_building_point(&p->building[k], l->position, l->position);
-            tpc_rotate(p->building[k].rotation, l->normal, l->normal);
+            tpc_leaf_vertex(&p->building[k], j, l->position, l->normal);
             memset(l->weights, 0, sizeof l->weights);
             l->weights[1 + k] = 1;
             l->rim = TREEPIECES_RIM * k + j;
@@ -2787,13 +2794,14 @@ static float tpc_uniform(tpc_growth *g, float low, float high) {
 
 /* ---- growing: rims in order of their radius ------------------------------------------------ */
 
-/* Eight buckets an octave, the thickest first: the bits of a float rise with its logarithm. */
+/* The bits of a float above 0 rise about as its logarithm, 2^23 an octave. */
 static uint32_t tpc_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits;
 }
 
+/* Eight buckets an octave, the thickest first. */
 static int tpc_bucket(float radius) {
     return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
 }
@@ -3185,8 +3193,7 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     node->type = (uint8_t)c->type;
     node->joint = (uint8_t)(bud->rim * 8 + turn);
     node->order = bud->order;
-    /* the thinner, the faster: two classes an octave, give or take one. The bits of a float rise about
-       as its logarithm, 2^23 an octave. */
+    /* the thinner, the faster: two classes an octave, give or take one */
     const int sway = (int)(tpc_bits(g->foot) >> 22) - (int)(tpc_bits(bud->radius) >> 22) +
                      (int)(txm_rng_next(&g->rng) >> 31);
     node->sway = (uint8_t)txm_clampi(sway, 0, TPC_CLASSES - 1);
@@ -3900,9 +3907,11 @@ static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
         out[k] = (bone[4 * k] * m[0] + bone[4 * k + 1] * m[1]) + bone[4 * k + 2] * m[2];
 }
 
-static void tpc_unit(float n[3]) {
-    const float length = sqrtf((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
-    for (int k = 0; k < 3; k++) n[k] /= length;
+/* The bones of a record's children, less its own; 0 where there is none. */
+static void tpc_children(const uint32_t *record, uint32_t children[TREEPIECES_MAX_LEAVES]) {
+    children[0] = record[1] & 0xffffu;
+    children[1] = record[1] >> 16;
+    children[2] = record[2] & 0xffffu;
 }
 
 TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
@@ -3910,12 +3919,13 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
     const treepieces_piece *piece = &forest->kit->pieces[type];
     const treepieces_batch *batch = &forest->batches[type];
     const uint32_t *word = batch->words + (size_t)instance * batch->stride;
-    const uint32_t difference[3] = {word[1] & 0xffffu, word[1] >> 16, word[2] & 0xffffu};
+    uint32_t difference[TREEPIECES_MAX_LEAVES];
     const float *own = bones + TREEPIECES_BONE * (size_t)word[0];
     const float *child[TREEPIECES_MAX_LEAVES];
     float stretch[TREEPIECES_MAX_LEAVES], own_squares[3];
     int turn[TREEPIECES_MAX_LEAVES];
     tpc_columns(own, own_squares);
+    tpc_children(word, difference);
     for (int k = 0; k < piece->leaf_count; k++) {
         float squares[3];
         child[k] = own + TREEPIECES_BONE * (size_t)difference[k];
@@ -4094,6 +4104,14 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
     return p.outer_count + n * n;
 }
 
+/* How much of each corner there is at (u, v). */
+static void tpc_weigh(float u, float v, float w[4]) {
+    w[0] = (1 - u) * (1 - v);
+    w[1] = (1 - u) * v;
+    w[2] = u * v;
+    w[3] = u * (1 - v);
+}
+
 /* A weighted sum of four numbers, the same to the bit whatever the order of the corners as long as
    two weights at most are not 0: opposite corners are added first, and x + 0 is x. */
 static float tpc_mix(const float w[4], float a, float b, float c, float d) {
@@ -4103,9 +4121,9 @@ static float tpc_mix(const float w[4], float a, float b, float c, float d) {
 TREEPIECES_API void treepieces_patch_point(const float positions[12], const float normals[12],
                                            float shape, float u, float v, float position[3],
                                            float normal[3]) {
-    const float w[4] = {(1 - u) * (1 - v), (1 - u) * v, u * v, u * (1 - v)};
     const float alpha = shape < 0 ? 0 : shape > 0 ? shape : 0.6f;
-    float p[3], n[3], depth[4];
+    float w[4], p[3], n[3], depth[4];
+    tpc_weigh(u, v, w);
     for (int k = 0; k < 3; k++) {
         p[k] = tpc_mix(w, positions[k], positions[3 + k], positions[6 + k], positions[9 + k]);
         n[k] = tpc_mix(w, normals[k], normals[3 + k], normals[6 + k], normals[9 + k]);
@@ -4136,11 +4154,6 @@ typedef struct tpc_mesh {
     treepieces_mesh mesh; /* first: the one is the other */
     txm_arena arena;
 } tpc_mesh;
-
-/* One corner of a quad as it is baked: a skinned vertex. */
-typedef struct tpc_corner {
-    float position[3], normal[3], weights[4]; /* weights: of the four joints of the piece */
-} tpc_corner;
 
 /* A mesh while it is baked. */
 typedef struct tpc_baking {
@@ -4207,14 +4220,13 @@ static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float nor
 
 /* How well a triangle faces where its corners' normals point; below 0: away from there. */
 static float tpc_facing(const float *a, const float *b, const float *c, const float normals[12]) {
-    float u[3], v[3], n[3];
+    float u[3], v[3], n[3], cross[3];
     for (int k = 0; k < 3; k++) {
         u[k] = b[k] - a[k];
         v[k] = c[k] - a[k];
         n[k] = (normals[k] + normals[3 + k]) + (normals[6 + k] + normals[9 + k]);
     }
-    const float cross[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                            u[0] * v[1] - u[1] * v[0]};
+    tpc_cross(u, v, cross);
     const float length = sqrtf(tpc_dot(cross, cross));
     return length > 0 ? tpc_dot(cross, n) / length : 0;
 }
@@ -4244,8 +4256,8 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
     if (triangles == 2) tpc_choose_diagonal(positions, normals, b->indices);
     for (int i = 0; i < vertices; i++) {
         const float u = b->coords[2 * i], v = b->coords[2 * i + 1];
-        const float w[4] = {(1 - u) * (1 - v), (1 - u) * v, u * v, u * (1 - v)};
-        float position[3], normal[3], weights[4], sum = 0;
+        float w[4], position[3], normal[3], weights[4], sum = 0;
+        tpc_weigh(u, v, w);
         treepieces_patch_point(positions, normals, b->lod.shape, u, v, position, normal);
         for (int k = 0; k < 4; k++) {
             const treepieces_vertex *c = piece->vertices;
@@ -4259,7 +4271,8 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
     for (int i = 0; i < 3 * triangles; i++) {
         const size_t at = 3 * b->out->triangle_count + (size_t)i;
         const float u = b->coords[2 * b->indices[i]], v = b->coords[2 * b->indices[i] + 1];
-        const float w[4] = {(1 - u) * (1 - v), (1 - u) * v, u * v, u * (1 - v)};
+        float w[4];
+        tpc_weigh(u, v, w);
         b->out->indices[at] = b->numbers[b->indices[i]];
         b->out->uvs[2 * at] = tpc_mix(w, uv[0][0], uv[1][0], uv[2][0], uv[3][0]);
         b->out->uvs[2 * at + 1] =
@@ -4309,10 +4322,9 @@ static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, s
                 continue;
             }
             treepieces_skin(b->forest, b->desc->bones, t, i, b->positions, b->normals);
+            tpc_children(record, b->joints + 1);
             b->joints[0] = own;
-            b->joints[1] = own + (record[1] & 0xffffu);
-            b->joints[2] = own + (record[1] >> 16);
-            b->joints[3] = own + (record[2] & 0xffffu);
+            for (int k = 1; k < 4; k++) b->joints[k] += own;
             for (int k = 0; k < piece->quad_count; k++) {
                 float positions[12];
                 int edges[4], more;
@@ -4777,9 +4789,8 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
         facing[2] = 0;
     }
     tpc_to_unit(facing, 1, 0, 0);
-    const float right[3] = {along[1] * facing[2] - along[2] * facing[1],
-                            along[2] * facing[0] - along[0] * facing[2],
-                            along[0] * facing[1] - along[1] * facing[0]};
+    float right[3];
+    tpc_cross(along, facing, right);
     for (int k = 0; k < 3; k++) {
         card->right[k] = half * right[k];
         card->up[k] = half * along[k];
