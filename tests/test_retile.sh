@@ -12,13 +12,6 @@ glbs=$root/$OUT/glb/retile # kept: .ci/run hands them to the Khronos validator
 rm -rf "$glbs" && mkdir -p "$glbs"
 cd "$tmp" || exit 1
 
-# refuses STATUS TEXT ARGUMENTS...: and the message holds this text
-refuses() {
-    status=$1 text=$2
-    shift 2
-    check "status $status, \"$text\": $(echo "$*" | tail -c 70)" refuses_so "$status" "$text" "$@"
-}
-
 # counts FILE: vertices and triangles of an OBJ or PLY file
 counts() {
     case $1 in

@@ -13,12 +13,6 @@ glbs=$root/$OUT/glb/tree # kept: .ci/run hands them to the Khronos validator and
 rm -rf "$glbs" && mkdir -p "$glbs"
 cd "$tmp" || exit 1
 
-# refuses STATUS TEXT ARGUMENTS...: and the message holds this text
-refuses() {
-    status=$1 text=$2
-    shift 2
-    check "status $status, \"$text\": $(echo "$*" | tail -c 70)" refuses_so "$status" "$text" "$@"
-}
 figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 figures() { # NAME=VALUE...: these are in stats.json
     for wish in "$@"; do

@@ -36,3 +36,10 @@ refuses_so() {
     run "$status" "$@" || return 1
     says "$text" || { echo "the message lacks '$text':"; cat err.log; return 1; }
 }
+
+# refuses STATUS TEXT ARGUMENTS...: the same as a test of its own
+refuses() {
+    status=$1 text=$2
+    shift 2
+    check "status $status, \"$text\": $(echo "$*" | tail -c 70)" refuses_so "$status" "$text" "$@"
+}

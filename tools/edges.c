@@ -116,12 +116,9 @@ static char *lines_as_text(const texpatch_edges *e, int layer, int is_svg, size_
 /* ---- lines as a picture ------------------------------------------------------------------ */
 
 static int new_picture(cli *run, int width, int height, int channels, txm_image *image) {
-    memset(image, 0, sizeof *image);
-    image->width = width;
-    image->height = height;
-    image->channels = channels;
-    image->pixels = calloc((size_t)width * (size_t)height, (size_t)channels);
-    return image->pixels ? CLI_DONE : cli_fail(run, CLI_FAILED, "out of memory; make it smaller");
+    return image_new(width, height, channels, TXM_U8, image)
+               ? CLI_DONE
+               : cli_fail(run, CLI_FAILED, "out of memory; make it smaller");
 }
 
 /* Lines over black, over the picture (in RGB) or over its layers (gray). */

@@ -184,6 +184,19 @@ int image_read_deep(const char *path, int channels, txm_image *image, const char
     return read_file(path, channels, 1, image, why);
 }
 
+int image_new(int width, int height, int channels, txm_sample sample, txm_image *image) {
+    size_t pixels, bytes;
+    memset(image, 0, sizeof *image);
+    image->width = width;
+    image->height = height;
+    image->channels = channels;
+    image->sample = sample;
+    if (txm_mul((size_t)width, (size_t)height, 1, &pixels) &&
+        txm_mul(pixels, (size_t)channels, txm_sample_bytes(sample), &bytes))
+        image->pixels = calloc(bytes, 1);
+    return image->pixels != NULL;
+}
+
 void image_free(txm_image *image) {
     stbi_image_free(image->pixels);
     memset(image, 0, sizeof *image);

@@ -31,6 +31,9 @@ int image_decode_deep(const unsigned char *bytes, size_t size, int channels, txm
                       const char **why);
 int image_read_deep(const char *path, int channels, txm_image *image, const char **why);
 
+/* A picture of zeros; image_free releases it. 0: no memory, or too large for any. */
+int image_new(int width, int height, int channels, txm_sample sample, txm_image *image);
+
 void image_free(txm_image *image);
 
 /* Can a path that ends in this extension (".png") take a width x height picture with so many

@@ -96,15 +96,7 @@ static int check_result(job *j, txm_status result, const char *what) {
 
 static int new_picture(job *j, int width, int height, int channels, txm_sample sample,
                        txm_image *image) {
-    size_t bytes;
-    memset(image, 0, sizeof *image);
-    image->width = width;
-    image->height = height;
-    image->channels = channels;
-    image->sample = sample;
-    if (txm_mul((size_t)width * (size_t)height, (size_t)channels, txm_sample_bytes(sample), &bytes))
-        image->pixels = malloc(bytes);
-    return image->pixels ? CLI_DONE : fail_memory(j);
+    return image_new(width, height, channels, sample, image) ? CLI_DONE : fail_memory(j);
 }
 
 /* ---- lists ------------------------------------------------------------------------------- */

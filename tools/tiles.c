@@ -88,12 +88,9 @@ static void print_document(FILE *to, const textiles_set *set, const textiles_lay
 /* ---- pictures --------------------------------------------------------------------------- */
 
 static int new_picture(cli *run, txm_image *image, int width, int height, int channels) {
-    memset(image, 0, sizeof *image);
-    image->width = width;
-    image->height = height;
-    image->channels = channels;
-    image->pixels = calloc((size_t)width * (size_t)height, (size_t)channels);
-    return image->pixels ? CLI_DONE : cli_fail(run, CLI_FAILED, "out of memory; make smaller tiles");
+    return image_new(width, height, channels, TXM_U8, image)
+               ? CLI_DONE
+               : cli_fail(run, CLI_FAILED, "out of memory; make smaller tiles");
 }
 
 /* Some of the plane that the set covers; what has no plane is laid in scan-line order. */

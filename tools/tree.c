@@ -140,17 +140,20 @@ static int grow(tree_job *j) {
                         j->species[0].name);
 }
 
-/* Bones at rest, and as the trees are to be seen: posed, and in the wind unless that is a clip. */
+/* Bones as the trees are to be seen: posed, and in the wind unless that is a clip of a rig, which needs
+   those at rest too. */
 static int pose(tree_job *j) {
     const treepieces_pose bent = {j->run.seed, (float)j->pose, NULL};
     const size_t nodes = j->forest->node_count;
     const treepieces_wind wind = tree_wind(j);
-    j->rest = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
+    const int has_rig = is_glb(j) && !j->is_forest;
+    txm_status result = TXM_OK;
     j->posed = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
-    if (!j->rest || !j->posed) return tree_fail_memory(j);
-    txm_status result = treepieces_bones(j->forest, NULL, &j->run.env, j->rest);
+    if (has_rig) j->rest = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
+    if (!j->posed || (has_rig && !j->rest)) return tree_fail_memory(j);
+    if (has_rig) result = treepieces_bones(j->forest, NULL, &j->run.env, j->rest);
     if (result == TXM_OK) result = treepieces_bones(j->forest, &bent, &j->run.env, j->posed);
-    if (result == TXM_OK && j->wind > 0 && (j->is_forest || !is_glb(j))) {
+    if (result == TXM_OK && j->wind > 0 && !has_rig) {
         float *state = (float *)tree_array(nodes, 4 * sizeof(float));
         if (!state) return tree_fail_memory(j);
         for (int i = WARM_UP - 1; i >= 0 && result == TXM_OK; i--)

@@ -9,12 +9,7 @@
 enum { DRAWN_LEAVES = 256, MAX_TILES = 64 };
 
 static int new_image(tree_job *j, txm_image *image, int width, int height, int channels) {
-    memset(image, 0, sizeof *image);
-    image->width = width;
-    image->height = height;
-    image->channels = channels;
-    image->pixels = calloc((size_t)width * (size_t)height, (size_t)channels);
-    return image->pixels ? CLI_DONE : tree_fail_memory(j);
+    return image_new(width, height, channels, TXM_U8, image) ? CLI_DONE : tree_fail_memory(j);
 }
 
 static int encode(tree_job *j, const txm_image *image, const char *kind, int s, picture *p) {
