@@ -51,6 +51,7 @@ static void counted_arrays(GLenum mode, GLint first, GLsizei count) {
 #define main forest_main
 #include "examples/forest_gl.c"
 #undef main
+#include "treekit.h"
 
 static int failures;
 
@@ -110,19 +111,6 @@ static forest_gl *open_scene(forest_gl *f) {
     choose_view(f);
     upload_bones(f);
     return f;
-}
-
-/* Any piece on any rim, in any direction. */
-static void any_piece(void *user, const treepieces_site *site, txm_rng *rng,
-                      treepieces_choice *choice) {
-    (void)user;
-    choice->type = (int)txm_rng_below(rng, TREEPIECES_BUILTIN);
-    choice->turn = (int)txm_rng_below(rng, TREEPIECES_RIM);
-    for (int k = 0; k < 3; k++) {
-        choice->direction[k] = site->direction[k] + txm_rng_float(rng) - 0.5f;
-        choice->ratios[k] = 0.3f + 0.7f * txm_rng_float(rng);
-    }
-    choice->length = site->radius * (0.5f + 3 * txm_rng_float(rng));
 }
 
 /* Trees about the origin in poses of their own, with nothing but what the pieces' shaders read. */

@@ -6,7 +6,7 @@
 
 gl=$OUT/gl_treepieces forest=$PWD/build/examples/forest_gl
 if [ ! "$gl" -nt tests/gl_treepieces.c ] || [ ! "$gl" -nt examples/forest_gl.c ] ||
-    [ ! "$gl" -nt treepieces.h ] || [ ! "$gl" -nt texmath.h ]; then
+    [ ! "$gl" -nt tests/treekit.h ] || [ ! "$gl" -nt treepieces.h ] || [ ! "$gl" -nt texmath.h ]; then
     # shellcheck disable=SC2086 # flags are words
     check "gl_treepieces builds" $CC -std=c99 -O2 -ffp-contract=off -Wall -Wextra -I. \
         tests/gl_treepieces.c build/stb.o -o "$gl" -lEGL -lOpenGL -lcjson -lm || exit 1

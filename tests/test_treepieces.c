@@ -9,6 +9,7 @@
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
 #include "testkit.h"
+#include "treekit.h"
 
 static treepieces_kit *kit;
 static treepieces_species oak;
@@ -53,20 +54,6 @@ static float *make_bones(const treepieces_forest *f, const treepieces_pose *pose
     float *bones = (float *)room(f->node_count, TREEPIECES_BONE * sizeof(float));
     assert_int_equal(treepieces_bones(f, pose, NULL, bones), TXM_OK);
     return bones;
-}
-
-/* Any piece on any rim, in any direction: own_rule of the tests that look at all pairs. */
-static void any_piece(void *user, const treepieces_site *site, txm_rng *rng,
-                      treepieces_choice *choice) {
-    (void)user;
-    /* not only tips after a tip-less beginning */
-    choice->type = (int)txm_rng_below(rng, TREEPIECES_BUILTIN);
-    choice->turn = (int)txm_rng_below(rng, TREEPIECES_RIM);
-    for (int k = 0; k < 3; k++) {
-        choice->direction[k] = site->direction[k] + txm_rng_float(rng) - 0.5f;
-        choice->ratios[k] = 0.3f + 0.7f * txm_rng_float(rng);
-    }
-    choice->length = site->radius * (0.5f + 3 * txm_rng_float(rng));
 }
 
 /* ---- rims -------------------------------------------------------------------------------- */
