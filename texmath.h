@@ -6,7 +6,8 @@
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
      generator, a sort, vectors, matrices, quaternions and colour spaces; and the few kernels that
      more than one of them uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the
-     minimum cut of a grid, the halving of an image, the Poisson equation on a masked image.
+     minimum cut of a grid, the halving of an image, the Poisson equation on a masked image, and
+     which sides of a mesh share an edge.
 
    QUICK START                                 (tests build and run this very block)
      // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
@@ -50,9 +51,10 @@
      Image rows go from top to bottom, x to the right.
 
    MEMORY
-     Only txm_arena_alloc and txm_poisson allocate, through the environment. txm_poisson holds
+     Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
+     txm_arena_zero, txm_flow_make (from an arena) and txm_poisson. txm_poisson holds
      64 + 4 * channels bytes for each unknown pixel, and gives all of it back before it returns.
-     The sort and the cut work in scratch memory of the caller.
+     The sort, the minimum-error cut and the sides of a mesh work in memory of the caller.
 
    THREADS
      No global state. Two calls may overlap unless they share what one of them writes: an env, an
@@ -61,10 +63,11 @@
    SAME BYTES
      Integers, 8- and 16-bit samples, generator, hash and sort: the same bits everywhere. All else
      is computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
-     makes necessary. That gives the same bits wherever arithmetic is IEEE 754 (on 32-bit x86:
-     -msse2), with -ffp-contract=off (as gcc -std=c99 has it) and without -ffast-math. What calls
-     pow, sin, cos or acos depends on the C library in about one result of 10^8: use it to show
-     colours and place cameras, not to decide. Sort, cut and eigenvectors leave no ties open.
+     makes necessary (vectors in double are not rounded). That gives the same bits wherever
+     arithmetic is IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it)
+     and without -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one
+     result of 10^8 (txm_sincos and txm_exp2 do not): use it to show colours and place cameras, not
+     to decide. Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
@@ -174,6 +177,40 @@ static inline txm_status txm_fail_at(txm_env *env, txm_status status, const char
     return txm_fail(env, status, line);
 }
 
+/* text into line, each # replaced by a number: the first by a, all others by b; cut to fit */
+static inline void txm_put_numbers(char *line, size_t capacity, const char *text, uint64_t a,
+                                   uint64_t b) {
+    size_t n = 0;
+    for (; *text && n + 1 < capacity; text++) {
+        char digits[20];
+        int count = 0;
+        if (*text != '#') {
+            line[n++] = *text;
+            continue;
+        }
+        for (; a || !count; a /= 10) digits[count++] = (char)('0' + a % 10);
+        while (count && n + 1 < capacity) line[n++] = digits[--count];
+        a = b;
+    }
+    line[n] = 0;
+}
+
+/* Record a failure whose message has numbers: the first # of text stands for a, the next for b. */
+static inline txm_status txm_fail_numbers(txm_env *env, txm_status status, const char *text,
+                                          uint64_t a, uint64_t b) {
+    char line[sizeof env->message];
+    txm_put_numbers(line, sizeof line, text, a, b);
+    return txm_fail(env, status, line);
+}
+
+/* The same with the name of what is wrong in front: "name: text". */
+static inline txm_status txm_fail_numbers_at(txm_env *env, txm_status status, const char *name,
+                                             const char *text, uint64_t a, uint64_t b) {
+    char line[sizeof env->message];
+    txm_put_numbers(line, sizeof line, text, a, b);
+    return txm_fail_at(env, status, name, line);
+}
+
 /* bytes of the environment's memory, not cleared; NULL if there is none or bytes is 0 */
 static inline void *txm_alloc(const txm_env *env, size_t bytes) {
     if (bytes == 0) return NULL;
@@ -228,6 +265,8 @@ typedef struct txm_arena {
     void (*release)(void *user, void *block);
     void *memory_user;
     void *blocks; /* the newest block, which links to the older ones; NULL = none */
+    int failed;   /* non-zero: some request since the arena was empty could not be met, so that
+                     a caller can make several and look once                     */
 } txm_arena;
 
 enum { TXM_ALIGN = 64 }; /* bytes; a cache line, and enough for any vector unit   */
@@ -238,17 +277,22 @@ static inline void txm_arena_init(txm_arena *arena, const txm_env *env) {
     arena->release = env ? env->release : NULL;
     arena->memory_user = env ? env->memory_user : NULL;
     arena->blocks = NULL;
+    arena->failed = 0;
 }
 
-/* count * size bytes, not cleared, aligned to 64. NULL if that is 0, overflows, or there is no
-   memory. One request to the allocator each, 64 bytes and a pointer longer. */
+/* count * size bytes, not cleared, aligned to 64. NULL if that is 0, or if it overflows or there is
+   no memory, which also sets arena->failed. One request to the allocator each, 64 bytes and a
+   pointer longer. */
 static inline void *txm_arena_alloc(txm_arena *arena, size_t count, size_t size) {
     size_t bytes, total;
-    void *raw;
-    if (!txm_mul(count, size, 1, &bytes) || bytes == 0) return NULL;
-    if (!txm_add(bytes, TXM_ALIGN + sizeof(void *), &total)) return NULL;
-    raw = arena->allocate ? arena->allocate(arena->memory_user, total) : malloc(total);
-    if (!raw) return NULL;
+    void *raw = NULL;
+    if (count == 0 || size == 0) return NULL;
+    if (txm_mul(count, size, 1, &bytes) && txm_add(bytes, TXM_ALIGN + sizeof(void *), &total))
+        raw = arena->allocate ? arena->allocate(arena->memory_user, total) : malloc(total);
+    if (!raw) {
+        arena->failed = 1;
+        return NULL;
+    }
     memcpy(raw, &arena->blocks, sizeof(void *));
     arena->blocks = raw;
     unsigned char *first = (unsigned char *)raw + sizeof(void *);
@@ -267,6 +311,7 @@ static inline void txm_arena_free(txm_arena *arena) {
     const txm_arena copy = *arena;
     void *block = arena->blocks;
     arena->blocks = NULL;
+    arena->failed = 0;
     while (block) {
         void *older;
         memcpy(&older, block, sizeof(void *));
@@ -319,6 +364,34 @@ static inline int txm_clampi(int x, int low, int high) {
 /* a (1 - t) + b t; exactly a at t = 0, b at t = 1, and a wherever a = b */
 static inline float txm_lerpf(float a, float b, float t) {
     return txm_float((double)a - (double)a * t + (double)b * t);
+}
+
+/* Sine and cosine of an angle of at most some thousand turns, to 1e-10: reduced to -pi/4..pi/4,
+   then Taylor. Sums, products and quotients only, so that the bits are the same everywhere, which
+   those of the C library are not. */
+static inline void txm_sincos(double angle, double *sine, double *cosine) {
+    const double turns = angle * (2 / TXM_PI);
+    const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
+    const double x = angle - quarter * (TXM_PI / 2), xx = x * x;
+    const double s =
+        x * (1 - xx / 6 * (1 - xx / 20 * (1 - xx / 42 * (1 - xx / 72 * (1 - xx / 110)))));
+    const double c =
+        1 - xx / 2 * (1 - xx / 12 * (1 - xx / 30 * (1 - xx / 56 * (1 - xx / 90 * (1 - xx / 132)))));
+    const int q = quarter & 3;
+    *sine = q == 0 ? s : q == 1 ? c : q == 2 ? -s : -c;
+    *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
+}
+
+/* 2^x for x from -1000 to 1000, to 1e-11 of the result: the whole part into the exponent, the rest
+   by Taylor. The same bits everywhere, as above. */
+static inline double txm_exp2(double x) {
+    const int whole = (int)(x + 1024.5) - 1024; /* rounded to nearest */
+    const double y = (x - whole) * 0.69314718055994530942;
+    const uint64_t bits = (uint64_t)(whole + 1023) << 52;
+    double sum = 1, power;
+    for (int k = 11; k > 0; k--) sum = 1 + sum * y / k;
+    memcpy(&power, &bits, sizeof power);
+    return sum * power;
 }
 
 /* ---- images ----------------------------------------------------------------------------- */
@@ -689,6 +762,68 @@ static inline txm_vec3 txm_vec3_perpendicular(txm_vec3 v) {
                           : y <= z         ? txm_v3(0, 1, 0)
                                            : txm_v3(0, 0, 1);
     return txm_vec3_normalize(txm_vec3_cross(txm_vec3_normalize(v), axis));
+}
+
+/* ---- vectors in double ------------------------------------------------------------------ */
+
+/* For geometry that decides: computed in double, no rounding to float in between. Plain sums and
+   products in the order written, so the bits are the same everywhere. */
+typedef struct txm_dvec3 {
+    double x, y, z;
+} txm_dvec3;
+
+static inline txm_dvec3 txm_d3(double x, double y, double z) {
+    txm_dvec3 v;
+    v.x = x;
+    v.y = y;
+    v.z = z;
+    return v;
+}
+/* the three floats at p */
+static inline txm_dvec3 txm_d3_load(const float *p) {
+    return txm_d3(p[0], p[1], p[2]);
+}
+static inline txm_dvec3 txm_d3_add(txm_dvec3 a, txm_dvec3 b) {
+    return txm_d3(a.x + b.x, a.y + b.y, a.z + b.z);
+}
+static inline txm_dvec3 txm_d3_sub(txm_dvec3 a, txm_dvec3 b) {
+    return txm_d3(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+static inline txm_dvec3 txm_d3_scale(txm_dvec3 a, double s) {
+    return txm_d3(a.x * s, a.y * s, a.z * s);
+}
+/* a + b s */
+static inline txm_dvec3 txm_d3_mad(txm_dvec3 a, txm_dvec3 b, double s) {
+    return txm_d3(a.x + b.x * s, a.y + b.y * s, a.z + b.z * s);
+}
+static inline double txm_d3_dot(txm_dvec3 a, txm_dvec3 b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+static inline txm_dvec3 txm_d3_cross(txm_dvec3 a, txm_dvec3 b) {
+    return txm_d3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+/* length and distance, also squared */
+static inline double txm_d3_len2(txm_dvec3 a) {
+    return txm_d3_dot(a, a);
+}
+static inline double txm_d3_len(txm_dvec3 a) {
+    return sqrt(txm_d3_dot(a, a));
+}
+static inline double txm_d3_dist2(txm_dvec3 a, txm_dvec3 b) {
+    return txm_d3_len2(txm_d3_sub(a, b));
+}
+static inline double txm_d3_dist(txm_dvec3 a, txm_dvec3 b) {
+    return sqrt(txm_d3_dist2(a, b));
+}
+/* length 1 in the same direction; the zero vector for the zero vector */
+static inline txm_dvec3 txm_d3_unit(txm_dvec3 a) {
+    const double n = txm_d3_len(a);
+    return n > 0 ? txm_d3_scale(a, 1 / n) : a;
+}
+/* twice the area of the triangle a b c times its unit normal, on the side from which it is
+   counter-clockwise */
+static inline txm_dvec3 txm_d3_area2(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
+    return txm_d3_cross(txm_d3_sub(b, a), txm_d3_sub(c, a));
 }
 
 /* ---- matrices --------------------------------------------------------------------------- */
@@ -1748,6 +1883,159 @@ static inline txm_status txm_poisson(const txm_poisson_desc *desc, txm_env *env)
 done:
     txm_arena_free(&arena);
     return status;
+}
+
+/* ---- meshes ----------------------------------------------------------------------------- */
+
+/* A mesh that the caller owns: faces of 3 corners each, or of 4. */
+typedef struct txm_mesh {
+    const float *positions;  /* 3 per vertex, finite; NULL where a function needs none         */
+    const uint32_t *indices; /* the vertices of each face, counter-clockwise seen from outside */
+    size_t vertex_count, face_count;
+    int corners; /* of a face: 3 or 4; 0 = 3 */
+} txm_mesh;
+
+/* no side, as sides are numbered in 32 bits */
+#define TXM_NO_SIDE 0xffffffffu
+
+/* corners of a face, sides of a mesh */
+static inline size_t txm_mesh_corners(const txm_mesh *mesh) {
+    return mesh->corners ? (size_t)mesh->corners : 3;
+}
+static inline size_t txm_mesh_sides(const txm_mesh *mesh) {
+    return mesh->face_count * txm_mesh_corners(mesh);
+}
+
+/* Is this a mesh that can be worked on? Any connectivity will do: borders, edges of many faces,
+   faces that name a vertex twice. A mesh without faces or vertices needs no array for them.
+
+   name       what the caller calls the mesh, for the message: "mesh: indices is NULL"
+   corners    3 or 4 if faces must have so many; 0 = either
+   positions  non-zero: they are needed and must be finite; 0: they are not looked at
+   most       refuse more vertices or faces; 0 = as many as 32 bits can number the sides of
+   return     TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE. The message names the first face or vertex
+              that is wrong, from 0
+   cost       O(faces + vertices)                                                          */
+static inline txm_status txm_mesh_check(const txm_mesh *mesh, const char *name, int corners,
+                                        int positions, size_t most, txm_env *env) {
+    if (!mesh) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "is NULL; pass a txm_mesh");
+    if (mesh->corners != 0 && mesh->corners != 3 && mesh->corners != 4)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "corners must be 3 or 4 (0 means 3)");
+    const size_t n = txm_mesh_corners(mesh);
+    if (corners && n != (size_t)corners)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           corners == 3 ? "faces must be triangles" : "faces must be quads");
+    if (most && (mesh->vertex_count > most || mesh->face_count > most))
+        return txm_fail_numbers_at(env, TXM_TOO_LARGE, name, "more than # vertices or faces", most,
+                                   0);
+    if (mesh->face_count > (TXM_NO_SIDE - 1) / n || mesh->face_count > SIZE_MAX / 64 ||
+        mesh->vertex_count > SIZE_MAX / 64)
+        return txm_fail_at(env, TXM_TOO_LARGE, name,
+                           "more faces or vertices than 32 bits can number the sides of");
+    if (mesh->face_count && !mesh->indices)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "indices is NULL");
+    if (positions && mesh->vertex_count && !mesh->positions)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "positions is NULL");
+    for (size_t i = 0; i < n * mesh->face_count; i++) {
+        if (mesh->indices[i] >= mesh->vertex_count)
+            return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
+                                       "face # names vertex #, which is not below vertex_count",
+                                       i / n, mesh->indices[i]);
+    }
+    for (size_t i = 0; positions && i < 3 * mesh->vertex_count; i++) {
+        if (!txm_is_finite(mesh->positions[i]))
+            return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
+                                       "the position of vertex # is not finite", i / 3, 0);
+    }
+    return TXM_OK;
+}
+
+/* the position of a corner; corner k of face f has the number f * corners + k */
+static inline txm_dvec3 txm_mesh_point(const txm_mesh *mesh, size_t corner) {
+    return txm_d3_load(mesh->positions + 3 * (size_t)mesh->indices[corner]);
+}
+/* the positions of a triangle's corners */
+static inline void txm_mesh_triangle(const txm_mesh *mesh, size_t face, txm_dvec3 p[3]) {
+    for (size_t k = 0; k < 3; k++) p[k] = txm_mesh_point(mesh, 3 * face + k);
+}
+
+/* Side i runs from corner i to the next corner of its face, whose number this is. */
+static inline size_t txm_mesh_next(const txm_mesh *mesh, size_t i) {
+    if (mesh->corners == 4) return i % 4 == 3 ? i - 3 : i + 1;
+    return i % 3 == 2 ? i - 2 : i + 1;
+}
+/* the corner before corner i of its face */
+static inline size_t txm_mesh_previous(const txm_mesh *mesh, size_t i) {
+    if (mesh->corners == 4) return i % 4 == 0 ? i + 3 : i - 1;
+    return i % 3 == 0 ? i + 2 : i - 1;
+}
+/* the lower and the higher vertex of side i: its edge */
+static inline uint32_t txm_mesh_low(const txm_mesh *mesh, size_t i) {
+    const uint32_t a = mesh->indices[i], b = mesh->indices[txm_mesh_next(mesh, i)];
+    return a < b ? a : b;
+}
+static inline uint32_t txm_mesh_high(const txm_mesh *mesh, size_t i) {
+    const uint32_t a = mesh->indices[i], b = mesh->indices[txm_mesh_next(mesh, i)];
+    return a < b ? b : a;
+}
+
+/* Which sides share an edge, that is, have the same two vertices: sort the sides by the lower, then
+   by the higher vertex of their edge. Those of one edge lie together, by number. value = the side,
+   key = the lower vertex.
+
+       for (size_t i = 0, end; i < sides; i = end) {
+           end = txm_mesh_edge_end(mesh, pairs, i);
+           ...  pairs[i].value to pairs[end - 1].value are the sides of one edge
+       }
+
+   pairs  room for 2 pairs for each side; the upper half is scratch
+   cost   O(faces); the mesh must have passed txm_mesh_check                               */
+static inline void txm_mesh_sort_sides(const txm_mesh *mesh, txm_pair *pairs) {
+    const size_t sides = txm_mesh_sides(mesh);
+    for (size_t i = 0; i < sides; i++) {
+        pairs[i].key = txm_mesh_high(mesh, i);
+        pairs[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(pairs, pairs + sides, sides);
+    for (size_t i = 0; i < sides; i++) pairs[i].key = txm_mesh_low(mesh, pairs[i].value);
+    txm_sort_pairs(pairs, pairs + sides, sides);
+}
+
+/* one past the last of the sorted sides that share the edge of pairs[i] */
+static inline size_t txm_mesh_edge_end(const txm_mesh *mesh, const txm_pair *pairs, size_t i) {
+    const size_t sides = txm_mesh_sides(mesh);
+    const uint32_t low = pairs[i].key, high = txm_mesh_high(mesh, pairs[i].value);
+    do i++;
+    while (i < sides && pairs[i].key == low && txm_mesh_high(mesh, pairs[i].value) == high);
+    return i;
+}
+
+/* what txm_mesh_link may do otherwise; add them up */
+enum {
+    TXM_LINK_DOWN = 1,  /* each side to the one before it, the lowest to the highest          */
+    TXM_LINK_POINTS = 2 /* sides from a vertex to itself have an edge like others             */
+};
+
+/* Link the sides of each edge into a ring: next[side] is the next higher side there, after the
+   highest the lowest; a side without another, or from a vertex to itself, is its own next.
+
+   pairs  the sides as txm_mesh_sort_sides left them
+   flags  0, or what to do otherwise
+   next   receives one side for each                                                       */
+static inline void txm_mesh_link(const txm_mesh *mesh, const txm_pair *pairs, int flags,
+                                 uint32_t *next) {
+    const size_t sides = txm_mesh_sides(mesh);
+    for (size_t i = 0, end; i < sides; i = end) {
+        end = txm_mesh_edge_end(mesh, pairs, i);
+        const int is_point = pairs[i].key == txm_mesh_high(mesh, pairs[i].value);
+        for (size_t k = i; k < end; k++) {
+            const size_t up = k + 1 < end ? k + 1 : i, down = k > i ? k - 1 : end - 1;
+            const size_t other = is_point && !(flags & TXM_LINK_POINTS) ? k
+                                 : flags & TXM_LINK_DOWN                ? down
+                                                                        : up;
+            next[pairs[k].value] = pairs[other].value;
+        }
+    }
 }
 
 #ifdef __cplusplus

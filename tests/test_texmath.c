@@ -89,6 +89,40 @@ static void test_fail(void **state) {
     assert_int_equal(txm_fail_at(NULL, TXM_TOO_LARGE, huge, huge), TXM_TOO_LARGE);
 }
 
+static void test_fail_numbers(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *line;
+        uint64_t a, b;
+    } cases[] = {
+        {"no number", "no number", 1, 2},
+        {"# first", "0 first", 0, 2},
+        {"last #", "last 10", 10, 2},
+        {"faces # and #", "faces 7 and 1234567", 7, 1234567},
+        {"#, #, #", "1, 0, 0", 1, 0},
+        {"##", "1844674407370955161518446744073709551614", UINT64_MAX, UINT64_MAX - 1},
+    };
+    txm_env env;
+    char huge[400], line[sizeof env.message + 8];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        memset(&env, 0, sizeof env);
+        assert_int_equal(
+            txm_fail_numbers(&env, TXM_TOO_LARGE, cases[i].text, cases[i].a, cases[i].b),
+            TXM_TOO_LARGE);
+        assert_string_equal(env.message, cases[i].line);
+        assert_int_equal(txm_fail_numbers_at(&env, TXM_BAD_DATA, "a #", cases[i].text, cases[i].a,
+                                             cases[i].b), TXM_BAD_DATA);
+        snprintf(line, sizeof line, "a #: %s", cases[i].line); /* a name is taken as it is */
+        assert_string_equal(env.message, line);
+        assert_int_equal(txm_fail_numbers(NULL, TXM_TOO_SMALL, cases[i].text, 1, 2), TXM_TOO_SMALL);
+    }
+    memset(huge, '#', sizeof huge); /* numbers are cut as text is */
+    huge[sizeof huge - 1] = 0;
+    txm_fail_numbers(&env, TXM_BAD_DATA, huge, 123, 456);
+    assert_int_equal(strlen(env.message), sizeof env.message - 1);
+    assert_memory_equal(env.message, "123456456456", 12);
+}
+
 static void test_sizes(void **state) {
     (void)state;
     static const size_t values[] = {0,
@@ -240,14 +274,67 @@ static void test_arena_failing(void **state) {
                 void *block =
                     i % 2 ? txm_arena_alloc(&arena, 10, 10) : txm_arena_zero(&arena, 9, 9);
                 assert_int_equal(block == NULL, i == k || (onward && i > k));
+                assert_int_equal(arena.failed != 0, i >= k); /* and later successes leave it */
             }
             txm_arena_free(&arena);
+            assert_int_equal(arena.failed, 0);
             assert_int_equal(tk_leaks(&memory), 0);
         }
     }
 }
 
+static void test_arena_failed(void **state) {
+    (void)state;
+    tk_memory memory;
+    memset(&memory, 0, sizeof memory);
+    txm_env env = tk_env(&memory, NULL);
+    txm_arena arena;
+    volatile size_t huge = SIZE_MAX;
+    memset(&arena, 0xff, sizeof arena);
+    txm_arena_init(&arena, &env);
+    assert_int_equal(arena.failed, 0);
+    txm_arena_alloc(&arena, 0, 8); /* nothing was asked for: no failure */
+    txm_arena_alloc(&arena, 8, 0);
+    txm_arena_zero(&arena, 0, huge);
+    assert_int_equal(arena.failed, 0);
+    txm_arena_alloc(&arena, huge / 2 + 1, 2);
+    assert_int_equal(arena.failed, 1);
+    txm_arena_free(&arena);
+    assert_int_equal(arena.failed, 0);
+    txm_arena_zero(&arena, huge - 8, 1);
+    assert_int_equal(arena.failed, 1);
+    txm_arena_init(&arena, &env);
+    assert_int_equal(arena.failed, 0);
+    assert_int_equal(memory.calls, 0);
+}
+
 /* ---- numbers ---------------------------------------------------------------------------- */
+
+static void test_sincos(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(5, 5);
+    for (int i = -4000; i <= 4000; i++) {
+        const double angle = i % 8 ? (txm_rng_double(&rng) - 0.5) * 4000 : i * (TXM_PI / 32);
+        double s = 7, c = 7;
+        txm_sincos(angle, &s, &c);
+        assert_near(s, sin(angle), 1e-10);
+        assert_near(c, cos(angle), 1e-10);
+        assert_near(s * s + c * c, 1, 1e-10);
+    }
+    double s, c;
+    txm_sincos(0, &s, &c);
+    assert_true(s == 0 && c == 1);
+}
+
+static void test_exp2(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(6, 6);
+    for (int i = -1000; i <= 1000; i++) {
+        const double x = txm_rng_double(&rng) * 2000 - 1000;
+        assert_true(txm_exp2(i) == ldexp(1, i)); /* whole powers have no error */
+        assert_near(txm_exp2(x) / pow(2, x), 1, 1e-11);
+    }
+}
 
 static void test_numbers(void **state) {
     (void)state;
@@ -589,6 +676,39 @@ static void test_vectors(void **state) {
     assert_vec3(txm_vec3_normalize(txm_v3(3e38f, 0, 0)), txm_v3(1, 0, 0), 0);
     assert_vec3(txm_vec3_normalize(txm_v3(0, 1e-44f, 0)), txm_v3(0, 1, 0), 0);
     assert_near(txm_vec3_length(txm_vec3_perpendicular(txm_v3(3e38f, 1e38f, 0))), 1, 1e-6);
+}
+
+static void test_double_vectors(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(8, 8);
+    for (int i = 0; i < 1000; i++) {
+        const txm_vec3 fa = random_vec3(&rng, 10), fb = random_vec3(&rng, 10);
+        const float three[3] = {fa.x, fa.y, fa.z};
+        const txm_dvec3 a = txm_d3_load(three), b = txm_d3(fb.x, fb.y, fb.z);
+        const txm_dvec3 c = txm_d3_cross(a, b), unit = txm_d3_unit(a), back = txm_d3_sub(b, a);
+        assert_true(a.x == fa.x && a.y == fa.y && a.z == fa.z);
+        assert_near(txm_d3_dot(a, c), 0, 1e-12);
+        assert_near(txm_d3_dot(b, c), 0, 1e-12);
+        assert_near(txm_d3_len2(c), txm_d3_len2(a) * txm_d3_len2(b) -
+                                        txm_d3_dot(a, b) * txm_d3_dot(a, b), 1e-9);
+        assert_near(txm_d3_len(unit), 1, 1e-15);
+        assert_near(txm_d3_dot(unit, a), txm_d3_len(a), 1e-12);
+        assert_near(txm_d3_dist(a, b), txm_d3_len(back), 0);
+        assert_near(txm_d3_dist2(a, b), txm_d3_len2(back), 0);
+        assert_near(txm_d3_dist(txm_d3_add(a, back), b), 0, 1e-13);
+        assert_near(txm_d3_dist(txm_d3_mad(a, back, 1), b), 0, 1e-13);
+        assert_near(txm_d3_dist(txm_d3_mad(a, b, -3), txm_d3_sub(a, txm_d3_scale(b, 3))), 0, 1e-13);
+        /* the same as the vectors in float, rounded */
+        assert_near(txm_vec3_length(fa), txm_d3_len(a), 1e-5);
+        assert_near(txm_vec3_dot(fa, fb), txm_d3_dot(a, b), 1e-4);
+        const txm_dvec3 corner = txm_d3(1, 2, 3);
+        const txm_dvec3 area = txm_d3_area2(corner, txm_d3_add(corner, a), txm_d3_add(corner, b));
+        assert_near(txm_d3_dist(area, c), 0, 1e-11);
+    }
+    const txm_dvec3 zero = txm_d3_unit(txm_d3(0, 0, 0));
+    assert_true(zero.x == 0 && zero.y == 0 && zero.z == 0);
+    const txm_dvec3 up = txm_d3_area2(txm_d3(0, 0, 0), txm_d3(2, 0, 0), txm_d3(0, 3, 0));
+    assert_true(up.x == 0 && up.y == 0 && up.z == 6);
 }
 
 static void test_matrix_inverse(void **state) {
@@ -1368,12 +1488,16 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_status_text),
         cmocka_unit_test(test_fail),
+        cmocka_unit_test(test_fail_numbers),
         cmocka_unit_test(test_sizes),
         cmocka_unit_test(test_parallel_for),
         cmocka_unit_test(test_allocation),
         cmocka_unit_test(test_arena),
         cmocka_unit_test(test_arena_inside_itself),
         cmocka_unit_test(test_arena_failing),
+        cmocka_unit_test(test_arena_failed),
+        cmocka_unit_test(test_sincos),
+        cmocka_unit_test(test_exp2),
         cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_image_check),
         cmocka_unit_test(test_image_samples),
@@ -1383,6 +1507,7 @@ int main(void) {
         cmocka_unit_test(test_shuffle),
         cmocka_unit_test(test_sort),
         cmocka_unit_test(test_vectors),
+        cmocka_unit_test(test_double_vectors),
         cmocka_unit_test(test_matrix_inverse),
         cmocka_unit_test(test_transforms),
         cmocka_unit_test(test_quaternions),
