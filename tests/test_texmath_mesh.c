@@ -2,14 +2,7 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    cc -std=c99 -I. -Itests tests/test_texmath_mesh.c -lcmocka -lpthread -lm                   */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include "testkit.h"
+#include "mathkit.h"
 
 /* ---- the check --------------------------------------------------------------------------- */
 

@@ -1,0 +1,62 @@
+/* mathkit.h - what the tests of texmath.h share: comparing, and random vectors
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   Includes cmocka.h and testkit.h.                                                            */
+#ifndef MATHKIT_H
+#define MATHKIT_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "testkit.h"
+
+static inline void assert_near(double a, double b, double tolerance) {
+    if (!(fabs(a - b) <= tolerance)) fail_msg("%.9g is not %.9g within %g", a, b, tolerance);
+}
+
+static inline float random_float(txm_rng *rng, float low, float high) {
+    return txm_lerpf(low, high, txm_rng_float(rng));
+}
+
+static inline txm_vec3 random_vec3(txm_rng *rng, float size) {
+    const float x = random_float(rng, -size, size), y = random_float(rng, -size, size);
+    return txm_v3(x, y, random_float(rng, -size, size));
+}
+
+static inline txm_quat random_quat(txm_rng *rng) {
+    txm_quat q;
+    do {
+        q.x = random_float(rng, -1, 1);
+        q.y = random_float(rng, -1, 1);
+        q.z = random_float(rng, -1, 1);
+        q.w = random_float(rng, -1, 1);
+    } while (txm_quat_dot(q, q) < 0.01);
+    return txm_quat_normalize(q);
+}
+
+static inline void assert_vec3(txm_vec3 a, txm_vec3 b, double tolerance) {
+    assert_near(a.x, b.x, tolerance);
+    assert_near(a.y, b.y, tolerance);
+    assert_near(a.z, b.z, tolerance);
+}
+
+static inline void assert_floats(const float *a, const float *b, int count, double tolerance) {
+    for (int i = 0; i < count; i++) assert_near(a[i], b[i], tolerance);
+}
+
+static inline txm_image view(void *pixels, int width, int height, int channels, txm_sample sample) {
+    txm_image im;
+    memset(&im, 0, sizeof im);
+    im.pixels = pixels;
+    im.width = width;
+    im.height = height;
+    im.channels = channels;
+    im.sample = sample;
+    return im;
+}
+
+#endif /* MATHKIT_H */
