@@ -1,4 +1,4 @@
-/* test_texmath.c - the common ground: statuses, sizes, memory, numbers, chance, sorting, the quick start
+/* test_texmath.c - statuses, sizes, memory, numbers, random numbers, sorting, the quick start
    SPDX-License-Identifier: MIT OR Unlicense
 
    cc -std=c99 -I. -Itests tests/test_texmath.c -lcmocka -lpthread -lm                        */
