@@ -140,6 +140,10 @@ static txm_image image_of(void *pixels, int width, int height, int channels) {
     return image;
 }
 
+static float dot(const float a[3], const float b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 /* ---- the forest --------------------------------------------------------------------------- */
 
 /* The whole file with a 0 at its end, for free(); NULL if it cannot be read. */
@@ -379,7 +383,7 @@ static void add_ball(cells *c, const float p[3], float radius, float loss) {
                 const float d[3] = {c->low[0] + ((float)x + 0.5f) * c->size - p[0],
                                     c->low[1] + ((float)y + 0.5f) * c->size - p[1],
                                     c->low[2] + ((float)z + 0.5f) * c->size - p[2]};
-                const float square = tpc_dot(d, d) / (reach * reach);
+                const float square = dot(d, d) / (reach * reach);
                 if (square < 1) *cell_at(c, x, y, z) += 0.75f * loss / reach * (1 - square);
             }
         }
@@ -759,7 +763,7 @@ static int upload_pictures(forest_gl *f) {
 }
 
 static void make_objects(forest_gl *f) {
-    const float to_sun[3] = {0.53f, 0.62f, 0.58f}, length = sqrtf(tpc_dot(to_sun, to_sun));
+    const float to_sun[3] = {0.53f, 0.62f, 0.58f}, length = sqrtf(dot(to_sun, to_sun));
     for (int k = 0; k < 3; k++) f->frame.sun[k] = to_sun[k] / length;
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
@@ -826,9 +830,9 @@ static void aim(forest_gl *f, int width, int height) {
     const float z[2] = {-(far + n) / (far - n), -2 * far * n / (far - n)};
     for (int column = 0; column < 4; column++) {
         /* the column of the view: right, up and back in its rows */
-        const float v[3] = {column < 3 ? right[column] : -tpc_dot(right, d->eye),
-                            column < 3 ? up[column] : -tpc_dot(up, d->eye),
-                            column < 3 ? back[column] : -tpc_dot(back, d->eye)};
+        const float v[3] = {column < 3 ? right[column] : -dot(right, d->eye),
+                            column < 3 ? up[column] : -dot(up, d->eye),
+                            column < 3 ? back[column] : -dot(back, d->eye)};
         float *m = d->view_projection + 4 * column;
         m[0] = v[0] / tan_right;
         m[1] = v[1] / tan_up;
@@ -848,7 +852,7 @@ static void draw_strips(forest_gl *f, int program, int count) {
 /* The leaf clouds as seen along the view, if it has turned. */
 static void draw_impostors(forest_gl *f) {
     static const float clear[4] = {0, 0, 0, 0}, nothing[4] = {-2, 0, 0, 0}, away = 1;
-    const float turned = 1 - tpc_dot(f->seen_from, f->frame.forward);
+    const float turned = 1 - dot(f->seen_from, f->frame.forward);
     if (!f->card_count || (f->has_impostors && turned < 1e-6f)) return;
     glBindFramebuffer(GL_FRAMEBUFFER, f->card_frame);
     glViewport(0, 0, CLOUD_SIDE, CLOUD_SIDE);
