@@ -18,15 +18,16 @@ LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
              tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
-# examples/brush.c opens a window, which takes SDL 2; examples/forest_gl.c takes OpenGL, and opens a
+# examples/brush.c opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
 # window if it can. Where that is not installed they are left out
 SDL     := $(shell sdl2-config --libs 2>/dev/null)
 GL      := $(shell printf '\043include <%s>\n' EGL/egl.h EGL/eglext.h GL/gl.h GL/glext.h | \
              sed '$$aint main(void) { return 0; }' | \
              $(CC) -xc - -o /dev/null -lEGL -lOpenGL 2>/dev/null && echo -lEGL -lOpenGL)
-LEFT_OUT = $(if $(SDL),,examples/brush.c) $(if $(GL),,examples/forest_gl.c)
-EXAMPLES = $(patsubst examples/%.c,$(BUILD)/examples/%, \
-             $(filter-out $(LEFT_OUT),$(wildcard examples/*.c)))
+LEFT_OUT = $(if $(SDL),,brush) $(if $(GL),,forest_gl)
+EXAMPLES = $(addprefix $(BUILD)/examples/,$(filter-out $(LEFT_OUT), \
+             $(patsubst examples/%.c,%,$(wildcard examples/*.c)) \
+             $(patsubst examples/%/main.c,%,$(wildcard examples/*/main.c))))
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
@@ -81,10 +82,16 @@ $(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
 	@mkdir -p $(@D)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
+# those of more than one file have a folder of their own
+$(BUILD)/examples/%: examples/%/main.c $(BUILD)/stb.o $(HEADERS)
+	@mkdir -p $(@D)
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
+
 $(BUILD)/examples/membrane: $(addprefix $(BUILD)/,mesh_io.o render.o image_io.o)
 $(BUILD)/examples/join: $(BUILD)/image_io.o
 $(BUILD)/examples/join: CPPFLAGS += -D_FILE_OFFSET_BITS=64
 $(BUILD)/examples/brush: LIBRARIES = $(SDL)
+$(BUILD)/examples/forest_gl: $(wildcard examples/forest_gl/*)
 $(BUILD)/examples/forest_gl: LIBRARIES = $(GL) $(SDL) -lcjson
 $(BUILD)/examples/forest_gl: CPPFLAGS += $(if $(SDL),-DFOREST_WINDOW) \
     -DFOREST_SHADERS='"$(PREFIX)/share/texkit/shaders"'
@@ -123,8 +130,8 @@ lint:
 	@tools/setup.sh lint
 	cppcheck --quiet -j 2 --std=c99 --enable=warning,performance,portability --inline-suppr \
 	    --error-exitcode=1 --suppress=missingIncludeSystem --suppress=uninitvar:texmath.h \
-	    -I. -Itools tools/*.c examples/*.c bench/*.c
-	printf '%s\n' tools/*.c examples/*.c bench/*.c | xargs -P 2 -I FILE \
+	    -I. -Itools tools/*.c examples/*.c examples/*/*.c bench/*.c
+	printf '%s\n' tools/*.c examples/*.c examples/*/*.c bench/*.c | xargs -P 2 -I FILE \
 	    clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -I. -Itools
 
 # ---- installing

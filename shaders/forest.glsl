@@ -1,4 +1,4 @@
-/* forest.glsl - the shaders of examples/forest_gl.c
+/* forest.glsl - the shaders of examples/forest_gl
    SPDX-License-Identifier: MIT OR Unlicense
 
    Each stage is compiled from "#version 430 core", a define that chooses it, treepieces.glsl and this

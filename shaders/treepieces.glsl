@@ -5,7 +5,7 @@
      Skins pieces as treepieces_skin does, chooses levels of tessellation and places the points of a
      patch as treepieces_edge_level and treepieces_patch_point do, finds the bark of a quad as
      treepieces_quad_uv does, and gives leaf clouds their depth. GLSL 4.30, no extensions. A program
-     that draws forests with it is examples/forest_gl.c, its shaders are in forest.glsl.
+     that draws forests with it is examples/forest_gl, its shaders are in forest.glsl.
 
    HOW TO USE IT
      Paste it after #version into the stages that need it. What it reads are buffers that hold the

@@ -3,7 +3,7 @@
 
    cc -I. tests/gl_treepieces.c build/stb.o -o gl_treepieces -lEGL -lOpenGL -lcjson -lm
 
-   Runs the shaders of examples/forest_gl.c without a window, on whatever driver EGL finds (Mesa's
+   Runs the shaders of examples/forest_gl without a window, on whatever driver EGL finds (Mesa's
    llvmpipe on machines without a graphics card), and prints "ok - what" or "not ok - what" for each
    test. The example is part of this program, so that its own buffers and draw calls are tested.
 
@@ -19,7 +19,7 @@
    treepieces_impostor make.
 
    Draw calls: those of the example, counted where it calls OpenGL.                             */
-#define _POSIX_C_SOURCE 199309L /* as the example says, which comes too late */
+#define _XOPEN_SOURCE 600 /* as headless.c says, which comes too late */
 #define GL_GLEXT_PROTOTYPES
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -49,7 +49,17 @@ static void counted_arrays(GLenum mode, GLint first, GLsizei count) {
 #define glDrawArraysInstanced counted_instances
 #define glDrawArrays counted_arrays
 #define main forest_main
-#include "examples/forest_gl.c"
+#include "examples/forest_gl/trees.c"
+#include "examples/forest_gl/files.c"
+#include "examples/forest_gl/options.c"
+#include "examples/forest_gl/pictures.c"
+#include "examples/forest_gl/shaders.c"
+#include "examples/forest_gl/light.c"
+#include "examples/forest_gl/buffers.c"
+#include "examples/forest_gl/camera.c"
+#include "examples/forest_gl/frame.c"
+#include "examples/forest_gl/headless.c"
+#include "examples/forest_gl/main.c"
 #undef main
 #include "treekit.h"
 

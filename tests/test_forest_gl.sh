@@ -5,7 +5,7 @@
 . tests/tap.sh
 
 gl=$OUT/gl_treepieces forest=$PWD/build/examples/forest_gl
-if [ ! "$gl" -nt tests/gl_treepieces.c ] || [ ! "$gl" -nt examples/forest_gl.c ] ||
+if [ ! "$gl" -nt tests/gl_treepieces.c ] || [ -n "$(find examples/forest_gl -newer "$gl")" ] ||
     [ ! "$gl" -nt tests/treekit.h ] || [ ! "$gl" -nt treepieces.h ] || [ ! "$gl" -nt texmath.h ]; then
     # shellcheck disable=SC2086 # flags are words
     check "gl_treepieces builds" $CC -std=c99 -O2 -ffp-contract=off -Wall -Wextra -I. \

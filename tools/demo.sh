@@ -166,7 +166,7 @@ bilayer() {
 BILAYER
 }
 
-# drawn OUT OPTIONS...: a picture by examples/forest_gl.c, no window
+# drawn OUT OPTIONS...: a picture by examples/forest_gl, no window
 drawn() {
     picture=$1
     shift
@@ -400,7 +400,7 @@ TREES
 if [ -x "$build/examples/forest_gl" ] &&
     drawn forest.png --count 1 --pieces 8 --size 64x64 2>"$out/forest.txt"; then
     cat >>"$out/index.part" <<'SPECIES'
-<p>Each species bare and in leaf, as <code>examples/forest_gl.c</code> draws them: tessellated where the eye is
+<p>Each species bare and in leaf, as <code>examples/forest_gl</code> draws them: tessellated where the eye is
 near, leaves as impostors with depth. Bark and leaves are drawn by the library.</p>
 <div class="trees">
 SPECIES

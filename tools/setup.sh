@@ -39,7 +39,7 @@ esac
 case $profile in test | lint | ci)
     need has_command sdl2-config libsdl2-dev # of examples/brush.c
 esac
-# of examples/forest_gl.c and of tests of shaders: OpenGL without a window, nor a graphics card
+# of examples/forest_gl and of tests of shaders: OpenGL without a window, nor a graphics card
 case $profile in demo | test | lint | ci)
     need has_header EGL/egl.h libegl-dev
     need has_header GL/glext.h libgl-dev

@@ -1,0 +1,59 @@
+/* camera.c - where the eye is
+   SPDX-License-Identifier: MIT OR Unlicense  */
+#include "forest_gl.h"
+
+static const float degree = 0.0174532925f, half_view = 19; /* degrees up and down */
+
+/* Where --orbit and --at leave it open: as far from the middle as shows it all. */
+void choose_view(forest_gl *f) {
+    const float tall = f->high[1] - f->low[1], tan_up = tanf(half_view * degree);
+    const float wide = 0.5f * (f->high[0] - f->low[0] + f->high[2] - f->low[2]);
+    const float tan_right = tan_up * (float)f->o.width / (float)f->o.height;
+    for (int k = 0; k < 3 && !f->o.has_at; k++) f->o.at[k] = 0.5f * (f->low[k] + f->high[k]);
+    if (f->o.orbit[2] > 0) return;
+    f->o.orbit[2] = 0.53f * txm_maxf(tall / tan_up, wide / tan_right) + 0.2f * wide;
+}
+
+/* Look at the forest from --orbit. */
+void aim(forest_gl *f, int width, int height) {
+    frame_data *d = &f->frame;
+    const float a = f->o.orbit[0] * degree, e = f->o.orbit[1] * degree, distance = f->o.orbit[2];
+    const float tan_up = tanf(half_view * degree), tan_right = tan_up * (float)width / (float)height;
+    const float wide = 0.5f * (f->high[0] - f->low[0] + f->high[2] - f->low[2]);
+    const float *middle = f->o.at;
+    const float back[3] = {cosf(e) * sinf(a), sinf(e), cosf(e) * cosf(a)};
+    const float right[3] = {cosf(a), 0, -sinf(a)};
+    const float up[3] = {-sinf(e) * sinf(a), cosf(e), -sinf(e) * cosf(a)};
+    for (int k = 0; k < 3; k++) {
+        d->eye[k] = middle[k] + distance * back[k];
+        d->right[k] = right[k];
+        d->up[k] = up[k];
+        d->forward[k] = -back[k];
+    }
+    d->eye[1] = txm_maxf(d->eye[1], 0.1f);
+    d->right[3] = tan_right;
+    d->up[3] = tan_up;
+    d->forward[3] = CLOUDS;
+    d->box_scale[3] = 0.18f / (distance + wide + 30);
+    d->lod[0] = f->o.level;
+    d->lod[1] = f->o.half;
+    d->lod[2] = 0.6f;
+    d->lod[3] = (float)f->sheets[0].width;
+    f->near_plane = txm_clampf(0.02f * distance, 0.05f, 1);
+    f->far_plane = distance + 4 * (wide + f->high[1]) + 500;
+    const float n = f->near_plane, far = f->far_plane;
+    const float z[2] = {-(far + n) / (far - n), -2 * far * n / (far - n)};
+    for (int column = 0; column < 4; column++) {
+        /* the column of the view: right, up and back in its rows */
+        const float v[3] = {column < 3 ? right[column] : -dot(right, d->eye),
+                            column < 3 ? up[column] : -dot(up, d->eye),
+                            column < 3 ? back[column] : -dot(back, d->eye)};
+        float *m = d->view_projection + 4 * column;
+        m[0] = v[0] / tan_right;
+        m[1] = v[1] / tan_up;
+        m[2] = z[0] * v[2] + (column == 3 ? z[1] : 0);
+        m[3] = -v[2];
+    }
+    glBindBuffer(GL_UNIFORM_BUFFER, f->block);
+    glBufferData(GL_UNIFORM_BUFFER, sizeof *d, d, GL_STREAM_DRAW);
+}

@@ -1,0 +1,83 @@
+/* forest_gl - a forest in the wind, drawn by the graphics card
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   forest_gl [--species NAME|FILE,...] [--count N] [--seed N] [--pieces N] [--bare]
+             [--bark DIR|SHEET.png] [--leaf PICTURE.png]
+             [--time T] [--wind SPEED] [--level MAX] [--half METRES] [--wire]
+             [--orbit AZIMUTH,ELEVATION,DISTANCE] [--at X,Y,Z] [--size WxH] [--shaders DIR]
+             [--headless OUT.png [--frames N] [--smooth N]]
+
+   What a game does with treepieces.h and shaders/treepieces.glsl. All arrays of the forest go to the
+   graphics card once, its bones once a frame. A frame is one instanced draw for each type of piece, one
+   for all leaf clouds, one for ground and sky, and one more if the view has turned, which renders the
+   clouds' impostors anew: never more than 10, however many trees there are.
+
+   In the window: drag to turn, wheel to come nearer, right button to move, w shows the levels of
+   tessellation, l the leaves, space stops the time, Esc quits. --headless needs neither window nor
+   graphics card; OUT with %d or %03d in it takes --frames pictures, 25 a second.
+
+   --bark    a set of framed tiles made by 'texkit tiles --kind frame', or a sheet of treepieces_bark
+   --leaf    a picture with transparency, for all species
+   --level, --half   tessellation at the eye, and the distance over which it halves
+   --orbit   degrees about the middle of the forest, and metres from there; --at: another middle
+   --smooth  samples across and down a pixel
+
+   The program in its files; calls go down only:
+
+                    main.c                  options, then a window or pictures
+              window.c  headless.c          SDL 2; EGL without a window, PNG files
+                   frame.c                  the draw calls of a frame
+             buffers.c  camera.c            buffers and textures; the matrix
+              light.c  shaders.c            shadows of crowns on a grid; programs
+                  pictures.c                bark and leaves
+                   trees.c                  species, forest, wind: calls treepieces.h
+             options.c  files.c             the command line; errors, files
+
+   forest_gl.h has the struct that they share.                                                   */
+#include "forest_gl.h"
+
+#include <stdio.h>
+
+static void close_forest(forest_gl *f) {
+    for (int s = 0; s < MAX_SPECIES; s++) {
+        free(f->sheets[s].pixels);
+        free(f->leaves[s].pixels);
+    }
+    free(f->bones);
+    free(f->sway);
+    treepieces_forest_free(f->forest);
+    treepieces_kit_free(f->kit);
+    if (f->display != EGL_NO_DISPLAY) eglTerminate(f->display);
+}
+
+int main(int argc, char **argv) {
+    static forest_gl f;
+    int step = 1;
+    f.o = defaults();
+    for (int i = 1; i < argc && step; i += step)
+        step = read_option(&f.o, argv[i], i + 1 < argc ? argv[i + 1] : NULL);
+    if (!step || !is_sound(&f.o)) {
+        fprintf(stderr,
+                "usage: forest_gl [--species NAME|FILE,...] [--count N] [--seed N] [--pieces N]\n"
+                "  [--bare] [--bark DIR|SHEET.png] [--leaf PNG] [--time T] [--wind SPEED]\n"
+                "  [--level MAX] [--half METRES] [--wire] [--orbit AZIMUTH,ELEVATION,DISTANCE]\n"
+                "  [--at X,Y,Z] [--size WxH] [--shaders DIR]\n"
+                "  [--headless OUT.png [--frames N, with %%d in OUT] [--smooth N]]\n");
+        return 2;
+    }
+    if (read_species(&f) && grow(&f) && make_pictures(&f)) {
+        choose_view(&f);
+        if (f.o.headless) {
+            if (open_headless(&f) && prepare(&f, argv[0])) render_pictures(&f);
+        } else {
+#ifdef FOREST_WINDOW
+            run_window(&f, argv[0]);
+#else
+            fail(&f, "built without a window; --headless OUT.png draws a picture");
+#endif
+        }
+    }
+    if (f.failed[0]) fprintf(stderr, "forest_gl: %s\n", f.failed);
+    close_forest(&f);
+    return f.failed[0] != 0;
+}
