@@ -443,6 +443,8 @@ TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
 #if defined(TEXPATCH_IMPLEMENTATION) && !defined(TEXPATCH_IMPLEMENTED)
 #define TEXPATCH_IMPLEMENTED
 
+/* ---- configuration ------------------------------------------------------------------ */
+
 #if defined(__SSE2__) && !defined(TEXPATCH_NO_SIMD)
 #include <emmintrin.h>
 #endif

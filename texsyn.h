@@ -252,6 +252,8 @@ TEXSYN_API void texsyn_end(texsyn_job *job);
 #if defined(TEXSYN_IMPLEMENTATION) && !defined(TEXSYN_IMPLEMENTED)
 #define TEXSYN_IMPLEMENTED
 
+/* ---- configuration ------------------------------------------------------------------ */
+
 #if !defined(TEXSYN_NO_SIMD) && defined(__SSE2__)
 #include <emmintrin.h>
 #define TXS_SSE2 1
@@ -684,6 +686,7 @@ static txs_pick *txs_best_pick(void) {
     return txs_pick_plain;
 #endif
 }
+
 /* ---- the sampler --------------------------------------------------------------------------
 
    Gibbs sampling of a canvas whose potentials are controlled: every potential is
@@ -1107,6 +1110,7 @@ static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, i
             s->integral[k][i] = level->types[k].potential[i] * TXS_PRECISE;
     return s;
 }
+
 /* ---- the example --------------------------------------------------------------------------
 
    The example becomes planes of decorrelated bands (principal components of the colours; alpha
@@ -1651,6 +1655,7 @@ done:
     txm_arena_free(&arena);
     return status;
 }
+
 /* ---- the model as bytes -------------------------------------------------------------------
 
    An adaptive binary arithmetic code (a range coder in the manner of LZMA's). One description of
@@ -1956,6 +1961,7 @@ static uint32_t txs_crc(const uint8_t *bytes, size_t count) {
     }
     return ~crc;
 }
+
 /* ---- public: models --------------------------------------------------------------------- */
 
 TEXSYN_API void texsyn_free(texsyn_model *model) {

@@ -467,6 +467,8 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
 #if defined(TEXTILES_IMPLEMENTATION) && !defined(TEXTILES_IMPLEMENTED)
 #define TEXTILES_IMPLEMENTED
 
+/* ---- configuration ------------------------------------------------------------------ */
+
 #if !defined(TEXTILES_NO_SIMD) && defined(__SSE2__)
 #include <emmintrin.h>
 #define TXT_SSE2 1

@@ -5524,6 +5524,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
     else txm_arena_free(&arena);
     return status;
 }
+
 #endif /* TREEPIECES_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------
