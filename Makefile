@@ -12,9 +12,10 @@ OPENMP  := $(shell echo 'int main(void) { return 0; }' | \
 WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow
 
 # -ffp-contract=off: the same bytes on machines with and without fused multiply-add
-COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -I. -Itools $(CPPFLAGS)
+COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -Isrc -I. -Itools $(CPPFLAGS)
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
+SOURCES := $(wildcard src/*.h src/*/*.h)
 HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
              tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
@@ -31,13 +32,14 @@ EXAMPLES = $(addprefix $(BUILD)/examples/,$(filter-out $(LEFT_OUT), \
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
-.PHONY: all help demo test examples bench lint install uninstall clean setup samples helpers
+.PHONY: all help headers demo test examples bench lint install uninstall clean setup samples helpers
 .DELETE_ON_ERROR:
 
 all: $(BUILD)/texkit
 
 help:
 	@echo "make            build $(BUILD)/texkit, the command line tool"
+	@echo "make headers    paste the headers at the root together from src/"
 	@echo "make demo       texture, tiles, meshes, trees from sample photographs, write out/index.html"
 	@echo "make test       run all tests, with the sanitizers on"
 	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
@@ -47,12 +49,17 @@ help:
 	@echo "make uninstall  take them away again"
 	@echo "make clean      remove $(BUILD)/ and out/"
 
+# ---- the headers at the root
+
+headers:
+	@tools/headers.sh
+
 # ---- the tool and its helpers
 
 setup:
 	@CC="$(CC)" tools/setup.sh tool
 
-$(BUILD)/%.o: tools/%.c $(wildcard tools/*.h) $(HEADERS) Makefile | setup
+$(BUILD)/%.o: tools/%.c $(wildcard tools/*.h) $(SOURCES) Makefile | setup
 	@mkdir -p $(@D)
 	$(COMPILE) -c $< -o $@
 
@@ -78,7 +85,7 @@ $(BUILD)/view: $(addprefix $(BUILD)/,view.o render.o mesh_io.o image_io.o stb.o)
 
 examples: $(EXAMPLES)
 
-$(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(HEADERS)
+$(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
@@ -100,12 +107,12 @@ $(BUILD)/examples/forest_gl: CPPFLAGS += $(if $(SDL),-DFOREST_WINDOW) \
 bench: $(BENCHES) $(PLAIN) samples
 	@for b in $(BENCHES); do $$b $$(ls -r $(BUILD)/samples/*.png) || exit 1; done
 
-$(BUILD)/bench/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
+$(BUILD)/bench/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
 
 # the same without SIMD, for comparison
-$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(HEADERS)
+$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD \
 	    $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
@@ -129,10 +136,10 @@ test:
 lint:
 	@tools/setup.sh lint
 	cppcheck --quiet -j 2 --std=c99 --enable=warning,performance,portability --inline-suppr \
-	    --error-exitcode=1 --suppress=missingIncludeSystem --suppress=uninitvar:texmath.h \
-	    -I. -Itools tools/*.c examples/*.c examples/*/*.c bench/*.c
+	    --error-exitcode=1 --suppress=missingIncludeSystem '--suppress=uninitvar:src/texmath/*' \
+	    -Isrc -I. -Itools tools/*.c examples/*.c examples/*/*.c bench/*.c
 	printf '%s\n' tools/*.c examples/*.c examples/*/*.c bench/*.c | xargs -P 2 -I FILE \
-	    clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -I. -Itools
+	    clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -Isrc -I. -Itools
 
 # ---- installing
 

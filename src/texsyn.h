@@ -1,0 +1,308 @@
+/* texsyn.h - v0.1.0 - learn a texture as a small table of statistics, synthesise any amount of it
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
+
+   WHAT IT DOES
+     Reads one photograph of a texture and keeps, for some dozens of ways in which two to four
+     pixels can lie to each other ("clique types"), how often each difference of their values
+     occurs: two to four thousand bytes. From that alone it makes new texture of any size, seamless
+     if wanted. No pixel of the photograph is kept, so none can be copied.
+
+   QUICK START                                 (tests build and run this very block)
+     // Learn a texture and make a larger one. cc -std=c99 quick.c -lm
+     #define TEXSYN_IMPLEMENTATION            // in exactly one .c or .cpp file
+     #include "texsyn.h"                      // texmath.h must lie beside it
+     #include <stdio.h>
+
+     int main(void) {
+         static unsigned char photo[64 * 64], larger[128 * 96];    // the caller owns all pixels
+         texsyn_learn_desc learn = {0};       // zero = the default, for every field
+         texsyn_synth_desc synth = {0};
+         texsyn_model *model;
+         txm_env env = {0};                   // malloc, silent, serial; receives the message
+         txm_image out = {0};
+         for (int i = 0; i < 64 * 64; i++)    // instead of a photograph: waves
+             photo[i] = (unsigned char)(128 + i % 64 * 9 % 50 + i / 64 * 5 % 70);
+         learn.example.pixels = photo;
+         learn.example.width = learn.example.height = 64;
+         out.pixels = larger;
+         out.width = synth.width = 128;
+         out.height = synth.height = 96;
+         if (texsyn_learn(&learn, &env, &model) != TXM_OK) {
+             fprintf(stderr, "learn: %s\n", env.message);
+             return 1;
+         }
+         synth.model = model;
+         if (texsyn_synthesize(&synth, &env, out) != TXM_OK) {
+             fprintf(stderr, "synthesise: %s\n", env.message);
+             return 1;
+         }
+         printf("%d clique types, pixel (5, 7) is %d\n", texsyn_clique_count(model),
+                larger[7 * 128 + 5]);
+         texsyn_free(model);
+         return 0;
+     }
+
+   WHAT IT IS GOOD FOR
+     Bark, grass, gravel, sand, litter, rust, plaster, coarse weaves: what repeats without order.
+     It cannot draw closed contours, long thin lines or exact layouts: cobbles merge, bricks lose
+     their courses. A photograph whose light or material drifts gives a texture with patches of
+     both; a mask leaves out what does not belong. About 256 x 256 pixels that show the largest
+     element a few dozen times are enough; fewer than 64 x 64 are too few to tell much.
+
+   HOW IT WORKS
+     The example is split into decorrelated colour bands of at most 32 values and into pyramid
+     levels. On each level, coarse first, a canvas is synthesised with the clique types so far, the
+     histograms of all others are compared with the example's, the worst are added, and so on [1].
+     Synthesis is Gibbs sampling [4] in which the potentials of the clique types are controlled so
+     that the histograms of the canvas follow those of the example.
+     Beyond [1], which has pairs: values beside each other as a coarse table, which tells a rare
+     value from a frequent one; and kinds of three and four pixels (corners, parallel differences,
+     differences along with those of the coarser level), which hold what pairs cannot tell.
+
+   CONFIGURATION   (define before the include that has _IMPLEMENTATION)
+     TEXSYN_STATIC       every function static to the including file (set it everywhere)
+     TEXSYN_MAX_PIXELS   refuse larger images; default 2^28
+     TEXSYN_NO_SIMD      plain C only. Else SSE2 where the compiler has it and, with gcc and clang,
+                         AVX2 where the processor has it. The bytes are the same.
+
+   MEMORY
+     A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
+     sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
+     takes 2 bytes per band and pixel for the level in work and the one above, margins aside: 8 to 9
+     bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from a canvas of at
+     least 64 x 64. After an error nothing stays allocated and *out is NULL.
+
+   TIME   (one core of 2023; make bench measures yours)
+     Learning 256 x 256 RGB about 1.3 s; synthesis about 1.5 s per RGB megapixel. Both grow with
+     the pixels and the clique types. The parallel-for hook spreads both.
+
+   THREADS
+     No global state. Calls with different env, job and out may overlap; a model may be used by many
+     calls at once.
+
+   SAME BYTES
+     Learning and synthesis give the same bytes for the same input, options and seed: whatever the
+     number of threads, with or without SIMD, on any compiler that keeps to IEEE 754 (see
+     texmath.h). Synthesis works in integers up to the last step.
+
+   LIMITS
+     Sides of the example 16 pixels or more, images and canvases up to TEXSYN_MAX_PIXELS, which may
+     be lowered; float samples up to a million. Differences under 1/255 are not seen, so scale a
+     float or 16-bit example of narrow range first. A model file is refused unless every number in
+     it makes sense. Build with -ffp-contract=off if the bytes of learned models must agree
+     everywhere.
+
+   REFERENCES
+     [1] A. Zalesny, D. Auf der Maur, L. Van Gool. Realistic textures for virtual reality.
+         VAST 2001, section 3.
+     [2] A. Zalesny, L. Van Gool. A compact model for viewpoint dependent texture synthesis.
+         SMILE 2000.
+     [3] G. Gimel'farb. Image textures and Gibbs random fields. Kluwer 1999 (controllable
+         simulated annealing, of which the control here is a faster relative).
+     [4] S. Geman, D. Geman. Stochastic relaxation, Gibbs distributions, and the Bayesian
+         restoration of images. IEEE PAMI 6(6), 1984.                                        */
+#ifndef TEXSYN_H
+#define TEXSYN_H
+
+#include "texmath.h"
+
+#define TEXSYN_VERSION "0.1.0"
+
+#ifndef TEXSYN_MAX_PIXELS
+#define TEXSYN_MAX_PIXELS (1 << 28) /* larger images are refused */
+#endif
+#if TEXSYN_MAX_PIXELS > (1 << 28)
+#error "TEXSYN_MAX_PIXELS: at most 2^28"
+#endif
+
+#if defined(TEXSYN_STATIC) && defined(__GNUC__)
+#define TEXSYN_API __attribute__((unused)) static
+#elif defined(TEXSYN_STATIC)
+#define TEXSYN_API static
+#else
+#define TEXSYN_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- learning --------------------------------------------------------------------------- */
+
+/* A learned texture; a value of its own, never changed after it is made. */
+typedef struct texsyn_model texsyn_model;
+
+typedef struct texsyn_learn_desc {
+    txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
+                          outlive the call                                                       */
+    txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
+    int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Finer levels look
+                          no further than 10 pixels: what is beyond, the coarsest sees           */
+    int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
+                          36 for a gray example                                                   */
+    int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
+                          fewer are made if a level would be under 8 px or hold little of a mask  */
+    float threshold;   /* stop adding types when no histogram differs by more, or by less than the
+                          sampling noise; 0 = 0.005                                               */
+    uint64_t seed;     /* of the random numbers; any value                                        */
+} texsyn_learn_desc;
+
+/* Learn a model: the analysis of [1], section 3, steps 1 to 6, on every pyramid level.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives the model, or NULL on any error; release it with texsyn_free
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
+          beyond a million; TXM_TOO_SMALL for an example under 16 x 16 or a mask of fewer than 256
+          pixels; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   see MEMORY and TIME above; a larger max_distance or max_types costs in proportion      */
+TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env, texsyn_model **out);
+
+/* Release a model by the allocator it was made with; NULL is allowed. */
+TEXSYN_API void texsyn_free(texsyn_model *model);
+
+/* ---- looking into a model --------------------------------------------------------------- */
+
+typedef enum texsyn_kind {
+    TEXSYN_SINGLE = 0, /* one pixel:  I_b(p)                                                     */
+    TEXSYN_PAIR,       /* two pixels: I_c(p + d) - I_b(p), head minus tail                       */
+    TEXSYN_PARENT,     /* a pixel and the coarser level above it: J_c(p) - I_b(p)                */
+    TEXSYN_VALUES,     /* two pixels, coarsely: class of I_b(p), class of I_c(p + d)             */
+    TEXSYN_CORNER,     /* three: classes of I_b(p + d) - I_b(p) and I_b(p + e) - I_b(p)          */
+    TEXSYN_SCALE,      /* classes of I_b(p + d) - I_b(p) and J_b(p + e) - J_b(p + d - e)         */
+    TEXSYN_PARALLEL    /* classes of I_b(p + d) - I_b(p) and I_c(p + e + d) - I_c(p + e)         */
+} texsyn_kind;
+
+/* One clique type of a model's neighbourhood system. */
+typedef struct texsyn_clique {
+    texsyn_kind kind;
+    int level;       /* 0 = full resolution                                                      */
+    int band, other; /* tail band b, head band c (equal within a band)                           */
+    int dx, dy;      /* displacement d in pixels of that level                                   */
+    int ex, ey;      /* displacement e                                                           */
+    int phase; /* of a pair of neighbours: 0 = all, 1 = tails at even, 2 = at odd coordinates */
+} texsyn_clique;
+
+TEXSYN_API int texsyn_channels(const texsyn_model *model);    /* of the example: 1, 3 or 4 */
+TEXSYN_API int texsyn_level_count(const texsyn_model *model); /* 1..6                      */
+TEXSYN_API int texsyn_band_count(const texsyn_model *model);  /* 1..4 decorrelated bands   */
+TEXSYN_API int texsyn_clique_count(const texsyn_model *model);
+
+/* Clique type index of 0..count-1; its normalised histogram goes to bins (if not NULL), at most
+   bin_count of them. Returns the number of bins of the type, 0 for a bad index. */
+TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_clique *clique,
+                                float *bins, int bin_count);
+
+/* ---- saving and loading ----------------------------------------------------------------- */
+
+/* Write the model as bytes: docs/model-format.md. *size receives the number of bytes needed; with
+   buffer NULL nothing else happens. Saving what was loaded gives the same bytes again.
+   return TXM_OK; TXM_BAD_ARGUMENT for NULL; TXM_TOO_SMALL if capacity < *size, with the buffer
+          untouched; TXM_OUT_OF_MEMORY                                                        */
+TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void *buffer,
+                                  size_t capacity, size_t *size);
+
+/* Read a model back. *out receives it, or NULL on any error; release it with texsyn_free.
+   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model with sensible numbers;
+          TXM_BAD_ARGUMENT for NULL; TXM_OUT_OF_MEMORY                                        */
+TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, texsyn_model **out);
+
+/* ---- synthesis -------------------------------------------------------------------------- */
+
+typedef struct texsyn_synth_desc {
+    const texsyn_model *model; /* must outlive the job                                          */
+    int width, height;         /* of the output in pixels, 1 or more each                        */
+    int tileable;              /* non-zero: the output continues across its own borders          */
+    int quality;               /* -2 fast .. +2 best: fewer or more sweeps; 0 = default          */
+    uint64_t seed;             /* another seed, another picture                                  */
+} texsyn_synth_desc;
+
+/* The simple way: one call. out is the caller's: desc->width x desc->height, the channels of the
+   model (or 3 where it has 1, or 4 = opaque), 8 or 16 bits, or float, which is not clamped to 0..1.
+   Untouched after an error.
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or a picture that does not fit;
+          TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(width * height * clique types); see MEMORY and TIME above                         */
+TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env, txm_image out);
+
+/* The stepping way, for progressive display: begin, step until *done is 1, image whenever a picture
+   is wanted, end. The picture is the same as that of the one call. */
+typedef struct texsyn_job texsyn_job;
+
+/* Check the description and make the job; *job is NULL on any error (as texsyn_synthesize has
+   them). The job keeps the allocator of env; the other calls may be given another env. */
+TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, texsyn_job **job);
+
+/* Do one sweep. *done (may be NULL) is the share of the work, 0..1, and 1 when all is made. After
+   TXM_OUT_OF_MEMORY the step may be tried again; after TXM_CANCELLED also, but a sweep was broken
+   off and the picture will not be the one of the same seed. */
+TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, float *done);
+
+/* The picture so far at full size, at any time, the finished one at the end. TXM_BAD_ARGUMENT if it
+   does not fit out; out is as for texsyn_synthesize. */
+TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_image out);
+
+/* Give everything back; NULL is allowed. */
+TEXSYN_API void texsyn_end(texsyn_job *job);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TEXSYN_H */
+
+#if defined(TEXSYN_IMPLEMENTATION) && !defined(TEXSYN_IMPLEMENTED)
+#define TEXSYN_IMPLEMENTED
+
+#include "texsyn/config.h"
+#include "texsyn/model.h"
+#include "texsyn/energy.h"
+#include "texsyn/sampler.h"
+#include "texsyn/example.h"
+#include "texsyn/learn.h"
+#include "texsyn/file.h"
+#include "texsyn/learning.h"
+#include "texsyn/synthesis.h"
+#endif /* TEXSYN_IMPLEMENTATION */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/

@@ -1,0 +1,68 @@
+#ifndef TEXSYN_CONFIG_H
+#define TEXSYN_CONFIG_H
+
+#include "../texsyn.h"
+
+/* ---- configuration ------------------------------------------------------------------ */
+
+#if !defined(TEXSYN_NO_SIMD) && defined(__SSE2__)
+#include <emmintrin.h>
+#define TXS_SSE2 1
+#if defined(__GNUC__)
+#include <immintrin.h>
+#define TXS_AVX2 1 /* compiled for AVX2 function by function, chosen when running */
+#endif
+#endif
+
+/* ---- constants -------------------------------------------------------------------------- */
+
+enum {
+    TXS_MAX_BANDS = 4,
+    TXS_MAX_LEVELS = 6,
+    TXS_VALUES = 32,      /* gray levels of a band; fewer are clearly worse, the rows of the
+                             sampler are as wide                                              */
+    TXS_CLASSES = 9,      /* of a value or a difference in the kinds that take two            */
+    TXS_DIFFERENCES = 63, /* -31..31                                                          */
+    TXS_BINS = TXS_CLASSES * TXS_CLASSES, /* of the largest histogram                         */
+    TXS_ONE = 65536,    /* sum of a normalised histogram                                    */
+    TXS_MAX_TYPES = 96, /* clique types of one level                                        */
+    TXS_MAX_ENDS = 112, /* ends of cliques at one pixel of one band: keeps energies 16 bit  */
+    TXS_MAX_REACH = 60, /* pixels                                                           */
+    TXS_NEAR = 10,      /* pixels: the finer levels look no further, coarser ones see the rest */
+    TXS_ROW = 64,       /* bytes of a table row for a difference                            */
+    TXS_TABLE = (2 * TXS_CLASSES + TXS_DIFFERENCES) * TXS_ROW, /* bytes of one type's tables  */
+    TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
+    TXS_NAT = 16,        /* steps of a row's byte per nat of energy                          */
+    TXS_FINE = 4,        /* steps of the summed energy per step of a byte                    */
+    TXS_PRECISE = 256,   /* steps of a controlled potential per step of a byte               */
+    TXS_NOISE = 8192,    /* entries of the noise table                                       */
+    TXS_WINDOW = 64,     /* weight of one count in the running histograms                    */
+    TXS_TASKS = 16,      /* shares of a pass, whatever the number of threads                 */
+    TXS_SAMPLES = 24576, /* pixels counted per sweep: as many as matter                      */
+    TXS_GRID = 8,        /* sub-lattices a side                                              */
+    TXS_TOGETHER = 8,    /* pixels drawn together                                            */
+    TXS_GROUP = 2,       /* sub-lattices between two looks at the histograms                 */
+    TXS_PROPORTIONAL = 150, /* gains of the control, nats per unit of histogram error; see   */
+    TXS_INTEGRAL = 40,      /* docs/choices.md                                               */
+    TXS_TYPES = 24,      /* added per level unless the caller says otherwise                 */
+    TXS_TYPES_GRAY = 36, /* if there is only one band                                       */
+    TXS_COARSE = 8,      /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
+    TXS_STEEPEST = 20,   /* such steps: the largest stored potential                         */
+    TXS_UNSEEN = 1,      /* such steps: the potential of a bin that has none stored          */
+    TXS_RARE = 3,        /* the smallest root whose bin has a stored potential               */
+    TXS_SMALLEST = 64    /* pixels: a narrower canvas has no statistics to speak of          */
+};
+
+/* Learning. Ours, by the medians of several measures over the stochastic exemplars: the kinds of
+   three and four pixels hold the shapes and are preferred. */
+#define TXS_THRESHOLD 0.005f   /* smallest distance of histograms that is worth a clique type    */
+#define TXS_NOISE_SHARE 0.75f  /* and that in units of what two samples of one source differ by  */
+#define TXS_CORNER_WEIGHT 2.0f /* of distances, pairs having 1                                   */
+#define TXS_EDGE_WEIGHT 2.5f
+
+/* classes of a difference -31..31: fine where differences are frequent */
+static const uint8_t txs_difference_class[TXS_DIFFERENCES + 1] = {
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 4,
+    5, 5, 6, 6, 6, 7, 7, 7, 7, 7, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8};
+
+#endif /* TEXSYN_CONFIG_H */

@@ -1,0 +1,173 @@
+#ifndef TEXSYN_LEARNING_H
+#define TEXSYN_LEARNING_H
+
+#include "file.h"
+
+/* ---- public: learning ------------------------------------------------------------------- */
+
+/* no float sample is NaN or larger than LIMITS says */
+static int txs_image_is_moderate(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < (size_t)im.width * (size_t)im.channels; i++)
+            if (!txm_is_finite((double)row[i]) || !(fabsf(row[i]) <= 1e6f)) return 0;
+    }
+    return 1;
+}
+
+static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
+    txm_status status;
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "learn: desc is NULL");
+    if ((status = txm_image_check(&d->example, "example", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+        return status;
+    if (d->example.channels == 2)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "example: 2 channels; give 1, 3 or 4");
+    if (d->example.width < 16 || d->example.height < 16)
+        return txm_fail(env, TXM_TOO_SMALL, "example: both sides must be at least 16 pixels");
+    if (!txs_image_is_moderate(&d->example))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "example: a sample is NaN or beyond a million");
+    if (d->mask.pixels) {
+        if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+            return status;
+        if (d->mask.width != d->example.width || d->mask.height != d->example.height)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must be as large as the example");
+        if (d->mask.channels > 1 || d->mask.sample != TXM_U8)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must have one 8-bit channel");
+    }
+    if (d->max_distance < 0 || d->max_distance == 1 || d->max_distance > TXS_MAX_REACH)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "max_distance must be 2 to 60, or 0");
+    if (d->max_types < 0 || d->max_types > 60)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "max_types must be 1 to 60, or 0");
+    if (d->levels < 0 || d->levels > TXS_MAX_LEVELS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "levels must be 1 to 6, or 0");
+    if (!(d->threshold >= 0) || !txm_is_finite((double)d->threshold))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "threshold must be 0 or more");
+    return TXM_OK;
+}
+
+/* Split the example into levels of quantised bands. */
+static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, txs_source *source,
+                              txm_arena *arena, txm_env *env) {
+    const txm_image *im = &desc->example;
+    const int side = im->width < im->height ? im->width : im->height;
+    m->channels = im->channels ? im->channels : 1;
+    m->levels = 1;
+    while (m->levels < (desc->levels ? desc->levels : TXS_MAX_LEVELS) &&
+           side >> m->levels >= (desc->levels ? 8 : TXS_SMALLEST))
+        m->levels++;
+    for (int i = 0; i < m->levels; i++) {
+        txs_source *s = &source[i];
+        s->width = im->width >> i;
+        s->height = im->height >> i;
+        const size_t pixels = (size_t)s->width * (size_t)s->height;
+        s->step = (int)(pixels / (1 << 17)) | 1;
+        s->value = (float *)txm_arena_alloc(arena, pixels * (size_t)m->channels, sizeof(float));
+        if (desc->mask.pixels) s->mask = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+        s->canvas.width = s->width;
+        s->canvas.height = s->height;
+        s->canvas.stride = s->width;
+        s->canvas.plane = (ptrdiff_t)pixels;
+        s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels);
+        if (!s->value || (desc->mask.pixels && !s->mask) || !s->canvas.pixels)
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+        if (i == 0) {
+            for (int y = 0; y < s->height && s->mask; y++)
+                memcpy(s->mask + (size_t)y * (size_t)s->width, txm_image_row_const(&desc->mask, y),
+                       (size_t)s->width);
+            size_t seen = 0;
+            for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
+            if (s->mask && seen < 256)
+                return txm_fail(env, TXM_TOO_SMALL,
+                                "mask: fewer than 256 pixels (16 x 16) are not 0");
+            txs_find_bands(m, im, s);
+            txs_split(m, im, s);
+        } else {
+            txs_halve(&source[i - 1], s, m->bands);
+            size_t seen = 0;
+            for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
+            if (s->mask && seen < 256) {
+                m->levels = i; /* the region is too ragged to be seen from further away */
+                break;
+            }
+        }
+        for (int b = 0; b < m->bands; b++) {
+            float fill = txs_quantise_band(&m->level[i], b, s);
+            if (i == 0) m->dither[b] = fill;
+        }
+    }
+    for (int i = m->levels - 2; i >= 0; i--)
+        txs_lay_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
+                       m->bands);
+    return TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
+                                   texsyn_model **out) {
+    if (out) *out = NULL;
+    else return txm_fail(env, TXM_BAD_ARGUMENT, "learn: out is NULL");
+    txm_status status = txs_learn_check(desc, env);
+    if (status != TXM_OK) return status;
+
+    txm_arena arena;
+    txs_source source[TXS_MAX_LEVELS];
+    txs_canvas canvas, above;
+    texsyn_model *m = NULL;
+    uint8_t *bytes = NULL;
+    size_t size;
+    float from = 0, total = 0;
+    memset(source, 0, sizeof source);
+    memset(&canvas, 0, sizeof canvas);
+    memset(&above, 0, sizeof above);
+    txm_arena_init(&arena, env);
+
+    int16_t *noise = (int16_t *)txm_arena_alloc(&arena, TXS_NOISE + TXS_VALUES, sizeof *noise);
+    m = (texsyn_model *)txm_arena_zero(&arena, 1, sizeof *m);
+    if (!noise || !m) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
+        goto done;
+    }
+    txs_noise_table(noise);
+    if ((status = txs_prepare(desc, m, source, &arena, env)) != TXM_OK) goto done;
+
+    for (int i = 0; i < m->levels; i++) total += 1.0f / (float)(1 << 2 * i);
+    for (int i = m->levels - 1; i >= 0; i--) {
+        txs_learner a;
+        memset(&a, 0, sizeof a);
+        a.desc = desc;
+        a.model = m;
+        a.index = i;
+        a.level = &m->level[i];
+        a.source = &source[i];
+        a.canvas = &canvas;
+        a.level->types = (txs_type *)txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof(txs_type));
+        const int margin = i + 1 == m->levels ? TXS_MAX_REACH : TXS_NEAR;
+        if (!a.level->types ||
+            !txs_canvas_make(&canvas, env, txm_clampi(source[i].width, 128, 256),
+                             txm_clampi(source[i].height, 128, 256), margin, 2 * m->bands)) {
+            status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
+            goto done;
+        }
+        if (above.pixels) txs_lay_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+        txs_canvas_free(&above, env);
+        const float to = from + 1.0f / (float)(1 << 2 * i) / total;
+        if ((status = txs_learn_level(&a, noise, env, from, to)) != TXM_OK) goto done;
+        from = to;
+        above = canvas;
+        canvas.pixels = NULL;
+    }
+
+    /* what is handed out has been through the file format: saving it loses nothing more */
+    if ((status = texsyn_save(m, env, NULL, 0, &size)) != TXM_OK) goto done;
+    bytes = (uint8_t *)txm_arena_alloc(&arena, size, 1);
+    if (!bytes) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
+    else if ((status = texsyn_save(m, env, bytes, size, &size)) == TXM_OK)
+        status = texsyn_load(bytes, size, env, out);
+done:
+    txs_canvas_free(&canvas, env);
+    txs_canvas_free(&above, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+#endif /* TEXSYN_LEARNING_H */
