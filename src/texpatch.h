@@ -1,0 +1,509 @@
+/* texpatch.h - v0.1.0 - more of a photographed texture, its layout kept, in a fraction of a second
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
+
+   WHAT IT DOES
+     From a photograph of a texture it makes as much of the same as is wanted: bricks stay in their
+     courses, tiles and weaves on their lattice, gravel becomes other gravel [1]. Several maps of a
+     material (albedo, normals, height ...) in register; tileable; guided by a painted map or by
+     drawn strokes that become edges of the texture; around pixels that are to be kept; parts made
+     anew; any window of a plane without end.
+
+   QUICK START                                 (tests build and run this very block)
+     // Twice as much of a texture. cc -std=c99 quick.c -lm
+     #define TEXPATCH_IMPLEMENTATION          // in exactly one .c or .cpp file
+     #include "texpatch.h"                    // texmath.h must lie beside it
+     #include <stdio.h>
+
+     int main(void) {
+         static unsigned char photo[64 * 64], pixels[128 * 128];   // the caller owns all pixels
+         texpatch_desc desc = {0};            // zero = the default, for every field
+         texpatch_exemplar exemplar = {0};
+         txm_env env = {0};                   // malloc, silent, serial; receives the message
+         txm_image picture = {0}, out = {0};
+         for (int i = 0; i < 64 * 64; i++)    // instead of a photograph: bricks
+             photo[i] = (unsigned char)(i / 64 % 16 < 2 || (i + i / 1024 % 2 * 16) % 32 < 2 ? 220
+                                                                        : 90 + i * i % 31);
+         picture.pixels = photo;
+         picture.width = picture.height = 64;
+         exemplar.maps = &picture;            // more maps in register may follow
+         desc.exemplars = &exemplar;
+         desc.exemplar_count = desc.map_count = 1;
+         desc.width = desc.height = 128;
+         desc.tileable = TEXPATCH_TILE_X | TEXPATCH_TILE_Y;
+         out.pixels = pixels;
+         out.width = out.height = 128;
+         if (texpatch_make(&desc, &env, &out) != TXM_OK) {
+             fprintf(stderr, "texture: %s\n", env.message);
+             return 1;
+         }
+         printf("the middle pixel is %d\n", pixels[64 * 128 + 64]);
+         return 0;
+     }
+
+   WHICH CALL
+     texpatch_make        a picture, or several maps in register, in one call
+     texpatch_begin ...   the same in steps with a picture after each of them; texpatch_again makes
+                          a part anew, texpatch_source_at tells where each pixel comes from
+     texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
+     texpatch_edges_...   the layers of a picture and their boundaries, as lines and as pictures;
+                          with texpatch_disturb and texpatch_control_guide strokes become edges
+     texpatch_half        coarser levels of a result
+     texsyn.h makes stochastic texture out of a model of a few kB instead of pieces of the
+     photograph; textiles.h cuts sets of tiles that are laid when the picture is drawn.
+
+   HOW IT WORKS
+     Not colours but coordinates are synthesised: each pixel of the output names one of the
+     exemplar. First pass [1, 3.4; 3], at the coarsest level of a pyramid: patches of N x N, N / 2
+     apart, in scan order, each the best match of all places, joined along minimum-error cuts.
+     Places off the exemplar's lattice - found in its autocorrelation - cost more, and so do places
+     that were used more than others. Second pass [1, 3.5; 2], coarse to fine: neighbourhoods of 16
+     then 8 pixels look for their best match among what their pixels continue, at random and a
+     lattice step away; each pixel takes of all that cover it the one nearest to their mean, with
+     the adaptive weights w = P |x - z|^(r - 2), r = 0.8, where P is the share of well-matched
+     neighbourhoods among those of high frequency around. Taking one instead of the mean, nothing
+     blurs. Differences are sums of absolute differences of bytes. At the end pieces are bent by up
+     to 4 pixels, so that lines meet at their seams, and small steps of colour there are spread.
+     The output of a torus, a part made anew and a cell of the plane are all the same work with
+     some pixels given.
+
+   WEAKNESSES
+     Stones that touch are merged here and there; perspective is not understood; a lattice that is
+     not parallel (pavement waves, fans) is not found. A knot of wood comes again.
+
+   CONFIGURATION   (define before the include that has _IMPLEMENTATION)
+     TEXPATCH_STATIC       every function static to the including file (set it everywhere)
+     TEXPATCH_MAX_PIXELS   refuse larger exemplars, outputs and windows; default 2^28
+     TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
+
+   MEMORY
+     For each pixel of the output some 60 bytes while it is made, RGB; of the exemplar some 6,
+     times the turned and mirrored forms. The plane holds one cell at a time, and 24 bytes for each
+     pixel along the upper and lower sides of a row of cells.
+
+   TIME   (one core of 2023; make bench measures yours)
+     512 x 512 out of 256 x 256 pixels, RGB: 0.3 s; without optimisation (passes = -1) 0.15 s. It
+     grows with the pixels of the output; the exemplar's size counts at the coarsest level alone.
+     The parallel-for hook spreads rows of windows and bands of rows.
+
+   THREADS
+     No global state. Calls with different env and outputs may overlap; a plane may be drawn by
+     many, a job belongs to one call at a time.
+
+   SAME BYTES
+     All choices are made in integers, or in float and double rounded once: the same bytes on any
+     number of threads, with and without SIMD and on any compiler that keeps to IEEE 754 (see
+     texmath.h), built with -ffp-contract=off. The levels of texpatch_half depend on libm's pow.
+
+   REFERENCES
+     [1] GPU-based interactive near-regular texture synthesis for digital human models.
+         Technology and Health Care.
+     [2] V. Kwatra, I. Essa, A. Bobick, N. Kwatra. Texture optimization for example-based synthesis.
+         SIGGRAPH 2005.
+     [3] A. Efros, W. Freeman. Image quilting for texture synthesis and transfer. SIGGRAPH 2001.
+     [4] C. Barnes, E. Shechtman, A. Finkelstein, D. Goldman. PatchMatch. SIGGRAPH 2009.
+     [5] S. Lefebvre, H. Hoppe. Parallel controllable texture synthesis. SIGGRAPH 2005.          */
+#ifndef TEXPATCH_H
+#define TEXPATCH_H
+
+#include "texmath.h"
+
+#define TEXPATCH_VERSION "0.1.0"
+
+#ifndef TEXPATCH_MAX_PIXELS
+#define TEXPATCH_MAX_PIXELS (1 << 28) /* larger exemplars and outputs are refused */
+#endif
+
+#if defined(TEXPATCH_STATIC) && defined(__GNUC__)
+#define TEXPATCH_API __attribute__((unused)) static
+#elif defined(TEXPATCH_STATIC)
+#define TEXPATCH_API static
+#else
+#define TEXPATCH_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- what to synthesise ------------------------------------------------------------------ */
+
+enum {
+    TEXPATCH_MAX_MAPS = 16,     /* pictures in register: albedo, normal, roughness, ...      */
+    TEXPATCH_MAX_EXEMPLARS = 8,
+    TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
+    TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
+    TEXPATCH_MAX_SIDE = 8192    /* of an exemplar; their heights together (with turns: the
+                                   larger sides, times turns) may be 32767                   */
+};
+
+/* How one of the maps is treated; all zero: a picture that follows the others. */
+typedef struct texpatch_map {
+    float weight;  /* 0..16: how much a difference in this map counts when pieces are matched;
+                      0 = it follows the others                                              */
+    int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
+                      as vectors, kept at unit length, turned with the piece. x to the right,
+                      y up (OpenGL); 2 = y down (DirectX)                                     */
+    int is_label;  /* values are names, not amounts: never blended or interpolated           */
+    int is_data;   /* amounts (height, roughness), not colours: averaged as they are         */
+} texpatch_map;
+
+/* One exemplar: a photograph, or several maps of one material in register. */
+typedef struct texpatch_exemplar {
+    const txm_image *maps; /* map_count pictures of one size; every exemplar has the same maps:
+                              channels and sample type                                       */
+    txm_image guide;       /* its guide, the size of the maps, 1..4 channels; pixels NULL: none */
+    txm_image mask;        /* TXM_U8, 1 channel: 0 = never use this pixel; pixels NULL: use all */
+} texpatch_exemplar;
+
+enum { TEXPATCH_TILE_X = 1, TEXPATCH_TILE_Y = 2 }; /* for texpatch_desc.tileable               */
+
+/* What to make. All zero but exemplars, their count, map_count and the size is a good default. */
+typedef struct texpatch_desc {
+    const texpatch_exemplar *exemplars; /* not modified; must live as long as the job draws     */
+    int exemplar_count;                 /* 1..TEXPATCH_MAX_EXEMPLARS                             */
+    int map_count;                      /* 1..TEXPATCH_MAX_MAPS                                  */
+    const texpatch_map *maps; /* map_count of them; NULL = only the first has weight, 1          */
+    int width, height;        /* of the output, in pixels, 1 or more                             */
+    int tileable;             /* TEXPATCH_TILE_X | TEXPATCH_TILE_Y: opposite sides fit            */
+    int patch;  /* side N of the patches of the first pass, in pixels of the output, which are laid
+                   N / 2 apart; 0 = what suits the exemplar                                      */
+    int passes; /* optimisation passes for each size of neighbourhood, 1..16; 0 = 3 (2 at full
+                   size); -1 = none: patches, cuts and blending alone, four times as fast        */
+    int turns;  /* 1, 2 or 4: pieces may be turned by half or quarter turns; 0 = 1               */
+    int mirror; /* pieces may be mirrored left to right                                          */
+    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 a piece may not
+                      go on farther than a neighbourhood, which costs detail and likeness        */
+    int lattice;   /* 0 = find out whether the exemplar has a lattice and keep it; 1 = it has this
+                      one; -1 = treat it as having none. It is looked for in a single exemplar
+                      that is neither turned nor mirrored                                        */
+    float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
+    txm_image guide;    /* what the exemplars' guides should look like here: width x height,
+                           channels and sample of theirs; pixels NULL: none                      */
+    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide says nothing here;
+                           pixels NULL: it counts everywhere                                     */
+    float guide_weight; /* 0..16: of a difference in the guide against one in a map of weight 1;
+                           0 = 2                                                                 */
+    const txm_image *kept; /* map_count pictures of width x height to be kept where keep is
+                           non-zero; NULL: none. They need not come from the exemplar            */
+    txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
+    uint64_t seed;         /* another seed, another texture                                      */
+} texpatch_desc;
+
+/* Make a texture in one call.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    map_count pictures of desc->width x desc->height, channels and sample of the maps;
+          untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps or guides that do not go
+          together or samples that are not finite; TXM_TOO_SMALL for an exemplar under
+          TEXPATCH_MIN_SIDE, or whose mask leaves no piece; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   see TIME and MEMORY                                                                 */
+TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
+                                      const txm_image *out);
+
+/* ---- step by step ------------------------------------------------------------------------ */
+
+/* A texture in the making. It keeps a copy of the allocator, not of the exemplars' pictures. */
+typedef struct texpatch_job texpatch_job;
+
+/* Prepare a job: pyramids, lattice. The same statuses as texpatch_make. */
+TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
+                                       texpatch_job **out);
+
+/* One step of the work, coarse first: at 512 x 512 some 5 to 60 ms. After an error (cancelling
+   included) the job is as before the step and the step may be tried again.
+   more   receives 0 once nothing is left to do; NULL is allowed                              */
+TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
+
+/* 0..1: how much of the work is done; 1 when texpatch_step has nothing left */
+TEXPATCH_API float texpatch_done(const texpatch_job *job);
+
+/* Draw a map as it is now. Possible after any step but no step at all: before the first,
+   TXM_BAD_ARGUMENT. A window of the output may be drawn: out's top left pixel is pixel (x, y) of
+   it, and all of out must lie inside. */
+TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
+                                      txm_image out);
+
+/* Where a pixel of the output comes from. Anything that lies in register with the exemplars can be
+   looked up later through it. */
+typedef struct texpatch_source {
+    float x, y;    /* pixel of the exemplar, as it is given (turns undone); fractions lie between
+                      pixel centres, which are whole numbers                                    */
+    int exemplar;  /* -1: the pixel was kept                                                    */
+    int turn;      /* quarter turns counter-clockwise that the piece has made, 0..3; + 4: it is
+                      mirrored (before turning)                                                 */
+} texpatch_source;
+TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
+
+/* Make a part anew: where again is non-zero (TXM_U8, 1 channel, the size of the output), after
+   all steps are done (else they are done first). What lies outside is kept and joined to. The
+   following steps do the work, in time proportional to the part's bounding box.
+   guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = as it was */
+TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
+                                       const txm_image *guide, const txm_image *guide_mask,
+                                       uint64_t seed, txm_env *env);
+
+/* Release a job; NULL is allowed. */
+TEXPATCH_API void texpatch_free(texpatch_job *job);
+
+/* The lattice that a job keeps: x, y of both steps in pixels of the exemplar; 0: it has none. */
+TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
+
+/* ---- levels of detail -------------------------------------------------------------------- */
+
+/* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
+   pixels, in linear light for 8- and 16-bit colours that are not data; normals are renormalised,
+   labels picked. So all levels agree with each other and with what a renderer makes of level 0.
+   map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT, TXM_TOO_LARGE */
+TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
+                                      txm_env *env, const txm_image *half);
+
+/* ---- the unbounded plane ----------------------------------------------------------------- */
+
+/* Any window of an endless texture that has no period. Windows that overlap agree to the byte,
+   whoever makes them, so a large picture can be made tile by tile, on many machines.
+
+   The plane is cut into square cells. Pieces at the cells' corners are made first, from the seed
+   and their place alone; then what lies along the edges between two of them; then the insides. */
+typedef struct texpatch_plane texpatch_plane;
+
+/* desc as for a job; width, height, tileable, guide and kept are not looked at. */
+TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
+                                            texpatch_plane **out);
+
+/* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
+   map_count pictures of one size. sources may be NULL, or width * height of them.
+   cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
+          that are multiples of cells waste least                                             */
+TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
+                                            txm_env *env, const txm_image *out,
+                                            texpatch_source *sources);
+TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane);
+TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
+
+/* ---- layered edges ----------------------------------------------------------------------- */
+
+enum { TEXPATCH_MAX_LEVELS = 16 };
+
+/* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
+   value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1). */
+typedef struct texpatch_polyline {
+    int layer;        /* 0..levels-1: this is a boundary of that layer                        */
+    int is_hole;      /* the layer lies outside it                                            */
+    size_t first;     /* its points are points[first .. first + count - 1], closed: the last is
+                         joined to the first                                                  */
+    size_t count;
+} texpatch_polyline;
+
+/* Found lines run along the cracks between pixels, a point at each pixel corner that they pass.
+   The layer lies to the right of the way (outer boundaries run clockwise as seen, holes the other
+   way), and what lies beyond the picture belongs to no layer. Each side of each crack between two
+   layers is part of exactly one line. Pixels that touch at a corner only do not belong together:
+   where a layer meets itself so, its line turns right, around the pixel that it came along. So
+   lines may touch at a corner but never cross, neither themselves nor others.
+
+         +---+              lines are in raster order of their first points: the top left corner
+         | k |              of the topmost (then leftmost) pixel of an outer boundary
+     +---+---+  the two pixels of layer k have a line each; the two
+     | k |      others too, whether of one layer or not
+     +---+                                                                                    */
+typedef struct texpatch_edges {
+    int levels, width, height;
+    float thresholds[TEXPATCH_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
+    int beside[TEXPATCH_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
+                                        none, it has no boundary but the picture's              */
+    texpatch_polyline *lines;
+    size_t line_count;
+    txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
+                         top left pixel                                                        */
+    size_t point_count;
+    txm_arena memory; /* belongs to the header                                                 */
+} texpatch_edges;
+
+/* What to find. All zero but the image is a good default. */
+typedef struct texpatch_edges_desc {
+    txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
+                        samples as they are, cut off at 0 and 1; alpha is not looked at        */
+    int levels;      /* 2..TEXPATCH_MAX_LEVELS; 0 = 4, as the paper has it                     */
+    float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
+                        1 to 3                                                                 */
+    int least;       /* regions whose boundary (holes and the picture's border included) is shorter
+                        than so many pixels go to the surrounding layer that they share most of
+                        it with, the shortest first; 0 = all are kept                          */
+    const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
+                        have about the same area, at the emptiest gray near there */
+} texpatch_edges_desc;
+
+/* Find the boundaries of all layers.
+
+   env    NULL, or how to allocate, report and cancel
+   out    receives them; release it with texpatch_edges_free. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
+          TXM_TOO_LARGE above TEXPATCH_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   O(pixels (1 + smooth + log least)) time, about 0.2 us a pixel; 13 bytes a pixel while it
+          works (9 without least, 5 without both), and the result: 8 bytes for each point, of which
+          there are up to four a pixel, and 24 for each line                                   */
+TEXPATCH_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+                                            texpatch_edges *out);
+
+/* Release edges, which are all zero then; NULL and all zero are allowed. Of several copies of the
+   struct only one may be released. */
+TEXPATCH_API void texpatch_edges_free(texpatch_edges *edges);
+
+/* The layer of each pixel of a picture, by the thresholds of edges, as a gray value: layer k is
+   255 k / (levels - 1), rounded. It serves as the guide of an exemplar (see control edges).
+
+   desc   image, smooth and least are looked at; with those that edges were found with, the layers
+          change exactly where its lines run
+   layers TXM_U8, 1 channel, the size of the picture; untouched after an error
+   return as texpatch_edges_find
+   cost   as texpatch_edges_find; 13 bytes a pixel                                             */
+TEXPATCH_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
+                                        const texpatch_edges *edges, txm_env *env,
+                                        const txm_image *layers);
+
+/* Draw boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
+   wide, on the layer's own side; colours run from dark to light with the layers, in one channel the
+   gray. What lies outside of the picture is not drawn.
+   cost   a byte for each pixel; O(pixels + length of the lines) time                           */
+TEXPATCH_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+                                            const txm_image *image);
+
+/* ---- control edges ----------------------------------------------------------------------- */
+
+/* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. Where it is closed,
+   its inside becomes the layer; an open one becomes a band of the layer, as wide as width says,
+   with round ends. */
+typedef struct texpatch_stroke {
+    const txm_vec2 *points; /* count of them, 2 or more (closed: 3), not all the same, in pixels of
+                               the output; they may lie outside it, up to 2^20                  */
+    int count;
+    int is_closed;
+    int layer;   /* 0..levels-1: what lies within                                               */
+    float width; /* of an open stroke, pixels, 2..256; 0 = 8                                    */
+} texpatch_stroke;
+
+typedef struct texpatch_control {
+    const texpatch_edges *edges; /* of the exemplar, from texpatch_edges_find                   */
+    const texpatch_stroke *strokes;
+    int stroke_count;  /* 0 or more                                                             */
+    int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but
+                          next to a stroke not the stroke's own layer */
+    float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
+                          -1 = none                                                             */
+    uint64_t seed;     /* another seed, another unrest                                          */
+} texpatch_control;
+
+/* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the
+   way in which those stray from their own smooth course are strung together along the stroke.
+
+   out    receives one closed line for each stroke, in their order (of an open stroke: around its
+          band), inside to the right; levels, thresholds and beside are the exemplar's, width and
+          height those given. Release it with texpatch_edges_free; untouched after an error.
+          A line strays from its stroke (the edge of its band) by 4 pixels at most; less from short
+          strokes and narrow bands, by 1/16 of the length and 7/16 of the width. Where the stroke
+          turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
+          cross itself. Of a layer without edges of 64 pixels in the exemplar, and with disturb =
+          -1, it is the stroke itself
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
+          edges that texpatch_edges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
+          pixels; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(edges + length of the strokes) time, about 1 us for each pixel of either; 200 bytes for
+          each pixel of the longest stroke (its band's outline), 30 for each of all, 100 for each of
+          the edges of a layer                                                                 */
+TEXPATCH_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
+                                         txm_env *env, texpatch_edges *out);
+
+/* The guide that makes a job follow the strokes, for texpatch_desc.guide and .guide_mask; the
+   exemplars' counterpart is texpatch_layers's picture.
+
+   disturbed  what texpatch_disturb made of the same control
+   guide  TXM_U8, 1 channel, the size given to texpatch_disturb: the gray of the layer. Pixels whose
+          centre lies inside a line (winding number not 0; of a centre on the line, that to its
+          right or below is inside) have the stroke's layer, the last stroke on top. With
+          background = -1, up to 8 pixels outside of the strokes it is the layer that the nearest
+          stroke's layer mostly borders on in the exemplar
+   mask   the same format: 0 where the strokes say nothing (with background = -1, farther than 8
+          pixels outside of all strokes), else 255
+   return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED. After an error
+          guide and mask are untouched
+   cost   O(pixels + area and height of the strokes) time, about 50 ns a pixel; 3 bytes a pixel and
+          24 for each row that a stroke's line crosses                                           */
+TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
+                                               const texpatch_edges *disturbed, txm_env *env,
+                                               const txm_image *guide, const txm_image *mask);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TEXPATCH_H */
+
+#if defined(TEXPATCH_IMPLEMENTATION) && !defined(TEXPATCH_IMPLEMENTED)
+#define TEXPATCH_IMPLEMENTED
+
+#include "texpatch/config.h"
+#include "texpatch/canvas.h"
+#include "texpatch/lattice.h"
+#include "texpatch/sheets.h"
+#include "texpatch/quilt.h"
+#include "texpatch/refine.h"
+#include "texpatch/finish.h"
+#include "texpatch/job.h"
+#include "texpatch/begin.h"
+#include "texpatch/draw.h"
+#include "texpatch/again.h"
+#include "texpatch/plane.h"
+#include "texpatch/half.h"
+#include "texpatch/check.h"
+#include "texpatch/layers.h"
+#include "texpatch/lines.h"
+#include "texpatch/roughness.h"
+#include "texpatch/strokes.h"
+#include "texpatch/guide.h"
+#endif /* TEXPATCH_IMPLEMENTATION */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/

@@ -1,0 +1,181 @@
+#ifndef TEXPATCH_AGAIN_H
+#define TEXPATCH_AGAIN_H
+
+#include "draw.h"
+
+/* ---- public: a part anew ------------------------------------------------------------------ */
+
+/* Does the output's pixel under canvas pixel (x, y) belong to the part? */
+static inline int txp_is_again(const texpatch_job *job, const txm_image *again, int x, int y) {
+    x = txm_clampi(x - job->margin_x, 0, job->setup.width - 1);
+    y = txm_clampi(y - job->margin_y, 0, job->setup.height - 1);
+    return ((const uint8_t *)txm_image_row_const(again, y))[x] != 0;
+}
+
+/* One axis of the box around a part: with context, large enough for the coarsest level and in steps
+   of its pixels; all of an axis that wraps if the context reaches over its end. */
+static void txp_part_extent(int low, int high, int extent, int wraps, int level, int *from,
+                            int *size) {
+    const int context = 2 * TXP_WINDOW, room = 2 * TXP_WINDOW << level, unit = 1 << level;
+    int a = low - context, b = high + context;
+    if (wraps && (a < 0 || b > extent)) {
+        *from = 0;
+        *size = extent;
+        return;
+    }
+    if (b - a < room) {
+        a -= (room - (b - a)) / 2;
+        b = a + room;
+    }
+    if (a < 0) {
+        b = b - a < extent ? b - a : extent;
+        a = 0;
+    }
+    if (b > extent) {
+        a = a - (b - extent) > 0 ? a - (b - extent) : 0;
+        b = extent;
+    }
+    a = a / unit * unit;
+    *from = a;
+    *size = b - a;
+}
+
+TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
+                                       const txm_image *guide, const txm_image *guide_mask,
+                                       uint64_t seed, txm_env *env) {
+    txm_status status;
+    txm_arena memory;
+    txp_given new_guide;
+    txm_image mask, no_mask;
+    int low_x, low_y, high_x = -1, high_y = -1;
+    int x0 = 0, y0 = 0, wide = 0, high = 0;
+    if (!job || !again) return txm_fail(env, TXM_BAD_ARGUMENT, "job or again is NULL");
+    const txp_source *s = job->source;
+    const txp_setup *u = &job->setup;
+    const size_t n = (size_t)s->bytes, all = (size_t)job->width * (size_t)job->height;
+    const size_t lanes = (size_t)txp_lanes(s), tail = n - (size_t)s->guide_at;
+    status = txp_check_mask(again, "again", u->width, u->height, env);
+    if (status != TXM_OK) return status;
+    mask = txm_image_resolve(*again);
+    if (guide) {
+        if (!s->guide_bytes)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "the job was begun without a guide");
+        status = txp_check_picture(guide, "guide", env);
+        if (status != TXM_OK) return status;
+        if (guide->width != u->width || guide->height != u->height ||
+            txm_image_resolve(*guide).channels != u->guides[0].channels ||
+            guide->sample != u->guides[0].sample)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
+                               "must have the size of the output and the exemplars' format");
+        if (guide_mask && guide_mask->pixels)
+            status = txp_check_mask(guide_mask, "guide_mask", u->width, u->height, env);
+        if (status != TXM_OK) return status;
+    }
+    status = txp_run(job, env);
+    if (status != TXM_OK) return status;
+
+    low_x = job->width;
+    low_y = job->height;
+    for (int y = 0; y < job->height; y++) {
+        for (int x = 0; x < job->width; x++) {
+            if (!txp_is_again(job, &mask, x, y)) continue;
+            low_x = x < low_x ? x : low_x;
+            high_x = x > high_x ? x : high_x;
+            low_y = y < low_y ? y : low_y;
+            high_y = y;
+        }
+    }
+    memset(&new_guide, 0, sizeof new_guide);
+    memset(&no_mask, 0, sizeof no_mask);
+    txm_arena_init(&memory, env);
+    texpatch_job *part = NULL;
+    if (guide && !txp_given_make(&new_guide, s, all, 0, 1, 0, &memory)) goto no_memory;
+    if (guide) {
+        const txm_image to = txm_image_resolve(*guide);
+        txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
+    }
+    if (high_x >= 0) {
+        const int top = s->levels - 1;
+        txm_arena own;
+        txm_arena_init(&own, env);
+        txp_part_extent(low_x, high_x + 1, job->width, u->tileable & TEXPATCH_TILE_X, top, &x0,
+                        &wide);
+        txp_part_extent(low_y, high_y + 1, job->height, u->tileable & TEXPATCH_TILE_Y, top, &y0,
+                        &high);
+        part =
+            txp_job_make(u, job->source, wide, high, txm_hash(seed ^ (job->seed + 1)), &own, env);
+        if (!part || !txp_given_make(&part->given, s, (size_t)wide * (size_t)high, 1,
+                                     s->guide_bytes > 0, 1, &own)) {
+            txm_arena_free(&own);
+            goto no_memory;
+        }
+        part->memory = own;
+    }
+
+    /* nothing can fail from here on */
+    for (size_t i = 0; i < all && guide; i++) {
+        uint8_t *shown = job->canvas.pixels + i / (size_t)job->width * job->canvas.pitch +
+                         i % (size_t)job->width * n;
+        const txp_place at = job->canvas.at[i];
+        memcpy(job->given.pixels + i * n + s->guide_at, new_guide.pixels + i * n + s->guide_at,
+               tail);
+        job->given.free_guide[i] = new_guide.free_guide[i];
+        job->canvas.free_guide[i] = new_guide.free_guide[i];
+        if (!new_guide.free_guide[i])
+            memcpy(shown + s->guide_at, new_guide.pixels + i * n + s->guide_at, tail);
+        else if (at.x >= 0)
+            memcpy(shown + s->guide_at, txp_stack_at(s, &s->stack[0], at.x, at.y) + s->guide_at,
+                   tail);
+    }
+    txm_arena_free(&memory);
+    if (!part) return TXM_OK;
+    part->setup.tileable = 0;
+    if (wide == job->width) part->setup.tileable |= u->tileable & TEXPATCH_TILE_X;
+    if (high == job->height) part->setup.tileable |= u->tileable & TEXPATCH_TILE_Y;
+    part->shift_x = job->shift_x + x0;
+    part->shift_y = job->shift_y + y0;
+    for (int y = 0; y < high; y++) {
+        for (int x = 0; x < wide; x++) {
+            const size_t i = (size_t)y * (size_t)wide + (size_t)x;
+            const size_t k = txp_index(&job->canvas, x0 + x, y0 + y);
+            part->given.fixed[i] = !txp_is_again(job, &mask, x0 + x, y0 + y) ||
+                                   (job->given.fixed && job->given.fixed[k]);
+            memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
+            if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
+            part->given.at[i] = job->canvas.at[k];
+            memcpy(part->given.bend + 2 * i, job->bend + 2 * k, 2 * sizeof(float));
+            memcpy(part->given.tone + lanes * i, job->tone + lanes * k, lanes * sizeof(float));
+        }
+    }
+    job->part = part;
+    job->part_x = x0;
+    job->part_y = y0;
+    return TXM_OK;
+no_memory:
+    txm_arena_free(&memory);
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a part");
+}
+
+/* An environment for a piece of a call: its progress is that of the whole, which rises piece by
+   piece. */
+typedef struct txp_quiet {
+    txm_env *env;
+    float done, total; /* pieces */
+} txp_quiet;
+
+static int txp_quiet_progress(void *user, float fraction, const char *stage) {
+    const txp_quiet *q = (const txp_quiet *)user;
+    (void)fraction;
+    return txm_progress(q->env, q->done / q->total, stage);
+}
+
+static txm_env txp_quiet_env(txp_quiet *q) {
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    if (q->env) env = *q->env;
+    env.progress = txp_quiet_progress;
+    env.progress_user = q;
+    return env;
+}
+
+#endif /* TEXPATCH_AGAIN_H */

@@ -1,0 +1,182 @@
+#ifndef TEXPATCH_CHECK_H
+#define TEXPATCH_CHECK_H
+
+#include "config.h"
+
+/* ---- edges: constants and progress ------------------------------------------------------- */
+
+enum {
+    TXP_E_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
+    TXP_E_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
+    TXP_E_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
+    TXP_E_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
+    TXP_E_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+
+    TXP_E_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
+    TXP_E_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
+    TXP_E_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
+    TXP_E_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
+    TXP_E_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
+    TXP_E_BINS = 16,   /* directions told apart in half a turn                                    */
+    TXP_E_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
+    TXP_E_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
+    TXP_E_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
+    TXP_E_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
+    TXP_E_GOOD = 8,    /* of them so many that join best are looked at closer                     */
+    TXP_E_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+};
+#define TXP_E_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
+#define TXP_E_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+
+/* The bar of one call: a stage fills from..to of it in total pieces of work. */
+typedef struct txp_e_bar {
+    const txm_env *env;
+    const char *stage;
+    double from, to, total, done;
+    size_t quiet; /* work since the last report */
+} txp_e_bar;
+
+static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double total) {
+    bar->from = bar->to;
+    bar->to = to;
+    bar->stage = stage;
+    bar->total = total > 1 ? total : 1;
+    bar->done = 0;
+}
+
+/* So much work is done; non-zero: stop. */
+static inline int txp_e_tick(txp_e_bar *bar, size_t work) {
+    bar->quiet += work;
+    if (bar->quiet < TXP_E_TICK) return 0;
+    bar->done += (double)bar->quiet;
+    bar->quiet = 0;
+    const double part = bar->done < bar->total ? bar->done / bar->total : 1;
+    return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
+}
+
+static txm_status txp_e_no_memory(txm_env *env) {
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the edges");
+}
+
+static txm_status txp_e_stopped(txm_env *env) {
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+/* ---- edges: checks of what the caller gives ---------------------------------------------- */
+
+/* A picture that edges can be found in, or (bytes: U8, 1 channel) a guide can be drawn into. */
+static txm_status txp_e_check_image(const txm_image *image, const char *name, int bytes,
+                                    txm_env *env) {
+    const size_t most = TEXPATCH_MAX_PIXELS < TXP_E_PIXELS ? TEXPATCH_MAX_PIXELS : TXP_E_PIXELS;
+    const txm_status status = txm_image_check(image, name, most, env);
+    if (status != TXM_OK) return status;
+    if (image->width > TXP_E_SIDE || image->height > TXP_E_SIDE)
+        return txm_fail_at(env, TXM_TOO_LARGE, name, "a side is longer than 2^20 pixels");
+    if (bytes && (image->sample != TXM_U8 || image->channels > 1))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be TXM_U8 with 1 channel");
+    return TXM_OK;
+}
+
+static int txp_e_thresholds_are_good(const float *thresholds, int levels) {
+    for (int k = 0; k < levels - 1; k++) {
+        if (!(thresholds[k] >= 0 && thresholds[k] <= 1)) return 0;
+        if (k > 0 && !(thresholds[k] > thresholds[k - 1])) return 0;
+    }
+    return 1;
+}
+
+static txm_status txp_e_check_desc(const texpatch_edges_desc *desc, txm_env *env) {
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    if (!(desc->smooth >= 0 && desc->smooth <= 16))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "smooth", "must be 0 to 16 pixels");
+    if (desc->least < 0)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "least", "must be 0 or more pixels");
+    return txp_e_check_image(&desc->image, "image", 0, env);
+}
+
+/* Edges as one of the functions here makes them. is_found: as texpatch_edges_find does, in unit
+   steps from corner to corner. */
+static txm_status txp_e_check_edges(const texpatch_edges *edges, const char *name, int is_found,
+                                    txp_e_bar *bar, txm_env *env) {
+    const char *foreign = "not as texpatch_edges_find or texpatch_disturb made it";
+    if (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS || edges->width < 1 ||
+        edges->height < 1 || edges->width > TXP_E_SIDE || edges->height > TXP_E_SIDE ||
+        !txp_e_thresholds_are_good(edges->thresholds, edges->levels) ||
+        (edges->line_count && !edges->lines) || (edges->point_count && !edges->points))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+    for (int k = 0; k < edges->levels; k++) {
+        if (edges->beside[k] < -1 || edges->beside[k] >= edges->levels || edges->beside[k] == k)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+    }
+    for (size_t i = 0; i < edges->line_count; i++) {
+        const texpatch_polyline *line = &edges->lines[i];
+        if (line->layer < 0 || line->layer >= edges->levels || line->count < 2 ||
+            line->first > edges->point_count || line->count > edges->point_count - line->first)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+        txm_vec2 p = edges->points[line->first + line->count - 1];
+        for (size_t j = 0; j < line->count; j++) {
+            const txm_vec2 q = edges->points[line->first + j];
+            const float most = (float)(2 * TXP_E_SIDE);
+            int good = q.x >= -most && q.x <= most && q.y >= -most && q.y <= most;
+            if (good && is_found) {
+                const float dx = q.x - p.x, dy = q.y - p.y;
+                good = q.x >= 0 && q.x <= (float)edges->width && q.y >= 0 &&
+                       q.y <= (float)edges->height && dx * dx + dy * dy == 1 && dx * dy == 0 &&
+                       q.x == (float)(int)q.x && q.y == (float)(int)q.y;
+            }
+            if (!good) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            p = q;
+        }
+    }
+    return TXM_OK;
+}
+
+static txm_status txp_e_check_stroke(const texpatch_stroke *s, int levels, double *length,
+                                     txp_e_bar *bar, txm_env *env) {
+    if (!s->points || s->count < (s->is_closed ? 3 : 2))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "needs 2 points or more, closed 3");
+    if (s->layer < 0 || s->layer >= levels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "layer must be 0 to levels - 1");
+    if (s->width != 0 && !(s->width >= 2 && s->width <= 256))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "width must be 0 or 2 to 256 pixels");
+    const float most = (float)TXP_E_SIDE;
+    double own = 0;
+    for (int i = 0; i < s->count; i++) {
+        const txm_vec2 p = s->points[i], q = s->points[i ? i - 1 : 0];
+        const double dx = (double)p.x - q.x, dy = (double)p.y - q.y;
+        if (!(p.x >= -most && p.x <= most && p.y >= -most && p.y <= most))
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke",
+                               "a coordinate is not a number or beyond 2^20 pixels");
+        own += sqrt(dx * dx + dy * dy);
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    if (!(own > 1e-3))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "has no length: its points are one");
+    *length += own;
+    if (*length > (double)TXP_E_LENGTH)
+        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "are longer than 2^26 pixels");
+    return TXM_OK;
+}
+
+static double txp_e_points_of(const texpatch_control *c) {
+    return c && c->edges ? (double)c->edges->point_count : 0;
+}
+
+/* All that texpatch_disturb and texpatch_control_guide look at. */
+static txm_status txp_e_check_control(const texpatch_control *c, txp_e_bar *bar, txm_env *env) {
+    double length = 0;
+    if (!c) return txm_fail(env, TXM_BAD_ARGUMENT, "control is NULL");
+    if (c->stroke_count < 0 || (c->stroke_count && !c->strokes))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "strokes", "NULL, or fewer than none");
+    if (!(c->disturb == -1 || (c->disturb >= 0 && c->disturb <= 4)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturb", "must be -1 or 0 to 4");
+    txm_status status = txp_e_check_edges(c->edges, "edges", 1, bar, env);
+    if (status == TXM_OK && (c->background < -1 || c->background >= c->edges->levels))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "background", "must be -1 to levels - 1");
+    for (int i = 0; i < c->stroke_count && status == TXM_OK; i++)
+        status = txp_e_check_stroke(&c->strokes[i], c->edges->levels, &length, bar, env);
+    return status;
+}
+
+#endif /* TEXPATCH_CHECK_H */

@@ -1,0 +1,271 @@
+#ifndef TEXPATCH_FINISH_H
+#define TEXPATCH_FINISH_H
+
+#include "canvas.h"
+
+/* ---- finish: pieces bent until lines meet, steps of colour spread ------------------------- */
+
+enum {
+    TXP_REACH = 4,
+    TXP_PROBE = 8,
+    TXP_ROUNDS = 12,
+    TXP_SEAMS = 64,
+    TXP_TILE = 16,
+    TXP_FADE = 48,
+    TXP_GIVEN = 64
+};
+
+/* A field over the canvas that shall jump by given amounts between neighbours: the minimum of
+
+       sum over neighbours of pull |u(q) - u(p) - jump|^2 + screen |u|^2,
+
+   which jumps at the seams and fades within 1 / sqrt(screen) pixels.                            */
+typedef struct txp_field {
+    int width, height, wrap, lanes; /* lanes: values per pixel, 2 or a multiple of 4           */
+    float *value;
+    int16_t *given;   /* lanes per pixel: pull times jump, in 1 / TXP_GIVEN                    */
+    uint8_t *pull[2]; /* to the right neighbour, to the lower one, in 1 / 255; 255 inside a piece */
+    float scale[4 * 255 + 1]; /* by the sum of the four pulls: 1 / (sum + screen)               */
+    const uint8_t *fixed; /* value stays as it is; NULL: nowhere                               */
+    uint8_t *busy; /* of each tile of TXP_TILE x 8 pixels: is anything asked of it or near it?  */
+    int tiles;     /* in a row                                                                */
+    int colour;    /* of the pixels that are relaxed now, as on a chessboard                  */
+} txp_field;
+
+static inline void txp_field_mark(const txp_field *f, int x, int y) {
+    f->busy[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
+}
+
+/* Tiles within reach of those that are marked are busy too. */
+static void txp_field_spread(const txp_field *f) {
+    const int rows = (f->height + 7) / 8, across = TXP_FADE / TXP_TILE, along = TXP_FADE / 8;
+    for (int j = 0; j < rows; j++) {
+        for (int i = 0; i < f->tiles; i++) {
+            if (f->busy[j * f->tiles + i] != 2) continue;
+            for (int v = -along; v <= along; v++) {
+                int y = j + v;
+                if (f->wrap & TEXPATCH_TILE_Y) y = (y + 2 * rows) % rows;
+                if (y < 0 || y >= rows) continue;
+                for (int u = -across; u <= across; u++) {
+                    int x = i + u;
+                    if (f->wrap & TEXPATCH_TILE_X) x = (x + 2 * f->tiles) % f->tiles;
+                    if (x < 0 || x >= f->tiles) continue;
+                    if (!f->busy[y * f->tiles + x]) f->busy[y * f->tiles + x] = 1;
+                }
+            }
+        }
+    }
+}
+
+static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *next,
+                                   const uint8_t *pull, int lanes) {
+    float *own = f->value + i * (size_t)lanes;
+    const int16_t *given = f->given + i * (size_t)lanes;
+    const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
+    const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
+    const float unit = 255.0f / (float)TXP_GIVEN;
+    const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
+    const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
+    for (int k = 0; k < lanes; k++) {
+        const float across = txm_float(txm_float(l * a[k]) + txm_float(r * b[k]));
+        const float along = txm_float(txm_float(u * c[k]) + txm_float(d * e[k]));
+        const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)given[k]));
+        own[k] = txm_float(own[k] + txm_float(1.6f * txm_float(txm_float(all * scale) - own[k])));
+    }
+}
+
+/* The pixels of one colour in 8 rows, relaxed beyond their best value. */
+static void txp_relax_rows(void *context, int index) {
+    const txp_field *f = (const txp_field *)context;
+    const int w = f->width, h = f->height, lanes = f->lanes;
+    for (int y = 8 * index; y < 8 * index + 8 && y < h; y++) {
+        const int up = y > 0 ? y - 1 : f->wrap & TEXPATCH_TILE_Y ? h - 1 : -1;
+        const int down = y + 1 < h ? y + 1 : f->wrap & TEXPATCH_TILE_Y ? 0 : -1;
+        const uint8_t *busy = f->busy + (size_t)(y / 8) * (size_t)f->tiles;
+        for (int x = (y + f->colour) % 2; x < w; x += 2) {
+            const size_t i = (size_t)y * (size_t)w + (size_t)x;
+            if (!busy[x / TXP_TILE]) {
+                x += TXP_TILE - 2; /* the next tile */
+                continue;
+            }
+            if (f->fixed && f->fixed[i]) continue;
+            const int left = x > 0 ? x - 1 : f->wrap & TEXPATCH_TILE_X ? w - 1 : -1;
+            const int right = x + 1 < w ? x + 1 : f->wrap & TEXPATCH_TILE_X ? 0 : -1;
+            size_t next[4];
+            uint8_t pull[4];
+            next[0] = left < 0 ? i : (size_t)y * (size_t)w + (size_t)left;
+            next[1] = right < 0 ? i : (size_t)y * (size_t)w + (size_t)right;
+            next[2] = up < 0 ? i : (size_t)up * (size_t)w + (size_t)x;
+            next[3] = down < 0 ? i : (size_t)down * (size_t)w + (size_t)x;
+            pull[0] = left < 0 ? 0 : f->pull[0][next[0]];
+            pull[1] = right < 0 ? 0 : f->pull[0][i];
+            pull[2] = up < 0 ? 0 : f->pull[1][next[2]];
+            pull[3] = down < 0 ? 0 : f->pull[1][i];
+            if (lanes == 4) txp_relax_pixel(f, i, next, pull, 4);
+            else if (lanes == 2) txp_relax_pixel(f, i, next, pull, 2);
+            else txp_relax_pixel(f, i, next, pull, lanes);
+        }
+    }
+}
+
+static void txp_relax_field(txp_field *f, txm_env *env) {
+    for (f->colour = 0; f->colour < 2; f->colour++)
+        txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
+}
+
+/* A seam between two pieces, as last measured: its key is how far their offsets are apart. */
+typedef struct txp_seam {
+    int x, y, dx, dy, found, shift[2];
+} txp_seam;
+
+/* The shift of the second piece that makes it continue the first, within TXP_REACH pixels; both are
+   seen around the same pixel. 0: none is clearly better than staying. */
+static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shift[2]) {
+    const txp_stack *k = &s->stack[0];
+    const int ax = a.x - TXP_PROBE / 2, ay = a.y - TXP_PROBE / 2;
+    const int bx = b.x - TXP_PROBE / 2, by = b.y - TXP_PROBE / 2;
+    shift[0] = shift[1] = 0;
+    if (!txp_fits(s, k, ax, ay, TXP_PROBE, TXP_PROBE) ||
+        !txp_fits(s, k, bx, by, TXP_PROBE, TXP_PROBE))
+        return 0;
+    const uint8_t *target = txp_stack_at(s, k, ax, ay);
+    const uint32_t now = txp_sad(target, k->pitch, txp_stack_at(s, k, bx, by), k->pitch,
+                                 TXP_PROBE * s->bytes, TXP_PROBE, UINT32_MAX);
+    uint32_t best = now / 10 * 7;
+    int found = 0;
+    if (now < TXP_PROBE * TXP_PROBE * 4) return 0;
+    for (int dy = -TXP_REACH; dy <= TXP_REACH; dy++) {
+        for (int dx = -TXP_REACH; dx <= TXP_REACH; dx++) {
+            if (!txp_fits(s, k, bx + dx, by + dy, TXP_PROBE, TXP_PROBE)) continue;
+            const uint32_t sad = txp_sad(target, k->pitch, txp_stack_at(s, k, bx + dx, by + dy),
+                                         k->pitch, TXP_PROBE * s->bytes, TXP_PROBE, best);
+            if (sad >= best) continue;
+            best = sad;
+            shift[0] = dx;
+            shift[1] = dy;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* The same, remembered for the next pixels of the seam between the same two pieces. */
+static int txp_seam_known(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
+                          txp_place b, int shift[2]) {
+    const int dx = a.x - b.x, dy = a.y - b.y;
+    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAMS];
+    if (m->dx != dx || m->dy != dy || abs(m->x - x) + abs(m->y - y) > 3) {
+        m->x = x;
+        m->y = y;
+        m->dx = dx;
+        m->dy = dy;
+        m->found = txp_seam_shift(s, a, b, m->shift);
+    }
+    shift[0] = m->shift[0];
+    shift[1] = m->shift[1];
+    return m->found;
+}
+
+/* Pixel j shall have `much` more than i. */
+static inline void txp_ask(const txp_field *f, size_t i, size_t j, size_t lane, int much) {
+    int16_t *a = f->given + i * (size_t)f->lanes + lane,
+            *b = f->given + j * (size_t)f->lanes + lane;
+    *a = (int16_t)(*a - much);
+    *b = (int16_t)(*b + much);
+}
+
+typedef struct txp_seams {
+    const txp_source *source;
+    const txp_canvas *canvas;
+    txp_field *bend, *tone;
+    int first_band;
+} txp_seams;
+
+/* What the seams right of and below the pixels of a band ask of the two fields: bend (x, y) and
+   tone (compared bytes). A step of colour is what both pieces see of each other in 5 x 5 pixels;
+   small steps are tone, large ones another thing. Stored for the first of the two pixels alone. */
+static void txp_measure_band(void *context, int lane) {
+    const txp_seams *m = (const txp_seams *)context;
+    const txp_source *s = m->source;
+    const txp_canvas *c = m->canvas;
+    const txp_stack *k = &s->stack[0];
+    const int top = (m->first_band + 2 * lane) * TXP_BAND;
+    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
+    txp_seam seams[TXP_SEAMS];
+    memset(seams, 0, sizeof seams);
+    for (int y = top; y < bottom; y++) {
+        for (int x = 0; x < c->width; x++) {
+            const size_t i = txp_index(c, x, y);
+            for (int d = 0; d < 2; d++) {
+                uint8_t *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
+                int qx = x + !d, qy = y + d, shift[2];
+                *bend = *tone = 255;
+                if (qx >= c->width) qx = 0;
+                if (qy >= c->height) qy = 0;
+                txp_place a = c->at[i];
+                const txp_place q = c->at[txp_index(c, qx, qy)];
+                if (a.x < 0 || q.x < 0) {
+                    *bend = *tone = 13;
+                    continue;
+                }
+                a.x = (int16_t)(a.x + !d);
+                a.y = (int16_t)(a.y + d);
+                if (a.x == q.x && a.y == q.y) continue;
+                if (!txp_seam_known(s, seams, x, y, a, q, shift)) *bend = 77; /* fits as it is */
+                *tone = 13;
+                const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
+                          by = q.y + shift[1] - 2;
+                int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
+                if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
+                    for (int v = 0; v < 5; v++) {
+                        const uint8_t *pa = txp_stack_at(s, k, ax, ay + v);
+                        const uint8_t *pb = txp_stack_at(s, k, bx, by + v);
+                        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
+                            for (int b = 0; b < s->guide_at; b++) sum[b] += pa[b] - pb[b];
+                        }
+                    }
+                    for (int b = 0; b < s->guide_at; b++)
+                        most = abs(sum[b]) > most ? abs(sum[b]) : most;
+                    if (most < 32 * 25)
+                        *tone = (uint8_t)(most < 12 * 25 ? 255
+                                                         : 13 + 242 * (32 * 25 - most) / (20 * 25));
+                }
+                /* u(q) - u(i) = jump: asked of q, and its negative of i */
+                const size_t j = txp_index(c, qx, qy);
+                if (shift[0] || shift[1]) {
+                    txp_field_mark(m->bend, x, y);
+                    txp_field_mark(m->bend, qx, qy);
+                }
+                if (most > 0 && most < 32 * 25) {
+                    txp_field_mark(m->tone, x, y);
+                    txp_field_mark(m->tone, qx, qy);
+                }
+                for (size_t b = 0; b < 2; b++)
+                    txp_ask(m->bend, i, j, b, *bend * shift[b] * TXP_GIVEN / 255);
+                for (size_t b = 0; b < (size_t)s->guide_at && most < 32 * 25; b++)
+                    txp_ask(m->tone, i, j, b, *tone * sum[b] * TXP_GIVEN / (25 * 255));
+            }
+        }
+    }
+}
+
+/* Room for a field; its values are all 0, in memory of their own. */
+static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
+                          txm_arena *memory, txm_arena *scratch) {
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    f->width = c->width;
+    f->height = c->height;
+    f->wrap = c->wrap;
+    f->fixed = c->fixed;
+    f->lanes = lanes;
+    for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
+    f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
+    f->given = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
+    f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
+    f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
+    f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
+    f->busy = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
+    return f->busy && f->value && f->given && f->pull[0] && f->pull[1];
+}
+
+#endif /* TEXPATCH_FINISH_H */

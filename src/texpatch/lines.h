@@ -1,0 +1,308 @@
+#ifndef TEXPATCH_LINES_H
+#define TEXPATCH_LINES_H
+
+#include "layers.h"
+
+/* ---- edges: from layers to lines --------------------------------------------------------- */
+
+/* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the
+   upper four the sides of the pixel whose cracks are still to be run through. */
+typedef struct txp_e_map {
+    int width, height;
+    uint8_t *at;
+} txp_e_map;
+
+/* is the pixel of this layer? */
+static int txp_e_is(const txp_e_map *m, int x, int y, int layer) {
+    if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
+    return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
+}
+
+/* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
+static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPATCH_MAX_LEVELS],
+                      txp_e_bar *bar) {
+    const int w = m->width;
+    *cracks = 0;
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < w; x++) {
+            uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
+            const int layer = *at & 15;
+            for (int side = 0; side < 4; side++) {
+                const int u = x + txp_e_side_x[side], v = y + txp_e_side_y[side];
+                if (txp_e_is(m, u, v, layer)) continue;
+                *at = (uint8_t)(*at | 16 << side);
+                ++*cracks;
+                if (u >= 0 && v >= 0 && u < w && v < m->height)
+                    shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
+            }
+            if (txp_e_tick(bar, 4)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Run through the cracks of one line, from side `side` of pixel (x, y), and unmark them.
+
+           l | a      p: the pixel to the right of the way (here upwards, along its left side)
+             ^        a: the next one on the same hand, l: the one across
+           - | p      a is of another layer: turn right, around p, whatever l is;
+                      a and l are of p's: turn left, around the corner of what lies between;
+                      only a is: straight on
+
+   As each crack has one successor and is that of one, the way comes back to its beginning.
+   points  receives the corners, or NULL; returns their number; 0 = cancelled
+   area    receives the area to the right, negative if the line is a hole's                   */
+static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *points,
+                          int64_t *area, txp_e_bar *bar) {
+    const int x0 = x, y0 = y, side0 = side, w = m->width;
+    const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
+    size_t count = 0;
+    *area = 0;
+    do {
+        uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
+        *at = (uint8_t)(*at & ~(16 << side));
+        if (points)
+            points[count] = txm_v2((float)(x + (side == 1 || side == 2)), (float)(y + (side >= 2)));
+        count++;
+        if (side == 1) *area += x + 1; /* integral of x dy */
+        if (side == 3) *area -= x;
+        const int ahead = (side + 1) & 3; /* the side across which a lies */
+        const int ax = x + txp_e_side_x[ahead], ay = y + txp_e_side_y[ahead];
+        if (!txp_e_is(m, ax, ay, layer)) {
+            side = ahead;
+        } else {
+            x = ax;
+            y = ay;
+            const int lx = ax + txp_e_side_x[side], ly = ay + txp_e_side_y[side];
+            if (txp_e_is(m, lx, ly, layer)) {
+                x = lx;
+                y = ly;
+                side = (side + 3) & 3;
+            }
+        }
+        if (txp_e_tick(bar, 4)) return 0;
+    } while (x != x0 || y != y0 || side != side0);
+    return count;
+}
+
+/* All lines in raster order of where they begin: run through once to count them, once to keep
+   them. */
+static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_edges *e,
+                                  txm_env *env) {
+    size_t shared[TEXPATCH_MAX_LEVELS][TEXPATCH_MAX_LEVELS], cracks;
+    for (int pass = 0; pass < 2; pass++) {
+        size_t lines = 0, points = 0;
+        memset(shared, 0, sizeof shared);
+        if (!txp_e_mark(m, &cracks, shared, bar)) return txp_e_stopped(env);
+        if (pass == 1) {
+            e->lines =
+                (texpatch_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
+            e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
+            if (!e->lines || !e->points) return txp_e_no_memory(env);
+        }
+        for (int y = 0; y < m->height; y++) {
+            for (int x = 0; x < m->width; x++) {
+                const uint8_t *at = m->at + (size_t)y * (size_t)m->width + (size_t)x;
+                for (int side = 0; side < 4; side++) {
+                    if (!(*at & 16 << side)) continue;
+                    int64_t area;
+                    const size_t count =
+                        txp_e_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
+                    if (!count) return txp_e_stopped(env);
+                    if (pass) {
+                        e->lines[lines].layer = *at & 15;
+                        e->lines[lines].is_hole = area < 0;
+                        e->lines[lines].first = points;
+                        e->lines[lines].count = count;
+                    }
+                    points += count;
+                    lines++;
+                }
+                if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            }
+        }
+        e->line_count = lines;
+        e->point_count = points;
+    }
+    for (int k = 0; k < e->levels; k++) {
+        int best = -1;
+        for (int j = 0; j < e->levels; j++) {
+            if (shared[k][j] > (best < 0 ? 0 : shared[k][best])) best = j;
+        }
+        e->beside[k] = best;
+    }
+    return TXM_OK;
+}
+
+static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, txm_arena *layers,
+                             txm_arena *scratch, texpatch_edges *e, txm_env *env) {
+    txp_e_map map;
+    const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
+    e->width = map.width = desc->image.width;
+    e->height = map.height = desc->image.height;
+    e->levels = desc->levels ? desc->levels : 4;
+    for (int k = 0; k < e->levels - 1 && desc->thresholds; k++)
+        e->thresholds[k] = desc->thresholds[k];
+    map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
+    if (!map.at) return txp_e_no_memory(env);
+    const txm_status status = txp_e_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
+                                          map.at, 0.7, bar, scratch, env);
+    if (status != TXM_OK) return status;
+    txp_e_stage(bar, "lines", 1, (double)count * 14);
+    return txp_e_trace_all(&map, bar, e, env);
+}
+
+TEXPATCH_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+                                            texpatch_edges *out) {
+    txm_status status = txp_e_check_desc(desc, env);
+    if (status != TXM_OK) return status;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    if (desc->levels && (desc->levels < 2 || desc->levels > TEXPATCH_MAX_LEVELS))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels",
+                           "must be 0 or 2 to TEXPATCH_MAX_LEVELS");
+    if (desc->thresholds &&
+        !txp_e_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
+
+    txm_arena layers, scratch;
+    txp_e_bar bar;
+    texpatch_edges e;
+    memset(&e, 0, sizeof e);
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_arena_init(&layers, env);
+    txm_arena_init(&scratch, env);
+    txm_arena_init(&e.memory, env);
+    status = txp_e_find(desc, &bar, &layers, &scratch, &e, env);
+    txm_arena_free(&scratch);
+    txm_arena_free(&layers);
+    if (status == TXM_OK) *out = e;
+    else txm_arena_free(&e.memory);
+    return status;
+}
+
+TEXPATCH_API void texpatch_edges_free(texpatch_edges *edges) {
+    if (!edges) return;
+    txm_arena_free(&edges->memory);
+    memset(edges, 0, sizeof *edges);
+}
+
+/* Turn layers into grays. 0 = cancelled. */
+static int txp_e_show(uint8_t *layer, size_t count, int levels, txp_e_bar *bar) {
+    uint8_t gray[TEXPATCH_MAX_LEVELS] = {0};
+    for (int k = 0; k < levels; k++)
+        gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
+    for (size_t i = 0; i < count; i++) {
+        layer[i] = gray[layer[i]];
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+TEXPATCH_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
+                                        const texpatch_edges *edges, txm_env *env,
+                                        const txm_image *layers) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_status status = txp_e_check_desc(desc, env);
+    if (status == TXM_OK) status = txp_e_check_image(layers, "layers", 1, env);
+    if (status == TXM_OK &&
+        (layers->width != desc->image.width || layers->height != desc->image.height))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
+    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS ||
+                             !txp_e_thresholds_are_good(edges->thresholds, edges->levels)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texpatch_edges_find made it");
+    if (status != TXM_OK) return status;
+
+    float thresholds[TEXPATCH_MAX_LEVELS];
+    txm_arena map, scratch;
+    txm_arena_init(&map, env);
+    txm_arena_init(&scratch, env);
+    memcpy(thresholds, edges->thresholds, sizeof thresholds);
+    const size_t width = (size_t)layers->width;
+    uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
+    status = layer ? txp_e_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+                   : txp_e_no_memory(env);
+    if (status == TXM_OK && !txp_e_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+        status = txp_e_stopped(env);
+    for (int y = 0; y < layers->height && status == TXM_OK; y++)
+        memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
+    txm_arena_free(&scratch);
+    txm_arena_free(&map);
+    return status;
+}
+
+/* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
+   twice a pixel. 0 = cancelled. */
+static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *line, uint8_t *marks,
+                           int width, int height, txp_e_bar *bar) {
+    const txm_vec2 *points = e->points + line->first;
+    for (size_t j = 0; j < line->count; j++) {
+        const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
+        const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
+        const double length = sqrt(dx * dx + dy * dy);
+        const int steps = 2 * (int)length + 1;
+        if (txp_e_tick(bar, 1)) return 0;
+        for (int i = 0; i < steps && length > 0; i++) {
+            const double t = (i + 0.5) / steps;
+            const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
+            if (x >= 0 && y >= 0 && x < width && y < height)
+                marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
+            if (txp_e_tick(bar, 2)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
+   not quite black. One channel: gray. */
+static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
+    static const int ramp[5][3] = {
+        {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
+    const int t = 1024 * (layer + 1) / levels; /* 0..1024: four spans of 256 */
+    if (channels == 1) return (uint8_t)((255 * (layer + 1) + levels / 2) / levels);
+    const int span = t < 1024 ? t / 256 : 3, rest = t - 256 * span;
+    return (uint8_t)((ramp[span][channel] * (256 - rest) + ramp[span + 1][channel] * rest) / 256);
+}
+
+TEXPATCH_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+                                            const txm_image *image) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txp_e_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
+    txm_status status = txp_e_check_image(image, "image", 0, env);
+    if (status != TXM_OK) return status;
+    const int channels = image->channels ? image->channels : 1;
+    if (image->sample != TXM_U8 || (channels != 1 && channels != 3))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "must be TXM_U8 with 1 or 3 channels");
+    status = txp_e_check_edges(edges, "edges", 0, &bar, env);
+    if (status != TXM_OK) return status;
+    if (layer < -1 || layer >= edges->levels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layer", "must be -1 to levels - 1");
+
+    const int width = image->width, height = image->height;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint8_t *marks = (uint8_t *)txm_arena_zero(&arena, (size_t)width, (size_t)height);
+    if (!marks) return txp_e_no_memory(env);
+    txp_e_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
+    for (size_t i = 0; i < edges->line_count && status == TXM_OK; i++) {
+        const texpatch_polyline *line = &edges->lines[i];
+        if (layer >= 0 && line->layer != layer) continue;
+        if (!txp_e_draw_line(edges, line, marks, width, height, &bar)) status = txp_e_stopped(env);
+    }
+    for (int y = 0; y < height && status == TXM_OK; y++) {
+        uint8_t *row = (uint8_t *)txm_image_row(image, y);
+        for (int x = 0; x < width; x++) {
+            const int mark = marks[(size_t)y * (size_t)width + (size_t)x];
+            for (int c = 0; c < channels && mark; c++)
+                row[x * channels + c] = txp_e_color(mark - 1, edges->levels, channels, c);
+        }
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+#endif /* TEXPATCH_LINES_H */

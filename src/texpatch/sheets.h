@@ -1,0 +1,375 @@
+#ifndef TEXPATCH_SHEETS_H
+#define TEXPATCH_SHEETS_H
+
+#include "canvas.h"
+#include "lattice.h"
+
+/* ---- the stack of sheets ------------------------------------------------------------------ */
+
+/* Sample a map between its pixels: cubic convolution (Keys, a = -1/2), clamped at the border and to
+   the range of the four pixels around, so that no halo appears; exact on whole numbers. */
+static void txp_cubic(double t, double w[4]) {
+    w[0] = ((-0.5 * t + 1) * t - 0.5) * t;
+    w[1] = (1.5 * t - 2.5) * t * t + 1;
+    w[2] = ((-1.5 * t + 2) * t + 0.5) * t;
+    w[3] = (0.5 * t - 0.5) * t * t;
+}
+
+static void txp_sample(const txm_image *im, double x, double y, int is_label, float *out) {
+    const int channels = im->channels;
+    if (is_label) {
+        const int ix = txm_clampi((int)floor(x + 0.5), 0, im->width - 1);
+        const int iy = txm_clampi((int)floor(y + 0.5), 0, im->height - 1);
+        for (int c = 0; c < channels; c++) out[c] = txm_image_get(im, ix, iy, c);
+        return;
+    }
+    const double fx = floor(x), fy = floor(y);
+    const int ix = (int)fx, iy = (int)fy;
+    double wx[4], wy[4];
+    int cx[4], cy[4];
+    txp_cubic(x - fx, wx);
+    txp_cubic(y - fy, wy);
+    for (int k = 0; k < 4; k++) {
+        cx[k] = txm_clampi(ix + k - 1, 0, im->width - 1);
+        cy[k] = txm_clampi(iy + k - 1, 0, im->height - 1);
+    }
+    for (int c = 0; c < channels; c++) {
+        double sum = 0, low = 1e30, high = -1e30;
+        for (int j = 0; j < 4; j++) {
+            double row = 0;
+            for (int i = 0; i < 4; i++) {
+                const double v = txm_image_get(im, cx[i], cy[j], c);
+                row += wx[i] * v;
+                if (i == 1 || i == 2) {
+                    if (j == 1 || j == 2) {
+                        low = v < low ? v : low;
+                        high = v > high ? v : high;
+                    }
+                }
+            }
+            sum += wy[j] * row;
+        }
+        out[c] = txm_float(sum < low ? low : sum > high ? high : sum);
+    }
+}
+
+/* Where sheet pixel (x, y), y within the sheet, lies in its exemplar. */
+static inline void txp_sheet_place(const txp_sheet *s, double x, double y, double *ex, double *ey) {
+    *ex = s->xx * x + s->xy * y + s->x0;
+    *ey = s->yx * x + s->yy * y + s->y0;
+}
+
+/* A job's view of a description after the checks. */
+typedef struct txp_setup {
+    txm_image maps[TEXPATCH_MAX_EXEMPLARS][TEXPATCH_MAX_MAPS]; /* resolved                     */
+    txm_image guides[TEXPATCH_MAX_EXEMPLARS], masks[TEXPATCH_MAX_EXEMPLARS];
+    texpatch_map kinds[TEXPATCH_MAX_MAPS];
+    txm_image kept[TEXPATCH_MAX_MAPS]; /* pixels NULL: nothing is kept                        */
+    int exemplar_count, map_count, width, height, tileable, patch, passes, turns, mirror, lattice;
+    int is_default; /* passes were not given                                                  */
+    float most_weight; /* of maps and guide: its differences use the whole range of a byte      */
+    float novelty, guide_weight, low[TEXPATCH_MAX_MAPS], high[TEXPATCH_MAX_MAPS];
+    float guide_low, guide_high;
+    double lattice_vectors[4];
+    uint64_t seed;
+} txp_setup;
+
+/* The compared bytes of one picture's pixel; returns how many. */
+static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label, double low,
+                       double high, double weight, uint8_t *out) {
+    float v[4];
+    if (whole) {
+        for (int c = 0; c < im->channels; c++) v[c] = txm_image_get(im, (int)x, (int)y, c);
+    } else {
+        txp_sample(im, x, y, is_label, v);
+    }
+    const double scale = high > low ? 255 / (high - low) * weight : 0;
+    for (int c = 0; c < im->channels; c++) {
+        const double f = ((double)v[c] - low) * scale + 0.5;
+        out[c] = (uint8_t)(f < 0 ? 0 : f > 255 ? 255 : f);
+    }
+    return im->channels;
+}
+
+/* The compared bytes of a pixel: maps with weight, padding, guide last. guide may be NULL. */
+static void txp_features(const txp_setup *u, const txp_source *s, const txm_image *maps,
+                         const txm_image *guide, double x, double y, int whole, uint8_t *out) {
+    const double most = (double)u->most_weight;
+    int n = 0;
+    memset(out, 0, (size_t)s->bytes);
+    for (int m = 0; m < u->map_count && maps; m++) {
+        if (!(u->kinds[m].weight > 0)) continue;
+        n += txp_feature(&maps[m], x, y, whole, u->kinds[m].is_label, (double)u->low[m],
+                         (double)u->high[m], (double)u->kinds[m].weight / most, out + n);
+    }
+    if (s->guide_bytes && guide)
+        txp_feature(guide, x, y, whole, 1, (double)u->guide_low, (double)u->guide_high,
+                    (double)u->guide_weight / most, out + s->guide_at);
+}
+
+/* Halve a level of the stack, sheet by sheet. */
+static void txp_stack_halve(const txp_source *s, const txp_stack *from, txp_stack *to) {
+    const size_t n = (size_t)s->bytes;
+    for (int k = 0; k < s->sheets; k++) {
+        for (int y = 0; y < to->high[k]; y++) {
+            const uint8_t *a = txp_stack_at(s, from, 0, from->first[k] + 2 * y);
+            const uint8_t *b = a + from->pitch;
+            uint8_t *out = to->pixels + (size_t)(to->first[k] + y) * to->pitch;
+            for (int x = 0; x < to->wide[k]; x++, a += 2 * n, b += 2 * n, out += n) {
+                for (size_t c = 0; c < n; c++)
+                    out[c] = (uint8_t)((a[c] + a[n + c] + b[c] + b[n + c] + 2) / 4);
+            }
+        }
+    }
+}
+
+/* Lay out one level: sheets one below the other. */
+static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *arena, int has_mask,
+                                 txm_env *env) {
+    int y = 0;
+    k->width = 0;
+    for (int n = 0; n < s->sheets; n++) {
+        k->first[n] = y;
+        y += k->high[n];
+        if (k->wide[n] > k->width) k->width = k->wide[n];
+    }
+    k->height = y;
+    k->pitch = (size_t)k->width * (size_t)s->bytes;
+    k->pixels = (uint8_t *)txm_arena_zero(arena, (size_t)k->height + 1, k->pitch);
+    k->sheet = (uint8_t *)txm_arena_alloc(arena, (size_t)k->height, 1);
+    k->bad = NULL;
+    if (has_mask)
+        k->bad = (uint32_t *)txm_arena_zero(arena, (size_t)(k->width + 1) * (size_t)(k->height + 1),
+                                            sizeof *k->bad);
+    if (!k->pixels || !k->sheet || (has_mask && !k->bad))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
+    for (int n = 0; n < s->sheets; n++) memset(k->sheet + k->first[n], n, (size_t)k->high[n]);
+    return TXM_OK;
+}
+
+/* Sums of the unusable pixels, which lie one byte each in width x height. */
+static void txp_stack_sum(txp_stack *k, const uint8_t *bad) {
+    const size_t w = (size_t)k->width + 1;
+    for (int y = 0; y < k->height; y++) {
+        uint32_t row = 0;
+        for (int x = 0; x < k->width; x++) {
+            row += bad[(size_t)y * (size_t)k->width + (size_t)x];
+            k->bad[(size_t)(y + 1) * w + (size_t)x + 1] =
+                k->bad[(size_t)y * w + (size_t)x + 1] + row;
+        }
+    }
+}
+
+/* The turned (then stretched) sheets of all exemplars. stretch: x and y of exemplar pixels per
+   sheet pixel, column by column, or NULL. */
+static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch) {
+    static const int turn_x[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
+    s->sheets = 0;
+    for (int e = 0; e < u->exemplar_count; e++) {
+        const int w = u->maps[e][0].width, h = u->maps[e][0].height;
+        for (int m = 0; m <= (u->mirror ? 1 : 0); m++) {
+            for (int t = 0; t < 4; t += 4 / u->turns) {
+                txp_sheet *k = &s->sheet[s->sheets++];
+                k->exemplar = e;
+                k->turn = t + 4 * m;
+                k->width = t % 2 ? h : w;
+                k->height = t % 2 ? w : h;
+                k->plain = 1;
+                /* Seen on the sheet the exemplar is turned counter-clockwise t times; the way back
+                   turns clockwise, rows running down. */
+                k->xx = turn_x[t][0];
+                k->xy = turn_x[t][1];
+                k->yx = -turn_x[t][1];
+                k->yy = turn_x[t][0];
+                k->x0 = k->xx + k->xy < 0 ? w - 1 : 0;
+                k->y0 = k->yx + k->yy < 0 ? h - 1 : 0;
+                if (m) { /* mirrored before turning */
+                    k->xx = -k->xx;
+                    k->xy = -k->xy;
+                    k->x0 = w - 1 - k->x0;
+                }
+                if (stretch) { /* one sheet only: (x, y) of the sheet is stretch (x, y) */
+                    k->plain = 0;
+                    k->xx = stretch[0];
+                    k->yx = stretch[1];
+                    k->xy = stretch[2];
+                    k->yy = stretch[3];
+                    /* the largest sheet whose corners stay inside, about the middle */
+                    const double ax = fabs(k->xx), bx = fabs(k->xy), ay = fabs(k->yx),
+                                 by = fabs(k->yy);
+                    double sw = w / ax, sh = h / by;
+                    for (int i = 0; i < 8; i++) {
+                        const double ow = ax * (sw - 1) + bx * (sh - 1),
+                                     oh = ay * (sw - 1) + by * (sh - 1);
+                        const double f = fmin((w - 1) / ow, (h - 1) / oh);
+                        sw = (sw - 1) * f + 1;
+                        sh = (sh - 1) * f + 1;
+                    }
+                    k->width = (int)sw;
+                    k->height = (int)sh;
+                    k->x0 =
+                        (w - 1) * 0.5 - (k->xx * (k->width - 1) + k->xy * (k->height - 1)) * 0.5;
+                    k->y0 =
+                        (h - 1) * 0.5 - (k->yx * (k->width - 1) + k->yy * (k->height - 1)) * 0.5;
+                }
+            }
+        }
+    }
+}
+
+/* How many levels, and how large the sheets are at each. least: the smaller side of the output if
+   it wraps, else large. */
+static void txp_source_sizes(txp_source *s, int least) {
+    int side = least;
+    for (int n = 0; n < s->sheets; n++) {
+        const txp_sheet *k = &s->sheet[n];
+        s->stack[0].wide[n] = k->width;
+        s->stack[0].high[n] = k->height;
+        if (k->width < side) side = k->width;
+        if (k->height < side) side = k->height;
+    }
+    for (s->levels = 1; side >= TXP_COARSE && s->levels < TXP_MAX_LEVELS; s->levels++, side /= 2) {
+        for (int n = 0; n < s->sheets; n++) {
+            s->stack[s->levels].wide[n] = s->stack[s->levels - 1].wide[n] / 2;
+            s->stack[s->levels].high[n] = s->stack[s->levels - 1].high[n] / 2;
+        }
+    }
+}
+
+typedef struct txp_rows {
+    const txp_setup *setup;
+    txp_source *source;
+    uint8_t *bad;
+} txp_rows;
+
+/* One row of the stack at full size. */
+static void txp_stack_row(void *context, int y) {
+    const txp_rows *r = (const txp_rows *)context;
+    const txp_source *s = r->source;
+    const txp_stack *k = &s->stack[0];
+    const int n = k->sheet[y];
+    const txp_sheet *sheet = &s->sheet[n];
+    const txm_image *mask = &r->setup->masks[sheet->exemplar];
+    for (int x = 0; x < k->wide[n]; x++) {
+        double ex, ey;
+        txp_sheet_place(sheet, x, y - k->first[n], &ex, &ey);
+        txp_features(r->setup, s, r->setup->maps[sheet->exemplar],
+                     &r->setup->guides[sheet->exemplar], ex, ey, sheet->plain,
+                     k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes);
+        if (r->bad && mask->pixels) {
+            const int ix = txm_clampi((int)floor(ex + 0.5), 0, mask->width - 1);
+            const int iy = txm_clampi((int)floor(ey + 0.5), 0, mask->height - 1);
+            r->bad[(size_t)y * (size_t)k->width + (size_t)x] =
+                ((const uint8_t *)txm_image_row_const(mask, iy))[ix] == 0;
+        }
+    }
+}
+
+/* All levels of the stack. */
+static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena, txm_env *env) {
+    txm_arena scratch;
+    txp_rows rows;
+    uint8_t *bad[TXP_MAX_LEVELS] = {NULL};
+    int has_mask = 0;
+    txm_status status = TXM_OK;
+    for (int e = 0; e < u->exemplar_count; e++) has_mask |= u->masks[e].pixels != NULL;
+    txm_arena_init(&scratch, env);
+    for (int l = 0; l < s->levels && status == TXM_OK; l++) {
+        status = txp_stack_make(s, &s->stack[l], arena, has_mask, env);
+        if (status != TXM_OK || !has_mask) continue;
+        bad[l] = (uint8_t *)txm_arena_zero(
+            &scratch, (size_t)s->stack[l].width * (size_t)s->stack[l].height, 1);
+        if (!bad[l]) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the masks");
+    }
+    rows.setup = u;
+    rows.source = s;
+    rows.bad = bad[0];
+    if (status == TXM_OK) {
+        txm_parallel_for(env, s->stack[0].height, txp_stack_row, &rows);
+        for (int l = 1; l < s->levels; l++) txp_stack_halve(s, &s->stack[l - 1], &s->stack[l]);
+        for (int l = 0; l < s->levels && has_mask; l++) {
+            txp_stack *k = &s->stack[l];
+            for (int n = 0; n < s->sheets && l > 0; n++) {
+                const size_t w = (size_t)s->stack[l - 1].width;
+                for (int y = 0; y < k->high[n]; y++) {
+                    for (int x = 0; x < k->wide[n]; x++) {
+                        const uint8_t *b = bad[l - 1] +
+                                           (size_t)(s->stack[l - 1].first[n] + 2 * y) * w +
+                                           2 * (size_t)x;
+                        bad[l][(size_t)(k->first[n] + y) * (size_t)k->width + (size_t)x] =
+                            (uint8_t)(b[0] | b[1] | b[w] | b[w + 1]);
+                    }
+                }
+            }
+            txp_stack_sum(k, bad[l]);
+        }
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* The contrast of the exemplars, from some thousand pairs of pixels. */
+static void txp_find_contrast(txp_source *s) {
+    const txp_stack *k = &s->stack[0];
+    txm_rng rng = txm_rng_make(1, 2);
+    uint64_t sum = 0;
+    for (int i = 0; i < 4096; i++) {
+        const uint8_t *p[2];
+        for (int j = 0; j < 2; j++) {
+            const int n = (int)txm_rng_below(&rng, (uint32_t)s->sheets);
+            const int x = (int)txm_rng_below(&rng, (uint32_t)k->wide[n]);
+            const int y = (int)txm_rng_below(&rng, (uint32_t)k->high[n]);
+            p[j] = txp_stack_at(s, k, x, k->first[n] + y);
+        }
+        for (int b = 0; b < s->guide_at; b++) sum += (uint64_t)abs(p[0][b] - p[1][b]);
+    }
+    s->contrast = (double)sum / 4096;
+}
+
+/* Look for a lattice at the coarsest level; sharpen its steps on finer ones. */
+static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
+    txm_arena scratch;
+    txp_correlation k;
+    double v[4] = {0, 0, 0, 0}, strongest = 0;
+    s->has_lattice = s->is_random = 0;
+    if (u->lattice == 1) {
+        memcpy(v, u->lattice_vectors, sizeof v);
+        s->has_lattice = 1;
+    } else if (s->sheets == 1) {
+        const int top = s->levels - 1;
+        const txp_stack *t = &s->stack[top];
+        txm_arena_init(&scratch, env);
+        k.width = t->wide[0];
+        k.height = t->high[0];
+        k.reach_x = k.width * 5 / 8;
+        k.reach_y = k.height * 5 / 8;
+        int16_t *gray =
+            (int16_t *)txm_arena_alloc(&scratch, (size_t)k.width * (size_t)k.height, sizeof *gray);
+        k.at = (float *)txm_arena_alloc(
+            &scratch, (size_t)(2 * k.reach_x + 1) * (size_t)(k.reach_y + 1), sizeof *k.at);
+        if (!gray || !k.at) {
+            txm_arena_free(&scratch);
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+        }
+        for (int y = 0; y < k.height; y++) {
+            for (int x = 0; x < k.width; x++) {
+                const uint8_t *p = txp_stack_at(s, t, x, y);
+                int sum = 0, n = 0;
+                for (int b = 0; b < s->guide_at && b < 3; b++, n++) sum += p[b];
+                gray[y * k.width + x] = (int16_t)(sum / n - 128);
+            }
+        }
+        k.gray = gray;
+        txm_parallel_for(env, k.reach_y + 1, txp_correlate_row, &k);
+        const int found = txp_lattice_find(&k, v, &strongest);
+        s->has_lattice = found && u->lattice != -1;
+        s->is_random = !found && strongest < 0.26;
+        for (int i = 0; i < 4; i++) v[i] *= 1 << top;
+        txm_arena_free(&scratch);
+    }
+    for (int l = 0; l < s->levels && s->has_lattice; l++)
+        txp_lattice_set(&s->stack[l], v, 1.0 / (1 << l));
+    return TXM_OK;
+}
+
+#endif /* TEXPATCH_SHEETS_H */
