@@ -1,0 +1,702 @@
+#ifndef TEXTILES_CUT_H
+#define TEXTILES_CUT_H
+
+#include "frame.h"
+
+/* ---- one tile ---------------------------------------------------------------------------- */
+
+/* A tile being made. Every texel has the number of the layer that it shows. */
+typedef struct txt_canvas {
+    const txt_build *b;
+    int tile, side, half; /* half: directions in which neighbours are counted, 2 or 3 */
+    int dx[3], dy[3];
+    uint8_t *inside, *locked;
+    uint16_t *label, *kept, *start, *best; /* kept, start: labels to go back to */
+    uint8_t *border;      /* rows to the nearest joint, at most 255 */
+    int32_t *shows;       /* number of the texel shown, -1 beyond the exemplar */
+    int32_t *other;       /* what a layer that is tried would show */
+    uint16_t *gap;        /* difference of the two */
+    txt_layer *layers;
+    int layer_capacity;
+    int layer_count, frame_count; /* the first frame_count belong to edges and corners */
+    txm_flow flow;
+    txt_query query;
+    txt_scratch scratch;
+    txt_place places[TXT_PLACES]; /* found for the inside */
+    int place_count, tries; /* how many of them are cut */
+    int best_place;
+} txt_canvas;
+
+/* What it costs that p shows a and its neighbour q shows c where they should go on: the squared sum
+   of how a and c differ on both sides of the cut. */
+static int32_t txt_seam(int at_p, int at_q) {
+    return (at_p + at_q) * (at_p + at_q);
+}
+
+/* cost of the cut between neighbouring texels p = (x, y) and q, as they are labelled */
+static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int dx, int dy) {
+    if (c->label[p] == c->label[q]) return 0;
+    const txt_layer *a = &c->layers[c->label[p]], *d = &c->layers[c->label[q]];
+    const int at_p = txt_difference(c->b, c->shows[p], txt_shown(c->b, d, x, y));
+    const int at_q = txt_difference(c->b, c->shows[q], txt_shown(c->b, a, x + dx, y + dy));
+    return txt_seam(at_p, at_q);
+}
+
+/* An edge's strip is the same in all tiles with its colour: the less of it shows, the less repeats. */
+static int32_t txt_bias(const txt_canvas *c, int label, int p) {
+    if (!c->layers[label].is_frame || c->border[p] < 3) return 0;
+    const int far = c->border[p] < 24 ? c->border[p] - 2 : 22;
+    return TXT_BIAS * far;
+}
+
+/* Energy of all cuts that touch the rectangle, and of what its texels show. */
+static int64_t txt_energy(const txt_canvas *c, int x0, int y0, int x1, int y1) {
+    const int side = c->side;
+    int64_t sum = 0;
+    for (int y = y0 - 1; y < y1; y++) {
+        for (int x = x0 - 1; x <= x1; x++) {
+            if (x < 0 || y < 0 || x >= side) continue;
+            const int p = y * side + x;
+            if (!c->inside[p]) continue;
+            if (x >= x0 && x < x1 && y >= y0) sum += txt_bias(c, c->label[p], p);
+            for (int k = 0; k < c->half; k++) {
+                const int qx = x + c->dx[k], qy = y + c->dy[k];
+                if (qx < 0 || qy < 0 || qx >= side || qy >= side) continue;
+                const int q = qy * side + qx;
+                if (c->inside[q] && c->label[p] != c->label[q])
+                    sum += txt_cut_cost(c, p, q, x, y, c->dx[k], c->dy[k]);
+            }
+        }
+    }
+    return sum;
+}
+
+/* Let layer l take over whatever texels of the rectangle make the energy least: one expansion move of
+   [Boykov 2001]. Returns by how much the energy fell; if it would not, all stays as it was. */
+static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) {
+    const txt_build *b = c->b;
+    txm_flow *g = &c->flow;
+    const int side = c->side, half = c->half, width = x1 - x0 + 2, height = y1 - y0 + 2;
+    g->count = width * height;
+    for (int k = 0; k < half; k++) {
+        g->step[k] = c->dy[k] * width + c->dx[k];
+        g->step[k + half] = -g->step[k];
+    }
+    for (int k = 0; k < 2 * half; k++) memset(g->arc[k], 0, (size_t)g->count * sizeof(int32_t));
+    memset(g->excess, 0, (size_t)g->count * sizeof(int32_t));
+
+    /* what the layer would show, one texel beyond the rectangle too */
+    int any = 0;
+    for (int y = y0 - 1; y <= y1; y++) {
+        for (int x = x0 - 1; x <= x1; x++) {
+            if (x < 0 || y < 0 || x >= side || y >= side) continue;
+            const int p = y * side + x;
+            if (!c->inside[p]) continue;
+            c->other[p] = txt_shown(b, &c->layers[l], x, y);
+            c->gap[p] = (uint16_t)txt_difference(b, c->shows[p], c->other[p]);
+        }
+    }
+#define TXT_MAY(p, x, y) \
+    ((x) >= x0 && (x) < x1 && (y) >= y0 && (y) < y1 && !c->locked[p] && c->other[p] >= 0 && \
+     c->label[p] != l)
+    for (int y = y0 - 1; y < y1; y++) {
+        for (int x = x0 - 1; x <= x1; x++) {
+            if (x < 0 || y < 0 || x >= side) continue;
+            const int p = y * side + x, node = (y - y0 + 1) * width + (x - x0 + 1);
+            if (!c->inside[p]) continue;
+            const int may_p = TXT_MAY(p, x, y), is_p = c->label[p] == l;
+            if (may_p) {
+                any = 1;
+                /* to change costs on the source's side, to stay on the sink's */
+                g->excess[node] += txt_bias(c, l, p) - txt_bias(c, c->label[p], p);
+            }
+            for (int k = 0; k < half; k++) {
+                const int qx = x + c->dx[k], qy = y + c->dy[k];
+                if (qx < 0 || qy < 0 || qx >= side || qy >= side) continue;
+                const int q = qy * side + qx;
+                if (!c->inside[q]) continue;
+                const int may_q = TXT_MAY(q, qx, qy), is_q = c->label[q] == l;
+                if (!may_p && !may_q) continue;
+                /* stay, stay; stay, change; change, stay; change, change costs nothing */
+                int32_t ss, sc, cs;
+                if (c->label[p] == c->label[q]) {
+                    ss = 0;
+                    sc = cs = txt_seam(c->gap[p], c->gap[q]);
+                } else {
+                    const txt_layer *lp = &c->layers[c->label[p]], *lq = &c->layers[c->label[q]];
+                    const int32_t pq = txt_shown(b, lp, qx, qy), qp = txt_shown(b, lq, x, y);
+                    ss = txt_seam(txt_difference(b, c->shows[p], qp),
+                                  txt_difference(b, c->shows[q], pq));
+                    sc = txt_seam(c->gap[p], txt_difference(b, c->other[q], pq));
+                    cs = txt_seam(c->gap[q], txt_difference(b, c->other[p], qp));
+                }
+                const int other = node + g->step[k];
+                if (may_p && may_q) {
+                    if (ss > sc + cs) ss = sc + cs; /* no arc can reward a seam; checked below */
+                    g->excess[node] += cs - ss;
+                    g->excess[other] -= cs;
+                    g->arc[k][node] += sc + cs - ss;
+                } else if (may_p) {
+                    g->excess[node] += is_q ? -sc : cs - ss;
+                } else {
+                    g->excess[other] += is_p ? -cs : sc - ss;
+                }
+            }
+        }
+    }
+    if (!any) return 0;
+    const int64_t before = txt_energy(c, x0, y0, x1, y1);
+    txm_flow_solve(g);
+    for (int y = y0; y < y1; y++)
+        memcpy(c->kept + y * side + x0, c->label + y * side + x0,
+               (size_t)(x1 - x0) * sizeof *c->label);
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            const int p = y * side + x, node = (y - y0 + 1) * width + (x - x0 + 1);
+            if (!c->inside[p] || !TXT_MAY(p, x, y)) continue;
+            if (g->tree[node] == TXM_FLOW_SINK) {
+                c->label[p] = (uint16_t)l;
+                const int32_t t = c->shows[p];
+                c->shows[p] = c->other[p];
+                c->other[p] = t; /* to go back */
+            }
+        }
+    }
+#undef TXT_MAY
+    const int64_t after = txt_energy(c, x0, y0, x1, y1);
+    if (after < before) return before - after;
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            const int p = y * side + x;
+            if (!c->inside[p] || c->label[p] == c->kept[p]) continue;
+            c->label[p] = c->kept[p];
+            c->shows[p] = c->other[p];
+        }
+    }
+    return 0;
+}
+
+/* ---- the frame of a tile ----------------------------------------------------------------- */
+
+/* side k of a tile: its strip, and how strip coordinates come from the tile's: (a, u) or, of
+   triangles, axial (i, j) = turned(x, y) + (di, dj) */
+typedef struct txt_side {
+    const txt_seam_strip *strip;
+    int turn, di, dj;
+    int layer[TXT_MAX_SEGMENTS + 2]; /* of the canvas, by the number of the strip's piece */
+} txt_side;
+
+/* Sides of a square: north, east, south, west; of a triangle 0, 1, 2. */
+static void txt_find_side(const txt_build *b, const textiles_tile *t, int k, txt_side *s) {
+    const int size = b->set->size, is_corner = b->set->kind == TEXTILES_CORNER;
+    s->turn = s->di = s->dj = 0;
+    if (b->is_triangle) {
+        /* side k runs in direction 1, 5, 3 (sixths) from its first corner; the strip in direction 0 */
+        const int run[3] = {1, 5, 3};
+        const int corner[3][2] = {{0, 0}, {0, size}, {size, 0}};
+        int i, j;
+        s->strip = &b->strips[t->edges[k]];
+        s->turn = (6 - run[k] + (t->directions[k] < 0 ? 3 : 0)) % 6;
+        txt_turn(s->turn, corner[k][0], corner[k][1], &i, &j);
+        s->di = (t->directions[k] < 0 ? size : 0) - i;
+        s->dj = -j;
+        return;
+    }
+    const int axis = k & 1;                         /* east and west run down */
+    const int ends[4][2] = {{0, 1}, {1, 2}, {3, 2}, {0, 3}}; /* of corners nw, ne, se, sw */
+    s->strip = &b->strips[is_corner ? txt_strip_index(b, axis, t->edges[ends[k][0]],
+                                                      t->edges[ends[k][1]])
+                                    : txt_strip_index(b, axis, t->edges[k], 0)];
+    s->di = k == 1 ? -size : 0;
+    s->dj = k == 2 ? -size : 0;
+}
+
+/* (a, u) of a texel on a side; u is 0, 1, .. or, from the other side, -1, -2, .. (triangles: 0, -1, ..
+   for + and 0, 1, .. for -) */
+static void txt_side_place(const txt_build *b, const txt_side *s, int x, int y, int *a, int *u) {
+    int i, j;
+    txt_turn(s->turn, x, y, &i, &j);
+    i += s->di;
+    j += s->dj;
+    if (b->is_triangle) {
+        *a = i + txt_half(j);
+        *u = j;
+    } else {
+        *a = s->strip->axis ? j : i;
+        *u = s->strip->axis ? i : j;
+    }
+}
+
+/* The layers of a side: its start's corner, its segments, its end's corner. */
+static void txt_add_side_layers(txt_canvas *c, txt_side *s) {
+    const txt_build *b = c->b;
+    for (int w = 0; w < s->strip->count + 2; w++) {
+        txt_layer *l = &c->layers[c->layer_count];
+        int i = s->di, j = s->dj;
+        l->turn = s->turn;
+        l->is_frame = 1;
+        if (w >= 1 && w <= s->strip->count) {
+            l->sheet = s->strip->segment[w - 1].sheet;
+            i += s->strip->segment[w - 1].i;
+            j += s->strip->segment[w - 1].j;
+        } else {
+            const int corner = s->strip->corner[w != 0], size = b->set->size;
+            l->sheet = b->corner[corner].sheet;
+            i += b->corner[corner].i;
+            j += b->corner[corner].j;
+            if (w && b->is_triangle) { /* seen from the end, turned by half a circle */
+                l->turn = (s->turn + 3) % 6;
+                i = b->corner[corner].i + size - s->di;
+                j = b->corner[corner].j - s->dj;
+            } else if (w) {
+                if (s->strip->axis) j -= size;
+                else i -= size;
+            }
+        }
+        l->i = i;
+        l->j = j;
+        s->layer[w] = 0;
+        while (memcmp(&c->layers[s->layer[w]], l, sizeof *l) != 0) s->layer[w]++;
+        if (s->layer[w] == c->layer_count) c->layer_count++; /* else two sides share a corner */
+    }
+}
+
+/* Begin a tile: what its edges prescribe is locked, the rest shows what the nearest edge would. */
+static void txt_begin_tile(txt_canvas *c, int tile) {
+    const txt_build *b = c->b;
+    const int side = c->side, size = b->set->size, sides = b->is_triangle ? 3 : 4;
+    txt_side list[4];
+    c->tile = tile;
+    c->layer_count = 0;
+    for (int k = 0; k < sides; k++) {
+        txt_find_side(b, &b->set->tiles[tile], k, &list[k]);
+        txt_add_side_layers(c, &list[k]);
+    }
+    c->frame_count = c->layer_count;
+    for (int y = 0; y < side; y++) {
+        for (int x = 0; x < side; x++) {
+            const int p = y * side + x;
+            c->inside[p] = (uint8_t)(!b->is_triangle || x + y <= size);
+            if (!c->inside[p]) continue;
+            int nearest = 0, depth = INT_MAX, na = 0, nu = 0, locks = 0;
+            for (int k = 0; k < sides; k++) {
+                int a, u;
+                txt_side_place(b, &list[k], x, y, &a, &u);
+                /* rows from the joint: 0 touches it */
+                const int row = b->is_triangle ? abs(u) : u < 0 ? -1 - u : u;
+                if (row < TXT_LOCK + b->is_triangle &&
+                    (!b->is_triangle || row == 0 || (a >= 6 && a <= size - 6)))
+                    locks = 1;
+                if (row < depth) {
+                    nearest = k;
+                    depth = row;
+                    na = a;
+                    nu = u;
+                }
+            }
+            const txt_seam_strip *s = list[nearest].strip;
+            const int line = txm_clampi(nu, b->lock_from, b->lock_from + b->lock_count - 1);
+            const int at = txm_clampi(na, 0, size - 1 + b->is_triangle);
+            const int w = s->which[at * b->lock_count + line - b->lock_from];
+            c->border[p] = (uint8_t)txm_clampi(depth, 0, 255);
+            c->locked[p] = (uint8_t)locks;
+            c->label[p] = (uint16_t)list[nearest].layer[w];
+            c->shows[p] = txt_shown(b, &c->layers[c->label[p]], x, y);
+            /* a segment or corner that ends before it gets here: take another of the same edge */
+            for (int v = 1; v <= s->count && c->shows[p] < 0; v++) {
+                c->label[p] = (uint16_t)list[nearest].layer[v];
+                c->shows[p] = txt_shown(b, &c->layers[c->label[p]], x, y);
+            }
+        }
+    }
+}
+
+/* Let every layer expand once more: those of the frame not far from where they are. */
+static void txt_settle(txt_canvas *c) {
+    const int reach = 20;
+    for (int l = 0; l < c->layer_count; l++) {
+        int x0 = INT_MAX, y0 = INT_MAX, x1 = 0, y1 = 0;
+        for (int y = 0; y < c->side; y++) {
+            for (int x = 0; x < c->side; x++) {
+                if (!c->inside[y * c->side + x] || c->label[y * c->side + x] != l) continue;
+                if (x < x0) x0 = x;
+                if (x >= x1) x1 = x + 1;
+                if (y < y0) y0 = y;
+                y1 = y + 1;
+            }
+        }
+        if (x1 == 0) continue;
+        txt_expand(c, l, txm_clampi(x0 - reach, 0, c->side), txm_clampi(y0 - reach, 0, c->side),
+                   txm_clampi(x1 + reach, 0, c->side), txm_clampi(y1 + reach, 0, c->side));
+    }
+}
+
+/* What lies deep in the rectangle and still shows the frame changes over to layer l at once. */
+static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            const int p = y * c->side + x;
+            if (!c->inside[p] || c->border[p] < depth || !c->layers[c->label[p]].is_frame) continue;
+            const int32_t t = txt_shown(c->b, &c->layers[l], x, y);
+            if (t < 0) continue;
+            c->label[p] = (uint16_t)l;
+            c->shows[p] = t;
+        }
+    }
+}
+
+/* Search units that a place costs for showing what other insides show already. */
+typedef struct txt_use_query {
+    const txt_build *b;
+    int turn, size;
+} txt_use_query;
+
+/* the rectangle of storage texels that a piece laid over the inside shows, about */
+static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, int box[4]) {
+    if (!b->is_triangle) {
+        box[0] = i;
+        box[1] = j;
+        box[2] = i + size;
+        box[3] = j + size;
+        return;
+    }
+    int ci, cj; /* a square about the triangle's middle with its area */
+    txt_turn(turn, size / 3, size / 3, &ci, &cj);
+    const int x = i + ci + txt_half(j + cj), y = j + cj, r = size / 3;
+    box[0] = x - r;
+    box[1] = y - r;
+    box[2] = x + r;
+    box[3] = y + r;
+}
+
+/* The cells that a piece shows, about; 0 if there are none. */
+static int txt_piece_cells(const txt_build *b, int sheet, int turn, int size, int i, int j,
+                           int cells[4]) {
+    const int across = b->sheets[sheet].width / TXT_CELL + 2;
+    const int down = b->sheets[sheet].height / TXT_CELL + 2;
+    int box[4];
+    txt_piece_box(b, turn, size, i, j, box);
+    for (int k = 0; k < 4; k++)
+        cells[k] = txm_clampi((box[k] + TXT_CELL / 2) / TXT_CELL, 0, (k & 1 ? down : across) - 1);
+    return (cells[2] - cells[0]) * (cells[3] - cells[1]);
+}
+
+/* What a piece would have more of the traits than usual. */
+static void txt_piece_traits(const txt_build *b, const txt_place *p, double more[TXT_TRAITS]) {
+    int c[4];
+    const int across = b->sheets[p->sheet].width / TXT_CELL + 2;
+    const int area = txt_piece_cells(b, p->sheet, p->turn, b->set->size, p->i, p->j, c);
+    const double *sum = b->traits[p->sheet];
+    for (int k = 0; k < TXT_TRAITS; k++) {
+        more[k] = 0;
+        if (area <= 0) continue;
+        more[k] = (sum[(c[3] * across + c[2]) * TXT_TRAITS + k] -
+                   sum[(c[1] * across + c[2]) * TXT_TRAITS + k] -
+                   sum[(c[3] * across + c[0]) * TXT_TRAITS + k] +
+                   sum[(c[1] * across + c[0]) * TXT_TRAITS + k]) / area - b->usual[k];
+    }
+}
+
+static void txt_use_extra(const void *context, int sheet, int i, int j, int n, uint32_t *cost) {
+    const txt_use_query *q = (const txt_use_query *)context;
+    const txt_build *b = q->b;
+    const int across = b->sheets[sheet].width / TXT_CELL + 2;
+    const uint32_t *sum = b->used[sheet];
+    for (int k = 0; k < n; k++) {
+        int c[4];
+        const int area = txt_piece_cells(b, sheet, q->turn, q->size, i + k, j, c);
+        if (area <= 0) continue;
+        const uint32_t use = sum[c[3] * across + c[2]] - sum[c[1] * across + c[2]] -
+                             sum[c[3] * across + c[0]] + sum[c[1] * across + c[0]];
+        cost[k] += use / (uint32_t)area;
+    }
+}
+
+/* Count what a tile has more of the traits than usual. */
+static void txt_count_traits(txt_build *b, const txt_canvas *c) {
+    double sum[TXT_TRAITS] = {0}, one[TXT_TRAITS];
+    int count = 0;
+    for (int p = 0; p < c->side * c->side; p++) {
+        if (!c->inside[p]) continue;
+        txt_texel_traits(b, c->shows[p], one);
+        for (int k = 0; k < TXT_TRAITS; k++) sum[k] += one[k];
+        count++;
+    }
+    for (int k = 0; k < TXT_TRAITS; k++) b->surplus[k] += sum[k] / count - b->usual[k];
+}
+
+/* Count what a tile's inside shows; units: search cost for a piece that is all used once. */
+static void txt_count_use(txt_build *b, const txt_canvas *c) {
+    for (int y = 0; y < c->side; y++) {
+        for (int x = 0; x < c->side; x++) {
+            const int p = y * c->side + x;
+            if (!c->inside[p] || c->layers[c->label[p]].is_frame) continue;
+            const int32_t t = c->shows[p];
+            const int e = txt_sheet_of(b, t);
+            const int w = b->sheets[e].width, at = t - b->sheets[e].first;
+            const int across = w / TXT_CELL + 2;
+            const uint32_t weight = 8 + b->salient[t] / 2; /* 16 of usual salience */
+            b->use[e][at / w / TXT_CELL * across + at % w / TXT_CELL] += weight;
+        }
+    }
+}
+
+/* Running sums of the use, in search units: a cell that is used once more than the others costs TXT_USE
+   gray levels at first, and less the more all of them are used. */
+static void txt_sum_use(txt_build *b) {
+    uint64_t total = 0;
+    for (int e = 0; e < b->sheet_count; e++) {
+        const int cells = (b->sheets[e].width / TXT_CELL + 2) * (b->sheets[e].height / TXT_CELL + 2);
+        for (int k = 0; k < cells; k++) total += b->use[e][k];
+    }
+    const uint64_t one = 16 * (uint64_t)b->texels; /* everything used once */
+    for (int e = 0; e < b->sheet_count; e++) {
+        const int across = b->sheets[e].width / TXT_CELL + 2;
+        const int down = b->sheets[e].height / TXT_CELL + 2;
+        for (int y = 1; y < down; y++) {
+            uint32_t row = 0;
+            for (int x = 1; x < across; x++) {
+                const uint64_t use = b->use[e][(y - 1) * across + x - 1];
+                row += (uint32_t)(use * TXT_USE * TXT_SCALE * b->texels /
+                                  (TXT_CELL * TXT_CELL * (one + total)));
+                b->used[e][y * across + x] = b->used[e][(y - 1) * across + x] + row;
+            }
+        }
+    }
+}
+
+/* Places of the exemplar that would continue the frame inwards. */
+static void txt_find_insides(txt_canvas *c) {
+    const txt_build *b = c->b;
+    const int side = c->side, turns = b->is_triangle ? 6 : 1;
+    txt_use_query use = {b, 0, b->set->size};
+    c->place_count = 0;
+    c->query.extra = txt_use_extra;
+    c->query.context = &use;
+    c->query.apart = 1 + b->set->size / (b->set->variants > 1 ? 8 : 12);
+    c->query.coarse = turns > 1 ? 3 : 0;
+    for (int turn = 0; turn < turns; turn++) {
+        c->query.count = 0;
+        use.turn = turn;
+        for (int y = 0; y < side; y++) {
+            for (int x = 0; x < side; x++) {
+                const int p = y * side + x;
+                if (!c->inside[p] || c->border[p] < 2 || c->border[p] > 10) continue;
+                if (c->border[p] % 3 != 2 || (x + y) % 3 || (turns > 1 && (x ^ y) & 1)) continue;
+                int i, j;
+                txt_turn(turn, x, y, &i, &j);
+                txt_sample_add(b, &c->query, i, j, c->shows[p]);
+            }
+        }
+        for (int e = 0; e < b->sheet_count; e++)
+            c->place_count = txt_search(b, &c->query, e, turn, &c->scratch, c->places,
+                                        c->place_count, TXT_PLACES);
+    }
+}
+
+/* The layer of a place: a new one, or the one there is. -1: no room. */
+static int txt_add_layer(txt_canvas *c, const txt_place *p) {
+    const txt_layer layer = {p->sheet, p->turn, p->i, p->j, 0};
+    for (int l = 0; l < c->layer_count; l++) {
+        txt_layer *old = &c->layers[l];
+        if (!old->is_frame && old->sheet == layer.sheet && old->turn == layer.turn &&
+            old->i == layer.i && old->j == layer.j)
+            return l;
+    }
+    if (c->layer_count == c->layer_capacity) return -1;
+    c->layers[c->layer_count] = layer;
+    return c->layer_count++;
+}
+
+/* Where the cuts are worst, look for a piece that fits what surrounds the place, and let it expand. */
+static void txt_mend(txt_canvas *c) {
+    const txt_build *b = c->b;
+    const int side = c->side, r = TXT_WINDOW;
+    int done_x[TXT_MENDS] = {0}, done_y[TXT_MENDS] = {0};
+    c->query.extra = NULL;
+    c->query.apart = 3;
+    c->query.coarse = 2;
+    const int mends = b->is_triangle ? TXT_MENDS * 2 / 3 : TXT_MENDS; /* half the area */
+    for (int n = 0; n < mends; n++) {
+        /* the window of the highest cost, on a grid */
+        int64_t worst = 0;
+        int wx = -1, wy = -1;
+        for (int y = 2; y + 2 < side; y += 4) {
+            for (int x = 2; x + 2 < side; x += 4) {
+                if (!c->inside[y * side + x]) continue;
+                int again = 0;
+                for (int k = 0; k < n; k++)
+                    again |= abs(done_x[k] - x) < 6 && abs(done_y[k] - y) < 6;
+                if (again) continue;
+                int64_t sum = 0;
+                for (int dy = -5; dy <= 5; dy++) {
+                    for (int dx = -5; dx <= 5; dx++) {
+                        const int px = x + dx, py = y + dy;
+                        if (px < 0 || py < 0 || px + 1 >= side || py + 1 >= side) continue;
+                        const int p = py * side + px;
+                        if (!c->inside[p]) continue;
+                        for (int k = 0; k < c->half; k++) {
+                            const int qx = px + c->dx[k], qy = py + c->dy[k];
+                            if (qx < 0) continue;
+                            const int q = qy * side + qx;
+                            if (c->inside[q] && c->label[p] != c->label[q])
+                                sum += txt_cut_cost(c, p, q, px, py, c->dx[k], c->dy[k]);
+                        }
+                    }
+                }
+                if (sum > worst) {
+                    worst = sum;
+                    wx = x;
+                    wy = y;
+                }
+            }
+        }
+        if (wx < 0) return;
+        done_x[n] = wx;
+        done_y[n] = wy;
+        const int x0 = txm_clampi(wx - r, 0, side), x1 = txm_clampi(wx + r + 1, 0, side);
+        const int y0 = txm_clampi(wy - r, 0, side), y1 = txm_clampi(wy + r + 1, 0, side);
+        txt_place found[2];
+        int count = 0;
+        int turn = c->layers[c->label[wy * side + wx]].turn;
+        c->query.count = 0;
+        for (int y = y0; y < y1; y += 2) {
+            for (int x = x0 + (y / 2 & 1); x < x1; x += 2) {
+                const int p = y * side + x;
+                if (!c->inside[p] || (abs(x - wx) < 6 && abs(y - wy) < 6 && !c->locked[p]))
+                    continue;
+                int i, j;
+                txt_turn(turn, x, y, &i, &j);
+                txt_sample_add(b, &c->query, i, j, c->shows[p]);
+            }
+        }
+        for (int e = 0; e < b->sheet_count; e++)
+            count = txt_search(b, &c->query, e, turn, &c->scratch, found, count, 2);
+        for (int k = 0; k < count; k++) {
+            const int before = c->layer_count, l = txt_add_layer(c, &found[k]);
+            if (l < 0) return;
+            if (txt_expand(c, l, x0, y0, x1, y1) == 0) c->layer_count = before;
+        }
+    }
+}
+
+/* Show again what the labels say. */
+static void txt_show(txt_canvas *c) {
+    for (int y = 0; y < c->side; y++) {
+        for (int x = 0; x < c->side; x++) {
+            const int p = y * c->side + x;
+            if (c->inside[p]) c->shows[p] = txt_shown(c->b, &c->layers[c->label[p]], x, y);
+        }
+    }
+}
+
+/* side of the blocks in which the inside is filled: the tile's, or what the exemplars allow for */
+static int txt_block_side(const txt_build *b) {
+    int most = 0;
+    for (int e = 0; e < b->sheet_count; e++) {
+        const txt_sheet *s = &b->sheets[e];
+        const int least = s->width < s->height ? s->width : s->height;
+        if (least > most) most = least;
+    }
+    if (b->set->side + 8 <= most) return b->set->side;
+    most = most * 5 / 8 - 16;
+    return most > 8 ? most : 8;
+}
+
+/* The exemplar is too small to fill the inside at once: block by block, each continuing the frame and
+   the blocks before it. */
+static void txt_fill_blocks(txt_canvas *c, int forced) {
+    const txt_build *b = c->b;
+    const int side = c->side, block = txt_block_side(b), reach = 8;
+    const int count = (side + block - 1) / block, size = (side + count - 1) / count;
+    txt_use_query use = {b, 0, size};
+    c->query.extra = txt_use_extra;
+    c->query.context = &use;
+    c->query.apart = 1 + size / 6;
+    for (int n = 0; n < count * count; n++) {
+        const int x0 = txm_clampi(n % count * size - reach, 0, side);
+        const int x1 = txm_clampi(n % count * size + size + reach, 0, side);
+        const int y0 = txm_clampi(n / count * size - reach, 0, side);
+        const int y1 = txm_clampi(n / count * size + size + reach, 0, side);
+        txt_place place[4];
+        int found = 0;
+        c->query.count = 0;
+        for (int y = y0; y < y1; y += 2) {
+            for (int x = x0 + (y / 2 & 1); x < x1; x += 2) {
+                const int p = y * side + x;
+                if (!c->inside[p] || (c->layers[c->label[p]].is_frame && c->border[p] > 10))
+                    continue;
+                txt_sample_add(b, &c->query, x, y, c->shows[p]);
+            }
+        }
+        if (c->query.count == 0) { /* nothing to continue: anywhere not used so far */
+            const int32_t any = b->sheets[0].first;
+            for (int k = 0; k < 4; k++)
+                txt_sample_add(b, &c->query, k & 1 ? x0 : x1 - 1, k & 2 ? y0 : y1 - 1, any);
+        }
+        for (int e = 0; e < b->sheet_count; e++)
+            found = txt_search(b, &c->query, e, 0, &c->scratch, place, found, 4);
+        /* not always the best: that is the same for all tiles with these edges */
+        txm_rng rng = txm_rng_make(b->desc->seed, (uint64_t)c->tile * 4096 + (uint64_t)n);
+        const int l =
+            found ? txt_add_layer(c, &place[txm_rng_below(&rng, (uint32_t)found)]) : -1;
+        if (l < 0) continue;
+        txt_force(c, l, x0, y0, x1, y1, forced);
+        txt_expand(c, l, x0, y0, x1, y1);
+    }
+}
+
+/* Where no piece reaches, which takes an exemplar much smaller than the tile, show the texel of the
+   sheet that is nearest to what the label asks for. */
+static void txt_fill_gaps(txt_canvas *c) {
+    const txt_build *b = c->b;
+    for (int p = 0; p < c->side * c->side; p++) {
+        if (!c->inside[p] || c->shows[p] >= 0) continue;
+        const txt_layer *l = &c->layers[c->label[p]];
+        const txt_sheet *s = &b->sheets[l->sheet];
+        int i, j;
+        txt_turn(l->turn, p % c->side, p / c->side, &i, &j);
+        j = txm_clampi(j + l->j, 0, s->height - 1);
+        i = txm_clampi(i + l->i + (b->is_triangle ? txt_half(j) : 0), 0, s->width - 1);
+        c->shows[p] = s->first + j * s->width + i;
+    }
+}
+
+/* Cut one inside after the other into the frame, keep the best, and mend it. */
+static void txt_cut_tile(txt_canvas *c) {
+    const txt_build *b = c->b;
+    const int side = c->side, size = b->set->size;
+    const size_t bytes = (size_t)side * (size_t)side * sizeof *c->label;
+    const int forced = b->is_triangle ? size / 6 : size / 5;
+    int64_t least = 0;
+    c->best_place = -1;
+    if (txt_block_side(b) < side || c->place_count == 0) {
+        txt_fill_blocks(c, forced);
+        txt_settle(c);
+        txt_mend(c);
+        return;
+    }
+    memcpy(c->start, c->label, bytes);
+    for (int k = 0; k < c->place_count && k < c->tries; k++) {
+        c->layer_count = c->frame_count;
+        memcpy(c->label, c->start, bytes);
+        txt_show(c);
+        txt_add_layer(c, &c->places[k]);
+        txt_force(c, c->frame_count, 0, 0, side, side, forced);
+        txt_expand(c, c->frame_count, 0, 0, side, side);
+        txt_settle(c);
+        const int64_t energy = txt_energy(c, 0, 0, side, side) +
+                               (int64_t)c->places[k].cost * TXT_PLACE_WEIGHT * side;
+        if (c->best_place >= 0 && energy >= least) continue;
+        least = energy;
+        c->best_place = k;
+        memcpy(c->best, c->label, bytes);
+    }
+    c->layer_count = c->frame_count;
+    txt_add_layer(c, &c->places[c->best_place]);
+    memcpy(c->label, c->best, bytes);
+    txt_show(c);
+    txt_mend(c);
+}
+
+#endif /* TEXTILES_CUT_H */
