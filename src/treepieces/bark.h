@@ -1,0 +1,279 @@
+#ifndef TREEPIECES_BARK_H
+#define TREEPIECES_BARK_H
+
+#include "../treepieces.h"
+
+/* ---- bark: sheets out of framed tiles ------------------------------------------------------ */
+
+TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc) {
+    int layers = TREEPIECES_OWN;
+    for (int i = 0; desc && desc->classes && i < desc->tile_count; i++)
+        if (desc->classes[i] >= layers) layers = desc->classes[i] + 1;
+    return layers;
+}
+
+static txm_status tpc_check_bark(const treepieces_bark_desc *d, const txm_image *out,
+                                 txm_env *env) {
+    if (!d || !d->tiles) return txm_fail(env, TXM_BAD_ARGUMENT, "desc or tiles is NULL");
+    if (d->tile_count < 1 || d->tile_count > 4096)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "tile_count must be 1 to 4096");
+    int plain = 0;
+    for (int i = 0; i < d->tile_count; i++) {
+        const txm_status status = txm_image_check(&d->tiles[i], "a tile", 0, env);
+        const int c = d->classes ? d->classes[i] : TREEPIECES_BARK;
+        if (status != TXM_OK) return status;
+        const txm_image t = txm_image_resolve(d->tiles[i]), first = txm_image_resolve(d->tiles[0]);
+        if (t.width != t.height || t.width != first.width || t.channels != first.channels ||
+            t.sample != first.sample)
+            return txm_fail(env, TXM_BAD_ARGUMENT,
+                            "tiles must be square, of one size, sample type and channel count");
+        if (t.width < 4 || t.width > 4096 || t.width % 2)
+            return txm_fail(env, TXM_BAD_ARGUMENT,
+                            "tiles must be 4 to 4096 pixels wide, an even number");
+        if (c != TREEPIECES_BARK && (c < TREEPIECES_OWN || c > 63))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "classes must be 0 or 5 to 63");
+        plain += c == TREEPIECES_BARK;
+    }
+    if (!plain) return txm_fail(env, TXM_BAD_ARGUMENT, "no tile is of class 0");
+    const txm_status status = txm_image_check(out, "out", 0, env);
+    if (status != TXM_OK) return status;
+    const txm_image o = txm_image_resolve(*out), t = txm_image_resolve(d->tiles[0]);
+    if (o.width != TREEPIECES_SHEET * t.width || o.channels != t.channels || o.sample != t.sample ||
+        o.height != TREEPIECES_SHEET * t.width * treepieces_bark_layers(d))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "out must be 8 tiles wide, 8 a layer high, of the tiles' channels and "
+                        "samples");
+    return TXM_OK;
+}
+
+/* A number of a tile of that class, at random; -1: there is none. */
+static int tpc_pick_tile(const treepieces_bark_desc *d, int tile_class, txm_rng *rng, int unlike,
+                         int unlike_too) {
+    int best = -1;
+    uint32_t most = 0;
+    for (int i = 0; i < d->tile_count; i++) {
+        if ((d->classes ? d->classes[i] : TREEPIECES_BARK) != tile_class) continue;
+        /* not like its neighbours as long as there is another */
+        const uint32_t preferred = i != unlike && i != unlike_too ? 1u << 31 : 1;
+        const uint32_t ticket = (txm_rng_next(rng) >> 1) | preferred;
+        if (ticket > most) {
+            most = ticket;
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* 1 at x = 0 falling smoothly to 0 at x = 1 and beyond */
+static float tpc_fade(float x) {
+    const float t = txm_clampf(1 - x, 0, 1);
+    return t * t * (3 - 2 * t);
+}
+
+/* A cell of the lowest row: (x, y) of its tile blended with what its class wants at the south side.
+   lower: four tiles of half the size for HALVING. */
+static float tpc_blend_texel(const txm_image *tile, const txm_image *const lower[4], int layer,
+                             int x, int y, int c) {
+    const int last = tile->width - 1, size = tile->width;
+    const float plain = txm_image_get(tile, x, y, c);
+    const float rise = (float)(last - y) / (float)size; /* from the south side, in tiles */
+    float other = plain, weight = 0;
+    if (layer == TREEPIECES_FOLD) { /* as much of itself mirrored: then both sides are the same */
+        weight = 0.5f * tpc_fade(4 * rise);
+        other = txm_image_get(tile, last - x, y, c);
+    } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side lies at the south */
+        weight = tpc_fade(2 * rise);
+        other = txm_image_get(tile, last - y, x, c);
+    } else if (layer == TREEPIECES_TURN_RIGHT) { /* its east side */
+        weight = tpc_fade(2 * rise);
+        other = txm_image_get(tile, y, last - x, c);
+    } else if (layer == TREEPIECES_HALVING) {
+        const txm_image *half = lower[(2 * x >= size) + 2 * (2 * y >= size)];
+        const int u = 2 * x % size, v = 2 * y % size;
+        weight = tpc_fade(rise);
+        other = 0.25f * ((txm_image_get(half, u, v, c) + txm_image_get(half, u + 1, v, c)) +
+                         (txm_image_get(half, u, v + 1, c) + txm_image_get(half, u + 1, v + 1, c)));
+    }
+    return txm_lerpf(plain, other, weight);
+}
+
+static void tpc_draw_cell(const txm_image *out, int column, int top, const txm_image *tile,
+                          const txm_image *const lower[4], int layer, int is_lowest) {
+    const size_t texel = (size_t)tile->channels * txm_sample_bytes(tile->sample);
+    for (int y = 0; y < tile->width; y++) {
+        char *row = (char *)txm_image_row(out, top + y) + (size_t)(column * tile->width) * texel;
+        if (!is_lowest || layer == TREEPIECES_BARK) {
+            memcpy(row, txm_image_row_const(tile, y), (size_t)tile->width * texel);
+            continue;
+        }
+        for (int x = 0; x < tile->width; x++)
+            for (int c = 0; c < tile->channels; c++)
+                txm_image_set(out, column * tile->width + x, top + y, c,
+                              tpc_blend_texel(tile, lower, layer, x, y, c));
+    }
+}
+
+/* Tiles of an own class: each on 2 x 2 cells, continued by its border. */
+static void tpc_draw_own(const treepieces_bark_desc *d, const txm_image *out, int layer,
+                         txm_rng *rng) {
+    const int size = txm_image_resolve(d->tiles[0]).width, first = layer * TREEPIECES_SHEET * size;
+    for (int b = 0; b < 16; b++) {
+        const int number = tpc_pick_tile(d, layer, rng, -1, -1);
+        const txm_image tile = txm_image_resolve(d->tiles[number < 0 ? 0 : number]);
+        for (int y = 0; y < 2 * size; y++)
+            for (int x = 0; x < 2 * size; x++)
+                for (int c = 0; c < tile.channels; c++) {
+                    const int from_x = txm_clampi(x - size / 2, 0, size - 1);
+                    const int from_y = txm_clampi(y - size / 2, 0, size - 1);
+                    txm_image_set(out, b % 4 * 2 * size + x, first + b / 4 * 2 * size + y, c,
+                                  txm_image_get(&tile, from_x, from_y, c));
+                }
+    }
+}
+
+static void tpc_draw_layer(const treepieces_bark_desc *d, const txm_image *out, int layer) {
+    enum { SIDE = TREEPIECES_SHEET };
+    int chosen[SIDE][SIDE];
+    txm_rng rng = txm_rng_make(d->seed, (uint64_t)layer);
+    if (layer >= TREEPIECES_OWN) {
+        tpc_draw_own(d, out, layer, &rng);
+        return;
+    }
+    for (int y = 0; y < SIDE; y++) {
+        for (int x = 0; x < SIDE; x++) {
+            const int left = x ? chosen[y][x - 1] : -1, above = y ? chosen[y - 1][x] : -1;
+            const txm_image *lower[4];
+            txm_image halves[4];
+            chosen[y][x] = tpc_pick_tile(d, TREEPIECES_BARK, &rng, left, above);
+            for (int k = 0; k < 4; k++) {
+                const int number = tpc_pick_tile(d, TREEPIECES_BARK, &rng, chosen[y][x], -1);
+                halves[k] = txm_image_resolve(d->tiles[number]);
+                lower[k] = &halves[k];
+            }
+            const txm_image tile = txm_image_resolve(d->tiles[chosen[y][x]]);
+            tpc_draw_cell(out, x, (layer * SIDE + y) * tile.width, &tile, lower, layer,
+                          y == SIDE - 1);
+        }
+    }
+}
+
+TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
+                                          txm_image out) {
+    const txm_status status = tpc_check_bark(desc, &out, env);
+    if (status != TXM_OK) return status;
+    const txm_image o = txm_image_resolve(out);
+    const int layers = treepieces_bark_layers(desc);
+    for (int layer = 0; layer < layers; layer++) tpc_draw_layer(desc, &o, layer);
+    return TXM_OK;
+}
+
+TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,
+                                      int pixels, int corner, float uv[2]) {
+    const uint32_t band = bands >> (8 * quad->band) & 255u;
+    const int is_own = quad->tile_class >= TREEPIECES_OWN;
+    const int across = is_own ? 1 : 1 << (band & 7), along = is_own ? 1 : 1 << (band >> 3 & 3);
+    const int east = corner >= 2, south = corner == 1 || corner == 2;
+    const float shift = is_own ? 0.5f : 0, half = 0.5f / (float)pixels;
+    uv[0] = ((float)((cell & 7) + (east ? across : 0)) + shift) / (float)TREEPIECES_SHEET;
+    uv[1] = ((float)((cell >> 3) + (south ? along : 0)) + shift) / (float)TREEPIECES_SHEET;
+    uv[1] += south ? -half : half; /* layers lie one under the other */
+    if (quad->tile_class == TREEPIECES_BARK && (band & 32)) return TREEPIECES_HALVING;
+    return quad->tile_class;
+}
+
+/* ---- bark: drawn ---------------------------------------------------------------------------- */
+
+/* Smooth noise of 0..1 on the unit torus with columns x rows cells. */
+static float tpc_noise(float x, float y, int columns, int rows, uint64_t seed) {
+    const float u = x * (float)columns, v = y * (float)rows;
+    const int i = (int)u, j = (int)v;
+    const float s = tpc_fade(1 - (u - (float)i)), t = tpc_fade(1 - (v - (float)j));
+    float corner[4];
+    for (int k = 0; k < 4; k++) {
+        const uint64_t a = (uint64_t)((i + (k & 1)) % columns);
+        const uint64_t b = (uint64_t)((j + (k >> 1)) % rows);
+        corner[k] = (float)(txm_hash(seed ^ (a << 40) ^ (b << 20)) >> 40) / 16777216.0f;
+    }
+    return txm_lerpf(txm_lerpf(corner[0], corner[1], s), txm_lerpf(corner[2], corner[3], s), t);
+}
+
+/* The noise of tile `number`: all tiles have that of number 0 at their border. The sum of two is
+   brought back to the contrast of one. */
+static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t seed, int number) {
+    const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
+    const float inside = 1 - tpc_fade((border - 0.03f) * 5), outside = 1 - inside;
+    if (!(inside > 0)) return tpc_noise(x, y, columns, rows, seed);
+    const float frame = outside > 0 ? tpc_noise(x, y, columns, rows, seed) - 0.5f : 0;
+    const float own = tpc_noise(x, y, columns, rows, seed + 1 + (uint64_t)number) - 0.5f;
+    return 0.5f + (outside * frame + inside * own) / sqrtf(inside * inside + outside * outside);
+}
+
+/* How light bark is at a place, about 1: plates between fissures along the stem. The fissures meet
+   the frame at the same places in all tiles and wander in between; so no frame shows. */
+static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
+    enum { PLATES = 3, CRACKS = 2 }; /* across and along a tile */
+    const float slow = tpc_framed_noise(x, y, 4, 3, seed + 1000, number) - 0.5f;
+    const float quick = tpc_framed_noise(x, y, 9, 7, seed + 2000, number) - 0.5f;
+    const float grain = tpc_framed_noise(x, y, 32, 11, seed + 3000, number) - 0.5f;
+    const float across = (float)PLATES * (1 + x) + 0.9f * slow + 0.25f * quick + 0.25f * grain;
+    const int plate = (int)across;
+    const float f = across - (float)plate, edge = txm_minf(f, 1 - f);
+    const float gap = 0.1f + 0.3f * tpc_framed_noise(x, y, 6, 3, seed + 4000, number);
+    /* cracks across a plate, at a height of its own */
+    const uint64_t own = txm_hash(seed + 9000 + (uint64_t)(plate % PLATES));
+    const float bend = tpc_framed_noise(x, y, 3, 4, seed + 5000, number) - 0.5f;
+    const float along = (float)CRACKS * (1 + y) + (float)(own >> 60) / 16 + 0.9f * bend;
+    const float g = along - (float)(int)along;
+    const float open = 2.4f * (tpc_framed_noise(x, y, 5, 4, seed + 6000, number) - 0.42f);
+    const float crack = tpc_fade(txm_minf(g, 1 - g) / 0.09f) * txm_clampf(open, 0, 1);
+    const float depth = txm_maxf(tpc_fade(edge / gap), 0.75f * crack);
+    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick; /* lit aslant */
+    return 0.46f + top * (1 - depth) + (0.4f - 0.2f * depth) * grain;
+}
+
+/* Smooth pale bark with dark lenticels across it, as birches have; none lie on the frame, where
+   they would be seen again and again. */
+static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
+    const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
+    const float inside = 1 - tpc_fade((border - 0.03f) * 5);
+    const uint64_t own = seed + 5000 + (uint64_t)number;
+    const float mark = tpc_noise(x, y, 3, 17, own), wide = tpc_noise(x, y, 2, 5, own + 1000);
+    const float shade = tpc_framed_noise(x, y, 3, 6, seed + 6000, number) - 0.5f;
+    const float grain = tpc_framed_noise(x, y, 20, 40, seed + 7000, number) - 0.5f;
+    const float dark = 0.55f * tpc_fade((0.9f - mark) * 9) + 0.4f * tpc_fade((0.97f - wide) * 9);
+    return 1 - inside * dark + 0.1f * grain + 0.1f * shade;
+}
+
+TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species, uint64_t seed,
+                                               txm_env *env, const txm_image *tiles,
+                                               int tile_count) {
+    if (!species || !tiles || tile_count < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "species or tiles is NULL, or tile_count below 1");
+    for (int i = 0; i < tile_count; i++) {
+        const txm_status status = txm_image_check(&tiles[i], "a tile", 0, env);
+        if (status != TXM_OK) return status;
+        if (tiles[i].width != tiles[i].height || txm_image_resolve(tiles[i]).channels < 3)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "tiles must be square, of 3 or 4 channels");
+    }
+    const float *color = species->bark_color;
+    const int is_pale = color[0] + color[1] + color[2] > 2;
+    for (int i = 0; i < tile_count; i++) {
+        const txm_image t = txm_image_resolve(tiles[i]);
+        for (int y = 0; y < t.height; y++) {
+            for (int x = 0; x < t.width; x++) {
+                const float u = ((float)x + 0.5f) / (float)t.width;
+                const float v = ((float)y + 0.5f) / (float)t.height;
+                const float relief =
+                    is_pale ? tpc_birch_relief(u, v, seed, i) : tpc_bark_relief(u, v, seed, i);
+                const float moss = tpc_framed_noise(u, v, 4, 4, seed + 8000, i) - 0.5f;
+                const float tint[4] = {1 - 0.08f * moss, 1 + 0.05f * moss, 1 - 0.1f * moss, 1};
+                for (int c = 0; c < t.channels; c++)
+                    txm_image_set(&t, x, y, c,
+                                  c == 3 ? 1 : txm_clampf(color[c] * relief * tint[c], 0, 1));
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+#endif /* TREEPIECES_BARK_H */

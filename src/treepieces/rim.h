@@ -1,0 +1,152 @@
+#ifndef TREEPIECES_RIM_H
+#define TREEPIECES_RIM_H
+
+#include "../treepieces.h"
+
+/* ---- numbers ----------------------------------------------------------------------------- */
+
+/* All that decides is sums, products, quotients and square roots, so that it is the same everywhere;
+   libm's sine and exponential are not. */
+
+/* sine and cosine of any moderate angle, to 1e-10: reduced to -pi/4..pi/4, then Taylor */
+static void tpc_sincos(double angle, double *sine, double *cosine) {
+    const double turns = angle * (2 / TXM_PI);
+    const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
+    const double x = angle - quarter * (TXM_PI / 2), xx = x * x;
+    const double s = x * (1 - xx / 6 * (1 - xx / 20 * (1 - xx / 42 * (1 - xx / 72 * (1 - xx / 110)))));
+    const double c = 1 - xx / 2 * (1 - xx / 12 * (1 - xx / 30 * (1 - xx / 56 * (1 - xx / 90 *
+                     (1 - xx / 132)))));
+    const int q = quarter & 3;
+    *sine = q == 0 ? s : q == 1 ? c : q == 2 ? -s : -c;
+    *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
+}
+
+/* 2^x, x from -1000 to 1000, to 1e-11: the whole part into the exponent, the rest by Taylor */
+static double tpc_exp2(double x) {
+    const int whole = (int)(x + 1024.5) - 1024; /* rounded to nearest */
+    const double y = (x - whole) * 0.69314718055994530942;
+    const uint64_t bits = (uint64_t)(whole + 1023) << 52;
+    double sum = 1, power;
+    for (int k = 11; k > 0; k--) sum = 1 + sum * y / k;
+    memcpy(&power, &bits, sizeof power);
+    return sum * power;
+}
+
+/* q v q* for a unit quaternion q = x y z w; out may be v */
+static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
+    const float tx = 2 * (q[1] * v[2] - q[2] * v[1]), ty = 2 * (q[2] * v[0] - q[0] * v[2]);
+    const float tz = 2 * (q[0] * v[1] - q[1] * v[0]);
+    const float x = v[0] + q[3] * tx + (q[1] * tz - q[2] * ty);
+    const float y = v[1] + q[3] * ty + (q[2] * tx - q[0] * tz);
+    const float z = v[2] + q[3] * tz + (q[0] * ty - q[1] * tx);
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+}
+
+/* out = a b: b first, then a; out may be one of them. All terms are added, some with the other sign:
+   gcc 12 makes one instruction that rounds once of neighbouring a - b c and a + b c, contraction off or
+   not. */
+static void tpc_multiply(const float a[4], const float b[4], float out[4]) {
+    const float back[3] = {-a[0], -a[1], -a[2]};
+    const float x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] + back[2] * b[1];
+    const float y = a[3] * b[1] + back[0] * b[2] + a[1] * b[3] + a[2] * b[0];
+    const float z = a[3] * b[2] + a[0] * b[1] + back[1] * b[0] + a[2] * b[3];
+    const float w = a[3] * b[3] + back[0] * b[0] + back[1] * b[1] + back[2] * b[2];
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+    out[3] = w;
+}
+
+static float tpc_dot(const float a[3], const float b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void tpc_cross(const float a[3], const float b[3], float out[3]) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static void tpc_unit(float v[3]) {
+    const float length = sqrtf(tpc_dot(v, v));
+    for (int k = 0; k < 3; k++) v[k] /= length;
+}
+
+/* ---- the canonical rim ------------------------------------------------------------------- */
+
+/* cos and sin of 60 k degrees */
+static const float tpc_cos6[TREEPIECES_RIM] = {1.0f, 0.5f, -0.5f, -1.0f, -0.5f, 0.5f};
+static const float tpc_sin6[TREEPIECES_RIM] = {0.0f,  0.86602540378f,  0.86602540378f,
+                                               0.0f, -0.86602540378f, -0.86602540378f};
+
+static const float tpc_cone_out = 0.99503719021f; /* 10 / sqrt(101): of the normal at a rim */
+static const float tpc_cone_up = 0.09950371902f;  /* 1 / sqrt(101)                          */
+
+static void tpc_rim_vertex(int place, float position[3], float normal[3]) {
+    position[0] = tpc_cos6[place];
+    position[1] = 0;
+    position[2] = -tpc_sin6[place];
+    normal[0] = tpc_cone_out * tpc_cos6[place];
+    normal[1] = tpc_cone_up;
+    normal[2] = -tpc_cone_out * tpc_sin6[place];
+}
+
+/* v turned about y by 60 k degrees, which takes place j of a rim to place j + k */
+static void tpc_turn(int k, const float v[3], float out[3]) {
+    const float c = tpc_cos6[k], s = tpc_sin6[k], x = v[0], z = v[2];
+    out[0] = c * x + s * z;
+    out[1] = v[1];
+    out[2] = c * z - s * x;
+}
+
+static void tpc_building_point(const treepieces_similarity *b, const float p[3], float out[3]) {
+    tpc_rotate(b->rotation, p, out);
+    for (int i = 0; i < 3; i++) out[i] = b->translation[i] + b->scale * out[i];
+}
+
+/* Place j of a leaf rim in the piece's model space. */
+static void tpc_leaf_vertex(const treepieces_similarity *b, int place, float position[3],
+                            float normal[3]) {
+    tpc_rim_vertex(place, position, normal);
+    tpc_building_point(b, position, position);
+    tpc_rotate(b->rotation, normal, normal);
+}
+
+/* The vertex numbers of leaf rim k, of the root rim for k = -1. */
+static const int *tpc_rim_of(const treepieces_piece *p, int k) {
+    return k < 0 ? p->root_rim : p->leaf_rims[k];
+}
+
+/* ---- the kit ----------------------------------------------------------------------------- */
+
+/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
+typedef struct tpc_seen {
+    float position[3], normal[3];
+} tpc_seen;
+
+/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
+typedef struct tpc_band {
+    float rise, spread;
+} tpc_band;
+
+/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
+   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
+typedef struct tpc_cells {
+    uint32_t bands[TREEPIECES_BANDS], bottom, own;
+    int first, last;
+} tpc_cells;
+
+struct treepieces_kit {
+    txm_arena arena; /* holds the kit itself and all it points to */
+    int count;
+    treepieces_piece pieces[TREEPIECES_MAX_TYPES];
+    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
+    tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
+    int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
+    float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
+    tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
+};
+
+#endif /* TREEPIECES_RIM_H */

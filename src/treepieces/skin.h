@@ -1,0 +1,263 @@
+#ifndef TREEPIECES_SKIN_H
+#define TREEPIECES_SKIN_H
+
+#include "rim.h"
+
+/* ---- skinning ---------------------------------------------------------------------------- */
+
+static void tpc_move_point(const float *bone, const float p[3], float out[3]) {
+    for (int k = 0; k < 3; k++)
+        out[k] = ((bone[4 * k] * p[0] + bone[4 * k + 1] * p[1]) + bone[4 * k + 2] * p[2]) +
+                 bone[4 * k + 3];
+}
+
+/* squares of the lengths of a bone's columns */
+static void tpc_columns(const float *bone, float squares[3]) {
+    for (int k = 0; k < 3; k++)
+        squares[k] = (bone[k] * bone[k] + bone[4 + k] * bone[4 + k]) + bone[8 + k] * bone[8 + k];
+}
+
+/* n by the inverse transpose: columns at right angles are divided by their squares */
+static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
+    float squares[3];
+    tpc_columns(bone, squares);
+    const float m[3] = {n[0] / squares[0], n[1] / squares[1], n[2] / squares[2]};
+    for (int k = 0; k < 3; k++)
+        out[k] = (bone[4 * k] * m[0] + bone[4 * k + 1] * m[1]) + bone[4 * k + 2] * m[2];
+}
+
+/* The bones of a record's children, less its own; 0 where there is none. */
+static void tpc_children(const uint32_t *record, uint32_t children[TREEPIECES_MAX_LEAVES]) {
+    children[0] = record[1] & 0xffffu;
+    children[1] = record[1] >> 16;
+    children[2] = record[2] & 0xffffu;
+}
+
+TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
+                                    uint32_t instance, float *positions, float *normals) {
+    const treepieces_piece *piece = &forest->kit->pieces[type];
+    const treepieces_batch *batch = &forest->batches[type];
+    const uint32_t *word = batch->words + (size_t)instance * batch->stride;
+    uint32_t difference[TREEPIECES_MAX_LEAVES];
+    const float *own = bones + TREEPIECES_BONE * (size_t)word[0];
+    const float *child[TREEPIECES_MAX_LEAVES];
+    float stretch[TREEPIECES_MAX_LEAVES], own_squares[3];
+    int turn[TREEPIECES_MAX_LEAVES];
+    tpc_columns(own, own_squares);
+    tpc_children(word, difference);
+    for (int k = 0; k < piece->leaf_count; k++) {
+        float squares[3];
+        child[k] = own + TREEPIECES_BONE * (size_t)difference[k];
+        turn[k] = (int)(word[2] >> (16 + 4 * k) & 15u);
+        tpc_columns(child[k], squares);
+        stretch[k] = sqrtf(squares[0] * own_squares[1] / (own_squares[0] * squares[1]));
+    }
+    for (int i = 0; i < piece->vertex_count; i++) {
+        const treepieces_vertex *v = &piece->vertices[i];
+        float *position = positions + 3 * i, p[3], n[3], moved[3], sum[3] = {0, 0, 0};
+        if (v->rim >= 0) {
+            const int k = v->rim / TREEPIECES_RIM;
+            tpc_rim_vertex((v->rim + TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, p, n);
+            tpc_move_point(child[k], p, position);
+            if (!normals) continue;
+            tpc_move_normal(child[k], n, sum);
+        } else {
+            const float w = v->weights[0];
+            tpc_move_point(own, v->position, position);
+            tpc_move_normal(own, v->normal, sum);
+            for (int c = 0; c < 3 && w < 1; c++) position[c] *= w;
+            for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
+            for (int k = 0; k < piece->leaf_count; k++) {
+                const float wk = v->weights[1 + k];
+                const tpc_seen *at = &forest->kit->seen[type][k * piece->vertex_count + i];
+                if (!(wk > 0)) continue;
+                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
+                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);
+                p[1] *= stretch[k];
+                n[1] /= stretch[k];
+                tpc_move_point(child[k], p, moved);
+                for (int c = 0; c < 3; c++) position[c] += wk * moved[c];
+                float squares[3];
+                tpc_columns(child[k], squares);
+                tpc_move_normal(child[k], n, moved);
+                for (int c = 0; c < 3; c++) sum[c] += wk * sqrtf(squares[0]) * moved[c];
+            }
+            if (!normals) continue;
+        }
+        tpc_unit(sum);
+        memcpy(normals + 3 * i, sum, sizeof sum);
+    }
+}
+
+/* ---- level of detail --------------------------------------------------------------------- */
+
+/* The level at a place, which is given as a sum of `count` points. */
+static int tpc_level(const treepieces_lod *lod, const float sum[3], float count) {
+    const float half = lod->half_distance > 0 ? lod->half_distance : 10;
+    const float most = txm_clampf(lod->max_level, 1, 64);
+    double squares = 0;
+    for (int k = 0; k < 3; k++) {
+        const double d = (double)(sum[k] / count - lod->eye[k]);
+        squares += d * d;
+    }
+    const float halvings = txm_clampf(txm_float(sqrt(squares) / half), 0, 100);
+    const double level = (double)most * tpc_exp2(-halvings);
+    const int whole = (int)level;
+    return whole < 1 ? 1 : whole + (level > whole);
+}
+
+TREEPIECES_API int treepieces_edge_level(const treepieces_lod *lod, const float a[3],
+                                         const float b[3]) {
+    const float sum[3] = {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+    return tpc_level(lod, sum, 2);
+}
+
+TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float corners[12]) {
+    float sum[3];
+    for (int k = 0; k < 3; k++)
+        sum[k] = (corners[k] + corners[3 + k]) + (corners[6 + k] + corners[9 + k]);
+    return tpc_level(lod, sum, 4);
+}
+
+/* Place i of 0..n along a side: multiples of 2^-16, so that place n - i is exactly 1 - place i. Steps
+   of n-ths that are rounded once, then multiplied, are what tessellation units take. */
+static float tpc_place_along(int i, int n) {
+    if (2 * i > n) return 1 - tpc_place_along(n - i, n);
+    if (2 * i == n) return 0.5f;
+    return (float)(i * ((65536 * 2 + n) / (2 * n))) / 65536.0f;
+}
+
+/* The vertices of a pattern: the sides' first, side k from corner k up to the one before corner
+   k + 1, then the inner grid, column by column. */
+typedef struct tpc_pattern {
+    int edges[4], first[4], inner, outer_count;
+} tpc_pattern;
+
+static int tpc_side_vertex(const tpc_pattern *p, int side, int i) {
+    return i < p->edges[side] ? p->first[side] + i : p->first[(side + 1) % 4];
+}
+
+/* Vertex i of 0..inner - 2 of the inner grid's border along a side, in the side's direction. */
+static int tpc_inner_vertex(const tpc_pattern *p, int side, int i) {
+    const int n = p->inner - 1, far = n - 1 - i;
+    const int u = side == 0 ? 0 : side == 1 ? i : side == 2 ? n - 1 : far;
+    const int v = side == 0 ? i : side == 1 ? n - 1 : side == 2 ? far : 0;
+    return p->outer_count + u * n + v;
+}
+
+static void tpc_add_triangle(uint16_t *indices, int *count, int a, int b, int c) {
+    if (indices) {
+        indices[3 * *count] = (uint16_t)a;
+        indices[3 * *count + 1] = (uint16_t)b;
+        indices[3 * *count + 2] = (uint16_t)c;
+    }
+    ++*count;
+}
+
+/* The strip between a side and the inner grid: always the next step that is the less far along. */
+static void tpc_stitch(const tpc_pattern *p, int side, uint16_t *indices, int *count) {
+    const int outer = p->edges[side], inner = p->inner - 2;
+    int i = 0, j = 0;
+    while (i < outer || j < inner) {
+        /* middles of the next outer and inner step; inner place j lies at (j + 1) / (inner + 2) */
+        const int a = (2 * i + 1) * (inner + 2), b = (2 * j + 3) * outer;
+        if (j == inner || (i < outer && a <= b)) {
+            tpc_add_triangle(indices, count, tpc_side_vertex(p, side, i),
+                             tpc_side_vertex(p, side, i + 1), tpc_inner_vertex(p, side, j));
+            i++;
+        } else {
+            tpc_add_triangle(indices, count, tpc_side_vertex(p, side, i),
+                             tpc_inner_vertex(p, side, j + 1), tpc_inner_vertex(p, side, j));
+            j++;
+        }
+    }
+}
+
+TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coords,
+                                      uint16_t *indices, int *triangles) {
+    static const int corner_u[4] = {0, 0, 1, 1}, corner_v[4] = {0, 1, 1, 0};
+    tpc_pattern p;
+    int count = 0;
+    p.outer_count = 0;
+    p.inner = txm_clampi(inner, 1, 64);
+    for (int k = 0; k < 4; k++) {
+        p.edges[k] = txm_clampi(edges[k], 1, 64);
+        p.first[k] = p.outer_count;
+        p.outer_count += p.edges[k];
+    }
+    if (p.inner == 1 && p.outer_count > 4) p.inner = 2;
+    const int n = p.inner - 1;
+    if (!coords && !indices) { /* the strips, and the grid within */
+        count = n == 0 ? 2 : p.outer_count + 4 * (n - 1) + 2 * (n - 1) * (n - 1);
+        if (triangles) *triangles = count;
+        return p.outer_count + n * n;
+    }
+    for (int k = 0; k < 4 && coords; k++) {
+        for (int i = 0; i < p.edges[k]; i++) {
+            const float t = tpc_place_along(i, p.edges[k]), back = 1 - t;
+            float *at = coords + 2 * (p.first[k] + i);
+            const int u = corner_u[k], v = corner_v[k], next = (k + 1) % 4;
+            at[0] = u == corner_u[next] ? (float)u : u ? back : t;
+            at[1] = v == corner_v[next] ? (float)v : v ? back : t;
+        }
+    }
+    for (int u = 0; u < n; u++) {
+        for (int v = 0; v < n; v++) {
+            if (coords) {
+                float *at = coords + 2 * (p.outer_count + u * n + v);
+                at[0] = tpc_place_along(u + 1, p.inner);
+                at[1] = tpc_place_along(v + 1, p.inner);
+            }
+            if (u + 1 == n || v + 1 == n) continue;
+            const int a = p.outer_count + u * n + v;
+            tpc_add_triangle(indices, &count, a, a + 1, a + n + 1);
+            tpc_add_triangle(indices, &count, a, a + n + 1, a + n);
+        }
+    }
+    if (n == 0) {
+        tpc_add_triangle(indices, &count, 0, 1, 2);
+        tpc_add_triangle(indices, &count, 0, 2, 3);
+    }
+    for (int k = 0; k < 4 && n > 0; k++) tpc_stitch(&p, k, indices, &count);
+    if (triangles) *triangles = count;
+    return p.outer_count + n * n;
+}
+
+/* How much of each corner there is at (u, v). */
+static void tpc_weigh(float u, float v, float w[4]) {
+    w[0] = (1 - u) * (1 - v);
+    w[1] = (1 - u) * v;
+    w[2] = u * v;
+    w[3] = u * (1 - v);
+}
+
+/* A weighted sum of four numbers, the same to the bit whatever the order of the corners as long as
+   two weights at most are not 0: opposite corners are added first, and x + 0 is x. */
+static float tpc_mix(const float w[4], float a, float b, float c, float d) {
+    return (w[0] * a + w[2] * c) + (w[1] * b + w[3] * d);
+}
+
+TREEPIECES_API void treepieces_patch_point(const float positions[12], const float normals[12],
+                                           float shape, float u, float v, float position[3],
+                                           float normal[3]) {
+    const float alpha = shape < 0 ? 0 : shape > 0 ? shape : 0.6f;
+    float w[4], p[3], n[3], depth[4];
+    tpc_weigh(u, v, w);
+    for (int k = 0; k < 3; k++) {
+        p[k] = tpc_mix(w, positions[k], positions[3 + k], positions[6 + k], positions[9 + k]);
+        n[k] = tpc_mix(w, normals[k], normals[3 + k], normals[6 + k], normals[9 + k]);
+    }
+    for (int i = 0; i < 4; i++) { /* above the corner's tangent plane */
+        const float *corner = positions + 3 * i, *up = normals + 3 * i;
+        depth[i] = (up[0] * (p[0] - corner[0]) + up[1] * (p[1] - corner[1])) +
+                   up[2] * (p[2] - corner[2]);
+    }
+    for (int k = 0; k < 3; k++)
+        position[k] = p[k] - alpha * tpc_mix(w, depth[0] * normals[k], depth[1] * normals[3 + k],
+                                             depth[2] * normals[6 + k], depth[3] * normals[9 + k]);
+    if (!normal) return;
+    tpc_unit(n);
+    memcpy(normal, n, sizeof n);
+}
+
+#endif /* TREEPIECES_SKIN_H */

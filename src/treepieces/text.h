@@ -1,0 +1,275 @@
+#ifndef TREEPIECES_TEXT_H
+#define TREEPIECES_TEXT_H
+
+#include "species.h"
+#include "presets.h"
+
+/* ---- species: reading -------------------------------------------------------------------- */
+
+typedef struct tpc_reader {
+    const char *at, *end; /* what is left of the line */
+    int line, order;      /* order -1: none begun     */
+    int keys, crown_line; /* keys so far; line of the last one of the crown */
+    treepieces_species species;
+    txm_env *env;
+} tpc_reader;
+
+typedef struct tpc_word {
+    const char *at, *end;
+} tpc_word;
+
+static int tpc_is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\r';
+}
+
+static int tpc_is_word(const tpc_word *w, const char *text) {
+    const size_t n = strlen(text);
+    return (size_t)(w->end - w->at) == n && !memcmp(w->at, text, n);
+}
+
+/* The next word of the line, 0 if there is none. */
+static int tpc_next_word(tpc_reader *r, tpc_word *w) {
+    while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
+    w->at = r->at;
+    while (r->at < r->end && !tpc_is_blank(*r->at)) r->at++;
+    w->end = r->at;
+    return w->at < w->end;
+}
+
+/* "line 7: WORD: fault"; the word may hold anything, and be NULL. */
+static txm_status tpc_misread(const tpc_reader *r, const tpc_word *w, const char *fault) {
+    char line[220], shown[28];
+    size_t n = 0;
+    for (const char *p = w ? w->at : NULL; p && p < w->end; p++) {
+        if (n + 4 >= sizeof shown) {
+            memcpy(shown + n, "...", 3);
+            n += 3;
+            break;
+        }
+        shown[n++] = *p > ' ' && *p < 127 ? *p : '?';
+    }
+    shown[n] = 0;
+    snprintf(line, sizeof line, "line %d: %s%s%s", r->line, shown, n ? ": " : "", fault);
+    return txm_fail(r->env, TXM_BAD_DATA, line);
+}
+
+/* One value of a field; the key is for messages. */
+static txm_status tpc_read_value(tpc_reader *r, const tpc_word *key, const tpc_field *f, void *base,
+                                 int i) {
+    char range[120];
+    tpc_word w;
+    double x = -1;
+    const char *const *names = tpc_names_of(f);
+    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
+    for (int k = 0; names && names[k]; k++)
+        if (tpc_is_word(&w, names[k])) x = k;
+    if (!names && !tpc_read_number(w.at, w.end, &x)) return tpc_misread(r, &w, "is no number");
+    const float value = x > -1e9 && x < 1e9 ? txm_float(x) : x < 0 ? -1e9f : 1e9f;
+    if (!(value >= f->low && value <= f->high) ||
+        (f->kind != TPC_REAL && value != (float)(int)value)) {
+        tpc_tell_range(f, range, sizeof range);
+        return tpc_misread(r, &w, range);
+    }
+    tpc_set(f, base, i, value == 0 ? 0 : value); /* no -0 */
+    return TXM_OK;
+}
+
+static txm_status tpc_read_name(tpc_reader *r, const tpc_word *key) {
+    char *name = r->species.name;
+    while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
+    while (r->at < r->end && tpc_is_blank(r->end[-1])) r->end--;
+    const size_t size = (size_t)(r->end - r->at);
+    if (!size) return tpc_misread(r, key, "a value is missing");
+    if (size >= TREEPIECES_MAX_NAME)
+        return tpc_misread(r, key, "longer than 31 characters");
+    memset(name, 0, TREEPIECES_MAX_NAME);
+    memcpy(name, r->at, size);
+    if (strlen(name) != size || !tpc_is_name(name))
+        return tpc_misread(r, key, "holds a control character");
+    r->at = r->end;
+    return TXM_OK;
+}
+
+/* "order N" begins an order; there are at least as many then. */
+static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
+    static const tpc_field field = {"order", 0, TPC_WHOLE, 1, 0, TREEPIECES_MAX_ORDERS - 1};
+    const txm_status status = tpc_read_value(r, key, &field, &r->order, 0);
+    if (status != TXM_OK) return status;
+    if (r->species.order_count <= r->order) r->species.order_count = r->order + 1;
+    return TXM_OK;
+}
+
+static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
+                                treepieces_species *species);
+
+/* "like NAME": the orders beyond those of that species keep what a fresh one has. */
+static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
+    tpc_word w;
+    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
+    if (r->keys) return tpc_misread(r, key, "must come before all other keys");
+    for (int i = 0; i < treepieces_preset_count(); i++) {
+        if (!tpc_is_word(&w, tpc_presets[i].name)) continue;
+        return tpc_read_text(tpc_presets[i].text, strlen(tpc_presets[i].text), r->env, &r->species);
+    }
+    return tpc_misread(r, &w, "is none of the built-in species");
+}
+
+static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
+    if (tpc_is_word(key, "like")) return tpc_begin_like(r, key);
+    if (tpc_is_word(key, "order")) return tpc_begin_order(r, key);
+    if (tpc_is_word(key, "name")) return tpc_read_name(r, key);
+    const tpc_field *field = NULL;
+    void *base = &r->species;
+    for (int i = 0; i < TPC_FIELDS; i++)
+        if (tpc_is_word(key, tpc_fields[i].key)) field = &tpc_fields[i];
+    for (int i = 0; i < TPC_ORDER_FIELDS && !field; i++) {
+        if (!tpc_is_word(key, tpc_order_fields[i].key)) continue;
+        if (r->order < 0) return tpc_misread(r, key, "needs a line \"order N\" before it");
+        field = &tpc_order_fields[i];
+        base = &r->species.orders[r->order];
+    }
+    if (!field) return tpc_misread(r, key, "is no key");
+    if (!strncmp(field->key, "crown_", 6)) r->crown_line = r->line;
+    for (int i = 0; i < field->count; i++) {
+        const txm_status status = tpc_read_value(r, key, field, base, i);
+        if (status != TXM_OK) return status;
+    }
+    return TXM_OK;
+}
+
+/* The line from r->at on: a key and its values, a comment, or nothing. */
+static txm_status tpc_read_line(tpc_reader *r) {
+    tpc_word key, rest;
+    const char *comment = (const char *)memchr(r->at, '#', (size_t)(r->end - r->at));
+    if (comment) r->end = comment;
+    if (!tpc_next_word(r, &key)) return TXM_OK;
+    const txm_status status = tpc_read_key(r, &key);
+    if (status != TXM_OK) return status;
+    if (tpc_next_word(r, &rest)) return tpc_misread(r, &key, "has too many values");
+    r->keys++;
+    return TXM_OK;
+}
+
+/* Read on top of what *species is. */
+static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
+                                treepieces_species *species) {
+    const char *at = text, *end = text + size;
+    tpc_reader r;
+    memset(&r, 0, sizeof r);
+    r.order = -1;
+    r.species = *species;
+    r.env = env;
+    while (at < end) {
+        const char *newline = (const char *)memchr(at, '\n', (size_t)(end - at));
+        r.at = at;
+        r.end = newline ? newline : end;
+        r.line++;
+        const txm_status status = tpc_read_line(&r);
+        if (status != TXM_OK) return status;
+        if (!newline) break;
+        at = newline + 1;
+    }
+    if (!(r.species.crown_base < r.species.crown_top)) {
+        r.line = r.crown_line;
+        return tpc_misread(&r, NULL, "crown_top must be above crown_base");
+    }
+    *species = r.species;
+    return TXM_OK;
+}
+
+TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size, txm_env *env,
+                                                   treepieces_species *species) {
+    treepieces_species fresh;
+    if (!species || (!text && size))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "text or species is NULL");
+    memset(&fresh, 0, sizeof fresh);
+    fresh.crown_top = 1; /* until it is read */
+    txm_status status = tpc_read_text(tpc_fresh, strlen(tpc_fresh), env, &fresh);
+    for (int k = 1; k < TREEPIECES_MAX_ORDERS; k++)
+        if (k >= fresh.order_count) fresh.orders[k] = fresh.orders[k - 1];
+    if (status == TXM_OK && size) status = tpc_read_text(text, size, env, &fresh);
+    if (status != TXM_OK) return status;
+    for (int k = fresh.order_count; k < TREEPIECES_MAX_ORDERS; k++)
+        memset(&fresh.orders[k], 0, sizeof fresh.orders[k]);
+    *species = fresh;
+    return TXM_OK;
+}
+
+/* ---- species: printing ------------------------------------------------------------------- */
+
+typedef struct tpc_writer {
+    char *text;
+    size_t capacity, length;
+} tpc_writer;
+
+static void tpc_write(tpc_writer *w, const char *text) {
+    for (; *text; text++, w->length++)
+        if (w->length + 1 < w->capacity) w->text[w->length] = *text;
+}
+
+static void tpc_write_fields(tpc_writer *w, const tpc_field *fields, int count, const void *base) {
+    char number[TPC_NUMBER];
+    for (int i = 0; i < count; i++) {
+        const tpc_field *f = &fields[i];
+        const char *const *names = tpc_names_of(f);
+        tpc_write(w, f->key);
+        for (int k = 0; k < f->count; k++) {
+            const float x = tpc_get(f, base, k);
+            tpc_write(w, " ");
+            if (!names || !(x >= f->low && x <= f->high)) tpc_write_number(x, number);
+            tpc_write(w, names && x >= f->low && x <= f->high ? names[(int)x] : number);
+        }
+        tpc_write(w, "\n");
+    }
+}
+
+TREEPIECES_API size_t treepieces_species_print(const treepieces_species *species, char *text,
+                                               size_t capacity) {
+    tpc_writer w;
+    char name[TREEPIECES_MAX_NAME + 1], order[32];
+    if (!species) return 0;
+    w.text = text;
+    w.capacity = text ? capacity : 0;
+    w.length = 0;
+    memcpy(name, species->name, TREEPIECES_MAX_NAME);
+    name[TREEPIECES_MAX_NAME] = 0;
+    if (name[0]) {
+        tpc_write(&w, "name ");
+        tpc_write(&w, name);
+        tpc_write(&w, "\n");
+    }
+    tpc_write_fields(&w, tpc_fields, TPC_FIELDS, species);
+    for (int k = 0; k < species->order_count && k < TREEPIECES_MAX_ORDERS; k++) {
+        snprintf(order, sizeof order, "\norder %d\n", k);
+        tpc_write(&w, order);
+        tpc_write_fields(&w, tpc_order_fields, TPC_ORDER_FIELDS, &species->orders[k]);
+    }
+    if (w.capacity) w.text[w.length < w.capacity ? w.length : w.capacity - 1] = 0;
+    return w.length;
+}
+
+TREEPIECES_API int treepieces_preset_count(void) {
+    return (int)(sizeof tpc_presets / sizeof tpc_presets[0]);
+}
+
+TREEPIECES_API const char *treepieces_preset_text(int index) {
+    return index >= 0 && index < treepieces_preset_count() ? tpc_presets[index].text : NULL;
+}
+
+TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
+                                            treepieces_species *species) {
+    char line[240];
+    if (!name || !species) return txm_fail(env, TXM_BAD_ARGUMENT, "name or species is NULL");
+    for (int i = 0; i < treepieces_preset_count(); i++) {
+        if (strcmp(name, tpc_presets[i].name)) continue;
+        const char *text = tpc_presets[i].text;
+        return treepieces_species_parse(text, strlen(text), env, species);
+    }
+    int n = snprintf(line, sizeof line, "no species \"%.24s\"; there are", name);
+    for (int i = 0; i < treepieces_preset_count() && n > 0 && (size_t)n < sizeof line; i++)
+        n += snprintf(line + n, sizeof line - (size_t)n, "%s %s", i ? "," : "",
+                      tpc_presets[i].name);
+    return txm_fail(env, TXM_BAD_ARGUMENT, line);
+}
+
+#endif /* TREEPIECES_TEXT_H */
