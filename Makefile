@@ -15,7 +15,7 @@ WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow
 COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -Isrc -I. -Itools $(CPPFLAGS)
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
-SOURCES := $(wildcard src/*.h src/*/*.h)
+SOURCES := $(wildcard *.h src/*.h src/*/*.h)
 HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
              tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
@@ -90,7 +90,7 @@ $(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(SOURCES)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
 # those of more than one file have a folder of their own
-$(BUILD)/examples/%: examples/%/main.c $(BUILD)/stb.o $(HEADERS)
+$(BUILD)/examples/%: examples/%/main.c $(BUILD)/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
