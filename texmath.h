@@ -91,6 +91,8 @@
 #ifndef TEXMATH_H
 #define TEXMATH_H
 
+/* ---- configuration ------------------------------------------------------------------ */
+
 #include <limits.h>
 #include <math.h>
 #include <stddef.h>
