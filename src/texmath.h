@@ -1,0 +1,157 @@
+/* texmath.h - v0.1.0 - the common ground of the texkit headers
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
+
+   WHAT IT DOES
+     Small things that every texkit header needs: status codes, the environment (allocator,
+     progress and cancel, parallel-for), checked size arithmetic, image views, a random number
+     generator, a sort, vectors, matrices, quaternions and colour spaces; and the few kernels that
+     more than one of them uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the
+     minimum cut of a grid, the halving of an image, the Poisson equation on a masked image, and
+     which sides of a mesh share an edge.
+
+   QUICK START                                 (tests build and run this very block)
+     // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
+     #include "texmath.h"
+     #include <stdio.h>
+
+     int main(void) {
+         static float pixels[64 * 64];            // the caller owns all pixels
+         static unsigned char hole[64 * 64];
+         txm_poisson_desc desc = {0};             // zero = the default, for every field
+         txm_env env = {0};                       // malloc, silent, serial; receives the message
+         desc.image.pixels = pixels;
+         desc.image.width = desc.image.height = 64;
+         desc.image.sample = TXM_F32;
+         desc.mask = desc.image;
+         desc.mask.pixels = hole;
+         desc.mask.sample = TXM_U8;
+         for (int y = 0; y < 64; y++) {
+             for (int x = 0; x < 64; x++) {
+                 hole[64 * y + x] = x >= 16 && x < 48 && y >= 16 && y < 48;
+                 txm_image_set(&desc.image, x, y, 0, hole[64 * y + x] ? 0.0f : (float)x / 63.0f);
+             }
+         }
+         if (txm_poisson(&desc, &env) != TXM_OK) {
+             fprintf(stderr, "poisson: %s\n", env.message);
+             return 1;
+         }
+         printf("centre of the ramp: %.4f\n", txm_image_get(&desc.image, 32, 32, 0)); // 0.5079
+         return 0;
+     }
+
+   CONFIGURATION
+     None. Every function is static inline, there is no implementation section: include the file
+     wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
+
+   CONVENTIONS
+     Vectors are columns; matrices are stored column by column, as OpenGL and glTF have them:
+     m[rows * column + row]; the product a b applies b first. Right-handed space; a camera looks
+     along -z; clip space is -1..1 on all axes. Angles are in radians. A quaternion (x, y, z, w) has
+     its scalar last. Colours are linear unless the name says srgb; see each function for ranges.
+     Image rows go from top to bottom, x to the right.
+
+   MEMORY
+     Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
+     txm_arena_zero, txm_flow_make (from an arena) and txm_poisson. txm_poisson holds
+     64 + 4 * channels bytes for each unknown pixel, and gives all of it back before it returns.
+     The sort, the minimum-error cut and the sides of a mesh work in memory of the caller.
+
+   THREADS
+     No global state. Two calls may overlap unless they share what one of them writes: an env, an
+     arena, a generator, an image.
+
+   SAME BYTES
+     Integers, 8- and 16-bit samples, generator, hash and sort: the same bits everywhere. All else
+     is computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
+     makes necessary (vectors in double are not rounded). That gives the same bits wherever
+     arithmetic is IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it)
+     and without -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one
+     result of 10^8 (txm_sincos and txm_exp2 do not): use it to show colours and place cameras, not
+     to decide. Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
+
+   LIMITS
+     An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
+     that return no status expect arguments in the range stated and do not check them.
+
+   REFERENCES
+     [1] M. O'Neill. PCG: a family of simple fast space-efficient statistically good algorithms for
+         random number generation. Harvey Mudd College HMC-CS-2014-0905, 2014.
+     [2] Y. Ohta, T. Kanade, T. Sakai. Color information for region segmentation. Computer Graphics
+         and Image Processing 13, 1980.
+     [3] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
+         SIGGRAPH 2001.
+     [4] P. Perez, M. Gangnet, A. Blake. Poisson image editing. SIGGRAPH 2003.
+     [5] R. Bridson. Fluid simulation for computer graphics, section 4.3 (the preconditioner
+         MIC(0) of I. Gustafsson. A class of first order factorization methods. BIT 18, 1978).
+     [6] IEC 61966-2-1:1999 (sRGB); CIE 15:2004 (XYZ, L*a*b*).
+     [7] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
+     [8] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.
+     [9] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
+         energy minimization in vision. IEEE PAMI 26(9), 2004.                                 */
+#ifndef TEXMATH_H
+#define TEXMATH_H
+
+#include "texmath/config.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#include "texmath/env.h"
+#include "texmath/number.h"
+#include "texmath/image.h"
+#include "texmath/random.h"
+#include "texmath/vector.h"
+#include "texmath/matrix.h"
+#include "texmath/color.h"
+#include "texmath/eigen.h"
+#include "texmath/cut.h"
+#include "texmath/poisson.h"
+#include "texmath/mesh.h"
+#ifdef __cplusplus
+}
+#endif
+#endif /* TEXMATH_H */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/

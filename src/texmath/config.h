@@ -1,0 +1,17 @@
+#ifndef TEXMATH_CONFIG_H
+#define TEXMATH_CONFIG_H
+
+/* ---- configuration ------------------------------------------------------------------ */
+
+#include <limits.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TEXMATH_VERSION "0.1.0"
+
+#define TXM_PI 3.14159265358979323846
+
+#endif /* TEXMATH_CONFIG_H */

@@ -1,0 +1,161 @@
+#ifndef TEXMATH_MESH_H
+#define TEXMATH_MESH_H
+
+#include "env.h"
+#include "random.h"
+#include "vector.h"
+
+/* ---- meshes ----------------------------------------------------------------------------- */
+
+/* A mesh that the caller owns: faces of 3 corners each, or of 4. */
+typedef struct txm_mesh {
+    const float *positions;  /* 3 per vertex, finite; NULL where a function needs none         */
+    const uint32_t *indices; /* the vertices of each face, counter-clockwise seen from outside */
+    size_t vertex_count, face_count;
+    int corners; /* of a face: 3 or 4; 0 = 3 */
+} txm_mesh;
+
+/* no side, as sides are numbered in 32 bits */
+#define TXM_NO_SIDE 0xffffffffu
+
+/* corners of a face, sides of a mesh */
+static inline size_t txm_mesh_corners(const txm_mesh *mesh) {
+    return mesh->corners ? (size_t)mesh->corners : 3;
+}
+static inline size_t txm_mesh_sides(const txm_mesh *mesh) {
+    return mesh->face_count * txm_mesh_corners(mesh);
+}
+
+/* Is this a mesh that can be worked on? Any connectivity will do: borders, edges of many faces,
+   faces that name a vertex twice. A mesh without faces or vertices needs no array for them.
+
+   name       what the caller calls the mesh, for the message: "mesh: indices is NULL"
+   corners    3 or 4 if faces must have so many; 0 = either
+   positions  non-zero: they are needed and must be finite; 0: they are not looked at
+   most       refuse more vertices or faces; 0 = as many as 32 bits can number the sides of
+   return     TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE. The message names the first face or vertex
+              that is wrong, from 0
+   cost       O(faces + vertices)                                                          */
+static inline txm_status txm_mesh_check(const txm_mesh *mesh, const char *name, int corners,
+                                        int positions, size_t most, txm_env *env) {
+    if (!mesh) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "is NULL; pass a txm_mesh");
+    if (mesh->corners != 0 && mesh->corners != 3 && mesh->corners != 4)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "corners must be 3 or 4 (0 means 3)");
+    const size_t n = txm_mesh_corners(mesh);
+    if (corners && n != (size_t)corners)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           corners == 3 ? "faces must be triangles" : "faces must be quads");
+    if (most && (mesh->vertex_count > most || mesh->face_count > most))
+        return txm_fail_numbers_at(env, TXM_TOO_LARGE, name, "more than # vertices or faces", most,
+                                   0);
+    if (mesh->face_count > (TXM_NO_SIDE - 1) / n || mesh->face_count > SIZE_MAX / 64 ||
+        mesh->vertex_count > SIZE_MAX / 64)
+        return txm_fail_at(env, TXM_TOO_LARGE, name,
+                           "more faces or vertices than 32 bits can number the sides of");
+    if (mesh->face_count && !mesh->indices)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "indices is NULL");
+    if (positions && mesh->vertex_count && !mesh->positions)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "positions is NULL");
+    for (size_t i = 0; i < n * mesh->face_count; i++) {
+        if (mesh->indices[i] >= mesh->vertex_count)
+            return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
+                                       "face # names vertex #, which is not below vertex_count",
+                                       i / n, mesh->indices[i]);
+    }
+    for (size_t i = 0; positions && i < 3 * mesh->vertex_count; i++) {
+        if (!txm_is_finite(mesh->positions[i]))
+            return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
+                                       "the position of vertex # is not finite", i / 3, 0);
+    }
+    return TXM_OK;
+}
+
+/* the position of a corner; corner k of face f has the number f * corners + k */
+static inline txm_dvec3 txm_mesh_point(const txm_mesh *mesh, size_t corner) {
+    return txm_d3_load(mesh->positions + 3 * (size_t)mesh->indices[corner]);
+}
+/* the positions of a triangle's corners */
+static inline void txm_mesh_triangle(const txm_mesh *mesh, size_t face, txm_dvec3 p[3]) {
+    for (size_t k = 0; k < 3; k++) p[k] = txm_mesh_point(mesh, 3 * face + k);
+}
+
+/* Side i runs from corner i to the next corner of its face, whose number this is. */
+static inline size_t txm_mesh_next(const txm_mesh *mesh, size_t i) {
+    if (mesh->corners == 4) return i % 4 == 3 ? i - 3 : i + 1;
+    return i % 3 == 2 ? i - 2 : i + 1;
+}
+/* the corner before corner i of its face */
+static inline size_t txm_mesh_previous(const txm_mesh *mesh, size_t i) {
+    if (mesh->corners == 4) return i % 4 == 0 ? i + 3 : i - 1;
+    return i % 3 == 0 ? i + 2 : i - 1;
+}
+/* the lower and the higher vertex of side i: its edge */
+static inline uint32_t txm_mesh_low(const txm_mesh *mesh, size_t i) {
+    const uint32_t a = mesh->indices[i], b = mesh->indices[txm_mesh_next(mesh, i)];
+    return a < b ? a : b;
+}
+static inline uint32_t txm_mesh_high(const txm_mesh *mesh, size_t i) {
+    const uint32_t a = mesh->indices[i], b = mesh->indices[txm_mesh_next(mesh, i)];
+    return a < b ? b : a;
+}
+
+/* Which sides share an edge, that is, have the same two vertices: sort the sides by the lower, then
+   by the higher vertex of their edge. Those of one edge lie together, by number. value = the side,
+   key = the lower vertex.
+
+       for (size_t i = 0, end; i < sides; i = end) {
+           end = txm_mesh_edge_end(mesh, pairs, i);
+           ...  pairs[i].value to pairs[end - 1].value are the sides of one edge
+       }
+
+   pairs  room for 2 pairs for each side; the upper half is scratch
+   cost   O(faces); the mesh must have passed txm_mesh_check                               */
+static inline void txm_mesh_sort_sides(const txm_mesh *mesh, txm_pair *pairs) {
+    const size_t sides = txm_mesh_sides(mesh);
+    for (size_t i = 0; i < sides; i++) {
+        pairs[i].key = txm_mesh_high(mesh, i);
+        pairs[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(pairs, pairs + sides, sides);
+    for (size_t i = 0; i < sides; i++) pairs[i].key = txm_mesh_low(mesh, pairs[i].value);
+    txm_sort_pairs(pairs, pairs + sides, sides);
+}
+
+/* one past the last of the sorted sides that share the edge of pairs[i] */
+static inline size_t txm_mesh_edge_end(const txm_mesh *mesh, const txm_pair *pairs, size_t i) {
+    const size_t sides = txm_mesh_sides(mesh);
+    const uint32_t low = pairs[i].key, high = txm_mesh_high(mesh, pairs[i].value);
+    do i++;
+    while (i < sides && pairs[i].key == low && txm_mesh_high(mesh, pairs[i].value) == high);
+    return i;
+}
+
+/* what txm_mesh_link may do otherwise; add them up */
+enum {
+    TXM_LINK_DOWN = 1,  /* each side to the one before it, the lowest to the highest          */
+    TXM_LINK_POINTS = 2 /* sides from a vertex to itself have an edge like others             */
+};
+
+/* Link the sides of each edge into a ring: next[side] is the next higher side there, after the
+   highest the lowest; a side without another, or from a vertex to itself, is its own next.
+
+   pairs  the sides as txm_mesh_sort_sides left them
+   flags  0, or what to do otherwise
+   next   receives one side for each                                                       */
+static inline void txm_mesh_link(const txm_mesh *mesh, const txm_pair *pairs, int flags,
+                                 uint32_t *next) {
+    const size_t sides = txm_mesh_sides(mesh);
+    for (size_t i = 0, end; i < sides; i = end) {
+        end = txm_mesh_edge_end(mesh, pairs, i);
+        const int is_point = pairs[i].key == txm_mesh_high(mesh, pairs[i].value);
+        for (size_t k = i; k < end; k++) {
+            const size_t up = k + 1 < end ? k + 1 : i, down = k > i ? k - 1 : end - 1;
+            const size_t other = is_point && !(flags & TXM_LINK_POINTS) ? k
+                                 : flags & TXM_LINK_DOWN                ? down
+                                                                        : up;
+            next[pairs[k].value] = pairs[other].value;
+        }
+    }
+}
+
+#endif /* TEXMATH_MESH_H */

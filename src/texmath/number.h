@@ -1,0 +1,79 @@
+#ifndef TEXMATH_NUMBER_H
+#define TEXMATH_NUMBER_H
+
+#include "config.h"
+
+/* ---- numbers ---------------------------------------------------------------------------- */
+
+/* neither infinite nor NaN; looks at the bits, so that -ffast-math cannot remove it */
+static inline int txm_is_finite(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return ((bits >> 52) & 0x7ff) != 0x7ff;
+}
+
+/* x rounded to float, for good. gcc 12 drops the rounding of neighbouring values that are widened
+   again ((double)(float)x becomes x, from -O2 on), so results would depend on what was inlined
+   where. Code that needs the same bits everywhere rounds with this and not with a cast: the empty
+   asm might have changed f, for all that gcc knows, and costs nothing. */
+static inline float txm_float(double x) {
+    float f = (float)x;
+#if defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__)
+#if defined(__SSE2__)
+    __asm__("" : "+x"(f));
+#elif defined(__aarch64__)
+    __asm__("" : "+w"(f));
+#else
+    __asm__("" : "+m"(f));
+#endif
+#endif
+    return f;
+}
+
+static inline float txm_minf(float a, float b) {
+    return b < a ? b : a;
+}
+static inline float txm_maxf(float a, float b) {
+    return b > a ? b : a;
+}
+/* x limited to low..high; low for NaN */
+static inline float txm_clampf(float x, float low, float high) {
+    return x >= low ? txm_minf(x, high) : low;
+}
+static inline int txm_clampi(int x, int low, int high) {
+    return x < low ? low : x > high ? high : x;
+}
+/* a (1 - t) + b t; exactly a at t = 0, b at t = 1, and a wherever a = b */
+static inline float txm_lerpf(float a, float b, float t) {
+    return txm_float((double)a - (double)a * t + (double)b * t);
+}
+
+/* Sine and cosine of an angle of at most some thousand turns, to 1e-10: reduced to -pi/4..pi/4,
+   then Taylor. Sums, products and quotients only, so that the bits are the same everywhere, which
+   those of the C library are not. */
+static inline void txm_sincos(double angle, double *sine, double *cosine) {
+    const double turns = angle * (2 / TXM_PI);
+    const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
+    const double x = angle - quarter * (TXM_PI / 2), xx = x * x;
+    const double s =
+        x * (1 - xx / 6 * (1 - xx / 20 * (1 - xx / 42 * (1 - xx / 72 * (1 - xx / 110)))));
+    const double c =
+        1 - xx / 2 * (1 - xx / 12 * (1 - xx / 30 * (1 - xx / 56 * (1 - xx / 90 * (1 - xx / 132)))));
+    const int q = quarter & 3;
+    *sine = q == 0 ? s : q == 1 ? c : q == 2 ? -s : -c;
+    *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
+}
+
+/* 2^x for x from -1000 to 1000, to 1e-11 of the result: the whole part into the exponent, the rest
+   by Taylor. The same bits everywhere, as above. */
+static inline double txm_exp2(double x) {
+    const int whole = (int)(x + 1024.5) - 1024; /* rounded to nearest */
+    const double y = (x - whole) * 0.69314718055994530942;
+    const uint64_t bits = (uint64_t)(whole + 1023) << 52;
+    double sum = 1, power;
+    for (int k = 11; k > 0; k--) sum = 1 + sum * y / k;
+    memcpy(&power, &bits, sizeof power);
+    return sum * power;
+}
+
+#endif /* TEXMATH_NUMBER_H */
