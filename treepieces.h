@@ -15,15 +15,19 @@
      #include <stdio.h>
 
      int main(void) {
-         treepieces_forest_desc desc = {0};   // zero = the default, for every field
-         treepieces_bake_desc bake = {0};
-         treepieces_wind wind = {0};
+         treepieces_forest_desc desc;
+         treepieces_bake_desc bake;
+         treepieces_wind wind;
          treepieces_species oak;
          treepieces_kit *kit;
          treepieces_forest *tree;
          treepieces_mesh *mesh;
-         txm_env env = {0};                   // malloc, silent, serial; receives the message
+         txm_env env;
          float *bones, *sway;                 // the caller owns what changes from frame to frame
+         memset(&desc, 0, sizeof desc);       // zero = the default, for every field
+         memset(&bake, 0, sizeof bake);
+         memset(&wind, 0, sizeof wind);
+         memset(&env, 0, sizeof env);         // malloc, silent, serial; receives the message
          if (treepieces_kit_make(NULL, 0, &env, &kit) != TXM_OK ||
              treepieces_preset("oak", &env, &oak) != TXM_OK)
              return 1;
@@ -36,8 +40,8 @@
              fprintf(stderr, "tree: %s\n", env.message);
              return 1;
          }
-         bones = malloc(tree->node_count * TREEPIECES_BONE * sizeof *bones);
-         sway = calloc(tree->node_count, 4 * sizeof *sway);
+         bones = (float *)malloc(tree->node_count * TREEPIECES_BONE * sizeof *bones);
+         sway = (float *)calloc(tree->node_count, 4 * sizeof *sway);
          if (!bones || !sway) return 1;
          wind.speed = 8;
          wind.gusts = 0.6f;
