@@ -664,31 +664,8 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 /* ---- numbers ----------------------------------------------------------------------------- */
 
 /* All that decides is sums, products, quotients and square roots, so that it is the same everywhere;
-   libm's sine and exponential are not. */
-
-/* sine and cosine of any moderate angle, to 1e-10: reduced to -pi/4..pi/4, then Taylor */
-static void tpc_sincos(double angle, double *sine, double *cosine) {
-    const double turns = angle * (2 / TXM_PI);
-    const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
-    const double x = angle - quarter * (TXM_PI / 2), xx = x * x;
-    const double s = x * (1 - xx / 6 * (1 - xx / 20 * (1 - xx / 42 * (1 - xx / 72 * (1 - xx / 110)))));
-    const double c = 1 - xx / 2 * (1 - xx / 12 * (1 - xx / 30 * (1 - xx / 56 * (1 - xx / 90 *
-                     (1 - xx / 132)))));
-    const int q = quarter & 3;
-    *sine = q == 0 ? s : q == 1 ? c : q == 2 ? -s : -c;
-    *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
-}
-
-/* 2^x, x from -1000 to 1000, to 1e-11: the whole part into the exponent, the rest by Taylor */
-static double tpc_exp2(double x) {
-    const int whole = (int)(x + 1024.5) - 1024; /* rounded to nearest */
-    const double y = (x - whole) * 0.69314718055994530942;
-    const uint64_t bits = (uint64_t)(whole + 1023) << 52;
-    double sum = 1, power;
-    for (int k = 11; k > 0; k--) sum = 1 + sum * y / k;
-    memcpy(&power, &bits, sizeof power);
-    return sum * power;
-}
+   libm's sine and exponential are not, those of texmath.h are. In float and not rounded from double as
+   texmath.h's own vectors are: a forest takes millions of these. */
 
 /* q v q* for a unit quaternion q = x y z w; out may be v */
 static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
@@ -864,8 +841,8 @@ static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double t
     treepieces_similarity *b = &s->piece.building[s->piece.leaf_count];
     const double degree = TXM_PI / 180;
     double st, ct, sl, cl;
-    tpc_sincos(turn * degree / 2, &st, &ct);
-    tpc_sincos(lean * degree / 2, &sl, &cl);
+    txm_sincos(turn * degree / 2, &st, &ct);
+    txm_sincos(lean * degree / 2, &sl, &cl);
     b->translation[0] = x;
     b->translation[1] = y;
     b->translation[2] = z;
@@ -927,7 +904,7 @@ static void tpc_make_y(tpc_shape *s) {
         const float to = arm ? 1.0f : -1.0f;
         double sine, cosine;
         treepieces_similarity *b = &s->piece.building[arm];
-        tpc_sincos(13 * TXM_PI / 180, &sine, &cosine);
+        txm_sincos(13 * TXM_PI / 180, &sine, &cosine);
         b->translation[1] = 1.3f;
         b->translation[2] = 0.7f * to;
         b->rotation[0] = txm_float(to * sine);
@@ -3125,7 +3102,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
         for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
         /* the thicker arm goes straighter on */
         const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
-        tpc_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
+        txm_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
         const float ahead = txm_float(cosine), aside = txm_float(sine);
         for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
         bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
@@ -3139,7 +3116,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     if (from->order + 1 < g->species->order_count) bud->order++;
     const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
                         tpc_uniform(g, -1, 1) * o->angle_spread;
-    tpc_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
+    txm_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
     const float ahead = txm_float(cosine), aside = txm_float(sine);
     for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
     bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
@@ -3271,7 +3248,7 @@ static void tpc_sprout(tpc_growth *g) {
     bud->parent = TREEPIECES_NONE;
     memcpy(bud->position, g->place.position, sizeof bud->position);
     double sine, cosine;
-    tpc_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
+    txm_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
     bud->rotation[1] = txm_float(sine);
     bud->rotation[3] = txm_float(cosine);
     bud->heading[1] = 1;
@@ -3663,7 +3640,7 @@ typedef struct tpc_air {
 /* sine of so many turns, however many */
 static double tpc_sine_of_turns(double turns) {
     double sine, cosine;
-    tpc_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
+    txm_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
     return sine;
 }
 
@@ -3673,7 +3650,7 @@ static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     static const double weights[TPC_WAVES] = {0.4, 0.3, 0.2, 0.1};
     txm_rng rng = txm_rng_make(wind->seed, 0x77696e64u);
     double sine, cosine;
-    tpc_sincos((double)wind->direction, &sine, &cosine);
+    txm_sincos((double)wind->direction, &sine, &cosine);
     air->direction[0] = txm_float(cosine);
     air->direction[1] = 0;
     air->direction[2] = txm_float(-sine);
@@ -3682,7 +3659,7 @@ static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     for (int i = 0; i < TPC_WAVES; i++) {
         tpc_wave *w = &air->waves[i];
         const double aside = 0.7 * ((double)txm_rng_float(&rng) - 0.5);
-        tpc_sincos((double)wind->direction + aside, &sine, &cosine);
+        txm_sincos((double)wind->direction + aside, &sine, &cosine);
         w->along[0] = cosine / lengths[i];
         w->along[1] = -sine / lengths[i];
         w->rate = (double)wind->speed * (0.8 + 0.4 * (double)txm_rng_float(&rng)) / lengths[i];
@@ -3724,18 +3701,18 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
 static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
     const double damping = 0.2, part = sqrt(1 - damping * damping);
     for (int c = 0; c < TPC_CLASSES; c++) {
-        const double frequency = 0.3 * tpc_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
+        const double frequency = 0.3 * txm_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
         const double fade = damping * omega * dt;
         double e = 0, sine = 0, cosine = 0;
         if (fade < 60) { /* beyond that nothing of the old swing is left */
-            e = tpc_exp2(-fade * 1.44269504088896340736);
-            tpc_sincos(omega * part * dt, &sine, &cosine);
+            e = txm_exp2(-fade * 1.44269504088896340736);
+            txm_sincos(omega * part * dt, &sine, &cosine);
         }
         air->classes[c].xx = txm_float(e * (cosine + damping / part * sine));
         air->classes[c].xv = txm_float(e * sine / (omega * part));
         air->classes[c].vx = txm_float(-e * omega / part * sine);
         air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
-        air->classes[c].give = txm_float(0.0065 * tpc_exp2(c / 5.0));
+        air->classes[c].give = txm_float(0.0065 * txm_exp2(c / 5.0));
         for (int k = 0; k < TPC_PHASES; k++)
             air->classes[c].flutter[k] =
                 wind->gusts * txm_float(0.5 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
@@ -3986,7 +3963,7 @@ static int tpc_level(const treepieces_lod *lod, const float sum[3], float count)
         squares += d * d;
     }
     const float halvings = txm_clampf(txm_float(sqrt(squares) / half), 0, 100);
-    const double level = (double)most * tpc_exp2(-halvings);
+    const double level = (double)most * txm_exp2(-halvings);
     const int whole = (int)level;
     return whole < 1 ? 1 : whole + (level > whole);
 }
@@ -4825,7 +4802,7 @@ static void tpc_spread(int index, int count, float phase, txm_rng *rng, float di
     const float jitter = 0.6f * tpc_signed(rng), off = 0.3f * tpc_signed(rng);
     const float y = txm_clampf(1 - (2 * (float)index + 1 + jitter) / (float)count, -1, 1);
     const float ring = sqrtf(1 - y * y);
-    tpc_sincos((double)phase + 2.399963229728653 * index + (double)off, &sine, &cosine);
+    txm_sincos((double)phase + 2.399963229728653 * index + (double)off, &sine, &cosine);
     direction[0] = ring * (float)cosine;
     direction[1] = y;
     direction[2] = ring * (float)sine;
@@ -5123,7 +5100,7 @@ static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const f
 static void tpc_go(const float a[2], const float heading[2], float degrees, float length,
                    float margin, float b[2]) {
     double sine, cosine;
-    tpc_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
+    txm_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
     const float x = heading[0] * (float)cosine - heading[1] * (float)sine;
     const float y = heading[0] * (float)sine + heading[1] * (float)cosine;
     b[0] = txm_clampf(a[0] + length * x, margin, 1 - margin);
@@ -5211,7 +5188,7 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
         double sine, cosine;
         float tip[2], foot[2];
         const float angle = turn + 72 * (float)i + 5 * tpc_signed(&s->rng);
-        tpc_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
+        txm_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
         const float length = radius * (1 - squash * (float)(cosine * cosine));
         const float half = 0.46f * radius * (1 - squash * (float)(sine * sine));
         tpc_go(at, up, angle, 0.08f * radius, 0.01f, foot);

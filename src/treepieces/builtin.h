@@ -60,8 +60,8 @@ static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double t
     treepieces_similarity *b = &s->piece.building[s->piece.leaf_count];
     const double degree = TXM_PI / 180;
     double st, ct, sl, cl;
-    tpc_sincos(turn * degree / 2, &st, &ct);
-    tpc_sincos(lean * degree / 2, &sl, &cl);
+    txm_sincos(turn * degree / 2, &st, &ct);
+    txm_sincos(lean * degree / 2, &sl, &cl);
     b->translation[0] = x;
     b->translation[1] = y;
     b->translation[2] = z;
@@ -123,7 +123,7 @@ static void tpc_make_y(tpc_shape *s) {
         const float to = arm ? 1.0f : -1.0f;
         double sine, cosine;
         treepieces_similarity *b = &s->piece.building[arm];
-        tpc_sincos(13 * TXM_PI / 180, &sine, &cosine);
+        txm_sincos(13 * TXM_PI / 180, &sine, &cosine);
         b->translation[1] = 1.3f;
         b->translation[2] = 0.7f * to;
         b->rotation[0] = txm_float(to * sine);

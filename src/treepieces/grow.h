@@ -386,7 +386,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
         for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
         /* the thicker arm goes straighter on */
         const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
-        tpc_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
+        txm_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
         const float ahead = txm_float(cosine), aside = txm_float(sine);
         for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
         bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
@@ -400,7 +400,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     if (from->order + 1 < g->species->order_count) bud->order++;
     const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
                         tpc_uniform(g, -1, 1) * o->angle_spread;
-    tpc_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
+    txm_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
     const float ahead = txm_float(cosine), aside = txm_float(sine);
     for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
     bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
@@ -532,7 +532,7 @@ static void tpc_sprout(tpc_growth *g) {
     bud->parent = TREEPIECES_NONE;
     memcpy(bud->position, g->place.position, sizeof bud->position);
     double sine, cosine;
-    tpc_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
+    txm_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
     bud->rotation[1] = txm_float(sine);
     bud->rotation[3] = txm_float(cosine);
     bud->heading[1] = 1;

@@ -63,7 +63,7 @@ static void tpc_spread(int index, int count, float phase, txm_rng *rng, float di
     const float jitter = 0.6f * tpc_signed(rng), off = 0.3f * tpc_signed(rng);
     const float y = txm_clampf(1 - (2 * (float)index + 1 + jitter) / (float)count, -1, 1);
     const float ring = sqrtf(1 - y * y);
-    tpc_sincos((double)phase + 2.399963229728653 * index + (double)off, &sine, &cosine);
+    txm_sincos((double)phase + 2.399963229728653 * index + (double)off, &sine, &cosine);
     direction[0] = ring * (float)cosine;
     direction[1] = y;
     direction[2] = ring * (float)sine;
@@ -361,7 +361,7 @@ static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const f
 static void tpc_go(const float a[2], const float heading[2], float degrees, float length,
                    float margin, float b[2]) {
     double sine, cosine;
-    tpc_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
+    txm_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
     const float x = heading[0] * (float)cosine - heading[1] * (float)sine;
     const float y = heading[0] * (float)sine + heading[1] * (float)cosine;
     b[0] = txm_clampf(a[0] + length * x, margin, 1 - margin);
@@ -449,7 +449,7 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
         double sine, cosine;
         float tip[2], foot[2];
         const float angle = turn + 72 * (float)i + 5 * tpc_signed(&s->rng);
-        tpc_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
+        txm_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
         const float length = radius * (1 - squash * (float)(cosine * cosine));
         const float half = 0.46f * radius * (1 - squash * (float)(sine * sine));
         tpc_go(at, up, angle, 0.08f * radius, 0.01f, foot);

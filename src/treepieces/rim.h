@@ -6,31 +6,8 @@
 /* ---- numbers ----------------------------------------------------------------------------- */
 
 /* All that decides is sums, products, quotients and square roots, so that it is the same everywhere;
-   libm's sine and exponential are not. */
-
-/* sine and cosine of any moderate angle, to 1e-10: reduced to -pi/4..pi/4, then Taylor */
-static void tpc_sincos(double angle, double *sine, double *cosine) {
-    const double turns = angle * (2 / TXM_PI);
-    const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
-    const double x = angle - quarter * (TXM_PI / 2), xx = x * x;
-    const double s = x * (1 - xx / 6 * (1 - xx / 20 * (1 - xx / 42 * (1 - xx / 72 * (1 - xx / 110)))));
-    const double c = 1 - xx / 2 * (1 - xx / 12 * (1 - xx / 30 * (1 - xx / 56 * (1 - xx / 90 *
-                     (1 - xx / 132)))));
-    const int q = quarter & 3;
-    *sine = q == 0 ? s : q == 1 ? c : q == 2 ? -s : -c;
-    *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
-}
-
-/* 2^x, x from -1000 to 1000, to 1e-11: the whole part into the exponent, the rest by Taylor */
-static double tpc_exp2(double x) {
-    const int whole = (int)(x + 1024.5) - 1024; /* rounded to nearest */
-    const double y = (x - whole) * 0.69314718055994530942;
-    const uint64_t bits = (uint64_t)(whole + 1023) << 52;
-    double sum = 1, power;
-    for (int k = 11; k > 0; k--) sum = 1 + sum * y / k;
-    memcpy(&power, &bits, sizeof power);
-    return sum * power;
-}
+   libm's sine and exponential are not, those of texmath.h are. In float and not rounded from double as
+   texmath.h's own vectors are: a forest takes millions of these. */
 
 /* q v q* for a unit quaternion q = x y z w; out may be v */
 static void tpc_rotate(const float q[4], const float v[3], float out[3]) {

@@ -101,7 +101,7 @@ static int tpc_level(const treepieces_lod *lod, const float sum[3], float count)
         squares += d * d;
     }
     const float halvings = txm_clampf(txm_float(sqrt(squares) / half), 0, 100);
-    const double level = (double)most * tpc_exp2(-halvings);
+    const double level = (double)most * txm_exp2(-halvings);
     const int whole = (int)level;
     return whole < 1 ? 1 : whole + (level > whole);
 }

@@ -30,7 +30,7 @@ typedef struct tpc_air {
 /* sine of so many turns, however many */
 static double tpc_sine_of_turns(double turns) {
     double sine, cosine;
-    tpc_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
+    txm_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
     return sine;
 }
 
@@ -40,7 +40,7 @@ static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     static const double weights[TPC_WAVES] = {0.4, 0.3, 0.2, 0.1};
     txm_rng rng = txm_rng_make(wind->seed, 0x77696e64u);
     double sine, cosine;
-    tpc_sincos((double)wind->direction, &sine, &cosine);
+    txm_sincos((double)wind->direction, &sine, &cosine);
     air->direction[0] = txm_float(cosine);
     air->direction[1] = 0;
     air->direction[2] = txm_float(-sine);
@@ -49,7 +49,7 @@ static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     for (int i = 0; i < TPC_WAVES; i++) {
         tpc_wave *w = &air->waves[i];
         const double aside = 0.7 * ((double)txm_rng_float(&rng) - 0.5);
-        tpc_sincos((double)wind->direction + aside, &sine, &cosine);
+        txm_sincos((double)wind->direction + aside, &sine, &cosine);
         w->along[0] = cosine / lengths[i];
         w->along[1] = -sine / lengths[i];
         w->rate = (double)wind->speed * (0.8 + 0.4 * (double)txm_rng_float(&rng)) / lengths[i];
@@ -91,18 +91,18 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
 static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
     const double damping = 0.2, part = sqrt(1 - damping * damping);
     for (int c = 0; c < TPC_CLASSES; c++) {
-        const double frequency = 0.3 * tpc_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
+        const double frequency = 0.3 * txm_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
         const double fade = damping * omega * dt;
         double e = 0, sine = 0, cosine = 0;
         if (fade < 60) { /* beyond that nothing of the old swing is left */
-            e = tpc_exp2(-fade * 1.44269504088896340736);
-            tpc_sincos(omega * part * dt, &sine, &cosine);
+            e = txm_exp2(-fade * 1.44269504088896340736);
+            txm_sincos(omega * part * dt, &sine, &cosine);
         }
         air->classes[c].xx = txm_float(e * (cosine + damping / part * sine));
         air->classes[c].xv = txm_float(e * sine / (omega * part));
         air->classes[c].vx = txm_float(-e * omega / part * sine);
         air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
-        air->classes[c].give = txm_float(0.0065 * tpc_exp2(c / 5.0));
+        air->classes[c].give = txm_float(0.0065 * txm_exp2(c / 5.0));
         for (int k = 0; k < TPC_PHASES; k++)
             air->classes[c].flutter[k] =
                 wind->gusts * txm_float(0.5 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
