@@ -1283,7 +1283,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
     tpc_seen *seen = (tpc_seen *)txm_arena_alloc(
         &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *seen);
     tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
-    if (!v || !q || !text || !seen || !cells)
+    if (kit->arena.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
     treepieces_piece *p = &kit->pieces[kit->count];
     *p = *from;
@@ -1348,10 +1348,10 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
     tpc_shape *shape = (tpc_shape *)txm_alloc(env, sizeof *shape);
     uint8_t *side = (uint8_t *)txm_alloc(env, TREEPIECES_MAX_VERTICES * TREEPIECES_MAX_VERTICES);
     txm_status status = TXM_OK;
+    if (kit) kit->arena = arena;
     if (!kit || !shape || !side) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the kit");
     } else {
-        kit->arena = arena;
         for (int i = 0; status == TXM_OK && i < TREEPIECES_BUILTIN; i++) {
             tpc_make_builtin(i, shape);
             status = tpc_take(kit, &shape->piece, env);
@@ -1360,12 +1360,11 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
             status = tpc_check_piece(&pieces[i], i, side, env);
             if (status == TXM_OK) status = tpc_take(kit, &pieces[i], env);
         }
-        arena = kit->arena;
     }
     txm_free(env, shape);
     txm_free(env, side);
     if (status == TXM_OK) *out = kit;
-    else txm_arena_free(&arena);
+    else treepieces_kit_free(kit);
     return status;
 }
 
@@ -3360,9 +3359,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->buds = (tpc_bud *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->buds);
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
-        if (!g->bands || !g->records)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
-        if (!g->nodes || !g->buds || !g->clusters)
+        if (p->scratch.failed)
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
     }
     return TXM_OK;
@@ -3514,7 +3511,7 @@ static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
     p->trees = (treepieces_tree *)txm_arena_zero(&p->made->arena, (size_t)trees, sizeof *p->trees);
     p->offsets = (uint32_t(*)[TREEPIECES_MAX_TYPES])txm_arena_alloc(&p->scratch, (size_t)trees,
                                                                    sizeof *p->offsets);
-    if (!p->trees || !p->offsets)
+    if (p->made->arena.failed || p->scratch.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
     p->made->forest.trees = p->trees;
     txm_status status = tpc_make_slots(p, env);
@@ -3584,7 +3581,7 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
         txm_arena_init(&f->node_arena, env);
         txm_arena_init(&f->cluster_arena, env);
     }
-    if (!f || !species) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
     } else {
         memcpy(species, desc->species, (size_t)desc->species_count * sizeof *species);
@@ -4136,6 +4133,34 @@ typedef struct tpc_mesh {
     txm_arena arena;
 } tpc_mesh;
 
+/* An empty mesh in an arena of its own; NULL: no memory. */
+static tpc_mesh *tpc_make_mesh(const txm_env *env) {
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    if (made) made->arena = arena;
+    return made;
+}
+
+/* Room for so many vertices and triangles; 0: no memory. */
+static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
+    treepieces_mesh *m = &made->mesh;
+    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
+    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
+    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
+    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
+    return !made->arena.failed;
+}
+
+/* The mesh if it was made, else NULL, and nothing stays allocated. */
+static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
+    if (status == TXM_OK) return &made->mesh;
+    if (made) treepieces_mesh_free(&made->mesh);
+    return NULL;
+}
+
 /* A mesh while it is baked. */
 typedef struct tpc_baking {
     const treepieces_bake_desc *desc;
@@ -4404,20 +4429,12 @@ static txm_status tpc_bake_into(tpc_baking *b, tpc_mesh *made, txm_env *env) {
     if (triangles > TPC_MESH_TRIANGLES)
         return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
     while (slots < 2 * vertices) slots *= 2;
-    treepieces_mesh *m = &made->mesh;
-    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
-    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
-    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
-    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
-    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
-    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
     b->table = (uint32_t *)txm_alloc(env, slots * sizeof(uint32_t));
-    if (!m->positions || !m->normals || !m->joints || !m->weights || !m->indices || !m->uvs ||
-        !b->table)
+    if (!tpc_alloc_mesh(made, vertices, triangles) || !b->table)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
     memset(b->table, 0, slots * sizeof(uint32_t));
     b->table_mask = slots - 1;
-    b->out = m;
+    b->out = &made->mesh;
     status = tpc_bake_tree(b, env, &vertices, &triangles);
     if (status == TXM_OK && b->desc->capped) tpc_bake_cap(b);
     return status;
@@ -4438,15 +4455,12 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
     if (desc->lod && (!(desc->lod->max_level >= 0 && desc->lod->max_level <= 64) ||
                       !(desc->lod->half_distance >= 0) || !(desc->lod->shape <= 1)))
         return txm_fail(env, TXM_BAD_ARGUMENT, "lod: a field is out of range");
-    txm_arena arena;
-    txm_arena_init(&arena, env);
-    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    tpc_mesh *made = tpc_make_mesh(env);
     tpc_baking *b = (tpc_baking *)txm_alloc(env, sizeof *b);
     txm_status status = TXM_OK;
     if (!made || !b) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
     } else {
-        made->arena = arena;
         memset(b, 0, sizeof *b);
         b->desc = desc;
         b->forest = desc->forest;
@@ -4456,11 +4470,9 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
         b->layers = desc->sheet_layers ? desc->sheet_layers : TREEPIECES_OWN;
         status = tpc_bake_into(b, made, env);
         txm_free(env, b->table);
-        arena = made->arena;
     }
     txm_free(env, b);
-    if (status == TXM_OK) *out = &made->mesh;
-    else txm_arena_free(&arena);
+    *out = tpc_hand_over(made, status);
     return status;
 }
 
@@ -5423,22 +5435,6 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */
 
-static txm_status tpc_alloc_cards(tpc_mesh *made, size_t cards, txm_env *env) {
-    treepieces_mesh *m = &made->mesh;
-    if (!cards) return TXM_OK;
-    m->positions = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
-    m->normals = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
-    m->joints = (uint32_t *)txm_arena_zero(&made->arena, cards, 16 * sizeof(uint32_t));
-    m->weights = (float *)txm_arena_zero(&made->arena, cards, 16 * sizeof(float));
-    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, cards, 6 * sizeof(uint32_t));
-    m->uvs = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
-    if (!m->positions || !m->normals || !m->joints || !m->weights || !m->indices || !m->uvs)
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
-    m->vertex_count = 4 * cards;
-    m->triangle_count = 2 * cards;
-    return TXM_OK;
-}
-
 /* Card number `index` of the mesh, of a cloud about `center`. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
                           const float center[3], float radius, uint32_t joint) {
@@ -5451,8 +5447,10 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
             m->positions[3 * vertex + a] = center[a] + radius * (card->center[a] + across);
             m->normals[3 * vertex + a] = card->normal[a];
         }
-        m->joints[4 * vertex] = joint;
-        m->weights[4 * vertex] = 1;
+        for (size_t j = 0; j < 4; j++) {
+            m->joints[4 * vertex + j] = j ? 0 : joint;
+            m->weights[4 * vertex + j] = j ? 0 : 1;
+        }
     }
     for (size_t k = 0; k < 6; k++) {
         m->indices[6 * index + k] = (uint32_t)(4 * index) + corners[k];
@@ -5474,19 +5472,18 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
     const size_t count = (size_t)treepieces_cloud(species, 0, NULL);
     if (count * t->cluster_count > 0x7fffffffu / 6)
         return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
-    txm_arena arena, scratch;
-    txm_arena_init(&arena, env);
+    const size_t all = count * t->cluster_count;
+    txm_arena scratch;
     txm_arena_init(&scratch, env);
-    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    tpc_mesh *made = tpc_make_mesh(env);
     treepieces_card *cards =
         (treepieces_card *)txm_arena_alloc(&scratch, (size_t)looks * (count + 1), sizeof *cards);
     txm_status status = TXM_OK;
-    if (!made || !cards) {
+    if (!made || !cards || !tpc_alloc_mesh(made, 4 * all, 2 * all)) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
     } else {
-        made->arena = arena;
-        status = tpc_alloc_cards(made, count * t->cluster_count, env);
-        arena = made->arena;
+        made->mesh.vertex_count = 4 * all;
+        made->mesh.triangle_count = 2 * all;
     }
     for (int k = 0; k < looks && status == TXM_OK; k++)
         treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
@@ -5501,8 +5498,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
                           c->node - t->first_node);
     }
     txm_arena_free(&scratch);
-    if (status == TXM_OK) *out = &made->mesh;
-    else txm_arena_free(&arena);
+    *out = tpc_hand_over(made, status);
     return status;
 }
 

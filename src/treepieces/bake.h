@@ -17,6 +17,34 @@ typedef struct tpc_mesh {
     txm_arena arena;
 } tpc_mesh;
 
+/* An empty mesh in an arena of its own; NULL: no memory. */
+static tpc_mesh *tpc_make_mesh(const txm_env *env) {
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    if (made) made->arena = arena;
+    return made;
+}
+
+/* Room for so many vertices and triangles; 0: no memory. */
+static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
+    treepieces_mesh *m = &made->mesh;
+    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
+    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
+    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
+    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
+    return !made->arena.failed;
+}
+
+/* The mesh if it was made, else NULL, and nothing stays allocated. */
+static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
+    if (status == TXM_OK) return &made->mesh;
+    if (made) treepieces_mesh_free(&made->mesh);
+    return NULL;
+}
+
 /* A mesh while it is baked. */
 typedef struct tpc_baking {
     const treepieces_bake_desc *desc;
@@ -285,20 +313,12 @@ static txm_status tpc_bake_into(tpc_baking *b, tpc_mesh *made, txm_env *env) {
     if (triangles > TPC_MESH_TRIANGLES)
         return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
     while (slots < 2 * vertices) slots *= 2;
-    treepieces_mesh *m = &made->mesh;
-    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
-    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
-    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
-    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
-    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
-    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
     b->table = (uint32_t *)txm_alloc(env, slots * sizeof(uint32_t));
-    if (!m->positions || !m->normals || !m->joints || !m->weights || !m->indices || !m->uvs ||
-        !b->table)
+    if (!tpc_alloc_mesh(made, vertices, triangles) || !b->table)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
     memset(b->table, 0, slots * sizeof(uint32_t));
     b->table_mask = slots - 1;
-    b->out = m;
+    b->out = &made->mesh;
     status = tpc_bake_tree(b, env, &vertices, &triangles);
     if (status == TXM_OK && b->desc->capped) tpc_bake_cap(b);
     return status;
@@ -319,15 +339,12 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
     if (desc->lod && (!(desc->lod->max_level >= 0 && desc->lod->max_level <= 64) ||
                       !(desc->lod->half_distance >= 0) || !(desc->lod->shape <= 1)))
         return txm_fail(env, TXM_BAD_ARGUMENT, "lod: a field is out of range");
-    txm_arena arena;
-    txm_arena_init(&arena, env);
-    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    tpc_mesh *made = tpc_make_mesh(env);
     tpc_baking *b = (tpc_baking *)txm_alloc(env, sizeof *b);
     txm_status status = TXM_OK;
     if (!made || !b) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
     } else {
-        made->arena = arena;
         memset(b, 0, sizeof *b);
         b->desc = desc;
         b->forest = desc->forest;
@@ -337,11 +354,9 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
         b->layers = desc->sheet_layers ? desc->sheet_layers : TREEPIECES_OWN;
         status = tpc_bake_into(b, made, env);
         txm_free(env, b->table);
-        arena = made->arena;
     }
     txm_free(env, b);
-    if (status == TXM_OK) *out = &made->mesh;
-    else txm_arena_free(&arena);
+    *out = tpc_hand_over(made, status);
     return status;
 }
 

@@ -79,9 +79,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->buds = (tpc_bud *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->buds);
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
-        if (!g->bands || !g->records)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
-        if (!g->nodes || !g->buds || !g->clusters)
+        if (p->scratch.failed)
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
     }
     return TXM_OK;
@@ -233,7 +231,7 @@ static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
     p->trees = (treepieces_tree *)txm_arena_zero(&p->made->arena, (size_t)trees, sizeof *p->trees);
     p->offsets = (uint32_t(*)[TREEPIECES_MAX_TYPES])txm_arena_alloc(&p->scratch, (size_t)trees,
                                                                    sizeof *p->offsets);
-    if (!p->trees || !p->offsets)
+    if (p->made->arena.failed || p->scratch.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
     p->made->forest.trees = p->trees;
     txm_status status = tpc_make_slots(p, env);
@@ -303,7 +301,7 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
         txm_arena_init(&f->node_arena, env);
         txm_arena_init(&f->cluster_arena, env);
     }
-    if (!f || !species) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the forest");
     } else {
         memcpy(species, desc->species, (size_t)desc->species_count * sizeof *species);

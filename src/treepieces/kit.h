@@ -250,7 +250,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
     tpc_seen *seen = (tpc_seen *)txm_arena_alloc(
         &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *seen);
     tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
-    if (!v || !q || !text || !seen || !cells)
+    if (kit->arena.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
     treepieces_piece *p = &kit->pieces[kit->count];
     *p = *from;
@@ -315,10 +315,10 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
     tpc_shape *shape = (tpc_shape *)txm_alloc(env, sizeof *shape);
     uint8_t *side = (uint8_t *)txm_alloc(env, TREEPIECES_MAX_VERTICES * TREEPIECES_MAX_VERTICES);
     txm_status status = TXM_OK;
+    if (kit) kit->arena = arena;
     if (!kit || !shape || !side) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the kit");
     } else {
-        kit->arena = arena;
         for (int i = 0; status == TXM_OK && i < TREEPIECES_BUILTIN; i++) {
             tpc_make_builtin(i, shape);
             status = tpc_take(kit, &shape->piece, env);
@@ -327,12 +327,11 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
             status = tpc_check_piece(&pieces[i], i, side, env);
             if (status == TXM_OK) status = tpc_take(kit, &pieces[i], env);
         }
-        arena = kit->arena;
     }
     txm_free(env, shape);
     txm_free(env, side);
     if (status == TXM_OK) *out = kit;
-    else txm_arena_free(&arena);
+    else treepieces_kit_free(kit);
     return status;
 }
 

@@ -684,22 +684,6 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */
 
-static txm_status tpc_alloc_cards(tpc_mesh *made, size_t cards, txm_env *env) {
-    treepieces_mesh *m = &made->mesh;
-    if (!cards) return TXM_OK;
-    m->positions = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
-    m->normals = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
-    m->joints = (uint32_t *)txm_arena_zero(&made->arena, cards, 16 * sizeof(uint32_t));
-    m->weights = (float *)txm_arena_zero(&made->arena, cards, 16 * sizeof(float));
-    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, cards, 6 * sizeof(uint32_t));
-    m->uvs = (float *)txm_arena_alloc(&made->arena, cards, 12 * sizeof(float));
-    if (!m->positions || !m->normals || !m->joints || !m->weights || !m->indices || !m->uvs)
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
-    m->vertex_count = 4 * cards;
-    m->triangle_count = 2 * cards;
-    return TXM_OK;
-}
-
 /* Card number `index` of the mesh, of a cloud about `center`. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
                           const float center[3], float radius, uint32_t joint) {
@@ -712,8 +696,10 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
             m->positions[3 * vertex + a] = center[a] + radius * (card->center[a] + across);
             m->normals[3 * vertex + a] = card->normal[a];
         }
-        m->joints[4 * vertex] = joint;
-        m->weights[4 * vertex] = 1;
+        for (size_t j = 0; j < 4; j++) {
+            m->joints[4 * vertex + j] = j ? 0 : joint;
+            m->weights[4 * vertex + j] = j ? 0 : 1;
+        }
     }
     for (size_t k = 0; k < 6; k++) {
         m->indices[6 * index + k] = (uint32_t)(4 * index) + corners[k];
@@ -735,19 +721,18 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
     const size_t count = (size_t)treepieces_cloud(species, 0, NULL);
     if (count * t->cluster_count > 0x7fffffffu / 6)
         return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
-    txm_arena arena, scratch;
-    txm_arena_init(&arena, env);
+    const size_t all = count * t->cluster_count;
+    txm_arena scratch;
     txm_arena_init(&scratch, env);
-    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    tpc_mesh *made = tpc_make_mesh(env);
     treepieces_card *cards =
         (treepieces_card *)txm_arena_alloc(&scratch, (size_t)looks * (count + 1), sizeof *cards);
     txm_status status = TXM_OK;
-    if (!made || !cards) {
+    if (!made || !cards || !tpc_alloc_mesh(made, 4 * all, 2 * all)) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
     } else {
-        made->arena = arena;
-        status = tpc_alloc_cards(made, count * t->cluster_count, env);
-        arena = made->arena;
+        made->mesh.vertex_count = 4 * all;
+        made->mesh.triangle_count = 2 * all;
     }
     for (int k = 0; k < looks && status == TXM_OK; k++)
         treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
@@ -762,8 +747,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
                           c->node - t->first_node);
     }
     txm_arena_free(&scratch);
-    if (status == TXM_OK) *out = &made->mesh;
-    else txm_arena_free(&arena);
+    *out = tpc_hand_over(made, status);
     return status;
 }
 
