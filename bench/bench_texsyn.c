@@ -129,16 +129,16 @@ static void sweep(const char *path, const txm_image *picture, void *pixels) {
         result one = nothing_yet, two = nothing_yet;
         int bytes = 0;
         for (int i = 0; i < RUNS; i++) {
-            texsyn_free(model);
+            texsyn_model_free(model);
             model = learn(exemplar, 1, &one);
             bytes = (int)model_bytes(model);
-            texsyn_free(model);
+            texsyn_model_free(model);
             model = learn(exemplar, 2, &two);
         }
         line("learn", side, &one, &two, bytes);
         free(exemplar.pixels);
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
     result unused = nothing_yet;
     model = learn(*picture, 2, &unused);
     for (int side = 256; side <= MAX_OUT; side *= 2) {
@@ -149,7 +149,7 @@ static void sweep(const char *path, const txm_image *picture, void *pixels) {
         }
         line("synth", side, &one, &two, 0);
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void one_line(const char *path, const txm_image *picture, void *pixels) {
@@ -161,7 +161,7 @@ static void one_line(const char *path, const txm_image *picture, void *pixels) {
            texsyn_clique_count(model), texsyn_level_count(model),
            (unsigned long)model_bytes(model));
     fflush(stdout);
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 /* ---- this build against the one without SIMD --------------------------------------------- */
@@ -208,7 +208,7 @@ int main(int argc, char **argv) {
             texsyn_model *model = learn(picture, 1, &learned);
             synthesise(model, 512, 1, pixels, &made);
             printf("%f %f\n", learned.cpu, made.cpu);
-            texsyn_free(model);
+            texsyn_model_free(model);
         } else if (i == 0) {
             sweep(path, &picture, pixels);
             printf("\none thread, synthesis of 512 x 512\n\n"

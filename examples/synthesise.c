@@ -63,7 +63,7 @@ int main(int argc, char **argv) {
     else fprintf(stderr, "\n%s: %lu bytes\n", argv[2], (unsigned long)size);
     free(pixels);
     free(bytes);
-    texsyn_free(model);
+    texsyn_model_free(model);
     stbi_image_free(learn.example.pixels);
     return failed != NULL;
 }

@@ -15,11 +15,11 @@
 
      int main(void) {
          static unsigned char photo[64 * 64], larger[128 * 96];    // the caller owns all pixels
-         texsyn_learn_desc learn = {0};       // zero = the default, for every field
-         texsyn_synth_desc synth = {0};
+         static texsyn_learn_desc learn;      // static: all zero, the default for every field
+         static texsyn_synth_desc synth;
+         static txm_env env;                  // malloc, silent, serial; receives the message
+         static txm_image out;
          texsyn_model *model;
-         txm_env env = {0};                   // malloc, silent, serial; receives the message
-         txm_image out = {0};
          for (int i = 0; i < 64 * 64; i++)    // instead of a photograph: waves
              photo[i] = (unsigned char)(128 + i % 64 * 9 % 50 + i / 64 * 5 % 70);
          learn.example.pixels = photo;
@@ -38,7 +38,7 @@
          }
          printf("%d clique types, pixel (5, 7) is %d\n", texsyn_clique_count(model),
                 larger[7 * 128 + 5]);
-         texsyn_free(model);
+         texsyn_model_free(model);
          return 0;
      }
 
@@ -150,7 +150,7 @@ typedef struct texsyn_learn_desc {
 /* Learn a model: the analysis of [1], section 3, steps 1 to 6, on every pyramid level.
 
    env    NULL, or how to allocate, report and spread the work
-   out    receives the model, or NULL on any error; release it with texsyn_free
+   out    receives the model, or NULL on any error; release it with texsyn_model_free
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
           beyond a million; TXM_TOO_SMALL for an example under 16 x 16 or a mask of fewer than 256
           pixels; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
@@ -158,7 +158,7 @@ typedef struct texsyn_learn_desc {
 TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env, texsyn_model **out);
 
 /* Release a model by the allocator it was made with; NULL is allowed. */
-TEXSYN_API void texsyn_free(texsyn_model *model);
+TEXSYN_API void texsyn_model_free(texsyn_model *model);
 
 /* ---- looking into a model --------------------------------------------------------------- */
 
@@ -201,7 +201,7 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
 TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void *buffer,
                                   size_t capacity, size_t *size);
 
-/* Read a model back. *out receives it, or NULL on any error; release it with texsyn_free.
+/* Read a model back. *out receives it, or NULL on any error; release it with texsyn_model_free.
    return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model with sensible numbers;
           TXM_BAD_ARGUMENT for NULL; TXM_OUT_OF_MEMORY                                        */
 TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, texsyn_model **out);
@@ -224,25 +224,26 @@ typedef struct texsyn_synth_desc {
    cost   O(width * height * clique types); see MEMORY and TIME above                         */
 TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env, txm_image out);
 
-/* The stepping way, for progressive display: begin, step until *done is 1, image whenever a picture
-   is wanted, end. The picture is the same as that of the one call. */
+/* The stepping way, for progressive display: begin, step while there is more to do, draw whenever a
+   picture is wanted, free. The picture is the same as that of the one call. */
 typedef struct texsyn_job texsyn_job;
 
 /* Check the description and make the job; *job is NULL on any error (as texsyn_synthesize has
    them). The job keeps the allocator of env; the other calls may be given another env. */
 TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, texsyn_job **job);
 
-/* Do one sweep. *done (may be NULL) is the share of the work, 0..1, and 1 when all is made. After
-   TXM_OUT_OF_MEMORY the step may be tried again; after TXM_CANCELLED also, but a sweep was broken
-   off and the picture will not be the one of the same seed. */
-TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, float *done);
+/* Do one sweep; the environment is told how much of the whole job is done. After TXM_OUT_OF_MEMORY
+   the step may be tried again; after TXM_CANCELLED also, but a sweep was interrupted and the picture
+   will not be the one of the same seed.
+   more   receives 1, or 0 once nothing is left to do; untouched after an error; NULL is allowed */
+TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, int *more);
 
-/* The picture so far at full size, at any time, the finished one at the end. TXM_BAD_ARGUMENT if it
-   does not fit out; out is as for texsyn_synthesize. */
-TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_image out);
+/* Draw the picture so far at full size; at any time, the finished one at the end. TXM_BAD_ARGUMENT
+   if it does not fit out; out is as for texsyn_synthesize. */
+TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image out);
 
-/* Give everything back; NULL is allowed. */
-TEXSYN_API void texsyn_end(texsyn_job *job);
+/* Release a job; NULL is allowed. */
+TEXSYN_API void texsyn_free(texsyn_job *job);
 
 #ifdef __cplusplus
 }

@@ -64,7 +64,7 @@ static uint64_t run(int channels, int tileable, txm_env *env, uint64_t hash) {
     txm_image image = {out, WIDTH, HEIGHT, channels, TXM_U8, 0};
     if (texsyn_synthesize(&synth, env, image) != TXM_OK) give_up("synthesize", env);
     hash = tk_hash(hash, out, (size_t)WIDTH * HEIGHT * (size_t)channels);
-    texsyn_free(model);
+    texsyn_model_free(model);
     return hash;
 }
 

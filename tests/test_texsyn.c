@@ -31,7 +31,7 @@ static void test_synth_sizes(void **state) {
             d.quality = quality;
             synthesize(&d, view(out, 20, 20, 3));
         }
-        texsyn_free(model);
+        texsyn_model_free(model);
     }
 }
 
@@ -73,7 +73,7 @@ static void test_synth_tileable(void **state) {
             add_wrap(out, width, height, border, inside);
         }
         for (int k = 0; k < 2; k++) assert_between(border[k] / inside[k], 0.8, 1.2);
-        texsyn_free(model);
+        texsyn_model_free(model);
     }
 }
 
@@ -88,7 +88,7 @@ static void run_with(txm_env *env, saved *s, uint8_t *out) {
     save(model, s);
     const texsyn_synth_desc t = synth_desc(model, 90, 200);
     assert_int_equal(texsyn_synthesize(&t, env, view(out, 90, 200, 3)), TXM_OK);
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_same_bytes(void **state) {
@@ -126,7 +126,7 @@ static void test_synth_seeds(void **state) {
         for (int k = 0; k < 64 * 64; k++) differ += a[k] != b[k];
         assert_true(differ > 64 * 64 / 2);
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_synth_steps(void **state) {
@@ -137,39 +137,47 @@ static void test_synth_steps(void **state) {
         texsyn_synth_desc d = synth_desc(model, 70, 50);
         synthesize(&d, view(whole, 70, 50, 3));
         texsyn_job *job = NULL;
-        float done = 0, before = 0;
+        tk_progress progress = {0};
+        txm_env env = tk_env(NULL, &progress);
+        float before = -1;
         int steps = 0;
         assert_int_equal(texsyn_begin(&d, NULL, &job), TXM_OK);
         memset(&d, 0xff, sizeof d); /* the job has its own copy */
-        assert_int_equal(texsyn_image(job, NULL, view(last, 70, 50, 3)), TXM_OK);
-        while (done < 1) {
-            assert_int_equal(texsyn_step(job, NULL, &done), TXM_OK);
-            assert_true(done > before && done <= 1);
-            before = done;
+        assert_int_equal(texsyn_draw(job, NULL, view(last, 70, 50, 3)), TXM_OK);
+        for (int more = 7; more;) {
+            assert_int_equal(texsyn_step(job, &env, &more), TXM_OK);
+            assert_true(more == 0 || more == 1);
+            assert_true(progress.last > before && progress.last < 1);
+            assert_int_equal(progress.errors, 0); /* one bar over all steps that never falls */
+            before = progress.last;
             steps++;
-            assert_int_equal(texsyn_image(job, NULL, view(out, 70, 50, 3)), TXM_OK);
+            assert_int_equal(texsyn_draw(job, NULL, view(out, 70, 50, 3)), TXM_OK);
             assert_true(memcmp(out, last, sizeof out) != 0);
             memcpy(last, out, sizeof out);
         }
         assert_true(steps > 4);
+        assert_true(before > 0.9f);
         assert_memory_equal(out, whole, sizeof whole);
 
         /* at the end nothing more happens */
-        assert_int_equal(texsyn_step(job, NULL, &done), TXM_OK);
-        assert_int_equal(texsyn_step(job, NULL, NULL), TXM_OK);
-        assert_true(done >= 1);
-        assert_int_equal(texsyn_image(job, NULL, view(out, 70, 50, 3)), TXM_OK);
+        int more = 7;
+        const long calls = progress.calls;
+        assert_int_equal(texsyn_step(job, &env, &more), TXM_OK);
+        assert_int_equal(texsyn_step(job, &env, NULL), TXM_OK);
+        assert_int_equal(more, 0);
+        assert_int_equal(progress.calls, calls);
+        assert_int_equal(texsyn_draw(job, NULL, view(out, 70, 50, 3)), TXM_OK);
         assert_memory_equal(out, whole, sizeof whole);
-        texsyn_end(job);
-        texsyn_free(model);
+        texsyn_free(job);
+        texsyn_model_free(model);
     }
-    texsyn_end(NULL);
-    float done = -1;
-    assert_int_equal(texsyn_step(NULL, NULL, &done), TXM_BAD_ARGUMENT);
-    assert_true(done < 0);
+    texsyn_free(NULL);
+    int more = 7;
+    assert_int_equal(texsyn_step(NULL, NULL, &more), TXM_BAD_ARGUMENT);
+    assert_int_equal(more, 7);
     memset(out, FILL, sizeof out);
     memset(last, FILL, sizeof last);
-    assert_int_equal(texsyn_image(NULL, NULL, view(out, 70, 50, 3)), TXM_BAD_ARGUMENT);
+    assert_int_equal(texsyn_draw(NULL, NULL, view(out, 70, 50, 3)), TXM_BAD_ARGUMENT);
     assert_memory_equal(out, last, sizeof out);
 }
 
@@ -237,7 +245,7 @@ static void test_synth_bad_arguments(void **state) {
         tk_progress progress = {0};
         txm_env env = tk_env(&memory, &progress);
         memset(out, FILL, sizeof out);
-        assert_int_equal(texsyn_image(job, &env, wrong[i]), TXM_BAD_ARGUMENT);
+        assert_int_equal(texsyn_draw(job, &env, wrong[i]), TXM_BAD_ARGUMENT);
         assert_true(env.message[0] != 0);
         env.message[0] = 0;
         assert_int_equal(texsyn_synthesize(&good, &env, wrong[i]), TXM_BAD_ARGUMENT);
@@ -246,8 +254,8 @@ static void test_synth_bad_arguments(void **state) {
         assert_int_equal(tk_leaks(&memory), 0);
         for (size_t k = 0; k < sizeof out; k++) assert_int_equal(out[k], FILL);
     }
-    texsyn_end(job);
-    texsyn_free(model);
+    texsyn_free(job);
+    texsyn_model_free(model);
 }
 
 static void test_synth_formats(void **state) {
@@ -282,7 +290,7 @@ static void test_synth_formats(void **state) {
             assert_near(v * 255, plain[i], 0.501);
             assert_near(v * 65535, words[i], 0.501);
         }
-        texsyn_free(model);
+        texsyn_model_free(model);
     }
 }
 
@@ -342,7 +350,7 @@ static txm_status try_learn(void *context, txm_env *env) {
     texsyn_model *model = (texsyn_model *)env;
     const txm_status status = texsyn_learn((const texsyn_learn_desc *)context, env, &model);
     assert_int_equal(model != NULL, status == TXM_OK);
-    texsyn_free(model);
+    texsyn_model_free(model);
     return status;
 }
 
@@ -356,7 +364,7 @@ static txm_status try_load(void *context, txm_env *env) {
     texsyn_model *model = (texsyn_model *)env;
     const txm_status status = texsyn_load(s->bytes, s->size, env, &model);
     assert_int_equal(model != NULL, status == TXM_OK);
-    texsyn_free(model);
+    texsyn_model_free(model);
     return status;
 }
 
@@ -374,29 +382,29 @@ static txm_status try_steps(void *context, txm_env *env) {
     static uint8_t out[33 * 40 * 3];
     texsyn_job *job = (texsyn_job *)env;
     txm_status first = texsyn_begin((const texsyn_synth_desc *)context, env, &job);
-    float done = 0;
+    int more = 1;
     if (first != TXM_OK) {
         assert_null(job);
         return first;
     }
-    while (done < 1) {
-        const float before = done;
-        const txm_status status = texsyn_step(job, env, &done);
-        assert_int_equal(texsyn_image(job, env, view(out, 33, 40, 3)), TXM_OK);
+    while (more) {
+        more = 7;
+        const txm_status status = texsyn_step(job, env, &more);
+        assert_int_equal(texsyn_draw(job, env, view(out, 33, 40, 3)), TXM_OK);
         if (status == TXM_OK) continue;
-        assert_true(done <= before && done >= before); /* untouched */
+        assert_int_equal(more, 7); /* untouched */
         if (first != TXM_OK || status == TXM_CANCELLED) {
             first = status;
             break;
         }
         first = status;
     }
-    if (done >= 1) { /* the failure left no trace */
+    if (!more) { /* the failure left no trace */
         static uint8_t whole[33 * 40 * 3];
         synthesize((const texsyn_synth_desc *)context, view(whole, 33, 40, 3));
         assert_memory_equal(out, whole, sizeof whole);
     }
-    texsyn_end(job);
+    texsyn_free(job);
     return first;
 }
 
@@ -419,7 +427,7 @@ static void test_model_failing(void **state) {
     save(model, &s);
     sweep_memory(try_save, model);
     sweep_memory(try_load, &s);
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_synth_failing(void **state) {
@@ -431,7 +439,7 @@ static void test_synth_failing(void **state) {
     sweep_memory(try_steps, &d);
     sweep_cancel(try_synthesize, &d, 120);
     sweep_cancel(try_steps, &d, 30);
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_synth_peak_memory(void **state) {
@@ -445,7 +453,7 @@ static void test_synth_peak_memory(void **state) {
     assert_int_equal(texsyn_synthesize(&d, &env, view(out, 512, 512, 3)), TXM_OK);
     assert_int_equal(tk_leaks(&memory), 0);
     assert_true(memory.peak_bytes <= 64u * 512 * 512 + (4u << 20));
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 /* The allocator that made a model releases it, also when the env is long gone. */
@@ -458,17 +466,17 @@ static void test_env_goes_first(void **state) {
     const texsyn_learn_desc d = learn_desc(view(pixels, 16, 16, 1), 1);
     texsyn_model *model = NULL;
     texsyn_job *job = NULL;
-    float done = 0;
+    int more = 1;
     assert_int_equal(texsyn_learn(&d, &env, &model), TXM_OK);
     const texsyn_synth_desc s = synth_desc(model, 20, 20);
     assert_int_equal(texsyn_begin(&s, &env, &job), TXM_OK);
     memset(&env, 0xff, sizeof env);
     txm_env another = tk_env(&other, NULL);
-    while (done < 1) assert_int_equal(texsyn_step(job, &another, &done), TXM_OK);
-    assert_int_equal(texsyn_image(job, &another, view(out, 20, 20, 1)), TXM_OK);
+    while (more) assert_int_equal(texsyn_step(job, &another, &more), TXM_OK);
+    assert_int_equal(texsyn_draw(job, &another, view(out, 20, 20, 1)), TXM_OK);
     assert_int_equal(other.calls, 0);
-    texsyn_end(job);
-    texsyn_free(model);
+    texsyn_free(job);
+    texsyn_model_free(model);
     assert_int_equal(tk_leaks(&memory), 0);
 }
 

@@ -75,8 +75,8 @@ static void test_save_and_load(void **state) {
         assert_int_equal(texsyn_load(NULL, 10, NULL, &none), TXM_BAD_ARGUMENT);
         assert_null(none);
         assert_int_equal(texsyn_load(s.bytes, size, NULL, NULL), TXM_BAD_ARGUMENT);
-        texsyn_free(loaded);
-        texsyn_free(model);
+        texsyn_model_free(loaded);
+        texsyn_model_free(model);
     }
 }
 
@@ -99,7 +99,7 @@ static void test_load_damaged(void **state) {
     static saved s;
     texsyn_model *model = small_model(3, 2);
     save(model, &s);
-    texsyn_free(model);
+    texsyn_model_free(model);
     for (size_t size = 0; size < s.size; size++) refuses_load(s.bytes, size);
     for (size_t at = 0; at < s.size; at++) {
         for (int bit = 0; bit < 9; bit++) { /* each bit, then all of them */
@@ -135,7 +135,7 @@ static void test_load_mutated(void **state) {
         texsyn_model *model = small_model(channels, channels);
         txm_rng rng = txm_rng_make(77, (uint64_t)channels);
         save(model, &s);
-        texsyn_free(model);
+        texsyn_model_free(model);
         for (int run = 0; run < RUNS; run++) {
             tk_memory memory = {0};
             txm_env env = tk_env(&memory, NULL);
@@ -173,7 +173,7 @@ static void test_load_mutated(void **state) {
                     assert_int_equal(
                         texsyn_synthesize(&d, NULL, view(out, 32, 32, texsyn_channels(model))),
                         TXM_OK);
-                texsyn_free(model);
+                texsyn_model_free(model);
             }
             assert_int_equal(tk_leaks(&memory), 0);
             assert_true(memory.peak_bytes < 4u << 20);

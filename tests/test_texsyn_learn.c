@@ -104,7 +104,7 @@ static void test_learn_bad_floats(void **state) {
     const texsyn_synth_desc d = synth_desc(model, 20, 20);
     synthesize(&d, view_float(out, 20, 20, 1));
     for (int i = 0; i < 400; i++) assert_between((double)out[i], -2e4, 1.02e6);
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_learn_masks(void **state) {
@@ -117,7 +117,7 @@ static void test_learn_masks(void **state) {
     memset(mask, 1, 255);
     refuses_learn(&d, TXM_TOO_SMALL, "a mask of 255 pixels");
     mask[255] = 1;
-    texsyn_free(learn(&d));
+    texsyn_model_free(learn(&d));
 
     /* ragged: no two neighbours, then no two pixels within 2, then lone columns */
     for (int kind = 0; kind < 3; kind++) {
@@ -137,7 +137,7 @@ static void test_learn_masks(void **state) {
             }
             const texsyn_synth_desc s = synth_desc(model, 24, 24);
             synthesize(&s, view(out, 24, 24, 1));
-            texsyn_free(model);
+            texsyn_model_free(model);
         }
     }
 }
@@ -174,7 +174,7 @@ static void test_learn_half(void **state) {
         }
         assert_near(mean_out, mean, 3);
         for (int i = 100; i < 200; i += 10) assert_near(histogram_out[i], histogram[i], 0.03);
-        texsyn_free(model);
+        texsyn_model_free(model);
     }
     d.levels = 1;
     texsyn_model *a = learn(&d);
@@ -182,8 +182,8 @@ static void test_learn_half(void **state) {
         if (!mask[i]) pixels[i] = (uint8_t)(i * 31);
     texsyn_model *b = learn(&d);
     assert_same_saved(a, b);
-    texsyn_free(a);
-    texsyn_free(b);
+    texsyn_model_free(a);
+    texsyn_model_free(b);
 }
 
 /* ---- learning: examples of all kinds ----------------------------------------------------- */
@@ -221,16 +221,16 @@ static void test_learn_kinds(void **state) {
             d.example = i ? view_words(words, 40, 32, channels) : view_float(floats, 40, 32, channels);
             texsyn_model *other = learn(&d);
             assert_same_saved(model, other);
-            texsyn_free(other);
+            texsyn_model_free(other);
         }
-        texsyn_free(model);
+        texsyn_model_free(model);
     }
     assert_int_equal(texsyn_channels(NULL), 0);
     assert_int_equal(texsyn_level_count(NULL), 0);
     assert_int_equal(texsyn_band_count(NULL), 0);
     assert_int_equal(texsyn_clique_count(NULL), 0);
     assert_int_equal(texsyn_clique_at(NULL, 0, NULL, NULL, 0), 0);
-    texsyn_free(NULL);
+    texsyn_model_free(NULL);
 }
 
 static void test_learn_flat(void **state) {
@@ -248,7 +248,7 @@ static void test_learn_flat(void **state) {
             synthesize(&s, view(out, 33, 17, channels));
             for (int i = 0; i < 33 * 17 * channels; i++)
                 assert_int_equal(out[i], colours[k][i % channels]);
-            texsyn_free(model);
+            texsyn_model_free(model);
         }
     }
 }
@@ -270,7 +270,7 @@ static void test_learn_two_values(void **state) {
         }
         assert_between(white, 0.4, 0.6);
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_learn_constant_alpha(void **state) {
@@ -284,7 +284,7 @@ static void test_learn_constant_alpha(void **state) {
     const texsyn_synth_desc s = synth_desc(model, 40, 40);
     synthesize(&s, view(out, 40, 40, 4));
     for (int i = 0; i < 40 * 40; i++) assert_int_equal(out[4 * i + 3], 200);
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 static void test_learn_strides(void **state) {
@@ -309,7 +309,7 @@ static void test_learn_strides(void **state) {
         d.mask.stride = flip ? -50 : 50;
         texsyn_model *other = learn(&d);
         assert_same_saved(model, other);
-        texsyn_free(other);
+        texsyn_model_free(other);
     }
 
     /* and on the way out: the bytes between the rows stay as they are */
@@ -327,7 +327,7 @@ static void test_learn_strides(void **state) {
             for (int x = 63; x < 80; x++) assert_int_equal(row[x], FILL);
         }
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 /* ---- learning: the neighbourhood system -------------------------------------------------- */
@@ -387,7 +387,7 @@ static void test_learn_options(void **state) {
             if (c.kind == TEXSYN_PAIR || c.kind == TEXSYN_VALUES)
                 assert_between(c.dx * c.dx + c.dy * c.dy, 0, reach * reach);
         }
-        texsyn_free(model);
+        texsyn_model_free(model);
     }
 
     /* as many levels as the example has room for; a threshold that nothing passes */
@@ -401,7 +401,7 @@ static void test_learn_options(void **state) {
         check_preselected(model, level, &others);
         assert_int_equal(others, 0);
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
 
     /* the default number of levels leaves the short side at 64 or more */
     static uint8_t large[256 * 128];
@@ -409,7 +409,7 @@ static void test_learn_options(void **state) {
     d = learn_desc(view(large, 256, 128, 1), 1);
     model = learn(&d);
     assert_int_equal(texsyn_level_count(model), 2);
-    texsyn_free(model);
+    texsyn_model_free(model);
 
     /* the seed counts, and only the seed */
     d = learn_desc(view(large, 64, 64, 1), 2);
@@ -418,13 +418,13 @@ static void test_learn_options(void **state) {
     static saved s, t;
     assert_same_saved(a, b);
     save(a, &s);
-    texsyn_free(b);
+    texsyn_model_free(b);
     d.seed = UINT64_MAX;
     b = learn(&d);
     save(b, &t);
     assert_true(s.size != t.size || memcmp(s.bytes, t.bytes, s.size) != 0);
-    texsyn_free(a);
-    texsyn_free(b);
+    texsyn_model_free(a);
+    texsyn_model_free(b);
 }
 
 /* ---- statistics --------------------------------------------------------------------------- */
@@ -531,7 +531,7 @@ static void test_statistics(void **state) {
         count_differences(out, OUT, OUT, v[0], v[1], made);
         assert_true(bins_distance(example, made, 63) > 0.08);
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
 }
 
 int main(void) {

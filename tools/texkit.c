@@ -107,7 +107,7 @@ static int run_learn(int argc, char **argv) {
                texsyn_clique_count(model), texsyn_level_count(model), size, cli_seconds(&run));
 done:
     free(bytes);
-    texsyn_free(model);
+    texsyn_model_free(model);
     image_free(&desc.example);
     image_free(&desc.mask);
     return status;
@@ -207,7 +207,7 @@ static int run_synth(int argc, char **argv) {
                cli_seconds(&run));
 done:
     free(out.pixels);
-    texsyn_free(model);
+    texsyn_model_free(model);
     return status;
 }
 

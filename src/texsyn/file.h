@@ -311,7 +311,7 @@ static uint32_t txs_crc(const uint8_t *bytes, size_t count) {
 
 /* ---- public: models --------------------------------------------------------------------- */
 
-TEXSYN_API void texsyn_free(texsyn_model *model) {
+TEXSYN_API void texsyn_model_free(texsyn_model *model) {
     if (model) txm_arena_free(&model->arena);
 }
 
@@ -396,7 +396,7 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
         *out = m;
         return TXM_OK;
     }
-    texsyn_free(m);
+    texsyn_model_free(m);
     return enough ? txm_fail(env, TXM_BAD_DATA, "the model's contents contradict each other")
                   : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to load the model");
 }

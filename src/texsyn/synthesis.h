@@ -109,11 +109,11 @@ TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, 
     }
     txm_status status = txs_enter_level(job, env);
     if (status == TXM_OK) *out = job;
-    else texsyn_end(job);
+    else texsyn_free(job);
     return status;
 }
 
-TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, float *done) {
+TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, int *more) {
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "step: job is NULL");
     txm_status status = TXM_OK;
     if (job->level >= 0) {
@@ -136,7 +136,7 @@ TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, float *done) {
             txm_arena_free(&job->level_arena);
         }
     }
-    if (done) *done = job->level < 0 ? 1.0f : (float)(job->done / job->work);
+    if (more) *more = job->level >= 0;
     return TXM_OK;
 }
 
@@ -201,8 +201,8 @@ static txm_status txs_check_out(const texsyn_synth_desc *desc, const txm_image *
     return TXM_OK;
 }
 
-TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_image out) {
-    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "image: job is NULL");
+TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image out) {
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "draw: job is NULL");
     const txm_status status = txs_check_out(&job->desc, &out, env);
     if (status != TXM_OK) return status;
     out = txm_image_resolve(out);
@@ -211,7 +211,7 @@ TEXSYN_API txm_status texsyn_image(const texsyn_job *job, txm_env *env, txm_imag
     return TXM_OK;
 }
 
-TEXSYN_API void texsyn_end(texsyn_job *job) {
+TEXSYN_API void texsyn_free(texsyn_job *job) {
     if (!job) return;
     txs_canvas_free(&job->canvas, &job->memory);
     txm_arena_free(&job->level_arena);
@@ -221,12 +221,11 @@ TEXSYN_API void texsyn_end(texsyn_job *job) {
 TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env,
                                         txm_image out) {
     texsyn_job *job;
-    float done = 0;
     txm_status status = texsyn_begin(desc, env, &job);
     if (status == TXM_OK) status = txs_check_out(desc, &out, env); /* before the work, not after */
-    while (status == TXM_OK && done < 1) status = texsyn_step(job, env, &done);
-    if (status == TXM_OK) status = texsyn_image(job, env, out);
-    texsyn_end(job);
+    for (int more = 1; more && status == TXM_OK;) status = texsyn_step(job, env, &more);
+    if (status == TXM_OK) status = texsyn_draw(job, env, out);
+    texsyn_free(job);
     return status;
 }
 

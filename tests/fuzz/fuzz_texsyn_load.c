@@ -99,7 +99,7 @@ static int load(const uint8_t *data, size_t size) {
         out.pixels = pixels;
         if (texsyn_synthesize(&desc, &env, out) != TXM_OK && !env.message[0]) abort();
     }
-    texsyn_free(model);
+    texsyn_model_free(model);
     return 0;
 }
 
