@@ -17,8 +17,8 @@
      int main(void) {
          static float pixels[64 * 64];            // the caller owns all pixels
          static unsigned char hole[64 * 64];
-         txm_poisson_desc desc = {0};             // zero = the default, for every field
-         txm_env env = {0};                       // malloc, silent, serial; receives the message
+         static txm_poisson_desc desc;            // static: all zero, the default for every field
+         static txm_env env;                      // malloc, silent, serial; receives the message
          desc.image.pixels = pixels;
          desc.image.width = desc.image.height = 64;
          desc.image.sample = TXM_F32;
