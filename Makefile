@@ -19,7 +19,7 @@ SOURCES := $(wildcard *.h src/*.h src/*/*.h)
 HEADERS := $(wildcard *.h)
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
              tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
-# examples/brush.c opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
+# examples/brush opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
 # window if it can. Where that is not installed they are left out
 SDL     := $(shell sdl2-config --libs 2>/dev/null)
 GL      := $(shell printf '\043include <%s>\n' EGL/egl.h EGL/eglext.h GL/gl.h GL/glext.h | \
@@ -94,9 +94,11 @@ $(BUILD)/examples/%: examples/%/main.c $(BUILD)/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
+$(BUILD)/examples/membrane: $(wildcard examples/membrane/*)
 $(BUILD)/examples/membrane: $(addprefix $(BUILD)/,mesh_io.o render.o image_io.o)
 $(BUILD)/examples/join: $(BUILD)/image_io.o
 $(BUILD)/examples/join: CPPFLAGS += -D_FILE_OFFSET_BITS=64
+$(BUILD)/examples/brush: $(wildcard examples/brush/*)
 $(BUILD)/examples/brush: LIBRARIES = $(SDL)
 $(BUILD)/examples/forest_gl: $(wildcard examples/forest_gl/*)
 $(BUILD)/examples/forest_gl: LIBRARIES = $(GL) $(SDL) -lcjson

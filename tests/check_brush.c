@@ -1,4 +1,4 @@
-/* check_brush.c - what examples/brush.c painted: check_brush PLAIN.png PAINTED.png SCRIPT LAYERS
+/* check_brush.c - what examples/brush painted: check_brush PLAIN.png PAINTED.png SCRIPT LAYERS
 
    PLAIN is the window without the strokes of SCRIPT, PAINTED with them, LAYERS what the program has
    said about the gray layers. They must differ near the strokes only, and within them PAINTED must

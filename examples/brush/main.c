@@ -1,0 +1,78 @@
+/* brush - a window to paint in: each stroke becomes an edge of the texture
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   brush EXEMPLAR [--script FILE] [--screenshot OUT.png]
+
+   What an editor does with texpatch.h. A job is stepped between the frames, so the window stays
+   alive and shows the texture as it comes about. A stroke takes on the unrest of the exemplar's own
+   edges and becomes a guide of gray layers, and only what the guide changes is made anew.
+
+     left button  draw a stroke           [ ]  narrower, wider        s    save a screenshot
+     wheel, 0-9   layer, from dark        c    strokes are closed     r    another seed
+                  to light                u    take the last back     Esc  quit
+
+   Each line "stroke LAYER WIDTH open|closed X Y X Y ..." of a script is played as if drawn by hand;
+   then the screenshot is saved and the program ends.
+
+   window.c     what is shown; keys and mouse          script.c   strokes from a file
+   strokes.c    what the mouse has drawn
+   texture.c    strokes to a guide, a guide to texture: calls texpatch.h                         */
+#include "brush.h"
+
+#include <stb/stb_image.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void run(brush *b, FILE *script) {
+    while (!b->failed && !b->is_over) {
+        SDL_Event e;
+        if (script && !b->more && !play_stroke(b, script)) {
+            b->is_over = 1;
+            b->shot_is_due = !b->failed && b->screenshot;
+        }
+        /* with nothing to do the program sleeps until something happens */
+        int is_event = b->more || b->is_over ? SDL_PollEvent(&e) : SDL_WaitEvent(&e);
+        for (; is_event && !b->failed; is_event = SDL_PollEvent(&e)) handle(b, &e);
+        if (b->more && !b->failed) work(b);
+        if (!b->failed) show(b);
+    }
+}
+
+int main(int argc, char **argv) {
+    static brush b;
+    FILE *script = NULL;
+    b.screenshot = "brush.png";
+    b.width = 16;
+    b.seed = 1;
+    for (int i = 2; i < argc; i += 2) {
+        if (i + 1 < argc && !strcmp(argv[i], "--screenshot")) b.screenshot = argv[i + 1];
+        else if (i + 1 < argc && !strcmp(argv[i], "--script")) {
+            if (script) fclose(script);
+            script = fopen(argv[i + 1], "r");
+            if (!script) b.failed = "cannot read the script";
+        } else argc = 0;
+    }
+    if (argc < 2) {
+        fprintf(stderr, "usage: brush EXEMPLAR [--script FILE] [--screenshot OUT.png]\n");
+        if (script) fclose(script);
+        return 2;
+    }
+    b.photo.pixels = stbi_load(argv[1], &b.photo.width, &b.photo.height, NULL, 3);
+    b.photo.channels = 3;
+    if (!b.photo.pixels) b.failed = stbi_failure_reason();
+    if (!b.failed) begin(&b);
+    if (!b.failed) open_window(&b);
+    run(&b, script);
+
+    if (b.failed) fprintf(stderr, "brush: %s\n", b.failed);
+    SDL_DestroyTexture(b.texture);
+    SDL_DestroyRenderer(b.renderer);
+    SDL_DestroyWindow(b.window);
+    SDL_Quit();
+    texpatch_free(b.job);
+    texpatch_edges_free(&b.edges);
+    free(b.layers.pixels);
+    stbi_image_free(b.photo.pixels);
+    if (script) fclose(script);
+    return b.failed != NULL;
+}
