@@ -56,6 +56,8 @@
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TRIMESH_RELAX_STATIC         every function static to the including file (set it everywhere)
      TRIMESH_MAX_VERTICES   refuse more vertices or triangles; default 2^26
+     TRIMESH_ASSERT(x)      programming errors inside the library, no input can reach one; default
+                            assert of <assert.h>
 
    MEMORY     About 200 bytes per input vertex and 600 per output vertex while working; the result
               takes 60 bytes per vertex. After an error nothing stays allocated, *out is NULL.
@@ -588,6 +590,11 @@ TRIMESH_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, 
 
 #include <stdio.h>
 
+#ifndef TRIMESH_ASSERT
+#include <assert.h>
+#define TRIMESH_ASSERT(x) assert(x)
+#endif
+
 /* ---- vectors in double -------------------------------------------------------------------- */
 
 typedef struct tmr_vec {
@@ -668,6 +675,8 @@ typedef struct tmr_surface {
                                counter-clockwise, so that walking on reaches all              */
     int32_t *component;     /* 1 per face, from 0                                               */
     int32_t component_count;
+    int32_t loop_count;     /* border loops                                                     */
+    int32_t border_count;   /* border edges: corners whose opposite is -1                       */
     uint32_t *origin;       /* 1 per face: the caller's triangle                                */
     uint8_t *turn;          /* 1 per face: how its corners map to the caller's: corner k is the
                                caller's corner (k + turn) % 3, or (turn - k + 3) % 3 with turn
@@ -713,7 +722,8 @@ static int32_t tmr_cw(const int32_t *opposite, int32_t c) {
 /* ---- mending: state and checks ------------------------------------------------------------ */
 
 enum {
-    TMR_MOST = 1 << 26,      /* vertices and triangles: numbers of corners stay below 2^31 / 10   */
+    TMR_MOST = 1 << 26,      /* vertices and triangles of an input or a result                    */
+    TMR_MOST_SLOTS = INT32_MAX / 3, /* of vertices or of triangles: corners are numbered by int32_t */
     TMR_NO_VERTEX = -1,      /* in the first corner of a triangle: to be taken away               */
     TMR_OVERFULL = -2,       /* as opposite: the edge has more than two triangles                 */
     TMR_MAPPED = 8,          /* as turn: corners do not match, take the nearest point of origin  */
@@ -1569,6 +1579,7 @@ static void tmr_number_fans(tmr_mend *m, tmr_surface *s, uint8_t *seen) {
             m->degree[old] = 0;
             v = m->rename[old];
         } else used++;
+        TRIMESH_ASSERT(v < s->vertex_count); /* as many as tmr_count_fans has counted */
         s->point[v] = m->point[old];
         if (s->scale) s->scale[v] = m->desc->scale[old];
         s->corner[v] = tmr_take_fan(m, c, seen, v);
@@ -1698,15 +1709,18 @@ static int32_t tmr_next_border(const tmr_surface *s, int32_t c) {
 
 /* Count border loops and take stock. */
 static void tmr_count_loops(tmr_surface *s, trimesh_report *report, uint8_t *seen) {
-    int32_t border = 0;
+    int32_t loops = 0, border = 0;
     memset(seen, 0, 3 * (size_t)s->face_count);
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         if (s->opposite[c] >= 0) continue;
         border++;
         if (seen[c]) continue;
         for (int32_t k = c; !seen[k]; k = tmr_next_border(s, k)) seen[k] = 1;
-        report->loops++;
+        loops++;
     }
+    s->loop_count = loops;
+    s->border_count = border;
+    report->loops = (size_t)loops;
     report->components = (size_t)s->component_count;
     report->euler = (long)s->vertex_count + s->face_count - (3 * (long)s->face_count + border) / 2;
 }
@@ -2050,6 +2064,7 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->first[id] = l->segment_count;
     l->border[id] = s->edge_kind[c] == TMR_BORDER_EDGE;
     for (;;) {
+        TRIMESH_ASSERT(l->segment_count < ends->first[s->vertex_count] / 2);
         const int32_t k = l->segment_count++, w = tmr_far_end(s, c, v);
         l->a[k] = v;
         l->b[k] = w;
@@ -2081,6 +2096,7 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
         if (!tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch)) return 0;
     }
     if (!tmr_list_ends(s, scratch, &ends)) return 0;
+    /* each edge is listed at both its ends and becomes one segment; no line is without segments */
     const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
     l->line_count = l->segment_count = 0;
     l->first = (int32_t *)txm_arena_zero(arena, segments + 1, sizeof(int32_t));
@@ -2745,12 +2761,25 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
            w->flag;
 }
 
-/* Copy the surface into w->m, with room for so many vertices and triangles. */
-static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
+/* Copy the surface into w->m, its border loops closed by ghosts, with room for `more` vertices.
+
+   The copy has one ghost vertex for each border loop and one ghost triangle for each border edge.
+   Every operation that makes a vertex makes two triangles (tmr_split, tmr_split_face), and slots are
+   never used twice:
+
+       vertices = V + loops + more
+       faces    = F + border edges + 2 more
+
+   return  TXM_OK; TXM_TOO_LARGE if corners could not be numbered; TXM_OUT_OF_MEMORY               */
+static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
     const tmr_surface *s = w->s;
     tmr_mesh *m = &w->m;
+    const double vertices = (double)s->vertex_count + s->loop_count + more;
+    const double faces = (double)s->face_count + s->border_count + 2 * more;
     memset(m, 0, sizeof *m);
-    if (!tmr_alloc_mesh(w, vertices, faces, arena)) return 0;
+    if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
+        return txm_fail(w->env, TXM_TOO_LARGE, "the surface and its borders are too large");
+    if (!tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena)) return TXM_OUT_OF_MEMORY;
     m->vertex_count = m->live = s->vertex_count;
     m->face_count = m->live_faces = s->face_count;
     const size_t corners = 3 * (size_t)s->face_count;
@@ -2770,10 +2799,11 @@ static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_ar
     }
     for (size_t c = 0; c < corners; c++) m->valence[m->vertex[c]]++;
 
-    /* ghosts: walk each border loop, one ghost triangle per border edge. From the border edge of
+    /* Ghosts: walk each border loop, one ghost triangle per border edge. From the border edge of
        corner c, which runs from u = next(c) to v = prev(c), the next one begins at v. */
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         if (m->opposite[c] >= 0) continue;
+        TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
         const int32_t ghost = m->vertex_count++, first_face = m->face_count;
         m->flags[ghost] = TMR_GHOST;
         m->p[ghost] = m->n[ghost] = tmr_v(0, 0, 0);
@@ -2784,6 +2814,7 @@ static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_ar
         m->ghosts++;
         int32_t e = c;
         do {
+            TRIMESH_ASSERT(m->face_count < m->face_limit);
             const int32_t f = 3 * m->face_count++;
             m->live_faces++;
             m->vertex[f] = ghost;
@@ -2803,7 +2834,9 @@ static int tmr_copy_surface(tmr_work *w, int32_t vertices, int32_t faces, txm_ar
             tmr_link(m, 3 * f + 2, 3 * next + 1, 0);
         }
     }
-    return 1;
+    TRIMESH_ASSERT(m->ghosts == s->loop_count);
+    TRIMESH_ASSERT(m->face_count == s->face_count + s->border_count);
+    return TXM_OK;
 }
 
 /* ---- back to the caller's triangles ------------------------------------------------------- */
@@ -3460,6 +3493,7 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         do {
             const int32_t to = m->vertex[tmr_next(c)];
             if (!tmr_is_ghost(m, to)) {
+                TRIMESH_ASSERT(k < links); /* of the valences: no more than neighbours, ghosts too */
                 level->to[k] = f->node[to];
                 level->weight[k++] = 1;
             }
@@ -3533,6 +3567,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
                 const int32_t to = a->parent[a->to[j]];
                 if (to == i) continue;
                 if (seen[to] < first) {
+                    TRIMESH_ASSERT(k < a->links); /* each comes from a link below, and no two from one */
                     seen[to] = k;
                     b->to[k] = to;
                     b->weight[k++] = 0;
@@ -3802,7 +3837,7 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
    lattice point of v, and bad[v] how many vertices went into it. */
 static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
-    const size_t most = (size_t)m->live_faces * 3 / 2 + 1;
+    const size_t most = (size_t)m->live_faces * 3 / 2 + 1; /* edges of a closed mesh */
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     if (!pairs || !room) return 0;
@@ -3821,6 +3856,7 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
             const double apart = tmr_dist(w->moved[a], w->moved[b]);
             if (apart > 0.5 * spacing) continue;
             if (tmr_kind_of(m, a) != TRIMESH_FREE && tmr_kind_of(m, b) != TRIMESH_FREE) continue;
+            TRIMESH_ASSERT(count < most);
             pairs[count].key = txm_sort_key(txm_float(apart + 0.05 * tmr_dist(m->p[a], m->p[b])));
             pairs[count++].value = (uint32_t)c;
         }
@@ -3894,7 +3930,7 @@ static int tmr_claim(tmr_work *w, int32_t c) {
 static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
                          int32_t *missing) {
     tmr_mesh *m = &w->m;
-    const size_t most = (size_t)m->face_limit * 3 / 2 + 1;
+    const size_t most = (size_t)m->face_limit * 3 / 2 + 1; /* edges there can ever be */
     txm_pair *pairs, *room;
     *missing = target - m->live;
     if (*missing == 0) return 1;
@@ -3910,6 +3946,7 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
                 continue;
             const double size = tmr_edge_size(w, c);
             if (sign > 0 && size < 0.6 && pass < 30) continue;
+            TRIMESH_ASSERT(count < most);
             pairs[count].key = (uint32_t)(1000 * (100 + tmr_count_cost(m, c, sign)) -
                                           sign * (int)(300 * fmin(size, 3)) +
                                           (m->edge[c] ? 2000 : 0));
@@ -4087,18 +4124,29 @@ static int tmr_may_subdivide(const tmr_work *w) {
     return bent * 100.0 <= edges;
 }
 
-/* Copy the living part of w->m into new arrays, each triangle cut in four if wanted. */
-static int tmr_rebuild(tmr_work *w, int cut, int32_t vertices, int32_t faces, txm_arena *arena,
-                       txm_arena *scratch) {
+/* Copy the living part of w->m into new arrays, each triangle cut in four if wanted, with room for
+   1000 vertices more.
+
+   Of each vertex and ghost that lives one stays. A cut adds at most one vertex per edge, of which
+   there are 3/2 live_faces, and makes four triangles of one, of a ghost triangle two. */
+static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena *scratch) {
+    enum { MORE = 1000 };
     const tmr_mesh old = w->m;
+    const double vertices = old.live + (double)old.ghosts + (cut ? 1.5 * old.live_faces : 0) + MORE;
+    const double faces = (cut ? 4.0 : 1.0) * old.live_faces + 4 * MORE;
     const float *old_size = w->size;
     tmr_mesh *m = &w->m;
     int32_t *number = (int32_t *)txm_arena_alloc(scratch, (size_t)old.vertex_count, sizeof(int32_t));
     int32_t *middle = (int32_t *)txm_arena_alloc(scratch, 3 * (size_t)old.face_count, sizeof(int32_t));
     int32_t *where = (int32_t *)txm_arena_alloc(scratch, (size_t)old.face_count, sizeof(int32_t));
-    if (!number || !middle || !where || !tmr_alloc_mesh(w, vertices, faces, arena)) return 0;
+    if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
+        return txm_fail(w->env, TXM_TOO_LARGE, "too many triangles");
+    if (!number || !middle || !where ||
+        !tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena))
+        return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < old.vertex_count; v++) {
         if (old.corner[v] < 0) continue;
+        TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
         const int32_t k = number[v] = m->vertex_count++;
         m->p[k] = old.p[v];
         m->n[k] = old.n[v];
@@ -4115,12 +4163,14 @@ static int tmr_rebuild(tmr_work *w, int cut, int32_t vertices, int32_t faces, tx
         where[f] = m->face_count;
         m->face_count += !cut ? 1 : ghost ? 2 : 4;
     }
+    TRIMESH_ASSERT(m->face_count <= m->face_limit);
     m->live_faces = m->face_count;
     for (int32_t c = 0; c < 3 * old.face_count && cut; c++) {
         if (old.vertex[c] < 0 || old.opposite[c] < c) continue;
         const int32_t a = old.vertex[tmr_next(c)], b = old.vertex[tmr_prev(c)];
         middle[c] = middle[old.opposite[c]] = -1;
         if ((old.flags[a] | old.flags[b]) & TMR_GHOST) continue;
+        TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
         middle[c] = middle[old.opposite[c]] = m->vertex_count;
         const int32_t v = m->vertex_count++;
         m->live++;
@@ -4218,7 +4268,7 @@ static int tmr_rebuild(tmr_work *w, int cut, int32_t vertices, int32_t faces, tx
         m->corner[m->vertex[c]] = c;
         m->valence[m->vertex[c]]++;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* ---- fitting ------------------------------------------------------------------------------ */
@@ -5163,11 +5213,10 @@ static txm_status tmr_take_out(tmr_work *w, const uint8_t *keep, float fraction)
 
 /* ---- strewing and joining: the whole -------------------------------------------------------- */
 
-/* Slots that a mesh of the surface with so many points put into it needs. */
-static void tmr_strewn_room(const tmr_surface *s, size_t loops, int32_t points, int32_t *vertices,
-                            int32_t *faces) {
-    *vertices = s->vertex_count + (int32_t)loops + points + points / 4 + 1000;
-    *faces = 2 * *vertices + s->face_count / 2 + 1000;
+/* Vertices to make room for so that a mesh of the surface takes so many points (ours: a quarter more,
+   for the vertices of lines). */
+static double tmr_strewn_room(double points) {
+    return points + floor(points / 4) + 1000;
 }
 
 static int tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
@@ -5496,6 +5545,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
     const tmr_surface *s = w->s;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
+        TRIMESH_ASSERT(mesh->vertex_count < (size_t)m->live);
         const size_t k = mesh->vertex_count++;
         const tmr_vec p = tmr_add(tmr_scale(m->p[v], s->diagonal), s->centre);
         number[v] = (int32_t)k;
@@ -5644,21 +5694,18 @@ static txm_status tmr_job_mend(trimesh_job *job) {
 }
 
 static txm_status tmr_job_strew(trimesh_job *job) {
-    int32_t vertices, faces;
-    tmr_strewn_room(&job->s, job->report.loops, (int32_t)job->desc.vertices, &vertices, &faces);
-    if (!tmr_copy_surface(&job->w, vertices, faces, &job->first)) return TXM_OUT_OF_MEMORY;
+    const double room = tmr_strewn_room((double)job->desc.vertices);
+    const txm_status status = tmr_copy_surface(&job->w, room, &job->first);
+    if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_JOIN;
     return tmr_strew(&job->t, &job->w, &job->desc, &job->scratch);
 }
 
 /* Join the strewn points; then leave behind what room the surface's own vertices took. */
 static txm_status tmr_job_join(trimesh_job *job) {
-    const txm_status status = tmr_join_points(&job->t, &job->scratch);
+    txm_status status = tmr_join_points(&job->t, &job->scratch);
     if (status != TXM_OK) return status;
-    const int32_t vertices = job->w.m.live + job->w.m.ghosts + 1000;
-    if (!tmr_rebuild(&job->w, 0, vertices, job->w.m.live_faces + 4000, &job->second,
-                     &job->scratch))
-        return TXM_OUT_OF_MEMORY;
+    if ((status = tmr_rebuild(&job->w, 0, &job->second, &job->scratch)) != TXM_OK) return status;
     txm_arena_free(&job->first);
     job->rounds = job->desc.iterations > 0 ? job->desc.iterations : TMR_ROUNDS;
     job->stage = TMR_STAGE_REPEL;
@@ -5679,13 +5726,12 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
     const double target = (double)job->desc.vertices;
     int32_t aim = (int32_t)target;
     for (int k = 0; k < job->cut; k++) aim = (int32_t)floor((aim + 3 * euler) / 4);
-    int32_t vertices = job->s.vertex_count + (int32_t)job->report.loops;
-    if (vertices < 3 * aim) vertices = 3 * aim;
-    vertices = vertices + vertices / 4 + 1000;
-    const int32_t faces = 2 * vertices + (int32_t)(4 * fabs(euler)) + 1000;
+    /* room for three vertices per one aimed at, or as many as the surface has, and a quarter more */
+    const double closed = (double)job->s.vertex_count + job->s.loop_count, most = fmax(closed, 3.0 * aim);
     job->w.length = tmr_job_spacing(job) * sqrt(target / aim);
-    if (!tmr_copy_surface(&job->w, vertices, faces, &job->first)) return TXM_OUT_OF_MEMORY;
-    const txm_status status = tmr_make_lattice(&job->w, aim, job->desc.seed);
+    txm_status status = tmr_copy_surface(&job->w, most + floor(most / 4) + 1000 - closed, &job->first);
+    if (status != TXM_OK) return status;
+    status = tmr_make_lattice(&job->w, aim, job->desc.seed);
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_SUBDIVIDE;
     if (!job->cut || tmr_may_subdivide(&job->w)) return TXM_OK;
@@ -5699,11 +5745,8 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
 static txm_status tmr_job_subdivide(trimesh_job *job) {
     tmr_work *w = &job->w;
     for (int left = job->cut;; left--) {
-        const int32_t vertices = (left ? w->m.live + (w->m.live_faces * 3) / 2 : w->m.live) +
-                                 w->m.ghosts + 1000;
-        const int32_t faces = (left ? 4 : 1) * w->m.live_faces + 4000;
-        if (!tmr_rebuild(w, left > 0, vertices, faces, &job->second, &job->scratch))
-            return TXM_OUT_OF_MEMORY;
+        const txm_status status = tmr_rebuild(w, left > 0, &job->second, &job->scratch);
+        if (status != TXM_OK) return status;
         txm_arena_free(&job->first);
         txm_arena_free(&job->scratch);
         job->first = job->second;
@@ -5720,9 +5763,8 @@ static int tmr_surface_crosses(trimesh_job *job) {
     tmr_work w = job->w;
     txm_arena arena;
     long found = -1;
-    const int32_t loops = (int32_t)job->report.loops;
     txm_arena_init(&arena, &job->env);
-    if (tmr_copy_surface(&w, job->s.vertex_count + loops, 2 * job->s.face_count + 8, &arena))
+    if (tmr_copy_surface(&w, 0, &arena) == TXM_OK)
         found = tmr_count_crossings(&w, NULL, &arena);
     txm_arena_free(&arena);
     return found < 0 ? -1 : found > 0;
@@ -6132,6 +6174,7 @@ static int tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vert
 static void tmr_grid_add(tmr_grid *g, tmr_vec p, int32_t v) {
     int32_t *head = g->head + tmr_grid_slot(g, floor(p.x / g->cell), floor(p.y / g->cell),
                                             floor(p.z / g->cell));
+    TRIMESH_ASSERT(*head != v); /* no point twice: it would be the one before itself */
     g->next[v] = *head;
     *head = v;
 }
@@ -6473,7 +6516,7 @@ static int tmr_turn_back(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const size_t n = 3 * u->old->triangle_count;
     size_t size = 16;
-    while (size < n) size *= 2; /* each edge twice: half of that is used */
+    while (size < 2 * n) size *= 2; /* an edge has a triangle or two: at most half of it is used */
     uint64_t *table = (uint64_t *)txm_arena_zero(&u->scratch, size, sizeof(uint64_t));
     if (!table) return 0;
     for (size_t c = 0; c < n; c++) {
@@ -6593,13 +6636,12 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     u->w.length = u->t.length;
     u->w.line_scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double points = fmax(tmr_points_for(u), (double)u->old->vertex_count);
-    int32_t vertices, faces;
     if (points > TMR_MOST / 4)
         return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
-    tmr_strewn_room(&u->s, report->loops, (int32_t)(2 * points), &vertices, &faces);
-    if (!tmr_copy_surface(&u->w, vertices, faces, &u->first)) return TXM_OUT_OF_MEMORY;
+    status = tmr_copy_surface(&u->w, tmr_strewn_room(floor(2 * points)), &u->first);
+    if (status != TXM_OK) return status;
     if (!tmr_strewn_alloc(&u->t, &u->scratch) || !tmr_update_alloc(u)) return TXM_OUT_OF_MEMORY;
-    if (!tmr_grid_build(&u->grid, u->t.length, (int32_t)points, vertices, &u->first))
+    if (!tmr_grid_build(&u->grid, u->t.length, (int32_t)points, u->w.m.vertex_limit, &u->first))
         return TXM_OUT_OF_MEMORY;
     tmr_map_segments(u);
     tmr_find_old(u);
