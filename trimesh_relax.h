@@ -4340,19 +4340,20 @@ static int tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
 }
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
-/* Does the open segment p q cross the inside of triangle a b c? */
-static int tmr_crosses(tmr_vec p, tmr_vec q, tmr_vec a, tmr_vec b, tmr_vec c) {
+/* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
+static int tmr_crosses(tmr_vec p, tmr_vec q, tmr_vec a, tmr_vec b, tmr_vec c, int rim) {
     const tmr_vec e1 = tmr_sub(b, a), e2 = tmr_sub(c, a), d = tmr_sub(q, p);
     const tmr_vec h = tmr_cross(d, e2);
-    const double det = tmr_dot(e1, h), eps = 1e-10;
+    const double det = tmr_dot(e1, h), eps = 1e-10, least = rim ? -eps : eps;
     if (fabs(det) <= 1e-10 * tmr_len(e1) * tmr_len(e2) * tmr_len(d)) return 0;
     const tmr_vec s = tmr_sub(p, a), k = tmr_cross(s, e1);
     const double u = tmr_dot(s, h) / det, v = tmr_dot(d, k) / det, t = tmr_dot(e2, k) / det;
-    return u > eps && v > eps && u + v < 1 - eps && t > eps && t < 1 - eps;
+    return u > least && v > least && u + v < 1 - least && t > eps && t < 1 - eps;
 }
 
-/* Do two triangles, which share at most one vertex, cross each other? */
-static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g) {
+/* Do two triangles, which share at most one vertex, cross each other? rim: also where an edge passes
+   through no more than the rim of the other triangle, as with cards that cross edge to edge. */
+static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
     const int32_t *v = m->vertex + 3 * f, *w = m->vertex + 3 * g;
     int shared = 0, kf = 0, kg = 0;
     for (int i = 0; i < 3; i++) {
@@ -4367,8 +4368,8 @@ static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g) {
     const tmr_vec a[3] = {m->p[v[0]], m->p[v[1]], m->p[v[2]]};
     const tmr_vec b[3] = {m->p[w[0]], m->p[w[1]], m->p[w[2]]};
     if (shared == 1)
-        return tmr_crosses(a[(kf + 1) % 3], a[(kf + 2) % 3], b[0], b[1], b[2]) ||
-               tmr_crosses(b[(kg + 1) % 3], b[(kg + 2) % 3], a[0], a[1], a[2]);
+        return tmr_crosses(a[(kf + 1) % 3], a[(kf + 2) % 3], b[0], b[1], b[2], rim) ||
+               tmr_crosses(b[(kg + 1) % 3], b[(kg + 2) % 3], a[0], a[1], a[2], rim);
     const tmr_vec n = tmr_area2(a[0], a[1], a[2]);
     double low = 0, high = 0; /* of b on either side of a's plane */
     for (int i = 0; i < 3; i++) {
@@ -4378,8 +4379,8 @@ static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g) {
     }
     if (low > 0 || high < 0) return 0;
     for (int i = 0; i < 3; i++) {
-        if (tmr_crosses(a[i], a[(i + 1) % 3], b[0], b[1], b[2])) return 1;
-        if (tmr_crosses(b[i], b[(i + 1) % 3], a[0], a[1], a[2])) return 1;
+        if (tmr_crosses(a[i], a[(i + 1) % 3], b[0], b[1], b[2], rim)) return 1;
+        if (tmr_crosses(b[i], b[(i + 1) % 3], a[0], a[1], a[2], rim)) return 1;
     }
     return 0;
 }
@@ -4465,9 +4466,9 @@ static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, 
 }
 
 /* How many pairs of triangles cross each other, and mark their vertices in w->bad? -1: no memory.
-   near: where to look, as tmr_mark_near has it; NULL = everywhere. Linear in the number of
-   triangles. */
-static long tmr_count_crossings(tmr_work *w, const uint8_t *near, txm_arena *scratch) {
+   near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
+   Linear in the number of triangles. */
+static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch) {
     const tmr_mesh *m = &w->m;
     tmr_cells g;
     long found = 0;
@@ -4485,7 +4486,7 @@ static long tmr_count_crossings(tmr_work *w, const uint8_t *near, txm_arena *scr
                 if (f == h) continue;
                 tmr_face_box(m, h, &low2, &high2);
                 if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
-                    low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h))
+                    low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h, rim))
                     continue;
                 found++;
                 for (int k = 0; k < 3; k++)
@@ -4664,7 +4665,7 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
         memset(w->bad, 0, count);
         txm_arena_init(&scratch, env);
-        const long crossings = tmr_count_crossings(w, round > 0 ? near : NULL, &scratch);
+        const long crossings = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch);
         txm_arena_free(&scratch);
         if (crossings < 0) goto no_memory;
         const long turned = tmr_count_turned(w, &doubtful);
@@ -5758,14 +5759,15 @@ static txm_status tmr_job_subdivide(trimesh_job *job) {
     return TXM_OK;
 }
 
-/* Does the surface cross itself? Then the result may, too. -1: no memory. */
-static int tmr_surface_crosses(trimesh_job *job) {
+/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. -1: no
+   memory. */
+static int tmr_surface_crosses(trimesh_job *job, int rim) {
     tmr_work w = job->w;
     txm_arena arena;
     long found = -1;
     txm_arena_init(&arena, &job->env);
     if (tmr_copy_surface(&w, 0, &arena) == TXM_OK)
-        found = tmr_count_crossings(&w, NULL, &arena);
+        found = tmr_count_crossings(&w, NULL, rim, &arena);
     txm_arena_free(&arena);
     return found < 0 ? -1 : found > 0;
 }
@@ -5773,15 +5775,17 @@ static int tmr_surface_crosses(trimesh_job *job) {
 /* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
    surface bends. 0: nothing is left to try. */
 static int tmr_job_retry(trimesh_job *job, txm_status *status) {
+    const int coarse = job->w.line_scale > 1;
+    const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
+    if (!coarse && !quartered && job->retries == 2) return 0;
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
-    if (job->w.line_scale > 1) {
+    if (coarse) {
         job->w.line_scale = 1; /* lines too coarse for what lies between them */
-    } else if (job->desc.method == TRIMESH_LATTICE && job->cut) {
+    } else if (quartered) {
         job->cut--;
     } else {
-        if (job->retries == 2) return 0;
         job->s.scale = job->retries ? job->plain_scale : job->s.scale;
         job->plain_scale = job->s.scale;
         if (!tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input,
@@ -5802,14 +5806,19 @@ static txm_status tmr_job_finish(trimesh_job *job) {
     const long target = (long)job->desc.vertices;
     txm_status status = tmr_polish(&job->w, (int32_t)target, &job->scratch);
     if (status != TXM_OK && status != TXM_TOO_SMALL) return status;
-    if (status == TXM_OK) {
+    const int exact = status == TXM_OK;
+    if (exact) {
         long faults;
         job->stage = TMR_STAGE_DONE;
         if (!tmr_mend_spots(&job->w, &faults, &job->env)) return TXM_OUT_OF_MEMORY;
-        const int crosses = faults == 0 ? 1 : tmr_surface_crosses(job);
+        const int crosses = faults == 0 ? 1 : tmr_surface_crosses(job, 0);
         if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
     }
     if (tmr_job_retry(job, &status)) return status;
+    if (exact) { /* as the last resort: sheets that touch edge to edge may be meant to cross */
+        const int crosses = tmr_surface_crosses(job, 1);
+        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+    }
     snprintf(text, sizeof text, "the surface has parts too thin or too fine for %ld vertices without "
              "crossings; give about %ld", target, 2 * target);
     return txm_fail(&job->env, TXM_TOO_SMALL, text);
