@@ -206,6 +206,7 @@ TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
 
 /* Release a mesh; NULL is allowed. */
 TRIMESH_API void trimesh_free(trimesh_mesh *mesh);
+
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
 /* A retiling under way, for viewers that show it and programs that have other things to do in
@@ -587,6 +588,8 @@ TRIMESH_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, 
 
 #if defined(TRIMESH_RELAX_IMPLEMENTATION) && !defined(TRIMESH_RELAX_IMPLEMENTED)
 #define TRIMESH_RELAX_IMPLEMENTED
+
+/* ---- configuration ------------------------------------------------------------------ */
 
 #include <stdio.h>
 
@@ -1807,6 +1810,7 @@ static txm_status tmr_surface_build(const trimesh_desc *desc, txm_env *env, txm_
     if (report) *report = m.report;
     return status;
 }
+
 /* ---- creases and borders as lines --------------------------------------------------------- */
 
 /* Creases and borders, cut into lines at the vertices that must stay: where they meet, end or turn
@@ -2181,6 +2185,7 @@ static tmr_vec tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t lin
 static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t k) {
     return l->start[k] + tmr_dist(s->point[l->a[k]], p);
 }
+
 /* ---- density ------------------------------------------------------------------------------ */
 
 enum { TMR_GRADE_SWEEPS = 12 };   /* ours: of the limit on how fast the edge length may change    */
@@ -2519,6 +2524,7 @@ static void tmr_collapse(tmr_mesh *m, int32_t c) {
     m->valence[d]--;
     m->valence[e]--;
 }
+
 /* ---- moving on the surface ---------------------------------------------------------------- */
 
 /* The point of triangle a b c nearest to p, as weights of b and c; *part: 0 inside, 1 2 3 the edge
@@ -2867,6 +2873,7 @@ static trimesh_source tmr_surface_source(const tmr_surface *s, const trimesh_des
     source.v = txm_clampf(txm_float(weight[2]), 0, txm_float(1.0 - source.u));
     return source;
 }
+
 /* ---- flips -------------------------------------------------------------------------------- */
 
 /* 2 inradius / circumradius, 1 for an equilateral triangle; negative if it disagrees with n */
@@ -3341,6 +3348,7 @@ static int32_t tmr_collapse_short(tmr_work *w, double limit, double line_limit, 
     }
     return count;
 }
+
 /* ---- fields on a hierarchy ---------------------------------------------------------------- */
 
 /* One level of the hierarchy: nodes with neighbours; level 0 are the vertices of the mesh, each
@@ -3892,6 +3900,7 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
     tmr_settle(w);
     return 1;
 }
+
 /* ---- the right number --------------------------------------------------------------------- */
 
 /* what collapsing (sign -1) or splitting (+1) the edge of c would do to the valences */
@@ -4338,6 +4347,7 @@ static int tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
     }
     return 1;
 }
+
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
 /* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
@@ -4696,6 +4706,7 @@ no_memory:
     txm_arena_free(&arena);
     return 0;
 }
+
 /* ---- points that repel each other [1, sections 3.1 to 3.3] --------------------------------- */
 
 /* The thesis strews points, lets them repel each other, then joins them. Here they are joined first
@@ -5416,6 +5427,7 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
 }
 
 #define TMR_CALM 0.002 /* ours: mean movement, in edge lengths, below which nothing more comes */
+
 /* ---- retiling ----------------------------------------------------------------------------- */
 
 #define TMR_CREASE_ANGLE 50 /* ours: degrees, see docs/choices.md#creases */
@@ -5578,6 +5590,7 @@ TRIMESH_API void trimesh_free(trimesh_mesh *mesh) {
     txm_arena arena = mesh->memory; /* the mesh lies in it */
     txm_arena_free(&arena);
 }
+
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
 enum tmr_stage {
@@ -6041,6 +6054,7 @@ TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
     const txm_status status = trimesh_begin(desc, env, report, &job);
     return status == TXM_OK ? trimesh_end(job, env, out) : status;
 }
+
 /* ---- after the surface has changed ---------------------------------------------------------- */
 
 /* The new surface is retiled with points that come from three places: the old mesh, where it lies
@@ -8500,6 +8514,7 @@ TRIMESH_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, t
 }
 
 #endif /* TRIMESH_RELAX_IMPLEMENTATION */
+
 /* ---- licence ----------------------------------------------------------------------------
 
    This file may be used under either of two licences, whichever you like better.
