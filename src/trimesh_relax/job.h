@@ -1,0 +1,472 @@
+#ifndef TRIMESH_RELAX_JOB_H
+#define TRIMESH_RELAX_JOB_H
+
+#include "mend_all.h"
+#include "repel.h"
+#include "retile.h"
+
+/* ---- retiling step by step ----------------------------------------------------------------- */
+
+enum tmr_stage {
+    TMR_STAGE_MEND,
+    TMR_STAGE_STREW,
+    TMR_STAGE_JOIN,
+    TMR_STAGE_REPEL,
+    TMR_STAGE_LATTICE,
+    TMR_STAGE_SUBDIVIDE,
+    TMR_STAGE_FINISH,
+    TMR_STAGE_DONE
+};
+
+struct trimesh_job {
+    trimesh_desc desc;
+    txm_env env;           /* hooks of the call at hand, its progress by way of tmr_job_report     */
+    int (*progress)(void *user, float fraction, const char *stage); /* the caller's             */
+    void *progress_user;
+    float fraction;        /* the highest reported                                              */
+    trimesh_report report;
+    txm_status status;     /* of the first failure                                             */
+    int stage;             /* next to be done                                                  */
+    int shown;             /* the last one done                                                */
+    int round, rounds;     /* of repulsion: done, at most                                      */
+    double mean, largest;  /* movement in the last one                                         */
+    int retries;           /* with adapted density                                              */
+    float *plain_scale;    /* before that                                                       */
+    int cut;               /* lattice: how often the number is quartered, then triangles cut in four */
+    tmr_surface s;
+    tmr_lines l;
+    tmr_work w;
+    tmr_strewn t;
+    txm_arena input;       /* surface and lines                                                */
+    txm_arena first;       /* the mesh, in it the surface's vertices                           */
+    txm_arena second;      /* the mesh, compact                                                */
+    txm_arena scratch;     /* of the stage at hand                                             */
+    txm_arena view;        /* what the state points to                                         */
+};
+
+/* Everything that can be wrong with the numbers in a descriptor, but for the surface. */
+static txm_status tmr_check_desc(const trimesh_desc *desc, txm_env *env) {
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
+    if (desc->vertices < 4)
+        return txm_fail(env, TXM_TOO_SMALL, "vertices must be 4 or more");
+    if (desc->vertices > TRIMESH_MAX_VERTICES || desc->vertices > TMR_MOST)
+        return txm_fail(env, TXM_TOO_LARGE, "vertices: more than TRIMESH_MAX_VERTICES");
+    if (desc->method != TRIMESH_LATTICE && desc->method != TRIMESH_REPEL)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "method must be TRIMESH_LATTICE or TRIMESH_REPEL");
+    if (!(desc->adapt >= 0 && desc->adapt <= 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "adapt must be 0 to 1");
+    if (!(desc->crease_angle >= 0 && desc->crease_angle <= 180))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "crease_angle must be 0 to 180 degrees");
+    if (!(desc->line_spacing >= 0.25f && desc->line_spacing <= 4) &&
+        !(desc->line_spacing >= 0 && desc->line_spacing <= 0))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "line_spacing must be 0.25 to 4, or 0");
+    if (desc->iterations < 0 || desc->iterations > 1000)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "iterations must be 0 to 1000");
+    return TXM_OK;
+}
+
+/* spacing of the result where the scale is 1, in scaled units */
+static double tmr_job_spacing(const trimesh_job *job) {
+    return tmr_spacing(&job->s, (double)job->desc.vertices);
+}
+
+/* Fewer than any such surface can do with? A closed piece needs 4 vertices, one with handles as
+   many as the complete graph that can be drawn on it (Heawood), an open one 3. */
+static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
+    const trimesh_report *r = &job->report;
+    char text[160];
+    double least = 3.0 * (double)r->components + (r->loops == 0 ? (double)r->components : 0);
+    if (r->components == 1 && r->loops == 0 && r->euler < 2)
+        least = ceil((7 + sqrt(49 - 24.0 * (double)r->euler)) / 2);
+    if ((double)job->desc.vertices >= least) return TXM_OK;
+    snprintf(text, sizeof text, "%ld vertices are too few for %ld pieces of Euler characteristic %ld;"
+             " give %.0f or more", (long)job->desc.vertices, (long)r->components, r->euler, least);
+    return txm_fail(env, TXM_TOO_SMALL, text);
+}
+
+/* ---- the stages: each sets the next one ----------------------------------------------------- */
+
+/* Mend the surface, find its lines. */
+static txm_status tmr_job_mend(trimesh_job *job) {
+    size_t crease_edges = 0;
+    const float angle = job->desc.crease_angle > 0 ? job->desc.crease_angle : TMR_CREASE_ANGLE;
+    const txm_status status =
+        tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
+    if (status != TXM_OK) return status;
+    if (tmr_check_least(job, &job->env) != TXM_OK) return TXM_TOO_SMALL;
+    tmr_normalize_scale(&job->s);
+    if (job->desc.adapt > 0 &&
+        !tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input, &job->scratch))
+        return TXM_OUT_OF_MEMORY;
+    if (!tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
+                         &crease_edges, &job->l))
+        return TXM_OUT_OF_MEMORY;
+    job->report.crease_edges = crease_edges;
+    job->w.s = &job->s;
+    job->w.l = &job->l;
+    job->w.desc = &job->desc;
+    job->w.env = &job->env;
+    job->w.line_scale = job->desc.line_spacing > 0 ? job->desc.line_spacing : 1;
+    double lines = 0; /* at most half of the vertices go to lines: further apart if need be */
+    for (int32_t i = 0; i < job->l.line_count; i++) lines += job->l.length[i];
+    job->w.line_scale = fmax(job->w.line_scale, lines / tmr_job_spacing(job) /
+                                                    (0.5 * (double)job->desc.vertices));
+    job->w.pull = 1;
+    job->w.step = 1;
+    /* closed: V - E + F with a ghost for each loop */
+    const double euler = (double)job->report.euler + (double)job->report.loops;
+    if (job->desc.vertices >= TMR_CUT_FROM && (double)job->desc.vertices + 3 * euler > 1000)
+        job->cut = job->desc.vertices >= 4 * TMR_CUT_FROM ? 2 : 1;
+    job->stage = job->desc.method == TRIMESH_REPEL ? TMR_STAGE_STREW : TMR_STAGE_LATTICE;
+    return TXM_OK;
+}
+
+static txm_status tmr_job_strew(trimesh_job *job) {
+    const double room = tmr_strewn_room((double)job->desc.vertices);
+    const txm_status status = tmr_copy_surface(&job->w, room, &job->first);
+    if (status != TXM_OK) return status;
+    job->stage = TMR_STAGE_JOIN;
+    return tmr_strew(&job->t, &job->w, &job->desc, &job->scratch);
+}
+
+/* Join the strewn points; then leave behind what room the surface's own vertices took. */
+static txm_status tmr_job_join(trimesh_job *job) {
+    txm_status status = tmr_join_points(&job->t, &job->scratch);
+    if (status != TXM_OK) return status;
+    if ((status = tmr_rebuild(&job->w, 0, &job->second, &job->scratch)) != TXM_OK) return status;
+    txm_arena_free(&job->first);
+    job->rounds = job->desc.iterations > 0 ? job->desc.iterations : TMR_ROUNDS;
+    job->stage = TMR_STAGE_REPEL;
+    return TXM_OK;
+}
+
+static txm_status tmr_job_repel(trimesh_job *job) {
+    tmr_repel_round(&job->w, tmr_repel_force(job->round, job->rounds), &job->mean, &job->largest);
+    job->round++;
+    if (job->round < job->rounds && job->mean >= TMR_CALM) return TXM_OK;
+    tmr_improve(&job->w, 10, 2, 0.8, 1); /* more than the lattice needs: it is regular already */
+    job->stage = TMR_STAGE_FINISH;
+    return TXM_OK;
+}
+
+static txm_status tmr_job_lattice(trimesh_job *job) {
+    const double euler = (double)job->report.euler + (double)job->report.loops;
+    const double target = (double)job->desc.vertices;
+    int32_t aim = (int32_t)target;
+    for (int k = 0; k < job->cut; k++) aim = (int32_t)floor((aim + 3 * euler) / 4);
+    /* room for three vertices per one aimed at, or as many as the surface has, and a quarter more */
+    const double closed = (double)job->s.vertex_count + job->s.loop_count, most = fmax(closed, 3.0 * aim);
+    job->w.length = tmr_job_spacing(job) * sqrt(target / aim);
+    txm_status status = tmr_copy_surface(&job->w, most + floor(most / 4) + 1000 - closed, &job->first);
+    if (status != TXM_OK) return status;
+    status = tmr_make_lattice(&job->w, aim, job->desc.seed);
+    if (status != TXM_OK) return status;
+    job->stage = TMR_STAGE_SUBDIVIDE;
+    if (!job->cut || tmr_may_subdivide(&job->w)) return TXM_OK;
+    job->cut--; /* too coarse: once more, at four times the number */
+    job->stage = TMR_STAGE_LATTICE;
+    txm_arena_free(&job->first);
+    memset(&job->w.m, 0, sizeof job->w.m);
+    return TXM_OK;
+}
+
+static txm_status tmr_job_subdivide(trimesh_job *job) {
+    tmr_work *w = &job->w;
+    for (int left = job->cut;; left--) {
+        const txm_status status = tmr_rebuild(w, left > 0, &job->second, &job->scratch);
+        if (status != TXM_OK) return status;
+        txm_arena_free(&job->first);
+        txm_arena_free(&job->scratch);
+        job->first = job->second;
+        txm_arena_init(&job->second, &job->env);
+        if (left) tmr_improve(w, 2, 2, 1, 1);
+        if (left <= 1) break;
+    }
+    job->stage = TMR_STAGE_FINISH;
+    return TXM_OK;
+}
+
+/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. -1: no
+   memory. */
+static int tmr_surface_crosses(trimesh_job *job, int rim) {
+    tmr_work w = job->w;
+    txm_arena arena;
+    long found = -1;
+    txm_arena_init(&arena, &job->env);
+    if (tmr_copy_surface(&w, 0, &arena) == TXM_OK)
+        found = tmr_count_crossings(&w, NULL, rim, &arena);
+    txm_arena_free(&arena);
+    return found < 0 ? -1 : found > 0;
+}
+
+/* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
+   surface bends. 0: nothing is left to try. */
+static int tmr_job_retry(trimesh_job *job, txm_status *status) {
+    const int coarse = job->w.line_scale > 1;
+    const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
+    if (!coarse && !quartered && job->retries == 2) return 0;
+    txm_arena_free(&job->first);
+    txm_arena_free(&job->second);
+    memset(&job->w.m, 0, sizeof job->w.m);
+    if (coarse) {
+        job->w.line_scale = 1; /* lines too coarse for what lies between them */
+    } else if (quartered) {
+        job->cut--;
+    } else {
+        job->s.scale = job->retries ? job->plain_scale : job->s.scale;
+        job->plain_scale = job->s.scale;
+        if (!tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input,
+                             &job->scratch)) {
+            *status = TXM_OUT_OF_MEMORY;
+            return 1;
+        }
+        job->retries++;
+    }
+    job->stage = TMR_STAGE_LATTICE;
+    *status = TXM_OK;
+    return 1;
+}
+
+/* Finish, and see that nothing is turned over or crosses: a result that is not sound never leaves. */
+static txm_status tmr_job_finish(trimesh_job *job) {
+    char text[160];
+    const long target = (long)job->desc.vertices;
+    txm_status status = tmr_polish(&job->w, (int32_t)target, &job->scratch);
+    if (status != TXM_OK && status != TXM_TOO_SMALL) return status;
+    const int exact = status == TXM_OK;
+    if (exact) {
+        long faults;
+        job->stage = TMR_STAGE_DONE;
+        if (!tmr_mend_spots(&job->w, &faults, &job->env)) return TXM_OUT_OF_MEMORY;
+        const int crosses = faults == 0 ? 1 : tmr_surface_crosses(job, 0);
+        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+    }
+    if (tmr_job_retry(job, &status)) return status;
+    if (exact) { /* as the last resort: sheets that touch edge to edge may be meant to cross */
+        const int crosses = tmr_surface_crosses(job, 1);
+        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+    }
+    snprintf(text, sizeof text, "the surface has parts too thin or too fine for %ld vertices without "
+             "crossings; give about %ld", target, 2 * target);
+    return txm_fail(&job->env, TXM_TOO_SMALL, text);
+}
+
+static const char *tmr_stage_name(int stage) {
+    static const char *const names[] = {"mend",    "strew",     "join",   "repel",
+                                        "lattice", "subdivide", "finish", "finish"};
+    return names[stage];
+}
+
+/* how much of the work is done, about */
+static float tmr_job_fraction(const trimesh_job *job) {
+    static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
+    const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
+    return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
+}
+
+/* One stage or round. A failure is for good. */
+static txm_status tmr_job_advance(trimesh_job *job) {
+    txm_status status = TXM_OK;
+    if (job->status != TXM_OK) return txm_fail(&job->env, job->status, "the job has failed before");
+    const int stage = job->stage;
+    if (stage == TMR_STAGE_DONE) return TXM_OK;
+    if (txm_progress(&job->env, tmr_job_fraction(job), tmr_stage_name(stage)))
+        status = TXM_CANCELLED;
+    else if (stage == TMR_STAGE_MEND) status = tmr_job_mend(job);
+    else if (stage == TMR_STAGE_STREW) status = tmr_job_strew(job);
+    else if (stage == TMR_STAGE_JOIN) status = tmr_job_join(job);
+    else if (stage == TMR_STAGE_REPEL) status = tmr_job_repel(job);
+    else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
+    else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
+    else status = tmr_job_finish(job);
+    if (status == TXM_OK && job->w.cancelled) status = TXM_CANCELLED;
+    if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its flags are there */
+    job->shown = stage;
+    job->status = status;
+    if (status == TXM_OUT_OF_MEMORY)
+        txm_fail(&job->env, status, "no memory to retile the surface");
+    if (status == TXM_CANCELLED) txm_fail(&job->env, status, "cancelled while retiling");
+    return status;
+}
+
+/* ---- what a viewer sees --------------------------------------------------------------------- */
+
+/* is vertex v of the mesh one of the points? Before they are joined only those strewn are. */
+static int tmr_is_point(const trimesh_job *job, int32_t v) {
+    const tmr_mesh *m = &job->w.m;
+    if (m->corner[v] < 0 || tmr_is_ghost(m, v)) return 0;
+    return job->stage != TMR_STAGE_JOIN || job->t.keep[v];
+}
+
+static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_state *state) {
+    const tmr_mesh *m = &job->w.m;
+    size_t n = 0;
+    for (int32_t v = 0; v < m->vertex_count; v++)
+        number[v] = tmr_is_point(job, v) ? (int32_t)n++ : -1;
+    if (n == 0) return TXM_OK;
+    float *p = (float *)txm_arena_alloc(&job->view, n, 3 * sizeof(float));
+    if (!p) return TXM_OUT_OF_MEMORY;
+    state->points = n;
+    state->positions = p;
+    for (int32_t v = 0; v < m->vertex_count; v++) {
+        if (number[v] < 0) continue;
+        const tmr_vec at = tmr_add(tmr_scale(m->p[v], job->s.diagonal), job->s.centre);
+        *p++ = txm_float(at.x);
+        *p++ = txm_float(at.y);
+        *p++ = txm_float(at.z);
+    }
+    return TXM_OK;
+}
+
+static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
+                                     trimesh_state *state) {
+    const tmr_mesh *m = &job->w.m;
+    size_t n = 0;
+    for (int32_t f = 0; f < m->face_count; f++) n += !tmr_is_dead(m, f) && !tmr_is_ghost_face(m, f);
+    if (n == 0) return TXM_OK;
+    uint32_t *indices = (uint32_t *)txm_arena_alloc(&job->view, n, 3 * sizeof(uint32_t));
+    if (!indices) return TXM_OUT_OF_MEMORY;
+    state->triangles = n;
+    state->indices = indices;
+    for (int32_t f = 0; f < m->face_count; f++) {
+        if (tmr_is_dead(m, f) || tmr_is_ghost_face(m, f)) continue;
+        for (int k = 0; k < 3; k++) *indices++ = (uint32_t)number[m->vertex[3 * f + k]];
+    }
+    return TXM_OK;
+}
+
+static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
+    const tmr_mesh *m = &job->w.m;
+    memset(state, 0, sizeof *state);
+    state->stage = tmr_stage_name(job->shown);
+    state->round = job->round;
+    state->fraction = tmr_job_fraction(job);
+    state->done = job->stage == TMR_STAGE_DONE;
+    state->mean = txm_float(job->mean);
+    state->largest = txm_float(job->largest);
+    if (job->status != TXM_OK || m->vertex_count == 0) return job->status;
+    int32_t *number =
+        (int32_t *)txm_arena_alloc(&job->view, (size_t)m->vertex_count, sizeof(int32_t));
+    if (!number) return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_show_points(job, number, state);
+    if (status == TXM_OK && job->stage != TMR_STAGE_JOIN)
+        status = tmr_show_triangles(job, number, state);
+    return status;
+}
+
+/* ---- jobs: public --------------------------------------------------------------------------- */
+
+/* Pass progress on, never falling, also where a stage is done twice. */
+static int tmr_job_report(void *user, float fraction, const char *stage) {
+    trimesh_job *job = (trimesh_job *)user;
+    if (fraction > job->fraction) job->fraction = fraction;
+    return job->progress(job->progress_user, job->fraction, stage);
+}
+
+/* Take the hooks of this call, not its allocator: the blocks are of the first one's. */
+static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
+    const txm_env old = job->env;
+    memset(&job->env, 0, sizeof job->env);
+    if (env) job->env = *env;
+    job->env.allocate = old.allocate;
+    job->env.release = old.release;
+    job->env.memory_user = old.memory_user;
+    job->env.message[0] = 0;
+    if (!job->env.progress) return;
+    job->progress = job->env.progress;
+    job->progress_user = job->env.progress_user;
+    job->env.progress = tmr_job_report;
+    job->env.progress_user = job;
+}
+
+/* Hand the message to the caller. */
+static txm_status tmr_job_leave(const trimesh_job *job, txm_env *env, txm_status status) {
+    return status == TXM_OK ? TXM_OK : txm_fail(env, status, job->env.message);
+}
+
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
+                                     trimesh_report *report, trimesh_job **job) {
+    if (report) memset(report, 0, sizeof *report);
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
+    *job = NULL;
+    txm_status status = tmr_check_desc(desc, env);
+    if (status != TXM_OK) return status;
+    trimesh_job *j = (trimesh_job *)txm_alloc(env, sizeof *j);
+    if (!j) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
+    memset(j, 0, sizeof *j);
+    if (env) j->env = *env;
+    tmr_job_enter(j, env);
+    j->desc = *desc;
+    txm_arena_init(&j->input, env);
+    txm_arena_init(&j->first, env);
+    txm_arena_init(&j->second, env);
+    txm_arena_init(&j->scratch, env);
+    txm_arena_init(&j->view, env);
+    status = tmr_job_advance(j);
+    if (report) *report = j->report;
+    tmr_job_leave(j, env, status);
+    if (status != TXM_OK) trimesh_job_free(j);
+    else *job = j;
+    return status;
+}
+
+TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, trimesh_state *state) {
+    if (state) memset(state, 0, sizeof *state);
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
+    tmr_job_enter(job, env);
+    txm_arena_free(&job->view);
+    txm_status status = tmr_job_advance(job);
+    if (state && status == TXM_OK) {
+        status = tmr_show(job, state);
+        if (status != TXM_OK) { /* the job itself goes on */
+            txm_arena_free(&job->view);
+            state->points = state->triangles = 0;
+            state->positions = NULL;
+            state->indices = NULL;
+            txm_fail(&job->env, status, "no memory for the state; the job can go on");
+        }
+    } else if (state) {
+        tmr_show(job, state);
+    }
+    return tmr_job_leave(job, env, status);
+}
+
+TRIMESH_API txm_status trimesh_end(trimesh_job *job, txm_env *env, trimesh_mesh **out) {
+    if (out) *out = NULL;
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
+    txm_status status = TXM_OK;
+    tmr_job_enter(job, env);
+    if (!out) status = txm_fail(&job->env, TXM_BAD_ARGUMENT, "out is NULL");
+    while (status == TXM_OK && job->stage != TMR_STAGE_DONE) status = tmr_job_advance(job);
+    if (status == TXM_OK) status = job->status;
+    if (status == TXM_OK) {
+        status = tmr_write(&job->w, out);
+        if (status != TXM_OK)
+            txm_fail(&job->env, status, "no memory for the mesh");
+    }
+    tmr_job_leave(job, env, status);
+    trimesh_job_free(job);
+    return status;
+}
+
+TRIMESH_API void trimesh_job_free(trimesh_job *job) {
+    if (!job) return;
+    const txm_env env = job->env;
+    txm_arena_free(&job->input);
+    txm_arena_free(&job->first);
+    txm_arena_free(&job->second);
+    txm_arena_free(&job->scratch);
+    txm_arena_free(&job->view);
+    txm_free(&env, job);
+}
+
+TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
+                                      trimesh_report *report, trimesh_mesh **out) {
+    trimesh_job *job;
+    if (out) *out = NULL;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    const txm_status status = trimesh_begin(desc, env, report, &job);
+    return status == TXM_OK ? trimesh_end(job, env, out) : status;
+}
+
+#endif /* TRIMESH_RELAX_JOB_H */

@@ -1,0 +1,449 @@
+#ifndef TRIMESH_RELAX_LINES_H
+#define TRIMESH_RELAX_LINES_H
+
+#include "surface.h"
+
+/* ---- creases and borders as lines --------------------------------------------------------- */
+
+/* Creases and borders, cut into lines at the vertices that must stay: where they meet, end or turn
+   sharply. A line is a run of segments, each an edge of the surface. */
+typedef struct tmr_lines {
+    int32_t line_count, segment_count;
+    int32_t *first;   /* 1 per line and one more: its first segment                             */
+    uint8_t *closed;  /* 1 per line: its end is its beginning, and no corner                    */
+    uint8_t *border;  /* 1 per line: part of the border                                         */
+    double *length;   /* 1 per line                                                             */
+    int32_t *a, *b;   /* 1 per segment: its vertices on the surface                             */
+    int32_t *face;    /* 1 per segment: a face beside it                                        */
+    int32_t *line;    /* 1 per segment                                                          */
+    double *start;    /* 1 per segment: distance from the beginning of the line to a            */
+    int32_t *edge;    /* 1 per corner of the surface: 0, or 1 + the line that its edge is part of */
+    uint8_t *kind;    /* 1 per vertex of the surface: trimesh_kind                              */
+    int32_t *segment; /* 1 per vertex of the surface: on a line one of its segments             */
+} tmr_lines;
+
+enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
+
+/* the edge opposite to corner c, seen from its vertex v: the other end */
+static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
+    const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
+    return a == v ? b : a;
+}
+
+/* how far the surface turns at the edge opposite to c: 1 - cosine of the angle; 0 at the border */
+static double tmr_turn_at(const tmr_surface *s, int32_t c) {
+    const int32_t o = s->opposite[c];
+    return o < 0 ? 0 : 1 - tmr_dot(s->normal[c / 3], s->normal[o / 3]);
+}
+
+/* Which edges of the surface are creases? Those at which it turns by the angle and more, and, for
+   a sharp edge is not the same as a coarse mesh, clearly more than at the other edges of the two
+   triangles: the surface turns at most half as much there. Where three or four edges of two
+   triangles are sharp, as on small steps and pins, they count by the angle alone if it is wide.
+   Writes 1 per corner into s->edge_kind. */
+static size_t tmr_find_creases(tmr_surface *s, double angle) {
+    const double least = angle >= 180 ? 3 : 1 - cos(angle * (TXM_PI / 180));
+    const double sure = fmax(least, 1 - cos(75 * (TXM_PI / 180)));
+    size_t count = 0;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        const int32_t o = s->opposite[c];
+        s->edge_kind[c] = o < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE;
+        const double turn = tmr_turn_at(s, c);
+        if (o < 0 || turn < least) continue;
+        /* the largest turn of the other edges but for those that are as sharp themselves */
+        const double around[4] = {tmr_turn_at(s, tmr_next(c)), tmr_turn_at(s, tmr_prev(c)),
+                                  tmr_turn_at(s, tmr_next(o)), tmr_turn_at(s, tmr_prev(o))};
+        double sum = 0;
+        int sharp = 0;
+        for (int k = 0; k < 4; k++) {
+            sharp += around[k] > 0.5 * turn;
+            sum += around[k] > 0.5 * turn ? 0 : around[k];
+        }
+        if (turn < sure && (sharp > 2 || sum > 0.25 * turn)) continue;
+        s->edge_kind[c] = TMR_CREASE_EDGE;
+        count++;
+    }
+    return count / 2;
+}
+
+/* One entry per vertex and line edge at it, in the order of the vertices. */
+typedef struct tmr_ends {
+    int32_t *first;  /* per vertex, and one more */
+    int32_t *corner; /* the edge opposite to it  */
+} tmr_ends;
+
+/* is this the one of an edge's two corners that speaks for it? */
+static int tmr_speaks(const tmr_surface *s, int32_t c) {
+    return s->opposite[c] < c;
+}
+
+static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends) {
+    const int32_t n = s->vertex_count;
+    int32_t total = 0;
+    ends->first = (int32_t *)txm_arena_zero(arena, (size_t)n + 2, sizeof(int32_t));
+    if (!ends->first) return 0;
+    int32_t *count = ends->first + 1;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
+        count[s->vertex[tmr_next(c)]]++;
+        count[s->vertex[tmr_prev(c)]]++;
+        total += 2;
+    }
+    ends->corner = (int32_t *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(int32_t));
+    if (!ends->corner) return 0;
+    int32_t sum = 0; /* first[v + 1] counts up from the place of v's first entry to its end */
+    for (int32_t v = 0; v < n; v++) {
+        const int32_t k = count[v];
+        count[v] = sum;
+        sum += k;
+    }
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
+        ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
+        ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
+    }
+    return 1;
+}
+
+/* Creases that hang together to less than the given length in all are noise: make them plain. */
+static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
+                                  txm_arena *arena) {
+    const int32_t n = s->vertex_count;
+    int32_t *stack = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
+    uint8_t *seen = (uint8_t *)txm_arena_zero(arena, (size_t)n, 1);
+    if (!stack || !seen) return 0;
+    for (int32_t v = 0; v < n; v++) {
+        int32_t size = 0, done = 0;
+        double length = 0;
+        int has_border = 0;
+        if (seen[v] || ends->first[v] == ends->first[v + 1]) continue;
+        seen[v] = 1;
+        stack[size++] = v;
+        for (; done < size; done++) {
+            const int32_t u = stack[done];
+            for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
+                const int32_t w = tmr_far_end(s, ends->corner[e], u);
+                has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
+                length += 0.5 * tmr_dist(s->point[u], s->point[w]);
+                if (!seen[w]) {
+                    seen[w] = 1;
+                    stack[size++] = w;
+                }
+            }
+        }
+        if (length >= least || has_border) continue;
+        for (int32_t i = 0; i < size; i++) {
+            for (int32_t e = ends->first[stack[i]]; e < ends->first[stack[i] + 1]; e++) {
+                const int32_t c = ends->corner[e];
+                s->edge_kind[c] = TMR_PLAIN_EDGE;
+                if (s->opposite[c] >= 0) s->edge_kind[s->opposite[c]] = TMR_PLAIN_EDGE;
+            }
+        }
+    }
+    return 1;
+}
+
+/* Direction from v along the line that starts with the edge of corner c, over about the distance
+   reach or up to where it branches. */
+static tmr_vec tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v, int32_t c,
+                                  double reach) {
+    int32_t at = tmr_far_end(s, c, v), e = c;
+    for (int i = 0; i < 1000; i++) {
+        if (tmr_dist2(s->point[at], s->point[v]) >= reach * reach) break;
+        if (ends->first[at + 1] - ends->first[at] != 2) break;
+        const int32_t k = ends->first[at];
+        e = ends->corner[k] == e ? ends->corner[k + 1] : ends->corner[k];
+        at = tmr_far_end(s, e, at);
+        if (at == v) break;
+    }
+    if (at == v) at = tmr_far_end(s, c, v);
+    return tmr_unit(tmr_sub(s->point[at], s->point[v]));
+}
+
+/* The kind of every vertex; corners where lines meet, end, or turn by more than 40 degrees over
+   the distance reach (the sharpest vertex of each bend only). */
+static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double reach,
+                            txm_arena *arena, uint8_t *kind) {
+    const int32_t n = s->vertex_count;
+    float *turn = (float *)txm_arena_zero(arena, (size_t)n, sizeof(float));
+    if (!turn) return 0;
+    for (int32_t v = 0; v < n; v++) {
+        const int32_t k = ends->first[v], count = ends->first[v + 1] - k;
+        kind[v] = TRIMESH_FREE;
+        if (count == 0) continue;
+        kind[v] = TRIMESH_CORNER;
+        if (count != 2) continue;
+        const int32_t c = ends->corner[k], d = ends->corner[k + 1];
+        if (s->edge_kind[c] != s->edge_kind[d]) continue;
+        kind[v] = s->edge_kind[c] == TMR_BORDER_EDGE ? TRIMESH_BORDER : TRIMESH_CREASE;
+        turn[v] = (float)(1 + tmr_dot(tmr_line_direction(s, ends, v, c, reach),
+                                      tmr_line_direction(s, ends, v, d, reach)));
+    }
+    const float limit = (float)(1 - cos(40 * TXM_PI / 180));
+    for (int32_t v = 0; v < n; v++) {
+        int sharpest = turn[v] > limit;
+        for (int32_t k = ends->first[v]; k < ends->first[v + 1] && sharpest; k++) {
+            int32_t at = v, e = ends->corner[k];
+            double way = 0;
+            for (int i = 0; i < 1000 && sharpest; i++) {
+                const int32_t next = tmr_far_end(s, e, at);
+                way += tmr_dist(s->point[at], s->point[next]);
+                at = next;
+                if (way > reach || at == v || turn[at] <= 0) break;
+                const float other = turn[at], own = turn[v];
+                sharpest = other < own || (at >= v && other <= own);
+                const int32_t j = ends->first[at];
+                e = ends->corner[j] == e ? ends->corner[j + 1] : ends->corner[j];
+            }
+        }
+        if (sharpest) kind[v] = TRIMESH_CORNER;
+    }
+    return 1;
+}
+
+enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are near it is no tip */
+#define TMR_TIP_DEFECT 1.3  /* ours: radians of angle missing around a tip                    */
+
+/* 2 pi minus the angles around each vertex: what is missing there for the surface to be flat. */
+static void tmr_angle_defects(const tmr_surface *s, float *defect) {
+    for (int32_t v = 0; v < s->vertex_count; v++) defect[v] = (float)(2 * TXM_PI);
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        const tmr_vec p = s->point[s->vertex[c]];
+        const tmr_vec a = tmr_sub(s->point[s->vertex[tmr_next(c)]], p);
+        const tmr_vec b = tmr_sub(s->point[s->vertex[tmr_prev(c)]], p);
+        defect[s->vertex[c]] -= txm_float(atan2(tmr_len(tmr_cross(a, b)), tmr_dot(a, b)));
+    }
+}
+
+/* Is v the tip of something thinner than an edge, such as a horn? Within reach much angle is
+   missing, and no vertex there lies beyond v along its normal. */
+static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *kind, int32_t v,
+                      double reach) {
+    int32_t list[TMR_TIP_BALL];
+    int count = 1;
+    double sum = 0;
+    list[0] = v;
+    for (int i = 0; i < count; i++) {
+        const int32_t u = list[i], first = s->corner[u];
+        if (kind[u] != TRIMESH_FREE) return 0;
+        if (tmr_dot(tmr_sub(s->point[u], s->point[v]), s->vertex_normal[v]) > 1e-9) return 0;
+        sum += defect[u];
+        for (int32_t c = first; c >= 0;) {
+            const int32_t x = s->vertex[tmr_next(c)];
+            int known = tmr_dist2(s->point[x], s->point[v]) > reach * reach;
+            for (int j = 0; j < count && !known; j++) known = list[j] == x;
+            if (!known && count == TMR_TIP_BALL) return 0;
+            if (!known) list[count++] = x;
+            c = tmr_ccw(s->opposite, c);
+            if (c == first) break;
+        }
+    }
+    return sum >= TMR_TIP_DEFECT;
+}
+
+/* Make the tips corners, so that they stay. 0: no memory. */
+static int tmr_find_tips(const tmr_surface *s, double reach, txm_arena *scratch, uint8_t *kind) {
+    float *defect = (float *)txm_arena_alloc(scratch, (size_t)s->vertex_count, sizeof(float));
+    if (!defect) return 0;
+    tmr_angle_defects(s, defect);
+    for (int32_t v = 0; v < s->vertex_count; v++)
+        if (kind[v] == TRIMESH_FREE && defect[v] > 0 && tmr_is_tip(s, defect, kind, v, reach))
+            kind[v] = TRIMESH_CORNER;
+    return 1;
+}
+
+/* Follow the line from v over the edge of corner c to its end, as one more line. */
+static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, int32_t v,
+                      int32_t c) {
+    const int32_t id = l->line_count++, begin = v;
+    double length = 0;
+    l->first[id] = l->segment_count;
+    l->border[id] = s->edge_kind[c] == TMR_BORDER_EDGE;
+    for (;;) {
+        TRIMESH_ASSERT(l->segment_count < ends->first[s->vertex_count] / 2);
+        const int32_t k = l->segment_count++, w = tmr_far_end(s, c, v);
+        l->a[k] = v;
+        l->b[k] = w;
+        l->face[k] = c / 3;
+        l->line[k] = id;
+        l->start[k] = length;
+        length += tmr_dist(s->point[v], s->point[w]);
+        l->edge[c] = 1 + id;
+        if (s->opposite[c] >= 0) l->edge[s->opposite[c]] = 1 + id;
+        l->segment[v] = l->segment[w] = k;
+        v = w;
+        if (v == begin || l->kind[v] == TRIMESH_CORNER) break;
+        const int32_t e = ends->first[v];
+        c = ends->corner[e] == c ? ends->corner[e + 1] : ends->corner[e];
+    }
+    l->closed[id] = v == begin && l->kind[v] != TRIMESH_CORNER;
+    l->length[id] = length;
+    l->first[id + 1] = l->segment_count;
+}
+
+/* Find all lines. spacing: the edge length to come, by which short creases and slight bends are
+   told from real ones. 0: no memory. */
+static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
+                           txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
+    tmr_ends ends;
+    const size_t n = (size_t)s->vertex_count, corners = 3 * (size_t)s->face_count;
+    if (tmr_find_creases(s, angle)) {
+        if (!tmr_list_ends(s, scratch, &ends)) return 0;
+        if (!tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch)) return 0;
+    }
+    if (!tmr_list_ends(s, scratch, &ends)) return 0;
+    /* each edge is listed at both its ends and becomes one segment; no line is without segments */
+    const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
+    l->line_count = l->segment_count = 0;
+    l->first = (int32_t *)txm_arena_zero(arena, segments + 1, sizeof(int32_t));
+    l->closed = (uint8_t *)txm_arena_alloc(arena, segments + 1, 1);
+    l->border = (uint8_t *)txm_arena_alloc(arena, segments + 1, 1);
+    l->length = (double *)txm_arena_alloc(arena, segments + 1, sizeof(double));
+    l->a = (int32_t *)txm_arena_alloc(arena, segments + 1, sizeof(int32_t));
+    l->b = (int32_t *)txm_arena_alloc(arena, segments + 1, sizeof(int32_t));
+    l->face = (int32_t *)txm_arena_alloc(arena, segments + 1, sizeof(int32_t));
+    l->line = (int32_t *)txm_arena_alloc(arena, segments + 1, sizeof(int32_t));
+    l->start = (double *)txm_arena_alloc(arena, segments + 1, sizeof(double));
+    l->edge = (int32_t *)txm_arena_zero(arena, corners, sizeof(int32_t));
+    l->kind = (uint8_t *)txm_arena_alloc(arena, n, 1);
+    l->segment = (int32_t *)txm_arena_zero(arena, n, sizeof(int32_t));
+    if (!l->first || !l->closed || !l->border || !l->length || !l->a || !l->b || !l->face ||
+        !l->line || !l->start || !l->edge || !l->kind || !l->segment)
+        return 0;
+    if (!tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind)) return 0;
+    if (angle < 180 && !tmr_find_tips(s, 0.75 * spacing, scratch, l->kind)) return 0;
+    for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
+        for (int32_t v = 0; v < s->vertex_count; v++) {
+            if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
+            for (int32_t k = ends.first[v]; k < ends.first[v + 1]; k++)
+                if (!l->edge[ends.corner[k]]) tmr_trace(s, &ends, l, v, ends.corner[k]);
+        }
+    }
+    *crease_edges = 0;
+    for (int32_t i = 0; i < l->line_count; i++)
+        if (!l->border[i]) *crease_edges += (size_t)(l->first[i + 1] - l->first[i]);
+    return 1;
+}
+
+/* the segment behind (step 1) or before (-1) segment k of its line; -1 at the end */
+static int32_t tmr_segment_step(const tmr_lines *l, int32_t k, int step) {
+    const int32_t line = l->line[k], first = l->first[line], last = l->first[line + 1] - 1;
+    if (step > 0 && k == last) return l->closed[line] ? first : -1;
+    if (step < 0 && k == first) return l->closed[line] ? last : -1;
+    return k + step;
+}
+
+/* The place on the line nearest to p, walking from segment *k as long as it gets nearer. */
+static tmr_vec tmr_project_line(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t *k) {
+    tmr_vec best = p;
+    double least = -1;
+    int direction = 0;
+    for (int32_t i = *k, guard = l->segment_count + 1; i >= 0 && guard > 0; guard--) {
+        const tmr_vec a = s->point[l->a[i]], ab = tmr_sub(s->point[l->b[i]], a);
+        const double t = tmr_dot(tmr_sub(p, a), ab) / (tmr_len2(ab) + 1e-300);
+        const tmr_vec q = tmr_mad(a, ab, t < 0 ? 0 : t > 1 ? 1 : t);
+        const double d = tmr_dist2(p, q);
+        if (least >= 0 && d >= least) break;
+        least = d;
+        best = q;
+        *k = i;
+        const int step = t < 0 ? -1 : t > 1 ? 1 : 0;
+        if (step == 0 || step == -direction) break;
+        direction = step;
+        i = tmr_segment_step(l, i, step);
+    }
+    return best;
+}
+
+/* the place on a line at the distance from its beginning; *k: the segment it lies on */
+static tmr_vec tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t line, double way,
+                           int32_t *k) {
+    int32_t low = l->first[line], high = l->first[line + 1] - 1;
+    while (low < high) { /* the last segment that starts at way or before */
+        const int32_t middle = (low + high + 1) / 2;
+        if (l->start[middle] <= way) low = middle;
+        else high = middle - 1;
+    }
+    const double end = low + 1 < l->first[line + 1] ? l->start[low + 1] : l->length[line];
+    const double span = end - l->start[low];
+    double t = span > 0 ? (way - l->start[low]) / span : 0;
+    t = t < 0 ? 0 : t > 1 ? 1 : t;
+    *k = low;
+    const tmr_vec a = s->point[l->a[low]];
+    return tmr_mad(a, tmr_sub(s->point[l->b[low]], a), t);
+}
+
+/* how far from the beginning of its line a place on segment k lies */
+static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t k) {
+    return l->start[k] + tmr_dist(s->point[l->a[k]], p);
+}
+
+/* ---- density ------------------------------------------------------------------------------ */
+
+enum { TMR_GRADE_SWEEPS = 12 };   /* ours: of the limit on how fast the edge length may change    */
+#define TMR_TURN_PER_EDGE 0.6     /* ours: radians that one edge may turn where density adapts    */
+#define TMR_LEAST_SIZE 0.2        /* ours: the shortest edges where it adapts fully               */
+
+/* The edge length, where the scale is 1, of so many vertices on the surface: triangles of edge L
+   take sqrt(3) / 4 L^2 each, and there are two per vertex. */
+static double tmr_spacing(const tmr_surface *s, double vertices) {
+    double sum = 0;
+    for (int32_t f = 0; f < s->face_count && s->scale; f++) {
+        const int32_t *v = s->vertex + 3 * f;
+        const double scale = (s->scale[v[0]] + (double)s->scale[v[1]] + s->scale[v[2]]) / 3;
+        const tmr_vec n = tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
+        sum += 0.5 * tmr_len(n) / (scale * scale);
+    }
+    return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
+}
+
+/* Make the mean of the scale such that with and without it the same number of vertices gives the
+   same spacing where it is 1. */
+static void tmr_normalize_scale(tmr_surface *s) {
+    if (!s->scale) return;
+    const double factor = tmr_spacing(s, 1) / sqrt(s->area * 1.1547005383792515);
+    for (int32_t v = 0; v < s->vertex_count; v++) s->scale[v] = txm_float(s->scale[v] * factor);
+}
+
+/* Curvature at every vertex: the most that the normal turns per unit of length along an edge. */
+static void tmr_curvature(const tmr_surface *s, float *curvature) {
+    for (int32_t v = 0; v < s->vertex_count; v++) curvature[v] = 0;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
+        const double length = tmr_dist(s->point[a], s->point[b]);
+        if (length <= 0) continue;
+        const float k = txm_float(tmr_dist(s->vertex_normal[a], s->vertex_normal[b]) / length);
+        curvature[a] = txm_maxf(curvature[a], k);
+        curvature[b] = txm_maxf(curvature[b], k);
+    }
+}
+
+/* Shorten the wanted edge lengths where the surface bends, such that an edge turns by no more than
+   TMR_TURN_PER_EDGE, fully or in part (adapt); and let them grow with the distance no faster than by
+   a third of it. 0: no memory. */
+static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
+                           txm_arena *scratch) {
+    const size_t n = (size_t)s->vertex_count;
+    float *curvature = (float *)txm_arena_alloc(scratch, n, sizeof(float));
+    float *scale = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    if (!curvature || !scale) return 0;
+    tmr_curvature(s, curvature);
+    for (size_t v = 0; v < n; v++) {
+        const double wanted = curvature[v] > 0 ? TMR_TURN_PER_EDGE / curvature[v] / spacing : 1;
+        const double limited = wanted < TMR_LEAST_SIZE ? TMR_LEAST_SIZE : wanted > 1 ? 1 : wanted;
+        scale[v] = txm_float((s->scale ? s->scale[v] : 1) * (1 - adapt + adapt * limited));
+    }
+    for (int sweep = 0; sweep < TMR_GRADE_SWEEPS; sweep++) {
+        for (int32_t i = 0; i < 3 * s->face_count; i++) {
+            const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
+            const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
+            const double d = tmr_dist(s->point[a], s->point[b]) / spacing / 3;
+            scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
+            scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
+        }
+    }
+    s->scale = scale;
+    return 1;
+}
+
+#endif /* TRIMESH_RELAX_LINES_H */

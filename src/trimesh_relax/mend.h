@@ -1,0 +1,539 @@
+#ifndef TRIMESH_RELAX_MEND_H
+#define TRIMESH_RELAX_MEND_H
+
+#include "config.h"
+
+/* ---- mending: state and checks ------------------------------------------------------------ */
+
+enum {
+    TMR_MOST = 1 << 26,      /* vertices and triangles of an input or a result                    */
+    TMR_MOST_SLOTS = INT32_MAX / 3, /* of vertices or of triangles: corners are numbered by int32_t */
+    TMR_NO_VERTEX = -1,      /* in the first corner of a triangle: to be taken away               */
+    TMR_OVERFULL = -2,       /* as opposite: the edge has more than two triangles                 */
+    TMR_MAPPED = 8,          /* as turn: corners do not match, take the nearest point of origin  */
+    TMR_MEND_ROUNDS = 8,     /* ours: of flipping and collapsing; one or two do for real damage   */
+    TMR_FLIP_SWEEPS = 64,    /* ours: to and fro over the thin triangles; few use more than three */
+    TMR_FAN_LIMIT = 256      /* ours: vertices of more triangles are not touched, for speed       */
+};
+
+/* What is worked on until the faces are clean. Vertices keep the caller's numbers to the end: a
+   vertex that another one lies on, or that is not used, is just not mentioned any more. */
+typedef struct tmr_mend {
+    const trimesh_desc *desc;
+    txm_env *env;
+    trimesh_report report;
+    int32_t vertex_count, face_count;
+    tmr_vec *point;    /* 1 per input vertex, scaled                                      */
+    int32_t *rename;   /* 1 per input vertex: which one stands for it                     */
+    int32_t *degree;   /* 1 per input vertex: counts, of the step at hand                 */
+    int32_t *stamp;    /* 1 per input vertex: marks neighbours                            */
+    int32_t *vertex;   /* the next four as in tmr_surface, with room for the input        */
+    int32_t *opposite;
+    uint32_t *origin;
+    uint8_t *turn;
+    uint8_t *flag;     /* 1 per face, of the step at hand                                 */
+    uint8_t *twin;     /* 1 per face: there was one of opposite winding                   */
+    int single;        /* non-zero: there are faces of which that is not so               */
+    int32_t *list;     /* 1 per face, of the step at hand                                 */
+    txm_pair *pairs, *spare; /* 1 per corner: edges in order                              */
+    int32_t *table;    /* hash table: index + 1, 0 = free                                 */
+    size_t table_size; /* a power of two, at least twice the vertices and the faces       */
+    tmr_vec centre;
+    double diagonal;
+    double noise;      /* scaled units: where single precision ends                       */
+} tmr_mend;
+
+static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
+    if (!txm_progress(m->env, fraction, "mend")) return TXM_OK;
+    return txm_fail(m->env, TXM_CANCELLED, "cancelled while mending the surface");
+}
+
+/* Refuse with the number of what is wrong. */
+static txm_status tmr_mend_fail(txm_env *env, txm_status status, const char *what, size_t number,
+                                const char *why) {
+    char line[160];
+    snprintf(line, sizeof line, "%s %lu (from 0) %s", what, (unsigned long)number, why);
+    return txm_fail(env, status, line);
+}
+
+static txm_status tmr_mend_fail_edge(tmr_mend *m, int32_t corner, int count) {
+    const int32_t a = m->vertex[tmr_next(corner)], b = m->vertex[tmr_prev(corner)];
+    char line[160];
+    m->report.bad_edge[0] = (uint32_t)(a < b ? a : b);
+    m->report.bad_edge[1] = (uint32_t)(a < b ? b : a);
+    if (count > 2)
+        snprintf(line, sizeof line,
+                 "edge between vertex %ld and %ld (of the input, from 0) has %d triangles; "
+                 "make the surface a manifold: at most two at an edge",
+                 (long)m->report.bad_edge[0], (long)m->report.bad_edge[1], count);
+    else
+        snprintf(line, sizeof line,
+                 "edge between vertex %ld and %ld (of the input, from 0) closes a one-sided "
+                 "band; cut the surface so that it has two sides",
+                 (long)m->report.bad_edge[0], (long)m->report.bad_edge[1]);
+    return txm_fail(m->env, TXM_BAD_DATA, line);
+}
+
+static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
+    const size_t count = desc->surface.vertex_count;
+    double least = 0, most = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double s = desc->scale[i];
+        if (!txm_is_finite(s) || !(s > 0))
+            return tmr_mend_fail(env, TXM_BAD_ARGUMENT, "scale of vertex", i,
+                                 "must be finite and above 0");
+        if (i == 0 || s < least) least = s;
+        if (i == 0 || s > most) most = s;
+    }
+    if (most > 1000 * least)
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "scale: the largest is more than 1000 times the least");
+    return TXM_OK;
+}
+
+/* All that can be wrong with the numbers themselves. */
+static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
+    const trimesh_view *in = &desc->surface;
+    const size_t limit = TRIMESH_MAX_VERTICES < TMR_MOST ? TRIMESH_MAX_VERTICES : TMR_MOST;
+    if (in->vertex_count == 0 || in->triangle_count == 0)
+        return txm_fail(env, TXM_TOO_SMALL, "the surface has no vertices or no triangles");
+    if (!in->positions || !in->indices)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "surface: positions or indices is NULL");
+    if (in->vertex_count > limit || in->triangle_count > limit)
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "the surface has more than TRIMESH_MAX_VERTICES vertices or triangles");
+    if (!(desc->weld >= 0 && desc->weld <= 0.01f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01");
+    for (size_t i = 0; i < 3 * in->vertex_count; i++) {
+        if (!txm_is_finite(in->positions[i]))
+            return tmr_mend_fail(env, TXM_BAD_DATA, "vertex", i / 3, "has a position not finite");
+    }
+    for (size_t i = 0; i < 3 * in->triangle_count; i++) {
+        if (in->indices[i] >= in->vertex_count)
+            return tmr_mend_fail(env, TXM_BAD_DATA, "triangle", i / 3,
+                                 "has a vertex index out of range");
+    }
+    return desc->scale ? tmr_check_scale(desc, env) : TXM_OK;
+}
+
+/* Allocate all that the mending needs: what the surface keeps from arena, the rest from scratch. */
+static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scratch) {
+    const size_t v = (size_t)m->vertex_count, f = (size_t)m->face_count;
+    m->table_size = 16;
+    while (m->table_size < 2 * (v > f ? v : f)) m->table_size *= 2;
+    m->vertex = (int32_t *)txm_arena_alloc(arena, 3 * f, sizeof(int32_t));
+    m->opposite = (int32_t *)txm_arena_alloc(arena, 3 * f, sizeof(int32_t));
+    m->origin = (uint32_t *)txm_arena_alloc(arena, f, sizeof(uint32_t));
+    m->turn = (uint8_t *)txm_arena_zero(arena, f, 1);
+    m->rename = (int32_t *)txm_arena_alloc(scratch, 3 * v, sizeof(int32_t));
+    m->flag = (uint8_t *)txm_arena_zero(scratch, 2 * f, 1);
+    m->list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
+    m->pairs = (txm_pair *)txm_arena_alloc(scratch, 6 * f, sizeof(txm_pair));
+    m->table = (int32_t *)txm_arena_alloc(scratch, m->table_size, sizeof(int32_t));
+    if (!m->vertex || !m->opposite || !m->origin || !m->turn || !m->rename || !m->flag ||
+        !m->list || !m->pairs || !m->table)
+        return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
+    m->degree = m->rename + v;
+    m->stamp = m->degree + v;
+    m->twin = m->flag + f;
+    m->spare = m->pairs + 3 * f;
+    return TXM_OK;
+}
+
+/* ---- mending: vertices -------------------------------------------------------------------- */
+
+/* Scale the used vertices; afterwards rename is -1 for the others. */
+static txm_status tmr_mend_scale(tmr_mend *m) {
+    const trimesh_view *in = &m->desc->surface;
+    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, largest = 0;
+    for (int32_t i = 0; i < m->vertex_count; i++) m->rename[i] = -1;
+    for (size_t i = 0; i < 3 * in->triangle_count; i++)
+        m->rename[in->indices[i]] = (int32_t)in->indices[i];
+    for (int k = 0; k < 3; k++)
+        low[k] = high[k] = in->positions[3 * (size_t)in->indices[0] + (size_t)k];
+    for (int32_t i = 0; i < m->vertex_count; i++) {
+        m->report.unused += m->rename[i] < 0;
+        for (int k = 0; k < 3 && m->rename[i] >= 0; k++) {
+            const double x = in->positions[3 * (size_t)i + (size_t)k];
+            if (x < low[k]) low[k] = x;
+            if (x > high[k]) high[k] = x;
+            if (fabs(x) > largest) largest = fabs(x);
+        }
+    }
+    const tmr_vec size = tmr_v(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    m->diagonal = tmr_len(size);
+    m->centre = tmr_v(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
+    if (!(m->diagonal > 0))
+        return txm_fail(m->env, TXM_TOO_SMALL, "all vertices of the surface are in one place");
+    m->noise = largest / m->diagonal * (1.0 / (1 << 23));
+    for (int32_t i = 0; i < m->vertex_count; i++) {
+        const float *p = in->positions + 3 * (size_t)i;
+        m->point[i] = tmr_v((p[0] - m->centre.x) / m->diagonal, (p[1] - m->centre.y) / m->diagonal,
+                            (p[2] - m->centre.z) / m->diagonal);
+    }
+    return TXM_OK;
+}
+
+static uint64_t tmr_hash_cell(tmr_vec cell) {
+    uint64_t bits[3];
+    cell = tmr_add(cell, tmr_v(0, 0, 0)); /* -0 to +0 */
+    memcpy(&bits[0], &cell.x, sizeof bits[0]);
+    memcpy(&bits[1], &cell.y, sizeof bits[1]);
+    memcpy(&bits[2], &cell.z, sizeof bits[2]);
+    return txm_hash(txm_hash(txm_hash(bits[0]) ^ bits[1]) ^ bits[2]);
+}
+
+static tmr_vec tmr_cell(tmr_vec p, double size) {
+    return size > 0 ? tmr_v(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
+}
+
+/* The lowest vertex in a cell that is not farther than size from point i, or else best. */
+static int32_t tmr_weld_look(const tmr_mend *m, tmr_vec cell, int32_t i, double size,
+                             int32_t best) {
+    size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
+    for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
+        const int32_t j = m->table[slot] - 1;
+        if ((best < 0 || j < best) && tmr_dist2(m->point[i], m->point[j]) <= size * size) best = j;
+    }
+    return best;
+}
+
+/* Each vertex, in order, joins the first one kept that is near enough, or else is kept. So no
+   chain of near vertices runs together, and few of those kept lie in one cell of the grid. With
+   size 0 a cell is a place. */
+static void tmr_weld(tmr_mend *m) {
+    double size = m->desc->weld;
+    if (size < 1e-14) size = 0; /* cells must be numbers that 1 can be added to */
+    const int reach = size > 0 ? 1 : 0;
+    memset(m->table, 0, m->table_size * sizeof *m->table);
+    for (int32_t i = 0; i < m->vertex_count; i++) {
+        if (m->rename[i] < 0) continue;
+        const tmr_vec cell = tmr_cell(m->point[i], size);
+        int32_t best = -1;
+        for (int x = -reach; x <= reach; x++) {
+            for (int y = -reach; y <= reach; y++) {
+                for (int z = -reach; z <= reach; z++)
+                    best = tmr_weld_look(m, tmr_add(cell, tmr_v(x, y, z)), i, size, best);
+            }
+        }
+        if (best >= 0) {
+            m->rename[i] = best;
+            m->report.welded++;
+            continue;
+        }
+        size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
+        while (m->table[slot]) slot = (slot + 1) & (m->table_size - 1);
+        m->table[slot] = i + 1;
+    }
+}
+
+/* ---- mending: faces ----------------------------------------------------------------------- */
+
+static void tmr_mend_load(tmr_mend *m) {
+    const uint32_t *indices = m->desc->surface.indices;
+    for (int32_t c = 0; c < 3 * m->face_count; c++) m->vertex[c] = m->rename[indices[c]];
+    for (int32_t f = 0; f < m->face_count; f++) m->origin[f] = (uint32_t)f;
+}
+
+/* Take away the faces that are marked so or have a vertex twice; the latter are counted. */
+static void tmr_mend_compact(tmr_mend *m) {
+    int32_t n = 0;
+    for (int32_t f = 0; f < m->face_count; f++) {
+        const int32_t *v = m->vertex + 3 * f;
+        if (v[0] == TMR_NO_VERTEX) continue;
+        if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) {
+            m->report.degenerate++;
+            continue;
+        }
+        memmove(m->vertex + 3 * n, v, 3 * sizeof *v);
+        m->origin[n] = m->origin[f];
+        m->turn[n] = m->turn[f];
+        m->twin[n++] = m->twin[f];
+    }
+    m->face_count = n;
+}
+
+/* 0: other vertices; 1: the same, the same way round; -1: the other way round */
+static int tmr_same_face(const int32_t *a, const int32_t *b) {
+    for (int k = 0; k < 3; k++) {
+        if (a[0] != b[k]) continue;
+        if (a[1] == b[(k + 1) % 3] && a[2] == b[(k + 2) % 3]) return 1;
+        if (a[2] == b[(k + 1) % 3] && a[1] == b[(k + 2) % 3]) return -1;
+    }
+    return 0;
+}
+
+/* Of faces with the same three vertices keep the first; remember where another was turned. */
+static void tmr_mend_duplicates(tmr_mend *m) {
+    const size_t mask = m->table_size - 1;
+    memset(m->table, 0, m->table_size * sizeof *m->table);
+    for (int32_t f = 0; f < m->face_count; f++) {
+        const int32_t *v = m->vertex + 3 * f;
+        /* a sum, for the order does not matter */
+        size_t slot = (size_t)(txm_hash((uint64_t)v[0] + 1) + txm_hash((uint64_t)v[1] + 1) +
+                               txm_hash((uint64_t)v[2] + 1)) & mask;
+        int same = 0;
+        for (; m->table[slot]; slot = (slot + 1) & mask) {
+            same = tmr_same_face(m->vertex + 3 * (m->table[slot] - 1), v);
+            if (same) break;
+        }
+        if (!same) {
+            m->table[slot] = f + 1;
+            continue;
+        }
+        if (same < 0) m->twin[m->table[slot] - 1] = 1;
+        m->report.duplicate++;
+        m->vertex[3 * f] = TMR_NO_VERTEX;
+    }
+    tmr_mend_compact(m);
+}
+
+/* ---- mending: edges ----------------------------------------------------------------------- */
+
+static int32_t tmr_edge_low(const tmr_mend *m, int32_t c) {
+    const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+    return a < b ? a : b;
+}
+static int32_t tmr_edge_high(const tmr_mend *m, int32_t c) {
+    const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+    return a < b ? b : a;
+}
+
+/* Sort pairs by key, few of them mostly; equal keys keep their order. */
+static void tmr_sort_few(txm_pair *pairs, txm_pair *spare, int32_t count) {
+    if (count > 32) {
+        txm_sort_pairs(pairs, spare, (size_t)count);
+        return;
+    }
+    for (int32_t i = 1; i < count; i++) {
+        const txm_pair p = pairs[i];
+        int32_t k = i;
+        for (; k > 0 && pairs[k - 1].key > p.key; k--) pairs[k] = pairs[k - 1];
+        pairs[k] = p;
+    }
+}
+
+/* Put the corners of equal edges side by side: counted into bins by the lower vertex, within a bin
+   sorted by the higher one, the key. */
+static void tmr_mend_sort(tmr_mend *m) {
+    const int32_t corners = 3 * m->face_count;
+    int32_t *bin = m->degree, sum = 0, begin = 0;
+    memset(bin, 0, (size_t)m->vertex_count * sizeof *bin);
+    for (int32_t c = 0; c < corners; c++) bin[tmr_edge_low(m, c)]++;
+    for (int32_t i = 0; i < m->vertex_count; i++) { /* from how many to where the first goes */
+        const int32_t n = bin[i];
+        bin[i] = sum;
+        sum += n;
+    }
+    for (int32_t c = 0; c < corners; c++) {
+        txm_pair *p = m->pairs + bin[tmr_edge_low(m, c)]++;
+        p->key = (uint32_t)tmr_edge_high(m, c);
+        p->value = (uint32_t)c;
+    }
+    for (int32_t i = 0; i < m->vertex_count; i++) {
+        tmr_sort_few(m->pairs + begin, m->spare, bin[i] - begin);
+        begin = bin[i];
+    }
+}
+
+/* The end of the run of equal edges that begins at i. */
+static int32_t tmr_run_end(const tmr_mend *m, int32_t i) {
+    const int32_t corners = 3 * m->face_count, first = (int32_t)m->pairs[i].value;
+    int32_t j = i + 1;
+    while (j < corners && m->pairs[j].key == m->pairs[i].key &&
+           tmr_edge_low(m, (int32_t)m->pairs[j].value) == tmr_edge_low(m, first)) j++;
+    return j;
+}
+
+/* Find the opposites; the number of edges with more than two faces. */
+static int32_t tmr_mend_link(tmr_mend *m) {
+    int32_t overfull = 0;
+    tmr_mend_sort(m);
+    for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
+        const int32_t c = (int32_t)m->pairs[i].value;
+        end = tmr_run_end(m, i);
+        if (end == i + 1) m->opposite[c] = -1;
+        else if (end == i + 2) {
+            m->opposite[c] = (int32_t)m->pairs[i + 1].value;
+            m->opposite[m->opposite[c]] = c;
+        } else {
+            for (int32_t k = i; k < end; k++) m->opposite[m->pairs[k].value] = TMR_OVERFULL;
+            overfull++;
+        }
+    }
+    return overfull;
+}
+
+/* Without area, for all that single precision can tell. */
+static int tmr_is_thin(const tmr_mend *m, const tmr_vec p[3]) {
+    double longest = 0;
+    for (int k = 0; k < 3; k++) longest = fmax(longest, tmr_dist2(p[k], p[(k + 1) % 3]));
+    longest = sqrt(longest);
+    const double height = longest > 0 ? tmr_len(tmr_area2(p[0], p[1], p[2])) / longest : 0;
+    /* the height that rounding alone can make counts only where the triangle looks thin as well */
+    return height <= 1e-6 * longest || (height <= m->noise && height <= 1e-3 * longest);
+}
+static void tmr_face_points(const tmr_mend *m, int32_t f, tmr_vec p[3]) {
+    for (int k = 0; k < 3; k++) p[k] = m->point[m->vertex[3 * f + k]];
+}
+static int tmr_face_is_thin(const tmr_mend *m, int32_t f) {
+    tmr_vec p[3];
+    tmr_face_points(m, f, p);
+    return tmr_is_thin(m, p);
+}
+
+/* A fin hangs on the edge of its corner c alone: its other two edges are borders. */
+static int tmr_is_fin(const tmr_mend *m, int32_t c, int thin_only) {
+    return m->opposite[tmr_next(c)] == -1 && m->opposite[tmr_prev(c)] == -1 &&
+           (!thin_only || tmr_face_is_thin(m, c / 3));
+}
+
+/* Mark the fins of a run if two or more faces stay; in doubt only those without area. */
+static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
+    for (int thin_only = 0; thin_only < 2; thin_only++) {
+        int32_t fins = 0;
+        for (int32_t k = begin; k < end; k++)
+            fins += tmr_is_fin(m, (int32_t)m->pairs[k].value, thin_only);
+        if (fins == 0 || end - begin - fins < 2) continue;
+        for (int32_t k = begin; k < end; k++) {
+            const int32_t c = (int32_t)m->pairs[k].value;
+            if (tmr_is_fin(m, c, thin_only)) m->flag[c / 3] = 1;
+        }
+        return 1;
+    }
+    return 0;
+}
+
+/* A wall inside, of two faces back to back, from which the first step kept one: where it meets two
+   faces of the outside, or only other walls, it goes, and so does all that hangs together with it.
+   (If all faces were double, they are the outside.) */
+static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
+    int32_t twins = 0, top = 0;
+    for (int32_t k = begin; k < end; k++) twins += m->twin[m->pairs[k].value / 3];
+    const int32_t others = end - begin - twins;
+    if (twins == 0 || !(others == 2 || (others == 0 && m->single))) return 0;
+    for (int32_t k = begin; k < end; k++) {
+        const int32_t f = (int32_t)m->pairs[k].value / 3;
+        if (!m->twin[f] || m->flag[f]) continue;
+        m->flag[f] = 1;
+        m->list[top++] = f;
+    }
+    while (top > 0) {
+        const int32_t f = m->list[--top];
+        for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
+            const int32_t g = m->opposite[c] < 0 ? f : m->opposite[c] / 3;
+            if (!m->twin[g] || m->flag[g]) continue;
+            m->flag[g] = 1;
+            m->list[top++] = g;
+        }
+    }
+    return 1;
+}
+
+/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces round it,
+   winding to and fro in turn. Faces with the inside between them belong together:
+
+            \  solid /           e is the edge from its lower vertex to the higher. The normal of a
+         -   \      /  +         face that winds along e (+) points to rising angles, so the solid
+              \    /             lies between it and the one before it, which must wind against
+               \  /              e (-).
+         +_____ e _____-
+               solid                                                                            */
+static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
+    enum { MOST = 16 };
+    const int32_t count = end - begin, low = tmr_edge_low(m, (int32_t)m->pairs[begin].value);
+    const int32_t high = tmr_edge_high(m, (int32_t)m->pairs[begin].value);
+    const tmr_vec e = tmr_unit(tmr_sub(m->point[high], m->point[low]));
+    tmr_vec u = e, w = e;
+    double angle[MOST];
+    int32_t corner[MOST];
+    if (count > MOST || count % 2) return 0;
+    for (int32_t k = 0; k < count; k++) {
+        const int32_t c = (int32_t)m->pairs[begin + k].value;
+        tmr_vec d = tmr_sub(m->point[m->vertex[c]], m->point[low]);
+        d = tmr_mad(d, e, -tmr_dot(d, e));
+        if (tmr_face_is_thin(m, c / 3)) return 0;
+        if (k == 0) {
+            u = tmr_unit(d);
+            w = tmr_cross(e, u);
+        }
+        const double a = k ? atan2(tmr_dot(d, w), tmr_dot(d, u)) : 0;
+        int32_t at = k;
+        for (; at > 0 && angle[at - 1] > a; at--) {
+            angle[at] = angle[at - 1];
+            corner[at] = corner[at - 1];
+        }
+        angle[at] = a;
+        corner[at] = c;
+    }
+    for (int32_t k = 0; k < count; k++) { /* clearly apart, and in turn? */
+        const int32_t next = (k + 1) % count;
+        const double gap = angle[next] - angle[k] + (next ? 0 : 2 * TXM_PI);
+        const int along = m->vertex[tmr_next(corner[k])] == low;
+        if (gap < 1e-4 || along == (m->vertex[tmr_next(corner[next])] == low)) return 0;
+    }
+    for (int32_t k = 0; k < count; k++) {
+        const int along = m->vertex[tmr_next(corner[k])] == low;
+        m->opposite[corner[k]] = corner[(k + count + (along ? -1 : 1)) % count];
+    }
+    return 1;
+}
+
+static void tmr_clear_flags(tmr_mend *m) {
+    for (int32_t f = 0; f < m->face_count; f++) m->flag[f] = 0;
+}
+
+/* Visit the edges with more than two faces; how many of them were mended. */
+static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t),
+                                 int32_t *bad, int *bad_count) {
+    int32_t mended = 0;
+    for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
+        end = tmr_run_end(m, i);
+        if (end - i < 3) continue;
+        if (mend(m, i, end)) mended++;
+        else if (*bad < 0) {
+            *bad = (int32_t)m->pairs[i].value;
+            *bad_count = (int)(end - i);
+        }
+    }
+    return mended;
+}
+
+/* Take away the faces that have a flag; how many. */
+static size_t tmr_cut_flagged(tmr_mend *m) {
+    size_t count = 0;
+    for (int32_t f = 0; f < m->face_count; f++) {
+        if (m->flag[f]) m->vertex[3 * f] = TMR_NO_VERTEX;
+        count += m->flag[f];
+    }
+    tmr_mend_compact(m);
+    return count;
+}
+
+/* Opposites, with every edge of at most two faces. */
+static txm_status tmr_mend_edges(tmr_mend *m) {
+    int32_t bad = -1;
+    int bad_count = 0;
+    for (int round = 0; tmr_mend_link(m) > 0; round++) {
+        int32_t ignored = 0; /* not below 0: nothing is written */
+        tmr_clear_flags(m);
+        for (int32_t f = 0; f < m->face_count; f++) m->single |= !m->twin[f];
+        if (round < TMR_MEND_ROUNDS) {
+            if (tmr_mend_overfull(m, tmr_cut_fins, &ignored, &bad_count)) {
+                m->report.fins += tmr_cut_flagged(m);
+                continue;
+            }
+            if (tmr_mend_overfull(m, tmr_cut_twins, &ignored, &bad_count)) {
+                m->report.duplicate += tmr_cut_flagged(m);
+                continue;
+            }
+        }
+        tmr_mend_overfull(m, tmr_pair_sheets, &bad, &bad_count);
+        if (bad >= 0) return tmr_mend_fail_edge(m, bad, bad_count);
+        break;
+    }
+    return TXM_OK;
+}
+
+#endif /* TRIMESH_RELAX_MEND_H */

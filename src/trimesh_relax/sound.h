@@ -1,0 +1,365 @@
+#ifndef TRIMESH_RELAX_SOUND_H
+#define TRIMESH_RELAX_SOUND_H
+
+#include "split.h"
+
+/* ---- is the result sound? ----------------------------------------------------------------- */
+
+/* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
+static int tmr_crosses(tmr_vec p, tmr_vec q, tmr_vec a, tmr_vec b, tmr_vec c, int rim) {
+    const tmr_vec e1 = tmr_sub(b, a), e2 = tmr_sub(c, a), d = tmr_sub(q, p);
+    const tmr_vec h = tmr_cross(d, e2);
+    const double det = tmr_dot(e1, h), eps = 1e-10, least = rim ? -eps : eps;
+    if (fabs(det) <= 1e-10 * tmr_len(e1) * tmr_len(e2) * tmr_len(d)) return 0;
+    const tmr_vec s = tmr_sub(p, a), k = tmr_cross(s, e1);
+    const double u = tmr_dot(s, h) / det, v = tmr_dot(d, k) / det, t = tmr_dot(e2, k) / det;
+    return u > least && v > least && u + v < 1 - least && t > eps && t < 1 - eps;
+}
+
+/* Do two triangles, which share at most one vertex, cross each other? rim: also where an edge passes
+   through no more than the rim of the other triangle, as with cards that cross edge to edge. */
+static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
+    const int32_t *v = m->vertex + 3 * f, *w = m->vertex + 3 * g;
+    int shared = 0, kf = 0, kg = 0;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            if (v[i] != w[j]) continue;
+            shared++;
+            kf = i;
+            kg = j;
+        }
+    }
+    if (shared > 1) return 0;
+    const tmr_vec a[3] = {m->p[v[0]], m->p[v[1]], m->p[v[2]]};
+    const tmr_vec b[3] = {m->p[w[0]], m->p[w[1]], m->p[w[2]]};
+    if (shared == 1)
+        return tmr_crosses(a[(kf + 1) % 3], a[(kf + 2) % 3], b[0], b[1], b[2], rim) ||
+               tmr_crosses(b[(kg + 1) % 3], b[(kg + 2) % 3], a[0], a[1], a[2], rim);
+    const tmr_vec n = tmr_area2(a[0], a[1], a[2]);
+    double low = 0, high = 0; /* of b on either side of a's plane */
+    for (int i = 0; i < 3; i++) {
+        const double d = tmr_dot(n, tmr_sub(b[i], a[0]));
+        low = i == 0 || d < low ? d : low;
+        high = i == 0 || d > high ? d : high;
+    }
+    if (low > 0 || high < 0) return 0;
+    for (int i = 0; i < 3; i++) {
+        if (tmr_crosses(a[i], a[(i + 1) % 3], b[0], b[1], b[2], rim)) return 1;
+        if (tmr_crosses(b[i], b[(i + 1) % 3], a[0], a[1], a[2], rim)) return 1;
+    }
+    return 0;
+}
+
+/* Triangles by the cells of a grid that their bounding boxes touch: hashed cells, sorted. */
+typedef struct tmr_cells {
+    double cell;
+    txm_pair *entry, *spare;
+    size_t count, limit;
+    int overflow;
+} tmr_cells;
+
+static uint32_t tmr_cell_key(int32_t x, int32_t y, int32_t z) {
+    return (uint32_t)(txm_hash((uint64_t)(uint32_t)x * 0x9e3779b1u + (uint64_t)(uint32_t)y *
+                               0x85ebca77u * 65537u + ((uint64_t)(uint32_t)z << 40)) >> 32);
+}
+
+static void tmr_face_box(const tmr_mesh *m, int32_t f, tmr_vec *low, tmr_vec *high) {
+    *low = *high = m->p[m->vertex[3 * f]];
+    for (int k = 1; k < 3; k++) {
+        const tmr_vec p = m->p[m->vertex[3 * f + k]];
+        *low = tmr_v(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
+        *high = tmr_v(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
+    }
+}
+
+static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
+    tmr_vec low, high;
+    tmr_face_box(m, f, &low, &high);
+    for (int32_t x = (int32_t)floor(low.x / g->cell); x <= (int32_t)floor(high.x / g->cell); x++) {
+        for (int32_t y = (int32_t)floor(low.y / g->cell); y <= (int32_t)floor(high.y / g->cell); y++) {
+            for (int32_t z = (int32_t)floor(low.z / g->cell); z <= (int32_t)floor(high.z / g->cell);
+                 z++) {
+                if (g->count == g->limit) {
+                    g->overflow = 1;
+                    return;
+                }
+                g->entry[g->count].key = tmr_cell_key(x, y, z);
+                g->entry[g->count++].value = (uint32_t)f;
+            }
+        }
+    }
+}
+
+enum { TMR_NEAR_CELLS = 1 << 16 }; /* coarse cells by hash that are near a marked vertex, or seem so */
+
+static uint32_t tmr_near_key(tmr_vec p, double cell, int dx, int dy, int dz) {
+    return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
+                        (int32_t)floor(p.z / cell) + dz) % TMR_NEAR_CELLS;
+}
+
+/* Set near for the coarse cells around the vertices marked in w->bad. */
+static void tmr_mark_near(const tmr_work *w, uint8_t *near) {
+    memset(near, 0, TMR_NEAR_CELLS);
+    for (int32_t v = 0; v < w->m.vertex_count; v++) {
+        if (!w->bad[v]) continue;
+        for (int k = 0; k < 27; k++)
+            near[tmr_near_key(w->m.p[v], 3 * w->length, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)] = 1;
+    }
+}
+
+/* The cells of all triangles, or of those near, in order. 0: no memory. */
+static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, txm_arena *arena) {
+    const tmr_mesh *m = &w->m;
+    memset(g, 0, sizeof *g);
+    g->cell = w->length * 0.65;
+    g->limit = (size_t)m->live_faces * 10 + 1000;
+    g->entry = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
+    g->spare = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
+    if (!g->entry || !g->spare) return 0;
+    do { /* in coarser cells if there are many large triangles */
+        g->cell *= 2;
+        g->count = 0;
+        g->overflow = 0;
+        for (int32_t f = 0; f < m->face_count && !g->overflow; f++) {
+            if (tmr_is_dead(m, f) || tmr_is_ghost_face(m, f)) continue;
+            if (near && !near[tmr_near_key(m->p[m->vertex[3 * f]], 3 * w->length, 0, 0, 0)]) continue;
+            tmr_cells_add(m, g, f);
+        }
+    } while (g->overflow);
+    txm_sort_pairs(g->entry, g->spare, g->count);
+    return 1;
+}
+
+/* How many pairs of triangles cross each other, and mark their vertices in w->bad? -1: no memory.
+   near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
+   Linear in the number of triangles. */
+static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch) {
+    const tmr_mesh *m = &w->m;
+    tmr_cells g;
+    long found = 0;
+    if (!tmr_cells_make(w, near, &g, scratch)) return -1;
+    for (size_t i = 0; i < g.count;) {
+        size_t end = i + 1;
+        while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
+        for (size_t x = i; x < end; x++) {
+            const int32_t f = (int32_t)g.entry[x].value;
+            tmr_vec low, high;
+            tmr_face_box(m, f, &low, &high);
+            for (size_t y = x + 1; y < end; y++) {
+                const int32_t h = (int32_t)g.entry[y].value;
+                tmr_vec low2, high2;
+                if (f == h) continue;
+                tmr_face_box(m, h, &low2, &high2);
+                if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
+                    low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h, rim))
+                    continue;
+                found++;
+                for (int k = 0; k < 3; k++)
+                    w->bad[m->vertex[3 * f + k]] = w->bad[m->vertex[3 * h + k]] = 1;
+            }
+        }
+        i = end;
+    }
+    return found;
+}
+
+enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one spot */
+
+/* Does the surface face along n anywhere near the place? Looks at the faces that hang together
+   with it, as far as they reach into a ball around p. */
+static int tmr_faces_along(const tmr_surface *s, tmr_vec n, int32_t face, tmr_vec p, double radius) {
+    int32_t list[TMR_SPOT_FACES];
+    int count = 1;
+    list[0] = face;
+    for (int i = 0; i < count; i++) {
+        if (tmr_dot(n, s->normal[list[i]]) > 0.3) return 1;
+        for (int k = 0; k < 3 && count < TMR_SPOT_FACES; k++) {
+            const int32_t o = s->opposite[3 * list[i] + k];
+            int known = o < 0;
+            for (int j = 0; j < count && !known; j++) known = list[j] == o / 3;
+            if (known || tmr_on_face(s, o / 3, p).d2 > radius * radius) continue;
+            list[count++] = o / 3;
+        }
+    }
+    return 0;
+}
+
+/* How many triangles have no area or face against all of the surface nearby? Those that only face
+   against the place nearest to them, as happens on thin sheets, are counted in *doubtful. Marks
+   their vertices. */
+static long tmr_count_turned(tmr_work *w, long *doubtful) {
+    const tmr_mesh *m = &w->m;
+    long found = 0;
+    *doubtful = 0;
+    for (int32_t f = 0; f < m->face_count; f++) {
+        const int32_t *v = m->vertex + 3 * f;
+        if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
+        const tmr_vec n = tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]);
+        const double longest = fmax(tmr_dist2(m->p[v[0]], m->p[v[1]]),
+                                    fmax(tmr_dist2(m->p[v[1]], m->p[v[2]]),
+                                         tmr_dist2(m->p[v[2]], m->p[v[0]])));
+        const double area2 = tmr_len(n);
+        int turned = area2 < 1e-4 * longest, doubt = 0;
+        if (!turned && tmr_agreement(w, v[0], v[1], v[2], m->p[v[0]], m->p[v[1]], m->p[v[2]]) < 0.2) {
+            const tmr_place at = tmr_below_middle(w, v);
+            doubt = tmr_dot(n, w->s->normal[at.face]) < 0 &&
+                    tmr_dot(n, tmr_normal_at(w->s, w->l, &at)) < 0;
+            turned = doubt && !tmr_faces_along(w->s, tmr_scale(n, 1 / area2), at.face, tmr_middle(m, v),
+                                               sqrt(at.d2) + 0.45 * w->length);
+        }
+        if (!turned && !doubt) continue;
+        found += turned;
+        *doubtful += !turned;
+        for (int k = 0; k < 3; k++) w->bad[v[k]] = 1;
+    }
+    return found;
+}
+
+/* Edges at which two triangles nearly lie on each other (they turn by more than 120 degrees), and
+   which are none of the surface's own: pull them towards the middle between the two far corners.
+   How many there were. */
+static long tmr_open_folds(tmr_work *w, double share) {
+    tmr_mesh *m = &w->m;
+    long found = 0;
+    for (int32_t v = 0; v < m->vertex_count; v++) {
+        tmr_stay(w, v);
+    }
+    for (int32_t c = 0; c < 3 * m->face_count; c++) {
+        if (!tmr_is_real_edge(m, c)) continue;
+        const int32_t o = m->opposite[c], d = m->vertex[c], e = m->vertex[o];
+        if (tmr_is_ghost(m, d) || tmr_is_ghost(m, e)) continue;
+        const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+        const tmr_vec n = tmr_unit(tmr_area2(m->p[d], m->p[a], m->p[b]));
+        if (tmr_dot(n, tmr_unit(tmr_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
+        found++;
+        const tmr_vec far = tmr_scale(tmr_add(m->p[d], m->p[e]), 0.5);
+        const tmr_vec near = tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5);
+        const tmr_vec to = tmr_scale(tmr_unit(tmr_sub(far, near)), share * w->length);
+        if (tmr_kind_of(m, a) == TRIMESH_FREE) w->moved[a] = tmr_add(w->moved[a], tmr_scale(to, w->size[a]));
+        if (tmr_kind_of(m, b) == TRIMESH_FREE) w->moved[b] = tmr_add(w->moved[b], tmr_scale(to, w->size[b]));
+    }
+    if (found) tmr_settle(w);
+    return found;
+}
+
+/* Extend the marks in w->bad to all neighbours of marked vertices. */
+static void tmr_grow_marks(tmr_work *w) {
+    const tmr_mesh *m = &w->m;
+    for (int32_t c = 0; c < 3 * m->face_count; c++) {
+        if (m->vertex[c] < 0) continue;
+        const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+        if (w->bad[a] == 1 && !w->bad[b]) w->bad[b] = 2;
+        if (w->bad[b] == 1 && !w->bad[a]) w->bad[a] = 2;
+    }
+    for (int32_t v = 0; v < m->vertex_count; v++) w->bad[v] = w->bad[v] != 0;
+}
+
+/* Move every marked vertex half-way to the middle of its neighbours, off the surface: what is finer
+   than the triangles can follow is smoothed away there. Lines only if nothing else has helped. */
+static void tmr_smooth_marked(tmr_work *w, int lines_too) {
+    tmr_mesh *m = &w->m;
+    for (int32_t v = 0; v < m->vertex_count; v++) {
+        const int kind = tmr_kind_of(m, v);
+        if (!w->bad[v] || m->corner[v] < 0 || (m->flags[v] & (TMR_GHOST | TMR_PINNED))) continue;
+        if (kind == TRIMESH_BORDER || (kind != TRIMESH_FREE && !lines_too)) continue;
+        tmr_vec sum = tmr_v(0, 0, 0);
+        int32_t count = 0, c = m->corner[v];
+        const int32_t first = c;
+        do {
+            const int32_t to = m->vertex[tmr_next(c)];
+            if (!tmr_is_ghost(m, to)) {
+                sum = tmr_add(sum, m->p[to]);
+                count++;
+            }
+            c = tmr_swing(m, c);
+        } while (c != first);
+        if (count == 0) continue;
+        m->p[v] = tmr_add(tmr_scale(m->p[v], 0.5), tmr_scale(sum, 0.5 / count));
+        if (kind != TRIMESH_FREE) continue;
+        const tmr_place at = tmr_project(w->s, m->p[v], m->source[v]);
+        m->source[v] = at.face;
+    }
+}
+
+#define TMR_FAIR 0.85 /* ours: quality of triangles that gets no further attention */
+
+/* A few more rounds of relaxation and flips just around the triangles that are still poor. */
+static void tmr_improve_spots(tmr_work *w, int rounds) {
+    tmr_mesh *m = &w->m;
+    w->pull = w->step = 1;
+    for (int round = 0; round < rounds; round++) {
+        int32_t poor = 0;
+        memset(w->bad, 0, (size_t)m->vertex_count);
+        for (int32_t f = 0; f < m->face_count; f++) {
+            const int32_t *v = m->vertex + 3 * f;
+            if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
+            if (tmr_quality(m->p[v[0]], m->p[v[1]], m->p[v[2]],
+                            tmr_expected_normal(w, v[0], v[1], v[2])) >= TMR_FAIR)
+                continue;
+            poor++;
+            for (int k = 0; k < 3; k++) w->bad[v[k]] = 1;
+        }
+        if (poor == 0) break;
+        for (int k = 0; k < 3; k++) tmr_grow_marks(w);
+        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count);
+        w->mask = w->mask_room;
+        for (int k = 0; k < 3; k++) tmr_relax(w);
+        w->mask = NULL;
+        tmr_flip_valences(w, 2, 0.4);
+        tmr_flip_delaunay(w, 2);
+    }
+}
+
+enum { TMR_SPOT_ROUNDS = 16 };
+
+/* Mend the few spots where triangles cross or face against the surface, by smoothing around them,
+   wider and wider; the best state found stays. *faults: how many are left; 0: no memory. */
+static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
+    const size_t count = (size_t)w->m.vertex_count;
+    txm_arena arena;
+    long best = -1;
+    tmr_vec *kept = NULL;
+    int32_t *kept_source = NULL;
+    uint8_t *near;
+    txm_arena_init(&arena, env);
+    near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
+    if (!near) goto no_memory;
+    for (int round = 0; round <= TMR_SPOT_ROUNDS; round++) {
+        txm_arena scratch;
+        long doubtful;
+        if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
+        memset(w->bad, 0, count);
+        txm_arena_init(&scratch, env);
+        const long crossings = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch);
+        txm_arena_free(&scratch);
+        if (crossings < 0) goto no_memory;
+        const long turned = tmr_count_turned(w, &doubtful);
+        const long score = 1000 * (crossings + turned) + doubtful;
+        if (best < 0 || score < best) {
+            best = score;
+            if (score > 0 && !kept) {
+                kept = (tmr_vec *)txm_arena_alloc(&arena, count, sizeof(tmr_vec));
+                kept_source = (int32_t *)txm_arena_alloc(&arena, count, sizeof(int32_t));
+                if (!kept || !kept_source) goto no_memory;
+            }
+            if (kept) memcpy(kept, w->m.p, count * sizeof(tmr_vec));
+            if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
+        }
+        if (score == 0 || (best < 1000 && round >= 4)) break;
+        if (50 * (crossings + turned) > (long)w->m.live_faces + 2000) break; /* hopeless */
+        for (int k = 0; k < 1 + round / 6; k++) tmr_grow_marks(w);
+        tmr_smooth_marked(w, round >= 6);
+    }
+    if (best > 0) {
+        memcpy(w->m.p, kept, count * sizeof(tmr_vec));
+        memcpy(w->m.source, kept_source, count * sizeof(int32_t));
+    }
+    *faults = best / 1000;
+    txm_arena_free(&arena);
+    return 1;
+no_memory:
+    txm_arena_free(&arena);
+    return 0;
+}
+
+#endif /* TRIMESH_RELAX_SOUND_H */
