@@ -12,11 +12,11 @@ OPENMP  := $(shell echo 'int main(void) { return 0; }' | \
 WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow
 
 # -ffp-contract=off: the same bytes on machines with and without fused multiply-add
-COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -Isrc -I. -Itools $(CPPFLAGS)
+COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -Isrc -Itools $(CPPFLAGS)
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
-SOURCES := $(wildcard *.h src/*.h src/*/*.h)
-HEADERS := $(wildcard *.h)
+SOURCES := $(wildcard src/*.h src/*/*.h)
+HEADERS := $(notdir $(wildcard src/*.h))
 TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
              tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
 # examples/brush opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
@@ -139,9 +139,9 @@ lint:
 	@tools/setup.sh lint
 	cppcheck --quiet -j 2 --std=c99 --enable=warning,performance,portability --inline-suppr \
 	    --error-exitcode=1 --suppress=missingIncludeSystem '--suppress=uninitvar:src/texmath/*' \
-	    -Isrc -I. -Itools tools/*.c examples/*.c examples/*/*.c bench/*.c
+	    -Isrc -Itools tools/*.c examples/*.c examples/*/*.c bench/*.c
 	printf '%s\n' tools/*.c examples/*.c examples/*/*.c bench/*.c | xargs -P 2 -I FILE \
-	    clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -Isrc -I. -Itools
+	    clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -Isrc -Itools
 
 # ---- installing
 
