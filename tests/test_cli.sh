@@ -6,6 +6,7 @@
 texkit=$(pwd)/$OUT/asan/texkit   # with the sanitizers
 released=$(pwd)/build/texkit     # as users have it
 draw=$(pwd)/build/draw
+shape=$(pwd)/build/shape
 check_tiles="/usr/bin/python3 $(pwd)/tests/check_tiles.py"
 cd "$tmp" || exit 1
 
@@ -76,8 +77,6 @@ check "an output behind a symbolic link" sh -c "
     echo old >target.png; ln -s target.png link.png
     '$texkit' synth sand.txs -o link.png $size --quiet && cmp a.png target.png && test -L link.png"
 check "an output to /dev/null" sh -c "ln -s /dev/null null.png; '$texkit' synth sand.txs -o null.png $size --quiet"
-check "the exemplar may be the output" sh -c "
-    cp sand.png same.png; '$texkit' synth same.png -o same.png $size --quiet && cmp b.png same.png"
 check "no temporary file is left" sh -c "! ls | grep -q tmp"
 
 # ---- options anywhere, in both spellings
@@ -421,6 +420,148 @@ for part in 10 50 90; do
     refuses 1 "cannot read 'cut.png'" tiles cut.png -o n --kind wang --size 32
     refuses 1 "cannot read 'cut.png'" tiles cells.png -o n --kind wang --size 32 --more cut.png
 done
+
+# ---- no input is written over, and no two outputs are one file, whatever links lead there
+mkdir over over/set over/folder over/links
+cd over || exit 1
+for name in a.png a-height.png mask.png; do "$draw" cells $name 64; done
+for name in set/atlas.png folder/atlas.png folder/atlas-2.png folder/preview.png out-height.png \
+    out-1.png out-height-1.png out-atlas.png out-texture.png out-bark.png out-leaves.png \
+    out-bark-2.png m.txs s.pfm; do
+    cp mask.png $name
+done
+echo '{"strokes": [{"points": [[8,8], [50,40]]}]}' >strokes.json
+echo '{}' >set/tiles.json
+"$shape" torus mesh.obj 16
+"$released" tree -o birch.txt --species birch --quiet
+cp birch.txt out.mtl
+for kind in png txs txt ply obj; do # hard links, links to links, and a folder by another name
+    ln a.png links/hard.$kind
+    ln -s hard.$kind links/soft.$kind
+done
+ln -s links again
+ln mesh.obj links/mesh.obj
+ln birch.txt links/birch.txt
+# keeps OUTPUT INPUT ARGUMENTS...: refused; the message names both
+keeps() {
+    output=$1 input=$2
+    shift 2
+    check "'$output' would destroy '$input': $*" keeps_both "would destroy" "$@"
+}
+# once OUTPUT OUTPUT ARGUMENTS...: the same of two outputs that are one file
+once() {
+    output=$1 input=$2
+    shift 2
+    check "'$output' is '$input' too: $*" keeps_both "written twice" "$@"
+}
+keeps_both() {
+    text=$1
+    shift
+    run 2 "$@" || return 1
+    says "'$output'" && says "'$input'" && says "$text" || { cat err.log; return 1; }
+}
+
+# -o and --stats of every command against its input
+for way in ./a links/hard again/soft; do
+    keeps $way.png a.png synth a.png -o $way.png $size
+    keeps $way.png a.png patch a.png -o $way.png $size
+    keeps $way.png a.png edges a.png -o $way.png
+    keeps $way.png a.png learn a.png -o n.txs --stats $way.png
+    keeps $way.png a.png tiles a.png -o n --kind wang --size 32 --stats $way.png
+    keeps $way.png a.png tree -o n.obj --leaf a.png --stats $way.png
+    keeps $way.png a.png forest --count 2 -o n.obj --leaf a.png --stats $way.png
+done
+for command in synth patch edges; do
+    more=
+    [ $command = edges ] || more=$size
+    keeps a.png again/soft.png $command again/soft.png -o a.png $more
+    keeps links/hard.png a.png $command a.png -o n.png $more --stats links/hard.png
+done
+keeps links/soft.txs a.png learn a.png -o links/soft.txs
+keeps m.txs ./m.txs synth ./m.txs -o n.png $size --stats m.txs
+keeps links/mesh.obj mesh.obj retile mesh.obj -o links/mesh.obj --vertices 200
+keeps mesh.obj links/mesh.obj retile links/mesh.obj -o n.ply --vertices 200 --stats mesh.obj
+keeps birch.txt links/birch.txt tree --species links/birch.txt -o birch.txt
+keeps links/birch.txt birch.txt forest --count 2 --species oak,birch.txt -o n.ply --stats links/birch.txt
+from_stdin() {
+    "$texkit" synth /dev/stdin -o a.png $size --quiet <a.png 2>err.log
+    [ $? = 2 ] && says "'a.png' would destroy '/dev/stdin'"
+}
+check "an input that comes in by /dev/stdin" from_stdin
+
+# the other inputs of each, and the outputs whose names are derived
+keeps links/hard.png ./a.png learn mask.png -o n.txs --mask ./a.png --stats links/hard.png
+patch="patch a.png $size"
+keeps a.png a.png $patch -o a.png --maps a-height.png
+cp a-height.png mask-height.png
+keeps a-height.png ./a-height.png patch mask.png $size -o a.png --maps mask-height.png,./a-height.png
+keeps out-height.png ./out-height.png $patch -o out.png --maps a-height.png --mask ./out-height.png
+keeps out-height.png ./out-height.png $patch -o out.png --exemplars mask.png \
+    --maps 'a-height.png;./out-height.png'
+keeps out-height.png ./out-height.png $patch -o out.png --exemplars ./out-height.png \
+    --maps 'a-height.png;mask.png'
+keeps out-1.png ./out-1.png $patch -o out.png --lod 2 --mask ./out-1.png
+keeps out-height-1.png ./out-height-1.png $patch -o out.png --lod 1 --maps a-height.png \
+    --guide mask.png --target ./out-height-1.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --guide ./out-1.png --target mask.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --guide mask.png --target mask.png \
+    --target-mask ./out-1.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --keep ./out-1.png --keep-mask mask.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --keep mask.png --keep-mask ./out-1.png
+keeps links/hard.txt ./a.png patch mask.png $size -o n.png --guide mask.png,./a.png --exemplars mask.png \
+    --target mask.png --stats links/hard.txt
+keeps strokes.json ./strokes.json $patch -o n.png --control ./strokes.json --stats strokes.json
+keeps s.pfm ./s.pfm $patch -o n.png --mask ./s.pfm --sources s.pfm
+keeps links/soft.png a.png edges a.png -o n.svg --layers links/soft.png
+keeps a.png links/hard.png edges links/hard.png -o n.json --layers a.png
+tiles="--kind wang --size 32"
+keeps folder/atlas.png folder/atlas.png tiles folder/atlas.png -o folder $tiles
+keeps folder//atlas-2.png folder/atlas-2.png tiles a.png -o folder/ $tiles --maps folder/atlas-2.png
+keeps folder/preview.png ./folder/preview.png tiles a.png -o folder $tiles --more mask.png,./folder/preview.png
+keeps folder/preview.png ./folder/preview.png tiles a.png -o folder $tiles \
+    --edges mask.png,./folder/preview.png
+keeps links/hard.txt ./a.png tiles mask.png -o n $tiles --more ./a.png --stats links/hard.txt
+retile="retile mesh.obj --vertices 200"
+keeps out-texture.png ./out-texture.png $retile -o out.ply --texture ./out-texture.png
+keeps out-atlas.png ./out-atlas.png $retile -o out.glb --patches ./out-atlas.png
+keeps out-texture.png ./out-texture.png $retile -o out.glb --texture mask.png --density ./out-texture.png
+keeps out.mtl ./out.mtl $retile -o out.obj --texture mask.png --density ./out.mtl
+keeps links/hard.ply ./a.png $retile -o links/hard.ply --density ./a.png
+keeps set/tiles.json set/tiles.json $retile -o n.obj --tiles set --stats set/tiles.json
+keeps ./set/atlas.png set/atlas.png $retile -o n.obj --tiles set --stats ./set/atlas.png
+for trees in "tree" "forest --count 2"; do
+    keeps out-bark.png ./out-bark.png $trees -o out.obj --leaf ./out-bark.png
+    keeps out-leaves.png ./out-leaves.png $trees -o out.obj --leaf ./out-leaves.png
+    keeps out.mtl ./out.mtl $trees -o out.obj --species ./out.mtl
+    keeps set/tiles.json set/tiles.json $trees -o n.glb --tiles set --stats set/tiles.json
+    keeps ./set/atlas.png set/atlas.png $trees -o n.glb --tiles set --stats ./set/atlas.png
+done
+keeps out-bark-2.png ./out-bark-2.png forest --count 2 -o out.obj --species oak,birch \
+    --leaf ./out-bark-2.png
+check "names that are not made are free" run 0 tree -o out.obj --bare --leaf ./out-leaves.png --pieces 20
+
+# two outputs
+once n.png ./n.png synth a.png -o ./n.png $size --stats n.png
+once ./n.png again/../n.png synth a.png -o again/../n.png $size --stats ./n.png
+rm -r links/*
+ln mask.png links/one.png
+ln mask.png links/two.png
+ln -s one.png links/three.png
+for pair in "two one" "three one" "three two"; do
+    first=links/${pair% *}.png second=again/${pair#* }.png
+    once $first $second edges a.png -o $first --layers $second
+    once $first $second synth a.png -o $first $size --stats $second
+done
+ln -s two.png links/n.txs
+once links/n.txs links/one.png learn a.png -o links/n.txs --stats links/one.png
+once ./folder/atlas.png folder/atlas.png tiles a.png -o folder $tiles --stats ./folder/atlas.png
+once ./out-height.png out-height.png $patch -o out.png --maps a-height.png --stats ./out-height.png
+once ./n.pfm n.pfm $patch -o n.png --sources ./n.pfm --stats n.pfm
+once ./out-atlas.png out-atlas.png $retile -o out.ply --tiles set --stats ./out-atlas.png
+once ./out.mtl out.mtl tree -o out.obj --stats ./out.mtl
+once ./out-leaves-2.png out-leaves-2.png forest --count 2 -o out.obj --species oak,birch \
+    --stats ./out-leaves-2.png
+cd ..
 
 # ---- stopped, out of memory (the tool as released)
 stop() {

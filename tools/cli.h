@@ -19,17 +19,22 @@ extern const char cli_versions[];
 /* Exit status of the program, as the manual promises. */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
-enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8 };
+enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8, CLI_MAX_PATH = 4096 };
 
 /* ---- options ---------------------------------------------------------------------------- */
 
 typedef enum cli_kind {
-    CLI_FLAG,   /* int *: 1 if given                                   */
-    CLI_TEXT,   /* const char **                                       */
-    CLI_INT,    /* int *, min..max                                     */
-    CLI_SEED,   /* uint64_t *                                          */
-    CLI_EXTENT, /* int[2], width and height, written WxH, min..max each */
-    CLI_END     /* closes the table                                    */
+    CLI_FLAG,   /* int *: 1 if given                                           */
+    CLI_TEXT,   /* const char **                                               */
+    CLI_INT,    /* int *, min..max                                             */
+    CLI_SEED,   /* uint64_t *                                                  */
+    CLI_EXTENT, /* int[2], width and height, written WxH, min..max each        */
+    CLI_INPUT,  /* const char **, a file that is read                          */
+    CLI_INPUTS, /* the same, several of them with commas between               */
+    CLI_GROUPS, /* the same, semicolons between such lists                     */
+    CLI_TILES,  /* const char **, a folder of 'texkit tiles' that is read      */
+    CLI_OUTPUT, /* const char **, a file that is written                       */
+    CLI_END     /* closes the table                                            */
 } cli_kind;
 
 typedef struct cli_option {
@@ -106,11 +111,25 @@ void cli_figures(cli *run, const char *name, const int *values, int count);
 /* Seconds since the command began. */
 double cli_seconds(const cli *run);
 
-/* Before the work: can this path be written at all? Says so if not; returns an exit status. */
-int cli_check_output(cli *run, const char *path);
+/* ---- the files of a run --------------------------------------------------------------------
 
-/* The same for a folder: is it there and writable, or can it be made? */
-int cli_check_folder(cli *run, const char *path);
+   No file that is read may be written over, and no two outputs may be one file, whatever links lead
+   to it. So every file is announced before any work. cli_begin does that for the inputs, -o, --stats
+   and options of the kinds above; a command does it for the names that it derives from them.
+   Writing takes announced outputs only.                                                         */
+
+/* This file will be read. An exit status. */
+int cli_reads(cli *run, const char *path);
+
+/* This file will be written: is it none of the others, and can it be written? An exit status. */
+int cli_writes(cli *run, const char *path);
+
+/* The same for a file of that name in the output folder, which need not be there yet. */
+int cli_writes_inside(cli *run, const char *name);
+
+/* Take the first name off a list; *list is what comes behind it, or NULL. 0: the name is empty or too
+   long. */
+int cli_take_name(const char **list, const char *separators, char name[CLI_MAX_PATH]);
 
 /* Write the output and the statistics, both or neither; returns the exit status. */
 int cli_finish(cli *run, const void *bytes, size_t size);

@@ -86,7 +86,7 @@ int path_beside(cli *run, const char *ending, char path[MAX_PATH]) {
         return cli_fail(run, CLI_USAGE, "'%s': the path is too long", run->output);
     snprintf(path, n + 1, "%s", run->output); /* without its extension */
     snprintf(path + n, MAX_PATH - n, "%s", ending);
-    return cli_check_output(run, path);
+    return cli_writes(run, path);
 }
 
 const char *name_in(const char *path) {

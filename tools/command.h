@@ -39,9 +39,9 @@ int check_picture_path(cli *run, const char *path, int width, int height, int ch
 /* Encode the picture for the output's extension and write it. */
 int finish_with_picture(cli *run, const txm_image *image);
 
-/* The output's path with another ending than its extension, for a file beside it; it can be written
-   there. An exit status. */
-enum { MAX_PATH = 4096 };
+/* The output's path with another ending than its extension, for a file that will be written beside
+   it. An exit status. */
+enum { MAX_PATH = CLI_MAX_PATH };
 int path_beside(cli *run, const char *ending, char path[MAX_PATH]);
 
 /* What follows the last '/'. */

@@ -154,11 +154,7 @@ static int check_options(cli *run, const options *o, texpatch_edges_desc *d, int
     file_extension(run->output, extension);
     if (!is_text(extension)) status = check_picture_path(run, run->output, 0, 0, 3);
     if (!status && o->layers) status = check_picture_path(run, o->layers, 0, 0, 1);
-    if (!status && o->layers) status = cli_check_output(run, o->layers);
     if (status) return status;
-    if (o->layers && (!strcmp(o->layers, run->output) ||
-                      (run->stats && !strcmp(o->layers, run->stats))))
-        return cli_fail(run, CLI_USAGE, "'%s' would be written twice; name two files", o->layers);
     if (o->smooth) {
         if (!parse_numbers(run, "--smooth", o->smooth, 1, 0, 16, numbers)) return CLI_USAGE;
         d->smooth = (float)numbers[0];
@@ -269,7 +265,7 @@ static int run_edges(int argc, char **argv) {
          TEXPATCH_MAX_LEVELS - 1},
         {CLI_TEXT, "--over", "WHAT", "draw over black (default), the picture or its layers",
          &o.over, 0, 0},
-        {CLI_TEXT, "--layers", "FILE", "also write the layers as grays", &o.layers, 0, 0},
+        {CLI_OUTPUT, "--layers", "FILE", "also write the layers as grays", &o.layers, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
 

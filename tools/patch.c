@@ -374,29 +374,22 @@ static int name_output(job *j, int map, int level, char path[MAX_PATH]) {
     return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->run.output);
 }
 
-/* All paths that will be written, each once, each writable as far as can be told. */
+/* All paths that will be written. */
 static int name_outputs(job *j) {
     const int levels = 1 + j->lod, count = j->desc.map_count * levels;
     int status = CLI_DONE;
     file_extension(j->run.output, j->extension);
     j->paths = (char(*)[MAX_PATH])calloc((size_t)count + 1, MAX_PATH);
     if (!j->paths) return fail_memory(j);
-    for (int i = 0; i < count && !status; i++)
+    for (int i = 0; i < count && !status; i++) {
         status = name_output(j, i / levels, i % levels, j->paths[i]);
+        if (!status && i > 0) status = cli_writes(&j->run, j->paths[i]); /* the first is -o */
+    }
     j->path_count = count;
     if (!status && j->sources) {
         if (strlen(j->sources) >= MAX_PATH)
             return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->sources);
         memcpy(j->paths[j->path_count++], j->sources, strlen(j->sources) + 1);
-    }
-    for (int i = 0; i < j->path_count && !status; i++) {
-        int is_double = j->run.stats && !strcmp(j->run.stats, j->paths[i]);
-        for (int k = 0; k < i; k++) is_double |= !strcmp(j->paths[k], j->paths[i]);
-        if (is_double)
-            return cli_fail(&j->run, CLI_USAGE,
-                            "'%s' would be written twice; give maps names that tell them apart",
-                            j->paths[i]);
-        if (i > 0) status = cli_check_output(&j->run, j->paths[i]);
     }
     if (!status)
         status = check_picture_path(&j->run, j->run.output, j->desc.width, j->desc.height, 0);
@@ -911,7 +904,7 @@ static int run_job(job *j, int argc, char **argv) {
          0, 0},
         {CLI_FLAG, "--tileable-y", NULL, "only from the lower one to the upper one", &j->tileable_y,
          0, 0},
-        {CLI_TEXT, "--maps", "M1,M2,...", "pictures in register with EXEMPLAR, made in register",
+        {CLI_GROUPS, "--maps", "M1,M2,...", "pictures in register with EXEMPLAR, made in register",
          &j->map_list, 0, 0},
         {CLI_TEXT, "--weights", "W0,W1,...",
          "how much EXEMPLAR and the maps count in matching, 0 to 16; default 1,0", &j->weights, 0,
@@ -923,8 +916,8 @@ static int run_job(job *j, int argc, char **argv) {
          &j->labels, 0, 0},
         {CLI_TEXT, "--data", "I,J,...", "these maps hold amounts (height, roughness), not colors",
          &j->data, 0, 0},
-        {CLI_TEXT, "--exemplars", "E2,...", "more exemplars, up to 8 in all", &j->more, 0, 0},
-        {CLI_TEXT, "--mask", "M", "use EXEMPLAR only where this picture is not black; one for each",
+        {CLI_INPUTS, "--exemplars", "E2,...", "more exemplars, up to 8 in all", &j->more, 0, 0},
+        {CLI_INPUTS, "--mask", "M", "use EXEMPLAR only where this picture is not black; one for each",
          &j->masks, 0, 0},
         {CLI_INT, "--patch", "N",
          "side of the first patches in pixels; default: what suits EXEMPLAR", &d->patch, 8,
@@ -938,22 +931,22 @@ static int run_job(job *j, int argc, char **argv) {
         {CLI_FLAG, "--mirror", NULL, "pieces may be mirrored", &d->mirror, 0, 0},
         {CLI_TEXT, "--novelty", "V", "0 to 1: avoid long pieces that are as in EXEMPLAR; default 0",
          &j->novelty, 0, 0},
-        {CLI_TEXT, "--guide", "G", "a picture in register with EXEMPLAR; one for each exemplar",
+        {CLI_INPUTS, "--guide", "G", "a picture in register with EXEMPLAR; one for each exemplar",
          &j->guides, 0, 0},
-        {CLI_TEXT, "--target", "T", "what the guide should look like in OUT", &j->target, 0, 0},
-        {CLI_TEXT, "--target-mask", "M", "where this picture is black, the target says nothing",
+        {CLI_INPUT, "--target", "T", "what the guide should look like in OUT", &j->target, 0, 0},
+        {CLI_INPUT, "--target-mask", "M", "where this picture is black, the target says nothing",
          &j->target_mask, 0, 0},
         {CLI_TEXT, "--guide-weight", "V", "against a map of weight 1; above 0, up to 16; default 2",
          &j->guide_weight, 0, 0},
-        {CLI_TEXT, "--control", "STROKES", "lines that become edges of the texture", &j->control, 0,
+        {CLI_INPUT, "--control", "STROKES", "lines that become edges of the texture", &j->control, 0,
          0},
-        {CLI_TEXT, "--keep", "K0,K1,...",
+        {CLI_INPUTS, "--keep", "K0,K1,...",
          "pictures of OUT's size, for each map, to be kept in part", &j->kept_list, 0, 0},
-        {CLI_TEXT, "--keep-mask", "M", "they are kept where this picture is not black", &j->keep, 0,
+        {CLI_INPUT, "--keep-mask", "M", "they are kept where this picture is not black", &j->keep, 0,
          0},
         {CLI_INT, "--lod", "K", "coarser levels to write, each half as wide", &j->lod, 0,
          MAX_LEVELS},
-        {CLI_TEXT, "--sources", "FILE.pfm", "where each pixel comes from", &j->sources, 0, 0},
+        {CLI_OUTPUT, "--sources", "FILE.pfm", "where each pixel comes from", &j->sources, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (cli_begin(run, &patch_manual, options, argc, argv, &status)) return status;

@@ -740,25 +740,6 @@ static int bake(job *j, mesh_data *baked) {
     return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->run.output, why);
 }
 
-/* The output and what goes beside it, all or none. */
-static int write_files(job *j, const cli_file *files, int count) {
-    cli *run = &j->run;
-    char folder[MAX_PATH] = ".";
-    if (count == 1) return cli_finish(run, files[0].bytes, files[0].size);
-    const size_t n = (size_t)(name_in(run->output) - run->output);
-    if (n >= sizeof folder)
-        return cli_fail(run, CLI_USAGE, "'%s': the path is too long", run->output);
-    if (n > 0) {
-        memcpy(folder, run->output, n); /* "/" stays, of "a/" the slash goes */
-        folder[n > 1 ? n - 1 : n] = 0;
-    }
-    const char *output = run->output;
-    run->output = folder;
-    const int status = cli_finish_folder(run, files, count);
-    run->output = output;
-    return status;
-}
-
 static int write_output(job *j) {
     cli *run = &j->run;
     cli_file files[3] = {{0}, {0}, {0}};
@@ -785,21 +766,21 @@ static int write_output(job *j) {
     }
     if (!status && !mesh_encode(j->extension, &scene, &bytes, &files[0].size, &why))
         status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
-    files[0].name = name_in(run->output);
+    files[0].name = run->output;
     files[0].bytes = bytes;
     if (!status && scene.library) {
         if (!mesh_encode_mtl(&scene, &mtl, &files[count].size, &why))
             status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", j->mtl_path, why);
-        files[count].name = scene.library;
+        files[count].name = j->mtl_path;
         files[count++].bytes = mtl;
     }
     if (!status && j->png) {
-        files[count].name = name_in(j->png_path);
+        files[count].name = j->png_path;
         files[count].bytes = j->png;
         files[count++].size = j->png_size;
     }
     cli_figure(run, "file_bytes", (double)files[0].size);
-    if (!status) status = write_files(j, files, count);
+    if (!status) status = cli_finish_files(run, files, count);
     free(bytes);
     free(mtl);
     mesh_free(&baked);
@@ -880,15 +861,15 @@ static int run_job(job *j, int argc, char **argv) {
          0, 100},
         {CLI_INT, "--spacing", "PERCENT",
          "edges along creases and borders, 25 to 400 of the others", &spacing, 25, 400},
-        {CLI_TEXT, "--density", "MAP",
+        {CLI_INPUT, "--density", "MAP",
          "picture on MESH's texture: shorter edges where it is lighter", &j->density, 0, 0},
-        {CLI_TEXT, "--tiles", "DIR", "texture: a triangle set of 'texkit tiles'", &j->tiles, 0, 0},
-        {CLI_TEXT, "--patches", "PICTURE", "texture: patches at random", &j->patches, 0, 0},
+        {CLI_TILES, "--tiles", "DIR", "texture: a triangle set of 'texkit tiles'", &j->tiles, 0, 0},
+        {CLI_INPUT, "--patches", "PICTURE", "texture: patches at random", &j->patches, 0, 0},
         {CLI_INT, "--patch-count", "N", "patches in PICTURE; default 4", &j->patch_count, 1, 256},
         {CLI_INT, "--gutter", "G", "pixels around each patch; default 8, or none", &j->gutter, 0,
          8192},
-        {CLI_TEXT, "--texture", "PICTURE", "texture: that of MESH", &j->texture, 0, 0},
-        {CLI_TEXT, "--instances", "PATCH.ply", "points or a small mesh for every triangle",
+        {CLI_INPUT, "--texture", "PICTURE", "texture: that of MESH", &j->texture, 0, 0},
+        {CLI_INPUT, "--instances", "PATCH.ply", "points or a small mesh for every triangle",
          &j->instances, 0, 0},
         {CLI_INT, "--dot", "PERCENT", "radius of points in edge lengths; default: they touch",
          &j->dot, 1, 1000},

@@ -63,7 +63,7 @@ static int run_learn(int argc, char **argv) {
          &desc.max_types, 1, 60},
         {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: by the size",
          &desc.levels, 1, 6},
-        {CLI_TEXT, "--mask", "M", "learn only where this picture, of the same size, is not black",
+        {CLI_INPUT, "--mask", "M", "learn only where this picture, of the same size, is not black",
          &mask_path, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };

@@ -34,6 +34,25 @@ static const cli_manual tiles_manual = {
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
     1, "exemplar", 1};
 
+/* ---- the files of a set ------------------------------------------------------------------ */
+
+static void name_atlas(int map, char name[24]) {
+    snprintf(name, 24, map ? "atlas-%d.png" : "atlas.png", map + 1);
+}
+
+/* All that will be written for an exemplar with the maps of that list. */
+static int announce_set(cli *run, const char *maps) {
+    int status = cli_writes_inside(run, "preview.png"), count = 1;
+    if (!status) status = cli_writes_inside(run, "tiles.json");
+    for (const char *at = maps; at; at = strchr(at + 1, ',')) count++;
+    for (int m = 0; m < count && m < TEXTILES_MAX_MAPS && !status; m++) {
+        char name[24];
+        name_atlas(m, name);
+        status = cli_writes_inside(run, name);
+    }
+    return status;
+}
+
 /* ---- tiles.json ------------------------------------------------------------------------- */
 
 static void print_ints(FILE *to, const char *name, const int *values, int count) {
@@ -123,7 +142,7 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
     const int maps = textiles_map_count(set);
     txm_image atlas[TEXTILES_MAX_MAPS], preview = {0};
     cli_file files[TEXTILES_MAX_MAPS + 2];
-    char names[TEXTILES_MAX_MAPS][24];
+    char names[TEXTILES_MAX_MAPS + 1][24];
     unsigned char *bytes[TEXTILES_MAX_MAPS + 1] = {NULL};
     char *json = NULL;
     size_t json_size = 0;
@@ -150,8 +169,7 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
     cli_stage(run, "encode");
     for (int m = 0; m <= maps && !status; m++) { /* the preview comes last */
         size_t size;
-        snprintf(names[m % TEXTILES_MAX_MAPS], sizeof names[0], m ? "atlas-%d.png" : "atlas.png",
-                 m + 1);
+        name_atlas(m, names[m]);
         if (!image_encode(".png", m < maps ? &atlas[m] : &preview, &bytes[m], &size, &why))
             status = cli_fail(run, CLI_FAILED, "cannot write into '%s': %s", run->output, why);
         files[count].name = m < maps ? names[m] : "preview.png";
@@ -214,18 +232,12 @@ typedef struct photos {
 /* Read the pictures that a list names, separated by commas, one after the other by the given function. */
 static int read_list(cli *run, const char *list, const char *option, int most, photos *p,
                      int (*take)(cli *run, photos *p, const char *path)) {
-    char path[4096];
+    char path[MAX_PATH];
     for (int n = 0; list; n++) {
-        const char *comma = strchr(list, ',');
-        const size_t length = comma ? (size_t)(comma - list) : strlen(list);
         if (n == most) return cli_fail(run, CLI_USAGE, "%s: at most %d pictures", option, most);
-        if (length == 0 || length >= sizeof path)
-            return cli_fail(run, CLI_USAGE, "%s: a name is empty or too long", option);
-        memcpy(path, list, length);
-        path[length] = 0;
+        cli_take_name(&list, ",", path);
         const int status = take(run, p, path);
         if (status) return status;
-        list = comma ? comma + 1 : NULL;
     }
     return CLI_DONE;
 }
@@ -323,9 +335,9 @@ static int run_tiles(int argc, char **argv) {
          &desc.reduced, 0, 0},
         {CLI_TEXT, "--classes", "LIST", "frame: edge colors n,e,s,w of each class, ';' between them",
          &classes, 0, 0},
-        {CLI_TEXT, "--maps", "M1,M2,...", "more maps of the exemplar, cut in register", &maps, 0, 0},
-        {CLI_TEXT, "--more", "E2,E3,...", "more exemplars of the same texture", &more, 0, 0},
-        {CLI_TEXT, "--edges", "P0,P1,...", "pictures to cut the edges of each color from", &edges, 0,
+        {CLI_INPUTS, "--maps", "M1,M2,...", "more maps of the exemplar, cut in register", &maps, 0, 0},
+        {CLI_INPUTS, "--more", "E2,E3,...", "more exemplars of the same texture", &more, 0, 0},
+        {CLI_INPUTS, "--edges", "P0,P1,...", "pictures to cut the edges of each color from", &edges, 0,
          0},
         {CLI_TEXT, "--packing", "HOW", "packed (with gutters), torus (Wei's layout) or slices",
          &packing, 0, 0},
@@ -359,6 +371,8 @@ static int run_tiles(int argc, char **argv) {
     if (status) return status;
     if (maps && (more || edges))
         return cli_fail(&run, CLI_USAGE, "--maps goes with one exemplar, without --more and --edges");
+    status = announce_set(&run, maps);
+    if (status) return status;
 
     cli_stage(&run, "read");
     status = read_image(&run, run.inputs[0], 0, &p.images[0][0]);

@@ -72,6 +72,8 @@ static int read_species(tree_job *j, const char *name, treepieces_species *speci
     size_t size;
     if (!strpbrk(name, "./"))
         return check_result(j, treepieces_preset(name, &j->run.env, species), name);
+    const int status = cli_reads(&j->run, name);
+    if (status) return status;
     unsigned char *text = file_read(name, &size);
     if (!text) return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", name, strerror(errno));
     const txm_status result =
@@ -84,19 +86,14 @@ static int read_all_species(tree_job *j) {
     char name[MAX_PATH];
     const char *list = j->species_list;
     while (list) {
-        const char *comma = j->is_forest ? strchr(list, ',') : NULL;
-        const size_t length = comma ? (size_t)(comma - list) : strlen(list);
         if (j->species_count == MAX_SPECIES)
             return cli_fail(&j->run, CLI_USAGE, "--species: at most %d", MAX_SPECIES);
-        if (length == 0 || length >= sizeof name)
+        if (!cli_take_name(&list, j->is_forest ? "," : "", name))
             return cli_fail(&j->run, CLI_USAGE, "--species: a name is empty or too long");
-        memcpy(name, list, length);
-        name[length] = 0;
         const int status = read_species(j, name, &j->species[j->species_count]);
         if (status) return status;
         if (j->bare) j->species[j->species_count].leaf_count = 0;
         j->species_count++;
-        list = comma ? comma + 1 : NULL;
     }
     return CLI_DONE;
 }
@@ -190,6 +187,11 @@ static int has_one_bark(const tree_job *j) {
     return j->tiles || is_glb(j);
 }
 
+/* Is a picture made of the bark of species s? */
+static int has_bark(const tree_job *j, int s) {
+    return s == 0 || !has_one_bark(j);
+}
+
 static void set_material(const tree_job *j, const picture *p, int is_cut_out, mesh_material *m) {
     m->name = p->name;
     m->is_cut_out = is_cut_out;
@@ -206,7 +208,7 @@ static int dress(tree_job *j, float tint[3]) {
     brightest_bark(j, tint);
     if (!strcmp(j->extension, ".ply")) return CLI_DONE;
     for (int s = 0; s < j->species_count && !status; s++) {
-        if (s == 0 || !has_one_bark(j))
+        if (has_bark(j, s))
             status = make_bark(j, s, has_one_bark(j) ? tint : j->species[s].bark_color);
         if (!status) status = make_leaves(j, s);
         set_material(j, &j->bark[s], 0, &j->bark_materials[s]);
@@ -416,25 +418,21 @@ static int write_output(tree_job *j, built *b) {
     cli *run = &j->run;
     cli_file files[2 + 2 * MAX_SPECIES];
     unsigned char *bytes = NULL, *mtl = NULL;
-    char mtl_path[MAX_PATH];
     const char *why;
     int status = CLI_DONE, count = 1;
     const int is_obj = !strcmp(j->extension, ".obj");
     memset(files, 0, sizeof files);
 
     b->scene.parts = b->parts;
-    if (is_obj) {
-        status = path_beside(run, ".mtl", mtl_path);
-        b->scene.library = name_in(mtl_path);
-    }
-    if (!status && !mesh_encode(j->extension, &b->scene, &bytes, &files[0].size, &why))
+    if (is_obj) b->scene.library = name_in(j->mtl_path);
+    if (!mesh_encode(j->extension, &b->scene, &bytes, &files[0].size, &why))
         status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
     files[0].name = run->output;
     files[0].bytes = bytes;
     if (!status && is_obj) {
         if (!mesh_encode_mtl(&b->scene, &mtl, &files[1].size, &why))
-            status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", mtl_path, why);
-        files[1].name = mtl_path;
+            status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", j->mtl_path, why);
+        files[1].name = j->mtl_path;
         files[1].bytes = mtl;
         count = 2;
         for (int s = 0; s < 2 * j->species_count; s++) {
@@ -495,18 +493,19 @@ static int grow_trees(tree_job *j, built *b) {
     return status;
 }
 
-/* Where the pictures go; refused before any work. */
-static int name_pictures(tree_job *j) {
-    int status = CLI_DONE;
+/* What goes beside an .obj. */
+static int name_files(tree_job *j) {
     char ending[32];
     if (strcmp(j->extension, ".obj") != 0) return CLI_DONE;
+    int status = path_beside(&j->run, ".mtl", j->mtl_path);
     for (int s = 0; s < j->species_count && !status; s++) {
         char number[12] = "";
         if (s > 0) snprintf(number, sizeof number, "-%d", s + 1);
         snprintf(ending, sizeof ending, "-bark%s.png", number);
-        status = path_beside(&j->run, ending, j->bark[s].path);
+        if (has_bark(j, s)) status = path_beside(&j->run, ending, j->bark[s].path);
         snprintf(ending, sizeof ending, "-leaves%s.png", number);
-        if (!status) status = path_beside(&j->run, ending, j->leaves[s].path);
+        if (!status && j->species[s].leaf_count)
+            status = path_beside(&j->run, ending, j->leaves[s].path);
     }
     return status;
 }
@@ -540,7 +539,7 @@ static int run_job(tree_job *j, int needs_glb) {
     status = read_all_species(j);
     if (status) return status;
     if (!strcmp(j->extension, ".txt")) return write_species(j);
-    status = name_pictures(j);
+    status = name_files(j);
     if (status) return status;
     b = (built *)tree_array(1, sizeof *b); /* too large for a small stack, as the job */
     if (!b) return tree_fail_memory(j);
@@ -585,8 +584,8 @@ static int run_tree(int argc, char **argv) {
     const cli_option options[] = {
         {CLI_TEXT, "--species", "NAME|FILE", "a built-in species or a file of one; default oak",
          &j->species_list, 0, 0},
-        {CLI_TEXT, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
-        {CLI_TEXT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
+        {CLI_TILES, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
+        {CLI_INPUT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
         {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
          &j->sheet, 128, 8192},
         {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
@@ -631,8 +630,8 @@ static int run_forest(int argc, char **argv) {
          &spacing, 0, 0},
         {CLI_INT, "--pieces", "N", "at most so many a tree, 8 to 65535; default 600", &j->pieces, 8,
          65535},
-        {CLI_TEXT, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
-        {CLI_TEXT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
+        {CLI_TILES, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
+        {CLI_INPUT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
         {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
          &j->sheet, 128, 8192},
         {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},

@@ -42,6 +42,8 @@ typedef struct tree_job {
     treepieces_forest *forest;
     float *rest, *posed; /* bones; posed: by --pose, and if baked by --wind */
 
+    char mtl_path[MAX_PATH]; /* beside an .obj */
+
     /* one bark of all species, or one of each */
     picture bark[MAX_SPECIES], leaves[MAX_SPECIES]; /* png NULL: none */
     mesh_material bark_materials[MAX_SPECIES], leaf_materials[MAX_SPECIES];
