@@ -754,36 +754,6 @@ static const int *tpc_rim_of(const treepieces_piece *p, int k) {
     return k < 0 ? p->root_rim : p->leaf_rims[k];
 }
 
-/* ---- the kit ----------------------------------------------------------------------------- */
-
-/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
-typedef struct tpc_seen {
-    float position[3], normal[3];
-} tpc_seen;
-
-/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
-typedef struct tpc_band {
-    float rise, spread;
-} tpc_band;
-
-/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
-   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
-typedef struct tpc_cells {
-    uint32_t bands[TREEPIECES_BANDS], bottom, own;
-    int first, last;
-} tpc_cells;
-
-struct treepieces_kit {
-    txm_arena arena; /* holds the kit itself and all it points to */
-    int count;
-    treepieces_piece pieces[TREEPIECES_MAX_TYPES];
-    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
-    tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
-    int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
-    float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
-    tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
-};
-
 /* ---- the built-in pieces ----------------------------------------------------------------- */
 
 /* A piece while it is put together. */
@@ -1035,6 +1005,36 @@ static void tpc_make_builtin(int type, tpc_shape *s) {
     }
     tpc_smooth(s);
 }
+
+/* ---- the kit ----------------------------------------------------------------------------- */
+
+/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
+typedef struct tpc_seen {
+    float position[3], normal[3];
+} tpc_seen;
+
+/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
+typedef struct tpc_band {
+    float rise, spread;
+} tpc_band;
+
+/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
+   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
+typedef struct tpc_cells {
+    uint32_t bands[TREEPIECES_BANDS], bottom, own;
+    int first, last;
+} tpc_cells;
+
+struct treepieces_kit {
+    txm_arena arena; /* holds the kit itself and all it points to */
+    int count;
+    treepieces_piece pieces[TREEPIECES_MAX_TYPES];
+    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
+    tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
+    int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
+    float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
+    tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
+};
 
 /* ---- what a piece must be ---------------------------------------------------------------- */
 
@@ -4119,369 +4119,6 @@ TREEPIECES_API void treepieces_patch_point(const float positions[12], const floa
     memcpy(normal, n, sizeof n);
 }
 
-/* ---- baked meshes ------------------------------------------------------------------------ */
-
-enum {
-    TPC_PATTERN_VERTICES = 4 * 64 + 63 * 63,
-    TPC_PATTERN_TRIANGLES = 2 * 64 * 64 + 4 * 64,
-    TPC_MESH_TRIANGLES = 0x7fffffff / 3 /* corners fit 31 bits */
-};
-
-/* A mesh with its memory. */
-typedef struct tpc_mesh {
-    treepieces_mesh mesh; /* first: the one is the other */
-    txm_arena arena;
-} tpc_mesh;
-
-/* An empty mesh in an arena of its own; NULL: no memory. */
-static tpc_mesh *tpc_make_mesh(const txm_env *env) {
-    txm_arena arena;
-    txm_arena_init(&arena, env);
-    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
-    if (made) made->arena = arena;
-    return made;
-}
-
-/* Room for so many vertices and triangles; 0: no memory. */
-static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
-    treepieces_mesh *m = &made->mesh;
-    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
-    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
-    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
-    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
-    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
-    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
-    return !made->arena.failed;
-}
-
-/* The mesh if it was made, else NULL, and nothing stays allocated. */
-static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
-    if (status == TXM_OK) return &made->mesh;
-    if (made) treepieces_mesh_free(&made->mesh);
-    return NULL;
-}
-
-/* A mesh while it is baked. */
-typedef struct tpc_baking {
-    const treepieces_bake_desc *desc;
-    const treepieces_forest *forest;
-    const treepieces_tree *tree;
-    treepieces_lod lod;
-    int sheet_size, layers;
-    treepieces_mesh *out;
-    int is_broken; /* met a position that is no number */
-    uint32_t *table; /* vertex + 1 by hash of its position; 0 = free */
-    size_t table_mask;
-    /* the quad at work */
-    float coords[2 * TPC_PATTERN_VERTICES];
-    uint16_t indices[3 * TPC_PATTERN_TRIANGLES];
-    uint32_t numbers[TPC_PATTERN_VERTICES]; /* in the mesh */
-    /* the piece at work */
-    float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
-    uint32_t joints[4];
-} tpc_baking;
-
-static int tpc_is_tessellated(const tpc_baking *b) {
-    return b->lod.max_level > 1;
-}
-
-/* Levels of a quad whose corners are given. */
-static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int edges[4]) {
-    for (int k = 0; k < 4; k++) edges[k] = 1;
-    if (!tpc_is_tessellated(b)) return 1;
-    for (int k = 0; k < 4; k++)
-        edges[k] = treepieces_edge_level(&b->lod, positions + 3 * k, positions + 3 * ((k + 1) % 4));
-    return treepieces_inner_level(&b->lod, positions);
-}
-
-/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out:
-   its bits are nobody's promise, so there might come more vertices than were counted. */
-static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
-                         const float weights[4]) {
-    treepieces_mesh *m = b->out;
-    uint32_t bits[3];
-    for (int k = 0; k < 3; k++) {
-        const float x = position[k] + 0.0f; /* -0 is 0 */
-        memcpy(&bits[k], &x, sizeof x);
-        if (!txm_is_finite((double)x)) b->is_broken = 1;
-    }
-    if (b->is_broken) return 0;
-    size_t slot = (size_t)txm_hash(bits[0] ^ (uint64_t)bits[1] << 32 ^ (uint64_t)bits[2] << 16);
-    for (;; slot++) {
-        const uint32_t found = b->table[slot & b->table_mask];
-        if (!found) break;
-        if (memcmp(m->positions + 3 * (size_t)(found - 1), bits, sizeof bits) == 0)
-            return found - 1;
-    }
-    const size_t i = m->vertex_count++;
-    b->table[slot & b->table_mask] = (uint32_t)i + 1;
-    memcpy(m->positions + 3 * i, bits, sizeof bits);
-    memcpy(m->normals + 3 * i, normal, 3 * sizeof *normal);
-    for (int k = 0; k < 4; k++) {
-        m->joints[4 * i + (size_t)k] = weights[k] > 0 ? b->joints[k] : 0;
-        m->weights[4 * i + (size_t)k] = weights[k];
-    }
-    return (uint32_t)i;
-}
-
-/* How well a triangle faces where its corners' normals point; below 0: away from there. */
-static float tpc_facing(const float *a, const float *b, const float *c, const float normals[12]) {
-    float u[3], v[3], n[3], cross[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = b[k] - a[k];
-        v[k] = c[k] - a[k];
-        n[k] = (normals[k] + normals[3 + k]) + (normals[6 + k] + normals[9 + k]);
-    }
-    tpc_cross(u, v, cross);
-    const float length = sqrtf(tpc_dot(cross, cross));
-    return length > 0 ? tpc_dot(cross, n) / length : 0;
-}
-
-/* Split a quad of level 1 along the diagonal that leaves the worse of its triangles the better. */
-static void tpc_choose_diagonal(const float p[12], const float n[12], uint16_t indices[6]) {
-    static const uint16_t other[6] = {1, 2, 3, 1, 3, 0};
-    const float kept = txm_minf(tpc_facing(p, p + 3, p + 6, n), tpc_facing(p, p + 6, p + 9, n));
-    const float turned =
-        txm_minf(tpc_facing(p + 3, p + 6, p + 9, n), tpc_facing(p + 3, p + 9, p, n));
-    if (turned > kept) memcpy(indices, other, sizeof other);
-}
-
-static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const uint32_t *record,
-                          int index) {
-    const treepieces_quad *q = &piece->quads[index];
-    const int cell = (int)(record[4 + index / 4] >> (8 * (index & 3)) & 255u);
-    float positions[12], normals[12], uv[4][2];
-    int edges[4], triangles, layer = 0;
-    for (int k = 0; k < 4; k++) {
-        memcpy(positions + 3 * k, b->positions + 3 * q->corners[k], 3 * sizeof(float));
-        memcpy(normals + 3 * k, b->normals + 3 * q->corners[k], 3 * sizeof(float));
-        layer = treepieces_quad_uv(q, record[3], cell, b->sheet_size, k, uv[k]);
-    }
-    const int inner = tpc_quad_levels(b, positions, edges);
-    const int vertices = treepieces_pattern(edges, inner, b->coords, b->indices, &triangles);
-    if (triangles == 2) tpc_choose_diagonal(positions, normals, b->indices);
-    for (int i = 0; i < vertices; i++) {
-        const float u = b->coords[2 * i], v = b->coords[2 * i + 1];
-        float w[4], position[3], normal[3], weights[4], sum = 0;
-        tpc_weigh(u, v, w);
-        treepieces_patch_point(positions, normals, b->lod.shape, u, v, position, normal);
-        for (int k = 0; k < 4; k++) {
-            const treepieces_vertex *c = piece->vertices;
-            weights[k] = tpc_mix(w, c[q->corners[0]].weights[k], c[q->corners[1]].weights[k],
-                                 c[q->corners[2]].weights[k], c[q->corners[3]].weights[k]);
-            sum += weights[k];
-        }
-        for (int k = 0; k < 4; k++) weights[k] /= sum;
-        b->numbers[i] = tpc_weld(b, position, normal, weights);
-    }
-    for (int i = 0; i < 3 * triangles; i++) {
-        const size_t at = 3 * b->out->triangle_count + (size_t)i;
-        const float u = b->coords[2 * b->indices[i]], v = b->coords[2 * b->indices[i] + 1];
-        float w[4];
-        tpc_weigh(u, v, w);
-        b->out->indices[at] = b->numbers[b->indices[i]];
-        b->out->uvs[2 * at] = tpc_mix(w, uv[0][0], uv[1][0], uv[2][0], uv[3][0]);
-        b->out->uvs[2 * at + 1] =
-            ((float)layer + tpc_mix(w, uv[0][1], uv[1][1], uv[2][1], uv[3][1])) / (float)b->layers;
-    }
-    b->out->triangle_count += (size_t)triangles;
-}
-
-/* The records of a tree lie together, of each type; *count receives how many. */
-static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces_tree *tree,
-                                 uint32_t *count) {
-    uint32_t ends[2];
-    for (int e = 0; e < 2; e++) { /* the first with a bone of at least ... */
-        const uint32_t bone = tree->first_node + (e ? tree->node_count : 0);
-        uint32_t low = 0, high = batch->count;
-        while (low < high) {
-            const uint32_t middle = low + (high - low) / 2;
-            if (batch->words[(size_t)middle * batch->stride] < bone) low = middle + 1;
-            else high = middle;
-        }
-        ends[e] = low;
-    }
-    *count = ends[1] - ends[0];
-    return ends[0];
-}
-
-/* Visit all quads: count what they need (out NULL), or bake them. */
-static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, size_t *triangles) {
-    uint32_t done = 0;
-    for (int t = 0; t < b->forest->type_count; t++) {
-        const treepieces_piece *piece = &b->forest->kit->pieces[t];
-        const treepieces_batch *batch = &b->forest->batches[t];
-        uint32_t count;
-        const uint32_t first = tpc_first_record(batch, b->tree, &count);
-        for (uint32_t i = first; i < first + count; i++, done++) {
-            const uint32_t *record = batch->words + (size_t)i * batch->stride;
-            const uint32_t own = record[0] - b->tree->first_node;
-            if ((done & 63) == 0 &&
-                txm_progress(env, (b->out ? 0.3f : 0) + (b->out ? 0.7f : 0.3f) * (float)done /
-                                      (float)b->tree->node_count, "bake"))
-                return txm_fail(env, TXM_CANCELLED, "cancelled");
-            if (*triangles > TPC_MESH_TRIANGLES)
-                return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
-            if (!b->out && !tpc_is_tessellated(b)) {
-                *vertices += (size_t)piece->vertex_count;
-                *triangles += 2 * (size_t)piece->quad_count;
-                continue;
-            }
-            treepieces_skin(b->forest, b->desc->bones, t, i, b->positions, b->normals);
-            tpc_children(record, b->joints + 1);
-            b->joints[0] = own;
-            for (int k = 1; k < 4; k++) b->joints[k] += own;
-            for (int k = 0; k < piece->quad_count; k++) {
-                float positions[12];
-                int edges[4], more;
-                if (b->out) {
-                    tpc_bake_quad(b, piece, record, k);
-                    continue;
-                }
-                for (int c = 0; c < 4; c++)
-                    memcpy(positions + 3 * c, b->positions + 3 * piece->quads[k].corners[c],
-                           3 * sizeof(float));
-                const int inner = tpc_quad_levels(b, positions, edges);
-                *vertices += (size_t)treepieces_pattern(edges, inner, NULL, NULL, &more);
-                *triangles += (size_t)more;
-            }
-            if (b->is_broken)
-                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are infinite, flat or no numbers");
-        }
-    }
-    return TXM_OK;
-}
-
-/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and
-   where they lie in the circle about the rim. */
-typedef struct tpc_cap {
-    uint32_t numbers[TREEPIECES_RIM * 64 + 1];
-    float places[TREEPIECES_RIM * 64 + 1][2];
-    int count; /* without the middle */
-} tpc_cap;
-
-static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *cap) {
-    const float own[4] = {1, 0, 0, 0};
-    cap->count = 0;
-    for (int j = 0; j < TREEPIECES_RIM; j++) { /* side j as the edge from corner 0 to 1 of a quad */
-        float p[12], normals[12], from[3], to[3], at[3], normal[3];
-        for (int k = 0; k < 4; k++) {
-            const int vertex = piece->root_rim[(j + (k == 1)) % TREEPIECES_RIM];
-            memcpy(p + 3 * k, b->positions + 3 * vertex, 3 * sizeof(float));
-            memcpy(normals + 3 * k, b->normals + 3 * vertex, 3 * sizeof(float));
-        }
-        tpc_rim_vertex(j, from, normal);
-        tpc_rim_vertex((j + 1) % TREEPIECES_RIM, to, normal);
-        const int level = tpc_is_tessellated(b) ? treepieces_edge_level(&b->lod, p, p + 3) : 1;
-        for (int i = 0; i < level; i++, cap->count++) {
-            const float t = tpc_place_along(i, level);
-            treepieces_patch_point(p, normals, b->lod.shape, 0, t, at, normal);
-            cap->numbers[cap->count] = tpc_weld(b, at, normal, own);
-            cap->places[cap->count][0] = (1 - t) * from[0] + t * to[0];
-            cap->places[cap->count][1] = (1 - t) * from[2] + t * to[2];
-        }
-    }
-}
-
-/* Close the foot: a hexagon by a fan of four; a finer rim, which need be neither convex nor bent at
-   all, by one about its middle. */
-static void tpc_bake_cap(tpc_baking *b) {
-    const float own[4] = {1, 0, 0, 0}, middle[3] = {0, 0, 0}, down[3] = {0, -1, 0};
-    const int type = b->forest->nodes[b->tree->first_node].type;
-    const float *bone = b->desc->bones + TREEPIECES_BONE * (size_t)b->tree->first_node;
-    treepieces_mesh *m = b->out;
-    uint32_t records;
-    tpc_cap cap;
-    const uint32_t first = tpc_first_record(&b->forest->batches[type], b->tree, &records);
-    treepieces_skin(b->forest, b->desc->bones, type, first, b->positions, b->normals);
-    b->joints[0] = 0;
-    tpc_find_cap(b, &b->forest->kit->pieces[type], &cap);
-    const int is_fine = cap.count > TREEPIECES_RIM, hub = is_fine ? cap.count : 0;
-    if (is_fine) {
-        float at[3], normal[3];
-        tpc_move_point(bone, middle, at);
-        tpc_move_normal(bone, down, normal);
-        tpc_unit(normal);
-        cap.numbers[hub] = tpc_weld(b, at, normal, own);
-        memset(cap.places[hub], 0, sizeof cap.places[hub]);
-    }
-    for (int i = !is_fine; i < cap.count - !is_fine; i++) {
-        const int corners[3] = {hub, (i + 1) % cap.count, i}; /* seen from below */
-        for (int k = 0; k < 3; k++) {
-            const size_t at = 3 * m->triangle_count + (size_t)k;
-            const float *place = cap.places[corners[k]]; /* on all of layer 0 */
-            m->indices[at] = cap.numbers[corners[k]];
-            m->uvs[2 * at] = 0.5f + 0.49f * place[0];
-            m->uvs[2 * at + 1] = (0.5f - 0.49f * place[1]) / (float)b->layers;
-        }
-        m->triangle_count++;
-    }
-}
-
-static txm_status tpc_bake_into(tpc_baking *b, tpc_mesh *made, txm_env *env) {
-    size_t vertices = 0, triangles = 0, slots = 64;
-    txm_status status = tpc_bake_tree(b, env, &vertices, &triangles);
-    if (status != TXM_OK) return status;
-    if (b->desc->capped) {
-        vertices++;
-        triangles += TREEPIECES_RIM * 64;
-    }
-    if (triangles > TPC_MESH_TRIANGLES)
-        return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
-    while (slots < 2 * vertices) slots *= 2;
-    b->table = (uint32_t *)txm_alloc(env, slots * sizeof(uint32_t));
-    if (!tpc_alloc_mesh(made, vertices, triangles) || !b->table)
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
-    memset(b->table, 0, slots * sizeof(uint32_t));
-    b->table_mask = slots - 1;
-    b->out = &made->mesh;
-    status = tpc_bake_tree(b, env, &vertices, &triangles);
-    if (status == TXM_OK && b->desc->capped) tpc_bake_cap(b);
-    return status;
-}
-
-static int tpc_has_tree(const treepieces_forest *forest, int tree) {
-    return forest && tree >= 0 && tree < forest->tree_count;
-}
-
-TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
-                                          treepieces_mesh **out) {
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    *out = NULL;
-    if (!desc || !desc->bones || !tpc_has_tree(desc->forest, desc->tree))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "desc or bones is NULL, or there is no such tree");
-    if (desc->sheet_size < 0 || desc->sheet_layers < 0 || desc->sheet_layers > 64)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "sheet_size or sheet_layers is out of range");
-    if (desc->lod && (!(desc->lod->max_level >= 0 && desc->lod->max_level <= 64) ||
-                      !(desc->lod->half_distance >= 0) || !(desc->lod->shape <= 1)))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "lod: a field is out of range");
-    tpc_mesh *made = tpc_make_mesh(env);
-    tpc_baking *b = (tpc_baking *)txm_alloc(env, sizeof *b);
-    txm_status status = TXM_OK;
-    if (!made || !b) {
-        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
-    } else {
-        memset(b, 0, sizeof *b);
-        b->desc = desc;
-        b->forest = desc->forest;
-        b->tree = &desc->forest->trees[desc->tree];
-        if (desc->lod) b->lod = *desc->lod;
-        b->sheet_size = desc->sheet_size ? desc->sheet_size : 512;
-        b->layers = desc->sheet_layers ? desc->sheet_layers : TREEPIECES_OWN;
-        status = tpc_bake_into(b, made, env);
-        txm_free(env, b->table);
-    }
-    txm_free(env, b);
-    *out = tpc_hand_over(made, status);
-    return status;
-}
-
-TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
-    if (!mesh) return;
-    txm_arena arena = ((tpc_mesh *)mesh)->arena;
-    txm_arena_free(&arena);
-}
-
 /* ---- bark: sheets out of framed tiles ------------------------------------------------------ */
 
 TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc) {
@@ -5431,6 +5068,369 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
     for (int i = 0; i < desc->card_count; i++)
         tpc_draw_card(desc, &desc->cards[i], &leaves, &c, &d);
     return TXM_OK;
+}
+
+/* ---- baked meshes ------------------------------------------------------------------------ */
+
+enum {
+    TPC_PATTERN_VERTICES = 4 * 64 + 63 * 63,
+    TPC_PATTERN_TRIANGLES = 2 * 64 * 64 + 4 * 64,
+    TPC_MESH_TRIANGLES = 0x7fffffff / 3 /* corners fit 31 bits */
+};
+
+/* A mesh with its memory. */
+typedef struct tpc_mesh {
+    treepieces_mesh mesh; /* first: the one is the other */
+    txm_arena arena;
+} tpc_mesh;
+
+/* An empty mesh in an arena of its own; NULL: no memory. */
+static tpc_mesh *tpc_make_mesh(const txm_env *env) {
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    tpc_mesh *made = (tpc_mesh *)txm_arena_zero(&arena, 1, sizeof *made);
+    if (made) made->arena = arena;
+    return made;
+}
+
+/* Room for so many vertices and triangles; 0: no memory. */
+static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
+    treepieces_mesh *m = &made->mesh;
+    m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
+    m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
+    m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
+    m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
+    m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
+    return !made->arena.failed;
+}
+
+/* The mesh if it was made, else NULL, and nothing stays allocated. */
+static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
+    if (status == TXM_OK) return &made->mesh;
+    if (made) treepieces_mesh_free(&made->mesh);
+    return NULL;
+}
+
+/* A mesh while it is baked. */
+typedef struct tpc_baking {
+    const treepieces_bake_desc *desc;
+    const treepieces_forest *forest;
+    const treepieces_tree *tree;
+    treepieces_lod lod;
+    int sheet_size, layers;
+    treepieces_mesh *out;
+    int is_broken; /* met a position that is no number */
+    uint32_t *table; /* vertex + 1 by hash of its position; 0 = free */
+    size_t table_mask;
+    /* the quad at work */
+    float coords[2 * TPC_PATTERN_VERTICES];
+    uint16_t indices[3 * TPC_PATTERN_TRIANGLES];
+    uint32_t numbers[TPC_PATTERN_VERTICES]; /* in the mesh */
+    /* the piece at work */
+    float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
+    uint32_t joints[4];
+} tpc_baking;
+
+static int tpc_is_tessellated(const tpc_baking *b) {
+    return b->lod.max_level > 1;
+}
+
+/* Levels of a quad whose corners are given. */
+static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int edges[4]) {
+    for (int k = 0; k < 4; k++) edges[k] = 1;
+    if (!tpc_is_tessellated(b)) return 1;
+    for (int k = 0; k < 4; k++)
+        edges[k] = treepieces_edge_level(&b->lod, positions + 3 * k, positions + 3 * ((k + 1) % 4));
+    return treepieces_inner_level(&b->lod, positions);
+}
+
+/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out:
+   its bits are nobody's promise, so there might come more vertices than were counted. */
+static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
+                         const float weights[4]) {
+    treepieces_mesh *m = b->out;
+    uint32_t bits[3];
+    for (int k = 0; k < 3; k++) {
+        const float x = position[k] + 0.0f; /* -0 is 0 */
+        memcpy(&bits[k], &x, sizeof x);
+        if (!txm_is_finite((double)x)) b->is_broken = 1;
+    }
+    if (b->is_broken) return 0;
+    size_t slot = (size_t)txm_hash(bits[0] ^ (uint64_t)bits[1] << 32 ^ (uint64_t)bits[2] << 16);
+    for (;; slot++) {
+        const uint32_t found = b->table[slot & b->table_mask];
+        if (!found) break;
+        if (memcmp(m->positions + 3 * (size_t)(found - 1), bits, sizeof bits) == 0)
+            return found - 1;
+    }
+    const size_t i = m->vertex_count++;
+    b->table[slot & b->table_mask] = (uint32_t)i + 1;
+    memcpy(m->positions + 3 * i, bits, sizeof bits);
+    memcpy(m->normals + 3 * i, normal, 3 * sizeof *normal);
+    for (int k = 0; k < 4; k++) {
+        m->joints[4 * i + (size_t)k] = weights[k] > 0 ? b->joints[k] : 0;
+        m->weights[4 * i + (size_t)k] = weights[k];
+    }
+    return (uint32_t)i;
+}
+
+/* How well a triangle faces where its corners' normals point; below 0: away from there. */
+static float tpc_facing(const float *a, const float *b, const float *c, const float normals[12]) {
+    float u[3], v[3], n[3], cross[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = b[k] - a[k];
+        v[k] = c[k] - a[k];
+        n[k] = (normals[k] + normals[3 + k]) + (normals[6 + k] + normals[9 + k]);
+    }
+    tpc_cross(u, v, cross);
+    const float length = sqrtf(tpc_dot(cross, cross));
+    return length > 0 ? tpc_dot(cross, n) / length : 0;
+}
+
+/* Split a quad of level 1 along the diagonal that leaves the worse of its triangles the better. */
+static void tpc_choose_diagonal(const float p[12], const float n[12], uint16_t indices[6]) {
+    static const uint16_t other[6] = {1, 2, 3, 1, 3, 0};
+    const float kept = txm_minf(tpc_facing(p, p + 3, p + 6, n), tpc_facing(p, p + 6, p + 9, n));
+    const float turned =
+        txm_minf(tpc_facing(p + 3, p + 6, p + 9, n), tpc_facing(p + 3, p + 9, p, n));
+    if (turned > kept) memcpy(indices, other, sizeof other);
+}
+
+static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const uint32_t *record,
+                          int index) {
+    const treepieces_quad *q = &piece->quads[index];
+    const int cell = (int)(record[4 + index / 4] >> (8 * (index & 3)) & 255u);
+    float positions[12], normals[12], uv[4][2];
+    int edges[4], triangles, layer = 0;
+    for (int k = 0; k < 4; k++) {
+        memcpy(positions + 3 * k, b->positions + 3 * q->corners[k], 3 * sizeof(float));
+        memcpy(normals + 3 * k, b->normals + 3 * q->corners[k], 3 * sizeof(float));
+        layer = treepieces_quad_uv(q, record[3], cell, b->sheet_size, k, uv[k]);
+    }
+    const int inner = tpc_quad_levels(b, positions, edges);
+    const int vertices = treepieces_pattern(edges, inner, b->coords, b->indices, &triangles);
+    if (triangles == 2) tpc_choose_diagonal(positions, normals, b->indices);
+    for (int i = 0; i < vertices; i++) {
+        const float u = b->coords[2 * i], v = b->coords[2 * i + 1];
+        float w[4], position[3], normal[3], weights[4], sum = 0;
+        tpc_weigh(u, v, w);
+        treepieces_patch_point(positions, normals, b->lod.shape, u, v, position, normal);
+        for (int k = 0; k < 4; k++) {
+            const treepieces_vertex *c = piece->vertices;
+            weights[k] = tpc_mix(w, c[q->corners[0]].weights[k], c[q->corners[1]].weights[k],
+                                 c[q->corners[2]].weights[k], c[q->corners[3]].weights[k]);
+            sum += weights[k];
+        }
+        for (int k = 0; k < 4; k++) weights[k] /= sum;
+        b->numbers[i] = tpc_weld(b, position, normal, weights);
+    }
+    for (int i = 0; i < 3 * triangles; i++) {
+        const size_t at = 3 * b->out->triangle_count + (size_t)i;
+        const float u = b->coords[2 * b->indices[i]], v = b->coords[2 * b->indices[i] + 1];
+        float w[4];
+        tpc_weigh(u, v, w);
+        b->out->indices[at] = b->numbers[b->indices[i]];
+        b->out->uvs[2 * at] = tpc_mix(w, uv[0][0], uv[1][0], uv[2][0], uv[3][0]);
+        b->out->uvs[2 * at + 1] =
+            ((float)layer + tpc_mix(w, uv[0][1], uv[1][1], uv[2][1], uv[3][1])) / (float)b->layers;
+    }
+    b->out->triangle_count += (size_t)triangles;
+}
+
+/* The records of a tree lie together, of each type; *count receives how many. */
+static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces_tree *tree,
+                                 uint32_t *count) {
+    uint32_t ends[2];
+    for (int e = 0; e < 2; e++) { /* the first with a bone of at least ... */
+        const uint32_t bone = tree->first_node + (e ? tree->node_count : 0);
+        uint32_t low = 0, high = batch->count;
+        while (low < high) {
+            const uint32_t middle = low + (high - low) / 2;
+            if (batch->words[(size_t)middle * batch->stride] < bone) low = middle + 1;
+            else high = middle;
+        }
+        ends[e] = low;
+    }
+    *count = ends[1] - ends[0];
+    return ends[0];
+}
+
+/* Visit all quads: count what they need (out NULL), or bake them. */
+static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, size_t *triangles) {
+    uint32_t done = 0;
+    for (int t = 0; t < b->forest->type_count; t++) {
+        const treepieces_piece *piece = &b->forest->kit->pieces[t];
+        const treepieces_batch *batch = &b->forest->batches[t];
+        uint32_t count;
+        const uint32_t first = tpc_first_record(batch, b->tree, &count);
+        for (uint32_t i = first; i < first + count; i++, done++) {
+            const uint32_t *record = batch->words + (size_t)i * batch->stride;
+            const uint32_t own = record[0] - b->tree->first_node;
+            if ((done & 63) == 0 &&
+                txm_progress(env, (b->out ? 0.3f : 0) + (b->out ? 0.7f : 0.3f) * (float)done /
+                                      (float)b->tree->node_count, "bake"))
+                return txm_fail(env, TXM_CANCELLED, "cancelled");
+            if (*triangles > TPC_MESH_TRIANGLES)
+                return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
+            if (!b->out && !tpc_is_tessellated(b)) {
+                *vertices += (size_t)piece->vertex_count;
+                *triangles += 2 * (size_t)piece->quad_count;
+                continue;
+            }
+            treepieces_skin(b->forest, b->desc->bones, t, i, b->positions, b->normals);
+            tpc_children(record, b->joints + 1);
+            b->joints[0] = own;
+            for (int k = 1; k < 4; k++) b->joints[k] += own;
+            for (int k = 0; k < piece->quad_count; k++) {
+                float positions[12];
+                int edges[4], more;
+                if (b->out) {
+                    tpc_bake_quad(b, piece, record, k);
+                    continue;
+                }
+                for (int c = 0; c < 4; c++)
+                    memcpy(positions + 3 * c, b->positions + 3 * piece->quads[k].corners[c],
+                           3 * sizeof(float));
+                const int inner = tpc_quad_levels(b, positions, edges);
+                *vertices += (size_t)treepieces_pattern(edges, inner, NULL, NULL, &more);
+                *triangles += (size_t)more;
+            }
+            if (b->is_broken)
+                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are infinite, flat or no numbers");
+        }
+    }
+    return TXM_OK;
+}
+
+/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and
+   where they lie in the circle about the rim. */
+typedef struct tpc_cap {
+    uint32_t numbers[TREEPIECES_RIM * 64 + 1];
+    float places[TREEPIECES_RIM * 64 + 1][2];
+    int count; /* without the middle */
+} tpc_cap;
+
+static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *cap) {
+    const float own[4] = {1, 0, 0, 0};
+    cap->count = 0;
+    for (int j = 0; j < TREEPIECES_RIM; j++) { /* side j as the edge from corner 0 to 1 of a quad */
+        float p[12], normals[12], from[3], to[3], at[3], normal[3];
+        for (int k = 0; k < 4; k++) {
+            const int vertex = piece->root_rim[(j + (k == 1)) % TREEPIECES_RIM];
+            memcpy(p + 3 * k, b->positions + 3 * vertex, 3 * sizeof(float));
+            memcpy(normals + 3 * k, b->normals + 3 * vertex, 3 * sizeof(float));
+        }
+        tpc_rim_vertex(j, from, normal);
+        tpc_rim_vertex((j + 1) % TREEPIECES_RIM, to, normal);
+        const int level = tpc_is_tessellated(b) ? treepieces_edge_level(&b->lod, p, p + 3) : 1;
+        for (int i = 0; i < level; i++, cap->count++) {
+            const float t = tpc_place_along(i, level);
+            treepieces_patch_point(p, normals, b->lod.shape, 0, t, at, normal);
+            cap->numbers[cap->count] = tpc_weld(b, at, normal, own);
+            cap->places[cap->count][0] = (1 - t) * from[0] + t * to[0];
+            cap->places[cap->count][1] = (1 - t) * from[2] + t * to[2];
+        }
+    }
+}
+
+/* Close the foot: a hexagon by a fan of four; a finer rim, which need be neither convex nor bent at
+   all, by one about its middle. */
+static void tpc_bake_cap(tpc_baking *b) {
+    const float own[4] = {1, 0, 0, 0}, middle[3] = {0, 0, 0}, down[3] = {0, -1, 0};
+    const int type = b->forest->nodes[b->tree->first_node].type;
+    const float *bone = b->desc->bones + TREEPIECES_BONE * (size_t)b->tree->first_node;
+    treepieces_mesh *m = b->out;
+    uint32_t records;
+    tpc_cap cap;
+    const uint32_t first = tpc_first_record(&b->forest->batches[type], b->tree, &records);
+    treepieces_skin(b->forest, b->desc->bones, type, first, b->positions, b->normals);
+    b->joints[0] = 0;
+    tpc_find_cap(b, &b->forest->kit->pieces[type], &cap);
+    const int is_fine = cap.count > TREEPIECES_RIM, hub = is_fine ? cap.count : 0;
+    if (is_fine) {
+        float at[3], normal[3];
+        tpc_move_point(bone, middle, at);
+        tpc_move_normal(bone, down, normal);
+        tpc_unit(normal);
+        cap.numbers[hub] = tpc_weld(b, at, normal, own);
+        memset(cap.places[hub], 0, sizeof cap.places[hub]);
+    }
+    for (int i = !is_fine; i < cap.count - !is_fine; i++) {
+        const int corners[3] = {hub, (i + 1) % cap.count, i}; /* seen from below */
+        for (int k = 0; k < 3; k++) {
+            const size_t at = 3 * m->triangle_count + (size_t)k;
+            const float *place = cap.places[corners[k]]; /* on all of layer 0 */
+            m->indices[at] = cap.numbers[corners[k]];
+            m->uvs[2 * at] = 0.5f + 0.49f * place[0];
+            m->uvs[2 * at + 1] = (0.5f - 0.49f * place[1]) / (float)b->layers;
+        }
+        m->triangle_count++;
+    }
+}
+
+static txm_status tpc_bake_into(tpc_baking *b, tpc_mesh *made, txm_env *env) {
+    size_t vertices = 0, triangles = 0, slots = 64;
+    txm_status status = tpc_bake_tree(b, env, &vertices, &triangles);
+    if (status != TXM_OK) return status;
+    if (b->desc->capped) {
+        vertices++;
+        triangles += TREEPIECES_RIM * 64;
+    }
+    if (triangles > TPC_MESH_TRIANGLES)
+        return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
+    while (slots < 2 * vertices) slots *= 2;
+    b->table = (uint32_t *)txm_alloc(env, slots * sizeof(uint32_t));
+    if (!tpc_alloc_mesh(made, vertices, triangles) || !b->table)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    memset(b->table, 0, slots * sizeof(uint32_t));
+    b->table_mask = slots - 1;
+    b->out = &made->mesh;
+    status = tpc_bake_tree(b, env, &vertices, &triangles);
+    if (status == TXM_OK && b->desc->capped) tpc_bake_cap(b);
+    return status;
+}
+
+static int tpc_has_tree(const treepieces_forest *forest, int tree) {
+    return forest && tree >= 0 && tree < forest->tree_count;
+}
+
+TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
+                                          treepieces_mesh **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!desc || !desc->bones || !tpc_has_tree(desc->forest, desc->tree))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "desc or bones is NULL, or there is no such tree");
+    if (desc->sheet_size < 0 || desc->sheet_layers < 0 || desc->sheet_layers > 64)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "sheet_size or sheet_layers is out of range");
+    if (desc->lod && (!(desc->lod->max_level >= 0 && desc->lod->max_level <= 64) ||
+                      !(desc->lod->half_distance >= 0) || !(desc->lod->shape <= 1)))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "lod: a field is out of range");
+    tpc_mesh *made = tpc_make_mesh(env);
+    tpc_baking *b = (tpc_baking *)txm_alloc(env, sizeof *b);
+    txm_status status = TXM_OK;
+    if (!made || !b) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    } else {
+        memset(b, 0, sizeof *b);
+        b->desc = desc;
+        b->forest = desc->forest;
+        b->tree = &desc->forest->trees[desc->tree];
+        if (desc->lod) b->lod = *desc->lod;
+        b->sheet_size = desc->sheet_size ? desc->sheet_size : 512;
+        b->layers = desc->sheet_layers ? desc->sheet_layers : TREEPIECES_OWN;
+        status = tpc_bake_into(b, made, env);
+        txm_free(env, b->table);
+    }
+    txm_free(env, b);
+    *out = tpc_hand_over(made, status);
+    return status;
+}
+
+TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
+    if (!mesh) return;
+    txm_arena arena = ((tpc_mesh *)mesh)->arena;
+    txm_arena_free(&arena);
 }
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */

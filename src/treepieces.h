@@ -670,10 +670,13 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #include "treepieces/grow.h"
 #include "treepieces/forest.h"
 #include "treepieces/wind.h"
-#include "treepieces/skin.h"
-#include "treepieces/bake.h"
+#include "treepieces/bones.h"
+#include "treepieces/tessellation.h"
 #include "treepieces/bark.h"
-#include "treepieces/leaves.h"
+#include "treepieces/cloud.h"
+#include "treepieces/spray.h"
+#include "treepieces/impostor.h"
+#include "treepieces/bake.h"
 #endif /* TREEPIECES_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------

@@ -1,7 +1,10 @@
 #ifndef TREEPIECES_BAKE_H
 #define TREEPIECES_BAKE_H
 
-#include "skin.h"
+#include "bones.h"
+#include "tessellation.h"
+#include "bark.h"
+#include "cloud.h"
 
 /* ---- baked meshes ------------------------------------------------------------------------ */
 
@@ -364,6 +367,75 @@ TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
     if (!mesh) return;
     txm_arena arena = ((tpc_mesh *)mesh)->arena;
     txm_arena_free(&arena);
+}
+
+/* ---- foliage: baked leaf cards ------------------------------------------------------------- */
+
+/* Card number `index` of the mesh, of a cloud about `center`. */
+static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
+                          const float center[3], float radius, uint32_t joint) {
+    static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
+    static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
+    for (size_t k = 0; k < 4; k++) {
+        const size_t vertex = 4 * index + k;
+        for (size_t a = 0; a < 3; a++) {
+            const float across = sides[k][0] * card->right[a] + sides[k][1] * card->up[a];
+            m->positions[3 * vertex + a] = center[a] + radius * (card->center[a] + across);
+            m->normals[3 * vertex + a] = card->normal[a];
+        }
+        for (size_t j = 0; j < 4; j++) {
+            m->joints[4 * vertex + j] = j ? 0 : joint;
+            m->weights[4 * vertex + j] = j ? 0 : 1;
+        }
+    }
+    for (size_t k = 0; k < 6; k++) {
+        m->indices[6 * index + k] = (uint32_t)(4 * index) + corners[k];
+        m->uvs[12 * index + 2 * k] = sides[corners[k]][0] > 0 ? 1.0f : 0.0f;
+        m->uvs[12 * index + 2 * k + 1] = sides[corners[k]][1] > 0 ? 0.0f : 1.0f;
+    }
+}
+
+TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
+                                                 const float *bones, int looks, txm_env *env,
+                                                 treepieces_mesh **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!bones || !tpc_has_tree(forest, tree))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "forest or bones is NULL, or there is no such tree");
+    if (looks < 1 || looks > 64) return txm_fail(env, TXM_BAD_ARGUMENT, "looks must be 1 to 64");
+    const treepieces_tree *t = &forest->trees[tree];
+    const treepieces_species *species = &forest->species[t->species];
+    const size_t count = (size_t)treepieces_cloud(species, 0, NULL);
+    if (count * t->cluster_count > 0x7fffffffu / 6)
+        return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 corners");
+    const size_t all = count * t->cluster_count;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    tpc_mesh *made = tpc_make_mesh(env);
+    treepieces_card *cards =
+        (treepieces_card *)txm_arena_alloc(&scratch, (size_t)looks * (count + 1), sizeof *cards);
+    txm_status status = TXM_OK;
+    if (!made || !cards || !tpc_alloc_mesh(made, 4 * all, 2 * all)) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mesh");
+    } else {
+        made->mesh.vertex_count = 4 * all;
+        made->mesh.triangle_count = 2 * all;
+    }
+    for (int k = 0; k < looks && status == TXM_OK; k++)
+        treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
+    for (uint32_t i = 0; i < t->cluster_count && status == TXM_OK; i++) {
+        const treepieces_cluster *c = &forest->clusters[t->first_cluster + i];
+        const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
+        const treepieces_card *look = cards + (size_t)(c->look % (uint32_t)looks) * count;
+        const float center[3] = {bone[3] + c->along * bone[1], bone[7] + c->along * bone[5],
+                                 bone[11] + c->along * bone[9]};
+        for (size_t k = 0; k < count; k++)
+            tpc_bake_card(&made->mesh, count * i + k, &look[k], center, c->radius,
+                          c->node - t->first_node);
+    }
+    txm_arena_free(&scratch);
+    *out = tpc_hand_over(made, status);
+    return status;
 }
 
 #endif /* TREEPIECES_BAKE_H */

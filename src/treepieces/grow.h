@@ -1,7 +1,7 @@
 #ifndef TREEPIECES_GROW_H
 #define TREEPIECES_GROW_H
 
-#include "rim.h"
+#include "kit.h"
 
 /* ---- growing: what a tree is made of ------------------------------------------------------ */
 

@@ -3,6 +3,36 @@
 
 #include "builtin.h"
 
+/* ---- the kit ----------------------------------------------------------------------------- */
+
+/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
+typedef struct tpc_seen {
+    float position[3], normal[3];
+} tpc_seen;
+
+/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
+typedef struct tpc_band {
+    float rise, spread;
+} tpc_band;
+
+/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
+   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
+typedef struct tpc_cells {
+    uint32_t bands[TREEPIECES_BANDS], bottom, own;
+    int first, last;
+} tpc_cells;
+
+struct treepieces_kit {
+    txm_arena arena; /* holds the kit itself and all it points to */
+    int count;
+    treepieces_piece pieces[TREEPIECES_MAX_TYPES];
+    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
+    tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
+    int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
+    float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
+    tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
+};
+
 /* ---- what a piece must be ---------------------------------------------------------------- */
 
 /* Refuse a piece; number < 0: the fault is not that of one vertex. */

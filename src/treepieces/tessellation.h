@@ -1,93 +1,7 @@
-#ifndef TREEPIECES_SKIN_H
-#define TREEPIECES_SKIN_H
+#ifndef TREEPIECES_TESSELLATION_H
+#define TREEPIECES_TESSELLATION_H
 
 #include "rim.h"
-
-/* ---- skinning ---------------------------------------------------------------------------- */
-
-static void tpc_move_point(const float *bone, const float p[3], float out[3]) {
-    for (int k = 0; k < 3; k++)
-        out[k] = ((bone[4 * k] * p[0] + bone[4 * k + 1] * p[1]) + bone[4 * k + 2] * p[2]) +
-                 bone[4 * k + 3];
-}
-
-/* squares of the lengths of a bone's columns */
-static void tpc_columns(const float *bone, float squares[3]) {
-    for (int k = 0; k < 3; k++)
-        squares[k] = (bone[k] * bone[k] + bone[4 + k] * bone[4 + k]) + bone[8 + k] * bone[8 + k];
-}
-
-/* n by the inverse transpose: columns at right angles are divided by their squares */
-static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
-    float squares[3];
-    tpc_columns(bone, squares);
-    const float m[3] = {n[0] / squares[0], n[1] / squares[1], n[2] / squares[2]};
-    for (int k = 0; k < 3; k++)
-        out[k] = (bone[4 * k] * m[0] + bone[4 * k + 1] * m[1]) + bone[4 * k + 2] * m[2];
-}
-
-/* The bones of a record's children, less its own; 0 where there is none. */
-static void tpc_children(const uint32_t *record, uint32_t children[TREEPIECES_MAX_LEAVES]) {
-    children[0] = record[1] & 0xffffu;
-    children[1] = record[1] >> 16;
-    children[2] = record[2] & 0xffffu;
-}
-
-TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
-                                    uint32_t instance, float *positions, float *normals) {
-    const treepieces_piece *piece = &forest->kit->pieces[type];
-    const treepieces_batch *batch = &forest->batches[type];
-    const uint32_t *word = batch->words + (size_t)instance * batch->stride;
-    uint32_t difference[TREEPIECES_MAX_LEAVES];
-    const float *own = bones + TREEPIECES_BONE * (size_t)word[0];
-    const float *child[TREEPIECES_MAX_LEAVES];
-    float stretch[TREEPIECES_MAX_LEAVES], own_squares[3];
-    int turn[TREEPIECES_MAX_LEAVES];
-    tpc_columns(own, own_squares);
-    tpc_children(word, difference);
-    for (int k = 0; k < piece->leaf_count; k++) {
-        float squares[3];
-        child[k] = own + TREEPIECES_BONE * (size_t)difference[k];
-        turn[k] = (int)(word[2] >> (16 + 4 * k) & 15u);
-        tpc_columns(child[k], squares);
-        stretch[k] = sqrtf(squares[0] * own_squares[1] / (own_squares[0] * squares[1]));
-    }
-    for (int i = 0; i < piece->vertex_count; i++) {
-        const treepieces_vertex *v = &piece->vertices[i];
-        float *position = positions + 3 * i, p[3], n[3], moved[3], sum[3] = {0, 0, 0};
-        if (v->rim >= 0) {
-            const int k = v->rim / TREEPIECES_RIM;
-            tpc_rim_vertex((v->rim + TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, p, n);
-            tpc_move_point(child[k], p, position);
-            if (!normals) continue;
-            tpc_move_normal(child[k], n, sum);
-        } else {
-            const float w = v->weights[0];
-            tpc_move_point(own, v->position, position);
-            tpc_move_normal(own, v->normal, sum);
-            for (int c = 0; c < 3 && w < 1; c++) position[c] *= w;
-            for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
-            for (int k = 0; k < piece->leaf_count; k++) {
-                const float wk = v->weights[1 + k];
-                const tpc_seen *at = &forest->kit->seen[type][k * piece->vertex_count + i];
-                if (!(wk > 0)) continue;
-                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
-                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);
-                p[1] *= stretch[k];
-                n[1] /= stretch[k];
-                tpc_move_point(child[k], p, moved);
-                for (int c = 0; c < 3; c++) position[c] += wk * moved[c];
-                float squares[3];
-                tpc_columns(child[k], squares);
-                tpc_move_normal(child[k], n, moved);
-                for (int c = 0; c < 3; c++) sum[c] += wk * sqrtf(squares[0]) * moved[c];
-            }
-            if (!normals) continue;
-        }
-        tpc_unit(sum);
-        memcpy(normals + 3 * i, sum, sizeof sum);
-    }
-}
 
 /* ---- level of detail --------------------------------------------------------------------- */
 
@@ -260,4 +174,4 @@ TREEPIECES_API void treepieces_patch_point(const float positions[12], const floa
     memcpy(normal, n, sizeof n);
 }
 
-#endif /* TREEPIECES_SKIN_H */
+#endif /* TREEPIECES_TESSELLATION_H */
