@@ -704,9 +704,24 @@ static void tpc_cross(const float a[3], const float b[3], float out[3]) {
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+/* Scale v to unit length. It must not be the zero vector. */
 static void tpc_unit(float v[3]) {
     const float length = sqrtf(tpc_dot(v, v));
     for (int k = 0; k < 3; k++) v[k] /= length;
+}
+
+/* The same, a little faster; the zero vector becomes +y. */
+static void tpc_unit_or_up(float v[3]) {
+    const float square = tpc_dot(v, v), scale = 1 / sqrtf(square);
+    if (square > 0)
+        for (int k = 0; k < 3; k++) v[k] *= scale;
+    else v[1] = 1;
+}
+
+/* The same; a vector shorter than 1e-6 becomes (x, y, z). */
+static void tpc_unit_or(float v[3], float x, float y, float z) {
+    const float length = sqrtf(tpc_dot(v, v)), other[3] = {x, y, z};
+    for (int k = 0; k < 3; k++) v[k] = length > 1e-6f ? v[k] / length : other[k];
 }
 
 /* ---- the canonical rim ------------------------------------------------------------------- */
@@ -1334,6 +1349,12 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
     return TXM_OK;
 }
 
+TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit) {
+    if (!kit) return;
+    txm_arena arena = kit->arena;
+    txm_arena_free(&arena);
+}
+
 TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, int count,
                                               txm_env *env, treepieces_kit **out) {
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
@@ -1366,12 +1387,6 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
     if (status == TXM_OK) *out = kit;
     else treepieces_kit_free(kit);
     return status;
-}
-
-TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit) {
-    if (!kit) return;
-    txm_arena arena = kit->arena;
-    txm_arena_free(&arena);
 }
 
 TREEPIECES_API int treepieces_kit_count(const treepieces_kit *kit) {
@@ -1657,783 +1672,210 @@ static txm_status tpc_species_check(const treepieces_species *s, txm_env *env) {
 /* What a species has that is not in its text: a small round tree. */
 static const char tpc_fresh[] =
     "flare 1.6\n"
-    "envelope free\n"
-    "crown_base 0\n"
-    "crown_top 1\n"
-    "crown_width 1\n"
-    "shade 0\n"
+    "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
     "stiffness 1\n"
-    "leaf_shape oval\n"
-    "leaf_count 24\n"
-    "leaf_size 0.3\n"
-    "cloud 0.5\n"
-    "cloud_flat 0.8\n"
-    "leaf_color 0.3 0.45 0.15\n"
-    "bark_color 0.4 0.35 0.3\n"
-    "order 0\n"
-    "length 8\n"
-    "length_spread 0.1\n"
-    "radius 0.025\n"
-    "taper 0.25\n"
-    "segments 12\n"
-    "start 0.25\n"
-    "side 0.45\n"
-    "pair 0.1\n"
-    "fork 0.12\n"
-    "triple 0\n"
-    "fork_angle 25\n"
+    "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud 0.5\n" "cloud_flat 0.8\n"
+    "leaf_color 0.3 0.45 0.15\n" "bark_color 0.4 0.35 0.3\n"
+    "order 0\n" "length 8\n" "length_spread 0.1\n" "radius 0.025\n" "taper 0.25\n" "segments 12\n"
+    "start 0.25\n" "side 0.45\n" "pair 0.1\n" "fork 0.12\n" "triple 0\n" "fork_angle 25\n"
     "fork_ratio 0.9\n"
-    "angle_base 0\n"
-    "angle_top 0\n"
-    "angle_spread 0\n"
-    "profile 1 1 1\n"
-    "roll 0\n"
-    "wander 6\n"
-    "tropism 0.05\n"
-    "sag 0\n"
-    "gravimorphism 0\n"
-    "flatten 0\n"
-    "leaves 0\n"
+    "angle_base 0\n" "angle_top 0\n" "angle_spread 0\n" "profile 1 1 1\n" "roll 0\n"
+    "wander 6\n" "tropism 0.05\n" "sag 0\n" "gravimorphism 0\n" "flatten 0\n" "leaves 0\n"
     "leaves_start 0.8\n"
-    "order 1\n"
-    "length 0.5\n"
-    "length_spread 0.2\n"
-    "radius 0.5\n"
-    "taper 0.2\n"
-    "segments 7\n"
-    "start 0.2\n"
-    "side 0.5\n"
-    "pair 0.1\n"
-    "fork 0.06\n"
-    "triple 0\n"
-    "fork_angle 25\n"
+    "order 1\n" "length 0.5\n" "length_spread 0.2\n" "radius 0.5\n" "taper 0.2\n" "segments 7\n"
+    "start 0.2\n" "side 0.5\n" "pair 0.1\n" "fork 0.06\n" "triple 0\n" "fork_angle 25\n"
     "fork_ratio 0.9\n"
-    "angle_base 65\n"
-    "angle_top 40\n"
-    "angle_spread 10\n"
-    "profile 1 0.9 0.5\n"
-    "roll 137.5\n"
-    "wander 9\n"
-    "tropism 0.05\n"
-    "sag 0\n"
-    "gravimorphism 0\n"
-    "flatten 0\n"
-    "leaves 0.5\n"
+    "angle_base 65\n" "angle_top 40\n" "angle_spread 10\n" "profile 1 0.9 0.5\n" "roll 137.5\n"
+    "wander 9\n" "tropism 0.05\n" "sag 0\n" "gravimorphism 0\n" "flatten 0\n" "leaves 0.5\n"
     "leaves_start 0.5\n"
-    "order 2\n"
-    "length 0.45\n"
-    "length_spread 0.25\n"
-    "radius 0.55\n"
-    "taper 0.3\n"
-    "segments 4\n"
-    "start 0.2\n"
-    "side 0.5\n"
-    "pair 0\n"
-    "fork 0\n"
-    "triple 0\n"
-    "fork_angle 25\n"
+    "order 2\n" "length 0.45\n" "length_spread 0.25\n" "radius 0.55\n" "taper 0.3\n" "segments 4\n"
+    "start 0.2\n" "side 0.5\n" "pair 0\n" "fork 0\n" "triple 0\n" "fork_angle 25\n"
     "fork_ratio 0.9\n"
-    "angle_base 55\n"
-    "angle_top 40\n"
-    "angle_spread 12\n"
-    "profile 1 0.9 0.6\n"
-    "roll 137.5\n"
-    "wander 12\n"
-    "tropism 0.03\n"
-    "sag 0\n"
-    "gravimorphism 0\n"
-    "flatten 0\n"
-    "leaves 0.8\n"
+    "angle_base 55\n" "angle_top 40\n" "angle_spread 12\n" "profile 1 0.9 0.6\n" "roll 137.5\n"
+    "wander 12\n" "tropism 0.03\n" "sag 0\n" "gravimorphism 0\n" "flatten 0\n" "leaves 0.8\n"
     "leaves_start 0.2\n";
 
 static const char tpc_oak[] =
-    "name oak\n"
-    "flare 1.7\n"
-    "stiffness 1.4\n"
-    "envelope ellipsoid\n"
-    "crown_base 0.08\n"
-    "crown_top 1.12\n"
-    "crown_width 1.35\n"
-    "leaf_shape lobed\n"
-    "leaf_count 40\n"
-    "leaf_size 0.4\n"
-    "cloud 0.85\n"
-    "cloud_flat 0.8\n"
-    "leaf_color 0.29 0.4 0.13\n"
-    "bark_color 0.4 0.35 0.29\n"
-    "order 0\n"
-    "length 15\n"
-    "radius 0.034\n"
-    "taper 0.05\n"
-    "segments 15\n"
-    "start 0.2\n"
-    "side 0.5\n"
-    "pair 0.05\n"
-    "fork 0.35\n"
-    "fork_angle 30\n"
-    "fork_ratio 0.95\n"
-    "wander 9\n"
-    "tropism 0.03\n"
-    "leaves 0.9\n"
-    "leaves_start 0.85\n"
-    "order 1\n"
-    "length 0.6\n"
-    "length_spread 0.2\n"
-    "radius 0.55\n"
-    "taper 0.06\n"
-    "segments 11\n"
-    "start 0.15\n"
-    "side 0.5\n"
-    "pair 0.05\n"
-    "fork 0.22\n"
-    "fork_angle 28\n"
-    "angle_base 78\n"
-    "angle_top 45\n"
-    "angle_spread 10\n"
-    "profile 1.1 1 0.6\n"
-    "roll 137.5\n"
-    "wander 15\n"
-    "tropism 0.06\n"
-    "leaves 0.7\n"
-    "leaves_start 0.5\n"
-    "order 2\n"
-    "gravimorphism 0.5\n"
-    "length 0.45\n"
-    "radius 0.5\n"
-    "taper 0.1\n"
-    "segments 7\n"
-    "start 0.1\n"
-    "side 0.55\n"
-    "fork 0.15\n"
-    "angle_base 65\n"
-    "angle_top 45\n"
-    "angle_spread 15\n"
-    "profile 1 0.9 0.5\n"
-    "wander 17\n"
-    "tropism 0.1\n"
-    "leaves 0.6\n"
-    "leaves_start 0.3\n"
-    "order 3\n"
-    "gravimorphism 0.5\n"
-    "length 0.5\n"
-    "radius 0.5\n"
-    "taper 0.2\n"
-    "segments 4\n"
-    "side 0.4\n"
-    "angle_base 55\n"
-    "angle_top 45\n"
-    "wander 18\n"
-    "tropism 0.08\n"
-    "leaves 0.6\n"
-    "leaves_start 0.2\n"
-    "order 4\n"
-    "gravimorphism 0.3\n"
-    "length 0.5\n"
-    "radius 0.55\n"
-    "segments 3\n"
-    "wander 16\n"
-    "leaves 0.5\n";
+    "name oak\n" "flare 1.7\n" "stiffness 1.4\n"
+    "envelope ellipsoid\n" "crown_base 0.08\n" "crown_top 1.12\n" "crown_width 1.35\n"
+    "leaf_shape lobed\n" "leaf_count 40\n" "leaf_size 0.4\n" "cloud 0.85\n" "cloud_flat 0.8\n"
+    "leaf_color 0.29 0.4 0.13\n" "bark_color 0.4 0.35 0.29\n"
+    "order 0\n" "length 15\n" "radius 0.034\n" "taper 0.05\n" "segments 15\n"
+    "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.35\n" "fork_angle 30\n" "fork_ratio 0.95\n"
+    "wander 9\n" "tropism 0.03\n" "leaves 0.9\n" "leaves_start 0.85\n"
+    "order 1\n" "length 0.6\n" "length_spread 0.2\n" "radius 0.55\n" "taper 0.06\n" "segments 11\n"
+    "start 0.15\n" "side 0.5\n" "pair 0.05\n" "fork 0.22\n" "fork_angle 28\n"
+    "angle_base 78\n" "angle_top 45\n" "angle_spread 10\n" "profile 1.1 1 0.6\n" "roll 137.5\n"
+    "wander 15\n" "tropism 0.06\n" "leaves 0.7\n" "leaves_start 0.5\n"
+    "order 2\n" "gravimorphism 0.5\n"
+    "length 0.45\n" "radius 0.5\n" "taper 0.1\n" "segments 7\n"
+    "start 0.1\n" "side 0.55\n" "fork 0.15\n"
+    "angle_base 65\n" "angle_top 45\n" "angle_spread 15\n" "profile 1 0.9 0.5\n"
+    "wander 17\n" "tropism 0.1\n" "leaves 0.6\n" "leaves_start 0.3\n"
+    "order 3\n" "gravimorphism 0.5\n"
+    "length 0.5\n" "radius 0.5\n" "taper 0.2\n" "segments 4\n" "side 0.4\n"
+    "angle_base 55\n" "angle_top 45\n"
+    "wander 18\n" "tropism 0.08\n" "leaves 0.6\n" "leaves_start 0.2\n"
+    "order 4\n" "gravimorphism 0.3\n" "length 0.5\n" "radius 0.55\n" "segments 3\n"
+    "wander 16\n" "leaves 0.5\n";
 
 static const char tpc_beech[] =
-    "name beech\n"
-    "flare 1.8\n"
-    "stiffness 1.2\n"
-    "leaf_shape oval\n"
-    "leaf_count 44\n"
-    "leaf_size 0.36\n"
-    "cloud 1\n"
-    "cloud_flat 0.6\n"
-    "leaf_color 0.28 0.39 0.14\n"
-    "bark_color 0.52 0.51 0.47\n"
-    "order 0\n"
-    "length 20\n"
-    "radius 0.024\n"
-    "taper 0.04\n"
-    "segments 26\n"
-    "start 0.14\n"
-    "side 0.8\n"
-    "pair 0.05\n"
-    "fork 0.08\n"
-    "fork_angle 20\n"
-    "fork_ratio 0.95\n"
-    "wander 4\n"
-    "tropism 0.08\n"
-    "leaves 0.9\n"
-    "leaves_start 0.9\n"
-    "order 1\n"
-    "length 0.55\n"
-    "radius 0.42\n"
-    "taper 0.05\n"
-    "segments 13\n"
-    "start 0.12\n"
-    "side 0.7\n"
-    "pair 0.05\n"
-    "fork 0.1\n"
-    "fork_angle 22\n"
-    "angle_base 66\n"
-    "angle_top 28\n"
-    "angle_spread 8\n"
-    "profile 1 1 0.4\n"
-    "wander 8\n"
-    "tropism 0.05\n"
-    "leaves 0.8\n"
-    "leaves_start 0.5\n"
-    "order 2\n"
-    "length 0.42\n"
-    "radius 0.45\n"
-    "taper 0.08\n"
-    "segments 7\n"
-    "start 0.1\n"
-    "side 0.6\n"
-    "fork 0.06\n"
-    "angle_base 60\n"
-    "angle_top 40\n"
-    "profile 1 0.9 0.4\n"
-    "wander 9\n"
-    "tropism 0.02\n"
-    "flatten 0.4\n"
-    "leaves 0.8\n"
-    "leaves_start 0.3\n"
-    "order 3\n"
-    "length 0.45\n"
-    "radius 0.45\n"
-    "taper 0.15\n"
-    "segments 5\n"
-    "side 0.4\n"
-    "angle_base 50\n"
-    "angle_top 40\n"
-    "wander 10\n"
-    "sag 15\n"
-    "flatten 0.5\n"
-    "leaves 0.6\n"
-    "leaves_start 0.2\n";
+    "name beech\n" "flare 1.8\n" "stiffness 1.2\n"
+    "leaf_shape oval\n" "leaf_count 44\n" "leaf_size 0.36\n" "cloud 1\n" "cloud_flat 0.6\n"
+    "leaf_color 0.28 0.39 0.14\n" "bark_color 0.52 0.51 0.47\n"
+    "order 0\n" "length 20\n" "radius 0.024\n" "taper 0.04\n" "segments 26\n"
+    "start 0.14\n" "side 0.8\n" "pair 0.05\n" "fork 0.08\n" "fork_angle 20\n" "fork_ratio 0.95\n"
+    "wander 4\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
+    "order 1\n" "length 0.55\n" "radius 0.42\n" "taper 0.05\n" "segments 13\n"
+    "start 0.12\n" "side 0.7\n" "pair 0.05\n" "fork 0.1\n" "fork_angle 22\n"
+    "angle_base 66\n" "angle_top 28\n" "angle_spread 8\n" "profile 1 1 0.4\n"
+    "wander 8\n" "tropism 0.05\n" "leaves 0.8\n" "leaves_start 0.5\n"
+    "order 2\n" "length 0.42\n" "radius 0.45\n" "taper 0.08\n" "segments 7\n"
+    "start 0.1\n" "side 0.6\n" "fork 0.06\n"
+    "angle_base 60\n" "angle_top 40\n" "profile 1 0.9 0.4\n"
+    "wander 9\n" "tropism 0.02\n" "flatten 0.4\n" "leaves 0.8\n" "leaves_start 0.3\n"
+    "order 3\n" "length 0.45\n" "radius 0.45\n" "taper 0.15\n" "segments 5\n"
+    "side 0.4\n" "angle_base 50\n" "angle_top 40\n"
+    "wander 10\n" "sag 15\n" "flatten 0.5\n" "leaves 0.6\n" "leaves_start 0.2\n";
 
 static const char tpc_maple[] =
-    "name maple\n"
-    "flare 1.5\n"
-    "leaf_shape lobed\n"
-    "leaf_count 44\n"
-    "leaf_size 0.42\n"
-    "cloud 0.8\n"
-    "cloud_flat 0.8\n"
-    "leaf_color 0.74 0.4 0.12\n"
-    "bark_color 0.42 0.38 0.33\n"
-    "order 0\n"
-    "length 15\n"
-    "radius 0.02\n"
-    "taper 0.05\n"
-    "segments 20\n"
-    "start 0.16\n"
-    "side 0.1\n"
-    "pair 0.5\n"
-    "fork 0.14\n"
-    "fork_angle 20\n"
-    "fork_ratio 0.95\n"
-    "wander 4\n"
-    "tropism 0.1\n"
-    "leaves 0.9\n"
-    "leaves_start 0.85\n"
-    "order 1\n"
-    "length 0.5\n"
-    "radius 0.42\n"
-    "taper 0.05\n"
-    "segments 11\n"
-    "start 0.2\n"
-    "side 0.15\n"
-    "pair 0.4\n"
-    "fork 0.12\n"
-    "angle_base 55\n"
-    "angle_top 30\n"
-    "profile 0.9 1 0.5\n"
-    "roll 90\n"
-    "wander 7\n"
-    "tropism 0.08\n"
-    "leaves 0.8\n"
-    "leaves_start 0.4\n"
-    "order 2\n"
-    "length 0.42\n"
-    "radius 0.42\n"
-    "taper 0.1\n"
-    "segments 7\n"
-    "start 0.15\n"
-    "side 0.1\n"
-    "pair 0.4\n"
-    "fork 0.06\n"
-    "angle_base 50\n"
-    "angle_top 40\n"
-    "profile 1 0.9 0.5\n"
-    "roll 90\n"
-    "wander 8\n"
-    "tropism 0.08\n"
-    "leaves 0.7\n"
-    "leaves_start 0.3\n"
-    "order 3\n"
-    "length 0.5\n"
-    "radius 0.45\n"
-    "taper 0.2\n"
-    "segments 4\n"
-    "side 0.1\n"
-    "pair 0.25\n"
-    "angle_base 45\n"
-    "angle_top 40\n"
-    "roll 90\n"
-    "wander 10\n"
-    "tropism 0.08\n"
-    "leaves 0.7\n"
-    "leaves_start 0.2\n";
+    "name maple\n" "flare 1.5\n"
+    "leaf_shape lobed\n" "leaf_count 44\n" "leaf_size 0.42\n" "cloud 0.8\n" "cloud_flat 0.8\n"
+    "leaf_color 0.74 0.4 0.12\n" "bark_color 0.42 0.38 0.33\n"
+    "order 0\n" "length 15\n" "radius 0.02\n" "taper 0.05\n" "segments 20\n"
+    "start 0.16\n" "side 0.1\n" "pair 0.5\n" "fork 0.14\n" "fork_angle 20\n" "fork_ratio 0.95\n"
+    "wander 4\n" "tropism 0.1\n" "leaves 0.9\n" "leaves_start 0.85\n"
+    "order 1\n" "length 0.5\n" "radius 0.42\n" "taper 0.05\n" "segments 11\n"
+    "start 0.2\n" "side 0.15\n" "pair 0.4\n" "fork 0.12\n"
+    "angle_base 55\n" "angle_top 30\n" "profile 0.9 1 0.5\n" "roll 90\n"
+    "wander 7\n" "tropism 0.08\n" "leaves 0.8\n" "leaves_start 0.4\n"
+    "order 2\n" "length 0.42\n" "radius 0.42\n" "taper 0.1\n" "segments 7\n"
+    "start 0.15\n" "side 0.1\n" "pair 0.4\n" "fork 0.06\n"
+    "angle_base 50\n" "angle_top 40\n" "profile 1 0.9 0.5\n" "roll 90\n"
+    "wander 8\n" "tropism 0.08\n" "leaves 0.7\n" "leaves_start 0.3\n"
+    "order 3\n" "length 0.5\n" "radius 0.45\n" "taper 0.2\n" "segments 4\n"
+    "side 0.1\n" "pair 0.25\n" "angle_base 45\n" "angle_top 40\n" "roll 90\n"
+    "wander 10\n" "tropism 0.08\n" "leaves 0.7\n" "leaves_start 0.2\n";
 
 static const char tpc_birch[] =
-    "name birch\n"
-    "flare 1.3\n"
-    "stiffness 0.7\n"
-    "leaf_shape heart\n"
-    "leaf_count 30\n"
-    "leaf_size 0.34\n"
-    "cloud 0.55\n"
-    "cloud_flat 1.1\n"
-    "leaf_color 0.4 0.52 0.16\n"
-    "bark_color 0.85 0.83 0.79\n"
-    "order 0\n"
-    "length 18\n"
-    "radius 0.01\n"
-    "taper 0.03\n"
-    "segments 38\n"
-    "start 0.14\n"
-    "side 0.85\n"
-    "pair 0.05\n"
-    "fork 0.01\n"
-    "fork_angle 14\n"
-    "wander 3\n"
-    "tropism 0.12\n"
-    "leaves 0.9\n"
-    "leaves_start 0.9\n"
-    "order 1\n"
-    "length 0.34\n"
-    "radius 0.36\n"
-    "taper 0.06\n"
-    "segments 11\n"
-    "start 0.1\n"
-    "side 0.9\n"
-    "fork 0.02\n"
-    "angle_base 52\n"
-    "angle_top 26\n"
-    "angle_spread 7\n"
-    "profile 0.85 0.95 0.3\n"
-    "wander 7\n"
-    "tropism 0.06\n"
-    "sag 30\n"
-    "leaves 0.6\n"
-    "leaves_start 0.5\n"
-    "order 2\n"
-    "length 0.42\n"
-    "radius 0.38\n"
-    "taper 0.12\n"
-    "segments 6\n"
-    "start 0.05\n"
-    "side 0.8\n"
-    "angle_base 50\n"
-    "angle_top 35\n"
-    "profile 1 1 0.6\n"
-    "wander 10\n"
-    "sag 100\n"
-    "tropism -0.06\n"
-    "leaves 0.5\n"
-    "leaves_start 0.3\n"
-    "order 3\n"
-    "length 0.7\n"
-    "radius 0.45\n"
-    "taper 0.3\n"
-    "segments 5\n"
-    "side 0\n"
-    "angle_base 45\n"
-    "angle_top 35\n"
-    "profile 1 1 0.7\n"
-    "wander 9\n"
-    "sag 110\n"
-    "tropism -0.14\n"
-    "leaves 0.6\n"
-    "leaves_start 0.2\n";
+    "name birch\n" "flare 1.3\n" "stiffness 0.7\n"
+    "leaf_shape heart\n" "leaf_count 30\n" "leaf_size 0.34\n" "cloud 0.55\n" "cloud_flat 1.1\n"
+    "leaf_color 0.4 0.52 0.16\n" "bark_color 0.85 0.83 0.79\n"
+    "order 0\n" "length 18\n" "radius 0.01\n" "taper 0.03\n" "segments 38\n"
+    "start 0.14\n" "side 0.85\n" "pair 0.05\n" "fork 0.01\n" "fork_angle 14\n"
+    "wander 3\n" "tropism 0.12\n" "leaves 0.9\n" "leaves_start 0.9\n"
+    "order 1\n" "length 0.34\n" "radius 0.36\n" "taper 0.06\n" "segments 11\n"
+    "start 0.1\n" "side 0.9\n" "fork 0.02\n"
+    "angle_base 52\n" "angle_top 26\n" "angle_spread 7\n" "profile 0.85 0.95 0.3\n"
+    "wander 7\n" "tropism 0.06\n" "sag 30\n" "leaves 0.6\n" "leaves_start 0.5\n"
+    "order 2\n" "length 0.42\n" "radius 0.38\n" "taper 0.12\n" "segments 6\n"
+    "start 0.05\n" "side 0.8\n" "angle_base 50\n" "angle_top 35\n" "profile 1 1 0.6\n"
+    "wander 10\n" "sag 100\n" "tropism -0.06\n" "leaves 0.5\n" "leaves_start 0.3\n"
+    "order 3\n" "length 0.7\n" "radius 0.45\n" "taper 0.3\n" "segments 5\n" "side 0\n"
+    "angle_base 45\n" "angle_top 35\n" "profile 1 1 0.7\n"
+    "wander 9\n" "sag 110\n" "tropism -0.14\n" "leaves 0.6\n" "leaves_start 0.2\n";
 
 static const char tpc_poplar[] =
-    "name poplar\n"
-    "flare 1.5\n"
-    "stiffness 0.9\n"
-    "leaf_shape heart\n"
-    "leaf_count 36\n"
-    "leaf_size 0.36\n"
-    "cloud 0.6\n"
-    "cloud_flat 1.3\n"
-    "leaf_color 0.3 0.44 0.14\n"
-    "bark_color 0.45 0.42 0.36\n"
-    "order 0\n"
-    "length 24\n"
-    "radius 0.013\n"
-    "taper 0.03\n"
-    "segments 50\n"
-    "start 0.04\n"
-    "side 0.6\n"
-    "pair 0.4\n"
-    "fork 0\n"
-    "wander 1.5\n"
-    "tropism 0.25\n"
-    "leaves 0.9\n"
-    "leaves_start 0.9\n"
-    "order 1\n"
-    "length_spread 0.12\n"
-    "length 0.26\n"
-    "radius 0.32\n"
-    "taper 0.06\n"
-    "segments 10\n"
-    "start 0.15\n"
-    "side 0.6\n"
-    "fork 0\n"
-    "angle_base 30\n"
-    "angle_top 18\n"
-    "angle_spread 5\n"
-    "profile 0.8 1 0.14\n"
-    "wander 4\n"
-    "tropism 0.16\n"
-    "leaves 0.7\n"
-    "leaves_start 0.12\n"
-    "order 2\n"
-    "length 0.4\n"
-    "radius 0.42\n"
-    "taper 0.12\n"
-    "segments 6\n"
-    "start 0.1\n"
-    "side 0.4\n"
-    "angle_base 32\n"
-    "angle_top 25\n"
-    "profile 1 0.9 0.5\n"
-    "wander 6\n"
-    "tropism 0.14\n"
-    "leaves 0.7\n"
-    "leaves_start 0.3\n"
-    "order 3\n"
-    "length 0.4\n"
-    "radius 0.5\n"
-    "taper 0.3\n"
-    "segments 3\n"
-    "angle_base 32\n"
-    "angle_top 25\n"
-    "wander 7\n"
-    "tropism 0.12\n"
-    "leaves 0.6\n";
+    "name poplar\n" "flare 1.5\n" "stiffness 0.9\n"
+    "leaf_shape heart\n" "leaf_count 36\n" "leaf_size 0.36\n" "cloud 0.6\n" "cloud_flat 1.3\n"
+    "leaf_color 0.3 0.44 0.14\n" "bark_color 0.45 0.42 0.36\n"
+    "order 0\n" "length 24\n" "radius 0.013\n" "taper 0.03\n" "segments 50\n"
+    "start 0.04\n" "side 0.6\n" "pair 0.4\n" "fork 0\n"
+    "wander 1.5\n" "tropism 0.25\n" "leaves 0.9\n" "leaves_start 0.9\n"
+    "order 1\n" "length_spread 0.12\n" "length 0.26\n" "radius 0.32\n" "taper 0.06\n"
+    "segments 10\n" "start 0.15\n" "side 0.6\n" "fork 0\n"
+    "angle_base 30\n" "angle_top 18\n" "angle_spread 5\n" "profile 0.8 1 0.14\n"
+    "wander 4\n" "tropism 0.16\n" "leaves 0.7\n" "leaves_start 0.12\n"
+    "order 2\n" "length 0.4\n" "radius 0.42\n" "taper 0.12\n" "segments 6\n"
+    "start 0.1\n" "side 0.4\n" "angle_base 32\n" "angle_top 25\n" "profile 1 0.9 0.5\n"
+    "wander 6\n" "tropism 0.14\n" "leaves 0.7\n" "leaves_start 0.3\n"
+    "order 3\n" "length 0.4\n" "radius 0.5\n" "taper 0.3\n" "segments 3\n"
+    "angle_base 32\n" "angle_top 25\n" "wander 7\n" "tropism 0.12\n" "leaves 0.6\n";
 
 static const char tpc_willow[] =
-    "name willow\n"
-    "flare 1.6\n"
-    "stiffness 0.6\n"
-    "leaf_shape lance\n"
-    "leaf_count 36\n"
-    "leaf_size 0.42\n"
-    "cloud 0.9\n"
-    "cloud_flat 2\n"
-    "leaf_color 0.42 0.5 0.18\n"
-    "bark_color 0.42 0.37 0.29\n"
-    "order 0\n"
-    "length 10\n"
-    "radius 0.042\n"
-    "taper 0.08\n"
-    "segments 13\n"
-    "start 0.2\n"
-    "side 0.5\n"
-    "pair 0.05\n"
-    "fork 0.4\n"
-    "fork_angle 30\n"
-    "fork_ratio 0.95\n"
-    "wander 8\n"
-    "tropism 0.03\n"
-    "order 1\n"
-    "length 0.62\n"
-    "radius 0.5\n"
-    "taper 0.1\n"
-    "segments 10\n"
-    "start 0.15\n"
-    "side 0.65\n"
-    "pair 0.3\n"
-    "fork 0.06\n"
-    "angle_base 60\n"
-    "angle_top 40\n"
-    "profile 1 1 0.7\n"
-    "wander 9\n"
-    "tropism 0.05\n"
-    "sag 50\n"
-    "leaves 0.3\n"
-    "leaves_start 0.4\n"
-    "order 2\n"
-    "length 0.8\n"
-    "radius 0.4\n"
-    "taper 0.12\n"
-    "segments 7\n"
-    "start 0.3\n"
-    "side 0.08\n"
-    "angle_base 60\n"
-    "angle_top 40\n"
-    "profile 1 1 0.8\n"
-    "wander 5\n"
-    "tropism -0.16\n"
-    "sag 70\n"
-    "gravimorphism 0.3\n"
-    "leaves 0.85\n"
+    "name willow\n" "flare 1.6\n" "stiffness 0.6\n"
+    "leaf_shape lance\n" "leaf_count 36\n" "leaf_size 0.42\n" "cloud 0.9\n" "cloud_flat 2\n"
+    "leaf_color 0.42 0.5 0.18\n" "bark_color 0.42 0.37 0.29\n"
+    "order 0\n" "length 10\n" "radius 0.042\n" "taper 0.08\n" "segments 13\n"
+    "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.4\n" "fork_angle 30\n" "fork_ratio 0.95\n"
+    "wander 8\n" "tropism 0.03\n"
+    "order 1\n" "length 0.62\n" "radius 0.5\n" "taper 0.1\n" "segments 10\n"
+    "start 0.15\n" "side 0.65\n" "pair 0.3\n" "fork 0.06\n"
+    "angle_base 60\n" "angle_top 40\n" "profile 1 1 0.7\n"
+    "wander 9\n" "tropism 0.05\n" "sag 50\n" "leaves 0.3\n" "leaves_start 0.4\n"
+    "order 2\n" "length 0.8\n" "radius 0.4\n" "taper 0.12\n" "segments 7\n"
+    "start 0.3\n" "side 0.08\n" "angle_base 60\n" "angle_top 40\n" "profile 1 1 0.8\n"
+    "wander 5\n" "tropism -0.16\n" "sag 70\n" "gravimorphism 0.3\n" "leaves 0.85\n"
     "leaves_start 0.15\n"
-    "order 3\n"
-    "length 0.6\n"
-    "radius 0.5\n"
-    "taper 0.3\n"
-    "segments 5\n"
-    "angle_base 30\n"
-    "angle_top 30\n"
-    "wander 5\n"
-    "tropism -0.3\n"
-    "leaves 0.85\n"
-    "leaves_start 0\n";
+    "order 3\n" "length 0.6\n" "radius 0.5\n" "taper 0.3\n" "segments 5\n"
+    "angle_base 30\n" "angle_top 30\n"
+    "wander 5\n" "tropism -0.3\n" "leaves 0.85\n" "leaves_start 0\n";
 
 static const char tpc_almond[] =
-    "name almond\n"
-    "flare 1.4\n"
-    "leaf_shape blossom\n"
-    "leaf_count 34\n"
-    "leaf_size 0.3\n"
-    "cloud 0.38\n"
-    "cloud_flat 0.9\n"
-    "leaf_color 0.94 0.76 0.8\n"
-    "bark_color 0.3 0.25 0.22\n"
-    "order 0\n"
-    "length 5.5\n"
-    "radius 0.026\n"
-    "taper 0.06\n"
-    "segments 14\n"
-    "start 0.2\n"
-    "side 0.35\n"
-    "fork 0.42\n"
-    "triple 0.1\n"
-    "fork_angle 32\n"
-    "fork_ratio 0.95\n"
-    "wander 8\n"
-    "tropism 0.1\n"
-    "leaves 0.7\n"
-    "leaves_start 0.6\n"
-    "order 1\n"
-    "length 0.5\n"
-    "radius 0.45\n"
-    "taper 0.1\n"
-    "segments 9\n"
-    "start 0.1\n"
-    "side 0.6\n"
-    "fork 0.15\n"
-    "fork_angle 28\n"
-    "angle_base 55\n"
-    "angle_top 40\n"
-    "profile 1 1 0.6\n"
-    "wander 11\n"
-    "tropism 0.08\n"
-    "leaves 0.7\n"
-    "leaves_start 0.3\n"
-    "order 2\n"
-    "length 0.45\n"
-    "radius 0.5\n"
-    "taper 0.15\n"
-    "segments 5\n"
-    "side 0.55\n"
-    "fork 0.05\n"
-    "angle_base 50\n"
-    "angle_top 40\n"
-    "profile 1 0.9 0.5\n"
-    "wander 12\n"
-    "tropism 0.08\n"
-    "leaves 0.7\n"
-    "leaves_start 0.2\n"
-    "order 3\n"
-    "length 0.5\n"
-    "radius 0.55\n"
-    "taper 0.3\n"
-    "segments 3\n"
-    "angle_base 45\n"
-    "angle_top 40\n"
-    "wander 12\n"
-    "tropism 0.06\n"
-    "leaves 0.6\n";
+    "name almond\n" "flare 1.4\n"
+    "leaf_shape blossom\n" "leaf_count 34\n" "leaf_size 0.3\n" "cloud 0.38\n" "cloud_flat 0.9\n"
+    "leaf_color 0.94 0.76 0.8\n" "bark_color 0.3 0.25 0.22\n"
+    "order 0\n" "length 5.5\n" "radius 0.026\n" "taper 0.06\n" "segments 14\n"
+    "start 0.2\n" "side 0.35\n" "fork 0.42\n" "triple 0.1\n" "fork_angle 32\n" "fork_ratio 0.95\n"
+    "wander 8\n" "tropism 0.1\n" "leaves 0.7\n" "leaves_start 0.6\n"
+    "order 1\n" "length 0.5\n" "radius 0.45\n" "taper 0.1\n" "segments 9\n"
+    "start 0.1\n" "side 0.6\n" "fork 0.15\n" "fork_angle 28\n"
+    "angle_base 55\n" "angle_top 40\n" "profile 1 1 0.6\n"
+    "wander 11\n" "tropism 0.08\n" "leaves 0.7\n" "leaves_start 0.3\n"
+    "order 2\n" "length 0.45\n" "radius 0.5\n" "taper 0.15\n" "segments 5\n"
+    "side 0.55\n" "fork 0.05\n" "angle_base 50\n" "angle_top 40\n" "profile 1 0.9 0.5\n"
+    "wander 12\n" "tropism 0.08\n" "leaves 0.7\n" "leaves_start 0.2\n"
+    "order 3\n" "length 0.5\n" "radius 0.55\n" "taper 0.3\n" "segments 3\n"
+    "angle_base 45\n" "angle_top 40\n" "wander 12\n" "tropism 0.06\n" "leaves 0.6\n";
 
 static const char tpc_pine[] =
-    "name pine\n"
-    "flare 1.4\n"
-    "leaf_shape needle\n"
-    "leaf_count 40\n"
-    "leaf_size 0.5\n"
-    "cloud 0.8\n"
-    "cloud_flat 0.4\n"
-    "leaf_color 0.24 0.35 0.19\n"
-    "bark_color 0.55 0.36 0.24\n"
-    "order 0\n"
-    "length 19\n"
-    "radius 0.0155\n"
-    "taper 0.06\n"
-    "segments 30\n"
-    "start 0.42\n"
-    "side 0.3\n"
-    "pair 0.6\n"
-    "fork 0.05\n"
-    "fork_angle 22\n"
-    "wander 4\n"
-    "tropism 0.08\n"
-    "leaves 0.9\n"
-    "leaves_start 0.9\n"
-    "order 1\n"
-    "length 0.3\n"
-    "radius 0.42\n"
-    "taper 0.1\n"
-    "segments 9\n"
-    "start 0.3\n"
-    "side 0.3\n"
-    "pair 0.25\n"
-    "fork 0.12\n"
-    "fork_angle 28\n"
-    "angle_base 90\n"
-    "angle_top 40\n"
-    "angle_spread 10\n"
-    "profile 0.75 1 0.5\n"
-    "wander 14\n"
-    "tropism 0.06\n"
-    "flatten 0.2\n"
-    "leaves 0.5\n"
-    "leaves_start 0.6\n"
-    "order 2\n"
-    "length 0.42\n"
-    "radius 0.45\n"
-    "taper 0.15\n"
-    "segments 5\n"
-    "start 0.2\n"
-    "side 0.3\n"
-    "pair 0.15\n"
-    "angle_base 60\n"
-    "angle_top 45\n"
-    "profile 1 0.9 0.5\n"
-    "wander 14\n"
-    "tropism 0.1\n"
-    "flatten 0.5\n"
-    "leaves 0.7\n"
-    "leaves_start 0.5\n"
-    "order 3\n"
-    "length 0.5\n"
-    "radius 0.5\n"
-    "taper 0.3\n"
-    "segments 3\n"
-    "angle_base 50\n"
-    "angle_top 40\n"
-    "wander 12\n"
-    "tropism 0.12\n"
-    "leaves 0.7\n"
-    "leaves_start 0.4\n";
+    "name pine\n" "flare 1.4\n"
+    "leaf_shape needle\n" "leaf_count 40\n" "leaf_size 0.5\n" "cloud 0.8\n" "cloud_flat 0.4\n"
+    "leaf_color 0.24 0.35 0.19\n" "bark_color 0.55 0.36 0.24\n"
+    "order 0\n" "length 19\n" "radius 0.0155\n" "taper 0.06\n" "segments 30\n"
+    "start 0.42\n" "side 0.3\n" "pair 0.6\n" "fork 0.05\n" "fork_angle 22\n"
+    "wander 4\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
+    "order 1\n" "length 0.3\n" "radius 0.42\n" "taper 0.1\n" "segments 9\n"
+    "start 0.3\n" "side 0.3\n" "pair 0.25\n" "fork 0.12\n" "fork_angle 28\n"
+    "angle_base 90\n" "angle_top 40\n" "angle_spread 10\n" "profile 0.75 1 0.5\n"
+    "wander 14\n" "tropism 0.06\n" "flatten 0.2\n" "leaves 0.5\n" "leaves_start 0.6\n"
+    "order 2\n" "length 0.42\n" "radius 0.45\n" "taper 0.15\n" "segments 5\n"
+    "start 0.2\n" "side 0.3\n" "pair 0.15\n"
+    "angle_base 60\n" "angle_top 45\n" "profile 1 0.9 0.5\n"
+    "wander 14\n" "tropism 0.1\n" "flatten 0.5\n" "leaves 0.7\n" "leaves_start 0.5\n"
+    "order 3\n" "length 0.5\n" "radius 0.5\n" "taper 0.3\n" "segments 3\n"
+    "angle_base 50\n" "angle_top 40\n"
+    "wander 12\n" "tropism 0.12\n" "leaves 0.7\n" "leaves_start 0.4\n";
 
 static const char tpc_spruce[] =
-    "name spruce\n"
-    "flare 1.4\n"
-    "leaf_shape needle\n"
-    "leaf_count 16\n"
-    "leaf_size 0.8\n"
-    "cloud 0.46\n"
-    "cloud_flat 0.55\n"
-    "leaf_color 0.2 0.31 0.19\n"
-    "bark_color 0.38 0.3 0.25\n"
-    "order 0\n"
-    "length 22\n"
-    "radius 0.014\n"
-    "taper 0.03\n"
-    "segments 64\n"
-    "start 0.04\n"
-    "side 0.05\n"
-    "pair 0.95\n"
-    "fork 0\n"
-    "wander 1\n"
-    "tropism 0.3\n"
-    "leaves 1\n"
-    "leaves_start 0.96\n"
-    "order 1\n"
-    "length 0.2\n"
-    "radius 0.38\n"
-    "taper 0.12\n"
-    "segments 9\n"
-    "start 0.05\n"
-    "side 0.1\n"
-    "pair 0.8\n"
-    "fork 0\n"
-    "angle_base 95\n"
-    "angle_top 55\n"
-    "angle_spread 6\n"
-    "profile 1 0.56 0.04\n"
-    "roll 80\n"
-    "wander 4\n"
-    "sag -22\n"
-    "leaves 0.9\n"
-    "leaves_start 0\n"
-    "order 2\n"
-    "length 0.38\n"
-    "radius 0.4\n"
-    "taper 0.3\n"
-    "segments 3\n"
-    "side 0\n"
-    "pair 0\n"
-    "angle_base 60\n"
-    "angle_top 50\n"
-    "profile 1 0.8 0.3\n"
-    "roll 15\n"
-    "wander 6\n"
-    "sag 25\n"
-    "flatten 0.7\n"
-    "leaves 0.8\n"
-    "leaves_start 0.1\n";
+    "name spruce\n" "flare 1.4\n"
+    "leaf_shape needle\n" "leaf_count 16\n" "leaf_size 0.8\n" "cloud 0.46\n" "cloud_flat 0.55\n"
+    "leaf_color 0.2 0.31 0.19\n" "bark_color 0.38 0.3 0.25\n"
+    "order 0\n" "length 22\n" "radius 0.014\n" "taper 0.03\n" "segments 64\n"
+    "start 0.04\n" "side 0.05\n" "pair 0.95\n" "fork 0\n"
+    "wander 1\n" "tropism 0.3\n" "leaves 1\n" "leaves_start 0.96\n"
+    "order 1\n" "length 0.2\n" "radius 0.38\n" "taper 0.12\n" "segments 9\n"
+    "start 0.05\n" "side 0.1\n" "pair 0.8\n" "fork 0\n"
+    "angle_base 95\n" "angle_top 55\n" "angle_spread 6\n" "profile 1 0.56 0.04\n" "roll 80\n"
+    "wander 4\n" "sag -22\n" "leaves 0.9\n" "leaves_start 0\n"
+    "order 2\n" "length 0.38\n" "radius 0.4\n" "taper 0.3\n" "segments 3\n"
+    "side 0\n" "pair 0\n"
+    "angle_base 60\n" "angle_top 50\n" "profile 1 0.8 0.3\n" "roll 15\n"
+    "wander 6\n" "sag 25\n" "flatten 0.7\n" "leaves 0.8\n" "leaves_start 0.1\n";
 
 static const char tpc_dead[] =
-    "name dead\n"
-    "flare 1.7\n"
-    "stiffness 2\n"
-    "leaf_count 0\n"
+    "name dead\n" "flare 1.7\n" "stiffness 2\n" "leaf_count 0\n"
     "bark_color 0.5 0.47 0.43\n"
-    "order 0\n"
-    "length 9\n"
-    "radius 0.036\n"
-    "taper 0.3\n"
-    "segments 12\n"
-    "start 0.3\n"
-    "side 0.55\n"
-    "fork 0.18\n"
-    "fork_angle 28\n"
-    "fork_ratio 0.85\n"
-    "wander 12\n"
-    "tropism 0.02\n"
-    "order 1\n"
-    "length 0.42\n"
-    "length_spread 0.6\n"
-    "radius 0.45\n"
-    "taper 0.3\n"
-    "segments 7\n"
-    "start 0.3\n"
-    "side 0.35\n"
-    "fork 0.12\n"
-    "angle_base 80\n"
-    "angle_top 40\n"
-    "angle_spread 18\n"
-    "profile 1 1 0.6\n"
-    "wander 20\n"
-    "tropism 0.03\n"
-    "order 2\n"
-    "length 0.4\n"
-    "length_spread 0.6\n"
-    "radius 0.45\n"
-    "taper 0.4\n"
-    "segments 4\n"
-    "side 0.25\n"
-    "angle_base 60\n"
-    "angle_top 45\n"
-    "angle_spread 20\n"
-    "wander 22\n"
-    "order 3\n"
-    "length 0.4\n"
-    "radius 0.5\n"
-    "taper 0.4\n"
-    "segments 3\n"
-    "wander 20\n";
+    "order 0\n" "length 9\n" "radius 0.036\n" "taper 0.3\n" "segments 12\n"
+    "start 0.3\n" "side 0.55\n" "fork 0.18\n" "fork_angle 28\n" "fork_ratio 0.85\n"
+    "wander 12\n" "tropism 0.02\n"
+    "order 1\n" "length 0.42\n" "length_spread 0.6\n" "radius 0.45\n" "taper 0.3\n" "segments 7\n"
+    "start 0.3\n" "side 0.35\n" "fork 0.12\n"
+    "angle_base 80\n" "angle_top 40\n" "angle_spread 18\n" "profile 1 1 0.6\n"
+    "wander 20\n" "tropism 0.03\n"
+    "order 2\n" "length 0.4\n" "length_spread 0.6\n" "radius 0.45\n" "taper 0.4\n" "segments 4\n"
+    "side 0.25\n" "angle_base 60\n" "angle_top 45\n" "angle_spread 20\n" "wander 22\n"
+    "order 3\n" "length 0.4\n" "radius 0.5\n" "taper 0.4\n" "segments 3\n" "wander 20\n";
 
 static const struct {
     const char *name, *text;
@@ -2450,12 +1892,21 @@ static const struct {
     {"dead", tpc_dead},
 };
 
+TREEPIECES_API int treepieces_preset_count(void) {
+    return (int)(sizeof tpc_presets / sizeof tpc_presets[0]);
+}
+
+TREEPIECES_API const char *treepieces_preset_text(int index) {
+    return index >= 0 && index < treepieces_preset_count() ? tpc_presets[index].text : NULL;
+}
+
 /* ---- species: reading -------------------------------------------------------------------- */
 
 typedef struct tpc_reader {
     const char *at, *end; /* what is left of the line */
     int line, order;      /* order -1: none begun     */
     int keys, crown_line; /* keys so far; line of the last one of the crown */
+    const char *like;     /* NULL, or the text to read behind this line     */
     treepieces_species species;
     txm_env *env;
 } tpc_reader;
@@ -2545,17 +1996,16 @@ static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
     return TXM_OK;
 }
 
-static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
-                                treepieces_species *species);
-
-/* "like NAME": the orders beyond those of that species keep what a fresh one has. */
+/* "like NAME": its text is read behind this line. The orders beyond those of that species keep what a
+   fresh one has. */
 static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
     tpc_word w;
     if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
     if (r->keys) return tpc_misread(r, key, "must come before all other keys");
     for (int i = 0; i < treepieces_preset_count(); i++) {
         if (!tpc_is_word(&w, tpc_presets[i].name)) continue;
-        return tpc_read_text(tpc_presets[i].text, strlen(tpc_presets[i].text), r->env, &r->species);
+        r->like = tpc_presets[i].text;
+        return TXM_OK;
     }
     return tpc_misread(r, &w, "is none of the built-in species");
 }
@@ -2610,7 +2060,10 @@ static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
         r.at = at;
         r.end = newline ? newline : end;
         r.line++;
-        const txm_status status = tpc_read_line(&r);
+        r.like = NULL;
+        txm_status status = tpc_read_line(&r);
+        if (status == TXM_OK && r.like)
+            status = tpc_read_text(r.like, strlen(r.like), env, &r.species);
         if (status != TXM_OK) return status;
         if (!newline) break;
         at = newline + 1;
@@ -2694,14 +2147,6 @@ TREEPIECES_API size_t treepieces_species_print(const treepieces_species *species
     return w.length;
 }
 
-TREEPIECES_API int treepieces_preset_count(void) {
-    return (int)(sizeof tpc_presets / sizeof tpc_presets[0]);
-}
-
-TREEPIECES_API const char *treepieces_preset_text(int index) {
-    return index >= 0 && index < treepieces_preset_count() ? tpc_presets[index].text : NULL;
-}
-
 TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
                                             treepieces_species *species) {
     char line[240];
@@ -2724,8 +2169,6 @@ enum {
     TPC_BUCKETS = 160,     /* of rims that wait, by the logarithm of their radius                 */
     TPC_GRID = 16,         /* cells a side of the grid of shade                                   */
     TPC_CLASSES = 16,      /* of oscillators                                                      */
-    TPC_BLOCK_TREES = 64,  /* trees that grow at once ...                                         */
-    TPC_BLOCK_PIECES = 1 << 18, /* ... as long as they have no more than so many pieces           */
     TPC_MAX_BRANCH = 60    /* percent: radius of a side branch over that of its stem at most      */
 };
 
@@ -2852,13 +2295,6 @@ static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
 
 /* ---- growing: the grammar ------------------------------------------------------------------ */
 
-static void tpc_normalize(float v[3]) {
-    const float square = tpc_dot(v, v), scale = 1 / sqrtf(square);
-    if (square > 0)
-        for (int k = 0; k < 3; k++) v[k] *= scale;
-    else v[1] = 1;
-}
-
 static const treepieces_order *tpc_order(const tpc_growth *g, int order) {
     return &g->species->orders[order < g->species->order_count ? order : g->species->order_count - 1];
 }
@@ -2961,7 +2397,7 @@ static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
         const float fall = o->sag * degree * 2 * at * (length / bud->length);
         h[1] -= fall * sqrtf(h[0] * h[0] + h[2] * h[2] + 0.02f);
     }
-    tpc_normalize(h);
+    tpc_unit_or_up(h);
 }
 
 /* ---- growing: a piece on a rim ------------------------------------------------------------- */
@@ -3119,7 +2555,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     const float ahead = txm_float(cosine), aside = txm_float(sine);
     for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
     bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
-    tpc_normalize(bud->heading);
+    tpc_unit_or_up(bud->heading);
     tpc_stand_off(bud, stem, out, c->ratios[k], offset);
     const float t = from->is_forked || parent->start >= 1
                         ? from->along
@@ -3154,7 +2590,7 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     float heading[3] = {c->direction[0], c->direction[1], c->direction[2]}, twist = 0, rotation[4];
     float joint[4];
     float after = bud->roll;
-    tpc_normalize(heading);
+    tpc_unit_or_up(heading);
     if (turn < 0) turn = tpc_sixth(bud->roll, &twist); /* a branch where the roll wants it */
     after -= 60 * (float)turn + twist;
     tpc_joint(bud->rotation, turn, heading, twist, joint);
@@ -3285,6 +2721,11 @@ static void tpc_grow(tpc_growth *g) {
 }
 
 /* ---- a forest ------------------------------------------------------------------------------ */
+
+enum {
+    TPC_BLOCK_TREES = 64,      /* trees that grow at once ...                           */
+    TPC_BLOCK_PIECES = 1 << 18 /* ... as long as they have no more than so many pieces  */
+};
 
 /* A forest with its memory. */
 typedef struct tpc_forest {
@@ -3557,6 +2998,15 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
     return TXM_OK;
 }
 
+TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest) {
+    if (!forest) return;
+    tpc_forest *f = (tpc_forest *)forest;
+    txm_arena arena = f->arena;
+    txm_arena_free(&f->node_arena);
+    txm_arena_free(&f->cluster_arena);
+    txm_arena_free(&arena);
+}
+
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out) {
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
@@ -3599,15 +3049,6 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
     else if (f) treepieces_forest_free(&f->forest);
     else txm_arena_free(&arena);
     return status;
-}
-
-TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest) {
-    if (!forest) return;
-    tpc_forest *f = (tpc_forest *)forest;
-    txm_arena arena = f->arena;
-    txm_arena_free(&f->node_arena);
-    txm_arena_free(&f->cluster_arena);
-    txm_arena_free(&arena);
 }
 
 /* ---- wind -------------------------------------------------------------------------------- */
@@ -4399,18 +3840,11 @@ static float tpc_signed(txm_rng *rng) {
     return 2 * txm_rng_float(rng) - 1;
 }
 
-/* v to unit length; spare if it has none */
-static void tpc_to_unit(float v[3], float spare_x, float spare_y, float spare_z) {
-    const float length = sqrtf(tpc_dot(v, v));
-    const float spare[3] = {spare_x, spare_y, spare_z};
-    for (int k = 0; k < 3; k++) v[k] = length > 1e-6f ? v[k] / length : spare[k];
-}
-
 /* Turn a card so that its picture grows along `along` and shows its face to `facing` as well as it
    then can; outward: where the cloud's surface looks to. */
 static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
                          const float outward[3], float half) {
-    tpc_to_unit(along, 1, 0, 0);
+    tpc_unit_or(along, 1, 0, 0);
     const float share = tpc_dot(facing, along);
     for (int k = 0; k < 3; k++) facing[k] -= share * along[k];
     if (tpc_dot(facing, facing) < 1e-6f) { /* anything across will do */
@@ -4418,7 +3852,7 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
         facing[1] = -along[0];
         facing[2] = 0;
     }
-    tpc_to_unit(facing, 1, 0, 0);
+    tpc_unit_or(facing, 1, 0, 0);
     float right[3];
     tpc_cross(along, facing, right);
     for (int k = 0; k < 3; k++) {
@@ -4426,7 +3860,7 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
         card->up[k] = half * along[k];
         card->normal[k] = outward[k] + 0.6f * facing[k];
     }
-    tpc_to_unit(card->normal, outward[0], outward[1], outward[2]);
+    tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }
 
 /* Impostors show no more than the sphere: draw a card's center in until its corners lie inside. */
@@ -4493,7 +3927,7 @@ static void tpc_leafy_card(const treepieces_species *species, treepieces_card *c
         cards[index].center[k] = size[k] * place[k];
         outward[k] = place[k] / scale[k];
     }
-    tpc_to_unit(outward, 0, 1, 0);
+    tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) {
         along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
         facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
@@ -4515,12 +3949,12 @@ static void tpc_needle_card(int index, int count, float phase, const float scale
     tpc_spread(index % twigs, twigs, phase, rng, along);
     const float at = reach * (0.3f + 0.7f * place);
     for (int k = 0; k < 3; k++) along[k] *= scale[k];
-    tpc_to_unit(along, 1, 0, 0);
+    tpc_unit_or(along, 1, 0, 0);
     for (int k = 0; k < 3; k++) {
         card->center[k] = at * along[k];
         outward[k] = along[k] + (k == 1 ? 0.35f : 0);
     }
-    tpc_to_unit(outward, 0, 1, 0);
+    tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(rng);
     /* across the twig, level */
     facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(rng);
@@ -5105,6 +4539,12 @@ static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
     return !made->arena.failed;
 }
 
+TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
+    if (!mesh) return;
+    txm_arena arena = ((tpc_mesh *)mesh)->arena;
+    txm_arena_free(&arena);
+}
+
 /* The mesh if it was made, else NULL, and nothing stays allocated. */
 static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
     if (status == TXM_OK) return &made->mesh;
@@ -5425,12 +4865,6 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
     txm_free(env, b);
     *out = tpc_hand_over(made, status);
     return status;
-}
-
-TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
-    if (!mesh) return;
-    txm_arena arena = ((tpc_mesh *)mesh)->arena;
-    txm_arena_free(&arena);
 }
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */

@@ -41,6 +41,12 @@ static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
     return !made->arena.failed;
 }
 
+TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
+    if (!mesh) return;
+    txm_arena arena = ((tpc_mesh *)mesh)->arena;
+    txm_arena_free(&arena);
+}
+
 /* The mesh if it was made, else NULL, and nothing stays allocated. */
 static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
     if (status == TXM_OK) return &made->mesh;
@@ -361,12 +367,6 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
     txm_free(env, b);
     *out = tpc_hand_over(made, status);
     return status;
-}
-
-TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
-    if (!mesh) return;
-    txm_arena arena = ((tpc_mesh *)mesh)->arena;
-    txm_arena_free(&arena);
 }
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */

@@ -10,18 +10,11 @@ static float tpc_signed(txm_rng *rng) {
     return 2 * txm_rng_float(rng) - 1;
 }
 
-/* v to unit length; spare if it has none */
-static void tpc_to_unit(float v[3], float spare_x, float spare_y, float spare_z) {
-    const float length = sqrtf(tpc_dot(v, v));
-    const float spare[3] = {spare_x, spare_y, spare_z};
-    for (int k = 0; k < 3; k++) v[k] = length > 1e-6f ? v[k] / length : spare[k];
-}
-
 /* Turn a card so that its picture grows along `along` and shows its face to `facing` as well as it
    then can; outward: where the cloud's surface looks to. */
 static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
                          const float outward[3], float half) {
-    tpc_to_unit(along, 1, 0, 0);
+    tpc_unit_or(along, 1, 0, 0);
     const float share = tpc_dot(facing, along);
     for (int k = 0; k < 3; k++) facing[k] -= share * along[k];
     if (tpc_dot(facing, facing) < 1e-6f) { /* anything across will do */
@@ -29,7 +22,7 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
         facing[1] = -along[0];
         facing[2] = 0;
     }
-    tpc_to_unit(facing, 1, 0, 0);
+    tpc_unit_or(facing, 1, 0, 0);
     float right[3];
     tpc_cross(along, facing, right);
     for (int k = 0; k < 3; k++) {
@@ -37,7 +30,7 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
         card->up[k] = half * along[k];
         card->normal[k] = outward[k] + 0.6f * facing[k];
     }
-    tpc_to_unit(card->normal, outward[0], outward[1], outward[2]);
+    tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }
 
 /* Impostors show no more than the sphere: draw a card's center in until its corners lie inside. */
@@ -104,7 +97,7 @@ static void tpc_leafy_card(const treepieces_species *species, treepieces_card *c
         cards[index].center[k] = size[k] * place[k];
         outward[k] = place[k] / scale[k];
     }
-    tpc_to_unit(outward, 0, 1, 0);
+    tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) {
         along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
         facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
@@ -126,12 +119,12 @@ static void tpc_needle_card(int index, int count, float phase, const float scale
     tpc_spread(index % twigs, twigs, phase, rng, along);
     const float at = reach * (0.3f + 0.7f * place);
     for (int k = 0; k < 3; k++) along[k] *= scale[k];
-    tpc_to_unit(along, 1, 0, 0);
+    tpc_unit_or(along, 1, 0, 0);
     for (int k = 0; k < 3; k++) {
         card->center[k] = at * along[k];
         outward[k] = along[k] + (k == 1 ? 0.35f : 0);
     }
-    tpc_to_unit(outward, 0, 1, 0);
+    tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(rng);
     /* across the twig, level */
     facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(rng);

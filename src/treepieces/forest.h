@@ -6,6 +6,11 @@
 
 /* ---- a forest ------------------------------------------------------------------------------ */
 
+enum {
+    TPC_BLOCK_TREES = 64,      /* trees that grow at once ...                           */
+    TPC_BLOCK_PIECES = 1 << 18 /* ... as long as they have no more than so many pieces  */
+};
+
 /* A forest with its memory. */
 typedef struct tpc_forest {
     treepieces_forest forest; /* first: the one is the other */
@@ -277,6 +282,15 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
     return TXM_OK;
 }
 
+TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest) {
+    if (!forest) return;
+    tpc_forest *f = (tpc_forest *)forest;
+    txm_arena arena = f->arena;
+    txm_arena_free(&f->node_arena);
+    txm_arena_free(&f->cluster_arena);
+    txm_arena_free(&arena);
+}
+
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out) {
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
@@ -319,15 +333,6 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
     else if (f) treepieces_forest_free(&f->forest);
     else txm_arena_free(&arena);
     return status;
-}
-
-TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest) {
-    if (!forest) return;
-    tpc_forest *f = (tpc_forest *)forest;
-    txm_arena arena = f->arena;
-    txm_arena_free(&f->node_arena);
-    txm_arena_free(&f->cluster_arena);
-    txm_arena_free(&arena);
 }
 
 #endif /* TREEPIECES_FOREST_H */

@@ -9,8 +9,6 @@ enum {
     TPC_BUCKETS = 160,     /* of rims that wait, by the logarithm of their radius                 */
     TPC_GRID = 16,         /* cells a side of the grid of shade                                   */
     TPC_CLASSES = 16,      /* of oscillators                                                      */
-    TPC_BLOCK_TREES = 64,  /* trees that grow at once ...                                         */
-    TPC_BLOCK_PIECES = 1 << 18, /* ... as long as they have no more than so many pieces           */
     TPC_MAX_BRANCH = 60    /* percent: radius of a side branch over that of its stem at most      */
 };
 
@@ -137,13 +135,6 @@ static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
 
 /* ---- growing: the grammar ------------------------------------------------------------------ */
 
-static void tpc_normalize(float v[3]) {
-    const float square = tpc_dot(v, v), scale = 1 / sqrtf(square);
-    if (square > 0)
-        for (int k = 0; k < 3; k++) v[k] *= scale;
-    else v[1] = 1;
-}
-
 static const treepieces_order *tpc_order(const tpc_growth *g, int order) {
     return &g->species->orders[order < g->species->order_count ? order : g->species->order_count - 1];
 }
@@ -246,7 +237,7 @@ static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
         const float fall = o->sag * degree * 2 * at * (length / bud->length);
         h[1] -= fall * sqrtf(h[0] * h[0] + h[2] * h[2] + 0.02f);
     }
-    tpc_normalize(h);
+    tpc_unit_or_up(h);
 }
 
 /* ---- growing: a piece on a rim ------------------------------------------------------------- */
@@ -404,7 +395,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     const float ahead = txm_float(cosine), aside = txm_float(sine);
     for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
     bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
-    tpc_normalize(bud->heading);
+    tpc_unit_or_up(bud->heading);
     tpc_stand_off(bud, stem, out, c->ratios[k], offset);
     const float t = from->is_forked || parent->start >= 1
                         ? from->along
@@ -439,7 +430,7 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     float heading[3] = {c->direction[0], c->direction[1], c->direction[2]}, twist = 0, rotation[4];
     float joint[4];
     float after = bud->roll;
-    tpc_normalize(heading);
+    tpc_unit_or_up(heading);
     if (turn < 0) turn = tpc_sixth(bud->roll, &twist); /* a branch where the roll wants it */
     after -= 60 * (float)turn + twist;
     tpc_joint(bud->rotation, turn, heading, twist, joint);

@@ -331,6 +331,12 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
     return TXM_OK;
 }
 
+TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit) {
+    if (!kit) return;
+    txm_arena arena = kit->arena;
+    txm_arena_free(&arena);
+}
+
 TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, int count,
                                               txm_env *env, treepieces_kit **out) {
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
@@ -363,12 +369,6 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
     if (status == TXM_OK) *out = kit;
     else treepieces_kit_free(kit);
     return status;
-}
-
-TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit) {
-    if (!kit) return;
-    txm_arena arena = kit->arena;
-    txm_arena_free(&arena);
 }
 
 TREEPIECES_API int treepieces_kit_count(const treepieces_kit *kit) {

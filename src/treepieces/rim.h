@@ -46,9 +46,24 @@ static void tpc_cross(const float a[3], const float b[3], float out[3]) {
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+/* Scale v to unit length. It must not be the zero vector. */
 static void tpc_unit(float v[3]) {
     const float length = sqrtf(tpc_dot(v, v));
     for (int k = 0; k < 3; k++) v[k] /= length;
+}
+
+/* The same, a little faster; the zero vector becomes +y. */
+static void tpc_unit_or_up(float v[3]) {
+    const float square = tpc_dot(v, v), scale = 1 / sqrtf(square);
+    if (square > 0)
+        for (int k = 0; k < 3; k++) v[k] *= scale;
+    else v[1] = 1;
+}
+
+/* The same; a vector shorter than 1e-6 becomes (x, y, z). */
+static void tpc_unit_or(float v[3], float x, float y, float z) {
+    const float length = sqrtf(tpc_dot(v, v)), other[3] = {x, y, z};
+    for (int k = 0; k < 3; k++) v[k] = length > 1e-6f ? v[k] / length : other[k];
 }
 
 /* ---- the canonical rim ------------------------------------------------------------------- */

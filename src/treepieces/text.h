@@ -10,6 +10,7 @@ typedef struct tpc_reader {
     const char *at, *end; /* what is left of the line */
     int line, order;      /* order -1: none begun     */
     int keys, crown_line; /* keys so far; line of the last one of the crown */
+    const char *like;     /* NULL, or the text to read behind this line     */
     treepieces_species species;
     txm_env *env;
 } tpc_reader;
@@ -99,17 +100,16 @@ static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
     return TXM_OK;
 }
 
-static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
-                                treepieces_species *species);
-
-/* "like NAME": the orders beyond those of that species keep what a fresh one has. */
+/* "like NAME": its text is read behind this line. The orders beyond those of that species keep what a
+   fresh one has. */
 static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
     tpc_word w;
     if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
     if (r->keys) return tpc_misread(r, key, "must come before all other keys");
     for (int i = 0; i < treepieces_preset_count(); i++) {
         if (!tpc_is_word(&w, tpc_presets[i].name)) continue;
-        return tpc_read_text(tpc_presets[i].text, strlen(tpc_presets[i].text), r->env, &r->species);
+        r->like = tpc_presets[i].text;
+        return TXM_OK;
     }
     return tpc_misread(r, &w, "is none of the built-in species");
 }
@@ -164,7 +164,10 @@ static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
         r.at = at;
         r.end = newline ? newline : end;
         r.line++;
-        const txm_status status = tpc_read_line(&r);
+        r.like = NULL;
+        txm_status status = tpc_read_line(&r);
+        if (status == TXM_OK && r.like)
+            status = tpc_read_text(r.like, strlen(r.like), env, &r.species);
         if (status != TXM_OK) return status;
         if (!newline) break;
         at = newline + 1;
@@ -246,14 +249,6 @@ TREEPIECES_API size_t treepieces_species_print(const treepieces_species *species
     }
     if (w.capacity) w.text[w.length < w.capacity ? w.length : w.capacity - 1] = 0;
     return w.length;
-}
-
-TREEPIECES_API int treepieces_preset_count(void) {
-    return (int)(sizeof tpc_presets / sizeof tpc_presets[0]);
-}
-
-TREEPIECES_API const char *treepieces_preset_text(int index) {
-    return index >= 0 && index < treepieces_preset_count() ? tpc_presets[index].text : NULL;
 }
 
 TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
