@@ -32,7 +32,7 @@ EXAMPLES = $(addprefix $(BUILD)/examples/,$(filter-out $(LEFT_OUT), \
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
-.PHONY: all help headers demo test examples bench lint install uninstall clean setup samples helpers
+.PHONY: all help headers demo test golden examples bench lint install uninstall clean setup samples helpers
 .DELETE_ON_ERROR:
 
 all: $(BUILD)/texkit
@@ -133,6 +133,17 @@ demo:
 test:
 	@CC="$(CC)" tools/setup.sh test
 	@CC="$(CC)" CXX="$(CXX)" tests/run.sh
+
+# the hashes that every build must give, written anew: only where output bytes change on purpose
+GOLDEN = $(addprefix $(BUILD)/golden/golden_,texmath texsyn texpatch texedges textiles trimesh_relax \
+             trimesh_cover treepieces)
+
+golden: $(GOLDEN)
+	tests/wide/golden/compare.sh --write $(GOLDEN)
+
+$(BUILD)/golden/%: tests/wide/golden/%.c tests/wide/golden/golden.h tests/testkit.h $(SOURCES)
+	@mkdir -p $(@D)
+	$(CC) -std=gnu99 -O2 -ffp-contract=off -Isrc -I. -Itests -Itests/wide/golden $< -o $@ -lpthread -lm
 
 # clang-tidy 14 finds uninitialised va_lists that are none once it reads several files in one run
 lint:

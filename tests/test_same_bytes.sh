@@ -1,40 +1,58 @@
 #!/bin/sh
-# The same models, pictures, tile sets and meshes, byte for byte, from each compiler, at each level of
-# optimisation on 2 threads, at -O3 on 1, 2 and 8 and with the indices of each parallel loop taken
-# backwards (0 below); and from plain C as with SIMD.
+# The same bytes as tests/wide/golden/golden.txt says, module by module and case by case: at -O2 on 1
+# and 3 threads; widely from each compiler, at each level of optimisation, on 1, 2 and 8 threads and
+# with the indices of each parallel loop taken backwards (0 below), with fused multiply-add allowed to
+# the compiler, and from plain C as with SIMD.
 . tests/tap.sh
 
-levels="-O0 -O3"
-[ "$FULL" = 1 ] && levels="-O0 -O1 -O2 -O3"
-grep -q '^flags.*\<fma\>' /proc/cpuinfo 2>/dev/null && levels="$levels -O3_-mfma_-mavx2"
+golden=tests/wide/golden
+modules=$(sed 's/ .*//' $golden/golden.txt | uniq)
+plain="-DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD"
 
-expected=
-for cc in $(compilers); do
-    for level in $levels; do
-        flags=$(echo "$level" | tr _ ' ')
-        check "builds with $cc $flags" \
-            $cc -std=gnu99 $flags -ffp-contract=off -I. -Itests tests/same_bytes.c \
-            -o "$tmp/same_bytes" -lpthread -lm || continue
-        numbers=2
-        [ "$level" = -O3 ] && numbers="1 2 8 0"
-        for threads in $numbers; do
-            hash=$("$tmp/same_bytes" $threads)
-            expected=${expected:-$hash}
-            check "hash $hash, $cc $flags, threads $threads" \
-                test -n "$hash" -a "$hash" = "$expected"
+# same COMPILER "FLAGS" THREADS...: all modules, built so, on so many threads
+same() {
+    cc=$1 flags=$2
+    shift 2
+    for module in $modules; do
+        program=$tmp/golden_$module runs=
+        # shellcheck disable=SC2086 # flags are words
+        check "builds golden_$module, $cc $flags" $cc -std=gnu99 $flags -ffp-contract=off -Isrc -I. \
+            -Itests -I$golden $golden/golden_$module.c -o "$program" -lpthread -lm || continue
+        for threads in "$@"; do
+            check "the golden bytes of $module, $cc $flags, threads $threads" \
+                $golden/compare.sh "$program $threads"
         done
     done
-done
-
-# without SIMD the same
-set -- $(compilers)
-check "builds without SIMD" \
-    "$1" -std=gnu99 -O2 -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD \
-    -DTEXPATCH_NO_SIMD -ffp-contract=off -I. -Itests \
-    tests/same_bytes.c -o "$tmp/plain" -lpthread -lm && {
-    hash=$("$tmp/plain" 2)
-    check "hash $hash, $1 -O2 without SIMD, threads 2" test -n "$hash" -a "$hash" = "$expected"
 }
+
+if [ "$FULL" = 1 ]; then
+    for cc in $(compilers); do
+        for level in -O0 -O1 -O2; do same "$cc" $level 2; done
+        same "$cc" -O3 1 2 8 0
+        if grep -q '^flags.*\<fma\>' /proc/cpuinfo 2>/dev/null; then
+            same "$cc" "-O3 -mfma -mavx2" 2
+        fi
+    done
+    set -- $(compilers)
+    same "$1" "-O2 $plain" 2
+else
+    set -- $(compilers)
+    same "$1" -O2 1 3
+fi
+
+# the message tells module and case; lines that are missing or foreign are noticed
+set -- $modules
+"$tmp/golden_$1" 1 >"$tmp/lines"
+name=$(sed -n '2s/ [^ ]*$//p' "$tmp/lines")
+differs() {
+    sed "$1" "$tmp/lines" >"$tmp/changed"
+    $golden/compare.sh "cat $tmp/changed" && { echo "$1 goes unnoticed"; return 1; }
+    $golden/compare.sh "cat $tmp/changed" | grep -q "^module ${name% *}, case ${name#* }: "
+}
+check "a different hash is noticed, with module and case" differs '2s/.$/x/'
+check "a missing case is noticed, with module and case" differs 2d
+check "a foreign case is noticed" sh -c "sed '2s/ / other-/' '$tmp/lines' >'$tmp/changed' &&
+    ! $golden/compare.sh 'cat $tmp/changed'"
 
 # the tool with OpenMP agrees with itself
 build/draw cells "$tmp/cells.png" 64
@@ -49,7 +67,9 @@ done
 
 # no thread steps on another's data
 if [ "$FULL" = 1 ] && has clang; then
-    check "clean under the thread sanitizer" sh -c "
-        clang -std=gnu99 -O1 -g -fsanitize=thread -ffp-contract=off -I. -Itests \
-            tests/same_bytes.c -o '$tmp/tsan' -lpthread -lm && '$tmp/tsan' 4"
+    for module in $modules; do
+        check "$module is clean under the thread sanitizer" sh -c "
+            clang -std=gnu99 -O1 -g -fsanitize=thread -ffp-contract=off -Isrc -I. -Itests -I$golden \
+                $golden/golden_$module.c -o '$tmp/tsan' -lpthread -lm && '$tmp/tsan' 4"
+    done
 fi

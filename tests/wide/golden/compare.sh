@@ -1,0 +1,39 @@
+#!/bin/sh
+# compare.sh CASES... - what golden programs print, compared with golden.txt
+#
+# Each argument is a golden program with its arguments in one word: "build/golden_texsyn 3". All lines
+# of its module must be there and be equal; of those that are not, the message names module and case.
+#
+#   compare.sh --write PROGRAM...    writes golden.txt anew, on purpose: the commit says why
+set -u
+golden=$(dirname "$0")/golden.txt
+
+if [ "${1:-}" = --write ]; then
+    shift
+    for program in "$@"; do "$program" 1 || exit 1; done >"$golden.new" && mv "$golden.new" "$golden"
+    exit
+fi
+
+status=0
+for run in "$@"; do
+    # shellcheck disable=SC2086 # program and arguments
+    lines=$($run) || { echo "$run failed"; status=1; }
+    module=$(echo "$lines" | sed -n '1s/ .*//p')
+    [ -n "$module" ] && grep -q "^$module " "$golden" || { echo "$run: no such module"; status=1; }
+    {
+        grep "^$module " "$golden"
+        echo "$lines"
+    } | awk -v run="$run" '
+        { n[$1 " " $2]++; different[$1 " " $2] = n[$1 " " $2] > 1 && $3 != hash[$1 " " $2]
+          hash[$1 " " $2] = $3 }
+        END {
+            for (c in n) {
+                split(c, word, " ")
+                if (n[c] != 2) print "module " word[1] ", case " word[2] ": only in one of golden.txt and " run
+                else if (different[c]) print "module " word[1] ", case " word[2] ": other bytes than in golden.txt from " run
+                if (n[c] != 2 || different[c]) bad = 1
+            }
+            exit bad
+        }' || status=1
+done
+exit $status

@@ -1,0 +1,121 @@
+/* golden_texsyn.c - hashes of models and pictures of texsyn.h; see golden.h
+   SPDX-License-Identifier: MIT OR Unlicense                                                      */
+#define TEXSYN_IMPLEMENTATION
+#include "texsyn.h"
+
+#include "golden.h"
+
+enum { SIDE = 64, WIDTH = 80, HEIGHT = 72 };
+static uint8_t exemplar[SIDE * SIDE * 4], mask[SIDE * SIDE], bytes[1 << 17];
+static uint8_t picture[WIDTH * HEIGHT * 4 * sizeof(float)];
+
+static uint64_t model_hash(const texsyn_model *model, txm_env *env, uint64_t hash) {
+    size_t size = 0;
+    golden_need(texsyn_save(model, env, bytes, sizeof bytes, &size), "save", env);
+    return tk_hash(hash, bytes, size);
+}
+
+static texsyn_learn_desc learning(int channels) {
+    texsyn_learn_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.example = golden_image(exemplar, SIDE, SIDE, channels, TXM_U8);
+    desc.max_distance = 12;
+    desc.max_types = 12;
+    return desc;
+}
+
+/* A model of one exemplar and a picture made from it. */
+static uint64_t both(const texsyn_learn_desc *learn, int channels, txm_sample sample, int tileable,
+                     int quality, txm_env *env) {
+    texsyn_model *model = NULL;
+    texsyn_synth_desc synth;
+    golden_need(texsyn_learn(learn, env, &model), "learn", env);
+    uint64_t hash = model_hash(model, env, 0);
+    memset(&synth, 0, sizeof synth);
+    synth.model = model;
+    synth.width = WIDTH;
+    synth.height = HEIGHT;
+    synth.tileable = tileable;
+    synth.quality = quality;
+    synth.seed = 3;
+    const txm_image out = golden_image(picture, WIDTH, HEIGHT, channels, sample);
+    golden_need(texsyn_synthesize(&synth, env, out), "synthesize", env);
+    hash = tk_hash(hash, picture,
+                   (size_t)WIDTH * HEIGHT * (size_t)channels * txm_sample_bytes(sample));
+    texsyn_model_free(model);
+    return hash;
+}
+
+static uint64_t gray(txm_env *env) {
+    golden_noise(exemplar, SIDE, SIDE, 1);
+    const texsyn_learn_desc desc = learning(1);
+    return both(&desc, 1, TXM_U8, 0, 0, env);
+}
+
+static uint64_t rgb_tileable(txm_env *env) {
+    golden_noise(exemplar, SIDE, SIDE, 3);
+    const texsyn_learn_desc desc = learning(3);
+    return both(&desc, 3, TXM_U8, 1, -1, env);
+}
+
+static uint64_t rgba_deep(txm_env *env) {
+    golden_noise(exemplar, SIDE, SIDE, 4);
+    texsyn_learn_desc desc = learning(4);
+    desc.max_types = 6;
+    return both(&desc, 4, TXM_U16, 0, -2, env);
+}
+
+static uint64_t blobs_fine(txm_env *env) {
+    golden_blobs(exemplar, SIDE, SIDE, 1);
+    texsyn_learn_desc desc = learning(1);
+    desc.max_distance = 20;
+    desc.max_types = 8;
+    desc.levels = 3;
+    desc.seed = 9;
+    return both(&desc, 3, TXM_F32, 0, 1, env);
+}
+
+static uint64_t masked(txm_env *env) {
+    golden_blobs(exemplar, SIDE, SIDE, 3);
+    for (int i = 0; i < SIDE * SIDE; i++)
+        mask[i] = (uint8_t)((i % SIDE - 30) * (i % SIDE - 30) + (i / SIDE - 30) * (i / SIDE - 30) <
+                            29 * 29);
+    texsyn_learn_desc desc = learning(3);
+    desc.mask = golden_image(mask, SIDE, SIDE, 1, TXM_U8);
+    desc.threshold = 0.02f;
+    desc.levels = 2;
+    return both(&desc, 3, TXM_U8, 0, -2, env);
+}
+
+/* saved and loaded again, and all that a model tells of itself */
+static uint64_t file(txm_env *env) {
+    texsyn_model *model = NULL, *again = NULL;
+    texsyn_clique clique;
+    size_t size = 0;
+    float bins[1024];
+    golden_bricks(exemplar, SIDE, SIDE, 3);
+    texsyn_learn_desc desc = learning(3);
+    desc.max_types = 10;
+    golden_need(texsyn_learn(&desc, env, &model), "learn", env);
+    golden_need(texsyn_save(model, env, bytes, sizeof bytes, &size), "save", env);
+    golden_need(texsyn_load(bytes, size, env, &again), "load", env);
+    uint64_t hash = model_hash(again, env, 0);
+    for (int i = 0; i < texsyn_clique_count(again); i++) {
+        const int count = texsyn_clique_at(again, i, &clique, bins, 1024);
+        const int numbers[9] = {(int)clique.kind, clique.level, clique.band, clique.other, clique.dx,
+                                clique.dy,        clique.ex,    clique.ey,   clique.phase};
+        hash = tk_hash(hash, numbers, sizeof numbers);
+        hash = tk_hash(hash, bins, (size_t)count * sizeof *bins);
+    }
+    texsyn_model_free(model);
+    texsyn_model_free(again);
+    return hash;
+}
+
+static const golden_case cases[] = {{"gray", gray},
+                                    {"rgb-tileable", rgb_tileable},
+                                    {"rgba-16-bits", rgba_deep},
+                                    {"blobs-fine-float", blobs_fine},
+                                    {"masked", masked},
+                                    {"file", file}};
+GOLDEN_MAIN("texsyn")
