@@ -6,7 +6,9 @@
    every compiler, level of optimisation and number of threads; tests/wide/golden/compare.sh tells
    which module and case differ.
 
-       golden_texsyn THREADS [CASE]     0 threads: one, with the indices of each loop backwards
+       make build/golden/golden_texsyn
+       build/golden/golden_texsyn THREADS [CASE]     0: one thread, the indices of loops backwards
+       tests/wide/golden/compare.sh "build/golden/golden_texsyn 3"
 
    Inputs are made of integers and of what the C standard rounds exactly, so that libm has no part
    in them.                                                                                       */
