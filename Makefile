@@ -17,8 +17,10 @@ LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 SOURCES := $(wildcard src/*.h src/*/*.h)
 HEADERS := $(notdir $(wildcard src/*.h))
-TEXKIT   = $(addprefix $(BUILD)/,texkit.o patch.o edges.o tiles.o retile.o tree.o tree_looks.o tree_rig.o \
-             tree_copies.o command.o cli.o image_io.o mesh_io.o stb.o)
+TOOL    := $(wildcard tools/*.[ch] tools/*/*.[ch])
+TEXKIT   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/*.c tools/commands/*.c tools/files/*.c))
+IMAGES   = $(BUILD)/files/image_io.o $(BUILD)/files/stb.o
+MESHES   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/files/mesh*.c))
 # examples/brush opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
 # window if it can. Where that is not installed they are left out
 SDL     := $(shell sdl2-config --libs 2>/dev/null)
@@ -59,12 +61,12 @@ headers:
 setup:
 	@CC="$(CC)" tools/setup.sh tool
 
-$(BUILD)/%.o: tools/%.c $(wildcard tools/*.h) $(SOURCES) Makefile | setup
+$(BUILD)/%.o: tools/%.c $(filter %.h,$(TOOL)) $(SOURCES) Makefile | setup
 	@mkdir -p $(@D)
 	$(COMPILE) -c $< -o $@
 
 # stb shifts into the sign bit on purpose; that is not what our sanitizer runs look for
-$(BUILD)/stb.o: COMPILE += -fno-sanitize=undefined
+$(BUILD)/files/stb.o: COMPILE += -fno-sanitize=undefined
 
 $(BUILD)/texkit: $(TEXKIT)
 	$(LINK) $^ -o $@ -lcjson -lm
@@ -72,31 +74,31 @@ $(BUILD)/texkit: $(TEXKIT)
 # small programs that the demo, the tests and the benchmark use
 helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/shape $(BUILD)/view
 
-$(BUILD)/crop $(BUILD)/draw: $(BUILD)/%: $(BUILD)/%.o $(BUILD)/image_io.o $(BUILD)/stb.o
+$(BUILD)/crop $(BUILD)/draw: $(BUILD)/%: $(BUILD)/helpers/%.o $(IMAGES)
 	$(LINK) $^ -o $@ -lm
 
-$(BUILD)/shape: $(BUILD)/shape.o
+$(BUILD)/shape: $(BUILD)/helpers/shape.o
 	$(LINK) $^ -o $@ -lm
 
-$(BUILD)/view: $(addprefix $(BUILD)/,view.o render.o mesh_io.o image_io.o stb.o)
+$(BUILD)/view: $(addprefix $(BUILD)/helpers/,view.o render.o) $(MESHES) $(IMAGES)
 	$(LINK) $^ -o $@ -lm
 
 # ---- examples and benchmarks
 
 examples: $(EXAMPLES)
 
-$(BUILD)/examples/%: examples/%.c $(BUILD)/stb.o $(SOURCES)
+$(BUILD)/examples/%: examples/%.c $(BUILD)/files/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
 # those of more than one file have a folder of their own
-$(BUILD)/examples/%: examples/%/main.c $(BUILD)/stb.o $(SOURCES)
+$(BUILD)/examples/%: examples/%/main.c $(BUILD)/files/stb.o $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
 
 $(BUILD)/examples/membrane: $(wildcard examples/membrane/*)
-$(BUILD)/examples/membrane: $(addprefix $(BUILD)/,mesh_io.o render.o image_io.o)
-$(BUILD)/examples/join: $(BUILD)/image_io.o
+$(BUILD)/examples/membrane: $(BUILD)/helpers/render.o $(MESHES) $(IMAGES)
+$(BUILD)/examples/join: $(IMAGES)
 $(BUILD)/examples/join: CPPFLAGS += -D_FILE_OFFSET_BITS=64
 $(BUILD)/examples/brush: $(wildcard examples/brush/*)
 $(BUILD)/examples/brush: LIBRARIES = $(SDL)
@@ -109,15 +111,15 @@ $(BUILD)/examples/forest_gl: CPPFLAGS += $(if $(SDL),-DFOREST_WINDOW) \
 bench: $(BENCHES) $(PLAIN) samples
 	@for b in $(BENCHES); do $$b $$(ls -r $(BUILD)/samples/*.png) || exit 1; done
 
-$(BUILD)/bench/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(SOURCES)
+$(BUILD)/bench/%: bench/%.c bench/bench.h $(IMAGES) $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
+	$(COMPILE) $< $(IMAGES) -o $@ -lm
 
 # the same without SIMD, for comparison
-$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(BUILD)/image_io.o $(BUILD)/stb.o $(SOURCES)
+$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(IMAGES) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD \
-	    $< $(BUILD)/image_io.o $(BUILD)/stb.o -o $@ -lm
+	    $< $(IMAGES) -o $@ -lm
 
 # ---- demo, tests, lint
 
@@ -150,8 +152,8 @@ lint:
 	@tools/setup.sh lint
 	cppcheck --quiet -j 2 --std=c99 --enable=warning,performance,portability --inline-suppr \
 	    --error-exitcode=1 --suppress=missingIncludeSystem '--suppress=uninitvar:src/texmath/*' \
-	    -Isrc -Itools tools/*.c examples/*.c examples/*/*.c bench/*.c
-	printf '%s\n' tools/*.c examples/*.c examples/*/*.c bench/*.c | xargs -P 2 -I FILE \
+	    -Isrc -Itools tools/*.c tools/*/*.c examples/*.c examples/*/*.c bench/*.c
+	printf '%s\n' tools/*.c tools/*/*.c examples/*.c examples/*/*.c bench/*.c | xargs -P 2 -I FILE \
 	    clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -Isrc -Itools
 
 # ---- installing

@@ -9,7 +9,7 @@
    bench_texpatch --once EXEMPLAR makes 512 x 512 once and prints the CPU seconds. */
 #define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
 #define TEXPATCH_IMPLEMENTATION
-#include "image_io.h"
+#include "files/image_io.h"
 #include "texpatch.h"
 
 #include "bench.h"

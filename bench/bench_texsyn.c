@@ -9,7 +9,7 @@
    bench_texsyn --once EXEMPLAR does one picture once and prints the CPU seconds of both stages. */
 #define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
 #define TEXSYN_IMPLEMENTATION
-#include "image_io.h"
+#include "files/image_io.h"
 #include "texsyn.h"
 
 #include "bench.h"

@@ -10,7 +10,7 @@
    seconds and the million tiles per second. */
 #define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
 #define TEXTILES_IMPLEMENTATION
-#include "image_io.h"
+#include "files/image_io.h"
 #include "textiles.h"
 
 #include "bench.h"

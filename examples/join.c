@@ -11,8 +11,8 @@
    GDAL, QGIS, ImageMagick) read any part of it at once, and compress it if that is wanted. A .ppm
    or .pgm has the bare samples, row by row. All keep 16 bits if the tiles have them.            */
 #define _XOPEN_SOURCE 700 /* POSIX: fseeko */
-#include "image_io.h"
-#include "stb_config.h"
+#include "files/image_io.h"
+#include "files/stb_config.h"
 
 #include <stdio.h>
 

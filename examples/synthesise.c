@@ -4,7 +4,7 @@
    synthesise PHOTO MODEL.txs OUT.png
 
    The whole of what a program does that embeds texsyn.h. Images are loaded and written by
-   stb_image and stb_image_write, linked from tools/stb.c; any other library does as well.       */
+   stb_image and stb_image_write, linked from tools/files/stb.c; any other library does as well. */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 

@@ -3,7 +3,7 @@
    PLAIN is the window without the strokes of SCRIPT, PAINTED with them, LAYERS what the program has
    said about the gray layers. They must differ near the strokes only, and within them PAINTED must
    have the gray of their layers, which PLAIN has not. */
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <stdio.h>
 

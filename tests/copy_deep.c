@@ -1,6 +1,6 @@
 /* copy_deep.c - read a picture of 16 bits and write it as PNG; for test_picture.sh
    SPDX-License-Identifier: MIT OR Unlicense */
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <stdio.h>
 

@@ -1,7 +1,7 @@
 /* gl_treepieces.c - shaders/treepieces.glsl does what treepieces.h does
    SPDX-License-Identifier: MIT OR Unlicense
 
-   cc -I. tests/gl_treepieces.c build/stb.o -o gl_treepieces -lEGL -lOpenGL -lcjson -lm
+   cc -I. tests/gl_treepieces.c build/files/stb.o -o gl_treepieces -lEGL -lOpenGL -lcjson -lm
 
    Runs the shaders of examples/forest_gl without a window, on whatever driver EGL finds (Mesa's
    llvmpipe on machines without a graphics card), and prints "ok - what" or "not ok - what" for each

@@ -6,7 +6,7 @@
 brush=$(pwd)/build/examples/brush
 check "brush builds" make -s build/examples/brush || exit 1
 check "check_brush builds" $CC -std=gnu99 -O2 -Wall -Wextra -I. -Itools tests/check_brush.c \
-    build/image_io.o build/stb.o -o "$tmp/check_brush" -lm || exit 1
+    build/files/image_io.o build/files/stb.o -o "$tmp/check_brush" -lm || exit 1
 build/draw clouds "$tmp/clouds.png" 192
 cd "$tmp" || exit 1
 

@@ -9,7 +9,7 @@ if [ ! "$gl" -nt tests/gl_treepieces.c ] || [ -n "$(find examples/forest_gl -new
     [ ! "$gl" -nt tests/treekit.h ] || [ ! "$gl" -nt treepieces.h ] || [ ! "$gl" -nt texmath.h ]; then
     # shellcheck disable=SC2086 # flags are words
     check "gl_treepieces builds" $CC -std=c99 -O2 -ffp-contract=off -Wall -Wextra -I. \
-        tests/gl_treepieces.c build/stb.o -o "$gl" -lEGL -lOpenGL -lcjson -lm || exit 1
+        tests/gl_treepieces.c build/files/stb.o -o "$gl" -lEGL -lOpenGL -lcjson -lm || exit 1
 fi
 "$gl" 2>&1 | sed '/^ok\|^not ok/!s/^/    # /'
 

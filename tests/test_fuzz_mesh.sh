@@ -66,7 +66,7 @@ end_header
 0.5 0.75 0 0 0.5 0 0.5
 END
 
-with="tools/mesh_io.c tools/image_io.c tools/stb.c"
+with="tools/files/mesh_io.c tools/files/image_io.c tools/files/stb.c"
 runs=30000
 [ "$FULL" = 1 ] && runs=300000
 # shellcheck disable=SC2086 # flags and files are words

@@ -1,7 +1,7 @@
 /* test_image_io.c - pictures of 16 bits: written, read again, converted; and files that are none
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Built with: tools/image_io.c tools/stb.c                                                       */
+   Built with: tools/files/image_io.c tools/files/stb.c                                           */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <stdio.h>
 

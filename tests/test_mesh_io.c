@@ -1,7 +1,7 @@
 /* test_mesh_io.c - mesh files read, written, read again; and files that are none
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Built with: tools/mesh_io.c tools/image_io.c tools/stb.c                                       */
+   Built with: tools/files/mesh_io.c tools/files/image_io.c tools/files/stb.c                                       */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "mesh_io.h"
+#include "files/mesh_io.h"
 
 #include <stdio.h>
 

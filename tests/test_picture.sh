@@ -87,7 +87,7 @@ check "nearly the same picture as .jpg" "$compare" same "$tmp/f.png" "$tmp/f.jpg
 
 # 16 bits: what others write is read and written again to the last bit
 check "copy_deep builds" $CC -std=c99 -O2 -Wall -Wextra -I. -Itools tests/copy_deep.c \
-    build/image_io.o build/stb.o -o "$tmp/copy_deep" -lm
+    build/files/image_io.o build/files/stb.o -o "$tmp/copy_deep" -lm
 for input in "png 1" "png 3" "png 4" "pgm 1" "ppm 3"; do
     set -- $input
     "$compare" deep "$tmp/reference.png" "$2"

@@ -1,7 +1,7 @@
 /* command.c - what the commands of texkit share; command.h tells how it is used
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "command.h"
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <cjson/cJSON.h>
 #include <ctype.h>

@@ -7,7 +7,7 @@
    mesh files in mesh_io.c. Read run_learn first: it shows all there is to embedding a header.    */
 #define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
 #include "command.h"
-#include "image_io.h"
+#include "files/image_io.h"
 
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"

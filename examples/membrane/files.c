@@ -2,8 +2,8 @@
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "membrane.h"
 
-#include "image_io.h"
-#include "render.h"
+#include "files/image_io.h"
+#include "helpers/render.h"
 
 #include <stdio.h>
 #include <stdlib.h>

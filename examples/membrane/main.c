@@ -15,7 +15,7 @@
    files.c      GLB, XYZ, PNG                                                                     */
 #include "membrane.h"
 
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 
 #include "trimesh_relax.h"
 
-#include "mesh_io.h"
+#include "files/mesh_io.h"
 
 /* ---- surface.c: where f = 0 on the rays from the origin ---- */
 enum {

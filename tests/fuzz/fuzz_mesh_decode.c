@@ -6,9 +6,9 @@
    and what they are as binary PLY:
    fuzz_mesh_decode RUNS FILE...
 
-   Built with tools/mesh_io.c, tools/image_io.c and tools/stb.c. Whatever is accepted must be as
-   mesh_io.h promises, be no larger than the file allows, and come back when it is written.      */
-#include "mesh_io.h"
+   Built with the mesh and image files of tools/files/. Whatever is accepted must be as mesh_io.h
+   promises, be no larger than the file allows, and come back when it is written.                */
+#include "files/mesh_io.h"
 
 #include <stdio.h>
 

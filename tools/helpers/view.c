@@ -17,7 +17,7 @@
      --points POINTS.ply   spheres too, of the points' colors; a MESH of points alone does as well
      --radius R            of these, in units of the mesh; default a hundredth of its extent
      --lengths             by the length of the edges: short blue, mean white, long red           */
-#include "image_io.h"
+#include "files/image_io.h"
 #include "render.h"
 
 #include <stdio.h>

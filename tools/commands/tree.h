@@ -7,7 +7,7 @@
 #define TREE_H
 
 #include "command.h"
-#include "mesh_io.h"
+#include "files/mesh_io.h"
 #include "treepieces.h"
 
 enum {

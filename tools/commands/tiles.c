@@ -2,7 +2,7 @@
    SPDX-License-Identifier: MIT OR Unlicense */
 #define _XOPEN_SOURCE 700 /* POSIX: open_memstream */
 #include "command.h"
-#include "image_io.h"
+#include "files/image_io.h"
 
 #define TEXTILES_IMPLEMENTATION
 #include "textiles.h"

@@ -4,8 +4,8 @@
    Read, retile, dress (texture coordinates, colors, instances), measure, write: run_retile at the
    end tells the story.                                                                         */
 #include "command.h"
-#include "image_io.h"
-#include "mesh_io.h"
+#include "files/image_io.h"
+#include "files/mesh_io.h"
 #include "textiles.h"
 
 #define TRIMESH_RELAX_IMPLEMENTATION

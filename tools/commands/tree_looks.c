@@ -1,7 +1,7 @@
 /* tree_looks.c - the pictures of 'texkit tree': bark out of tiles, leaves
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "tree.h"
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <cjson/cJSON.h>
 #include <stdio.h>

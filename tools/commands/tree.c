@@ -4,7 +4,7 @@
    Read the species, grow, pose, dress (bark, leaves), build, write: grow_trees and run_job at the
    end tell the story. What is built is a baked mesh, a mesh with a skeleton, or copies.          */
 #include "tree.h"
-#include "image_io.h"
+#include "files/image_io.h"
 
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"

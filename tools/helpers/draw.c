@@ -3,7 +3,7 @@
 
    The pictures are the project's own, drawn with integers only, so they are the same everywhere.
    Channels: 1, 3 (default) or 4, whose alpha is made of one of the others.                      */
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <stdio.h>
 

@@ -4,7 +4,7 @@
    Read, follow strokes if there are any, synthesise (a job, or a window of the endless plane),
    draw, write: run_job at the end tells the story.                                             */
 #include "command.h"
-#include "image_io.h"
+#include "files/image_io.h"
 
 #define TEXPATCH_IMPLEMENTATION
 #include "texpatch.h"

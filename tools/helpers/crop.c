@@ -3,7 +3,7 @@
 
    SHRINK first averages blocks of SHRINK x SHRINK pixels; a picture smaller than SIDE x SIDE
    (default 256) is cut to a square of its shorter side.                                        */
-#include "image_io.h"
+#include "files/image_io.h"
 
 #include <stdio.h>
 

@@ -7,7 +7,7 @@
 #ifndef RENDER_H
 #define RENDER_H
 
-#include "mesh_io.h"
+#include "files/mesh_io.h"
 
 typedef struct render_desc {
     int width, height;        /* pixels, 1..16384 each                                         */
