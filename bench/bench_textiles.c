@@ -74,13 +74,13 @@ static void kinds(const char *path, const txm_image *picture) {
     for (int kind = TEXTILES_WANG; kind <= TEXTILES_FRAME; kind++) {
         for (int colors = 2; colors <= 3; colors++) {
             result one, all;
-            textiles_free(make(picture, (textiles_kind)kind, colors, 128, 1, &one));
+            textiles_set_free(make(picture, (textiles_kind)kind, colors, 128, 1, &one));
             textiles_set *set = make(picture, (textiles_kind)kind, colors, 128, threads, &all);
             printf("%-8s %6d %5d %8.2f %10.2f %8.2f %7.3f %8.1f %6.3f\n", kind_names[kind], colors,
                    textiles_count(set), one.seconds, all.seconds, one.seconds / all.seconds,
                    one.seconds / textiles_count(set), (double)all.peak / 1048576, mean_joint(set));
             fflush(stdout);
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -93,8 +93,8 @@ static void one_line(const char *path, const txm_image *picture) {
            picture->height, picture->channels, wang.cpu, mean_joint(w), triangle.cpu,
            mean_joint(t));
     fflush(stdout);
-    textiles_free(w);
-    textiles_free(t);
+    textiles_set_free(w);
+    textiles_set_free(t);
 }
 
 /* ---- the plane ---------------------------------------------------------------------------- */
@@ -168,7 +168,7 @@ static void lookups(void) {
                    lookup_rate(&plane, NULL, &sum));
             if (kind == TEXTILES_TRIANGLE) printf("        -\n");
             else printf(" %8.1f\n", lookup_rate(&plane, tiles, &sum));
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
     free(tiles);
@@ -215,7 +215,7 @@ static void do_once(const txm_image *picture) {
     textiles_set *set = make(picture, TEXTILES_WANG, 2, 128, 1, &r);
     if (!tiles || textiles_plane_make(set, 1, NULL, &plane) != TXM_OK) give_up("plane", "no memory");
     printf("%f %f\n", r.cpu, lookup_rate(&plane, tiles, &sum));
-    textiles_free(set);
+    textiles_set_free(set);
     free(tiles);
 }
 

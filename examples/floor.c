@@ -141,7 +141,7 @@ int main(int argc, char **argv) {
 
     if (failed) fprintf(stderr, "floor: %s\n", failed);
     for (int k = 0; k < LEVELS; k++) free(texture.level[k].pixels);
-    textiles_free(set);
+    textiles_set_free(set);
     stbi_image_free(photo.pixels);
     free(out);
     return failed != NULL;

@@ -18,13 +18,13 @@
      int main(void) {
          static unsigned char photo[128 * 128], plane_pixels[256 * 192];
          static unsigned char atlas_pixels[1 << 20];      // the caller owns all pixels
-         textiles_desc desc = {0};            // zero = the default, for every field
+         static textiles_desc desc;           // static: all zero, the default for every field
          textiles_exemplar exemplar;
          textiles_set *set;
          textiles_layout layout;
          textiles_plane plane;
-         txm_env env = {0};                   // malloc, silent, serial; receives the message
-         txm_image picture = {0}, atlas = {0}, out = {0};
+         static txm_env env;                  // malloc, silent, serial; receives the message
+         static txm_image picture, atlas, out;
          for (int i = 0; i < 128 * 128; i++)  // instead of a photograph: noise in waves
              photo[i] = (unsigned char)(90 + i % 128 * 7 % 50 + i / 128 * 5 % 70 + i * i % 31);
          picture.pixels = photo;
@@ -54,7 +54,7 @@
          }
          printf("%d tiles, atlas %d x %d, tile %d at (5, 7)\n", textiles_count(set),
                 layout.width, layout.height, textiles_plane_tile(&plane, 5, 7));
-         textiles_free(set);
+         textiles_set_free(set);
          return 0;
      }
 
@@ -218,9 +218,9 @@ typedef enum textiles_repair {
 } textiles_repair;
 
 typedef struct textiles_desc {
-    textiles_kind kind;
     const textiles_exemplar *exemplars; /* not modified, need not outlive the call             */
     int exemplar_count;                 /* 1..TEXTILES_MAX_EXEMPLARS                           */
+    textiles_kind kind;
     int size;     /* side of a tile in pixels, 32..1024; an edge of a triangle has size + 1 texels;
                      0 = 128                                                                     */
     int colors;   /* per axis, or of corners, or of triangle edges: 2..4 (frame: 1..4); 0 = 2    */
@@ -243,7 +243,7 @@ typedef struct textiles_set textiles_set;
 /* Cut a tile set out of exemplars by image quilting [1, 2, 5, 8]; see HOW IT WORKS.
 
    env    NULL, or how to allocate, report and spread the work
-   out    receives the set, or NULL on any error; release it with textiles_free
+   out    receives the set, or NULL on any error; release it with textiles_set_free
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps that do not go together or
           samples that are not finite; TXM_TOO_SMALL for an exemplar under 64 x 64;
           TXM_TOO_LARGE above TEXTILES_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
@@ -261,7 +261,7 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
                                         textiles_set **out);
 
 /* Release a set by the allocator it was made with; NULL is allowed. */
-TEXTILES_API void textiles_free(textiles_set *set);
+TEXTILES_API void textiles_set_free(textiles_set *set);
 
 /* ---- looking into a set ------------------------------------------------------------------ */
 
@@ -314,9 +314,9 @@ typedef enum textiles_packing {
 /* Where the tiles lie in one picture; a plain value. Tile t has its pixel (x, y) at
    (px + sx * x, py + sx * y) for the px, py, sx of textiles_place. */
 typedef struct textiles_layout {
-    textiles_packing packing;
+    int size, colors, variants, count; /* of the set                           */
     textiles_kind kind;
-    int size, colors, variants, count;
+    textiles_packing packing;
     int gutter;           /* pixels                                            */
     int columns;          /* cells a row                                       */
     int pitch_x, pitch_y; /* pixels from cell to cell                          */
@@ -358,8 +358,8 @@ TEXTILES_API txm_status textiles_draw_tile(const textiles_set *set, int tile, in
    the place and the seed alone, in constant time. Needs a complete wang, corner or triangle set (a
    reduced triangle set will do). A plain value, small enough to copy; valid as long as the set. */
 typedef struct textiles_plane {
-    textiles_kind kind;
     int colors, variants;
+    textiles_kind kind;
     uint32_t seed;
     const int32_t *table; /* triangles: by symbols, tile * 4 + rotation, see textiles_plane_table */
 } textiles_plane;

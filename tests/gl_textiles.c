@@ -224,7 +224,7 @@ static textiles_set *import(const kind_of *k, int size, painter *paint) {
                 paint(k, &tile, t, size, b % side, b / side,
                       pixels + (size_t)t * bytes + 4 * (size_t)b);
         }
-        textiles_free(set);
+        textiles_set_free(set);
         need_status(textiles_import(&d, tiles, k->count, 1, &env, &set), &env, "import");
     }
     free(tiles);
@@ -295,7 +295,7 @@ static void close_scene(scene *s) {
     glDeleteTextures(1, &s->texture);
     if (s->table) glDeleteTextures(1, &s->table);
     free(s->atlas.pixels);
-    textiles_free(s->set);
+    textiles_set_free(s->set);
 }
 
 /* pixel (x, y) of the view shows the place first + (x + 1/2) across + (y + 1/2) down, as seen from the

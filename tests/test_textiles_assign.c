@@ -255,7 +255,7 @@ static void test_meshes(void **state) {
                     }
                 }
                 assert_true(beside * 200 <= faces); /* with one variant colours do it, mostly */
-                textiles_free(set);
+                textiles_set_free(set);
             }
         }
     }
@@ -275,7 +275,7 @@ static void test_mesh_is_deterministic(void **state) {
     assert_memory_equal(rotations[0], rotations[1], m.faces * sizeof(int));
     assert_true(differences(tiles[0], tiles[2], (int)m.faces) > (int)m.faces / 2);
     check_usage(tiles[0], (int)m.faces, textiles_count(set), 7);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 /* Vertex numbers up to 2^32 - 2 need no memory of their own. */
@@ -287,7 +287,7 @@ static void test_mesh_sparse_numbers(void **state) {
     for (size_t i = 0; i < 3 * m.faces; i++) m.index[i] = UINT32_MAX - 1 - m.index[i] * 3000000u;
     m.vertices = UINT32_MAX;
     assert_int_equal(cover(set, &m, 1), 0);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 static void refuses_mesh(const textiles_set *set, const uint32_t *indices, size_t faces,
@@ -327,8 +327,8 @@ static void test_mesh_refuses(void **state) {
     assert_int_equal(textiles_assign_triangles(set, indices, 2, 4, 1, NULL, tiles, NULL),
                      TXM_BAD_ARGUMENT);
     assert_int_equal(textiles_assign_triangles(set, NULL, 0, 0, 1, NULL, NULL, NULL), TXM_OK);
-    textiles_free(wang);
-    textiles_free(set);
+    textiles_set_free(wang);
+    textiles_set_free(set);
 }
 
 static void test_mesh_misfortune(void **state) {
@@ -343,7 +343,7 @@ static void test_mesh_misfortune(void **state) {
     c.vertices = m.vertices;
     fill(c.in, 4096, FILL);
     check_misfortune(&c);
-    textiles_free(c.set);
+    textiles_set_free(c.set);
 }
 
 /* ---- meshes of quads -------------------------------------------------------------------- */
@@ -401,7 +401,7 @@ static void test_quads(void **state) {
             if (w > 2 && h > 2) assert_int_equal(count_beside(tiles, w, h, torus), 0);
             if (n == 900 && v == 1 && c == 2) check_usage(tiles, 900, 16, 7);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -435,14 +435,14 @@ static void test_quads_with_edges(void **state) {
             if (v > 2 && textiles_colors(set) > 1 && textiles_kind_of(set) == TEXTILES_WANG)
                 assert_int_equal(count_beside(tiles, W, H, torus), 0);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
     textiles_set *five = make_set(TEXTILES_FRAME, 1, 5, 0); /* one class, five variants: enough */
     make_quads(index, W, H, 1);
     memset(edges, 0, sizeof edges);
     assert_int_equal(textiles_assign_quads(five, index, W * H, W * H, edges, 3, NULL, tiles), TXM_OK);
     assert_int_equal(count_beside(tiles, W, H, 1), 0);
-    textiles_free(five);
+    textiles_set_free(five);
 }
 
 static void refuses_quads(const textiles_set *set, const uint32_t *indices, size_t faces,
@@ -516,10 +516,10 @@ static void test_quads_refuse(void **state) {
     const uint32_t pole[] = {0, 1, 2, 0, 0, 2, 3, 0, 0, 3, 1, 0};
     assert_int_equal(textiles_assign_quads(wang, pole, 3, 4, NULL, 1, NULL, tiles), TXM_OK);
     for (int k = 0; k < 3; k++) assert_true(joins(wang, tiles[k], tiles[(k + 1) % 3], 0));
-    textiles_free(wang);
-    textiles_free(reduced);
-    textiles_free(corner);
-    textiles_free(frame);
+    textiles_set_free(wang);
+    textiles_set_free(reduced);
+    textiles_set_free(corner);
+    textiles_set_free(frame);
 }
 
 static void test_quads_misfortune(void **state) {
@@ -536,7 +536,7 @@ static void test_quads_misfortune(void **state) {
     check_misfortune(&c);
     c.edges = edges;
     check_misfortune(&c);
-    textiles_free(c.set);
+    textiles_set_free(c.set);
 }
 
 int main(void) {

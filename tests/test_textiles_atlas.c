@@ -230,7 +230,7 @@ static void test_rectangles(void **state) {
                 assert_int_equal(l.width * l.height, l.count * size * size);
                 check_rectangles(&kinds[i], &l);
             }
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -278,7 +278,7 @@ static void test_footprints(void **state) {
             free(atlas.pixels);
         }
         free(alone.pixels);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -310,7 +310,7 @@ static void test_torus(void **state) {
             }
         }
         free(atlas.pixels);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -415,7 +415,7 @@ static void test_gutters(void **state) {
             }
             free(im.pixels);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -453,7 +453,7 @@ static void test_atlas(void **state) {
             free(im.pixels);
             free(atlas.pixels);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -474,7 +474,7 @@ static void test_left_over(void **state) {
         }
     }
     free(atlas.pixels);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 /* Where no neighbour fits, the border goes on; where only one axis has one, that one does. */
@@ -502,7 +502,7 @@ static void test_lonely_frames(void **state) {
             }
         }
         free(im.pixels);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -550,7 +550,7 @@ static void test_uv(void **state) {
             }
             free(atlas.pixels);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -599,7 +599,7 @@ static void test_plane_copies(void **state) {
             free(out.pixels);
             free(small.pixels);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -638,7 +638,7 @@ static void test_plane_filters(void **state) {
         }
         free(atlas.pixels);
     }
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 /* Across a tile's border a torus goes on with what lies there in the picture, round its ends too; a
@@ -675,7 +675,7 @@ static void test_plane_borders(void **state) {
     assert_true(wrapped > 20);
     free(round.pixels);
     free(apart.pixels);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 /* The texels of a triangle lie where the declaration says, for each corner by itself. */
@@ -715,7 +715,7 @@ static void test_plane_triangles(void **state) {
             }
             free(atlas.pixels);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -751,7 +751,7 @@ static void test_plane_of_sixteen_bits(void **state) {
         free(words.pixels);
         free(out.pixels);
         free(deep.pixels);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -790,7 +790,7 @@ static void test_same_bytes(void **state) {
         }
         free(first.pixels);
         free(out.pixels);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -830,11 +830,11 @@ static void test_bad_layouts(void **state) {
     assert_int_equal(textiles_face_uv(&l, 0, 3, uv), 0);
     assert_int_equal(textiles_face_uv(&l, 0, -1, uv), 0);
     assert_int_equal(px, 5);
-    textiles_free(wang);
-    textiles_free(reduced);
-    textiles_free(triangle);
-    textiles_free(frame);
-    textiles_free(corner);
+    textiles_set_free(wang);
+    textiles_set_free(reduced);
+    textiles_set_free(triangle);
+    textiles_set_free(frame);
+    textiles_set_free(corner);
 }
 
 /* 256 tiles of 80 pixels are within the limit, with wide gutters no longer. */
@@ -848,7 +848,7 @@ static void test_too_large(void **state) {
     assert_int_equal(textiles_layout_make(set, TEXTILES_PACKED, 40, &env, &l), TXM_TOO_LARGE);
     assert_int_equal(textiles_layout_make(set, TEXTILES_SLICES, 40, &env, &l), TXM_TOO_LARGE);
     assert_int_equal(l.gutter, 16);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 /* every field of a layout changed in turn */
@@ -933,7 +933,7 @@ static void test_bad_pictures(void **state) {
             const textiles_layout small = lay_out(fewer, TEXTILES_PACKED, 2);
             txm_image im = atlas_of(fewer, &small, 0);
             refused(textiles_draw_plane(&of_others, &small, &im, 0, 0, 1, &env, out));
-            textiles_free(fewer);
+            textiles_set_free(fewer);
             free(im.pixels);
         }
         free(atlas.pixels);
@@ -941,8 +941,8 @@ static void test_bad_pictures(void **state) {
         free(out.pixels);
         free(bytes.pixels);
         free(tile.pixels);
-        textiles_free(set);
-        textiles_free(other);
+        textiles_set_free(set);
+        textiles_set_free(other);
     }
 }
 

@@ -42,7 +42,7 @@ static void test_sixteen_bits(void **state) {
             assert_near(joints[0].mean, joints[1].mean, repair == TEXTILES_REPAIR_NONE ? 1e-9 : 0.01);
             for (int i = 0; i < 2; i++) {
                 close_book(&b[i]);
-                textiles_free(sets[i]);
+                textiles_set_free(sets[i]);
             }
         }
     }
@@ -90,7 +90,7 @@ static void test_several_exemplars(void **state) {
             if (!used[0] || !used[1] || !used[2])
                 fail_msg("kind %d: %d, %d, %d pixels of the exemplars", k, used[0], used[1], used[2]);
             close_book(&b);
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
     for (int e = 0; e < 3; e++) free(maps[e].pixels);
@@ -114,7 +114,7 @@ static void try_size(textiles_kind kind, int width, int height, int channels, in
     if (kind != TEXTILES_TRIANGLE) check_pixels(&b, &exemplar);
     if (getenv("TEXTILES_TEST_SHOW")) measure(set, 0);
     close_book(&b);
-    textiles_free(set);
+    textiles_set_free(set);
     free(map.pixels);
 }
 
@@ -163,7 +163,7 @@ static void test_tiny_exemplars(void **state) {
             check_sources(&b, sizes);
             check_pixels(&b, &exemplar);
             close_book(&b);
-            textiles_free(set);
+            textiles_set_free(set);
         }
         assert_int_equal(tk_leaks(&memory), 0);
         free(map.pixels);
@@ -199,7 +199,7 @@ static void test_constant(void **state) {
                 assert_true(j.mean == 1 && j.worst == 1 && j.least == 1 && j.overall == 1);
             }
             close_book(&b);
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }

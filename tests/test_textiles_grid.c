@@ -48,7 +48,7 @@ static void test_scanline(void **state) {
             check_usage(tiles, W * H, count, 5 + 2.0 * cases[i].reduced);
         textiles_scanline(set, W, H, 8, NULL, again);
         assert_true(differences(tiles, again, W * H) > W * H / 4);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -79,7 +79,7 @@ static void test_scanline_runs(void **state) {
             }
         }
         if (i != 2) assert_true(forced < W * H / 8);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -113,9 +113,9 @@ static void test_scanline_refuses(void **state) {
     check_joins(frame, tiles, 1, 16, 0);
     assert_int_equal(textiles_scanline(frame, 16, 1, 1, &env, tiles), TXM_OK);
     check_joins(frame, tiles, 16, 1, 0);
-    textiles_free(wang);
-    textiles_free(triangle);
-    textiles_free(frame);
+    textiles_set_free(wang);
+    textiles_set_free(triangle);
+    textiles_set_free(frame);
 }
 
 /* ---- tiling under constraints ----------------------------------------------------------- */
@@ -158,7 +158,7 @@ static void test_solve(void **state) {
                     if (wishes[t] >= 0) assert_int_equal(again[t], wishes[t]);
             }
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -209,7 +209,7 @@ static void test_solve_is_exact(void **state) {
                 refused++;
             }
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
     assert_true(solved > 300 && refused > 300);
 }
@@ -226,7 +226,7 @@ static void test_solve_runs(void **state) {
         const int runs = count_runs(tiles, 100, 100, 0);
         if (kind == TEXTILES_WANG) assert_int_equal(runs, 0);
         else assert_true(runs < 40);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -306,12 +306,12 @@ static void test_solve_refuses(void **state) {
     fill(wishes, 128, -1);
     solve(frame, 1, 9, 0, 1, wishes); /* below each other they do */
     refuses_solve(frame, 1, 9, 1, wishes, TXM_BAD_DATA, "no tiling");
-    textiles_free(wang);
-    textiles_free(reduced);
-    textiles_free(corner);
-    textiles_free(triangle);
-    textiles_free(frame);
-    textiles_free(bricks);
+    textiles_set_free(wang);
+    textiles_set_free(reduced);
+    textiles_set_free(corner);
+    textiles_set_free(triangle);
+    textiles_set_free(frame);
+    textiles_set_free(bricks);
 }
 
 static void test_solve_misfortune(void **state) {
@@ -322,7 +322,7 @@ static void test_solve_misfortune(void **state) {
         c.set = solve_case(i);
         fill(c.in, 4096, -1);
         check_misfortune(&c);
-        textiles_free(c.set);
+        textiles_set_free(c.set);
     }
 }
 
@@ -349,7 +349,7 @@ static void test_solve_cancel_search(void **state) {
             assert_filled(tiles, 200 * 200, -1);
             points++;
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
     assert_true(points > 8);
 }

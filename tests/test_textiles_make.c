@@ -79,7 +79,7 @@ static void test_seeds_differ(void **state) {
         assert_between(share, 0.8, 1);
         assert_true(edge * 2 > b->count * SIZE);
         close_book(&other);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -236,7 +236,7 @@ static void test_triangle_values(void **state) {
     }
     assert_true(inner > b.count * 300 && turned > b.count * 20);
     close_book(&b);
-    textiles_free(set);
+    textiles_set_free(set);
     for (int m = 0; m < 3; m++) free(maps[m].pixels);
 }
 

@@ -153,7 +153,7 @@ static void test_guarantee(void **state) {
         d.reduced = k == TEXTILES_WANG || triangle;
         textiles_set *set = make(&d);
         check_guarantee(set);
-        textiles_free(set);
+        textiles_set_free(set);
         free(map.pixels);
     }
 }
@@ -175,25 +175,25 @@ static void test_measure_controls(void **state) {
             fail_msg("kind %d: tiles cut anywhere seem to match: mean %.3f, worst %.3f; of a made set "
                      "%.3f, %.3f", k, j.mean, j.worst, good.mean, good.worst);
         close_book(&b);
-        textiles_free(set);
+        textiles_set_free(set);
 
         /* one tile for all, whose sides belong together but for the step from last to first */
         set = import_cut(&d, counts[k], &periodic, cut_the_same);
         b = open_book(set, 0);
         if (k != TEXTILES_TRIANGLE) check_measure(&b, 0);
         close_book(&b);
-        textiles_free(set);
+        textiles_set_free(set);
 
         const txm_image none = view(NULL, 0, 0, 1, TXM_U8);
         set = import_cut(&d, counts[k], &none, cut_gray);
         j = measure(set, 0);
         assert_true(j.mean == 1 && j.worst == 1 && j.least == 1 && j.overall == 1 && j.pairs > 0);
-        textiles_free(set);
+        textiles_set_free(set);
         if (k == TEXTILES_TRIANGLE) continue;
         set = import_cut(&d, counts[k], &none, cut_flat);
         j = measure(set, 0);
         assert_true(j.worst > 1e6 && j.least == 1);
-        textiles_free(set);
+        textiles_set_free(set);
     }
     free(periodic.pixels);
 }

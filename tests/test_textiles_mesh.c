@@ -184,7 +184,7 @@ static void test_sphere(void **state) {
     assert_true(ratio > 0.8 && ratio <= 1.1);
     assert_true(shuffled > 1.3);
     free(atlas.pixels);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 int main(void) {

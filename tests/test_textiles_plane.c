@@ -31,7 +31,7 @@ static void test_sets_squares(void **state) {
                 const int beyond[4] = {0, c, 0, 0}, below[4] = {0, 0, 0, -1};
                 assert_int_equal(textiles_find(set, beyond, NULL, NULL), -1);
                 assert_int_equal(textiles_find(set, below, NULL, NULL), -1);
-                textiles_free(set);
+                textiles_set_free(set);
             }
         }
     }
@@ -61,7 +61,7 @@ static void test_sets_reduced_wang(void **state) {
                 assert_int_equal(seen[key], 2);
                 assert_int_equal(ends[key], 2);
             }
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -105,7 +105,7 @@ static void test_sets_triangles(void **state) {
                 same &= t.directions[0] == t.directions[1] && t.directions[1] == t.directions[2];
                 assert_int_equal(shown[base], same ? 1 : 3);
             }
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -164,7 +164,7 @@ static void test_plane_formula(void **state) {
                 const int y = k < 1000 ? any_int(&rng) : k / 32 % 32 - 16;
                 assert_int_equal(textiles_plane_tile(&p, x, y), formula_tile(&p, x, y));
             }
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -199,7 +199,7 @@ static void test_plane_windows(void **state) {
         textiles_plane_fill(&p, 0, 0, 0, 5, tiles);
         textiles_plane_fill(&p, 0, 0, 5, -1, tiles);
         assert_filled(tiles, 4, FILL);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -232,7 +232,7 @@ static void test_plane_statistics(void **state) {
         p.seed += 1;
         textiles_plane_fill(&p, -100, -77, W, H, other);
         assert_true(differences(tiles, other, W * H) > W * H * 3 / 4);
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -332,7 +332,7 @@ static void test_plane_triangles(void **state) {
             }
             assert_true(same < 3 * (64 - d) * (64 - d) / 3);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -368,7 +368,7 @@ static void test_plane_equal_ranks(void **state) {
         assert_int_equal(t.directions[s.side], -u.directions[o.side]);
     }
     assert_int_equal(found, 4);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 static void test_plane_table(void **state) {
@@ -394,7 +394,7 @@ static void test_plane_table(void **state) {
             assert_int_equal(textiles_plane_tile(&p, 0, 0), -1);
             textiles_plane_fill(&p, 0, 0, 2, 1, tiles);
             assert_filled(tiles, 2, -1);
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
     textiles_set *set = make_set(TEXTILES_WANG, 2, 1, 0);
@@ -405,7 +405,7 @@ static void test_plane_table(void **state) {
     assert_int_equal(count, 0);
     assert_int_equal(textiles_plane_triangle(&p, 0, 0, 0, &r), -1);
     assert_int_equal(r, 0);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 static void test_plane_refuses(void **state) {
@@ -424,7 +424,7 @@ static void test_plane_refuses(void **state) {
         assert_int_equal(textiles_plane_make(i < 3 ? sets[i] : NULL, 0, NULL, i == 2 ? NULL : &p),
                          TXM_BAD_ARGUMENT);
     }
-    for (int i = 0; i < 3; i++) textiles_free(sets[i]);
+    for (int i = 0; i < 3; i++) textiles_set_free(sets[i]);
 }
 
 int main(void) {

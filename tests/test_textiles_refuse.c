@@ -212,7 +212,7 @@ static txm_status try_make(const textiles_desc *d, txm_env *env) {
     const txm_status status = textiles_make(d, env, &set);
     if (status == TXM_OK) assert_non_null(set);
     else assert_null(set);
-    textiles_free(set);
+    textiles_set_free(set);
     return status;
 }
 
@@ -302,7 +302,7 @@ static void test_peak_memory(void **state) {
         assert_true(memory.peak_bytes < kept + (size_t)(n * n) * (40 + 8 * 3) +
                                             (size_t)(d.variants * size * size) * 190 +
                                             (size_t)d.variants * (1 << 20));
-        textiles_free(set);
+        textiles_set_free(set);
         assert_int_equal(tk_leaks(&memory), 0);
         free(map.pixels);
     }

@@ -63,7 +63,7 @@ static void test_list_squares(void **state) {
                                   i / colors % colors, i % colors};
                 check_find(set, e, NULL, i * variants, 0);
             }
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -90,7 +90,7 @@ static void test_list_reduced_wang(void **state) {
             }
             assert_int_equal(found, 2 * colors); /* all others are not there */
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
 }
 
@@ -129,7 +129,7 @@ static void test_list_triangles(void **state) {
             }
             /* all, or all but a quarter: those that run one way round */
             assert_int_equal(seen, reduced ? s * s * s * 3 / 4 : s * s * s);
-            textiles_free(set);
+            textiles_set_free(set);
         }
     }
 }
@@ -144,7 +144,7 @@ static void test_list_frames(void **state) {
             check_find(set, e, NULL, 2 * k, 0);
             check_find(set, other, NULL, k ? -1 : 0, 0);
         }
-        textiles_free(set);
+        textiles_set_free(set);
     }
     const book *b = &common[TEXTILES_FRAME][0];
     assert_int_equal(b->count, 15);
@@ -236,14 +236,14 @@ static void test_import_round_trip(void **state) {
             }
         }
         close_book(&b);
-        textiles_free(set);
+        textiles_set_free(set);
         assert_int_equal(tk_leaks(&memory), 0);
         free(bytes);
         free(words);
         free(floats);
         free(tiles);
     }
-    textiles_free(NULL);
+    textiles_set_free(NULL);
 }
 
 /* Beyond a triangle's third side anything may lie. */
@@ -262,7 +262,7 @@ static void test_import_beyond_triangles(void **state) {
     const textiles_desc d = desc_of(TEXTILES_TRIANGLE, NULL, 0, S - 1);
     const txm_status status = textiles_import(&d, tiles, 24, 1, &env, &set);
     if (status != TXM_OK) fail_msg("what lies beyond is looked at: %d, %s", status, env.message);
-    textiles_free(set);
+    textiles_set_free(set);
 }
 
 static void refuses_import(const textiles_desc *d, const txm_image *tiles, int count, int maps,
@@ -344,7 +344,7 @@ static void test_import_refuses(void **state) {
             txm_env failing = tk_env(&memory, NULL);
             textiles_set *set = (textiles_set *)&memory;
             const txm_status status = textiles_import(&d, tiles, 16, 1, &failing, &set);
-            if (status == TXM_OK) textiles_free(set);
+            if (status == TXM_OK) textiles_set_free(set);
             assert_int_equal(tk_leaks(&memory), 0);
             if (memory.calls < k) {
                 assert_true(status == TXM_OK && k > 3);

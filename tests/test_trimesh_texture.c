@@ -602,7 +602,7 @@ static void test_tiles(void **state) {
     tile2[3] = tiles;
     assert_int_equal(trimesh_place_tiles(n, tile2, turn2, tile_uv, (size_t)tiles, NULL, uv),
                      TXM_BAD_ARGUMENT);
-    textiles_free(set);
+    textiles_set_free(set);
     free(pictures);
     free(tile_uv);
     free(color);

@@ -284,7 +284,7 @@ static inline uint64_t hash_and_free(textiles_set *set, int types) {
     book b = open_book(set, types);
     const uint64_t h = hash_of(&b);
     close_book(&b);
-    textiles_free(set);
+    textiles_set_free(set);
     return h;
 }
 
@@ -364,7 +364,7 @@ static inline int free_common(void **state) {
     for (int k = 0; k < KINDS; k++) {
         for (int r = 0; r < 2; r++) {
             close_book(&common[k][r]);
-            textiles_free(common_sets[k][r]);
+            textiles_set_free(common_sets[k][r]);
         }
     }
     for (int m = 0; m < 3; m++) free(common_maps[m].pixels);

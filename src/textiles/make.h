@@ -266,7 +266,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     if (status == TXM_OK && txm_progress(env, 1, "tiles"))
         status = txm_fail(env, TXM_CANCELLED, "cancelled at the very end");
     txm_arena_free(&b.arena);
-    if (status != TXM_OK) textiles_free(b.set);
+    if (status != TXM_OK) textiles_set_free(b.set);
     else *out = b.set;
     return status;
 }

@@ -273,7 +273,7 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
     status = txt_set_make(desc, maps, map_count, 0, env, &s);
     if (status != TXM_OK) return status;
     if (s->count != tile_count) {
-        textiles_free(s);
+        textiles_set_free(s);
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "tile_count is not the number of tiles that such a set has");
     }
@@ -289,7 +289,7 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
     return TXM_OK;
 }
 
-TEXTILES_API void textiles_free(textiles_set *set) {
+TEXTILES_API void textiles_set_free(textiles_set *set) {
     if (!set) return;
     txm_arena arena = set->arena; /* the set lies in a block of its own */
     txm_arena_free(&arena);

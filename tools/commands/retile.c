@@ -372,7 +372,7 @@ static int dress_with_tiles(job *j) {
                                                            &j->run.env, tiles,
                                                            tiles + m->triangle_count), j->tiles);
     if (!status) status = place_tiles(j, tiles, tiles + m->triangle_count, f.uv, f.count);
-    textiles_free(set);
+    textiles_set_free(set);
     free(f.tiles);
     free(f.uv);
     free(tiles);

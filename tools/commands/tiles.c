@@ -414,7 +414,7 @@ static int run_tiles(int argc, char **argv) {
                "%.1f s\n", run.output, textiles_count(set), layout.width, layout.height, joints.mean,
                joints.worst, cli_seconds(&run));
 done:
-    textiles_free(set);
+    textiles_set_free(set);
     free_photos(&p);
     return status;
 }

@@ -59,21 +59,21 @@ static uint64_t set_hash(const textiles_set *set, txm_env *env, uint64_t hash) {
 static uint64_t wang(txm_env *env) {
     textiles_set *set = make(TEXTILES_WANG, 3, 1, env);
     const uint64_t hash = set_hash(set, env, 0);
-    textiles_free(set);
+    textiles_set_free(set);
     return hash;
 }
 
 static uint64_t corner(txm_env *env) {
     textiles_set *set = make(TEXTILES_CORNER, 1, 1, env);
     const uint64_t hash = set_hash(set, env, 0);
-    textiles_free(set);
+    textiles_set_free(set);
     return hash;
 }
 
 static uint64_t triangle(txm_env *env) {
     textiles_set *set = make(TEXTILES_TRIANGLE, 3, 1, env);
     const uint64_t hash = set_hash(set, env, 0);
-    textiles_free(set);
+    textiles_set_free(set);
     return hash;
 }
 
@@ -108,7 +108,7 @@ static uint64_t frame(txm_env *env) {
         golden_need(textiles_draw_tile(set, t, 4, 1, env, image), "draw a tile", env);
         hash = tk_hash(hash, values, sizeof values);
     }
-    textiles_free(set);
+    textiles_set_free(set);
     return hash;
 }
 
@@ -136,13 +136,13 @@ static uint64_t atlases(txm_env *env) {
     uint64_t hash = atlas_hash(set, TEXTILES_PACKED, -1, env, 0);
     hash = atlas_hash(set, TEXTILES_TORUS, 0, env, hash);
     hash = atlas_hash(set, TEXTILES_SLICES, 4, env, hash);
-    textiles_free(set);
+    textiles_set_free(set);
     set = make(TEXTILES_TRIANGLE, 1, 1, env);
     hash = atlas_hash(set, TEXTILES_PACKED, 4, env, hash);
-    textiles_free(set);
+    textiles_set_free(set);
     set = make(TEXTILES_CORNER, 1, 1, env);
     hash = atlas_hash(set, TEXTILES_TORUS, -1, env, hash);
-    textiles_free(set);
+    textiles_set_free(set);
     return hash;
 }
 
@@ -171,7 +171,7 @@ static uint64_t planes(txm_env *env) {
         golden_need(textiles_draw_plane(&plane, &layout, &atlas, -123.25, 4567.5, 0.75, env, window),
                     "draw the plane", env);
         hash = tk_hash(hash, out + bytes, 90 * 70);
-        textiles_free(set);
+        textiles_set_free(set);
     }
     return hash;
 }
@@ -191,7 +191,7 @@ static uint64_t grids(txm_env *env) {
         for (int i = 1; i < 60 * 50; i++) tiles[i] = -1;
         golden_need(textiles_solve(set, 60, 50, 1, 7, env, tiles), "solve", env);
         hash = tk_hash(hash, tiles, sizeof tiles);
-        textiles_free(set);
+        textiles_set_free(set);
     }
     return hash;
 }
@@ -218,14 +218,14 @@ static uint64_t meshes(txm_env *env) {
     golden_need(textiles_measure(set, 0, env, &joints), "measure", env);
     const double triangle_joints[4] = {joints.mean, joints.worst, joints.least, joints.overall};
     hash = tk_hash(hash, triangle_joints, sizeof triangle_joints);
-    textiles_free(set);
+    textiles_set_free(set);
     set = make(TEXTILES_WANG, 1, 1, env);
     golden_need(textiles_assign_quads(set, quads, N * N, N * N, NULL, 4, env, tiles), "quads", env);
     hash = tk_hash(hash, tiles, N * N * sizeof *tiles);
     golden_need(textiles_measure(set, 0, env, &joints), "measure", env);
     const double square_joints[4] = {joints.mean, joints.worst, joints.least, joints.overall};
     hash = tk_hash(hash, square_joints, sizeof square_joints);
-    textiles_free(set);
+    textiles_set_free(set);
     return hash;
 }
 
