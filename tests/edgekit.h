@@ -1,7 +1,7 @@
 /* edgekit.h - what the tests of edges and strokes share: pictures, layers, strokes
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Includes cmocka.h, texpatch.h and testkit.h.                                                */
+   Includes cmocka.h, texedges.h and testkit.h.                                                */
 #ifndef EDGEKIT_H
 #define EDGEKIT_H
 
@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-#include "texpatch.h"
+#include "texedges.h"
 
 #include "testkit.h"
 

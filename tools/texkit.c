@@ -11,6 +11,7 @@
 
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
+#include "texedges.h"
 #include "texpatch.h"
 #include "textiles.h"
 #include "treepieces.h"
@@ -22,8 +23,8 @@
 
 const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
-                   ", texpatch " TEXPATCH_VERSION ", textiles " TEXTILES_VERSION
-                   ", trimesh_relax " TRIMESH_RELAX_VERSION
+                   ", texpatch " TEXPATCH_VERSION ", texedges " TEXEDGES_VERSION
+                   ", textiles " TEXTILES_VERSION ", trimesh_relax " TRIMESH_RELAX_VERSION
                    ", treepieces " TREEPIECES_VERSION ")";
 
 enum { MAX_SIDE = 1 << 24 };

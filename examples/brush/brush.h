@@ -3,6 +3,7 @@
 #ifndef BRUSH_H
 #define BRUSH_H
 
+#include "texedges.h"
 #include "texpatch.h"
 
 #include <SDL2/SDL.h>

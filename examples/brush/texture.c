@@ -2,6 +2,8 @@
    SPDX-License-Identifier: MIT OR Unlicense  */
 #define TEXPATCH_IMPLEMENTATION
 #include "texpatch.h"
+#define TEXEDGES_IMPLEMENTATION
+#include "texedges.h"
 
 #include "brush.h"
 

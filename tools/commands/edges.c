@@ -3,7 +3,9 @@
 #define _XOPEN_SOURCE 700 /* POSIX: open_memstream */
 #include "command.h"
 #include "files/image_io.h"
-#include "texpatch.h"
+
+#define TEXEDGES_IMPLEMENTATION
+#include "texedges.h"
 
 #include <stdio.h>
 

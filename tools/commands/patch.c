@@ -5,6 +5,7 @@
    draw, write: run_job at the end tells the story.                                             */
 #include "command.h"
 #include "files/image_io.h"
+#include "texedges.h"
 
 #define TEXPATCH_IMPLEMENTATION
 #include "texpatch.h"

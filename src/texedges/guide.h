@@ -1,7 +1,7 @@
-#ifndef TEXPATCH_GUIDE_H
-#define TEXPATCH_GUIDE_H
+#ifndef TEXEDGES_GUIDE_H
+#define TEXEDGES_GUIDE_H
 
-#include "lines.h"
+#include "layers.h"
 
 /* ---- control: the guide ------------------------------------------------------------------ */
 
@@ -189,7 +189,7 @@ static txm_status txp_e_guide_make(const texpatch_control *c, const texpatch_edg
     return txp_e_show(g->at, count, lines->levels, bar) ? TXM_OK : txp_e_stopped(env);
 }
 
-TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
+TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
                                                const texpatch_edges *disturbed, txm_env *env,
                                                const txm_image *guide, const txm_image *mask) {
     txp_e_bar bar;
@@ -236,4 +236,4 @@ TEXPATCH_API txm_status texpatch_control_guide(const texpatch_control *control,
     return status;
 }
 
-#endif /* TEXPATCH_GUIDE_H */
+#endif /* TEXEDGES_GUIDE_H */

@@ -1,5 +1,5 @@
-#ifndef TEXPATCH_STROKES_H
-#define TEXPATCH_STROKES_H
+#ifndef TEXEDGES_STROKES_H
+#define TEXEDGES_STROKES_H
 
 #include "roughness.h"
 
@@ -283,7 +283,7 @@ static txm_status txp_e_disturb(const texpatch_control *c, txp_e_bar *bar, txm_a
     return TXM_OK;
 }
 
-TEXPATCH_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
+TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
                                          txm_env *env, texpatch_edges *out) {
     txp_e_bar bar;
     memset(&bar, 0, sizeof bar);
@@ -324,4 +324,4 @@ TEXPATCH_API txm_status texpatch_disturb(const texpatch_control *control, int wi
     return status;
 }
 
-#endif /* TEXPATCH_STROKES_H */
+#endif /* TEXEDGES_STROKES_H */

@@ -1,5 +1,5 @@
-#ifndef TEXPATCH_ROUGHNESS_H
-#define TEXPATCH_ROUGHNESS_H
+#ifndef TEXEDGES_ROUGHNESS_H
+#define TEXEDGES_ROUGHNESS_H
 
 #include "check.h"
 
@@ -402,4 +402,4 @@ static int txp_e_weave(const txp_e_unrest *u, txm_rng *rng, txp_e_sample *sample
     return 1;
 }
 
-#endif /* TEXPATCH_ROUGHNESS_H */
+#endif /* TEXEDGES_ROUGHNESS_H */

@@ -1,8 +1,8 @@
-/* test_texpatch_edges.c - layers of a picture and their boundaries
+/* test_texedges.c - layers of a picture and their boundaries
    SPDX-License-Identifier: MIT OR Unlicense
 
-   cc -std=c99 -I. -Itests tests/test_texpatch_edges.c -lcmocka -lpthread -lm                  */
-#define TEXPATCH_IMPLEMENTATION
+   cc -std=c99 -I. -Itests tests/test_texedges.c -lcmocka -lpthread -lm                        */
+#define TEXEDGES_IMPLEMENTATION
 #include "edgekit.h"
 
 /* ---- what must hold --------------------------------------------------------------------- */

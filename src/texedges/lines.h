@@ -1,5 +1,5 @@
-#ifndef TEXPATCH_LINES_H
-#define TEXPATCH_LINES_H
+#ifndef TEXEDGES_LINES_H
+#define TEXEDGES_LINES_H
 
 #include "layers.h"
 
@@ -152,7 +152,7 @@ static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, tx
     return txp_e_trace_all(&map, bar, e, env);
 }
 
-TEXPATCH_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
                                             texpatch_edges *out) {
     txm_status status = txp_e_check_desc(desc, env);
     if (status != TXM_OK) return status;
@@ -181,56 +181,10 @@ TEXPATCH_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm
     return status;
 }
 
-TEXPATCH_API void texpatch_edges_free(texpatch_edges *edges) {
+TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges) {
     if (!edges) return;
     txm_arena_free(&edges->memory);
     memset(edges, 0, sizeof *edges);
-}
-
-/* Turn layers into grays. 0 = cancelled. */
-static int txp_e_show(uint8_t *layer, size_t count, int levels, txp_e_bar *bar) {
-    uint8_t gray[TEXPATCH_MAX_LEVELS] = {0};
-    for (int k = 0; k < levels; k++)
-        gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
-    for (size_t i = 0; i < count; i++) {
-        layer[i] = gray[layer[i]];
-        if (txp_e_tick(bar, 1)) return 0;
-    }
-    return 1;
-}
-
-TEXPATCH_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
-                                        const texpatch_edges *edges, txm_env *env,
-                                        const txm_image *layers) {
-    txp_e_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
-    txm_status status = txp_e_check_desc(desc, env);
-    if (status == TXM_OK) status = txp_e_check_image(layers, "layers", 1, env);
-    if (status == TXM_OK &&
-        (layers->width != desc->image.width || layers->height != desc->image.height))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
-    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS ||
-                             !txp_e_thresholds_are_good(edges->thresholds, edges->levels)))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texpatch_edges_find made it");
-    if (status != TXM_OK) return status;
-
-    float thresholds[TEXPATCH_MAX_LEVELS];
-    txm_arena map, scratch;
-    txm_arena_init(&map, env);
-    txm_arena_init(&scratch, env);
-    memcpy(thresholds, edges->thresholds, sizeof thresholds);
-    const size_t width = (size_t)layers->width;
-    uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
-    status = layer ? txp_e_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
-                   : txp_e_no_memory(env);
-    if (status == TXM_OK && !txp_e_show(layer, width * (size_t)layers->height, edges->levels, &bar))
-        status = txp_e_stopped(env);
-    for (int y = 0; y < layers->height && status == TXM_OK; y++)
-        memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
-    txm_arena_free(&scratch);
-    txm_arena_free(&map);
-    return status;
 }
 
 /* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
@@ -266,7 +220,7 @@ static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
     return (uint8_t)((ramp[span][channel] * (256 - rest) + ramp[span + 1][channel] * rest) / 256);
 }
 
-TEXPATCH_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
                                             const txm_image *image) {
     txp_e_bar bar;
     memset(&bar, 0, sizeof bar);
@@ -305,4 +259,4 @@ TEXPATCH_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int lay
     return status;
 }
 
-#endif /* TEXPATCH_LINES_H */
+#endif /* TEXEDGES_LINES_H */

@@ -1,8 +1,8 @@
-/* test_texpatch_edges_refuse.c - edges and strokes: bad input, failing memory, cancelling
+/* test_texedges_refuse.c - edges and strokes: bad input, failing memory, cancelling
    SPDX-License-Identifier: MIT OR Unlicense
 
-   cc -std=c99 -I. -Itests tests/test_texpatch_edges_refuse.c -lcmocka -lpthread -lm           */
-#define TEXPATCH_IMPLEMENTATION
+   cc -std=c99 -I. -Itests tests/test_texedges_refuse.c -lcmocka -lpthread -lm                 */
+#define TEXEDGES_IMPLEMENTATION
 #include "edgekit.h"
 
 /* ---- bad input -------------------------------------------------------------------------- */

@@ -1,8 +1,8 @@
-/* test_texpatch_strokes.c - disturbed strokes, their statistics, guides made of them
+/* test_texedges_strokes.c - disturbed strokes, their statistics, guides made of them
    SPDX-License-Identifier: MIT OR Unlicense
 
-   cc -std=c99 -I. -Itests tests/test_texpatch_strokes.c -lcmocka -lpthread -lm                */
-#define TEXPATCH_IMPLEMENTATION
+   cc -std=c99 -I. -Itests tests/test_texedges_strokes.c -lcmocka -lpthread -lm                */
+#define TEXEDGES_IMPLEMENTATION
 #include "edgekit.h"
 
 /* ---- strokes ---------------------------------------------------------------------------- */

@@ -1,0 +1,1933 @@
+/* texedges.h - v0.1.0 - the gray layers of a picture, their boundaries, and strokes drawn like them
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)          */
+#ifndef TEXEDGES_H
+#define TEXEDGES_H
+
+#include "texmath.h"
+
+#define TEXEDGES_VERSION "0.1.0"
+
+#ifndef TEXEDGES_MAX_PIXELS
+#define TEXEDGES_MAX_PIXELS (1 << 28) /* larger pictures are refused */
+#endif
+
+#if defined(TEXEDGES_STATIC) && defined(__GNUC__)
+#define TEXEDGES_API __attribute__((unused)) static
+#elif defined(TEXEDGES_STATIC)
+#define TEXEDGES_API static
+#else
+#define TEXEDGES_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- layered edges ----------------------------------------------------------------------- */
+
+enum { TEXPATCH_MAX_LEVELS = 16 };
+
+/* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
+   value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1). */
+typedef struct texpatch_polyline {
+    int layer;        /* 0..levels-1: this is a boundary of that layer                        */
+    int is_hole;      /* the layer lies outside it                                            */
+    size_t first;     /* its points are points[first .. first + count - 1], closed: the last is
+                         joined to the first                                                  */
+    size_t count;
+} texpatch_polyline;
+
+/* Found lines run along the cracks between pixels, a point at each pixel corner that they pass.
+   The layer lies to the right of the way (outer boundaries run clockwise as seen, holes the other
+   way), and what lies beyond the picture belongs to no layer. Each side of each crack between two
+   layers is part of exactly one line. Pixels that touch at a corner only do not belong together:
+   where a layer meets itself so, its line turns right, around the pixel that it came along. So
+   lines may touch at a corner but never cross, neither themselves nor others.
+
+         +---+              lines are in raster order of their first points: the top left corner
+         | k |              of the topmost (then leftmost) pixel of an outer boundary
+     +---+---+  the two pixels of layer k have a line each; the two
+     | k |      others too, whether of one layer or not
+     +---+                                                                                    */
+typedef struct texpatch_edges {
+    int levels, width, height;
+    float thresholds[TEXPATCH_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
+    int beside[TEXPATCH_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
+                                        none, it has no boundary but the picture's              */
+    texpatch_polyline *lines;
+    size_t line_count;
+    txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
+                         top left pixel                                                        */
+    size_t point_count;
+    txm_arena memory; /* belongs to the header                                                 */
+} texpatch_edges;
+
+/* What to find. All zero but the image is a good default. */
+typedef struct texpatch_edges_desc {
+    txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
+                        samples as they are, cut off at 0 and 1; alpha is not looked at        */
+    int levels;      /* 2..TEXPATCH_MAX_LEVELS; 0 = 4, as the paper has it                     */
+    float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
+                        1 to 3                                                                 */
+    int least;       /* regions whose boundary (holes and the picture's border included) is shorter
+                        than so many pixels go to the surrounding layer that they share most of
+                        it with, the shortest first; 0 = all are kept                          */
+    const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
+                        have about the same area, at the emptiest gray near there */
+} texpatch_edges_desc;
+
+/* Find the boundaries of all layers.
+
+   env    NULL, or how to allocate, report and cancel
+   out    receives them; release it with texpatch_edges_free. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
+          TXM_TOO_LARGE above TEXEDGES_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   O(pixels (1 + smooth + log least)) time, about 0.2 us a pixel; 13 bytes a pixel while it
+          works (9 without least, 5 without both), and the result: 8 bytes for each point, of which
+          there are up to four a pixel, and 24 for each line                                   */
+TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+                                            texpatch_edges *out);
+
+/* Release edges, which are all zero then; NULL and all zero are allowed. Of several copies of the
+   struct only one may be released. */
+TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges);
+
+/* The layer of each pixel of a picture, by the thresholds of edges, as a gray value: layer k is
+   255 k / (levels - 1), rounded. It serves as the guide of an exemplar (see control edges).
+
+   desc   image, smooth and least are looked at; with those that edges were found with, the layers
+          change exactly where its lines run
+   layers TXM_U8, 1 channel, the size of the picture; untouched after an error
+   return as texpatch_edges_find
+   cost   as texpatch_edges_find; 13 bytes a pixel                                             */
+TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
+                                        const texpatch_edges *edges, txm_env *env,
+                                        const txm_image *layers);
+
+/* Draw boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
+   wide, on the layer's own side; colours run from dark to light with the layers, in one channel the
+   gray. What lies outside of the picture is not drawn.
+   cost   a byte for each pixel; O(pixels + length of the lines) time                           */
+TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+                                            const txm_image *image);
+
+/* ---- control edges ----------------------------------------------------------------------- */
+
+/* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. Where it is closed,
+   its inside becomes the layer; an open one becomes a band of the layer, as wide as width says,
+   with round ends. */
+typedef struct texpatch_stroke {
+    const txm_vec2 *points; /* count of them, 2 or more (closed: 3), not all the same, in pixels of
+                               the output; they may lie outside it, up to 2^20                  */
+    int count;
+    int is_closed;
+    int layer;   /* 0..levels-1: what lies within                                               */
+    float width; /* of an open stroke, pixels, 2..256; 0 = 8                                    */
+} texpatch_stroke;
+
+typedef struct texpatch_control {
+    const texpatch_edges *edges; /* of the exemplar, from texpatch_edges_find                   */
+    const texpatch_stroke *strokes;
+    int stroke_count;  /* 0 or more                                                             */
+    int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but
+                          next to a stroke not the stroke's own layer */
+    float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
+                          -1 = none                                                             */
+    uint64_t seed;     /* another seed, another unrest                                          */
+} texpatch_control;
+
+/* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the
+   way in which those stray from their own smooth course are strung together along the stroke.
+
+   out    receives one closed line for each stroke, in their order (of an open stroke: around its
+          band), inside to the right; levels, thresholds and beside are the exemplar's, width and
+          height those given. Release it with texpatch_edges_free; untouched after an error.
+          A line strays from its stroke (the edge of its band) by 4 pixels at most; less from short
+          strokes and narrow bands, by 1/16 of the length and 7/16 of the width. Where the stroke
+          turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
+          cross itself. Of a layer without edges of 64 pixels in the exemplar, and with disturb =
+          -1, it is the stroke itself
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
+          edges that texpatch_edges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
+          pixels; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(edges + length of the strokes) time, about 1 us for each pixel of either; 200 bytes for
+          each pixel of the longest stroke (its band's outline), 30 for each of all, 100 for each of
+          the edges of a layer                                                                 */
+TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
+                                         txm_env *env, texpatch_edges *out);
+
+/* The guide that makes a job follow the strokes, for texpatch_desc.guide and .guide_mask; the
+   exemplars' counterpart is texpatch_layers's picture.
+
+   disturbed  what texpatch_disturb made of the same control
+   guide  TXM_U8, 1 channel, the size given to texpatch_disturb: the gray of the layer. Pixels whose
+          centre lies inside a line (winding number not 0; of a centre on the line, that to its
+          right or below is inside) have the stroke's layer, the last stroke on top. With
+          background = -1, up to 8 pixels outside of the strokes it is the layer that the nearest
+          stroke's layer mostly borders on in the exemplar
+   mask   the same format: 0 where the strokes say nothing (with background = -1, farther than 8
+          pixels outside of all strokes), else 255
+   return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED. After an error
+          guide and mask are untouched
+   cost   O(pixels + area and height of the strokes) time, about 50 ns a pixel; 3 bytes a pixel and
+          24 for each row that a stroke's line crosses                                           */
+TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
+                                               const texpatch_edges *disturbed, txm_env *env,
+                                               const txm_image *guide, const txm_image *mask);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TEXEDGES_H */
+
+#if defined(TEXEDGES_IMPLEMENTATION) && !defined(TEXEDGES_IMPLEMENTED)
+#define TEXEDGES_IMPLEMENTED
+
+/* ---- edges: constants and progress ------------------------------------------------------- */
+
+enum {
+    TXP_E_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
+    TXP_E_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
+    TXP_E_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
+    TXP_E_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
+    TXP_E_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+
+    TXP_E_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
+    TXP_E_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
+    TXP_E_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
+    TXP_E_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
+    TXP_E_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
+    TXP_E_BINS = 16,   /* directions told apart in half a turn                                    */
+    TXP_E_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
+    TXP_E_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
+    TXP_E_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
+    TXP_E_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
+    TXP_E_GOOD = 8,    /* of them so many that join best are looked at closer                     */
+    TXP_E_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+};
+#define TXP_E_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
+#define TXP_E_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+
+/* The bar of one call: a stage fills from..to of it in total pieces of work. */
+typedef struct txp_e_bar {
+    const txm_env *env;
+    const char *stage;
+    double from, to, total, done;
+    size_t quiet; /* work since the last report */
+} txp_e_bar;
+
+static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double total) {
+    bar->from = bar->to;
+    bar->to = to;
+    bar->stage = stage;
+    bar->total = total > 1 ? total : 1;
+    bar->done = 0;
+}
+
+/* So much work is done; non-zero: stop. */
+static inline int txp_e_tick(txp_e_bar *bar, size_t work) {
+    bar->quiet += work;
+    if (bar->quiet < TXP_E_TICK) return 0;
+    bar->done += (double)bar->quiet;
+    bar->quiet = 0;
+    const double part = bar->done < bar->total ? bar->done / bar->total : 1;
+    return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
+}
+
+static txm_status txp_e_no_memory(txm_env *env) {
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the edges");
+}
+
+static txm_status txp_e_stopped(txm_env *env) {
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+/* ---- edges: checks of what the caller gives ---------------------------------------------- */
+
+/* A picture that edges can be found in, or (bytes: U8, 1 channel) a guide can be drawn into. */
+static txm_status txp_e_check_image(const txm_image *image, const char *name, int bytes,
+                                    txm_env *env) {
+    const size_t most = TEXEDGES_MAX_PIXELS < TXP_E_PIXELS ? TEXEDGES_MAX_PIXELS : TXP_E_PIXELS;
+    const txm_status status = txm_image_check(image, name, most, env);
+    if (status != TXM_OK) return status;
+    if (image->width > TXP_E_SIDE || image->height > TXP_E_SIDE)
+        return txm_fail_at(env, TXM_TOO_LARGE, name, "a side is longer than 2^20 pixels");
+    if (bytes && (image->sample != TXM_U8 || image->channels > 1))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be TXM_U8 with 1 channel");
+    return TXM_OK;
+}
+
+static int txp_e_thresholds_are_good(const float *thresholds, int levels) {
+    for (int k = 0; k < levels - 1; k++) {
+        if (!(thresholds[k] >= 0 && thresholds[k] <= 1)) return 0;
+        if (k > 0 && !(thresholds[k] > thresholds[k - 1])) return 0;
+    }
+    return 1;
+}
+
+static txm_status txp_e_check_desc(const texpatch_edges_desc *desc, txm_env *env) {
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    if (!(desc->smooth >= 0 && desc->smooth <= 16))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "smooth", "must be 0 to 16 pixels");
+    if (desc->least < 0)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "least", "must be 0 or more pixels");
+    return txp_e_check_image(&desc->image, "image", 0, env);
+}
+
+/* Edges as one of the functions here makes them. is_found: as texpatch_edges_find does, in unit
+   steps from corner to corner. */
+static txm_status txp_e_check_edges(const texpatch_edges *edges, const char *name, int is_found,
+                                    txp_e_bar *bar, txm_env *env) {
+    const char *foreign = "not as texpatch_edges_find or texpatch_disturb made it";
+    if (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS || edges->width < 1 ||
+        edges->height < 1 || edges->width > TXP_E_SIDE || edges->height > TXP_E_SIDE ||
+        !txp_e_thresholds_are_good(edges->thresholds, edges->levels) ||
+        (edges->line_count && !edges->lines) || (edges->point_count && !edges->points))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+    for (int k = 0; k < edges->levels; k++) {
+        if (edges->beside[k] < -1 || edges->beside[k] >= edges->levels || edges->beside[k] == k)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+    }
+    for (size_t i = 0; i < edges->line_count; i++) {
+        const texpatch_polyline *line = &edges->lines[i];
+        if (line->layer < 0 || line->layer >= edges->levels || line->count < 2 ||
+            line->first > edges->point_count || line->count > edges->point_count - line->first)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+        txm_vec2 p = edges->points[line->first + line->count - 1];
+        for (size_t j = 0; j < line->count; j++) {
+            const txm_vec2 q = edges->points[line->first + j];
+            const float most = (float)(2 * TXP_E_SIDE);
+            int good = q.x >= -most && q.x <= most && q.y >= -most && q.y <= most;
+            if (good && is_found) {
+                const float dx = q.x - p.x, dy = q.y - p.y;
+                good = q.x >= 0 && q.x <= (float)edges->width && q.y >= 0 &&
+                       q.y <= (float)edges->height && dx * dx + dy * dy == 1 && dx * dy == 0 &&
+                       q.x == (float)(int)q.x && q.y == (float)(int)q.y;
+            }
+            if (!good) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
+            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            p = q;
+        }
+    }
+    return TXM_OK;
+}
+
+static txm_status txp_e_check_stroke(const texpatch_stroke *s, int levels, double *length,
+                                     txp_e_bar *bar, txm_env *env) {
+    if (!s->points || s->count < (s->is_closed ? 3 : 2))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "needs 2 points or more, closed 3");
+    if (s->layer < 0 || s->layer >= levels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "layer must be 0 to levels - 1");
+    if (s->width != 0 && !(s->width >= 2 && s->width <= 256))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "width must be 0 or 2 to 256 pixels");
+    const float most = (float)TXP_E_SIDE;
+    double own = 0;
+    for (int i = 0; i < s->count; i++) {
+        const txm_vec2 p = s->points[i], q = s->points[i ? i - 1 : 0];
+        const double dx = (double)p.x - q.x, dy = (double)p.y - q.y;
+        if (!(p.x >= -most && p.x <= most && p.y >= -most && p.y <= most))
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke",
+                               "a coordinate is not a number or beyond 2^20 pixels");
+        own += sqrt(dx * dx + dy * dy);
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    if (!(own > 1e-3))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "has no length: its points are one");
+    *length += own;
+    if (*length > (double)TXP_E_LENGTH)
+        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "are longer than 2^26 pixels");
+    return TXM_OK;
+}
+
+static double txp_e_points_of(const texpatch_control *c) {
+    return c && c->edges ? (double)c->edges->point_count : 0;
+}
+
+/* All that texpatch_disturb and texpatch_control_guide look at. */
+static txm_status txp_e_check_control(const texpatch_control *c, txp_e_bar *bar, txm_env *env) {
+    double length = 0;
+    if (!c) return txm_fail(env, TXM_BAD_ARGUMENT, "control is NULL");
+    if (c->stroke_count < 0 || (c->stroke_count && !c->strokes))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "strokes", "NULL, or fewer than none");
+    if (!(c->disturb == -1 || (c->disturb >= 0 && c->disturb <= 4)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturb", "must be -1 or 0 to 4");
+    txm_status status = txp_e_check_edges(c->edges, "edges", 1, bar, env);
+    if (status == TXM_OK && (c->background < -1 || c->background >= c->edges->levels))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "background", "must be -1 to levels - 1");
+    for (int i = 0; i < c->stroke_count && status == TXM_OK; i++)
+        status = txp_e_check_stroke(&c->strokes[i], c->edges->levels, &length, bar, env);
+    return status;
+}
+
+/* ---- edges: from a picture to layers ----------------------------------------------------- */
+
+/* The gray of each pixel, 0..1. 0 = cancelled, -1 = a sample is not finite, 1 = done. */
+static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
+    const int is_color = image->channels >= 3;
+    for (int y = 0; y < image->height; y++) {
+        for (int x = 0; x < image->width; x++) {
+            double g = txm_image_get(image, x, y, 0);
+            if (is_color)
+                g = 0.2126 * g + 0.7152 * txm_image_get(image, x, y, 1) +
+                    0.0722 * txm_image_get(image, x, y, 2);
+            if (!txm_is_finite(g)) return -1;
+            *gray++ = txm_float(g < 0 ? 0 : g > 1 ? 1 : g);
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Blur by the weights 1 - |d| / (radius + 1), rows then columns; beyond its border the picture goes
+   on as it ends. scratch: as large as gray. 0 = cancelled. */
+static int txp_e_blur(float *gray, float *scratch, int width, int height, double radius,
+                      txp_e_bar *bar) {
+    const int reach = (int)radius;
+    double weight[17] = {1}, sum = 0;
+    for (int d = 0; d <= reach; d++) {
+        weight[d] = 1 - d / (radius + 1);
+        sum += d ? 2 * weight[d] : 1;
+    }
+    for (int pass = 0; pass < 2; pass++) {
+        const float *from = pass ? scratch : gray;
+        float *to = pass ? gray : scratch;
+        const int last = (pass ? height : width) - 1;
+        const size_t w = (size_t)width, step = pass ? w : 1;
+        for (int y = 0; y < height; y++) {
+            for (int x = 0; x < width; x++) {
+                const int at = pass ? y : x;
+                const size_t i = (size_t)y * w + (size_t)x;
+                double g = from[i] * weight[0];
+                for (int d = 1; d <= reach; d++) {
+                    const int back = d < at ? d : at, ahead = d < last - at ? d : last - at;
+                    g += weight[d] *
+                         ((double)from[i - (size_t)back * step] + from[i + (size_t)ahead * step]);
+                }
+                to[i] = txm_float(g / sum);
+                if (txp_e_tick(bar, (size_t)reach + 1)) return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+/* Thresholds that part count grays into layers of about the same area.
+
+   In a histogram of 256 bins, cut k lies where k / levels of the area are darker, or up to a
+   quarter of a layer's area beside that, where the two bins next to the cut hold least; of a gap
+   in the middle. Where one bin holds too much for that, on its nearer side. 0 = cancelled. */
+static int txp_e_divide(const float *gray, size_t count, int levels, float *thresholds,
+                        txp_e_bar *bar) {
+    size_t bins[256], below[257];
+    int previous = 0;
+    memset(bins, 0, sizeof bins);
+    for (size_t i = 0; i < count; i++) {
+        bins[(int)((double)gray[i] * 255 + 0.5)]++;
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    below[0] = 0;
+    for (int b = 0; b < 256; b++) below[b + 1] = below[b] + bins[b];
+    for (int k = 1; k < levels; k++) { /* all areas times 4 levels: whole numbers */
+        const uint64_t target = 4 * (uint64_t)k * count, quarter = count;
+        const int most = 256 - (levels - k);
+        int best = 0;
+        uint64_t best_off = 0, best_held = 0;
+        for (int cut = previous + 1; cut <= most; cut++) {
+            const uint64_t area = 4 * (uint64_t)levels * below[cut];
+            const uint64_t held = bins[cut - 1] + bins[cut];
+            const uint64_t off = area > target ? area - target : target - area;
+            const int near = off <= quarter, best_near = best && best_off <= quarter;
+            int better = !best || off < best_off;
+            if (near || best_near)
+                better = near && (!best_near || held < best_held || (held == best_held && better));
+            if (!better) continue;
+            best = cut;
+            best_off = off;
+            best_held = held;
+        }
+        int end = best;
+        while (end < most && below[end + 1] == below[best] &&
+               bins[end] + bins[end + 1] == best_held)
+            end++;
+        previous = best + (end - best) / 2;
+        thresholds[k - 1] = txm_float((previous - 0.5) / 255);
+    }
+    return 1;
+}
+
+/* The neighbour of a pixel beyond its side 0 = top, 1 = right, 2 = bottom, 3 = left; a crack is run
+   through clockwise, so that its pixel lies to the right: along the top to the right, and so on. */
+static const int txp_e_side_x[4] = {0, 1, 0, -1}, txp_e_side_y[4] = {-1, 0, 1, 0};
+
+/* Connected pixels of one layer are a region. It is known by one of its pixels, its root; next
+   links root and boundary pixels to a circle. Two circles are joined by swapping one link each. */
+typedef struct txp_e_regions {
+    int width, height;
+    int32_t *parent, *next;
+    int32_t *length; /* of the root: cracks of the region's boundary */
+    uint8_t *layer;  /* of the root: what the region shows now       */
+} txp_e_regions;
+
+static int32_t txp_e_root(const txp_e_regions *r, int32_t p) {
+    while (r->parent[p] != p) p = r->parent[p] = r->parent[r->parent[p]];
+    return p;
+}
+
+/* Unite the regions of two roots; returns the new root. */
+static int32_t txp_e_unite(txp_e_regions *r, int32_t a, int32_t b) {
+    if (b < a) return txp_e_unite(r, b, a);
+    return r->parent[b] = a;
+}
+
+/* the pixel beyond a side of p, -1: none */
+static int32_t txp_e_beyond(const txp_e_regions *r, int32_t p, int side) {
+    const int x = p % r->width + txp_e_side_x[side], y = p / r->width + txp_e_side_y[side];
+    if (x < 0 || y < 0 || x >= r->width || y >= r->height) return -1;
+    return p + txp_e_side_x[side] + txp_e_side_y[side] * r->width;
+}
+
+static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
+    const int32_t count = (int32_t)r->width * r->height;
+    for (int32_t p = 0; p < count; p++) {
+        r->parent[p] = r->next[p] = p;
+        r->length[p] = 0;
+        int32_t root = p;
+        for (int side = 3; side >= 0; side -= 3) { /* left and above */
+            const int32_t q = txp_e_beyond(r, p, side);
+            if (q < 0 || r->layer[q] != r->layer[p]) continue;
+            const int32_t other = txp_e_root(r, q);
+            if (other != root) root = txp_e_unite(r, root, other);
+        }
+        if (txp_e_tick(bar, 2)) return 0;
+    }
+    for (int32_t p = 0; p < count; p++) {
+        const int32_t root = txp_e_root(r, p);
+        int cracks = 0;
+        for (int side = 0; side < 4; side++) {
+            const int32_t q = txp_e_beyond(r, p, side);
+            cracks += q < 0 || r->layer[q] != r->layer[p];
+        }
+        r->length[root] += cracks;
+        if (cracks && p != root) {
+            r->next[p] = r->next[root];
+            r->next[root] = p;
+        }
+        if (txp_e_tick(bar, 2)) return 0;
+    }
+    return 1;
+}
+
+/* Give a region to the layer with which it shares most of its boundary, the darkest of several, and
+   unite it with all regions of that layer around it. Returns the new root, -1 if the region is the
+   whole picture. Pixels that are on no boundary any more are taken out of the circle. */
+static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
+    int32_t shared[TEXPATCH_MAX_LEVELS];
+    memset(shared, 0, sizeof shared);
+    for (int32_t before = region, p = region;;) {
+        int inner = 1;
+        for (int side = 0; side < 4; side++) {
+            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t other = q < 0 ? region : txp_e_root(r, q);
+            if (other == region) continue;
+            inner = 0;
+            shared[r->layer[other]]++;
+        }
+        ++*work;
+        if (inner && p != region) r->next[before] = r->next[p];
+        else before = p;
+        p = r->next[p];
+        if (p == region) break;
+    }
+    int target = 0;
+    for (int k = 1; k < TEXPATCH_MAX_LEVELS; k++) {
+        if (shared[k] > shared[target]) target = k;
+    }
+    if (shared[target] == 0) return -1;
+    int32_t root = region, length = r->length[region] - 2 * shared[target];
+    for (int32_t p = region, after;; p = after) {
+        after = r->next[p]; /* what is joined in behind p is not walked through */
+        for (int side = 0; side < 4; side++) {
+            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t other = q < 0 ? root : txp_e_root(r, q);
+            if (other == root || r->layer[other] != target) continue;
+            const int32_t link = r->next[p];
+            r->next[p] = r->next[other];
+            r->next[other] = link;
+            length += r->length[other];
+            root = txp_e_unite(r, root, other);
+        }
+        ++*work;
+        if (after == region) break;
+    }
+    r->layer[root] = (uint8_t)target;
+    r->length[root] = length;
+    return root;
+}
+
+/* Dissolve regions until all have a boundary of least cracks or more: first those under 8, then
+   under 16 and so on, each time in raster order of the roots. A region of n cracks is one of
+   O(pixels / n), so all this takes O(pixels log least). 0 = cancelled. */
+static int txp_e_regions_clean(txp_e_regions *r, int least, txp_e_bar *bar) {
+    const int32_t count = (int32_t)r->width * r->height;
+    for (int bound = 4; bound < least;) {
+        bound = bound < least / 2 ? 2 * bound : least;
+        for (int32_t p = 0; p < count; p++) {
+            int32_t region = r->parent[p] == p ? p : -1;
+            while (region >= 0 && r->length[region] < bound) {
+                size_t work = 0;
+                region = txp_e_dissolve(r, region, &work);
+                if (txp_e_tick(bar, 8 * work)) return 0;
+            }
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+    }
+    for (int32_t p = 0; p < count; p++) {
+        r->layer[p] = r->layer[txp_e_root(r, p)];
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+/* The layer of each pixel. is_given: thresholds holds levels - 1 of them, else it receives them.
+   to: the part of the bar that is full then. */
+static txm_status txp_e_split(const texpatch_edges_desc *desc, int levels, int is_given,
+                              float *thresholds, uint8_t *layer, double to, txp_e_bar *bar,
+                              txm_arena *arena, txm_env *env) {
+    const int width = desc->image.width, height = desc->image.height;
+    const size_t count = (size_t)width * (size_t)height;
+    const double smooth = desc->smooth;
+    float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
+    float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
+    if (!gray || (smooth > 0 && !scratch)) return txp_e_no_memory(env);
+    txp_e_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
+    const int good = txp_e_gray(&desc->image, gray, bar);
+    if (good < 0)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is infinite or not a number");
+    if (!good || (smooth > 0 && !txp_e_blur(gray, scratch, width, height, smooth, bar)) ||
+        (!is_given && !txp_e_divide(gray, count, levels, thresholds, bar)))
+        return txp_e_stopped(env);
+    for (size_t i = 0; i < count; i++) {
+        int k = 0;
+        while (k < levels - 1 && gray[i] >= thresholds[k]) k++;
+        layer[i] = (uint8_t)k;
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    txm_arena_free(arena);
+    if (desc->least <= 4) return TXM_OK; /* nothing is shorter */
+
+    txp_e_regions r;
+    r.width = width;
+    r.height = height;
+    r.layer = layer;
+    r.parent = (int32_t *)txm_arena_alloc(arena, count, 3 * sizeof(int32_t));
+    if (!r.parent) return txp_e_no_memory(env);
+    r.next = r.parent + count;
+    r.length = r.next + count;
+    txp_e_stage(bar, "regions", to, (double)count * 12);
+    if (!txp_e_regions_make(&r, bar) || !txp_e_regions_clean(&r, desc->least, bar))
+        return txp_e_stopped(env);
+    txm_arena_free(arena);
+    return TXM_OK;
+}
+
+/* Turn layers into grays. 0 = cancelled. */
+static int txp_e_show(uint8_t *layer, size_t count, int levels, txp_e_bar *bar) {
+    uint8_t gray[TEXPATCH_MAX_LEVELS] = {0};
+    for (int k = 0; k < levels; k++)
+        gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
+    for (size_t i = 0; i < count; i++) {
+        layer[i] = gray[layer[i]];
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
+                                        const texpatch_edges *edges, txm_env *env,
+                                        const txm_image *layers) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_status status = txp_e_check_desc(desc, env);
+    if (status == TXM_OK) status = txp_e_check_image(layers, "layers", 1, env);
+    if (status == TXM_OK &&
+        (layers->width != desc->image.width || layers->height != desc->image.height))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
+    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS ||
+                             !txp_e_thresholds_are_good(edges->thresholds, edges->levels)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texpatch_edges_find made it");
+    if (status != TXM_OK) return status;
+
+    float thresholds[TEXPATCH_MAX_LEVELS];
+    txm_arena map, scratch;
+    txm_arena_init(&map, env);
+    txm_arena_init(&scratch, env);
+    memcpy(thresholds, edges->thresholds, sizeof thresholds);
+    const size_t width = (size_t)layers->width;
+    uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
+    status = layer ? txp_e_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+                   : txp_e_no_memory(env);
+    if (status == TXM_OK && !txp_e_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+        status = txp_e_stopped(env);
+    for (int y = 0; y < layers->height && status == TXM_OK; y++)
+        memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
+    txm_arena_free(&scratch);
+    txm_arena_free(&map);
+    return status;
+}
+
+/* ---- edges: from layers to lines --------------------------------------------------------- */
+
+/* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the
+   upper four the sides of the pixel whose cracks are still to be run through. */
+typedef struct txp_e_map {
+    int width, height;
+    uint8_t *at;
+} txp_e_map;
+
+/* is the pixel of this layer? */
+static int txp_e_is(const txp_e_map *m, int x, int y, int layer) {
+    if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
+    return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
+}
+
+/* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
+static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPATCH_MAX_LEVELS],
+                      txp_e_bar *bar) {
+    const int w = m->width;
+    *cracks = 0;
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < w; x++) {
+            uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
+            const int layer = *at & 15;
+            for (int side = 0; side < 4; side++) {
+                const int u = x + txp_e_side_x[side], v = y + txp_e_side_y[side];
+                if (txp_e_is(m, u, v, layer)) continue;
+                *at = (uint8_t)(*at | 16 << side);
+                ++*cracks;
+                if (u >= 0 && v >= 0 && u < w && v < m->height)
+                    shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
+            }
+            if (txp_e_tick(bar, 4)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Run through the cracks of one line, from side `side` of pixel (x, y), and unmark them.
+
+           l | a      p: the pixel to the right of the way (here upwards, along its left side)
+             ^        a: the next one on the same hand, l: the one across
+           - | p      a is of another layer: turn right, around p, whatever l is;
+                      a and l are of p's: turn left, around the corner of what lies between;
+                      only a is: straight on
+
+   As each crack has one successor and is that of one, the way comes back to its beginning.
+   points  receives the corners, or NULL; returns their number; 0 = cancelled
+   area    receives the area to the right, negative if the line is a hole's                   */
+static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *points,
+                          int64_t *area, txp_e_bar *bar) {
+    const int x0 = x, y0 = y, side0 = side, w = m->width;
+    const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
+    size_t count = 0;
+    *area = 0;
+    do {
+        uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
+        *at = (uint8_t)(*at & ~(16 << side));
+        if (points)
+            points[count] = txm_v2((float)(x + (side == 1 || side == 2)), (float)(y + (side >= 2)));
+        count++;
+        if (side == 1) *area += x + 1; /* integral of x dy */
+        if (side == 3) *area -= x;
+        const int ahead = (side + 1) & 3; /* the side across which a lies */
+        const int ax = x + txp_e_side_x[ahead], ay = y + txp_e_side_y[ahead];
+        if (!txp_e_is(m, ax, ay, layer)) {
+            side = ahead;
+        } else {
+            x = ax;
+            y = ay;
+            const int lx = ax + txp_e_side_x[side], ly = ay + txp_e_side_y[side];
+            if (txp_e_is(m, lx, ly, layer)) {
+                x = lx;
+                y = ly;
+                side = (side + 3) & 3;
+            }
+        }
+        if (txp_e_tick(bar, 4)) return 0;
+    } while (x != x0 || y != y0 || side != side0);
+    return count;
+}
+
+/* All lines in raster order of where they begin: run through once to count them, once to keep
+   them. */
+static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_edges *e,
+                                  txm_env *env) {
+    size_t shared[TEXPATCH_MAX_LEVELS][TEXPATCH_MAX_LEVELS], cracks;
+    for (int pass = 0; pass < 2; pass++) {
+        size_t lines = 0, points = 0;
+        memset(shared, 0, sizeof shared);
+        if (!txp_e_mark(m, &cracks, shared, bar)) return txp_e_stopped(env);
+        if (pass == 1) {
+            e->lines =
+                (texpatch_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
+            e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
+            if (!e->lines || !e->points) return txp_e_no_memory(env);
+        }
+        for (int y = 0; y < m->height; y++) {
+            for (int x = 0; x < m->width; x++) {
+                const uint8_t *at = m->at + (size_t)y * (size_t)m->width + (size_t)x;
+                for (int side = 0; side < 4; side++) {
+                    if (!(*at & 16 << side)) continue;
+                    int64_t area;
+                    const size_t count =
+                        txp_e_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
+                    if (!count) return txp_e_stopped(env);
+                    if (pass) {
+                        e->lines[lines].layer = *at & 15;
+                        e->lines[lines].is_hole = area < 0;
+                        e->lines[lines].first = points;
+                        e->lines[lines].count = count;
+                    }
+                    points += count;
+                    lines++;
+                }
+                if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            }
+        }
+        e->line_count = lines;
+        e->point_count = points;
+    }
+    for (int k = 0; k < e->levels; k++) {
+        int best = -1;
+        for (int j = 0; j < e->levels; j++) {
+            if (shared[k][j] > (best < 0 ? 0 : shared[k][best])) best = j;
+        }
+        e->beside[k] = best;
+    }
+    return TXM_OK;
+}
+
+static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, txm_arena *layers,
+                             txm_arena *scratch, texpatch_edges *e, txm_env *env) {
+    txp_e_map map;
+    const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
+    e->width = map.width = desc->image.width;
+    e->height = map.height = desc->image.height;
+    e->levels = desc->levels ? desc->levels : 4;
+    for (int k = 0; k < e->levels - 1 && desc->thresholds; k++)
+        e->thresholds[k] = desc->thresholds[k];
+    map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
+    if (!map.at) return txp_e_no_memory(env);
+    const txm_status status = txp_e_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
+                                          map.at, 0.7, bar, scratch, env);
+    if (status != TXM_OK) return status;
+    txp_e_stage(bar, "lines", 1, (double)count * 14);
+    return txp_e_trace_all(&map, bar, e, env);
+}
+
+TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
+                                            texpatch_edges *out) {
+    txm_status status = txp_e_check_desc(desc, env);
+    if (status != TXM_OK) return status;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    if (desc->levels && (desc->levels < 2 || desc->levels > TEXPATCH_MAX_LEVELS))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels",
+                           "must be 0 or 2 to TEXPATCH_MAX_LEVELS");
+    if (desc->thresholds &&
+        !txp_e_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
+
+    txm_arena layers, scratch;
+    txp_e_bar bar;
+    texpatch_edges e;
+    memset(&e, 0, sizeof e);
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_arena_init(&layers, env);
+    txm_arena_init(&scratch, env);
+    txm_arena_init(&e.memory, env);
+    status = txp_e_find(desc, &bar, &layers, &scratch, &e, env);
+    txm_arena_free(&scratch);
+    txm_arena_free(&layers);
+    if (status == TXM_OK) *out = e;
+    else txm_arena_free(&e.memory);
+    return status;
+}
+
+TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges) {
+    if (!edges) return;
+    txm_arena_free(&edges->memory);
+    memset(edges, 0, sizeof *edges);
+}
+
+/* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
+   twice a pixel. 0 = cancelled. */
+static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *line, uint8_t *marks,
+                           int width, int height, txp_e_bar *bar) {
+    const txm_vec2 *points = e->points + line->first;
+    for (size_t j = 0; j < line->count; j++) {
+        const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
+        const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
+        const double length = sqrt(dx * dx + dy * dy);
+        const int steps = 2 * (int)length + 1;
+        if (txp_e_tick(bar, 1)) return 0;
+        for (int i = 0; i < steps && length > 0; i++) {
+            const double t = (i + 0.5) / steps;
+            const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
+            if (x >= 0 && y >= 0 && x < width && y < height)
+                marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
+            if (txp_e_tick(bar, 2)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
+   not quite black. One channel: gray. */
+static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
+    static const int ramp[5][3] = {
+        {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
+    const int t = 1024 * (layer + 1) / levels; /* 0..1024: four spans of 256 */
+    if (channels == 1) return (uint8_t)((255 * (layer + 1) + levels / 2) / levels);
+    const int span = t < 1024 ? t / 256 : 3, rest = t - 256 * span;
+    return (uint8_t)((ramp[span][channel] * (256 - rest) + ramp[span + 1][channel] * rest) / 256);
+}
+
+TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
+                                            const txm_image *image) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txp_e_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
+    txm_status status = txp_e_check_image(image, "image", 0, env);
+    if (status != TXM_OK) return status;
+    const int channels = image->channels ? image->channels : 1;
+    if (image->sample != TXM_U8 || (channels != 1 && channels != 3))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "must be TXM_U8 with 1 or 3 channels");
+    status = txp_e_check_edges(edges, "edges", 0, &bar, env);
+    if (status != TXM_OK) return status;
+    if (layer < -1 || layer >= edges->levels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layer", "must be -1 to levels - 1");
+
+    const int width = image->width, height = image->height;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint8_t *marks = (uint8_t *)txm_arena_zero(&arena, (size_t)width, (size_t)height);
+    if (!marks) return txp_e_no_memory(env);
+    txp_e_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
+    for (size_t i = 0; i < edges->line_count && status == TXM_OK; i++) {
+        const texpatch_polyline *line = &edges->lines[i];
+        if (layer >= 0 && line->layer != layer) continue;
+        if (!txp_e_draw_line(edges, line, marks, width, height, &bar)) status = txp_e_stopped(env);
+    }
+    for (int y = 0; y < height && status == TXM_OK; y++) {
+        uint8_t *row = (uint8_t *)txm_image_row(image, y);
+        for (int x = 0; x < width; x++) {
+            const int mark = marks[(size_t)y * (size_t)width + (size_t)x];
+            for (int c = 0; c < channels && mark; c++)
+                row[x * channels + c] = txp_e_color(mark - 1, edges->levels, channels, c);
+        }
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- control: lines as rows of points ---------------------------------------------------- */
+
+typedef struct txp_e_point {
+    double x, y;
+} txp_e_point;
+
+static txp_e_point txp_e_between(txp_e_point a, txp_e_point b, double t) {
+    txp_e_point p;
+    p.x = a.x + (b.x - a.x) * t;
+    p.y = a.y + (b.y - a.y) * t;
+    return p;
+}
+
+static double txp_e_distance(txp_e_point a, txp_e_point b) {
+    const double dx = b.x - a.x, dy = b.y - a.y;
+    return sqrt(dx * dx + dy * dy);
+}
+
+/* Length of n points; closed: back to the first. Negative: cancelled. */
+static double txp_e_length(const txp_e_point *p, size_t n, int is_closed, txp_e_bar *bar) {
+    double sum = 0;
+    for (size_t i = 1; i < n + (is_closed != 0); i++) {
+        sum += txp_e_distance(p[i - 1], p[i < n ? i : 0]);
+        if (txp_e_tick(bar, 1)) return -1;
+    }
+    return sum;
+}
+
+/* m points at equal distances along a line of n points and this length: closed from the first point
+   on, open from the first to the last. 0 = cancelled. */
+static int txp_e_resample(const txp_e_point *p, size_t n, int is_closed, double length,
+                          txp_e_point *out, size_t m, txp_e_bar *bar) {
+    const size_t segments = is_closed ? n : n - 1;
+    const double step = length / (double)(is_closed ? m : m - 1);
+    size_t i = 0;
+    double from = 0, span = txp_e_distance(p[0], p[1]); /* of segment i */
+    for (size_t k = 0; k < m; k++) {
+        const double at = step * (double)k;
+        while (at > from + span && i + 1 < segments) {
+            from += span;
+            i++;
+            span = txp_e_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+        const double t = span > 0 ? (at - from) / span : 0;
+        out[k] = txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return 1;
+}
+
+/* Blur a line by the weights radius + 1 - |d|, whole numbers. Closed: around (n > radius); open:
+   near the ends with as small a radius as they need, so that they stay. 0 = cancelled. */
+static int txp_e_soften(const txp_e_point *p, size_t n, int is_closed, size_t radius,
+                        txp_e_point *out, txp_e_bar *bar) {
+    for (size_t i = 0; i < n; i++) {
+        size_t reach = radius;
+        if (!is_closed && reach > i) reach = i;
+        if (!is_closed && reach > n - 1 - i) reach = n - 1 - i;
+        double x = 0, y = 0;
+        for (size_t d = 1; d <= reach; d++) {
+            const txp_e_point a = p[i >= d ? i - d : i + n - d];
+            const txp_e_point b = p[i + d < n ? i + d : i + d - n];
+            const double weight = (double)(reach + 1 - d);
+            x += weight * (a.x + b.x);
+            y += weight * (a.y + b.y);
+        }
+        const double weight = (double)(reach + 1), sum = weight * weight;
+        out[i].x = (x + weight * p[i].x) / sum;
+        out[i].y = (y + weight * p[i].y) / sum;
+        if (txp_e_tick(bar, reach + 1)) return 0;
+    }
+    return 1;
+}
+
+/* The unit vector from a to b; if they are one point, as it was before. */
+static void txp_e_direction(txp_e_point a, txp_e_point b, txp_e_point *direction) {
+    const double length = txp_e_distance(a, b);
+    if (!(length > 1e-9)) return;
+    direction->x = (b.x - a.x) / length;
+    direction->y = (b.y - a.y) / length;
+}
+
+/* ---- control: the unrest of the exemplar's edges ----------------------------------------- */
+
+/* One sample of a line of the exemplar, a pixel of its length from the next: how far its smooth
+   course moves on meanwhile, and where the line lies from there, ahead and to the right. */
+typedef struct txp_e_sample {
+    double step, ahead, right;
+    double length; /* of the line to the next sample, tamed as it is                           */
+    int bin;       /* its direction against its course                                         */
+} txp_e_sample;
+
+/* The unrest of one layer: rows of samples one behind the other, and the places at which a piece of
+   TXP_E_PIECE + TXP_E_JOIN samples can begin. */
+typedef struct txp_e_unrest {
+    txp_e_sample *samples;
+    size_t *starts;
+    size_t count, start_count;
+    double amount;            /* by which the exemplar's is multiplied                          */
+    double step;              /* mean of all steps                                              */
+    double share[TXP_E_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
+} txp_e_unrest;
+
+/* Room for the work on one line of up to count points. */
+typedef struct txp_e_bench {
+    txp_e_point *a, *b, *c;
+} txp_e_bench;
+
+static int txp_e_bench_make(txp_e_bench *bench, txm_arena *arena, size_t count) {
+    bench->a = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
+    bench->b = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
+    bench->c = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
+    return bench->a && bench->b && bench->c;
+}
+
+/* The factor that makes a vector of this length no longer than TXP_E_STRAY: 1 up to TXP_E_LINEAR,
+   then the length grows slower and slower. */
+static double txp_e_tame(double length) {
+    const double room = TXP_E_STRAY - TXP_E_LINEAR, more = length - TXP_E_LINEAR;
+    return more > 0 ? (TXP_E_LINEAR + room * more / (more + room)) / length : 1;
+}
+
+/* The direction of (ahead, right), no matter which way: 0 = straight on, then every 16th of half a
+   turn to the right. The table: cosine and sine of 1/2, 3/2, ... of such a step. */
+static int txp_e_bin(double ahead, double right) {
+    static const double edge[TXP_E_BINS / 2][2] = {
+        {0.99518473, 0.09801714}, {0.95694034, 0.29028468}, {0.88192126, 0.47139674},
+        {0.77301045, 0.63439328}, {0.63439328, 0.77301045}, {0.47139674, 0.88192126},
+        {0.29028468, 0.95694034}, {0.09801714, 0.99518473}};
+    const double x = ahead < 0 ? -ahead : ahead, y = right < 0 ? -right : right;
+    int k = 0;
+    while (k < TXP_E_BINS / 2 && y * edge[k][0] > x * edge[k][1]) k++;
+    return (ahead < 0) != (right < 0) ? (TXP_E_BINS - k) % TXP_E_BINS : k % TXP_E_BINS;
+}
+
+/* The directions of a line of n points in bench->b against its course, its blur of radius
+   TXP_E_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
+   of a line with `amount` times the unrest, or put into the samples of its points.
+   0 = cancelled. */
+static int txp_e_directions(const txp_e_bench *bench, size_t n, int is_closed, size_t light,
+                            double amount, double *share, txp_e_sample *samples, txp_e_bar *bar) {
+    const txp_e_point *line = bench->a, *course = bench->c;
+    const size_t trim = is_closed || !share ? 0 : TXP_E_COURSE; /* the ends of the course are bad */
+    if (!txp_e_soften(bench->b, n, is_closed, light, bench->a, bar) ||
+        !txp_e_soften(bench->b, n, is_closed, TXP_E_COURSE, bench->c, bar))
+        return 0;
+    for (size_t i = trim; i < n - trim; i++) {
+        size_t at[4]; /* the course from at[0] to at[3], the line from at[1] to at[2] */
+        for (int k = 0; k < 4; k++) {
+            const size_t off = k == 0 || k == 3 ? TXP_E_CHORD : 1;
+            if (k < 2) at[k] = i >= off ? i - off : is_closed ? i + n - off : 0;
+            else at[k] = i + off < n ? i + off : is_closed ? i + off - n : n - 1;
+        }
+        const double cx = course[at[3]].x - course[at[0]].x, cy = course[at[3]].y - course[at[0]].y;
+        const double dx = line[at[2]].x - line[at[1]].x, dy = line[at[2]].y - line[at[1]].y;
+        const int bin = txp_e_bin(cx * dx + cy * dy, amount * (cx * dy - cy * dx));
+        if (share) share[bin] += 1;
+        if (samples) {
+            samples[i].bin = bin;
+            samples[i].length = txp_e_distance(line[i], line[at[2]]);
+        }
+        if (txp_e_tick(bar, 4)) return 0;
+    }
+    return 1;
+}
+
+/* Take in one line: n points in bench->a, a pixel apart at most. With S the blur of radius
+   TXP_E_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
+   would shrink. Ends of open lines are left out, where the course is bad. 0 = cancelled. */
+static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int is_closed,
+                        txp_e_bar *bar) {
+    txp_e_point *line = bench->b, *blurred = bench->a, *course = bench->c;
+    if (n < TXP_E_SHORT) return 1;
+    const double length = txp_e_length(bench->a, n, is_closed, bar);
+    if (length < 0) return 0;
+    const size_t m = (size_t)(length + 0.5) + !is_closed; /* at most n */
+    const size_t trim = is_closed ? 0 : TXP_E_SCALE;
+    if (m < TXP_E_SHORT + 2 * trim) return 1;
+    if (!txp_e_resample(bench->a, n, is_closed, length, line, m, bar) ||
+        !txp_e_soften(line, m, is_closed, TXP_E_SCALE, blurred, bar) ||
+        !txp_e_soften(blurred, m, is_closed, TXP_E_SCALE, course, bar))
+        return 0;
+    for (size_t i = 0; i < m; i++) {
+        course[i].x = 2 * blurred[i].x - course[i].x;
+        course[i].y = 2 * blurred[i].y - course[i].y;
+    }
+    /* a closed line goes on beyond its end, so that pieces can begin anywhere */
+    const size_t room = TXP_E_PIECE + TXP_E_JOIN, end = is_closed ? m + room : m - trim;
+    txp_e_sample *first = u->samples + u->count;
+    txp_e_point direction;
+    direction.x = 1;
+    direction.y = 0;
+    for (size_t i = trim; i < end; i++) {
+        const size_t at = i % m, back = (i + m - TXP_E_CHORD) % m, front = (i + TXP_E_CHORD) % m;
+        const double dx = line[at].x - course[at].x, dy = line[at].y - course[at].y;
+        txp_e_sample *s = &u->samples[u->count];
+        txp_e_direction(course[back], course[front], &direction);
+        s->step = txp_e_distance(course[at], course[(i + 1) % m]);
+        s->ahead = u->amount * (dx * direction.x + dy * direction.y);
+        s->right = u->amount * (dy * direction.x - dx * direction.y);
+        if (i + room <= end) {
+            u->starts[u->start_count++] = u->count;
+            u->step += s->step;
+        }
+        u->count++;
+        if (txp_e_tick(bar, 4)) return 0;
+    }
+    if (!txp_e_directions(bench, m, is_closed, TXP_E_LIGHT, u->amount, u->share, NULL, bar))
+        return 0;
+    /* Tame the unrest and count its directions once more, along a straight course; smoother than
+       the exemplar's, as a line loses some when it is drawn in pixels. So as much as the exemplar
+       shows will be seen in the end. */
+    double x = 0;
+    const size_t count = end - trim;
+    for (size_t i = 0; i < count; i++) {
+        txp_e_sample *s = first + i;
+        const double factor = txp_e_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
+        s->ahead *= factor;
+        s->right *= factor;
+        line[i].x = x + s->ahead;
+        line[i].y = s->right;
+        x += s->step;
+        if (txp_e_tick(bar, 2)) return 0;
+    }
+    return txp_e_directions(bench, count, 0, TXP_E_LIGHT + 1, 1, NULL, first, bar);
+}
+
+/* does the crack from p to q run along the picture's border? */
+static int txp_e_on_border(const texpatch_edges *e, txm_vec2 p, txm_vec2 q) {
+    return (p.x == q.x && (p.x == 0 || p.x == (float)e->width)) ||
+           (p.y == q.y && (p.y == 0 || p.y == (float)e->height));
+}
+
+/* Take in the parts of a line that lie inside the picture. 0 = cancelled. */
+static int txp_e_listen_line(txp_e_unrest *u, const txp_e_bench *bench, const texpatch_edges *e,
+                             const texpatch_polyline *line, txp_e_bar *bar) {
+    const txm_vec2 *p = e->points + line->first;
+    size_t start = line->count, n = 0;
+    for (size_t j = 0; j < line->count && start == line->count; j++) { /* the first on the border */
+        if (txp_e_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    const int is_closed = start == line->count;
+    for (size_t k = 0; k < line->count; k++) {
+        const size_t j = (start + k) % line->count, next = (j + 1) % line->count;
+        if (txp_e_on_border(e, p[j], p[next])) {
+            if (!txp_e_listen(u, bench, n, 0, bar)) return 0;
+            n = 0;
+        } else { /* the middle of the crack: so a slope of one pixel in one is a straight line */
+            bench->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
+            bench->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
+            n++;
+        }
+        if (txp_e_tick(bar, 1)) return 0;
+    }
+    return txp_e_listen(u, bench, n, is_closed, bar);
+}
+
+/* The unrest of a layer, amount times that of the exemplar, with memory from the arena. */
+static txm_status txp_e_listen_layer(txp_e_unrest *u, const texpatch_edges *e, int layer,
+                                     double amount, txm_arena *arena, txp_e_bar *bar,
+                                     txm_env *env) {
+    const size_t room = TXP_E_PIECE + TXP_E_JOIN;
+    txp_e_bench bench;
+    size_t most = 0, longest = 0;
+    double sum = 0;
+    memset(u, 0, sizeof *u);
+    u->amount = amount;
+    for (size_t i = 0; i < e->line_count; i++) {
+        const texpatch_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
+        most += line->count + room;
+        if (line->count > longest) longest = line->count;
+    }
+    if (most == 0) return TXM_OK;
+    u->samples = (txp_e_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
+    u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
+    if (!u->samples || !u->starts || !txp_e_bench_make(&bench, arena, longest + room))
+        return txp_e_no_memory(env);
+    for (size_t i = 0; i < e->line_count; i++) {
+        const texpatch_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
+        if (!txp_e_listen_line(u, &bench, e, line, bar)) return txp_e_stopped(env);
+    }
+    for (int b = 0; b < TXP_E_BINS; b++) sum += u->share[b];
+    for (int b = 0; b < TXP_E_BINS && sum > 0; b++) u->share[b] /= sum;
+    if (u->start_count) u->step /= (double)u->start_count;
+    if (u->step < 0.125) u->step = 0.125; /* of a line that turns in place */
+    return TXM_OK;
+}
+
+/* ---- control: new unrest out of pieces --------------------------------------------------- */
+
+/* How badly TXP_E_JOIN samples go together: place and, as there are several, slope. */
+static double txp_e_gap(const txp_e_sample *a, const txp_e_sample *b) {
+    double sum = 0;
+    for (int j = 0; j < TXP_E_JOIN; j++) {
+        const double ahead = a[j].ahead - b[j].ahead, right = a[j].right - b[j].right;
+        sum += ahead * ahead + right * right;
+    }
+    return sum;
+}
+
+/* Let a piece begin where the tail of the last one is: the difference of their first samples is
+   taken back over TXP_E_JOIN samples. Fading from one to the other would even out both. */
+static void txp_e_join(const txp_e_sample *tail, txp_e_sample *piece) {
+    const double ahead = tail->ahead - piece->ahead, right = tail->right - piece->right;
+    for (int j = 0; j < TXP_E_JOIN; j++) {
+        const double part = 1 - j / (double)TXP_E_JOIN;
+        piece[j].ahead += ahead * part;
+        piece[j].right += right * part;
+    }
+}
+
+/* What the next piece of a row is chosen by. */
+typedef struct txp_e_row {
+    const txp_e_sample *tail; /* how the last piece would go on; NULL: there is none           */
+    double length;            /* of the line so far                                            */
+    double bins[TXP_E_BINS];  /* and of its parts by direction                                 */
+} txp_e_row;
+
+/* How far the directions are from their shares once a piece is there. */
+static double txp_e_deviation(const txp_e_row *row, const double *share, const txp_e_sample *piece,
+                              size_t length) {
+    double bins[TXP_E_BINS], total = row->length, sum = 0;
+    memcpy(bins, row->bins, sizeof bins);
+    for (size_t j = 0; j < length; j++) {
+        bins[piece[j].bin] += piece[j].length;
+        total += piece[j].length;
+    }
+    for (int b = 0; b < TXP_E_BINS; b++) {
+        const double off = bins[b] - share[b] * total;
+        sum += off * off / (share[b] + 0.01);
+    }
+    return sum;
+}
+
+/* Choose a piece of this length: of some taken at random those that join best, to the tail and at
+   the end to head (NULL: to nothing, one of the piece itself: to its own beginning); of these the
+   one that brings the directions nearest to their shares. */
+static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, const txp_e_row *row,
+                                        size_t length, int closes, const txp_e_sample *head) {
+    const txp_e_sample *good[TXP_E_GOOD + 1] = {NULL}, *best;
+    double gaps[TXP_E_GOOD + 1] = {0}, least;
+    int count = 0;
+    for (int i = 0; i < TXP_E_TRIES * (closes ? 4 : 1); i++) {
+        const size_t pick = (size_t)(txm_rng_double(rng) * (double)u->start_count);
+        const txp_e_sample *piece = u->samples + u->starts[pick];
+        double gap = row->tail ? txp_e_gap(row->tail, piece) : 0;
+        if (closes) gap += txp_e_gap(piece + length, head ? head : piece);
+        int at = count;
+        for (; at > 0 && gap < gaps[at - 1]; at--) {
+            gaps[at] = gaps[at - 1];
+            good[at] = good[at - 1];
+        }
+        gaps[at] = gap;
+        good[at] = piece;
+        if (count < TXP_E_GOOD) count++;
+    }
+    best = good[0];
+    least = closes ? 0 : txp_e_deviation(row, u->share, best, length);
+    for (int i = 1; i < count && !closes; i++) {
+        const double off = txp_e_deviation(row, u->share, good[i], length);
+        if (off >= least) continue;
+        best = good[i];
+        least = off;
+    }
+    return best;
+}
+
+/* String pieces together to a closed row of m samples, m >= TXP_E_PIECE / 3. 0 = cancelled. */
+static int txp_e_weave(const txp_e_unrest *u, txm_rng *rng, txp_e_sample *samples, size_t m,
+                       txp_e_bar *bar) {
+    const size_t shortest = TXP_E_PIECE / 3;
+    txp_e_row row;
+    memset(&row, 0, sizeof row);
+    for (size_t k = 0; k < m;) {
+        const size_t rest = m - k;
+        size_t length = rest;
+        if (rest > TXP_E_PIECE)
+            length = shortest + txm_rng_below(rng, TXP_E_PIECE - (uint32_t)shortest + 1);
+        if (length < rest && rest - length < shortest) length = rest - shortest;
+        const txp_e_sample *piece =
+            txp_e_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
+        memcpy(samples + k, piece, length * sizeof *samples);
+        if (row.tail) txp_e_join(row.tail, samples + k);
+        for (size_t j = 0; j < length; j++) {
+            row.bins[piece[j].bin] += piece[j].length;
+            row.length += piece[j].length;
+        }
+        row.tail = piece + length;
+        k += length;
+        if (txp_e_tick(bar, 64 * TXP_E_TRIES)) return 0;
+    }
+    txp_e_join(row.tail, samples);
+    return 1;
+}
+
+/* ---- control: disturbed strokes ---------------------------------------------------------- */
+
+/* Points of the outline of a stroke; with points NULL they are only counted. */
+typedef struct txp_e_outline {
+    txp_e_point *points;
+    size_t count;
+} txp_e_outline;
+
+static void txp_e_put(txp_e_outline *o, double x, double y) {
+    if (o->points) {
+        o->points[o->count].x = x;
+        o->points[o->count].y = y;
+    }
+    o->count++;
+}
+
+/* One side of a band around n points, to the left of the way (back: of the way back), and the round
+   end behind it. Where the line turns outwards the gap is filled in steps of a pixel or so. */
+static int txp_e_side(const txp_e_point *p, size_t n, int back, double half, txp_e_outline *o,
+                      txp_e_bar *bar) {
+    txp_e_point d, before;
+    d.x = 1;
+    d.y = 0;
+    for (size_t i = 1; i < n; i++) { /* a direction to begin with */
+        const size_t at = back ? n - i : i - 1, next = back ? at - 1 : at + 1;
+        if (txp_e_distance(p[at], p[next]) > 1e-9) {
+            txp_e_direction(p[at], p[next], &d);
+            break;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        const size_t at = back ? n - 1 - i : i;
+        const size_t low = at > 2 ? at - 2 : 0, high = at + 2 < n ? at + 2 : n - 1;
+        before = d;
+        txp_e_direction(p[back ? high : low], p[back ? low : high], &d);
+        const int turns = i ? (int)(half * txp_e_distance(before, d)) : 0;
+        for (int k = 1; k <= turns; k++) {
+            txp_e_point mid, zero;
+            zero.x = zero.y = 0;
+            mid = before;
+            txp_e_direction(zero, txp_e_between(before, d, (double)k / (turns + 1)), &mid);
+            txp_e_put(o, p[at].x + half * mid.y, p[at].y - half * mid.x);
+        }
+        txp_e_put(o, p[at].x + half * d.y, p[at].y - half * d.x);
+        if (txp_e_tick(bar, (size_t)turns + 1)) return 0;
+    }
+    /* half a circle, in two quarters ((1 - t^2) u + 2 t v) / (1 + t^2), from left over ahead to
+       right */
+    const txp_e_point end = p[back ? 0 : n - 1];
+    const int steps = (int)(1.6 * half) + 1;
+    for (int k = 1; k < 2 * steps; k++) {
+        const double t = (double)(k < steps ? k : k - steps) / steps;
+        const double c = half * (1 - t * t) / (1 + t * t), s = half * 2 * t / (1 + t * t);
+        const double left = k < steps ? c : -s, ahead = k < steps ? s : c;
+        txp_e_put(o, end.x + left * d.y + ahead * d.x, end.y - left * d.x + ahead * d.y);
+    }
+    return !txp_e_tick(bar, 4 * (size_t)steps);
+}
+
+/* The outline of a stroke as a closed line, its inside to the right: of a closed one, its points in
+   the right order; of an open one, both sides of its band. */
+static txm_status txp_e_outline_make(const texpatch_stroke *s, txp_e_outline *o, txm_arena *arena,
+                                     txp_e_bar *bar, txm_env *env) {
+    const size_t n = (size_t)s->count;
+    txp_e_point *given = (txp_e_point *)txm_arena_alloc(arena, n, sizeof *given);
+    double area = 0;
+    if (!given) return txp_e_no_memory(env);
+    for (size_t i = 0; i < n; i++) {
+        const txm_vec2 p = s->points[i], q = s->points[i + 1 < n ? i + 1 : 0], p0 = s->points[0];
+        given[i].x = p.x;
+        given[i].y = p.y;
+        area += ((double)p.x - p0.x) * ((double)q.y - p0.y) -
+                ((double)q.x - p0.x) * ((double)p.y - p0.y);
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    if (s->is_closed) {
+        for (size_t i = 0, j = n - 1; i < j && area < 0; i++, j--) {
+            const txp_e_point p = given[i];
+            given[i] = given[j];
+            given[j] = p;
+        }
+        o->points = given;
+        o->count = n;
+        return TXM_OK;
+    }
+    const double length = txp_e_length(given, n, 0, bar);
+    if (length < 0) return txp_e_stopped(env);
+    const size_t m = (size_t)length + 2;
+    txp_e_point *even = (txp_e_point *)txm_arena_alloc(arena, 2 * m, sizeof *even);
+    if (!even) return txp_e_no_memory(env);
+    if (!txp_e_resample(given, n, 0, length, even, m, bar) ||
+        !txp_e_soften(even, m, 0, TXP_E_CORNER, even + m, bar))
+        return txp_e_stopped(env);
+    const double half = 0.5 * (s->width > 0 ? s->width : 8);
+    for (int pass = 0; pass < 2; pass++) { /* count, then keep */
+        o->points =
+            pass ? (txp_e_point *)txm_arena_alloc(arena, o->count, sizeof *o->points) : NULL;
+        if (pass && !o->points) return txp_e_no_memory(env);
+        o->count = 0;
+        if (!txp_e_side(even + m, m, 0, half, o, bar) || !txp_e_side(even + m, m, 1, half, o, bar))
+            return txp_e_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* The place at u on a closed line of n points. */
+static txp_e_point txp_e_at(const txp_e_point *p, size_t n, double u) {
+    const double wide = (double)n;
+    if (u < 0) u += wide;
+    if (u >= wide) u -= wide;
+    size_t i = (size_t)u;
+    if (i >= n) i = n - 1;
+    return txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], u - (double)i);
+}
+
+/* Do the segments a b and c d cross? Touching does not count. */
+static int txp_e_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 *at) {
+    if (txm_maxf(a.x, b.x) < txm_minf(c.x, d.x) || txm_maxf(c.x, d.x) < txm_minf(a.x, b.x) ||
+        txm_maxf(a.y, b.y) < txm_minf(c.y, d.y) || txm_maxf(c.y, d.y) < txm_minf(a.y, b.y))
+        return 0;
+    const double ux = (double)b.x - a.x, uy = (double)b.y - a.y;
+    const double vx = (double)d.x - c.x, vy = (double)d.y - c.y;
+    const double wx = (double)c.x - a.x, wy = (double)c.y - a.y;
+    const double c_side = ux * wy - uy * wx, d_side = c_side + (ux * vy - uy * vx);
+    const double a_side = vy * wx - vx * wy, b_side = a_side + (vx * uy - vy * ux);
+    if (!((c_side < 0 && d_side > 0) || (c_side > 0 && d_side < 0))) return 0;
+    if (!((a_side < 0 && b_side > 0) || (a_side > 0 && b_side < 0))) return 0;
+    const double t = a_side / (a_side - b_side);
+    *at = txm_v2(txm_float(a.x + ux * t), txm_float(a.y + uy * t));
+    return 1;
+}
+
+/* Cut loops of fewer than TXP_E_LOOP points off a closed line: points are put on a stack; where the
+   segment to the next one crosses an earlier one, the stack goes back to that and on from where
+   they cross. Then once more from another point, for loops through the first. Returns how many
+   points remain; 0 = cancelled.
+   scratch: room for n points */
+static size_t txp_e_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txp_e_bar *bar) {
+    for (int round = 0; round < 2; round++) {
+        const size_t turn = n / 2;
+        size_t top = 0;
+        for (size_t i = 0; i <= n; i++) { /* the last is the first again */
+            const txm_vec2 next = points[(turn + i) % n];
+            for (size_t k = 2; top > k && k <= TXP_E_LOOP; k++) { /* youngest first: small loops */
+                const txm_vec2 *old = scratch + top - k - 1;
+                txm_vec2 at;
+                if (i == n && old == scratch) break; /* these two meet in the first point */
+                if (!txp_e_cross(scratch[top - 1], next, old[0], old[1], &at)) continue;
+                top -= k;
+                scratch[top++] = at;
+                k = 1;
+            }
+            if (i < n) scratch[top++] = next;
+            if (txp_e_tick(bar, TXP_E_LOOP)) return 0;
+        }
+        n = top;
+        memcpy(points, scratch, n * sizeof *points);
+    }
+    return n;
+}
+
+/* The outline o disturbed by up to stray pixels, in memory from the arena. */
+static txm_status txp_e_shake(const txp_e_unrest *u, double stray, txm_rng *rng,
+                              const txp_e_outline *o, txm_vec2 **points, size_t *count,
+                              txm_arena *arena, txp_e_bar *bar, txm_env *env) {
+    const double length = txp_e_length(o->points, o->count, 1, bar);
+    if (length < 0) return txp_e_stopped(env);
+    if (stray > length / 16) stray = length / 16;
+    if (length > 4 * (double)TXP_E_LENGTH)
+        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "turn too often for their width");
+    const size_t n = length > 16 ? (size_t)(length + 0.5) : 16, shortest = TXP_E_PIECE / 3;
+    size_t m = (size_t)(length / u->step + 0.5);
+    if (m < shortest) m = shortest;
+    txp_e_point *even = (txp_e_point *)txm_arena_alloc(arena, n, 2 * sizeof *even);
+    txp_e_sample *row = (txp_e_sample *)txm_arena_alloc(arena, m, sizeof *row);
+    txm_vec2 *line = (txm_vec2 *)txm_arena_alloc(arena, m + 1, 2 * sizeof *line);
+    if (!even || !row || !line) return txp_e_no_memory(env);
+    const txp_e_point *soft = even + n;
+    const size_t corner = n < 8 * TXP_E_CORNER ? n / 8 : (size_t)TXP_E_CORNER;
+    if (!txp_e_resample(o->points, o->count, 1, length, even, n, bar) ||
+        !txp_e_soften(even, n, 1, corner, even + n, bar) || !txp_e_weave(u, rng, row, m, bar))
+        return txp_e_stopped(env);
+
+    double sum = 0, at = 0;
+    for (size_t k = 0; k < m; k++) sum += row[k].step;
+    const double stretch = sum > 0 ? (double)n / sum : 0; /* samples of the stroke for each step */
+    const double scale = stray / TXP_E_STRAY;
+    const double chord = n < 4 * TXP_E_CHORD ? (double)n / 4 : (double)TXP_E_CHORD;
+    txp_e_point direction;
+    direction.x = 1;
+    direction.y = 0;
+    for (size_t k = 0; k < m; k++) {
+        const txp_e_point p = txp_e_at(soft, n, at), given = txp_e_at(even, n, at);
+        txp_e_direction(txp_e_at(soft, n, at - chord), txp_e_at(soft, n, at + chord), &direction);
+        const double most = stray - txp_e_distance(p, given);
+        const double ahead = row[k].ahead * scale, right = row[k].right * scale;
+        const double off = sqrt(ahead * ahead + right * right);
+        const double factor = off <= most ? 1 : most > 0 ? most / off : 0;
+        line[k].x = txm_float(p.x + factor * (ahead * direction.x - right * direction.y));
+        line[k].y = txm_float(p.y + factor * (ahead * direction.y + right * direction.x));
+        at += row[k].step * stretch;
+        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+    }
+    *points = line;
+    *count = txp_e_unloop(line, m, line + m + 1, bar);
+    return *count ? TXM_OK : txp_e_stopped(env);
+}
+
+/* One stroke: its line, in memory from `lines`. */
+static txm_status txp_e_stroke(const texpatch_control *c, int i, const txp_e_unrest *u,
+                               txm_vec2 **points, size_t *count, txm_arena *lines, txp_e_bar *bar,
+                               txm_env *env) {
+    const texpatch_stroke *s = &c->strokes[i];
+    const double width = s->is_closed ? 256 : s->width > 0 ? s->width : 8; /* sides must not meet */
+    const double stray = width < 8 ? width * TXP_E_STRAY / 8 : TXP_E_STRAY;
+    txm_arena work;
+    txp_e_outline o;
+    txm_vec2 *made = NULL;
+    txm_rng rng = txm_rng_make(c->seed, (uint64_t)i);
+    txm_arena_init(&work, env);
+    memset(&o, 0, sizeof o);
+    txm_status status = txp_e_outline_make(s, &o, &work, bar, env);
+    const int is_still = c->disturb < 0 || u->start_count == 0;
+    *count = o.count;
+    if (status == TXM_OK && !is_still)
+        status = txp_e_shake(u, stray, &rng, &o, &made, count, &work, bar, env);
+    if (status == TXM_OK) {
+        *points = (txm_vec2 *)txm_arena_alloc(lines, *count, sizeof **points);
+        if (!*points) status = txp_e_no_memory(env);
+    }
+    for (size_t k = 0; k < *count && status == TXM_OK; k++) {
+        (*points)[k] =
+            is_still ? txm_v2(txm_float(o.points[k].x), txm_float(o.points[k].y)) : made[k];
+        if (txp_e_tick(bar, 1)) status = txp_e_stopped(env);
+    }
+    txm_arena_free(&work);
+    return status;
+}
+
+/* All strokes, layer by layer, so that the unrest of one layer at a time is held. */
+static txm_status txp_e_disturb(const texpatch_control *c, txp_e_bar *bar, txm_arena *lines,
+                                texpatch_edges *e, txm_env *env) {
+    const size_t n = (size_t)c->stroke_count;
+    txm_vec2 **points = (txm_vec2 **)txm_arena_alloc(lines, n, sizeof(txm_vec2 *));
+    e->lines = (texpatch_polyline *)txm_arena_zero(&e->memory, n, sizeof *e->lines);
+    if (n && (!points || !e->lines)) return txp_e_no_memory(env);
+    for (int layer = 0; layer < e->levels; layer++) {
+        txm_arena held;
+        txp_e_unrest u;
+        int is_used = 0;
+        txm_status status = TXM_OK;
+        memset(&u, 0, sizeof u);
+        for (int i = 0; i < c->stroke_count; i++) is_used |= c->strokes[i].layer == layer;
+        txm_arena_init(&held, env);
+        if (is_used && c->disturb >= 0)
+            status = txp_e_listen_layer(&u, c->edges, layer, c->disturb > 0 ? c->disturb : 1, &held,
+                                        bar, env);
+        for (int i = 0; i < c->stroke_count && status == TXM_OK && is_used; i++) {
+            if (c->strokes[i].layer != layer) continue;
+            e->lines[i].layer = layer;
+            status = txp_e_stroke(c, i, &u, &points[i], &e->lines[i].count, lines, bar, env);
+        }
+        txm_arena_free(&held);
+        if (status != TXM_OK) return status;
+    }
+    e->line_count = n;
+    for (size_t i = 0; i < n; i++) {
+        e->lines[i].first = e->point_count;
+        e->point_count += e->lines[i].count;
+    }
+    if (n == 0) return TXM_OK;
+    e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, e->point_count, sizeof *e->points);
+    if (!e->points) return txp_e_no_memory(env);
+    for (size_t i = 0; i < n; i++) {
+        memcpy(e->points + e->lines[i].first, points[i], e->lines[i].count * sizeof *e->points);
+        if (txp_e_tick(bar, e->lines[i].count)) return txp_e_stopped(env);
+    }
+    return TXM_OK;
+}
+
+TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
+                                         txm_env *env, texpatch_edges *out) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    if (width < 1 || height < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
+    if (width > TXP_E_SIDE || height > TXP_E_SIDE)
+        return txm_fail(env, TXM_TOO_LARGE, "a side is longer than 2^20 pixels");
+    txp_e_stage(&bar, "edges", 0.1, txp_e_points_of(control));
+    txm_status status = txp_e_check_control(control, &bar, env);
+    if (status != TXM_OK) return status;
+
+    double work = 150 * (double)control->edges->point_count;
+    for (int i = 0; i < control->stroke_count; i++) {
+        const texpatch_stroke *s = &control->strokes[i];
+        for (int k = 1; k < s->count; k++) {
+            const txm_vec2 p = s->points[k - 1], q = s->points[k];
+            const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
+            work += 250 * sqrt(dx * dx + dy * dy);
+        }
+    }
+    txp_e_stage(&bar, "strokes", 1, work);
+    txm_arena lines;
+    texpatch_edges e;
+    memset(&e, 0, sizeof e);
+    e.levels = control->edges->levels;
+    e.width = width;
+    e.height = height;
+    memcpy(e.thresholds, control->edges->thresholds, sizeof e.thresholds);
+    memcpy(e.beside, control->edges->beside, sizeof e.beside);
+    txm_arena_init(&lines, env);
+    txm_arena_init(&e.memory, env);
+    status = txp_e_disturb(control, &bar, &lines, &e, env);
+    txm_arena_free(&lines);
+    if (status == TXM_OK) *out = e;
+    else txm_arena_free(&e.memory);
+    return status;
+}
+
+/* ---- control: the guide ------------------------------------------------------------------ */
+
+/* The map that a guide is drawn from: layer + 1 of each pixel, 0 = nothing. */
+typedef struct txp_e_guide {
+    int width, height;
+    uint8_t *at;
+} txp_e_guide;
+
+/* Coordinates in 256ths of a pixel, in which all that follows is exact. */
+static int64_t txp_e_fixed(float x) {
+    return (int64_t)floor((double)x * 256 + 0.5);
+}
+
+/* a / b rounded up, b > 0 */
+static int64_t txp_e_ceil(int64_t a, int64_t b) {
+    return a / b + (a % b > 0);
+}
+
+/* The rows whose centres a segment passes, in first..end-1, and where: its upper end counts, its
+   lower one does not, so that a corner counts once and a level segment not at all. */
+typedef struct txp_e_slope {
+    int64_t x, y, dx, dy; /* of the upper end, and from there to the lower one */
+    int first, end, down; /* down: 1 if the segment runs so, else 0             */
+} txp_e_slope;
+
+static txp_e_slope txp_e_slope_of(txm_vec2 p, txm_vec2 q, int height) {
+    const int64_t px = txp_e_fixed(p.x), py = txp_e_fixed(p.y);
+    const int64_t qx = txp_e_fixed(q.x), qy = txp_e_fixed(q.y);
+    txp_e_slope s;
+    s.down = py < qy;
+    s.x = s.down ? px : qx;
+    s.y = s.down ? py : qy;
+    s.dx = s.down ? qx - px : px - qx;
+    s.dy = s.down ? qy - py : py - qy;
+    const int64_t first = txp_e_ceil(s.y - 128, 256), end = txp_e_ceil(s.y + s.dy - 128, 256);
+    s.first = first < 0 ? 0 : first > height ? height : (int)first;
+    s.end = end < s.first ? s.first : end > height ? height : (int)end;
+    return s;
+}
+
+/* The first pixel of a row whose centre lies on the segment or to its right, 0..width. */
+static uint32_t txp_e_column(const txp_e_slope *s, int row, int width) {
+    const int64_t down = 256 * (int64_t)row + 128 - s->y;
+    const int64_t column = txp_e_ceil((s->x - 128) * s->dy + down * s->dx, 256 * s->dy);
+    return (uint32_t)(column < 0 ? 0 : column > width ? width : column);
+}
+
+/* Fill the inside of a line (winding number not 0) with value. The places where it passes the rows'
+   centres are listed by rows, each row is sorted by columns, and filled between them. */
+static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, int value,
+                             txm_arena *arena, txp_e_bar *bar, txm_env *env) {
+    int top = g->height, bottom = 0;
+    size_t total = 0, longest = 0;
+    for (size_t i = 0; i < n; i++) {
+        const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+        if (s.first < s.end && s.first < top) top = s.first;
+        if (s.first < s.end && s.end > bottom) bottom = s.end;
+        total += (size_t)(s.end - s.first);
+        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+    }
+    if (total == 0) return TXM_OK;
+    /* next[r]: where the next passage of row top + r goes; in the end, where the row ends */
+    const size_t rows = (size_t)(bottom - top);
+    size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
+    txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
+    if (!next || !list) return txp_e_no_memory(env);
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t i = 0; i < n; i++) {
+            const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+            for (int y = s.first; y < s.end; y++) {
+                size_t *at = &next[y - top];
+                if (pass) {
+                    list[*at].key = txp_e_column(&s, y, g->width);
+                    list[*at].value = (uint32_t)s.down;
+                }
+                ++*at;
+                if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+            }
+            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        }
+        for (size_t r = 0, sum = 0; r < rows && pass == 0; r++) { /* from how many to where */
+            const size_t count = next[r];
+            if (count > longest) longest = count;
+            next[r] = sum;
+            sum += count;
+        }
+    }
+    txm_pair *scratch = (txm_pair *)txm_arena_alloc(arena, longest, sizeof *scratch);
+    if (!scratch) return txp_e_no_memory(env);
+    for (size_t r = 0; r < rows; r++) {
+        const size_t from = r ? next[r - 1] : 0, count = next[r] - from;
+        uint8_t *row = g->at + (size_t)(top + (int)r) * (size_t)g->width;
+        int64_t winding = 0;
+        txm_sort_pairs(list + from, scratch, count);
+        for (size_t i = from; i + 1 < from + count; i++) {
+            winding += list[i].value ? 1 : -1;
+            if (winding) memset(row + list[i].key, value, list[i + 1].key - list[i].key);
+        }
+        if (txp_e_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txp_e_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* With a free background: around the strokes the layer that the nearest one borders on. Of each
+   pixel of a row first the distance to the nearest stroke in the row, then over the rows above and
+   below the least sum of squares; of several as near the left, then the upper one.
+   off, what: two bytes for each pixel. 0 = cancelled */
+static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uint8_t *what,
+                      txp_e_bar *bar) {
+    const size_t w = (size_t)g->width;
+    for (int y = 0; y < g->height; y++) {
+        const uint8_t *row = g->at + (size_t)y * w;
+        uint8_t *distance = off + (size_t)y * w, *mark = what + (size_t)y * w;
+        int since = TXP_E_RING + 1, last = 0; /* how far back, and what */
+        for (size_t x = 0; x < w; x++) {
+            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            if (row[x]) last = row[x];
+            distance[x] = (uint8_t)since;
+            mark[x] = (uint8_t)last;
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+        since = TXP_E_RING + 1;
+        for (size_t x = w; x-- > 0;) {
+            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            if (row[x]) last = row[x];
+            if (since < distance[x]) {
+                distance[x] = (uint8_t)since;
+                mark[x] = (uint8_t)last;
+            }
+            if (txp_e_tick(bar, 1)) return 0;
+        }
+    }
+    for (int y = 0; y < g->height; y++) {
+        const int low = y > TXP_E_RING ? y - TXP_E_RING : 0;
+        const int high = y + TXP_E_RING < g->height ? y + TXP_E_RING : g->height - 1;
+        for (size_t x = 0; x < w; x++) {
+            uint8_t *at = g->at + (size_t)y * w + x;
+            int least = TXP_E_RING * TXP_E_RING + 1, mark = 0;
+            if (txp_e_tick(bar, 2)) return 0;
+            if (off[(size_t)y * w + x] == 0) continue; /* inside a stroke */
+            for (int v = low; v <= high; v++) {
+                const int dx = off[(size_t)v * w + x], dy = v - y;
+                if (dx * dx + dy * dy >= least) continue;
+                least = dx * dx + dy * dy;
+                mark = what[(size_t)v * w + x];
+            }
+            *at = (uint8_t)(mark ? beside[mark - 1] + 1 : 0);
+            if (txp_e_tick(bar, 8)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* Draw all lines, and what is around them. mask, what: with a free background two more bytes for
+   each pixel, else NULL. In the end g holds grays, mask what there is to say. */
+static txm_status txp_e_guide_make(const texpatch_control *c, const texpatch_edges *lines,
+                                   const txp_e_guide *g, uint8_t *mask, uint8_t *what,
+                                   txp_e_bar *bar, txm_env *env) {
+    const size_t count = (size_t)g->width * (size_t)g->height;
+    for (size_t i = 0; i < lines->line_count; i++) {
+        const texpatch_polyline *line = &lines->lines[i];
+        txm_arena work;
+        txm_arena_init(&work, env);
+        const txm_status status = txp_e_fill(g, lines->points + line->first, line->count,
+                                             line->layer + 1, &work, bar, env);
+        txm_arena_free(&work);
+        if (status != TXM_OK) return status;
+    }
+    txp_e_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
+    if (mask) {
+        int beside[TEXPATCH_MAX_LEVELS];
+        for (int k = 0; k < lines->levels; k++) { /* a layer that borders on none: any other one */
+            beside[k] = c->edges->beside[k];
+            if (beside[k] < 0) beside[k] = k ? k - 1 : 1;
+        }
+        if (!txp_e_ring(g, beside, mask, what, bar)) return txp_e_stopped(env);
+    }
+    for (size_t i = 0; i < count; i++) {
+        const int layer = g->at[i] ? g->at[i] - 1 : mask ? 0 : c->background;
+        if (mask) mask[i] = g->at[i] ? 255 : 0;
+        g->at[i] = (uint8_t)layer;
+        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+    }
+    return txp_e_show(g->at, count, lines->levels, bar) ? TXM_OK : txp_e_stopped(env);
+}
+
+TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
+                                               const texpatch_edges *disturbed, txm_env *env,
+                                               const txm_image *guide, const txm_image *mask) {
+    txp_e_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    txm_status status = txp_e_check_image(guide, "guide", 1, env);
+    if (status == TXM_OK) status = txp_e_check_image(mask, "mask", 1, env);
+    txp_e_stage(&bar, "edges", 0.2, txp_e_points_of(control));
+    if (status == TXM_OK) status = txp_e_check_control(control, &bar, env);
+    if (status == TXM_OK) status = txp_e_check_edges(disturbed, "disturbed", 0, &bar, env);
+    if (status != TXM_OK) return status;
+    if (guide->width != disturbed->width || guide->height != disturbed->height ||
+        mask->width != disturbed->width || mask->height != disturbed->height)
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "guide and mask must have the size that texpatch_disturb was given");
+    int same = disturbed->levels == control->edges->levels &&
+               disturbed->line_count == (size_t)control->stroke_count;
+    for (int i = 0; i < control->stroke_count && same; i++)
+        same = disturbed->lines[i].layer == control->strokes[i].layer;
+    if (!same)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturbed",
+                           "made of other strokes than control holds");
+
+    const size_t w = (size_t)guide->width, count = w * (size_t)guide->height;
+    const int is_free = control->background < 0;
+    txm_arena arena;
+    txp_e_guide g;
+    txp_e_stage(&bar, "strokes", 0.5, 30 * (double)disturbed->point_count);
+    txm_arena_init(&arena, env);
+    g.width = guide->width;
+    g.height = guide->height;
+    g.at = (uint8_t *)txm_arena_zero(&arena, count, is_free ? 3 : 1);
+    uint8_t *told = g.at && is_free ? g.at + count : NULL;
+    status =
+        g.at ? txp_e_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
+             : txp_e_no_memory(env);
+    for (int y = 0; y < g.height && g.at && status == TXM_OK; y++) {
+        uint8_t *row = (uint8_t *)txm_image_row(mask, y);
+        memcpy(txm_image_row(guide, y), g.at + (size_t)y * w, w);
+        if (told) memcpy(row, told + (size_t)y * w, w);
+        else memset(row, 255, w);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+#endif /* TEXEDGES_IMPLEMENTATION */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/
