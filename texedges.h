@@ -25,17 +25,17 @@ extern "C" {
 
 /* ---- layered edges ----------------------------------------------------------------------- */
 
-enum { TEXPATCH_MAX_LEVELS = 16 };
+enum { TEXEDGES_MAX_LEVELS = 16 };
 
 /* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
    value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1). */
-typedef struct texpatch_polyline {
+typedef struct texedges_polyline {
     int layer;        /* 0..levels-1: this is a boundary of that layer                        */
     int is_hole;      /* the layer lies outside it                                            */
     size_t first;     /* its points are points[first .. first + count - 1], closed: the last is
                          joined to the first                                                  */
     size_t count;
-} texpatch_polyline;
+} texedges_polyline;
 
 /* Found lines run along the cracks between pixels, a point at each pixel corner that they pass.
    The layer lies to the right of the way (outer boundaries run clockwise as seen, holes the other
@@ -49,24 +49,24 @@ typedef struct texpatch_polyline {
      +---+---+  the two pixels of layer k have a line each; the two
      | k |      others too, whether of one layer or not
      +---+                                                                                    */
-typedef struct texpatch_edges {
+typedef struct texedges_set {
     int levels, width, height;
-    float thresholds[TEXPATCH_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
-    int beside[TEXPATCH_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
+    float thresholds[TEXEDGES_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
+    int beside[TEXEDGES_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
                                         none, it has no boundary but the picture's              */
-    texpatch_polyline *lines;
+    texedges_polyline *lines;
     size_t line_count;
     txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
                          top left pixel                                                        */
     size_t point_count;
     txm_arena memory; /* belongs to the header                                                 */
-} texpatch_edges;
+} texedges_set;
 
 /* What to find. All zero but the image is a good default. */
-typedef struct texpatch_edges_desc {
+typedef struct texedges_desc {
     txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
                         samples as they are, cut off at 0 and 1; alpha is not looked at        */
-    int levels;      /* 2..TEXPATCH_MAX_LEVELS; 0 = 4, as the paper has it                     */
+    int levels;      /* 2..TEXEDGES_MAX_LEVELS; 0 = 4, as the paper has it                     */
     float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
                         1 to 3                                                                 */
     int least;       /* regions whose boundary (holes and the picture's border included) is shorter
@@ -74,24 +74,24 @@ typedef struct texpatch_edges_desc {
                         it with, the shortest first; 0 = all are kept                          */
     const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
                         have about the same area, at the emptiest gray near there */
-} texpatch_edges_desc;
+} texedges_desc;
 
 /* Find the boundaries of all layers.
 
    env    NULL, or how to allocate, report and cancel
-   out    receives them; release it with texpatch_edges_free. Untouched after an error
+   out    receives them; release it with texedges_set_free. Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
           TXM_TOO_LARGE above TEXEDGES_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
           TXM_CANCELLED
    cost   O(pixels (1 + smooth + log least)) time, about 0.2 us a pixel; 13 bytes a pixel while it
           works (9 without least, 5 without both), and the result: 8 bytes for each point, of which
           there are up to four a pixel, and 24 for each line                                   */
-TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
-                                            texpatch_edges *out);
+TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env,
+                                      texedges_set *out);
 
 /* Release edges, which are all zero then; NULL and all zero are allowed. Of several copies of the
    struct only one may be released. */
-TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges);
+TEXEDGES_API void texedges_set_free(texedges_set *edges);
 
 /* The layer of each pixel of a picture, by the thresholds of edges, as a gray value: layer k is
    255 k / (levels - 1), rounded. It serves as the guide of an exemplar (see control edges).
@@ -99,69 +99,69 @@ TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges);
    desc   image, smooth and least are looked at; with those that edges were found with, the layers
           change exactly where its lines run
    layers TXM_U8, 1 channel, the size of the picture; untouched after an error
-   return as texpatch_edges_find
-   cost   as texpatch_edges_find; 13 bytes a pixel                                             */
-TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
-                                        const texpatch_edges *edges, txm_env *env,
+   return as texedges_find
+   cost   as texedges_find; 13 bytes a pixel                                             */
+TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
+                                        const texedges_set *edges, txm_env *env,
                                         const txm_image *layers);
 
 /* Draw boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
    wide, on the layer's own side; colours run from dark to light with the layers, in one channel the
    gray. What lies outside of the picture is not drawn.
    cost   a byte for each pixel; O(pixels + length of the lines) time                           */
-TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
-                                            const txm_image *image);
+TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
+                                      const txm_image *image);
 
 /* ---- control edges ----------------------------------------------------------------------- */
 
 /* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. Where it is closed,
    its inside becomes the layer; an open one becomes a band of the layer, as wide as width says,
    with round ends. */
-typedef struct texpatch_stroke {
+typedef struct texedges_stroke {
     const txm_vec2 *points; /* count of them, 2 or more (closed: 3), not all the same, in pixels of
                                the output; they may lie outside it, up to 2^20                  */
     int count;
     int is_closed;
     int layer;   /* 0..levels-1: what lies within                                               */
     float width; /* of an open stroke, pixels, 2..256; 0 = 8                                    */
-} texpatch_stroke;
+} texedges_stroke;
 
-typedef struct texpatch_control {
-    const texpatch_edges *edges; /* of the exemplar, from texpatch_edges_find                   */
-    const texpatch_stroke *strokes;
+typedef struct texedges_control {
+    const texedges_set *edges; /* of the exemplar, from texedges_find                   */
+    const texedges_stroke *strokes;
     int stroke_count;  /* 0 or more                                                             */
     int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but
                           next to a stroke not the stroke's own layer */
     float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
                           -1 = none                                                             */
     uint64_t seed;     /* another seed, another unrest                                          */
-} texpatch_control;
+} texedges_control;
 
 /* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the
    way in which those stray from their own smooth course are strung together along the stroke.
 
    out    receives one closed line for each stroke, in their order (of an open stroke: around its
           band), inside to the right; levels, thresholds and beside are the exemplar's, width and
-          height those given. Release it with texpatch_edges_free; untouched after an error.
+          height those given. Release it with texedges_set_free; untouched after an error.
           A line strays from its stroke (the edge of its band) by 4 pixels at most; less from short
           strokes and narrow bands, by 1/16 of the length and 7/16 of the width. Where the stroke
           turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
           cross itself. Of a layer without edges of 64 pixels in the exemplar, and with disturb =
           -1, it is the stroke itself
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
-          edges that texpatch_edges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
+          edges that texedges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
           pixels; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(edges + length of the strokes) time, about 1 us for each pixel of either; 200 bytes for
           each pixel of the longest stroke (its band's outline), 30 for each of all, 100 for each of
           the edges of a layer                                                                 */
-TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
-                                         txm_env *env, texpatch_edges *out);
+TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
+                                         txm_env *env, texedges_set *out);
 
 /* The guide that makes a job follow the strokes, for texpatch_desc.guide and .guide_mask; the
-   exemplars' counterpart is texpatch_layers's picture.
+   exemplars' counterpart is texedges_layers's picture.
 
-   disturbed  what texpatch_disturb made of the same control
-   guide  TXM_U8, 1 channel, the size given to texpatch_disturb: the gray of the layer. Pixels whose
+   disturbed  what texedges_disturb made of the same control
+   guide  TXM_U8, 1 channel, the size given to texedges_disturb: the gray of the layer. Pixels whose
           centre lies inside a line (winding number not 0; of a centre on the line, that to its
           right or below is inside) have the stroke's layer, the last stroke on top. With
           background = -1, up to 8 pixels outside of the strokes it is the layer that the nearest
@@ -172,9 +172,9 @@ TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int wi
           guide and mask are untouched
    cost   O(pixels + area and height of the strokes) time, about 50 ns a pixel; 3 bytes a pixel and
           24 for each row that a stroke's line crosses                                           */
-TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
-                                               const texpatch_edges *disturbed, txm_env *env,
-                                               const txm_image *guide, const txm_image *mask);
+TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
+                                       const texedges_set *disturbed, txm_env *env,
+                                       const txm_image *guide, const txm_image *mask);
 
 #ifdef __cplusplus
 }
@@ -184,40 +184,40 @@ TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
 #if defined(TEXEDGES_IMPLEMENTATION) && !defined(TEXEDGES_IMPLEMENTED)
 #define TEXEDGES_IMPLEMENTED
 
-/* ---- edges: constants and progress ------------------------------------------------------- */
+/* ---- constants and progress ------------------------------------------------------------ */
 
 enum {
-    TXP_E_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
-    TXP_E_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
-    TXP_E_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
-    TXP_E_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
-    TXP_E_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+    TXE_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
+    TXE_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
+    TXE_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
+    TXE_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
+    TXE_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
 
-    TXP_E_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
-    TXP_E_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
-    TXP_E_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
-    TXP_E_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
-    TXP_E_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
-    TXP_E_BINS = 16,   /* directions told apart in half a turn                                    */
-    TXP_E_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
-    TXP_E_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
-    TXP_E_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
-    TXP_E_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
-    TXP_E_GOOD = 8,    /* of them so many that join best are looked at closer                     */
-    TXP_E_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+    TXE_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
+    TXE_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
+    TXE_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
+    TXE_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
+    TXE_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
+    TXE_BINS = 16,   /* directions told apart in half a turn                                    */
+    TXE_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
+    TXE_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
+    TXE_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
+    TXE_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
+    TXE_GOOD = 8,    /* of them so many that join best are looked at closer                     */
+    TXE_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
 };
-#define TXP_E_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
-#define TXP_E_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+#define TXE_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
+#define TXE_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
 
 /* The bar of one call: a stage fills from..to of it in total pieces of work. */
-typedef struct txp_e_bar {
+typedef struct txe_bar {
     const txm_env *env;
     const char *stage;
     double from, to, total, done;
     size_t quiet; /* work since the last report */
-} txp_e_bar;
+} txe_bar;
 
-static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double total) {
+static void txe_stage(txe_bar *bar, const char *stage, double to, double total) {
     bar->from = bar->to;
     bar->to = to;
     bar->stage = stage;
@@ -226,39 +226,39 @@ static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double tot
 }
 
 /* So much work is done; non-zero: stop. */
-static inline int txp_e_tick(txp_e_bar *bar, size_t work) {
+static inline int txe_tick(txe_bar *bar, size_t work) {
     bar->quiet += work;
-    if (bar->quiet < TXP_E_TICK) return 0;
+    if (bar->quiet < TXE_TICK) return 0;
     bar->done += (double)bar->quiet;
     bar->quiet = 0;
     const double part = bar->done < bar->total ? bar->done / bar->total : 1;
     return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
 }
 
-static txm_status txp_e_no_memory(txm_env *env) {
+static txm_status txe_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the edges");
 }
 
-static txm_status txp_e_stopped(txm_env *env) {
+static txm_status txe_stopped(txm_env *env) {
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
-/* ---- edges: checks of what the caller gives ---------------------------------------------- */
+/* ---- checks of what the caller gives --------------------------------------------------- */
 
 /* A picture that edges can be found in, or (bytes: U8, 1 channel) a guide can be drawn into. */
-static txm_status txp_e_check_image(const txm_image *image, const char *name, int bytes,
-                                    txm_env *env) {
-    const size_t most = TEXEDGES_MAX_PIXELS < TXP_E_PIXELS ? TEXEDGES_MAX_PIXELS : TXP_E_PIXELS;
+static txm_status txe_check_image(const txm_image *image, const char *name, int bytes,
+                                  txm_env *env) {
+    const size_t most = TEXEDGES_MAX_PIXELS < TXE_PIXELS ? TEXEDGES_MAX_PIXELS : TXE_PIXELS;
     const txm_status status = txm_image_check(image, name, most, env);
     if (status != TXM_OK) return status;
-    if (image->width > TXP_E_SIDE || image->height > TXP_E_SIDE)
+    if (image->width > TXE_SIDE || image->height > TXE_SIDE)
         return txm_fail_at(env, TXM_TOO_LARGE, name, "a side is longer than 2^20 pixels");
     if (bytes && (image->sample != TXM_U8 || image->channels > 1))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be TXM_U8 with 1 channel");
     return TXM_OK;
 }
 
-static int txp_e_thresholds_are_good(const float *thresholds, int levels) {
+static int txe_thresholds_are_good(const float *thresholds, int levels) {
     for (int k = 0; k < levels - 1; k++) {
         if (!(thresholds[k] >= 0 && thresholds[k] <= 1)) return 0;
         if (k > 0 && !(thresholds[k] > thresholds[k - 1])) return 0;
@@ -266,23 +266,23 @@ static int txp_e_thresholds_are_good(const float *thresholds, int levels) {
     return 1;
 }
 
-static txm_status txp_e_check_desc(const texpatch_edges_desc *desc, txm_env *env) {
+static txm_status txe_check_desc(const texedges_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
     if (!(desc->smooth >= 0 && desc->smooth <= 16))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "smooth", "must be 0 to 16 pixels");
     if (desc->least < 0)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "least", "must be 0 or more pixels");
-    return txp_e_check_image(&desc->image, "image", 0, env);
+    return txe_check_image(&desc->image, "image", 0, env);
 }
 
-/* Edges as one of the functions here makes them. is_found: as texpatch_edges_find does, in unit
+/* Edges as one of the functions here makes them. is_found: as texedges_find does, in unit
    steps from corner to corner. */
-static txm_status txp_e_check_edges(const texpatch_edges *edges, const char *name, int is_found,
-                                    txp_e_bar *bar, txm_env *env) {
-    const char *foreign = "not as texpatch_edges_find or texpatch_disturb made it";
-    if (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS || edges->width < 1 ||
-        edges->height < 1 || edges->width > TXP_E_SIDE || edges->height > TXP_E_SIDE ||
-        !txp_e_thresholds_are_good(edges->thresholds, edges->levels) ||
+static txm_status txe_check_edges(const texedges_set *edges, const char *name, int is_found,
+                                  txe_bar *bar, txm_env *env) {
+    const char *foreign = "not as texedges_find or texedges_disturb made it";
+    if (!edges || edges->levels < 2 || edges->levels > TEXEDGES_MAX_LEVELS || edges->width < 1 ||
+        edges->height < 1 || edges->width > TXE_SIDE || edges->height > TXE_SIDE ||
+        !txe_thresholds_are_good(edges->thresholds, edges->levels) ||
         (edges->line_count && !edges->lines) || (edges->point_count && !edges->points))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
     for (int k = 0; k < edges->levels; k++) {
@@ -290,14 +290,14 @@ static txm_status txp_e_check_edges(const texpatch_edges *edges, const char *nam
             return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
     }
     for (size_t i = 0; i < edges->line_count; i++) {
-        const texpatch_polyline *line = &edges->lines[i];
+        const texedges_polyline *line = &edges->lines[i];
         if (line->layer < 0 || line->layer >= edges->levels || line->count < 2 ||
             line->first > edges->point_count || line->count > edges->point_count - line->first)
             return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
         txm_vec2 p = edges->points[line->first + line->count - 1];
         for (size_t j = 0; j < line->count; j++) {
             const txm_vec2 q = edges->points[line->first + j];
-            const float most = (float)(2 * TXP_E_SIDE);
+            const float most = (float)(2 * TXE_SIDE);
             int good = q.x >= -most && q.x <= most && q.y >= -most && q.y <= most;
             if (good && is_found) {
                 const float dx = q.x - p.x, dy = q.y - p.y;
@@ -306,22 +306,22 @@ static txm_status txp_e_check_edges(const texpatch_edges *edges, const char *nam
                        q.x == (float)(int)q.x && q.y == (float)(int)q.y;
             }
             if (!good) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
-            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            if (txe_tick(bar, 1)) return txe_stopped(env);
             p = q;
         }
     }
     return TXM_OK;
 }
 
-static txm_status txp_e_check_stroke(const texpatch_stroke *s, int levels, double *length,
-                                     txp_e_bar *bar, txm_env *env) {
+static txm_status txe_check_stroke(const texedges_stroke *s, int levels, double *length,
+                                   txe_bar *bar, txm_env *env) {
     if (!s->points || s->count < (s->is_closed ? 3 : 2))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "needs 2 points or more, closed 3");
     if (s->layer < 0 || s->layer >= levels)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "layer must be 0 to levels - 1");
     if (s->width != 0 && !(s->width >= 2 && s->width <= 256))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "width must be 0 or 2 to 256 pixels");
-    const float most = (float)TXP_E_SIDE;
+    const float most = (float)TXE_SIDE;
     double own = 0;
     for (int i = 0; i < s->count; i++) {
         const txm_vec2 p = s->points[i], q = s->points[i ? i - 1 : 0];
@@ -330,40 +330,40 @@ static txm_status txp_e_check_stroke(const texpatch_stroke *s, int levels, doubl
             return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke",
                                "a coordinate is not a number or beyond 2^20 pixels");
         own += sqrt(dx * dx + dy * dy);
-        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        if (txe_tick(bar, 1)) return txe_stopped(env);
     }
     if (!(own > 1e-3))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "has no length: its points are one");
     *length += own;
-    if (*length > (double)TXP_E_LENGTH)
+    if (*length > (double)TXE_LENGTH)
         return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "are longer than 2^26 pixels");
     return TXM_OK;
 }
 
-static double txp_e_points_of(const texpatch_control *c) {
+static double txe_points_of(const texedges_control *c) {
     return c && c->edges ? (double)c->edges->point_count : 0;
 }
 
-/* All that texpatch_disturb and texpatch_control_guide look at. */
-static txm_status txp_e_check_control(const texpatch_control *c, txp_e_bar *bar, txm_env *env) {
+/* All that texedges_disturb and texedges_guide look at. */
+static txm_status txe_check_control(const texedges_control *c, txe_bar *bar, txm_env *env) {
     double length = 0;
     if (!c) return txm_fail(env, TXM_BAD_ARGUMENT, "control is NULL");
     if (c->stroke_count < 0 || (c->stroke_count && !c->strokes))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "strokes", "NULL, or fewer than none");
     if (!(c->disturb == -1 || (c->disturb >= 0 && c->disturb <= 4)))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturb", "must be -1 or 0 to 4");
-    txm_status status = txp_e_check_edges(c->edges, "edges", 1, bar, env);
+    txm_status status = txe_check_edges(c->edges, "edges", 1, bar, env);
     if (status == TXM_OK && (c->background < -1 || c->background >= c->edges->levels))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "background", "must be -1 to levels - 1");
     for (int i = 0; i < c->stroke_count && status == TXM_OK; i++)
-        status = txp_e_check_stroke(&c->strokes[i], c->edges->levels, &length, bar, env);
+        status = txe_check_stroke(&c->strokes[i], c->edges->levels, &length, bar, env);
     return status;
 }
 
-/* ---- edges: from a picture to layers ----------------------------------------------------- */
+/* ---- from a picture to layers ---------------------------------------------------------- */
 
 /* The gray of each pixel, 0..1. 0 = cancelled, -1 = a sample is not finite, 1 = done. */
-static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
+static int txe_gray(const txm_image *image, float *gray, txe_bar *bar) {
     const int is_color = image->channels >= 3;
     for (int y = 0; y < image->height; y++) {
         for (int x = 0; x < image->width; x++) {
@@ -373,7 +373,7 @@ static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
                     0.0722 * txm_image_get(image, x, y, 2);
             if (!txm_is_finite(g)) return -1;
             *gray++ = txm_float(g < 0 ? 0 : g > 1 ? 1 : g);
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
     }
     return 1;
@@ -381,8 +381,8 @@ static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
 
 /* Blur by the weights 1 - |d| / (radius + 1), rows then columns; beyond its border the picture goes
    on as it ends. scratch: as large as gray. 0 = cancelled. */
-static int txp_e_blur(float *gray, float *scratch, int width, int height, double radius,
-                      txp_e_bar *bar) {
+static int txe_blur(float *gray, float *scratch, int width, int height, double radius,
+                    txe_bar *bar) {
     const int reach = (int)radius;
     double weight[17] = {1}, sum = 0;
     for (int d = 0; d <= reach; d++) {
@@ -405,7 +405,7 @@ static int txp_e_blur(float *gray, float *scratch, int width, int height, double
                          ((double)from[i - (size_t)back * step] + from[i + (size_t)ahead * step]);
                 }
                 to[i] = txm_float(g / sum);
-                if (txp_e_tick(bar, (size_t)reach + 1)) return 0;
+                if (txe_tick(bar, (size_t)reach + 1)) return 0;
             }
         }
     }
@@ -417,14 +417,14 @@ static int txp_e_blur(float *gray, float *scratch, int width, int height, double
    In a histogram of 256 bins, cut k lies where k / levels of the area are darker, or up to a
    quarter of a layer's area beside that, where the two bins next to the cut hold least; of a gap
    in the middle. Where one bin holds too much for that, on its nearer side. 0 = cancelled. */
-static int txp_e_divide(const float *gray, size_t count, int levels, float *thresholds,
-                        txp_e_bar *bar) {
+static int txe_divide(const float *gray, size_t count, int levels, float *thresholds,
+                      txe_bar *bar) {
     size_t bins[256], below[257];
     int previous = 0;
     memset(bins, 0, sizeof bins);
     for (size_t i = 0; i < count; i++) {
         bins[(int)((double)gray[i] * 255 + 0.5)]++;
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
     }
     below[0] = 0;
     for (int b = 0; b < 256; b++) below[b + 1] = below[b] + bins[b];
@@ -458,54 +458,54 @@ static int txp_e_divide(const float *gray, size_t count, int levels, float *thre
 
 /* The neighbour of a pixel beyond its side 0 = top, 1 = right, 2 = bottom, 3 = left; a crack is run
    through clockwise, so that its pixel lies to the right: along the top to the right, and so on. */
-static const int txp_e_side_x[4] = {0, 1, 0, -1}, txp_e_side_y[4] = {-1, 0, 1, 0};
+static const int txe_side_x[4] = {0, 1, 0, -1}, txe_side_y[4] = {-1, 0, 1, 0};
 
 /* Connected pixels of one layer are a region. It is known by one of its pixels, its root; next
    links root and boundary pixels to a circle. Two circles are joined by swapping one link each. */
-typedef struct txp_e_regions {
+typedef struct txe_regions {
     int width, height;
     int32_t *parent, *next;
     int32_t *length; /* of the root: cracks of the region's boundary */
     uint8_t *layer;  /* of the root: what the region shows now       */
-} txp_e_regions;
+} txe_regions;
 
-static int32_t txp_e_root(const txp_e_regions *r, int32_t p) {
+static int32_t txe_root(const txe_regions *r, int32_t p) {
     while (r->parent[p] != p) p = r->parent[p] = r->parent[r->parent[p]];
     return p;
 }
 
 /* Unite the regions of two roots; returns the new root. */
-static int32_t txp_e_unite(txp_e_regions *r, int32_t a, int32_t b) {
-    if (b < a) return txp_e_unite(r, b, a);
+static int32_t txe_unite(txe_regions *r, int32_t a, int32_t b) {
+    if (b < a) return txe_unite(r, b, a);
     return r->parent[b] = a;
 }
 
 /* the pixel beyond a side of p, -1: none */
-static int32_t txp_e_beyond(const txp_e_regions *r, int32_t p, int side) {
-    const int x = p % r->width + txp_e_side_x[side], y = p / r->width + txp_e_side_y[side];
+static int32_t txe_beyond(const txe_regions *r, int32_t p, int side) {
+    const int x = p % r->width + txe_side_x[side], y = p / r->width + txe_side_y[side];
     if (x < 0 || y < 0 || x >= r->width || y >= r->height) return -1;
-    return p + txp_e_side_x[side] + txp_e_side_y[side] * r->width;
+    return p + txe_side_x[side] + txe_side_y[side] * r->width;
 }
 
-static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
+static int txe_regions_make(txe_regions *r, txe_bar *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int32_t p = 0; p < count; p++) {
         r->parent[p] = r->next[p] = p;
         r->length[p] = 0;
         int32_t root = p;
         for (int side = 3; side >= 0; side -= 3) { /* left and above */
-            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t q = txe_beyond(r, p, side);
             if (q < 0 || r->layer[q] != r->layer[p]) continue;
-            const int32_t other = txp_e_root(r, q);
-            if (other != root) root = txp_e_unite(r, root, other);
+            const int32_t other = txe_root(r, q);
+            if (other != root) root = txe_unite(r, root, other);
         }
-        if (txp_e_tick(bar, 2)) return 0;
+        if (txe_tick(bar, 2)) return 0;
     }
     for (int32_t p = 0; p < count; p++) {
-        const int32_t root = txp_e_root(r, p);
+        const int32_t root = txe_root(r, p);
         int cracks = 0;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t q = txe_beyond(r, p, side);
             cracks += q < 0 || r->layer[q] != r->layer[p];
         }
         r->length[root] += cracks;
@@ -513,7 +513,7 @@ static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
             r->next[p] = r->next[root];
             r->next[root] = p;
         }
-        if (txp_e_tick(bar, 2)) return 0;
+        if (txe_tick(bar, 2)) return 0;
     }
     return 1;
 }
@@ -521,14 +521,14 @@ static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
 /* Give a region to the layer with which it shares most of its boundary, the darkest of several, and
    unite it with all regions of that layer around it. Returns the new root, -1 if the region is the
    whole picture. Pixels that are on no boundary any more are taken out of the circle. */
-static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
-    int32_t shared[TEXPATCH_MAX_LEVELS];
+static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
+    int32_t shared[TEXEDGES_MAX_LEVELS];
     memset(shared, 0, sizeof shared);
     for (int32_t before = region, p = region;;) {
         int inner = 1;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txp_e_beyond(r, p, side);
-            const int32_t other = q < 0 ? region : txp_e_root(r, q);
+            const int32_t q = txe_beyond(r, p, side);
+            const int32_t other = q < 0 ? region : txe_root(r, q);
             if (other == region) continue;
             inner = 0;
             shared[r->layer[other]]++;
@@ -540,7 +540,7 @@ static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
         if (p == region) break;
     }
     int target = 0;
-    for (int k = 1; k < TEXPATCH_MAX_LEVELS; k++) {
+    for (int k = 1; k < TEXEDGES_MAX_LEVELS; k++) {
         if (shared[k] > shared[target]) target = k;
     }
     if (shared[target] == 0) return -1;
@@ -548,14 +548,14 @@ static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
     for (int32_t p = region, after;; p = after) {
         after = r->next[p]; /* what is joined in behind p is not walked through */
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txp_e_beyond(r, p, side);
-            const int32_t other = q < 0 ? root : txp_e_root(r, q);
+            const int32_t q = txe_beyond(r, p, side);
+            const int32_t other = q < 0 ? root : txe_root(r, q);
             if (other == root || r->layer[other] != target) continue;
             const int32_t link = r->next[p];
             r->next[p] = r->next[other];
             r->next[other] = link;
             length += r->length[other];
-            root = txp_e_unite(r, root, other);
+            root = txe_unite(r, root, other);
         }
         ++*work;
         if (after == region) break;
@@ -568,7 +568,7 @@ static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
 /* Dissolve regions until all have a boundary of least cracks or more: first those under 8, then
    under 16 and so on, each time in raster order of the roots. A region of n cracks is one of
    O(pixels / n), so all this takes O(pixels log least). 0 = cancelled. */
-static int txp_e_regions_clean(txp_e_regions *r, int least, txp_e_bar *bar) {
+static int txe_regions_clean(txe_regions *r, int least, txe_bar *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int bound = 4; bound < least;) {
         bound = bound < least / 2 ? 2 * bound : least;
@@ -576,100 +576,100 @@ static int txp_e_regions_clean(txp_e_regions *r, int least, txp_e_bar *bar) {
             int32_t region = r->parent[p] == p ? p : -1;
             while (region >= 0 && r->length[region] < bound) {
                 size_t work = 0;
-                region = txp_e_dissolve(r, region, &work);
-                if (txp_e_tick(bar, 8 * work)) return 0;
+                region = txe_dissolve(r, region, &work);
+                if (txe_tick(bar, 8 * work)) return 0;
             }
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
     }
     for (int32_t p = 0; p < count; p++) {
-        r->layer[p] = r->layer[txp_e_root(r, p)];
-        if (txp_e_tick(bar, 1)) return 0;
+        r->layer[p] = r->layer[txe_root(r, p)];
+        if (txe_tick(bar, 1)) return 0;
     }
     return 1;
 }
 
 /* The layer of each pixel. is_given: thresholds holds levels - 1 of them, else it receives them.
    to: the part of the bar that is full then. */
-static txm_status txp_e_split(const texpatch_edges_desc *desc, int levels, int is_given,
-                              float *thresholds, uint8_t *layer, double to, txp_e_bar *bar,
-                              txm_arena *arena, txm_env *env) {
+static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
+                            float *thresholds, uint8_t *layer, double to, txe_bar *bar,
+                            txm_arena *arena, txm_env *env) {
     const int width = desc->image.width, height = desc->image.height;
     const size_t count = (size_t)width * (size_t)height;
     const double smooth = desc->smooth;
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
-    if (!gray || (smooth > 0 && !scratch)) return txp_e_no_memory(env);
-    txp_e_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
-    const int good = txp_e_gray(&desc->image, gray, bar);
+    if (!gray || (smooth > 0 && !scratch)) return txe_no_memory(env);
+    txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
+    const int good = txe_gray(&desc->image, gray, bar);
     if (good < 0)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is infinite or not a number");
-    if (!good || (smooth > 0 && !txp_e_blur(gray, scratch, width, height, smooth, bar)) ||
-        (!is_given && !txp_e_divide(gray, count, levels, thresholds, bar)))
-        return txp_e_stopped(env);
+    if (!good || (smooth > 0 && !txe_blur(gray, scratch, width, height, smooth, bar)) ||
+        (!is_given && !txe_divide(gray, count, levels, thresholds, bar)))
+        return txe_stopped(env);
     for (size_t i = 0; i < count; i++) {
         int k = 0;
         while (k < levels - 1 && gray[i] >= thresholds[k]) k++;
         layer[i] = (uint8_t)k;
-        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        if (txe_tick(bar, 1)) return txe_stopped(env);
     }
     txm_arena_free(arena);
     if (desc->least <= 4) return TXM_OK; /* nothing is shorter */
 
-    txp_e_regions r;
+    txe_regions r;
     r.width = width;
     r.height = height;
     r.layer = layer;
     r.parent = (int32_t *)txm_arena_alloc(arena, count, 3 * sizeof(int32_t));
-    if (!r.parent) return txp_e_no_memory(env);
+    if (!r.parent) return txe_no_memory(env);
     r.next = r.parent + count;
     r.length = r.next + count;
-    txp_e_stage(bar, "regions", to, (double)count * 12);
-    if (!txp_e_regions_make(&r, bar) || !txp_e_regions_clean(&r, desc->least, bar))
-        return txp_e_stopped(env);
+    txe_stage(bar, "regions", to, (double)count * 12);
+    if (!txe_regions_make(&r, bar) || !txe_regions_clean(&r, desc->least, bar))
+        return txe_stopped(env);
     txm_arena_free(arena);
     return TXM_OK;
 }
 
 /* Turn layers into grays. 0 = cancelled. */
-static int txp_e_show(uint8_t *layer, size_t count, int levels, txp_e_bar *bar) {
-    uint8_t gray[TEXPATCH_MAX_LEVELS] = {0};
+static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
+    uint8_t gray[TEXEDGES_MAX_LEVELS] = {0};
     for (int k = 0; k < levels; k++)
         gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
     for (size_t i = 0; i < count; i++) {
         layer[i] = gray[layer[i]];
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
     }
     return 1;
 }
 
-TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
-                                        const texpatch_edges *edges, txm_env *env,
+TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
+                                        const texedges_set *edges, txm_env *env,
                                         const txm_image *layers) {
-    txp_e_bar bar;
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
-    txm_status status = txp_e_check_desc(desc, env);
-    if (status == TXM_OK) status = txp_e_check_image(layers, "layers", 1, env);
+    txm_status status = txe_check_desc(desc, env);
+    if (status == TXM_OK) status = txe_check_image(layers, "layers", 1, env);
     if (status == TXM_OK &&
         (layers->width != desc->image.width || layers->height != desc->image.height))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
-    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS ||
-                             !txp_e_thresholds_are_good(edges->thresholds, edges->levels)))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texpatch_edges_find made it");
+    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXEDGES_MAX_LEVELS ||
+                             !txe_thresholds_are_good(edges->thresholds, edges->levels)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texedges_find made it");
     if (status != TXM_OK) return status;
 
-    float thresholds[TEXPATCH_MAX_LEVELS];
+    float thresholds[TEXEDGES_MAX_LEVELS];
     txm_arena map, scratch;
     txm_arena_init(&map, env);
     txm_arena_init(&scratch, env);
     memcpy(thresholds, edges->thresholds, sizeof thresholds);
     const size_t width = (size_t)layers->width;
     uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
-    status = layer ? txp_e_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
-                   : txp_e_no_memory(env);
-    if (status == TXM_OK && !txp_e_show(layer, width * (size_t)layers->height, edges->levels, &bar))
-        status = txp_e_stopped(env);
+    status = layer ? txe_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+                   : txe_no_memory(env);
+    if (status == TXM_OK && !txe_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+        status = txe_stopped(env);
     for (int y = 0; y < layers->height && status == TXM_OK; y++)
         memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
     txm_arena_free(&scratch);
@@ -677,24 +677,24 @@ TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
     return status;
 }
 
-/* ---- edges: from layers to lines --------------------------------------------------------- */
+/* ---- from layers to lines -------------------------------------------------------------- */
 
 /* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the
    upper four the sides of the pixel whose cracks are still to be run through. */
-typedef struct txp_e_map {
+typedef struct txe_map {
     int width, height;
     uint8_t *at;
-} txp_e_map;
+} txe_map;
 
 /* is the pixel of this layer? */
-static int txp_e_is(const txp_e_map *m, int x, int y, int layer) {
+static int txe_is(const txe_map *m, int x, int y, int layer) {
     if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
     return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
 }
 
 /* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
-static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPATCH_MAX_LEVELS],
-                      txp_e_bar *bar) {
+static int txe_mark(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_MAX_LEVELS],
+                    txe_bar *bar) {
     const int w = m->width;
     *cracks = 0;
     for (int y = 0; y < m->height; y++) {
@@ -702,14 +702,14 @@ static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPA
             uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
             const int layer = *at & 15;
             for (int side = 0; side < 4; side++) {
-                const int u = x + txp_e_side_x[side], v = y + txp_e_side_y[side];
-                if (txp_e_is(m, u, v, layer)) continue;
+                const int u = x + txe_side_x[side], v = y + txe_side_y[side];
+                if (txe_is(m, u, v, layer)) continue;
                 *at = (uint8_t)(*at | 16 << side);
                 ++*cracks;
                 if (u >= 0 && v >= 0 && u < w && v < m->height)
                     shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
             }
-            if (txp_e_tick(bar, 4)) return 0;
+            if (txe_tick(bar, 4)) return 0;
         }
     }
     return 1;
@@ -726,8 +726,8 @@ static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPA
    As each crack has one successor and is that of one, the way comes back to its beginning.
    points  receives the corners, or NULL; returns their number; 0 = cancelled
    area    receives the area to the right, negative if the line is a hole's                   */
-static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *points,
-                          int64_t *area, txp_e_bar *bar) {
+static size_t txe_trace(const txe_map *m, int x, int y, int side, txm_vec2 *points,
+                        int64_t *area, txe_bar *bar) {
     const int x0 = x, y0 = y, side0 = side, w = m->width;
     const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
     size_t count = 0;
@@ -741,38 +741,38 @@ static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *
         if (side == 1) *area += x + 1; /* integral of x dy */
         if (side == 3) *area -= x;
         const int ahead = (side + 1) & 3; /* the side across which a lies */
-        const int ax = x + txp_e_side_x[ahead], ay = y + txp_e_side_y[ahead];
-        if (!txp_e_is(m, ax, ay, layer)) {
+        const int ax = x + txe_side_x[ahead], ay = y + txe_side_y[ahead];
+        if (!txe_is(m, ax, ay, layer)) {
             side = ahead;
         } else {
             x = ax;
             y = ay;
-            const int lx = ax + txp_e_side_x[side], ly = ay + txp_e_side_y[side];
-            if (txp_e_is(m, lx, ly, layer)) {
+            const int lx = ax + txe_side_x[side], ly = ay + txe_side_y[side];
+            if (txe_is(m, lx, ly, layer)) {
                 x = lx;
                 y = ly;
                 side = (side + 3) & 3;
             }
         }
-        if (txp_e_tick(bar, 4)) return 0;
+        if (txe_tick(bar, 4)) return 0;
     } while (x != x0 || y != y0 || side != side0);
     return count;
 }
 
 /* All lines in raster order of where they begin: run through once to count them, once to keep
    them. */
-static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_edges *e,
-                                  txm_env *env) {
-    size_t shared[TEXPATCH_MAX_LEVELS][TEXPATCH_MAX_LEVELS], cracks;
+static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
+                                txm_env *env) {
+    size_t shared[TEXEDGES_MAX_LEVELS][TEXEDGES_MAX_LEVELS], cracks;
     for (int pass = 0; pass < 2; pass++) {
         size_t lines = 0, points = 0;
         memset(shared, 0, sizeof shared);
-        if (!txp_e_mark(m, &cracks, shared, bar)) return txp_e_stopped(env);
+        if (!txe_mark(m, &cracks, shared, bar)) return txe_stopped(env);
         if (pass == 1) {
             e->lines =
-                (texpatch_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
+                (texedges_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
             e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
-            if (!e->lines || !e->points) return txp_e_no_memory(env);
+            if (!e->lines || !e->points) return txe_no_memory(env);
         }
         for (int y = 0; y < m->height; y++) {
             for (int x = 0; x < m->width; x++) {
@@ -781,8 +781,8 @@ static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_e
                     if (!(*at & 16 << side)) continue;
                     int64_t area;
                     const size_t count =
-                        txp_e_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
-                    if (!count) return txp_e_stopped(env);
+                        txe_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
+                    if (!count) return txe_stopped(env);
                     if (pass) {
                         e->lines[lines].layer = *at & 15;
                         e->lines[lines].is_hole = area < 0;
@@ -792,7 +792,7 @@ static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_e
                     points += count;
                     lines++;
                 }
-                if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+                if (txe_tick(bar, 1)) return txe_stopped(env);
             }
         }
         e->line_count = lines;
@@ -808,9 +808,9 @@ static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_e
     return TXM_OK;
 }
 
-static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, txm_arena *layers,
-                             txm_arena *scratch, texpatch_edges *e, txm_env *env) {
-    txp_e_map map;
+static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *layers,
+                           txm_arena *scratch, texedges_set *e, txm_env *env) {
+    txe_map map;
     const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
     e->width = map.width = desc->image.width;
     e->height = map.height = desc->image.height;
@@ -818,36 +818,36 @@ static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, tx
     for (int k = 0; k < e->levels - 1 && desc->thresholds; k++)
         e->thresholds[k] = desc->thresholds[k];
     map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
-    if (!map.at) return txp_e_no_memory(env);
-    const txm_status status = txp_e_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
-                                          map.at, 0.7, bar, scratch, env);
+    if (!map.at) return txe_no_memory(env);
+    const txm_status status = txe_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
+                                        map.at, 0.7, bar, scratch, env);
     if (status != TXM_OK) return status;
-    txp_e_stage(bar, "lines", 1, (double)count * 14);
-    return txp_e_trace_all(&map, bar, e, env);
+    txe_stage(bar, "lines", 1, (double)count * 14);
+    return txe_trace_all(&map, bar, e, env);
 }
 
-TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
-                                            texpatch_edges *out) {
-    txm_status status = txp_e_check_desc(desc, env);
+TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env,
+                                      texedges_set *out) {
+    txm_status status = txe_check_desc(desc, env);
     if (status != TXM_OK) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    if (desc->levels && (desc->levels < 2 || desc->levels > TEXPATCH_MAX_LEVELS))
+    if (desc->levels && (desc->levels < 2 || desc->levels > TEXEDGES_MAX_LEVELS))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels",
-                           "must be 0 or 2 to TEXPATCH_MAX_LEVELS");
+                           "must be 0 or 2 to TEXEDGES_MAX_LEVELS");
     if (desc->thresholds &&
-        !txp_e_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
+        !txe_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
 
     txm_arena layers, scratch;
-    txp_e_bar bar;
-    texpatch_edges e;
+    txe_bar bar;
+    texedges_set e;
     memset(&e, 0, sizeof e);
     memset(&bar, 0, sizeof bar);
     bar.env = env;
     txm_arena_init(&layers, env);
     txm_arena_init(&scratch, env);
     txm_arena_init(&e.memory, env);
-    status = txp_e_find(desc, &bar, &layers, &scratch, &e, env);
+    status = txe_find(desc, &bar, &layers, &scratch, &e, env);
     txm_arena_free(&scratch);
     txm_arena_free(&layers);
     if (status == TXM_OK) *out = e;
@@ -855,7 +855,7 @@ TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm
     return status;
 }
 
-TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges) {
+TEXEDGES_API void texedges_set_free(texedges_set *edges) {
     if (!edges) return;
     txm_arena_free(&edges->memory);
     memset(edges, 0, sizeof *edges);
@@ -863,21 +863,21 @@ TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges) {
 
 /* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
    twice a pixel. 0 = cancelled. */
-static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *line, uint8_t *marks,
-                           int width, int height, txp_e_bar *bar) {
+static int txe_draw_line(const texedges_set *e, const texedges_polyline *line, uint8_t *marks,
+                         int width, int height, txe_bar *bar) {
     const txm_vec2 *points = e->points + line->first;
     for (size_t j = 0; j < line->count; j++) {
         const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
         const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
         const double length = sqrt(dx * dx + dy * dy);
         const int steps = 2 * (int)length + 1;
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
         for (int i = 0; i < steps && length > 0; i++) {
             const double t = (i + 0.5) / steps;
             const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
             if (x >= 0 && y >= 0 && x < width && y < height)
                 marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
-            if (txp_e_tick(bar, 2)) return 0;
+            if (txe_tick(bar, 2)) return 0;
         }
     }
     return 1;
@@ -885,7 +885,7 @@ static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *lin
 
 /* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
    not quite black. One channel: gray. */
-static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
+static uint8_t txe_color(int layer, int levels, int channels, int channel) {
     static const int ramp[5][3] = {
         {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
     const int t = 1024 * (layer + 1) / levels; /* 0..1024: four spans of 256 */
@@ -894,18 +894,18 @@ static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
     return (uint8_t)((ramp[span][channel] * (256 - rest) + ramp[span + 1][channel] * rest) / 256);
 }
 
-TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
-                                            const txm_image *image) {
-    txp_e_bar bar;
+TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
+                                      const txm_image *image) {
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
-    txp_e_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
-    txm_status status = txp_e_check_image(image, "image", 0, env);
+    txe_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
+    txm_status status = txe_check_image(image, "image", 0, env);
     if (status != TXM_OK) return status;
     const int channels = image->channels ? image->channels : 1;
     if (image->sample != TXM_U8 || (channels != 1 && channels != 3))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "must be TXM_U8 with 1 or 3 channels");
-    status = txp_e_check_edges(edges, "edges", 0, &bar, env);
+    status = txe_check_edges(edges, "edges", 0, &bar, env);
     if (status != TXM_OK) return status;
     if (layer < -1 || layer >= edges->levels)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "layer", "must be -1 to levels - 1");
@@ -914,88 +914,88 @@ TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int lay
     txm_arena arena;
     txm_arena_init(&arena, env);
     uint8_t *marks = (uint8_t *)txm_arena_zero(&arena, (size_t)width, (size_t)height);
-    if (!marks) return txp_e_no_memory(env);
-    txp_e_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
+    if (!marks) return txe_no_memory(env);
+    txe_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
     for (size_t i = 0; i < edges->line_count && status == TXM_OK; i++) {
-        const texpatch_polyline *line = &edges->lines[i];
+        const texedges_polyline *line = &edges->lines[i];
         if (layer >= 0 && line->layer != layer) continue;
-        if (!txp_e_draw_line(edges, line, marks, width, height, &bar)) status = txp_e_stopped(env);
+        if (!txe_draw_line(edges, line, marks, width, height, &bar)) status = txe_stopped(env);
     }
     for (int y = 0; y < height && status == TXM_OK; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(image, y);
         for (int x = 0; x < width; x++) {
             const int mark = marks[(size_t)y * (size_t)width + (size_t)x];
             for (int c = 0; c < channels && mark; c++)
-                row[x * channels + c] = txp_e_color(mark - 1, edges->levels, channels, c);
+                row[x * channels + c] = txe_color(mark - 1, edges->levels, channels, c);
         }
     }
     txm_arena_free(&arena);
     return status;
 }
 
-/* ---- control: lines as rows of points ---------------------------------------------------- */
+/* ---- lines as rows of points ----------------------------------------------------------- */
 
-typedef struct txp_e_point {
+typedef struct txe_point {
     double x, y;
-} txp_e_point;
+} txe_point;
 
-static txp_e_point txp_e_between(txp_e_point a, txp_e_point b, double t) {
-    txp_e_point p;
+static txe_point txe_between(txe_point a, txe_point b, double t) {
+    txe_point p;
     p.x = a.x + (b.x - a.x) * t;
     p.y = a.y + (b.y - a.y) * t;
     return p;
 }
 
-static double txp_e_distance(txp_e_point a, txp_e_point b) {
+static double txe_distance(txe_point a, txe_point b) {
     const double dx = b.x - a.x, dy = b.y - a.y;
     return sqrt(dx * dx + dy * dy);
 }
 
 /* Length of n points; closed: back to the first. Negative: cancelled. */
-static double txp_e_length(const txp_e_point *p, size_t n, int is_closed, txp_e_bar *bar) {
+static double txe_length(const txe_point *p, size_t n, int is_closed, txe_bar *bar) {
     double sum = 0;
     for (size_t i = 1; i < n + (is_closed != 0); i++) {
-        sum += txp_e_distance(p[i - 1], p[i < n ? i : 0]);
-        if (txp_e_tick(bar, 1)) return -1;
+        sum += txe_distance(p[i - 1], p[i < n ? i : 0]);
+        if (txe_tick(bar, 1)) return -1;
     }
     return sum;
 }
 
 /* m points at equal distances along a line of n points and this length: closed from the first point
    on, open from the first to the last. 0 = cancelled. */
-static int txp_e_resample(const txp_e_point *p, size_t n, int is_closed, double length,
-                          txp_e_point *out, size_t m, txp_e_bar *bar) {
+static int txe_resample(const txe_point *p, size_t n, int is_closed, double length,
+                        txe_point *out, size_t m, txe_bar *bar) {
     const size_t segments = is_closed ? n : n - 1;
     const double step = length / (double)(is_closed ? m : m - 1);
     size_t i = 0;
-    double from = 0, span = txp_e_distance(p[0], p[1]); /* of segment i */
+    double from = 0, span = txe_distance(p[0], p[1]); /* of segment i */
     for (size_t k = 0; k < m; k++) {
         const double at = step * (double)k;
         while (at > from + span && i + 1 < segments) {
             from += span;
             i++;
-            span = txp_e_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
-            if (txp_e_tick(bar, 1)) return 0;
+            span = txe_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
+            if (txe_tick(bar, 1)) return 0;
         }
         const double t = span > 0 ? (at - from) / span : 0;
-        out[k] = txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
-        if (txp_e_tick(bar, 1)) return 0;
+        out[k] = txe_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
+        if (txe_tick(bar, 1)) return 0;
     }
     return 1;
 }
 
 /* Blur a line by the weights radius + 1 - |d|, whole numbers. Closed: around (n > radius); open:
    near the ends with as small a radius as they need, so that they stay. 0 = cancelled. */
-static int txp_e_soften(const txp_e_point *p, size_t n, int is_closed, size_t radius,
-                        txp_e_point *out, txp_e_bar *bar) {
+static int txe_soften(const txe_point *p, size_t n, int is_closed, size_t radius,
+                      txe_point *out, txe_bar *bar) {
     for (size_t i = 0; i < n; i++) {
         size_t reach = radius;
         if (!is_closed && reach > i) reach = i;
         if (!is_closed && reach > n - 1 - i) reach = n - 1 - i;
         double x = 0, y = 0;
         for (size_t d = 1; d <= reach; d++) {
-            const txp_e_point a = p[i >= d ? i - d : i + n - d];
-            const txp_e_point b = p[i + d < n ? i + d : i + d - n];
+            const txe_point a = p[i >= d ? i - d : i + n - d];
+            const txe_point b = p[i + d < n ? i + d : i + d - n];
             const double weight = (double)(reach + 1 - d);
             x += weight * (a.x + b.x);
             y += weight * (a.y + b.y);
@@ -1003,135 +1003,135 @@ static int txp_e_soften(const txp_e_point *p, size_t n, int is_closed, size_t ra
         const double weight = (double)(reach + 1), sum = weight * weight;
         out[i].x = (x + weight * p[i].x) / sum;
         out[i].y = (y + weight * p[i].y) / sum;
-        if (txp_e_tick(bar, reach + 1)) return 0;
+        if (txe_tick(bar, reach + 1)) return 0;
     }
     return 1;
 }
 
 /* The unit vector from a to b; if they are one point, as it was before. */
-static void txp_e_direction(txp_e_point a, txp_e_point b, txp_e_point *direction) {
-    const double length = txp_e_distance(a, b);
+static void txe_direction(txe_point a, txe_point b, txe_point *direction) {
+    const double length = txe_distance(a, b);
     if (!(length > 1e-9)) return;
     direction->x = (b.x - a.x) / length;
     direction->y = (b.y - a.y) / length;
 }
 
-/* ---- control: the unrest of the exemplar's edges ----------------------------------------- */
+/* ---- the unrest of the exemplar's edges ------------------------------------------------ */
 
 /* One sample of a line of the exemplar, a pixel of its length from the next: how far its smooth
    course moves on meanwhile, and where the line lies from there, ahead and to the right. */
-typedef struct txp_e_sample {
+typedef struct txe_sample {
     double step, ahead, right;
     double length; /* of the line to the next sample, tamed as it is                           */
     int bin;       /* its direction against its course                                         */
-} txp_e_sample;
+} txe_sample;
 
 /* The unrest of one layer: rows of samples one behind the other, and the places at which a piece of
-   TXP_E_PIECE + TXP_E_JOIN samples can begin. */
-typedef struct txp_e_unrest {
-    txp_e_sample *samples;
+   TXE_PIECE + TXE_JOIN samples can begin. */
+typedef struct txe_unrest {
+    txe_sample *samples;
     size_t *starts;
     size_t count, start_count;
     double amount;            /* by which the exemplar's is multiplied                          */
     double step;              /* mean of all steps                                              */
-    double share[TXP_E_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
-} txp_e_unrest;
+    double share[TXE_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
+} txe_unrest;
 
 /* Room for the work on one line of up to count points. */
-typedef struct txp_e_bench {
-    txp_e_point *a, *b, *c;
-} txp_e_bench;
+typedef struct txe_bench {
+    txe_point *a, *b, *c;
+} txe_bench;
 
-static int txp_e_bench_make(txp_e_bench *bench, txm_arena *arena, size_t count) {
-    bench->a = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
-    bench->b = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
-    bench->c = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
+static int txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
+    bench->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
+    bench->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
+    bench->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
     return bench->a && bench->b && bench->c;
 }
 
-/* The factor that makes a vector of this length no longer than TXP_E_STRAY: 1 up to TXP_E_LINEAR,
+/* The factor that makes a vector of this length no longer than TXE_STRAY: 1 up to TXE_LINEAR,
    then the length grows slower and slower. */
-static double txp_e_tame(double length) {
-    const double room = TXP_E_STRAY - TXP_E_LINEAR, more = length - TXP_E_LINEAR;
-    return more > 0 ? (TXP_E_LINEAR + room * more / (more + room)) / length : 1;
+static double txe_tame(double length) {
+    const double room = TXE_STRAY - TXE_LINEAR, more = length - TXE_LINEAR;
+    return more > 0 ? (TXE_LINEAR + room * more / (more + room)) / length : 1;
 }
 
 /* The direction of (ahead, right), no matter which way: 0 = straight on, then every 16th of half a
    turn to the right. The table: cosine and sine of 1/2, 3/2, ... of such a step. */
-static int txp_e_bin(double ahead, double right) {
-    static const double edge[TXP_E_BINS / 2][2] = {
+static int txe_bin(double ahead, double right) {
+    static const double edge[TXE_BINS / 2][2] = {
         {0.99518473, 0.09801714}, {0.95694034, 0.29028468}, {0.88192126, 0.47139674},
         {0.77301045, 0.63439328}, {0.63439328, 0.77301045}, {0.47139674, 0.88192126},
         {0.29028468, 0.95694034}, {0.09801714, 0.99518473}};
     const double x = ahead < 0 ? -ahead : ahead, y = right < 0 ? -right : right;
     int k = 0;
-    while (k < TXP_E_BINS / 2 && y * edge[k][0] > x * edge[k][1]) k++;
-    return (ahead < 0) != (right < 0) ? (TXP_E_BINS - k) % TXP_E_BINS : k % TXP_E_BINS;
+    while (k < TXE_BINS / 2 && y * edge[k][0] > x * edge[k][1]) k++;
+    return (ahead < 0) != (right < 0) ? (TXE_BINS - k) % TXE_BINS : k % TXE_BINS;
 }
 
 /* The directions of a line of n points in bench->b against its course, its blur of radius
-   TXP_E_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
+   TXE_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
    of a line with `amount` times the unrest, or put into the samples of its points.
    0 = cancelled. */
-static int txp_e_directions(const txp_e_bench *bench, size_t n, int is_closed, size_t light,
-                            double amount, double *share, txp_e_sample *samples, txp_e_bar *bar) {
-    const txp_e_point *line = bench->a, *course = bench->c;
-    const size_t trim = is_closed || !share ? 0 : TXP_E_COURSE; /* the ends of the course are bad */
-    if (!txp_e_soften(bench->b, n, is_closed, light, bench->a, bar) ||
-        !txp_e_soften(bench->b, n, is_closed, TXP_E_COURSE, bench->c, bar))
+static int txe_directions(const txe_bench *bench, size_t n, int is_closed, size_t light,
+                          double amount, double *share, txe_sample *samples, txe_bar *bar) {
+    const txe_point *line = bench->a, *course = bench->c;
+    const size_t trim = is_closed || !share ? 0 : TXE_COURSE; /* the ends of the course are bad */
+    if (!txe_soften(bench->b, n, is_closed, light, bench->a, bar) ||
+        !txe_soften(bench->b, n, is_closed, TXE_COURSE, bench->c, bar))
         return 0;
     for (size_t i = trim; i < n - trim; i++) {
         size_t at[4]; /* the course from at[0] to at[3], the line from at[1] to at[2] */
         for (int k = 0; k < 4; k++) {
-            const size_t off = k == 0 || k == 3 ? TXP_E_CHORD : 1;
+            const size_t off = k == 0 || k == 3 ? TXE_CHORD : 1;
             if (k < 2) at[k] = i >= off ? i - off : is_closed ? i + n - off : 0;
             else at[k] = i + off < n ? i + off : is_closed ? i + off - n : n - 1;
         }
         const double cx = course[at[3]].x - course[at[0]].x, cy = course[at[3]].y - course[at[0]].y;
         const double dx = line[at[2]].x - line[at[1]].x, dy = line[at[2]].y - line[at[1]].y;
-        const int bin = txp_e_bin(cx * dx + cy * dy, amount * (cx * dy - cy * dx));
+        const int bin = txe_bin(cx * dx + cy * dy, amount * (cx * dy - cy * dx));
         if (share) share[bin] += 1;
         if (samples) {
             samples[i].bin = bin;
-            samples[i].length = txp_e_distance(line[i], line[at[2]]);
+            samples[i].length = txe_distance(line[i], line[at[2]]);
         }
-        if (txp_e_tick(bar, 4)) return 0;
+        if (txe_tick(bar, 4)) return 0;
     }
     return 1;
 }
 
 /* Take in one line: n points in bench->a, a pixel apart at most. With S the blur of radius
-   TXP_E_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
+   TXE_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
    would shrink. Ends of open lines are left out, where the course is bad. 0 = cancelled. */
-static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int is_closed,
-                        txp_e_bar *bar) {
-    txp_e_point *line = bench->b, *blurred = bench->a, *course = bench->c;
-    if (n < TXP_E_SHORT) return 1;
-    const double length = txp_e_length(bench->a, n, is_closed, bar);
+static int txe_listen(txe_unrest *u, const txe_bench *bench, size_t n, int is_closed,
+                      txe_bar *bar) {
+    txe_point *line = bench->b, *blurred = bench->a, *course = bench->c;
+    if (n < TXE_SHORT) return 1;
+    const double length = txe_length(bench->a, n, is_closed, bar);
     if (length < 0) return 0;
     const size_t m = (size_t)(length + 0.5) + !is_closed; /* at most n */
-    const size_t trim = is_closed ? 0 : TXP_E_SCALE;
-    if (m < TXP_E_SHORT + 2 * trim) return 1;
-    if (!txp_e_resample(bench->a, n, is_closed, length, line, m, bar) ||
-        !txp_e_soften(line, m, is_closed, TXP_E_SCALE, blurred, bar) ||
-        !txp_e_soften(blurred, m, is_closed, TXP_E_SCALE, course, bar))
+    const size_t trim = is_closed ? 0 : TXE_SCALE;
+    if (m < TXE_SHORT + 2 * trim) return 1;
+    if (!txe_resample(bench->a, n, is_closed, length, line, m, bar) ||
+        !txe_soften(line, m, is_closed, TXE_SCALE, blurred, bar) ||
+        !txe_soften(blurred, m, is_closed, TXE_SCALE, course, bar))
         return 0;
     for (size_t i = 0; i < m; i++) {
         course[i].x = 2 * blurred[i].x - course[i].x;
         course[i].y = 2 * blurred[i].y - course[i].y;
     }
     /* a closed line goes on beyond its end, so that pieces can begin anywhere */
-    const size_t room = TXP_E_PIECE + TXP_E_JOIN, end = is_closed ? m + room : m - trim;
-    txp_e_sample *first = u->samples + u->count;
-    txp_e_point direction;
+    const size_t room = TXE_PIECE + TXE_JOIN, end = is_closed ? m + room : m - trim;
+    txe_sample *first = u->samples + u->count;
+    txe_point direction;
     direction.x = 1;
     direction.y = 0;
     for (size_t i = trim; i < end; i++) {
-        const size_t at = i % m, back = (i + m - TXP_E_CHORD) % m, front = (i + TXP_E_CHORD) % m;
+        const size_t at = i % m, back = (i + m - TXE_CHORD) % m, front = (i + TXE_CHORD) % m;
         const double dx = line[at].x - course[at].x, dy = line[at].y - course[at].y;
-        txp_e_sample *s = &u->samples[u->count];
-        txp_e_direction(course[back], course[front], &direction);
-        s->step = txp_e_distance(course[at], course[(i + 1) % m]);
+        txe_sample *s = &u->samples[u->count];
+        txe_direction(course[back], course[front], &direction);
+        s->step = txe_distance(course[at], course[(i + 1) % m]);
         s->ahead = u->amount * (dx * direction.x + dy * direction.y);
         s->right = u->amount * (dy * direction.x - dx * direction.y);
         if (i + room <= end) {
@@ -1139,9 +1139,9 @@ static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int
             u->step += s->step;
         }
         u->count++;
-        if (txp_e_tick(bar, 4)) return 0;
+        if (txe_tick(bar, 4)) return 0;
     }
-    if (!txp_e_directions(bench, m, is_closed, TXP_E_LIGHT, u->amount, u->share, NULL, bar))
+    if (!txe_directions(bench, m, is_closed, TXE_LIGHT, u->amount, u->share, NULL, bar))
         return 0;
     /* Tame the unrest and count its directions once more, along a straight course; smoother than
        the exemplar's, as a line loses some when it is drawn in pixels. So as much as the exemplar
@@ -1149,88 +1149,88 @@ static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int
     double x = 0;
     const size_t count = end - trim;
     for (size_t i = 0; i < count; i++) {
-        txp_e_sample *s = first + i;
-        const double factor = txp_e_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
+        txe_sample *s = first + i;
+        const double factor = txe_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
         s->ahead *= factor;
         s->right *= factor;
         line[i].x = x + s->ahead;
         line[i].y = s->right;
         x += s->step;
-        if (txp_e_tick(bar, 2)) return 0;
+        if (txe_tick(bar, 2)) return 0;
     }
-    return txp_e_directions(bench, count, 0, TXP_E_LIGHT + 1, 1, NULL, first, bar);
+    return txe_directions(bench, count, 0, TXE_LIGHT + 1, 1, NULL, first, bar);
 }
 
 /* does the crack from p to q run along the picture's border? */
-static int txp_e_on_border(const texpatch_edges *e, txm_vec2 p, txm_vec2 q) {
+static int txe_on_border(const texedges_set *e, txm_vec2 p, txm_vec2 q) {
     return (p.x == q.x && (p.x == 0 || p.x == (float)e->width)) ||
            (p.y == q.y && (p.y == 0 || p.y == (float)e->height));
 }
 
 /* Take in the parts of a line that lie inside the picture. 0 = cancelled. */
-static int txp_e_listen_line(txp_e_unrest *u, const txp_e_bench *bench, const texpatch_edges *e,
-                             const texpatch_polyline *line, txp_e_bar *bar) {
+static int txe_listen_line(txe_unrest *u, const txe_bench *bench, const texedges_set *e,
+                           const texedges_polyline *line, txe_bar *bar) {
     const txm_vec2 *p = e->points + line->first;
     size_t start = line->count, n = 0;
     for (size_t j = 0; j < line->count && start == line->count; j++) { /* the first on the border */
-        if (txp_e_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
+        if (txe_tick(bar, 1)) return 0;
     }
     const int is_closed = start == line->count;
     for (size_t k = 0; k < line->count; k++) {
         const size_t j = (start + k) % line->count, next = (j + 1) % line->count;
-        if (txp_e_on_border(e, p[j], p[next])) {
-            if (!txp_e_listen(u, bench, n, 0, bar)) return 0;
+        if (txe_on_border(e, p[j], p[next])) {
+            if (!txe_listen(u, bench, n, 0, bar)) return 0;
             n = 0;
         } else { /* the middle of the crack: so a slope of one pixel in one is a straight line */
             bench->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
             bench->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
             n++;
         }
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
     }
-    return txp_e_listen(u, bench, n, is_closed, bar);
+    return txe_listen(u, bench, n, is_closed, bar);
 }
 
 /* The unrest of a layer, amount times that of the exemplar, with memory from the arena. */
-static txm_status txp_e_listen_layer(txp_e_unrest *u, const texpatch_edges *e, int layer,
-                                     double amount, txm_arena *arena, txp_e_bar *bar,
-                                     txm_env *env) {
-    const size_t room = TXP_E_PIECE + TXP_E_JOIN;
-    txp_e_bench bench;
+static txm_status txe_listen_layer(txe_unrest *u, const texedges_set *e, int layer,
+                                   double amount, txm_arena *arena, txe_bar *bar,
+                                   txm_env *env) {
+    const size_t room = TXE_PIECE + TXE_JOIN;
+    txe_bench bench;
     size_t most = 0, longest = 0;
     double sum = 0;
     memset(u, 0, sizeof *u);
     u->amount = amount;
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
+        const texedges_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXE_SHORT) continue;
         most += line->count + room;
         if (line->count > longest) longest = line->count;
     }
     if (most == 0) return TXM_OK;
-    u->samples = (txp_e_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
+    u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
-    if (!u->samples || !u->starts || !txp_e_bench_make(&bench, arena, longest + room))
-        return txp_e_no_memory(env);
+    if (!u->samples || !u->starts || !txe_bench_make(&bench, arena, longest + room))
+        return txe_no_memory(env);
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
-        if (!txp_e_listen_line(u, &bench, e, line, bar)) return txp_e_stopped(env);
+        const texedges_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXE_SHORT) continue;
+        if (!txe_listen_line(u, &bench, e, line, bar)) return txe_stopped(env);
     }
-    for (int b = 0; b < TXP_E_BINS; b++) sum += u->share[b];
-    for (int b = 0; b < TXP_E_BINS && sum > 0; b++) u->share[b] /= sum;
+    for (int b = 0; b < TXE_BINS; b++) sum += u->share[b];
+    for (int b = 0; b < TXE_BINS && sum > 0; b++) u->share[b] /= sum;
     if (u->start_count) u->step /= (double)u->start_count;
     if (u->step < 0.125) u->step = 0.125; /* of a line that turns in place */
     return TXM_OK;
 }
 
-/* ---- control: new unrest out of pieces --------------------------------------------------- */
+/* ---- new unrest out of pieces ---------------------------------------------------------- */
 
-/* How badly TXP_E_JOIN samples go together: place and, as there are several, slope. */
-static double txp_e_gap(const txp_e_sample *a, const txp_e_sample *b) {
+/* How badly TXE_JOIN samples go together: place and, as there are several, slope. */
+static double txe_gap(const txe_sample *a, const txe_sample *b) {
     double sum = 0;
-    for (int j = 0; j < TXP_E_JOIN; j++) {
+    for (int j = 0; j < TXE_JOIN; j++) {
         const double ahead = a[j].ahead - b[j].ahead, right = a[j].right - b[j].right;
         sum += ahead * ahead + right * right;
     }
@@ -1238,33 +1238,33 @@ static double txp_e_gap(const txp_e_sample *a, const txp_e_sample *b) {
 }
 
 /* Let a piece begin where the tail of the last one is: the difference of their first samples is
-   taken back over TXP_E_JOIN samples. Fading from one to the other would even out both. */
-static void txp_e_join(const txp_e_sample *tail, txp_e_sample *piece) {
+   taken back over TXE_JOIN samples. Fading from one to the other would even out both. */
+static void txe_join(const txe_sample *tail, txe_sample *piece) {
     const double ahead = tail->ahead - piece->ahead, right = tail->right - piece->right;
-    for (int j = 0; j < TXP_E_JOIN; j++) {
-        const double part = 1 - j / (double)TXP_E_JOIN;
+    for (int j = 0; j < TXE_JOIN; j++) {
+        const double part = 1 - j / (double)TXE_JOIN;
         piece[j].ahead += ahead * part;
         piece[j].right += right * part;
     }
 }
 
 /* What the next piece of a row is chosen by. */
-typedef struct txp_e_row {
-    const txp_e_sample *tail; /* how the last piece would go on; NULL: there is none           */
+typedef struct txe_row {
+    const txe_sample *tail; /* how the last piece would go on; NULL: there is none           */
     double length;            /* of the line so far                                            */
-    double bins[TXP_E_BINS];  /* and of its parts by direction                                 */
-} txp_e_row;
+    double bins[TXE_BINS];  /* and of its parts by direction                                 */
+} txe_row;
 
 /* How far the directions are from their shares once a piece is there. */
-static double txp_e_deviation(const txp_e_row *row, const double *share, const txp_e_sample *piece,
-                              size_t length) {
-    double bins[TXP_E_BINS], total = row->length, sum = 0;
+static double txe_deviation(const txe_row *row, const double *share, const txe_sample *piece,
+                            size_t length) {
+    double bins[TXE_BINS], total = row->length, sum = 0;
     memcpy(bins, row->bins, sizeof bins);
     for (size_t j = 0; j < length; j++) {
         bins[piece[j].bin] += piece[j].length;
         total += piece[j].length;
     }
-    for (int b = 0; b < TXP_E_BINS; b++) {
+    for (int b = 0; b < TXE_BINS; b++) {
         const double off = bins[b] - share[b] * total;
         sum += off * off / (share[b] + 0.01);
     }
@@ -1274,16 +1274,16 @@ static double txp_e_deviation(const txp_e_row *row, const double *share, const t
 /* Choose a piece of this length: of some taken at random those that join best, to the tail and at
    the end to head (NULL: to nothing, one of the piece itself: to its own beginning); of these the
    one that brings the directions nearest to their shares. */
-static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, const txp_e_row *row,
-                                        size_t length, int closes, const txp_e_sample *head) {
-    const txp_e_sample *good[TXP_E_GOOD + 1] = {NULL}, *best;
-    double gaps[TXP_E_GOOD + 1] = {0}, least;
+static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe_row *row,
+                                    size_t length, int closes, const txe_sample *head) {
+    const txe_sample *good[TXE_GOOD + 1] = {NULL}, *best;
+    double gaps[TXE_GOOD + 1] = {0}, least;
     int count = 0;
-    for (int i = 0; i < TXP_E_TRIES * (closes ? 4 : 1); i++) {
+    for (int i = 0; i < TXE_TRIES * (closes ? 4 : 1); i++) {
         const size_t pick = (size_t)(txm_rng_double(rng) * (double)u->start_count);
-        const txp_e_sample *piece = u->samples + u->starts[pick];
-        double gap = row->tail ? txp_e_gap(row->tail, piece) : 0;
-        if (closes) gap += txp_e_gap(piece + length, head ? head : piece);
+        const txe_sample *piece = u->samples + u->starts[pick];
+        double gap = row->tail ? txe_gap(row->tail, piece) : 0;
+        if (closes) gap += txe_gap(piece + length, head ? head : piece);
         int at = count;
         for (; at > 0 && gap < gaps[at - 1]; at--) {
             gaps[at] = gaps[at - 1];
@@ -1291,12 +1291,12 @@ static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, con
         }
         gaps[at] = gap;
         good[at] = piece;
-        if (count < TXP_E_GOOD) count++;
+        if (count < TXE_GOOD) count++;
     }
     best = good[0];
-    least = closes ? 0 : txp_e_deviation(row, u->share, best, length);
+    least = closes ? 0 : txe_deviation(row, u->share, best, length);
     for (int i = 1; i < count && !closes; i++) {
-        const double off = txp_e_deviation(row, u->share, good[i], length);
+        const double off = txe_deviation(row, u->share, good[i], length);
         if (off >= least) continue;
         best = good[i];
         least = off;
@@ -1304,43 +1304,43 @@ static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, con
     return best;
 }
 
-/* String pieces together to a closed row of m samples, m >= TXP_E_PIECE / 3. 0 = cancelled. */
-static int txp_e_weave(const txp_e_unrest *u, txm_rng *rng, txp_e_sample *samples, size_t m,
-                       txp_e_bar *bar) {
-    const size_t shortest = TXP_E_PIECE / 3;
-    txp_e_row row;
+/* String pieces together to a closed row of m samples, m >= TXE_PIECE / 3. 0 = cancelled. */
+static int txe_weave(const txe_unrest *u, txm_rng *rng, txe_sample *samples, size_t m,
+                     txe_bar *bar) {
+    const size_t shortest = TXE_PIECE / 3;
+    txe_row row;
     memset(&row, 0, sizeof row);
     for (size_t k = 0; k < m;) {
         const size_t rest = m - k;
         size_t length = rest;
-        if (rest > TXP_E_PIECE)
-            length = shortest + txm_rng_below(rng, TXP_E_PIECE - (uint32_t)shortest + 1);
+        if (rest > TXE_PIECE)
+            length = shortest + txm_rng_below(rng, TXE_PIECE - (uint32_t)shortest + 1);
         if (length < rest && rest - length < shortest) length = rest - shortest;
-        const txp_e_sample *piece =
-            txp_e_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
+        const txe_sample *piece =
+            txe_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
         memcpy(samples + k, piece, length * sizeof *samples);
-        if (row.tail) txp_e_join(row.tail, samples + k);
+        if (row.tail) txe_join(row.tail, samples + k);
         for (size_t j = 0; j < length; j++) {
             row.bins[piece[j].bin] += piece[j].length;
             row.length += piece[j].length;
         }
         row.tail = piece + length;
         k += length;
-        if (txp_e_tick(bar, 64 * TXP_E_TRIES)) return 0;
+        if (txe_tick(bar, 64 * TXE_TRIES)) return 0;
     }
-    txp_e_join(row.tail, samples);
+    txe_join(row.tail, samples);
     return 1;
 }
 
-/* ---- control: disturbed strokes ---------------------------------------------------------- */
+/* ---- disturbed strokes ----------------------------------------------------------------- */
 
 /* Points of the outline of a stroke; with points NULL they are only counted. */
-typedef struct txp_e_outline {
-    txp_e_point *points;
+typedef struct txe_outline {
+    txe_point *points;
     size_t count;
-} txp_e_outline;
+} txe_outline;
 
-static void txp_e_put(txp_e_outline *o, double x, double y) {
+static void txe_put(txe_outline *o, double x, double y) {
     if (o->points) {
         o->points[o->count].x = x;
         o->points[o->count].y = y;
@@ -1350,15 +1350,15 @@ static void txp_e_put(txp_e_outline *o, double x, double y) {
 
 /* One side of a band around n points, to the left of the way (back: of the way back), and the round
    end behind it. Where the line turns outwards the gap is filled in steps of a pixel or so. */
-static int txp_e_side(const txp_e_point *p, size_t n, int back, double half, txp_e_outline *o,
-                      txp_e_bar *bar) {
-    txp_e_point d, before;
+static int txe_side(const txe_point *p, size_t n, int back, double half, txe_outline *o,
+                    txe_bar *bar) {
+    txe_point d, before;
     d.x = 1;
     d.y = 0;
     for (size_t i = 1; i < n; i++) { /* a direction to begin with */
         const size_t at = back ? n - i : i - 1, next = back ? at - 1 : at + 1;
-        if (txp_e_distance(p[at], p[next]) > 1e-9) {
-            txp_e_direction(p[at], p[next], &d);
+        if (txe_distance(p[at], p[next]) > 1e-9) {
+            txe_direction(p[at], p[next], &d);
             break;
         }
     }
@@ -1366,50 +1366,50 @@ static int txp_e_side(const txp_e_point *p, size_t n, int back, double half, txp
         const size_t at = back ? n - 1 - i : i;
         const size_t low = at > 2 ? at - 2 : 0, high = at + 2 < n ? at + 2 : n - 1;
         before = d;
-        txp_e_direction(p[back ? high : low], p[back ? low : high], &d);
-        const int turns = i ? (int)(half * txp_e_distance(before, d)) : 0;
+        txe_direction(p[back ? high : low], p[back ? low : high], &d);
+        const int turns = i ? (int)(half * txe_distance(before, d)) : 0;
         for (int k = 1; k <= turns; k++) {
-            txp_e_point mid, zero;
+            txe_point mid, zero;
             zero.x = zero.y = 0;
             mid = before;
-            txp_e_direction(zero, txp_e_between(before, d, (double)k / (turns + 1)), &mid);
-            txp_e_put(o, p[at].x + half * mid.y, p[at].y - half * mid.x);
+            txe_direction(zero, txe_between(before, d, (double)k / (turns + 1)), &mid);
+            txe_put(o, p[at].x + half * mid.y, p[at].y - half * mid.x);
         }
-        txp_e_put(o, p[at].x + half * d.y, p[at].y - half * d.x);
-        if (txp_e_tick(bar, (size_t)turns + 1)) return 0;
+        txe_put(o, p[at].x + half * d.y, p[at].y - half * d.x);
+        if (txe_tick(bar, (size_t)turns + 1)) return 0;
     }
     /* half a circle, in two quarters ((1 - t^2) u + 2 t v) / (1 + t^2), from left over ahead to
        right */
-    const txp_e_point end = p[back ? 0 : n - 1];
+    const txe_point end = p[back ? 0 : n - 1];
     const int steps = (int)(1.6 * half) + 1;
     for (int k = 1; k < 2 * steps; k++) {
         const double t = (double)(k < steps ? k : k - steps) / steps;
         const double c = half * (1 - t * t) / (1 + t * t), s = half * 2 * t / (1 + t * t);
         const double left = k < steps ? c : -s, ahead = k < steps ? s : c;
-        txp_e_put(o, end.x + left * d.y + ahead * d.x, end.y - left * d.x + ahead * d.y);
+        txe_put(o, end.x + left * d.y + ahead * d.x, end.y - left * d.x + ahead * d.y);
     }
-    return !txp_e_tick(bar, 4 * (size_t)steps);
+    return !txe_tick(bar, 4 * (size_t)steps);
 }
 
 /* The outline of a stroke as a closed line, its inside to the right: of a closed one, its points in
    the right order; of an open one, both sides of its band. */
-static txm_status txp_e_outline_make(const texpatch_stroke *s, txp_e_outline *o, txm_arena *arena,
-                                     txp_e_bar *bar, txm_env *env) {
+static txm_status txe_outline_make(const texedges_stroke *s, txe_outline *o, txm_arena *arena,
+                                   txe_bar *bar, txm_env *env) {
     const size_t n = (size_t)s->count;
-    txp_e_point *given = (txp_e_point *)txm_arena_alloc(arena, n, sizeof *given);
+    txe_point *given = (txe_point *)txm_arena_alloc(arena, n, sizeof *given);
     double area = 0;
-    if (!given) return txp_e_no_memory(env);
+    if (!given) return txe_no_memory(env);
     for (size_t i = 0; i < n; i++) {
         const txm_vec2 p = s->points[i], q = s->points[i + 1 < n ? i + 1 : 0], p0 = s->points[0];
         given[i].x = p.x;
         given[i].y = p.y;
         area += ((double)p.x - p0.x) * ((double)q.y - p0.y) -
                 ((double)q.x - p0.x) * ((double)p.y - p0.y);
-        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        if (txe_tick(bar, 1)) return txe_stopped(env);
     }
     if (s->is_closed) {
         for (size_t i = 0, j = n - 1; i < j && area < 0; i++, j--) {
-            const txp_e_point p = given[i];
+            const txe_point p = given[i];
             given[i] = given[j];
             given[j] = p;
         }
@@ -1417,38 +1417,38 @@ static txm_status txp_e_outline_make(const texpatch_stroke *s, txp_e_outline *o,
         o->count = n;
         return TXM_OK;
     }
-    const double length = txp_e_length(given, n, 0, bar);
-    if (length < 0) return txp_e_stopped(env);
+    const double length = txe_length(given, n, 0, bar);
+    if (length < 0) return txe_stopped(env);
     const size_t m = (size_t)length + 2;
-    txp_e_point *even = (txp_e_point *)txm_arena_alloc(arena, 2 * m, sizeof *even);
-    if (!even) return txp_e_no_memory(env);
-    if (!txp_e_resample(given, n, 0, length, even, m, bar) ||
-        !txp_e_soften(even, m, 0, TXP_E_CORNER, even + m, bar))
-        return txp_e_stopped(env);
+    txe_point *even = (txe_point *)txm_arena_alloc(arena, 2 * m, sizeof *even);
+    if (!even) return txe_no_memory(env);
+    if (!txe_resample(given, n, 0, length, even, m, bar) ||
+        !txe_soften(even, m, 0, TXE_CORNER, even + m, bar))
+        return txe_stopped(env);
     const double half = 0.5 * (s->width > 0 ? s->width : 8);
     for (int pass = 0; pass < 2; pass++) { /* count, then keep */
         o->points =
-            pass ? (txp_e_point *)txm_arena_alloc(arena, o->count, sizeof *o->points) : NULL;
-        if (pass && !o->points) return txp_e_no_memory(env);
+            pass ? (txe_point *)txm_arena_alloc(arena, o->count, sizeof *o->points) : NULL;
+        if (pass && !o->points) return txe_no_memory(env);
         o->count = 0;
-        if (!txp_e_side(even + m, m, 0, half, o, bar) || !txp_e_side(even + m, m, 1, half, o, bar))
-            return txp_e_stopped(env);
+        if (!txe_side(even + m, m, 0, half, o, bar) || !txe_side(even + m, m, 1, half, o, bar))
+            return txe_stopped(env);
     }
     return TXM_OK;
 }
 
 /* The place at u on a closed line of n points. */
-static txp_e_point txp_e_at(const txp_e_point *p, size_t n, double u) {
+static txe_point txe_at(const txe_point *p, size_t n, double u) {
     const double wide = (double)n;
     if (u < 0) u += wide;
     if (u >= wide) u -= wide;
     size_t i = (size_t)u;
     if (i >= n) i = n - 1;
-    return txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], u - (double)i);
+    return txe_between(p[i], p[i + 1 < n ? i + 1 : 0], u - (double)i);
 }
 
 /* Do the segments a b and c d cross? Touching does not count. */
-static int txp_e_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 *at) {
+static int txe_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 *at) {
     if (txm_maxf(a.x, b.x) < txm_minf(c.x, d.x) || txm_maxf(c.x, d.x) < txm_minf(a.x, b.x) ||
         txm_maxf(a.y, b.y) < txm_minf(c.y, d.y) || txm_maxf(c.y, d.y) < txm_minf(a.y, b.y))
         return 0;
@@ -1464,28 +1464,28 @@ static int txp_e_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 
     return 1;
 }
 
-/* Cut loops of fewer than TXP_E_LOOP points off a closed line: points are put on a stack; where the
+/* Cut loops of fewer than TXE_LOOP points off a closed line: points are put on a stack; where the
    segment to the next one crosses an earlier one, the stack goes back to that and on from where
    they cross. Then once more from another point, for loops through the first. Returns how many
    points remain; 0 = cancelled.
    scratch: room for n points */
-static size_t txp_e_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txp_e_bar *bar) {
+static size_t txe_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txe_bar *bar) {
     for (int round = 0; round < 2; round++) {
         const size_t turn = n / 2;
         size_t top = 0;
         for (size_t i = 0; i <= n; i++) { /* the last is the first again */
             const txm_vec2 next = points[(turn + i) % n];
-            for (size_t k = 2; top > k && k <= TXP_E_LOOP; k++) { /* youngest first: small loops */
+            for (size_t k = 2; top > k && k <= TXE_LOOP; k++) { /* youngest first: small loops */
                 const txm_vec2 *old = scratch + top - k - 1;
                 txm_vec2 at;
                 if (i == n && old == scratch) break; /* these two meet in the first point */
-                if (!txp_e_cross(scratch[top - 1], next, old[0], old[1], &at)) continue;
+                if (!txe_cross(scratch[top - 1], next, old[0], old[1], &at)) continue;
                 top -= k;
                 scratch[top++] = at;
                 k = 1;
             }
             if (i < n) scratch[top++] = next;
-            if (txp_e_tick(bar, TXP_E_LOOP)) return 0;
+            if (txe_tick(bar, TXE_LOOP)) return 0;
         }
         n = top;
         memcpy(points, scratch, n * sizeof *points);
@@ -1494,105 +1494,105 @@ static size_t txp_e_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txp_e_
 }
 
 /* The outline o disturbed by up to stray pixels, in memory from the arena. */
-static txm_status txp_e_shake(const txp_e_unrest *u, double stray, txm_rng *rng,
-                              const txp_e_outline *o, txm_vec2 **points, size_t *count,
-                              txm_arena *arena, txp_e_bar *bar, txm_env *env) {
-    const double length = txp_e_length(o->points, o->count, 1, bar);
-    if (length < 0) return txp_e_stopped(env);
+static txm_status txe_shake(const txe_unrest *u, double stray, txm_rng *rng,
+                            const txe_outline *o, txm_vec2 **points, size_t *count,
+                            txm_arena *arena, txe_bar *bar, txm_env *env) {
+    const double length = txe_length(o->points, o->count, 1, bar);
+    if (length < 0) return txe_stopped(env);
     if (stray > length / 16) stray = length / 16;
-    if (length > 4 * (double)TXP_E_LENGTH)
+    if (length > 4 * (double)TXE_LENGTH)
         return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "turn too often for their width");
-    const size_t n = length > 16 ? (size_t)(length + 0.5) : 16, shortest = TXP_E_PIECE / 3;
+    const size_t n = length > 16 ? (size_t)(length + 0.5) : 16, shortest = TXE_PIECE / 3;
     size_t m = (size_t)(length / u->step + 0.5);
     if (m < shortest) m = shortest;
-    txp_e_point *even = (txp_e_point *)txm_arena_alloc(arena, n, 2 * sizeof *even);
-    txp_e_sample *row = (txp_e_sample *)txm_arena_alloc(arena, m, sizeof *row);
+    txe_point *even = (txe_point *)txm_arena_alloc(arena, n, 2 * sizeof *even);
+    txe_sample *row = (txe_sample *)txm_arena_alloc(arena, m, sizeof *row);
     txm_vec2 *line = (txm_vec2 *)txm_arena_alloc(arena, m + 1, 2 * sizeof *line);
-    if (!even || !row || !line) return txp_e_no_memory(env);
-    const txp_e_point *soft = even + n;
-    const size_t corner = n < 8 * TXP_E_CORNER ? n / 8 : (size_t)TXP_E_CORNER;
-    if (!txp_e_resample(o->points, o->count, 1, length, even, n, bar) ||
-        !txp_e_soften(even, n, 1, corner, even + n, bar) || !txp_e_weave(u, rng, row, m, bar))
-        return txp_e_stopped(env);
+    if (!even || !row || !line) return txe_no_memory(env);
+    const txe_point *soft = even + n;
+    const size_t corner = n < 8 * TXE_CORNER ? n / 8 : (size_t)TXE_CORNER;
+    if (!txe_resample(o->points, o->count, 1, length, even, n, bar) ||
+        !txe_soften(even, n, 1, corner, even + n, bar) || !txe_weave(u, rng, row, m, bar))
+        return txe_stopped(env);
 
     double sum = 0, at = 0;
     for (size_t k = 0; k < m; k++) sum += row[k].step;
     const double stretch = sum > 0 ? (double)n / sum : 0; /* samples of the stroke for each step */
-    const double scale = stray / TXP_E_STRAY;
-    const double chord = n < 4 * TXP_E_CHORD ? (double)n / 4 : (double)TXP_E_CHORD;
-    txp_e_point direction;
+    const double scale = stray / TXE_STRAY;
+    const double chord = n < 4 * TXE_CHORD ? (double)n / 4 : (double)TXE_CHORD;
+    txe_point direction;
     direction.x = 1;
     direction.y = 0;
     for (size_t k = 0; k < m; k++) {
-        const txp_e_point p = txp_e_at(soft, n, at), given = txp_e_at(even, n, at);
-        txp_e_direction(txp_e_at(soft, n, at - chord), txp_e_at(soft, n, at + chord), &direction);
-        const double most = stray - txp_e_distance(p, given);
+        const txe_point p = txe_at(soft, n, at), given = txe_at(even, n, at);
+        txe_direction(txe_at(soft, n, at - chord), txe_at(soft, n, at + chord), &direction);
+        const double most = stray - txe_distance(p, given);
         const double ahead = row[k].ahead * scale, right = row[k].right * scale;
         const double off = sqrt(ahead * ahead + right * right);
         const double factor = off <= most ? 1 : most > 0 ? most / off : 0;
         line[k].x = txm_float(p.x + factor * (ahead * direction.x - right * direction.y));
         line[k].y = txm_float(p.y + factor * (ahead * direction.y + right * direction.x));
         at += row[k].step * stretch;
-        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+        if (txe_tick(bar, 4)) return txe_stopped(env);
     }
     *points = line;
-    *count = txp_e_unloop(line, m, line + m + 1, bar);
-    return *count ? TXM_OK : txp_e_stopped(env);
+    *count = txe_unloop(line, m, line + m + 1, bar);
+    return *count ? TXM_OK : txe_stopped(env);
 }
 
 /* One stroke: its line, in memory from `lines`. */
-static txm_status txp_e_stroke(const texpatch_control *c, int i, const txp_e_unrest *u,
-                               txm_vec2 **points, size_t *count, txm_arena *lines, txp_e_bar *bar,
-                               txm_env *env) {
-    const texpatch_stroke *s = &c->strokes[i];
+static txm_status txe_stroke(const texedges_control *c, int i, const txe_unrest *u,
+                             txm_vec2 **points, size_t *count, txm_arena *lines, txe_bar *bar,
+                             txm_env *env) {
+    const texedges_stroke *s = &c->strokes[i];
     const double width = s->is_closed ? 256 : s->width > 0 ? s->width : 8; /* sides must not meet */
-    const double stray = width < 8 ? width * TXP_E_STRAY / 8 : TXP_E_STRAY;
+    const double stray = width < 8 ? width * TXE_STRAY / 8 : TXE_STRAY;
     txm_arena work;
-    txp_e_outline o;
+    txe_outline o;
     txm_vec2 *made = NULL;
     txm_rng rng = txm_rng_make(c->seed, (uint64_t)i);
     txm_arena_init(&work, env);
     memset(&o, 0, sizeof o);
-    txm_status status = txp_e_outline_make(s, &o, &work, bar, env);
+    txm_status status = txe_outline_make(s, &o, &work, bar, env);
     const int is_still = c->disturb < 0 || u->start_count == 0;
     *count = o.count;
     if (status == TXM_OK && !is_still)
-        status = txp_e_shake(u, stray, &rng, &o, &made, count, &work, bar, env);
+        status = txe_shake(u, stray, &rng, &o, &made, count, &work, bar, env);
     if (status == TXM_OK) {
         *points = (txm_vec2 *)txm_arena_alloc(lines, *count, sizeof **points);
-        if (!*points) status = txp_e_no_memory(env);
+        if (!*points) status = txe_no_memory(env);
     }
     for (size_t k = 0; k < *count && status == TXM_OK; k++) {
         (*points)[k] =
             is_still ? txm_v2(txm_float(o.points[k].x), txm_float(o.points[k].y)) : made[k];
-        if (txp_e_tick(bar, 1)) status = txp_e_stopped(env);
+        if (txe_tick(bar, 1)) status = txe_stopped(env);
     }
     txm_arena_free(&work);
     return status;
 }
 
 /* All strokes, layer by layer, so that the unrest of one layer at a time is held. */
-static txm_status txp_e_disturb(const texpatch_control *c, txp_e_bar *bar, txm_arena *lines,
-                                texpatch_edges *e, txm_env *env) {
+static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena *lines,
+                              texedges_set *e, txm_env *env) {
     const size_t n = (size_t)c->stroke_count;
     txm_vec2 **points = (txm_vec2 **)txm_arena_alloc(lines, n, sizeof(txm_vec2 *));
-    e->lines = (texpatch_polyline *)txm_arena_zero(&e->memory, n, sizeof *e->lines);
-    if (n && (!points || !e->lines)) return txp_e_no_memory(env);
+    e->lines = (texedges_polyline *)txm_arena_zero(&e->memory, n, sizeof *e->lines);
+    if (n && (!points || !e->lines)) return txe_no_memory(env);
     for (int layer = 0; layer < e->levels; layer++) {
         txm_arena held;
-        txp_e_unrest u;
+        txe_unrest u;
         int is_used = 0;
         txm_status status = TXM_OK;
         memset(&u, 0, sizeof u);
         for (int i = 0; i < c->stroke_count; i++) is_used |= c->strokes[i].layer == layer;
         txm_arena_init(&held, env);
         if (is_used && c->disturb >= 0)
-            status = txp_e_listen_layer(&u, c->edges, layer, c->disturb > 0 ? c->disturb : 1, &held,
-                                        bar, env);
+            status = txe_listen_layer(&u, c->edges, layer, c->disturb > 0 ? c->disturb : 1, &held,
+                                      bar, env);
         for (int i = 0; i < c->stroke_count && status == TXM_OK && is_used; i++) {
             if (c->strokes[i].layer != layer) continue;
             e->lines[i].layer = layer;
-            status = txp_e_stroke(c, i, &u, &points[i], &e->lines[i].count, lines, bar, env);
+            status = txe_stroke(c, i, &u, &points[i], &e->lines[i].count, lines, bar, env);
         }
         txm_arena_free(&held);
         if (status != TXM_OK) return status;
@@ -1604,40 +1604,40 @@ static txm_status txp_e_disturb(const texpatch_control *c, txp_e_bar *bar, txm_a
     }
     if (n == 0) return TXM_OK;
     e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, e->point_count, sizeof *e->points);
-    if (!e->points) return txp_e_no_memory(env);
+    if (!e->points) return txe_no_memory(env);
     for (size_t i = 0; i < n; i++) {
         memcpy(e->points + e->lines[i].first, points[i], e->lines[i].count * sizeof *e->points);
-        if (txp_e_tick(bar, e->lines[i].count)) return txp_e_stopped(env);
+        if (txe_tick(bar, e->lines[i].count)) return txe_stopped(env);
     }
     return TXM_OK;
 }
 
-TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
-                                         txm_env *env, texpatch_edges *out) {
-    txp_e_bar bar;
+TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
+                                         txm_env *env, texedges_set *out) {
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     if (width < 1 || height < 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
-    if (width > TXP_E_SIDE || height > TXP_E_SIDE)
+    if (width > TXE_SIDE || height > TXE_SIDE)
         return txm_fail(env, TXM_TOO_LARGE, "a side is longer than 2^20 pixels");
-    txp_e_stage(&bar, "edges", 0.1, txp_e_points_of(control));
-    txm_status status = txp_e_check_control(control, &bar, env);
+    txe_stage(&bar, "edges", 0.1, txe_points_of(control));
+    txm_status status = txe_check_control(control, &bar, env);
     if (status != TXM_OK) return status;
 
     double work = 150 * (double)control->edges->point_count;
     for (int i = 0; i < control->stroke_count; i++) {
-        const texpatch_stroke *s = &control->strokes[i];
+        const texedges_stroke *s = &control->strokes[i];
         for (int k = 1; k < s->count; k++) {
             const txm_vec2 p = s->points[k - 1], q = s->points[k];
             const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
             work += 250 * sqrt(dx * dx + dy * dy);
         }
     }
-    txp_e_stage(&bar, "strokes", 1, work);
+    txe_stage(&bar, "strokes", 1, work);
     txm_arena lines;
-    texpatch_edges e;
+    texedges_set e;
     memset(&e, 0, sizeof e);
     e.levels = control->edges->levels;
     e.width = width;
@@ -1646,92 +1646,92 @@ TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int wi
     memcpy(e.beside, control->edges->beside, sizeof e.beside);
     txm_arena_init(&lines, env);
     txm_arena_init(&e.memory, env);
-    status = txp_e_disturb(control, &bar, &lines, &e, env);
+    status = txe_disturb(control, &bar, &lines, &e, env);
     txm_arena_free(&lines);
     if (status == TXM_OK) *out = e;
     else txm_arena_free(&e.memory);
     return status;
 }
 
-/* ---- control: the guide ------------------------------------------------------------------ */
+/* ---- the guide ------------------------------------------------------------------------- */
 
 /* The map that a guide is drawn from: layer + 1 of each pixel, 0 = nothing. */
-typedef struct txp_e_guide {
+typedef struct txe_guide {
     int width, height;
     uint8_t *at;
-} txp_e_guide;
+} txe_guide;
 
 /* Coordinates in 256ths of a pixel, in which all that follows is exact. */
-static int64_t txp_e_fixed(float x) {
+static int64_t txe_fixed(float x) {
     return (int64_t)floor((double)x * 256 + 0.5);
 }
 
 /* a / b rounded up, b > 0 */
-static int64_t txp_e_ceil(int64_t a, int64_t b) {
+static int64_t txe_ceil(int64_t a, int64_t b) {
     return a / b + (a % b > 0);
 }
 
 /* The rows whose centres a segment passes, in first..end-1, and where: its upper end counts, its
    lower one does not, so that a corner counts once and a level segment not at all. */
-typedef struct txp_e_slope {
+typedef struct txe_slope {
     int64_t x, y, dx, dy; /* of the upper end, and from there to the lower one */
     int first, end, down; /* down: 1 if the segment runs so, else 0             */
-} txp_e_slope;
+} txe_slope;
 
-static txp_e_slope txp_e_slope_of(txm_vec2 p, txm_vec2 q, int height) {
-    const int64_t px = txp_e_fixed(p.x), py = txp_e_fixed(p.y);
-    const int64_t qx = txp_e_fixed(q.x), qy = txp_e_fixed(q.y);
-    txp_e_slope s;
+static txe_slope txe_slope_of(txm_vec2 p, txm_vec2 q, int height) {
+    const int64_t px = txe_fixed(p.x), py = txe_fixed(p.y);
+    const int64_t qx = txe_fixed(q.x), qy = txe_fixed(q.y);
+    txe_slope s;
     s.down = py < qy;
     s.x = s.down ? px : qx;
     s.y = s.down ? py : qy;
     s.dx = s.down ? qx - px : px - qx;
     s.dy = s.down ? qy - py : py - qy;
-    const int64_t first = txp_e_ceil(s.y - 128, 256), end = txp_e_ceil(s.y + s.dy - 128, 256);
+    const int64_t first = txe_ceil(s.y - 128, 256), end = txe_ceil(s.y + s.dy - 128, 256);
     s.first = first < 0 ? 0 : first > height ? height : (int)first;
     s.end = end < s.first ? s.first : end > height ? height : (int)end;
     return s;
 }
 
 /* The first pixel of a row whose centre lies on the segment or to its right, 0..width. */
-static uint32_t txp_e_column(const txp_e_slope *s, int row, int width) {
+static uint32_t txe_column(const txe_slope *s, int row, int width) {
     const int64_t down = 256 * (int64_t)row + 128 - s->y;
-    const int64_t column = txp_e_ceil((s->x - 128) * s->dy + down * s->dx, 256 * s->dy);
+    const int64_t column = txe_ceil((s->x - 128) * s->dy + down * s->dx, 256 * s->dy);
     return (uint32_t)(column < 0 ? 0 : column > width ? width : column);
 }
 
 /* Fill the inside of a line (winding number not 0) with value. The places where it passes the rows'
    centres are listed by rows, each row is sorted by columns, and filled between them. */
-static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, int value,
-                             txm_arena *arena, txp_e_bar *bar, txm_env *env) {
+static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int value,
+                           txm_arena *arena, txe_bar *bar, txm_env *env) {
     int top = g->height, bottom = 0;
     size_t total = 0, longest = 0;
     for (size_t i = 0; i < n; i++) {
-        const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+        const txe_slope s = txe_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
         if (s.first < s.end && s.first < top) top = s.first;
         if (s.first < s.end && s.end > bottom) bottom = s.end;
         total += (size_t)(s.end - s.first);
-        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+        if (txe_tick(bar, 4)) return txe_stopped(env);
     }
     if (total == 0) return TXM_OK;
     /* next[r]: where the next passage of row top + r goes; in the end, where the row ends */
     const size_t rows = (size_t)(bottom - top);
     size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
     txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
-    if (!next || !list) return txp_e_no_memory(env);
+    if (!next || !list) return txe_no_memory(env);
     for (int pass = 0; pass < 2; pass++) {
         for (size_t i = 0; i < n; i++) {
-            const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+            const txe_slope s = txe_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
             for (int y = s.first; y < s.end; y++) {
                 size_t *at = &next[y - top];
                 if (pass) {
-                    list[*at].key = txp_e_column(&s, y, g->width);
+                    list[*at].key = txe_column(&s, y, g->width);
                     list[*at].value = (uint32_t)s.down;
                 }
                 ++*at;
-                if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+                if (txe_tick(bar, 4)) return txe_stopped(env);
             }
-            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            if (txe_tick(bar, 1)) return txe_stopped(env);
         }
         for (size_t r = 0, sum = 0; r < rows && pass == 0; r++) { /* from how many to where */
             const size_t count = next[r];
@@ -1741,7 +1741,7 @@ static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, 
         }
     }
     txm_pair *scratch = (txm_pair *)txm_arena_alloc(arena, longest, sizeof *scratch);
-    if (!scratch) return txp_e_no_memory(env);
+    if (!scratch) return txe_no_memory(env);
     for (size_t r = 0; r < rows; r++) {
         const size_t from = r ? next[r - 1] : 0, count = next[r] - from;
         uint8_t *row = g->at + (size_t)(top + (int)r) * (size_t)g->width;
@@ -1751,7 +1751,7 @@ static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, 
             winding += list[i].value ? 1 : -1;
             if (winding) memset(row + list[i].key, value, list[i + 1].key - list[i].key);
         }
-        if (txp_e_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txp_e_stopped(env);
+        if (txe_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txe_stopped(env);
     }
     return TXM_OK;
 }
@@ -1760,38 +1760,38 @@ static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, 
    pixel of a row first the distance to the nearest stroke in the row, then over the rows above and
    below the least sum of squares; of several as near the left, then the upper one.
    off, what: two bytes for each pixel. 0 = cancelled */
-static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uint8_t *what,
-                      txp_e_bar *bar) {
+static int txe_ring(const txe_guide *g, const int *beside, uint8_t *off, uint8_t *what,
+                    txe_bar *bar) {
     const size_t w = (size_t)g->width;
     for (int y = 0; y < g->height; y++) {
         const uint8_t *row = g->at + (size_t)y * w;
         uint8_t *distance = off + (size_t)y * w, *mark = what + (size_t)y * w;
-        int since = TXP_E_RING + 1, last = 0; /* how far back, and what */
+        int since = TXE_RING + 1, last = 0; /* how far back, and what */
         for (size_t x = 0; x < w; x++) {
-            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            since = row[x] ? 0 : since <= TXE_RING ? since + 1 : since;
             if (row[x]) last = row[x];
             distance[x] = (uint8_t)since;
             mark[x] = (uint8_t)last;
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
-        since = TXP_E_RING + 1;
+        since = TXE_RING + 1;
         for (size_t x = w; x-- > 0;) {
-            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            since = row[x] ? 0 : since <= TXE_RING ? since + 1 : since;
             if (row[x]) last = row[x];
             if (since < distance[x]) {
                 distance[x] = (uint8_t)since;
                 mark[x] = (uint8_t)last;
             }
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
     }
     for (int y = 0; y < g->height; y++) {
-        const int low = y > TXP_E_RING ? y - TXP_E_RING : 0;
-        const int high = y + TXP_E_RING < g->height ? y + TXP_E_RING : g->height - 1;
+        const int low = y > TXE_RING ? y - TXE_RING : 0;
+        const int high = y + TXE_RING < g->height ? y + TXE_RING : g->height - 1;
         for (size_t x = 0; x < w; x++) {
             uint8_t *at = g->at + (size_t)y * w + x;
-            int least = TXP_E_RING * TXP_E_RING + 1, mark = 0;
-            if (txp_e_tick(bar, 2)) return 0;
+            int least = TXE_RING * TXE_RING + 1, mark = 0;
+            if (txe_tick(bar, 2)) return 0;
             if (off[(size_t)y * w + x] == 0) continue; /* inside a stroke */
             for (int v = low; v <= high; v++) {
                 const int dx = off[(size_t)v * w + x], dy = v - y;
@@ -1800,7 +1800,7 @@ static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uin
                 mark = what[(size_t)v * w + x];
             }
             *at = (uint8_t)(mark ? beside[mark - 1] + 1 : 0);
-            if (txp_e_tick(bar, 8)) return 0;
+            if (txe_tick(bar, 8)) return 0;
         }
     }
     return 1;
@@ -1808,53 +1808,53 @@ static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uin
 
 /* Draw all lines, and what is around them. mask, what: with a free background two more bytes for
    each pixel, else NULL. In the end g holds grays, mask what there is to say. */
-static txm_status txp_e_guide_make(const texpatch_control *c, const texpatch_edges *lines,
-                                   const txp_e_guide *g, uint8_t *mask, uint8_t *what,
-                                   txp_e_bar *bar, txm_env *env) {
+static txm_status txe_guide_make(const texedges_control *c, const texedges_set *lines,
+                                 const txe_guide *g, uint8_t *mask, uint8_t *what,
+                                 txe_bar *bar, txm_env *env) {
     const size_t count = (size_t)g->width * (size_t)g->height;
     for (size_t i = 0; i < lines->line_count; i++) {
-        const texpatch_polyline *line = &lines->lines[i];
+        const texedges_polyline *line = &lines->lines[i];
         txm_arena work;
         txm_arena_init(&work, env);
-        const txm_status status = txp_e_fill(g, lines->points + line->first, line->count,
-                                             line->layer + 1, &work, bar, env);
+        const txm_status status = txe_fill(g, lines->points + line->first, line->count,
+                                           line->layer + 1, &work, bar, env);
         txm_arena_free(&work);
         if (status != TXM_OK) return status;
     }
-    txp_e_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
+    txe_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
     if (mask) {
-        int beside[TEXPATCH_MAX_LEVELS];
+        int beside[TEXEDGES_MAX_LEVELS];
         for (int k = 0; k < lines->levels; k++) { /* a layer that borders on none: any other one */
             beside[k] = c->edges->beside[k];
             if (beside[k] < 0) beside[k] = k ? k - 1 : 1;
         }
-        if (!txp_e_ring(g, beside, mask, what, bar)) return txp_e_stopped(env);
+        if (!txe_ring(g, beside, mask, what, bar)) return txe_stopped(env);
     }
     for (size_t i = 0; i < count; i++) {
         const int layer = g->at[i] ? g->at[i] - 1 : mask ? 0 : c->background;
         if (mask) mask[i] = g->at[i] ? 255 : 0;
         g->at[i] = (uint8_t)layer;
-        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        if (txe_tick(bar, 1)) return txe_stopped(env);
     }
-    return txp_e_show(g->at, count, lines->levels, bar) ? TXM_OK : txp_e_stopped(env);
+    return txe_show(g->at, count, lines->levels, bar) ? TXM_OK : txe_stopped(env);
 }
 
-TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
-                                               const texpatch_edges *disturbed, txm_env *env,
-                                               const txm_image *guide, const txm_image *mask) {
-    txp_e_bar bar;
+TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
+                                       const texedges_set *disturbed, txm_env *env,
+                                       const txm_image *guide, const txm_image *mask) {
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
-    txm_status status = txp_e_check_image(guide, "guide", 1, env);
-    if (status == TXM_OK) status = txp_e_check_image(mask, "mask", 1, env);
-    txp_e_stage(&bar, "edges", 0.2, txp_e_points_of(control));
-    if (status == TXM_OK) status = txp_e_check_control(control, &bar, env);
-    if (status == TXM_OK) status = txp_e_check_edges(disturbed, "disturbed", 0, &bar, env);
+    txm_status status = txe_check_image(guide, "guide", 1, env);
+    if (status == TXM_OK) status = txe_check_image(mask, "mask", 1, env);
+    txe_stage(&bar, "edges", 0.2, txe_points_of(control));
+    if (status == TXM_OK) status = txe_check_control(control, &bar, env);
+    if (status == TXM_OK) status = txe_check_edges(disturbed, "disturbed", 0, &bar, env);
     if (status != TXM_OK) return status;
     if (guide->width != disturbed->width || guide->height != disturbed->height ||
         mask->width != disturbed->width || mask->height != disturbed->height)
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "guide and mask must have the size that texpatch_disturb was given");
+                        "guide and mask must have the size that texedges_disturb was given");
     int same = disturbed->levels == control->edges->levels &&
                disturbed->line_count == (size_t)control->stroke_count;
     for (int i = 0; i < control->stroke_count && same; i++)
@@ -1866,16 +1866,16 @@ TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
     const size_t w = (size_t)guide->width, count = w * (size_t)guide->height;
     const int is_free = control->background < 0;
     txm_arena arena;
-    txp_e_guide g;
-    txp_e_stage(&bar, "strokes", 0.5, 30 * (double)disturbed->point_count);
+    txe_guide g;
+    txe_stage(&bar, "strokes", 0.5, 30 * (double)disturbed->point_count);
     txm_arena_init(&arena, env);
     g.width = guide->width;
     g.height = guide->height;
     g.at = (uint8_t *)txm_arena_zero(&arena, count, is_free ? 3 : 1);
     uint8_t *told = g.at && is_free ? g.at + count : NULL;
     status =
-        g.at ? txp_e_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
-             : txp_e_no_memory(env);
+        g.at ? txe_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
+             : txe_no_memory(env);
     for (int y = 0; y < g.height && g.at && status == TXM_OK; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(mask, y);
         memcpy(txm_image_row(guide, y), g.at + (size_t)y * w, w);

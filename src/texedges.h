@@ -25,17 +25,17 @@ extern "C" {
 
 /* ---- layered edges ----------------------------------------------------------------------- */
 
-enum { TEXPATCH_MAX_LEVELS = 16 };
+enum { TEXEDGES_MAX_LEVELS = 16 };
 
 /* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
    value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1). */
-typedef struct texpatch_polyline {
+typedef struct texedges_polyline {
     int layer;        /* 0..levels-1: this is a boundary of that layer                        */
     int is_hole;      /* the layer lies outside it                                            */
     size_t first;     /* its points are points[first .. first + count - 1], closed: the last is
                          joined to the first                                                  */
     size_t count;
-} texpatch_polyline;
+} texedges_polyline;
 
 /* Found lines run along the cracks between pixels, a point at each pixel corner that they pass.
    The layer lies to the right of the way (outer boundaries run clockwise as seen, holes the other
@@ -49,24 +49,24 @@ typedef struct texpatch_polyline {
      +---+---+  the two pixels of layer k have a line each; the two
      | k |      others too, whether of one layer or not
      +---+                                                                                    */
-typedef struct texpatch_edges {
+typedef struct texedges_set {
     int levels, width, height;
-    float thresholds[TEXPATCH_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
-    int beside[TEXPATCH_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
+    float thresholds[TEXEDGES_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
+    int beside[TEXEDGES_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
                                         none, it has no boundary but the picture's              */
-    texpatch_polyline *lines;
+    texedges_polyline *lines;
     size_t line_count;
     txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
                          top left pixel                                                        */
     size_t point_count;
     txm_arena memory; /* belongs to the header                                                 */
-} texpatch_edges;
+} texedges_set;
 
 /* What to find. All zero but the image is a good default. */
-typedef struct texpatch_edges_desc {
+typedef struct texedges_desc {
     txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
                         samples as they are, cut off at 0 and 1; alpha is not looked at        */
-    int levels;      /* 2..TEXPATCH_MAX_LEVELS; 0 = 4, as the paper has it                     */
+    int levels;      /* 2..TEXEDGES_MAX_LEVELS; 0 = 4, as the paper has it                     */
     float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
                         1 to 3                                                                 */
     int least;       /* regions whose boundary (holes and the picture's border included) is shorter
@@ -74,24 +74,24 @@ typedef struct texpatch_edges_desc {
                         it with, the shortest first; 0 = all are kept                          */
     const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
                         have about the same area, at the emptiest gray near there */
-} texpatch_edges_desc;
+} texedges_desc;
 
 /* Find the boundaries of all layers.
 
    env    NULL, or how to allocate, report and cancel
-   out    receives them; release it with texpatch_edges_free. Untouched after an error
+   out    receives them; release it with texedges_set_free. Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
           TXM_TOO_LARGE above TEXEDGES_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
           TXM_CANCELLED
    cost   O(pixels (1 + smooth + log least)) time, about 0.2 us a pixel; 13 bytes a pixel while it
           works (9 without least, 5 without both), and the result: 8 bytes for each point, of which
           there are up to four a pixel, and 24 for each line                                   */
-TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
-                                            texpatch_edges *out);
+TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env,
+                                      texedges_set *out);
 
 /* Release edges, which are all zero then; NULL and all zero are allowed. Of several copies of the
    struct only one may be released. */
-TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges);
+TEXEDGES_API void texedges_set_free(texedges_set *edges);
 
 /* The layer of each pixel of a picture, by the thresholds of edges, as a gray value: layer k is
    255 k / (levels - 1), rounded. It serves as the guide of an exemplar (see control edges).
@@ -99,69 +99,69 @@ TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges);
    desc   image, smooth and least are looked at; with those that edges were found with, the layers
           change exactly where its lines run
    layers TXM_U8, 1 channel, the size of the picture; untouched after an error
-   return as texpatch_edges_find
-   cost   as texpatch_edges_find; 13 bytes a pixel                                             */
-TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
-                                        const texpatch_edges *edges, txm_env *env,
+   return as texedges_find
+   cost   as texedges_find; 13 bytes a pixel                                             */
+TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
+                                        const texedges_set *edges, txm_env *env,
                                         const txm_image *layers);
 
 /* Draw boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
    wide, on the layer's own side; colours run from dark to light with the layers, in one channel the
    gray. What lies outside of the picture is not drawn.
    cost   a byte for each pixel; O(pixels + length of the lines) time                           */
-TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
-                                            const txm_image *image);
+TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
+                                      const txm_image *image);
 
 /* ---- control edges ----------------------------------------------------------------------- */
 
 /* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. Where it is closed,
    its inside becomes the layer; an open one becomes a band of the layer, as wide as width says,
    with round ends. */
-typedef struct texpatch_stroke {
+typedef struct texedges_stroke {
     const txm_vec2 *points; /* count of them, 2 or more (closed: 3), not all the same, in pixels of
                                the output; they may lie outside it, up to 2^20                  */
     int count;
     int is_closed;
     int layer;   /* 0..levels-1: what lies within                                               */
     float width; /* of an open stroke, pixels, 2..256; 0 = 8                                    */
-} texpatch_stroke;
+} texedges_stroke;
 
-typedef struct texpatch_control {
-    const texpatch_edges *edges; /* of the exemplar, from texpatch_edges_find                   */
-    const texpatch_stroke *strokes;
+typedef struct texedges_control {
+    const texedges_set *edges; /* of the exemplar, from texedges_find                   */
+    const texedges_stroke *strokes;
     int stroke_count;  /* 0 or more                                                             */
     int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but
                           next to a stroke not the stroke's own layer */
     float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
                           -1 = none                                                             */
     uint64_t seed;     /* another seed, another unrest                                          */
-} texpatch_control;
+} texedges_control;
 
 /* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the
    way in which those stray from their own smooth course are strung together along the stroke.
 
    out    receives one closed line for each stroke, in their order (of an open stroke: around its
           band), inside to the right; levels, thresholds and beside are the exemplar's, width and
-          height those given. Release it with texpatch_edges_free; untouched after an error.
+          height those given. Release it with texedges_set_free; untouched after an error.
           A line strays from its stroke (the edge of its band) by 4 pixels at most; less from short
           strokes and narrow bands, by 1/16 of the length and 7/16 of the width. Where the stroke
           turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
           cross itself. Of a layer without edges of 64 pixels in the exemplar, and with disturb =
           -1, it is the stroke itself
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
-          edges that texpatch_edges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
+          edges that texedges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
           pixels; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(edges + length of the strokes) time, about 1 us for each pixel of either; 200 bytes for
           each pixel of the longest stroke (its band's outline), 30 for each of all, 100 for each of
           the edges of a layer                                                                 */
-TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int width, int height,
-                                         txm_env *env, texpatch_edges *out);
+TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
+                                         txm_env *env, texedges_set *out);
 
 /* The guide that makes a job follow the strokes, for texpatch_desc.guide and .guide_mask; the
-   exemplars' counterpart is texpatch_layers's picture.
+   exemplars' counterpart is texedges_layers's picture.
 
-   disturbed  what texpatch_disturb made of the same control
-   guide  TXM_U8, 1 channel, the size given to texpatch_disturb: the gray of the layer. Pixels whose
+   disturbed  what texedges_disturb made of the same control
+   guide  TXM_U8, 1 channel, the size given to texedges_disturb: the gray of the layer. Pixels whose
           centre lies inside a line (winding number not 0; of a centre on the line, that to its
           right or below is inside) have the stroke's layer, the last stroke on top. With
           background = -1, up to 8 pixels outside of the strokes it is the layer that the nearest
@@ -172,9 +172,9 @@ TEXEDGES_API txm_status texpatch_disturb(const texpatch_control *control, int wi
           guide and mask are untouched
    cost   O(pixels + area and height of the strokes) time, about 50 ns a pixel; 3 bytes a pixel and
           24 for each row that a stroke's line crosses                                           */
-TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
-                                               const texpatch_edges *disturbed, txm_env *env,
-                                               const txm_image *guide, const txm_image *mask);
+TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
+                                       const texedges_set *disturbed, txm_env *env,
+                                       const txm_image *guide, const txm_image *mask);
 
 #ifdef __cplusplus
 }

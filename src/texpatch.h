@@ -46,7 +46,7 @@
                           a part anew, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
      texpatch_edges_...   the layers of a picture and their boundaries, as lines and as pictures;
-                          with texpatch_disturb and texpatch_control_guide strokes become edges
+                          with texedges_disturb and texedges_guide strokes become edges
      texpatch_half        coarser levels of a result
      texsyn.h makes stochastic texture out of a model of a few kB instead of pieces of the
      photograph; textiles.h cuts sets of tiles that are laid when the picture is drawn.

@@ -42,8 +42,8 @@ static const float by_number[15] = {0.5f / 255,  1.5f / 255,  2.5f / 255,  3.5f 
                                     8.5f / 255,  9.5f / 255,  10.5f / 255, 11.5f / 255,
                                     12.5f / 255, 13.5f / 255, 14.5f / 255};
 
-static inline texpatch_edges_desc desc_of(txm_image image, int levels, const float *thresholds) {
-    texpatch_edges_desc d;
+static inline texedges_desc desc_of(txm_image image, int levels, const float *thresholds) {
+    texedges_desc d;
     memset(&d, 0, sizeof d);
     d.image = image;
     d.levels = levels;
@@ -51,21 +51,21 @@ static inline texpatch_edges_desc desc_of(txm_image image, int levels, const flo
     return d;
 }
 
-static inline texpatch_edges find(const texpatch_edges_desc *desc) {
+static inline texedges_set find(const texedges_desc *desc) {
     txm_env env = {0};
-    texpatch_edges e;
-    const txm_status status = texpatch_edges_find(desc, &env, &e);
+    texedges_set e;
+    const txm_status status = texedges_find(desc, &env, &e);
     if (status != TXM_OK) fail_msg("find: %d, %s", status, env.message);
     return e;
 }
 
 /* edges of a picture that holds the numbers of its layers */
-static inline texpatch_edges find_numbers(uint8_t *pixels, int width, int height, int levels) {
-    const texpatch_edges_desc d = desc_of(gray(pixels, width, height), levels, by_number);
+static inline texedges_set find_numbers(uint8_t *pixels, int width, int height, int levels) {
+    const texedges_desc d = desc_of(gray(pixels, width, height), levels, by_number);
     return find(&d);
 }
 
-static inline double area_of(const texpatch_edges *e, const texpatch_polyline *line) {
+static inline double area_of(const texedges_set *e, const texedges_polyline *line) {
     double sum = 0;
     for (size_t j = 0; j < line->count; j++) {
         const txm_vec2 p = e->points[line->first + j];
@@ -115,7 +115,7 @@ static inline int is_untouched(const void *bytes, size_t count) {
 enum { CIRCLE = 400, WIDE = 512 };
 
 /* A circle, a clover, a wave: gentle strokes of this layer. */
-static inline int draw_strokes(texpatch_stroke strokes[3], int layer) {
+static inline int draw_strokes(texedges_stroke strokes[3], int layer) {
     static txm_vec2 circle[CIRCLE], clover[CIRCLE], wave[CIRCLE];
     for (int i = 0; i < CIRCLE; i++) {
         const double a = 2 * TXM_PI * i / CIRCLE, r = 95 + 22 * sin(3 * a), t = i / (CIRCLE - 1.0);
@@ -134,9 +134,9 @@ static inline int draw_strokes(texpatch_stroke strokes[3], int layer) {
     return 3;
 }
 
-static inline texpatch_control control_of(const texpatch_edges *edges, const texpatch_stroke *strokes,
-                                   int count) {
-    texpatch_control c;
+static inline texedges_control control_of(const texedges_set *edges, const texedges_stroke *strokes,
+                                          int count) {
+    texedges_control c;
     memset(&c, 0, sizeof c);
     c.edges = edges;
     c.strokes = strokes;
@@ -144,20 +144,20 @@ static inline texpatch_control control_of(const texpatch_edges *edges, const tex
     return c;
 }
 
-static inline texpatch_edges disturb(const texpatch_control *control, int width, int height) {
+static inline texedges_set disturb(const texedges_control *control, int width, int height) {
     txm_env env = {0};
-    texpatch_edges e;
-    const txm_status status = texpatch_disturb(control, width, height, &env, &e);
+    texedges_set e;
+    const txm_status status = texedges_disturb(control, width, height, &env, &e);
     if (status != TXM_OK) fail_msg("disturb: %d, %s", status, env.message);
     return e;
 }
 
-static inline void guide_of(const texpatch_control *control, const texpatch_edges *lines, uint8_t *guide,
-                     uint8_t *mask) {
+static inline void guide_of(const texedges_control *control, const texedges_set *lines,
+                            uint8_t *guide, uint8_t *mask) {
     txm_env env = {0};
     const txm_image g = gray(guide, lines->width, lines->height);
     const txm_image m = gray(mask, lines->width, lines->height);
-    const txm_status status = texpatch_control_guide(control, lines, &env, &g, &m);
+    const txm_status status = texedges_guide(control, lines, &env, &g, &m);
     if (status != TXM_OK) fail_msg("guide: %d, %s", status, env.message);
 }
 

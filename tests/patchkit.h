@@ -290,8 +290,8 @@ static inline texpatch_exemplar exemplar_of(const txm_image *maps) {
     return e;
 }
 
-static inline texpatch_desc desc_of(const texpatch_exemplar *exemplars, int count, int maps, int width,
-                             int height) {
+static inline texpatch_desc desc_of(const texpatch_exemplar *exemplars, int count, int maps,
+                                    int width, int height) {
     texpatch_desc d;
     memset(&d, 0, sizeof d);
     d.exemplars = exemplars;
@@ -338,7 +338,7 @@ static inline void run_but_one(texpatch_job *job, const texpatch_desc *desc) {
 }
 
 static inline txm_image drawn(const texpatch_job *job, int map, const txm_image *like, int width,
-                       int height) {
+                              int height) {
     txm_env env = {0};
     const txm_image out = new_image(width, height, like->channels, like->sample);
     const txm_status status = texpatch_draw(job, map, 0, 0, &env, out);

@@ -8,15 +8,15 @@
 /* ---- what must hold --------------------------------------------------------------------- */
 
 /* Everything that must hold for the boundaries of a map of layers. */
-static void check_lines(const texpatch_edges *e, const uint8_t *layer) {
+static void check_lines(const texedges_set *e, const uint8_t *layer) {
     const int w = e->width, h = e->height;
     /* how often each side of each crack is run through: right, down, left, up from a corner */
     uint8_t *used = (uint8_t *)calloc((size_t)(w + 1) * (size_t)(h + 1), 4);
-    double area[TEXPATCH_MAX_LEVELS] = {0}, pixels[TEXPATCH_MAX_LEVELS] = {0};
+    double area[TEXEDGES_MAX_LEVELS] = {0}, pixels[TEXEDGES_MAX_LEVELS] = {0};
     size_t points = 0, cracks = 0;
     static const int dx[4] = {1, 0, -1, 0}, dy[4] = {0, 1, 0, -1};
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
+        const texedges_polyline *line = &e->lines[i];
         assert_int_equal(line->first, points);
         points += line->count;
         assert_true(line->count >= 4 && line->layer >= 0 && line->layer < e->levels);
@@ -65,12 +65,12 @@ static void check_lines(const texpatch_edges *e, const uint8_t *layer) {
 
 /* No line crosses itself or another: at each corner the ways in and out of all lines, turned by a
    hair to the right where they share a crack, must not interleave. */
-static void check_no_crossing(const texpatch_edges *e) {
+static void check_no_crossing(const texedges_set *e) {
     const int w = e->width + 1;
     uint8_t *passes = (uint8_t *)calloc((size_t)w * (size_t)(e->height + 1), 4 * 2);
     uint8_t *count = (uint8_t *)calloc((size_t)w * (size_t)(e->height + 1), 1);
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
+        const texedges_polyline *line = &e->lines[i];
         const txm_vec2 *p = e->points + line->first;
         for (size_t j = 0; j < line->count; j++) {
             const txm_vec2 a = p[(j + line->count - 1) % line->count], b = p[j];
@@ -111,7 +111,7 @@ static void test_disc(void **state) {
         pixels[i] = x * x + y * y <= 15 * 15;
         area += pixels[i];
     }
-    texpatch_edges e = find_numbers(pixels, 64, 48, 2);
+    texedges_set e = find_numbers(pixels, 64, 48, 2);
     check_lines(&e, pixels);
     check_no_crossing(&e);
     assert_int_equal(e.line_count, 3); /* the picture's border, the hole in it, the disc */
@@ -125,10 +125,10 @@ static void test_disc(void **state) {
     assert_true(e.points[e.lines[2].first].x == 30 && e.points[e.lines[2].first].y == 5);
     assert_int_equal(e.beside[0], 1);
     assert_int_equal(e.beside[1], 0);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
     assert_null(e.lines);
-    texpatch_edges_free(&e);
-    texpatch_edges_free(NULL);
+    texedges_set_free(&e);
+    texedges_set_free(NULL);
 }
 
 static void test_rings(void **state) {
@@ -140,26 +140,26 @@ static void test_rings(void **state) {
         const int r = (int)(sqrt(x * x + y * y) / 9);
         pixels[i] = (uint8_t)(r < 5 ? r % 3 : 0);
     }
-    texpatch_edges e = find_numbers(pixels, 96, 96, 3);
+    texedges_set e = find_numbers(pixels, 96, 96, 3);
     check_lines(&e, pixels);
     check_no_crossing(&e);
     assert_int_equal(e.line_count, 11);
     for (size_t i = 0; i < e.line_count; i++) holes += e.lines[i].is_hole;
     assert_int_equal(holes, 5);
     assert_int_equal(e.beside[2], 0); /* outside of a ring is longer than inside */
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
 /* Pixels that meet at a corner do not belong together, whoever asks. */
 static void test_saddles(void **state) {
     (void)state;
     uint8_t two[4] = {1, 0, 0, 1};
-    texpatch_edges e = find_numbers(two, 2, 2, 2);
+    texedges_set e = find_numbers(two, 2, 2, 2);
     check_lines(&e, two);
     check_no_crossing(&e);
     assert_int_equal(e.line_count, 4);
     for (size_t i = 0; i < 4; i++) assert_int_equal(e.lines[i].count, 4);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 
     static uint8_t board[20 * 20];
     for (int i = 0; i < 400; i++) board[i] = (uint8_t)((i % 20 + i / 20) & 1);
@@ -167,7 +167,7 @@ static void test_saddles(void **state) {
     check_lines(&e, board);
     check_no_crossing(&e);
     assert_int_equal(e.line_count, 400);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 
     /* a ring that closes at a corner only: inside and outside of it are one line */
     uint8_t ring[25] = {0, 0, 0, 0, 0, /* */
@@ -183,22 +183,22 @@ static void test_saddles(void **state) {
     int ring_lines = 0;
     for (size_t i = 0; i < e.line_count; i++) ring_lines += e.lines[i].layer == 1;
     assert_int_equal(ring_lines, 1);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
 static void test_whole_picture(void **state) {
     (void)state;
     uint8_t one = 77;
     static uint8_t plain[30 * 20];
-    texpatch_edges_desc d = desc_of(gray(&one, 1, 1), 0, NULL);
-    texpatch_edges e = find(&d);
+    texedges_desc d = desc_of(gray(&one, 1, 1), 0, NULL);
+    texedges_set e = find(&d);
     assert_int_equal(e.levels, 4);
     assert_int_equal(e.line_count, 1);
     assert_int_equal(e.point_count, 4);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
     for (int v = 0; v < 256; v += 51) { /* whatever its gray: rising thresholds, one layer */
         memset(plain, v, sizeof plain);
-        for (int levels = 2; levels <= TEXPATCH_MAX_LEVELS; levels++) {
+        for (int levels = 2; levels <= TEXEDGES_MAX_LEVELS; levels++) {
             d = desc_of(gray(plain, 30, 20), levels, NULL);
             d.smooth = 3;
             d.least = 1000000;
@@ -207,7 +207,7 @@ static void test_whole_picture(void **state) {
             assert_int_equal(e.lines[0].count, 100);
             for (int k = 1; k < levels - 1; k++) assert_true(e.thresholds[k] > e.thresholds[k - 1]);
             for (int k = 0; k < levels; k++) assert_int_equal(e.beside[k], -1);
-            texpatch_edges_free(&e);
+            texedges_set_free(&e);
         }
     }
 }
@@ -230,12 +230,12 @@ static void test_random_pictures(void **state) {
     txm_rng rng = txm_rng_make(5, 0);
     for (int i = 0; i < 200; i++) {
         const int width = txm_rng_range(&rng, 1, 64), height = txm_rng_range(&rng, 1, 64);
-        const int levels = txm_rng_range(&rng, 2, TEXPATCH_MAX_LEVELS);
+        const int levels = txm_rng_range(&rng, 2, TEXEDGES_MAX_LEVELS);
         draw_random(pixels, width, height, levels, txm_rng_range(&rng, 1, 4), &rng);
-        texpatch_edges e = find_numbers(pixels, width, height, levels);
+        texedges_set e = find_numbers(pixels, width, height, levels);
         check_lines(&e, pixels);
         check_no_crossing(&e);
-        texpatch_edges_free(&e);
+        texedges_set_free(&e);
     }
 }
 
@@ -269,7 +269,8 @@ static int count_short(const uint8_t *layer, int width, int height, int least) {
     return found;
 }
 
-/* Small regions go to their surroundings until none is left; texpatch_layers agrees with the lines. */
+/* Small regions go to their surroundings until none is left; texedges_layers agrees with the
+   lines. */
 static void test_least(void **state) {
     (void)state;
     static uint8_t pixels[64 * 64], shown[64 * 64], numbers[64 * 64];
@@ -279,11 +280,11 @@ static void test_least(void **state) {
         const int levels = txm_rng_range(&rng, 2, 6);
         const int least = txm_rng_range(&rng, 0, i % 4 ? 40 : 400);
         draw_random(pixels, width, height, levels, txm_rng_range(&rng, 1, 4), &rng);
-        texpatch_edges_desc d = desc_of(gray(pixels, width, height), levels, by_number);
+        texedges_desc d = desc_of(gray(pixels, width, height), levels, by_number);
         d.least = least;
-        texpatch_edges e = find(&d);
+        texedges_set e = find(&d);
         const txm_image to = gray(shown, width, height);
-        assert_int_equal(texpatch_layers(&d, &e, NULL, &to), TXM_OK);
+        assert_int_equal(texedges_layers(&d, &e, NULL, &to), TXM_OK);
         for (int p = 0; p < width * height; p++) {
             numbers[p] = (uint8_t)((shown[p] * (levels - 1) + 127) / 255);
             assert_int_equal(shown[p], (int)(255.0 * numbers[p] / (levels - 1) + 0.5));
@@ -292,7 +293,7 @@ static void test_least(void **state) {
         if (least <= 4) assert_memory_equal(numbers, pixels, (size_t)(width * height));
         check_lines(&e, numbers);
         check_no_crossing(&e);
-        texpatch_edges_free(&e);
+        texedges_set_free(&e);
     }
 
     /* a small region goes to the layer that it shares most with: two sides of 3 against one each */
@@ -302,13 +303,13 @@ static void test_least(void **state) {
         for (int x = 5; x < 9; x++) one[9 * y + x] = 2;
     }
     one[9 * 4 + 4] = 1;
-    texpatch_edges_desc d = desc_of(gray(one, 9, 9), 3, by_number);
+    texedges_desc d = desc_of(gray(one, 9, 9), 3, by_number);
     d.least = 5;
-    texpatch_edges e = find(&d);
+    texedges_set e = find(&d);
     assert_int_equal(e.line_count, 2);
     assert_int_equal(e.lines[0].layer, 0);
     assert_int_equal(e.lines[0].count, 2 * (9 + 5));
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
 /* ---- gray and thresholds ---------------------------------------------------------------- */
@@ -319,15 +320,15 @@ static void test_thresholds(void **state) {
     draw_blobs(pixels, SIDE, 3, 0.3);
     for (int levels = 2; levels <= 8; levels++) {
         double area[8] = {0};
-        const texpatch_edges_desc d = desc_of(gray(pixels, SIDE, SIDE), levels, NULL);
-        texpatch_edges e = find(&d);
+        const texedges_desc d = desc_of(gray(pixels, SIDE, SIDE), levels, NULL);
+        texedges_set e = find(&d);
         for (size_t i = 0; i < e.line_count; i++)
             area[e.lines[i].layer] += area_of(&e, &e.lines[i]);
         for (int k = 0; k < levels; k++) { /* each threshold up to a quarter of a layer off */
             assert_true(area[k] >= 0.5 * SIDE * SIDE / levels);
             assert_true(area[k] <= 1.5 * SIDE * SIDE / levels);
         }
-        texpatch_edges_free(&e);
+        texedges_set_free(&e);
     }
 
     /* two heaps with a gap between them, not in the middle: the gap's middle is found */
@@ -336,10 +337,10 @@ static void test_thresholds(void **state) {
         const int first = txm_rng_below(&rng, 100) < 55;
         pixels[i] = (uint8_t)txm_rng_range(&rng, first ? 10 : 120, first ? 80 : 240);
     }
-    texpatch_edges_desc d = desc_of(gray(pixels, SIDE, SIDE), 2, NULL);
-    texpatch_edges e = find(&d);
+    texedges_desc d = desc_of(gray(pixels, SIDE, SIDE), 2, NULL);
+    texedges_set e = find(&d);
     assert_true(e.thresholds[0] > 95 / 255.0f && e.thresholds[0] < 105 / 255.0f);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 
     /* the value itself belongs to the upper layer */
     uint8_t row[3] = {127, 128, 129};
@@ -349,7 +350,7 @@ static void test_thresholds(void **state) {
     assert_int_equal(e.line_count, 2);
     assert_int_equal(e.lines[0].count, 4);
     assert_int_equal(e.lines[1].count, 6);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
 /* The same picture in all formats has the same edges. */
@@ -360,10 +361,10 @@ static void test_formats(void **state) {
     static uint16_t words[W * H * 4];
     static float floats[W * H * 4];
     for (int i = 0; i < W * H; i++) plain[i] = (uint8_t)(255 * noise(9, 9, i % W, i / W));
-    texpatch_edges_desc d = desc_of(gray(plain, W, H), 3, NULL);
+    texedges_desc d = desc_of(gray(plain, W, H), 3, NULL);
     d.smooth = 1.5f;
     d.least = 12;
-    texpatch_edges e = find(&d);
+    texedges_set e = find(&d);
     for (int channels = 1; channels <= 4; channels++) {
         for (int sample = 0; sample < 3; sample++) {
             txm_rng rng = txm_rng_make(1, 1);
@@ -382,15 +383,15 @@ static void test_formats(void **state) {
             void *of[3] = {bytes, words, floats};
             d.image = view(of[sample], W, H, channels, kind);
             if (sample == 0) d.image.stride = (W + 3) * channels;
-            texpatch_edges other = find(&d);
+            texedges_set other = find(&d);
             assert_int_equal(other.line_count, e.line_count);
             assert_int_equal(other.point_count, e.point_count);
             assert_memory_equal(other.points, e.points, e.point_count * sizeof *e.points);
             assert_memory_equal(other.lines, e.lines, e.line_count * sizeof *e.lines);
-            texpatch_edges_free(&other);
+            texedges_set_free(&other);
         }
     }
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 
     /* gray is the luma, cut off at 0 and 1 */
     float rgb[4 * 3] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 9, -9, 9};
@@ -400,7 +401,7 @@ static void test_formats(void **state) {
         d = desc_of(view(rgb + 3 * i, 1, 1, 3, TXM_F32), 4, marks);
         e = find(&d);
         assert_int_equal(e.lines[0].layer, expected[i]);
-        texpatch_edges_free(&e);
+        texedges_set_free(&e);
     }
 }
 
@@ -412,28 +413,28 @@ static void test_smooth(void **state) {
     for (int i = 0; i < 64 * 64; i++) pixels[i] = (uint8_t)txm_rng_below(&rng, 256);
     for (int r = 0; r <= 16; r += 4) { /* the more blur, the less edge */
         const float half = 0.5f;
-        texpatch_edges_desc d = desc_of(gray(pixels, 64, 64), 2, &half);
+        texedges_desc d = desc_of(gray(pixels, 64, 64), 2, &half);
         d.smooth = (float)r;
-        texpatch_edges e = find(&d);
+        texedges_set e = find(&d);
         assert_true(e.point_count < last);
         last = e.point_count;
-        texpatch_edges_free(&e);
+        texedges_set_free(&e);
     }
     /* a point becomes a pyramid: with radius 2 the weights are 1/3 2/3 1 2/3 1/3 over 3 */
     memset(pixels, 0, sizeof pixels);
     pixels[32 * 64 + 32] = 255;
     float marks[2] = {1.5f / 81, 3.5f / 81};
-    texpatch_edges_desc d = desc_of(gray(pixels, 64, 64), 3, marks);
+    texedges_desc d = desc_of(gray(pixels, 64, 64), 3, marks);
     d.smooth = 2;
-    texpatch_edges e = find(&d);
+    texedges_set e = find(&d);
     const txm_image to = gray(layers, 64, 64);
-    assert_int_equal(texpatch_layers(&d, &e, NULL, &to), TXM_OK);
+    assert_int_equal(texedges_layers(&d, &e, NULL, &to), TXM_OK);
     for (int i = 0; i < 64 * 64; i++) {
         const int x = abs(i % 64 - 32), y = abs(i / 64 - 32);
         const int weight = x > 2 || y > 2 ? 0 : (3 - x) * (3 - y);
         assert_int_equal(layers[i], weight < 2 ? 0 : weight < 4 ? 128 : 255);
     }
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
 /* ---- drawing ---------------------------------------------------------------------------- */
@@ -444,15 +445,15 @@ static void test_draw(void **state) {
     static uint8_t layer[W * H], one[W * H], three[(W + 1) * H * 3];
     txm_rng rng = txm_rng_make(4, 4);
     draw_random(layer, W, H, 3, 5, &rng);
-    texpatch_edges e = find_numbers(layer, W, H, 3);
+    texedges_set e = find_numbers(layer, W, H, 3);
     for (int wanted = -1; wanted < 3; wanted++) {
         memset(one, 7, sizeof one);
         memset(three, 7, sizeof three);
         const txm_image to = gray(one, W, H);
         txm_image rgb = view(three, W, H, 3, TXM_U8);
         rgb.stride = (W + 1) * 3;
-        assert_int_equal(texpatch_edges_draw(&e, wanted, NULL, &to), TXM_OK);
-        assert_int_equal(texpatch_edges_draw(&e, wanted, NULL, &rgb), TXM_OK);
+        assert_int_equal(texedges_draw(&e, wanted, NULL, &to), TXM_OK);
+        assert_int_equal(texedges_draw(&e, wanted, NULL, &rgb), TXM_OK);
         for (int i = 0; i < W * H; i++) { /* the pixels along the cracks, no others */
             const int x = i % W, y = i / W, k = layer[i];
             const int inner = x > 0 && layer[i - 1] == k && x + 1 < W && layer[i + 1] == k &&
@@ -468,10 +469,10 @@ static void test_draw(void **state) {
     memset(small, 7, sizeof small);
     memset(one, 7, sizeof one);
     const txm_image to = gray(one, W, H), part = gray(small, 10, 10);
-    assert_int_equal(texpatch_edges_draw(&e, -1, NULL, &to), TXM_OK);
-    assert_int_equal(texpatch_edges_draw(&e, -1, NULL, &part), TXM_OK);
+    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_OK);
+    assert_int_equal(texedges_draw(&e, -1, NULL, &part), TXM_OK);
     for (int y = 0; y < 10; y++) assert_memory_equal(small + 10 * y, one + W * y, 10);
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
 /* ---- all tests -------------------------------------------------------------------------- */

@@ -7,25 +7,25 @@
 
 /* ---- bad input -------------------------------------------------------------------------- */
 
-static void refuse_find(const texpatch_edges_desc *d, txm_status expected) {
+static void refuse_find(const texedges_desc *d, txm_status expected) {
     txm_env env = {0};
-    texpatch_edges e;
+    texedges_set e;
     memset(&e, FILL, sizeof e);
-    const txm_status status = texpatch_edges_find(d, &env, &e);
+    const txm_status status = texedges_find(d, &env, &e);
     if (status != expected) fail_msg("%d, not %d: %s", status, expected, env.message);
     assert_true(is_untouched(&e, sizeof e));
     assert_true(env.message[0] != 0);
-    assert_int_equal(texpatch_edges_find(d, NULL, &e), expected);
+    assert_int_equal(texedges_find(d, NULL, &e), expected);
 }
 
 static void test_find_refuses(void **state) {
     (void)state;
     static uint8_t pixels[16 * 16], layers[16 * 16];
     float floats[4] = {0, 0.5f, NAN, 1}, steep[3] = {0.2f, 0.2f, 0.4f};
-    const texpatch_edges_desc good = desc_of(gray(pixels, 16, 16), 4, NULL);
-    texpatch_edges_desc d = good;
+    const texedges_desc good = desc_of(gray(pixels, 16, 16), 4, NULL);
+    texedges_desc d = good;
     refuse_find(NULL, TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_edges_find(&d, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_find(&d, NULL, NULL), TXM_BAD_ARGUMENT);
     d.image.pixels = NULL;
     refuse_find(&d, TXM_BAD_ARGUMENT);
     static const int levels[5] = {1, -1, 17, INT_MAX, INT_MIN};
@@ -66,52 +66,52 @@ static void test_find_refuses(void **state) {
     refuse_find(&d, TXM_TOO_LARGE);
 
     /* layers and draw */
-    texpatch_edges e = find(&good), odd = e;
+    texedges_set e = find(&good), odd = e;
     memset(layers, FILL, sizeof layers);
     txm_image to = gray(layers, 16, 16);
-    assert_int_equal(texpatch_layers(NULL, &e, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_layers(&good, NULL, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_layers(&good, &e, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(NULL, &e, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, NULL, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, &e, NULL, NULL), TXM_BAD_ARGUMENT);
     odd.levels = 1;
-    assert_int_equal(texpatch_layers(&good, &odd, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, &odd, NULL, &to), TXM_BAD_ARGUMENT);
     odd = e;
     odd.thresholds[1] = NAN;
-    assert_int_equal(texpatch_layers(&good, &odd, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, &odd, NULL, &to), TXM_BAD_ARGUMENT);
     to.height = 15;
-    assert_int_equal(texpatch_layers(&good, &e, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, &e, NULL, &to), TXM_BAD_ARGUMENT);
     to = view(layers, 16, 8, 2, TXM_U8);
-    assert_int_equal(texpatch_layers(&good, &e, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, &e, NULL, &to), TXM_BAD_ARGUMENT);
 
     to = gray(layers, 16, 16);
-    assert_int_equal(texpatch_edges_draw(NULL, -1, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_edges_draw(&e, -1, NULL, NULL), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_edges_draw(&e, -2, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_edges_draw(&e, 4, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(NULL, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&e, -1, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&e, -2, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&e, 4, NULL, &to), TXM_BAD_ARGUMENT);
     to = view(layers, 8, 8, 4, TXM_U8);
-    assert_int_equal(texpatch_edges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
     to = gray(layers, 16, 16);
     odd = e;
     odd.point_count--;
-    assert_int_equal(texpatch_edges_draw(&odd, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&odd, -1, NULL, &to), TXM_BAD_ARGUMENT);
     odd = e;
     odd.lines = NULL;
-    assert_int_equal(texpatch_edges_draw(&odd, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&odd, -1, NULL, &to), TXM_BAD_ARGUMENT);
     odd = e;
     const txm_vec2 kept = e.points[3];
     e.points[3].x = NAN;
-    assert_int_equal(texpatch_edges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
     e.points[3].x = 1e30f;
-    assert_int_equal(texpatch_edges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
     e.points[3] = kept;
     assert_true(is_untouched(layers, sizeof layers));
-    texpatch_edges_free(&e);
+    texedges_set_free(&e);
 }
 
-static void refuse_control(const texpatch_control *c, int width, int height, txm_status expected) {
+static void refuse_control(const texedges_control *c, int width, int height, txm_status expected) {
     txm_env env = {0};
-    texpatch_edges e;
+    texedges_set e;
     memset(&e, FILL, sizeof e);
-    const txm_status status = texpatch_disturb(c, width, height, &env, &e);
+    const txm_status status = texedges_disturb(c, width, height, &env, &e);
     if (status != expected) fail_msg("%d, not %d: %s", status, expected, env.message);
     assert_true(is_untouched(&e, sizeof e));
     assert_true(env.message[0] != 0);
@@ -121,19 +121,19 @@ static void test_control_refuses(void **state) {
     (void)state;
     static uint8_t pixels[64 * 64], bytes[2][64 * 64];
     for (int i = 0; i < 64 * 64; i++) pixels[i] = (uint8_t)(i % 64 / 32);
-    texpatch_edges e = find_numbers(pixels, 64, 64, 2), odd = e;
+    texedges_set e = find_numbers(pixels, 64, 64, 2), odd = e;
     txm_vec2 points[4] = {{5, 5}, {40, 8}, {42, 44}, {9, 40}};
-    texpatch_stroke good_stroke, s;
+    texedges_stroke good_stroke, s;
     memset(&good_stroke, 0, sizeof good_stroke);
     good_stroke.points = points;
     good_stroke.count = 4;
     good_stroke.is_closed = 1;
     s = good_stroke;
-    const texpatch_control good = control_of(&e, &s, 1);
-    texpatch_control c = good;
+    const texedges_control good = control_of(&e, &s, 1);
+    texedges_control c = good;
 
     refuse_control(NULL, 64, 64, TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_disturb(&c, 64, 64, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_disturb(&c, 64, 64, NULL, NULL), TXM_BAD_ARGUMENT);
     refuse_control(&c, 0, 64, TXM_BAD_ARGUMENT);
     refuse_control(&c, 64, -1, TXM_BAD_ARGUMENT);
     refuse_control(&c, INT_MAX, 64, TXM_TOO_LARGE);
@@ -211,25 +211,25 @@ static void test_control_refuses(void **state) {
     e.points[5] = kept;
 
     /* the guide */
-    texpatch_edges lines = disturb(&good, 64, 64);
+    texedges_set lines = disturb(&good, 64, 64);
     memset(bytes, FILL, sizeof bytes);
     txm_image guide = gray(bytes[0], 64, 64), mask = gray(bytes[1], 64, 64);
-    assert_int_equal(texpatch_control_guide(NULL, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_control_guide(&good, NULL, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_control_guide(&good, &lines, NULL, NULL, &mask), TXM_BAD_ARGUMENT);
-    assert_int_equal(texpatch_control_guide(&good, &lines, NULL, &guide, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(NULL, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, NULL, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, &lines, NULL, NULL, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, NULL), TXM_BAD_ARGUMENT);
     mask.height = 63;
-    assert_int_equal(texpatch_control_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     mask = view(bytes[1], 32, 64, 2, TXM_U8);
-    assert_int_equal(texpatch_control_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     mask = gray(bytes[1], 64, 64);
     lines.lines[0].layer = 1;
-    assert_int_equal(texpatch_control_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     lines.lines[0].layer = 0;
-    assert_int_equal(texpatch_control_guide(&good, &e, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, &e, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     assert_true(is_untouched(bytes, sizeof bytes));
-    texpatch_edges_free(&lines);
-    texpatch_edges_free(&e);
+    texedges_set_free(&lines);
+    texedges_set_free(&e);
 }
 
 /* ---- misfortune ------------------------------------------------------------------------- */
@@ -237,33 +237,33 @@ static void test_control_refuses(void **state) {
 /* One of the five functions on a fixed task; *untouched: its output is as before. */
 typedef struct task {
     int which;
-    texpatch_edges_desc desc;
-    texpatch_edges blobs, lines;
-    texpatch_stroke strokes[3];
-    texpatch_control control;
+    texedges_desc desc;
+    texedges_set blobs, lines;
+    texedges_stroke strokes[3];
+    texedges_control control;
 } task;
 
 static uint8_t task_pixels[192 * 192], task_out[2][320 * 320];
 
 static txm_status run_task(task *t, txm_env *env, int *untouched) {
-    texpatch_edges e;
+    texedges_set e;
     const int side = 192;
     txm_image to = gray(task_out[0], side, side);
     txm_status status = TXM_OK;
     memset(&e, FILL, sizeof e);
     memset(task_out, FILL, sizeof task_out);
     switch (t->which) {
-    case 0: status = texpatch_edges_find(&t->desc, env, &e); break;
-    case 1: status = texpatch_layers(&t->desc, &t->blobs, env, &to); break;
-    case 2: status = texpatch_edges_draw(&t->blobs, -1, env, &to); break;
-    case 3: status = texpatch_disturb(&t->control, 320, 320, env, &e); break;
+    case 0: status = texedges_find(&t->desc, env, &e); break;
+    case 1: status = texedges_layers(&t->desc, &t->blobs, env, &to); break;
+    case 2: status = texedges_draw(&t->blobs, -1, env, &to); break;
+    case 3: status = texedges_disturb(&t->control, 320, 320, env, &e); break;
     default: {
         const txm_image guide = gray(task_out[0], 320, 320), mask = gray(task_out[1], 320, 320);
-        status = texpatch_control_guide(&t->control, &t->lines, env, &guide, &mask);
+        status = texedges_guide(&t->control, &t->lines, env, &guide, &mask);
     }
     }
     *untouched = is_untouched(&e, sizeof e) && is_untouched(task_out, sizeof task_out);
-    if (status == TXM_OK && (t->which == 0 || t->which == 3)) texpatch_edges_free(&e);
+    if (status == TXM_OK && (t->which == 0 || t->which == 3)) texedges_set_free(&e);
     return status;
 }
 
@@ -321,8 +321,8 @@ static void test_misfortune(void **state) {
             assert_true(untouched);
         }
     }
-    texpatch_edges_free(&t.lines);
-    texpatch_edges_free(&t.blobs);
+    texedges_set_free(&t.lines);
+    texedges_set_free(&t.blobs);
 }
 
 /* What is held while it works, per pixel, is what the header promises. */
@@ -341,8 +341,8 @@ static void test_memory(void **state) {
         if (t.which == 2) assert_true(peak < 1.5 * pixels + 1000);
         if (t.which == 4) assert_true(peak < 4 * out + 1000);
     }
-    texpatch_edges_free(&t.lines);
-    texpatch_edges_free(&t.blobs);
+    texedges_set_free(&t.lines);
+    texedges_set_free(&t.blobs);
 }
 
 /* ---- all tests -------------------------------------------------------------------------- */

@@ -22,7 +22,7 @@ static double distance_to(const txm_vec2 *p, int count, int is_closed, double x,
 }
 
 /* from a point to the outline of a stroke: of an open one, to the edge of its band */
-static double distance_to_stroke(const texpatch_stroke *s, double x, double y) {
+static double distance_to_stroke(const texedges_stroke *s, double x, double y) {
     const double d = distance_to(s->points, s->count, s->is_closed, x, y);
     return s->is_closed ? d : fabs(d - 0.5 * (s->width > 0 ? s->width : 8));
 }
@@ -49,10 +49,10 @@ static int count_crossings(const txm_vec2 *p, size_t n) {
 }
 
 /* The exemplar that the strokes below take after, 4 layers. */
-static texpatch_edges find_blobs(uint64_t seed, double rough) {
+static texedges_set find_blobs(uint64_t seed, double rough) {
     static uint8_t pixels[SIDE * SIDE];
     draw_blobs(pixels, SIDE, seed, rough);
-    texpatch_edges_desc d = desc_of(gray(pixels, SIDE, SIDE), 4, NULL);
+    texedges_desc d = desc_of(gray(pixels, SIDE, SIDE), 4, NULL);
     d.least = 24;
     return find(&d);
 }
@@ -60,19 +60,19 @@ static texpatch_edges find_blobs(uint64_t seed, double rough) {
 static void test_disturb(void **state) {
     (void)state;
     static uint8_t guide[WIDE * WIDE], mask[WIDE * WIDE];
-    texpatch_edges blobs = find_blobs(1, 0.3);
-    texpatch_stroke strokes[3];
+    texedges_set blobs = find_blobs(1, 0.3);
+    texedges_stroke strokes[3];
     for (int layer = 0; layer < 4; layer++) {
-        texpatch_control c = control_of(&blobs, strokes, draw_strokes(strokes, layer));
+        texedges_control c = control_of(&blobs, strokes, draw_strokes(strokes, layer));
         c.background = layer ? 0 : 3;
         c.seed = 1 + (uint64_t)layer;
-        texpatch_edges lines = disturb(&c, WIDE, WIDE);
+        texedges_set lines = disturb(&c, WIDE, WIDE);
         assert_int_equal(lines.line_count, 3);
         assert_true(lines.width == WIDE && lines.height == WIDE && lines.levels == 4);
         assert_memory_equal(lines.thresholds, blobs.thresholds, sizeof lines.thresholds);
         double strays = 0, points = 0;
         for (int i = 0; i < 3; i++) {
-            const texpatch_polyline *line = &lines.lines[i];
+            const texedges_polyline *line = &lines.lines[i];
             const txm_vec2 *p = lines.points + line->first;
             assert_int_equal(line->layer, layer);
             assert_int_equal(line->is_hole, 0);
@@ -96,7 +96,7 @@ static void test_disturb(void **state) {
         /* the guide's edge is where the strokes are: on both sides of 90 % of their length */
         guide_of(&c, &lines, guide, mask);
         for (int i = 0; i < 3; i++) {
-            const texpatch_stroke *s = &strokes[i];
+            const texedges_stroke *s = &strokes[i];
             int near = 0;
             for (int j = 0; j < s->count; j++) {
                 const double reach = 4 + (s->is_closed ? 0 : 0.5 * s->width);
@@ -115,9 +115,9 @@ static void test_disturb(void **state) {
             }
             assert_true(near >= 0.9 * s->count);
         }
-        texpatch_edges_free(&lines);
+        texedges_set_free(&lines);
     }
-    texpatch_edges_free(&blobs);
+    texedges_set_free(&blobs);
 }
 
 /* Strokes as people draw them: corners, hairpins, knots, out of the picture, tiny, crossing. */
@@ -125,11 +125,11 @@ static void test_disturb_anything(void **state) {
     (void)state;
     static uint8_t guide[200 * 160], mask[200 * 160];
     static txm_vec2 points[200];
-    texpatch_edges blobs = find_blobs(2, 0.5);
+    texedges_set blobs = find_blobs(2, 0.5);
     txm_rng rng = txm_rng_make(3, 3);
     double worst = 0;
     for (int i = 0; i < 150; i++) {
-        texpatch_stroke s;
+        texedges_stroke s;
         memset(&s, 0, sizeof s);
         s.points = points;
         s.is_closed = (int)txm_rng_below(&rng, 2);
@@ -145,10 +145,10 @@ static void test_disturb_anything(void **state) {
                                    points[j - 1].y + txm_rng_float(&rng) - 0.5f);
         }
         points[1].x += 1; /* not all the same */
-        texpatch_control c = control_of(&blobs, &s, 1);
+        texedges_control c = control_of(&blobs, &s, 1);
         c.disturb = i % 4 == 3 ? 4.0f : 0;
         c.background = -1;
-        texpatch_edges lines = disturb(&c, 200, 160);
+        texedges_set lines = disturb(&c, 200, 160);
         assert_int_equal(lines.line_count, 1);
         assert_true(lines.lines[0].count >= 2);
         for (size_t j = 0; j < lines.point_count && s.is_closed; j++) {
@@ -166,26 +166,26 @@ static void test_disturb_anything(void **state) {
             if (d - half > worst) worst = d - half;
         }
         guide_of(&c, &lines, guide, mask);
-        texpatch_edges_free(&lines);
+        texedges_set_free(&lines);
     }
     if (!(worst <= 4)) fail_msg("a line strays by %g", worst);
-    texpatch_edges_free(&blobs);
+    texedges_set_free(&blobs);
 }
 
 static void test_disturb_seeds(void **state) {
     (void)state;
-    texpatch_edges blobs = find_blobs(1, 0.3);
-    texpatch_stroke strokes[3];
-    texpatch_control c = control_of(&blobs, strokes, draw_strokes(strokes, 1));
-    texpatch_edges a = disturb(&c, WIDE, WIDE), b = disturb(&c, WIDE, WIDE);
+    texedges_set blobs = find_blobs(1, 0.3);
+    texedges_stroke strokes[3];
+    texedges_control c = control_of(&blobs, strokes, draw_strokes(strokes, 1));
+    texedges_set a = disturb(&c, WIDE, WIDE), b = disturb(&c, WIDE, WIDE);
     assert_int_equal(a.point_count, b.point_count);
     assert_memory_equal(a.points, b.points, a.point_count * sizeof *a.points);
     c.seed = 1;
-    texpatch_edges other = disturb(&c, WIDE, WIDE);
+    texedges_set other = disturb(&c, WIDE, WIDE);
     assert_true(other.point_count != a.point_count ||
                 memcmp(other.points, a.points, a.point_count * sizeof *a.points) != 0);
-    texpatch_edges_free(&b);
-    texpatch_edges_free(&other);
+    texedges_set_free(&b);
+    texedges_set_free(&other);
 
     /* a stroke's line does not depend on the others' layers, nor on how the edges were made */
     c.seed = 0;
@@ -193,7 +193,7 @@ static void test_disturb_seeds(void **state) {
     b = disturb(&c, WIDE, WIDE);
     assert_int_equal(a.lines[0].count, b.lines[0].count);
     assert_memory_equal(a.points, b.points, a.lines[0].count * sizeof *a.points);
-    texpatch_edges_free(&b);
+    texedges_set_free(&b);
 
     /* more and less of it */
     double stray[3];
@@ -204,21 +204,21 @@ static void test_disturb_seeds(void **state) {
         for (size_t j = 0; j < b.lines[0].count; j++)
             stray[k] += distance_to_stroke(&strokes[0], b.points[j].x, b.points[j].y) /
                         (double)b.lines[0].count;
-        texpatch_edges_free(&b);
+        texedges_set_free(&b);
     }
     assert_true(stray[0] < 0.5 * stray[1] && stray[1] < stray[2]);
-    texpatch_edges_free(&a);
-    texpatch_edges_free(&blobs);
+    texedges_set_free(&a);
+    texedges_set_free(&blobs);
 }
 
 /* Without disturbance, or without edges in the exemplar, the line is the stroke itself. */
 static void test_disturb_none(void **state) {
     (void)state;
     static uint8_t plain[64 * 64];
-    texpatch_edges none = find_numbers(plain, 64, 64, 3), blobs = find_blobs(1, 0.3);
+    texedges_set none = find_numbers(plain, 64, 64, 3), blobs = find_blobs(1, 0.3);
     const txm_vec2 square[4] = {{10, 10}, {10, 50}, {50, 50}, {50, 10}}; /* counterclockwise */
     const txm_vec2 segment[2] = {{20, 30}, {60, 30}};
-    texpatch_stroke strokes[2];
+    texedges_stroke strokes[2];
     memset(strokes, 0, sizeof strokes);
     strokes[0].points = square;
     strokes[0].count = 4;
@@ -228,28 +228,28 @@ static void test_disturb_none(void **state) {
     strokes[1].count = 2;
     strokes[1].layer = 1;
     for (int k = 0; k < 2; k++) {
-        texpatch_control c = control_of(k ? &blobs : &none, strokes, 2);
+        texedges_control c = control_of(k ? &blobs : &none, strokes, 2);
         c.disturb = k ? -1.0f : 0;
-        texpatch_edges lines = disturb(&c, 80, 60);
+        texedges_set lines = disturb(&c, 80, 60);
         assert_int_equal(lines.lines[0].count, 4);
         for (int j = 0; j < 4; j++)
             assert_memory_equal(&lines.points[j], &square[3 - j], sizeof *square);
-        const texpatch_polyline *band = &lines.lines[1];
+        const texedges_polyline *band = &lines.lines[1];
         for (size_t j = 0; j < band->count; j++) {
             const txm_vec2 p = lines.points[band->first + j];
             assert_true(fabs(distance_to(segment, 2, 0, p.x, p.y) - 4) < 1e-3);
         }
         const double expected = 40 * 8 + TXM_PI * 16, area = area_of(&lines, band);
         assert_true(fabs(area - expected) < 0.01 * expected);
-        texpatch_edges_free(&lines);
+        texedges_set_free(&lines);
     }
-    texpatch_control c = control_of(&blobs, NULL, 0); /* no strokes at all */
-    texpatch_edges lines = disturb(&c, 80, 60);
+    texedges_control c = control_of(&blobs, NULL, 0); /* no strokes at all */
+    texedges_set lines = disturb(&c, 80, 60);
     assert_int_equal(lines.line_count, 0);
     assert_int_equal(lines.point_count, 0);
-    texpatch_edges_free(&lines);
-    texpatch_edges_free(&none);
-    texpatch_edges_free(&blobs);
+    texedges_set_free(&lines);
+    texedges_set_free(&none);
+    texedges_set_free(&blobs);
 }
 
 /* ---- statistics ------------------------------------------------------------------------- */
@@ -309,11 +309,11 @@ static void count_directions(double *x, double *y, int n, int is_closed, double 
 }
 
 /* the edges of a layer, those along the picture's border left out */
-static void count_edges(const texpatch_edges *e, int layer, double bins[2][BINS]) {
+static void count_edges(const texedges_set *e, int layer, double bins[2][BINS]) {
     static double x[40000], y[40000];
     memset(bins, 0, 2 * sizeof bins[0]);
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
+        const texedges_polyline *line = &e->lines[i];
         const txm_vec2 *p = e->points + line->first;
         const int count = (int)line->count;
         int start = -1, n = 0;
@@ -364,18 +364,18 @@ static void test_statistics(void **state) {
     for (int round = 0; round < 3; round++) {
         static uint8_t pixels[384 * 384];
         draw_blobs(pixels, 384, 5 + (uint64_t)round, 0.2 + 0.1 * round);
-        texpatch_edges_desc d = desc_of(gray(pixels, 384, 384), 2, NULL);
+        texedges_desc d = desc_of(gray(pixels, 384, 384), 2, NULL);
         d.least = 24;
-        texpatch_edges e = find(&d);
+        texedges_set e = find(&d);
         for (int layer = 0; layer < 2; layer++) {
             double halves[2][BINS], all[BINS], lines[BINS] = {0}, drawn[BINS] = {0}, bins[2][BINS];
-            texpatch_stroke strokes[3];
+            texedges_stroke strokes[3];
             count_edges(&e, layer, halves);
             for (int b = 0; b < BINS; b++) all[b] = halves[0][b] + halves[1][b];
-            texpatch_control c = control_of(&e, strokes, draw_strokes(strokes, layer));
+            texedges_control c = control_of(&e, strokes, draw_strokes(strokes, layer));
             c.background = 1 - layer;
             for (c.seed = 0; c.seed < 4; c.seed++) {
-                texpatch_edges o = disturb(&c, WIDE, WIDE);
+                texedges_set o = disturb(&c, WIDE, WIDE);
                 for (size_t i = 0; i < o.line_count; i++) {
                     memset(bins, 0, sizeof bins);
                     for (size_t j = 0; j < o.lines[i].count; j++) {
@@ -386,12 +386,12 @@ static void test_statistics(void **state) {
                     for (int b = 0; b < BINS; b++) lines[b] += bins[1][b];
                 }
                 guide_of(&c, &o, guide, mask);
-                const texpatch_edges_desc g = desc_of(gray(guide, WIDE, WIDE), 2, NULL);
-                texpatch_edges found = find(&g);
+                const texedges_desc g = desc_of(gray(guide, WIDE, WIDE), 2, NULL);
+                texedges_set found = find(&g);
                 count_edges(&found, layer, bins);
                 for (int b = 0; b < BINS; b++) drawn[b] += bins[0][b] + bins[1][b];
-                texpatch_edges_free(&found);
-                texpatch_edges_free(&o);
+                texedges_set_free(&found);
+                texedges_set_free(&o);
             }
             const double own = chi_square(halves[0], halves[1]);
             const double line = chi_square(lines, all), edge = chi_square(drawn, all);
@@ -399,7 +399,7 @@ static void test_statistics(void **state) {
                 fail_msg("round %d layer %d: halves %.4f, lines %.4f, guide %.4f", round, layer,
                          own, line, edge);
         }
-        texpatch_edges_free(&e);
+        texedges_set_free(&e);
     }
 }
 
@@ -428,10 +428,10 @@ static void test_guide_fill(void **state) {
     enum { W = 70, H = 50 };
     static uint8_t guide[W * H], mask[W * H], plain[16 * 16];
     static txm_vec2 points[4][40];
-    texpatch_edges none = find_numbers(plain, 16, 16, 5);
+    texedges_set none = find_numbers(plain, 16, 16, 5);
     txm_rng rng = txm_rng_make(8, 8);
     for (int i = 0; i < 200; i++) {
-        texpatch_stroke strokes[4];
+        texedges_stroke strokes[4];
         memset(strokes, 0, sizeof strokes);
         for (int k = 0; k < 4; k++) {
             strokes[k].points = points[k];
@@ -445,9 +445,9 @@ static void test_guide_fill(void **state) {
             }
             points[k][0].x = 30.25f;
         }
-        texpatch_control c = control_of(&none, strokes, 4);
+        texedges_control c = control_of(&none, strokes, 4);
         c.background = (int)txm_rng_below(&rng, 5);
-        texpatch_edges lines = disturb(&c, W, H);
+        texedges_set lines = disturb(&c, W, H);
         guide_of(&c, &lines, guide, mask);
         for (int p = 0; p < W * H; p++) {
             int layer = c.background;
@@ -458,13 +458,13 @@ static void test_guide_fill(void **state) {
             assert_int_equal(guide[p], (int)(255.0 * layer / 4 + 0.5));
             assert_int_equal(mask[p], 255);
         }
-        texpatch_edges_free(&lines);
+        texedges_set_free(&lines);
     }
 
     /* two squares that share a side through pixel centres: each pixel belongs to one of them */
     const txm_vec2 left[4] = {{4.5f, 4.5f}, {20.5f, 4.5f}, {20.5f, 20.5f}, {4.5f, 20.5f}};
     const txm_vec2 right[4] = {{20.5f, 4.5f}, {36.5f, 4.5f}, {36.5f, 20.5f}, {20.5f, 20.5f}};
-    texpatch_stroke strokes[2];
+    texedges_stroke strokes[2];
     memset(strokes, 0, sizeof strokes);
     int counts[5] = {0};
     for (int k = 0; k < 2; k++) {
@@ -473,16 +473,16 @@ static void test_guide_fill(void **state) {
         strokes[k].is_closed = 1;
         strokes[k].layer = k + 1;
     }
-    texpatch_control c = control_of(&none, strokes, 2);
-    texpatch_edges lines = disturb(&c, W, H);
+    texedges_control c = control_of(&none, strokes, 2);
+    texedges_set lines = disturb(&c, W, H);
     guide_of(&c, &lines, guide, mask);
     for (int p = 0; p < W * H; p++) counts[(guide[p] + 32) / 64]++;
     assert_int_equal(counts[1], 256);
     assert_int_equal(counts[2], 256);
     assert_int_equal(guide[4 * W + 4], 64);
     assert_int_equal(guide[20 * W + 20], 0);
-    texpatch_edges_free(&lines);
-    texpatch_edges_free(&none);
+    texedges_set_free(&lines);
+    texedges_set_free(&none);
 }
 
 static void test_guide_free(void **state) {
@@ -491,10 +491,10 @@ static void test_guide_free(void **state) {
     static uint8_t guide[W * H], mask[W * H], layer[96 * 96];
     for (int i = 0; i < 96 * 96; i++) layer[i] = (uint8_t)(i % 96 / 24); /* bars 0 1 2 3 */
     for (int i = 0; i < 96 * 48; i++) layer[i] = layer[i] == 1 ? 3 : layer[i];
-    texpatch_edges e = find_numbers(layer, 96, 96, 4);
+    texedges_set e = find_numbers(layer, 96, 96, 4);
     const txm_vec2 a[4] = {{10, 10}, {30, 12}, {32, 30}, {12, 28}};
     const txm_vec2 b[4] = {{44, 6}, {80, 6}, {84, 50}, {70, 54}};
-    texpatch_stroke strokes[2];
+    texedges_stroke strokes[2];
     memset(strokes, 0, sizeof strokes);
     for (int k = 0; k < 2; k++) {
         strokes[k].points = k ? b : a;
@@ -502,9 +502,9 @@ static void test_guide_free(void **state) {
         strokes[k].is_closed = 1;
         strokes[k].layer = k ? 2 : 0;
     }
-    texpatch_control c = control_of(&e, strokes, 2);
+    texedges_control c = control_of(&e, strokes, 2);
     c.background = -1;
-    texpatch_edges lines = disturb(&c, W, H);
+    texedges_set lines = disturb(&c, W, H);
     guide_of(&c, &lines, guide, mask);
     assert_true(e.beside[0] >= 0 && e.beside[0] != 0 && e.beside[2] >= 0 && e.beside[2] != 2);
     for (int p = 0; p < W * H; p++) {
@@ -514,7 +514,7 @@ static void test_guide_free(void **state) {
             const int d = (q % W - x) * (q % W - x) + (q / W - y) * (q / W - y);
             if (d > 64) continue;
             for (int k = 0; k < 2; k++) {
-                const texpatch_polyline *line = &lines.lines[k];
+                const texedges_polyline *line = &lines.lines[k];
                 if (d >= near[k]) continue;
                 if (winding_of(lines.points + line->first, (int)line->count, q % W, q / W))
                     near[k] = d;
@@ -528,14 +528,14 @@ static void test_guide_free(void **state) {
         else if (near[1] < near[0]) assert_int_equal(guide[p], 85 * e.beside[2]);
         else assert_true(guide[p] == 85 * e.beside[0] || guide[p] == 85 * e.beside[2]);
     }
-    texpatch_edges_free(&lines);
+    texedges_set_free(&lines);
 
     c.stroke_count = 0; /* nothing drawn, nothing said */
     lines = disturb(&c, W, H);
     guide_of(&c, &lines, guide, mask);
     for (int p = 0; p < W * H; p++) assert_int_equal(mask[p], 0);
-    texpatch_edges_free(&lines);
-    texpatch_edges_free(&e);
+    texedges_set_free(&lines);
+    texedges_set_free(&e);
 }
 
 /* ---- all tests -------------------------------------------------------------------------- */

@@ -24,7 +24,7 @@ typedef struct brush {
     /* the texture and what it is made of */
     txm_image photo, layers;    /* the exemplar, and the layer of each of its pixels            */
     texpatch_exemplar exemplar; /* the two together                                             */
-    texpatch_edges edges;       /* the boundaries between layers                                */
+    texedges_set edges;       /* the boundaries between layers                                */
     texpatch_job *job;
     txm_env env; /* malloc, silent, one thread: more of them would go in here                   */
     uint64_t seed;
@@ -34,7 +34,7 @@ typedef struct brush {
     uint8_t guide[SIDE * SIDE], mask[SIDE * SIDE]; /* what the job follows at present            */
 
     /* what is drawn: strokes lie one behind the other in points, that under way behind the last */
-    texpatch_stroke strokes[MAX_STROKES + 1];
+    texedges_stroke strokes[MAX_STROKES + 1];
     txm_vec2 points[MAX_POINTS];
     int stroke_count, point_count, is_drawing;
     int layer, width, is_closed; /* of the next stroke                                          */

@@ -70,7 +70,7 @@ int main(int argc, char **argv) {
     SDL_DestroyWindow(b.window);
     SDL_Quit();
     texpatch_free(b.job);
-    texpatch_edges_free(&b.edges);
+    texedges_set_free(&b.edges);
     free(b.layers.pixels);
     stbi_image_free(b.photo.pixels);
     if (script) fclose(script);

@@ -5,7 +5,7 @@
 #include <math.h>
 
 void add_point(brush *b, int x, int y) {
-    texpatch_stroke *s = &b->strokes[b->stroke_count];
+    texedges_stroke *s = &b->strokes[b->stroke_count];
     const txm_vec2 p = txm_v2((float)x + 0.5f, (float)y + 0.5f);
     if (b->point_count + s->count == MAX_POINTS) return;
     if (s->count > 0) {
@@ -16,7 +16,7 @@ void add_point(brush *b, int x, int y) {
 }
 
 void begin_stroke(brush *b, int x, int y) {
-    const texpatch_stroke stroke = {b->points + b->point_count, 0, b->is_closed, b->layer,
+    const texedges_stroke stroke = {b->points + b->point_count, 0, b->is_closed, b->layer,
                                     (float)b->width};
     if (b->stroke_count == MAX_STROKES) return;
     b->strokes[b->stroke_count] = stroke;
@@ -25,7 +25,7 @@ void begin_stroke(brush *b, int x, int y) {
 }
 
 void end_stroke(brush *b) {
-    const texpatch_stroke *s = &b->strokes[b->stroke_count];
+    const texedges_stroke *s = &b->strokes[b->stroke_count];
     if (!b->is_drawing) return;
     b->is_drawing = 0;
     if (s->count < (s->is_closed ? 3 : 2)) return; /* a click */

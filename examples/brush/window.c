@@ -26,7 +26,7 @@ void open_window(brush *b) {
 
 /* The texture, and the stroke under way over it; all of it into a file if that is asked for. */
 void show(brush *b) {
-    const texpatch_stroke *s = &b->strokes[b->stroke_count];
+    const texedges_stroke *s = &b->strokes[b->stroke_count];
     SDL_RenderCopy(b->renderer, b->texture, NULL, NULL);
     SDL_SetRenderDrawColor(b->renderer, 255, 160, 0, 255);
     for (int i = 1; b->is_drawing && i < s->count + s->is_closed; i++) {

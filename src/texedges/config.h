@@ -3,40 +3,40 @@
 
 #include "../texedges.h"
 
-/* ---- edges: constants and progress ------------------------------------------------------- */
+/* ---- constants and progress ------------------------------------------------------------ */
 
 enum {
-    TXP_E_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
-    TXP_E_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
-    TXP_E_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
-    TXP_E_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
-    TXP_E_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+    TXE_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
+    TXE_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
+    TXE_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
+    TXE_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
+    TXE_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
 
-    TXP_E_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
-    TXP_E_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
-    TXP_E_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
-    TXP_E_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
-    TXP_E_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
-    TXP_E_BINS = 16,   /* directions told apart in half a turn                                    */
-    TXP_E_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
-    TXP_E_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
-    TXP_E_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
-    TXP_E_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
-    TXP_E_GOOD = 8,    /* of them so many that join best are looked at closer                     */
-    TXP_E_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+    TXE_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
+    TXE_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
+    TXE_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
+    TXE_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
+    TXE_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
+    TXE_BINS = 16,   /* directions told apart in half a turn                                    */
+    TXE_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
+    TXE_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
+    TXE_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
+    TXE_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
+    TXE_GOOD = 8,    /* of them so many that join best are looked at closer                     */
+    TXE_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
 };
-#define TXP_E_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
-#define TXP_E_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+#define TXE_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
+#define TXE_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
 
 /* The bar of one call: a stage fills from..to of it in total pieces of work. */
-typedef struct txp_e_bar {
+typedef struct txe_bar {
     const txm_env *env;
     const char *stage;
     double from, to, total, done;
     size_t quiet; /* work since the last report */
-} txp_e_bar;
+} txe_bar;
 
-static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double total) {
+static void txe_stage(txe_bar *bar, const char *stage, double to, double total) {
     bar->from = bar->to;
     bar->to = to;
     bar->stage = stage;
@@ -45,20 +45,20 @@ static void txp_e_stage(txp_e_bar *bar, const char *stage, double to, double tot
 }
 
 /* So much work is done; non-zero: stop. */
-static inline int txp_e_tick(txp_e_bar *bar, size_t work) {
+static inline int txe_tick(txe_bar *bar, size_t work) {
     bar->quiet += work;
-    if (bar->quiet < TXP_E_TICK) return 0;
+    if (bar->quiet < TXE_TICK) return 0;
     bar->done += (double)bar->quiet;
     bar->quiet = 0;
     const double part = bar->done < bar->total ? bar->done / bar->total : 1;
     return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
 }
 
-static txm_status txp_e_no_memory(txm_env *env) {
+static txm_status txe_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the edges");
 }
 
-static txm_status txp_e_stopped(txm_env *env) {
+static txm_status txe_stopped(txm_env *env) {
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 

@@ -3,85 +3,85 @@
 
 #include "layers.h"
 
-/* ---- control: the guide ------------------------------------------------------------------ */
+/* ---- the guide ------------------------------------------------------------------------- */
 
 /* The map that a guide is drawn from: layer + 1 of each pixel, 0 = nothing. */
-typedef struct txp_e_guide {
+typedef struct txe_guide {
     int width, height;
     uint8_t *at;
-} txp_e_guide;
+} txe_guide;
 
 /* Coordinates in 256ths of a pixel, in which all that follows is exact. */
-static int64_t txp_e_fixed(float x) {
+static int64_t txe_fixed(float x) {
     return (int64_t)floor((double)x * 256 + 0.5);
 }
 
 /* a / b rounded up, b > 0 */
-static int64_t txp_e_ceil(int64_t a, int64_t b) {
+static int64_t txe_ceil(int64_t a, int64_t b) {
     return a / b + (a % b > 0);
 }
 
 /* The rows whose centres a segment passes, in first..end-1, and where: its upper end counts, its
    lower one does not, so that a corner counts once and a level segment not at all. */
-typedef struct txp_e_slope {
+typedef struct txe_slope {
     int64_t x, y, dx, dy; /* of the upper end, and from there to the lower one */
     int first, end, down; /* down: 1 if the segment runs so, else 0             */
-} txp_e_slope;
+} txe_slope;
 
-static txp_e_slope txp_e_slope_of(txm_vec2 p, txm_vec2 q, int height) {
-    const int64_t px = txp_e_fixed(p.x), py = txp_e_fixed(p.y);
-    const int64_t qx = txp_e_fixed(q.x), qy = txp_e_fixed(q.y);
-    txp_e_slope s;
+static txe_slope txe_slope_of(txm_vec2 p, txm_vec2 q, int height) {
+    const int64_t px = txe_fixed(p.x), py = txe_fixed(p.y);
+    const int64_t qx = txe_fixed(q.x), qy = txe_fixed(q.y);
+    txe_slope s;
     s.down = py < qy;
     s.x = s.down ? px : qx;
     s.y = s.down ? py : qy;
     s.dx = s.down ? qx - px : px - qx;
     s.dy = s.down ? qy - py : py - qy;
-    const int64_t first = txp_e_ceil(s.y - 128, 256), end = txp_e_ceil(s.y + s.dy - 128, 256);
+    const int64_t first = txe_ceil(s.y - 128, 256), end = txe_ceil(s.y + s.dy - 128, 256);
     s.first = first < 0 ? 0 : first > height ? height : (int)first;
     s.end = end < s.first ? s.first : end > height ? height : (int)end;
     return s;
 }
 
 /* The first pixel of a row whose centre lies on the segment or to its right, 0..width. */
-static uint32_t txp_e_column(const txp_e_slope *s, int row, int width) {
+static uint32_t txe_column(const txe_slope *s, int row, int width) {
     const int64_t down = 256 * (int64_t)row + 128 - s->y;
-    const int64_t column = txp_e_ceil((s->x - 128) * s->dy + down * s->dx, 256 * s->dy);
+    const int64_t column = txe_ceil((s->x - 128) * s->dy + down * s->dx, 256 * s->dy);
     return (uint32_t)(column < 0 ? 0 : column > width ? width : column);
 }
 
 /* Fill the inside of a line (winding number not 0) with value. The places where it passes the rows'
    centres are listed by rows, each row is sorted by columns, and filled between them. */
-static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, int value,
-                             txm_arena *arena, txp_e_bar *bar, txm_env *env) {
+static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int value,
+                           txm_arena *arena, txe_bar *bar, txm_env *env) {
     int top = g->height, bottom = 0;
     size_t total = 0, longest = 0;
     for (size_t i = 0; i < n; i++) {
-        const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+        const txe_slope s = txe_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
         if (s.first < s.end && s.first < top) top = s.first;
         if (s.first < s.end && s.end > bottom) bottom = s.end;
         total += (size_t)(s.end - s.first);
-        if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+        if (txe_tick(bar, 4)) return txe_stopped(env);
     }
     if (total == 0) return TXM_OK;
     /* next[r]: where the next passage of row top + r goes; in the end, where the row ends */
     const size_t rows = (size_t)(bottom - top);
     size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
     txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
-    if (!next || !list) return txp_e_no_memory(env);
+    if (!next || !list) return txe_no_memory(env);
     for (int pass = 0; pass < 2; pass++) {
         for (size_t i = 0; i < n; i++) {
-            const txp_e_slope s = txp_e_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
+            const txe_slope s = txe_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);
             for (int y = s.first; y < s.end; y++) {
                 size_t *at = &next[y - top];
                 if (pass) {
-                    list[*at].key = txp_e_column(&s, y, g->width);
+                    list[*at].key = txe_column(&s, y, g->width);
                     list[*at].value = (uint32_t)s.down;
                 }
                 ++*at;
-                if (txp_e_tick(bar, 4)) return txp_e_stopped(env);
+                if (txe_tick(bar, 4)) return txe_stopped(env);
             }
-            if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+            if (txe_tick(bar, 1)) return txe_stopped(env);
         }
         for (size_t r = 0, sum = 0; r < rows && pass == 0; r++) { /* from how many to where */
             const size_t count = next[r];
@@ -91,7 +91,7 @@ static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, 
         }
     }
     txm_pair *scratch = (txm_pair *)txm_arena_alloc(arena, longest, sizeof *scratch);
-    if (!scratch) return txp_e_no_memory(env);
+    if (!scratch) return txe_no_memory(env);
     for (size_t r = 0; r < rows; r++) {
         const size_t from = r ? next[r - 1] : 0, count = next[r] - from;
         uint8_t *row = g->at + (size_t)(top + (int)r) * (size_t)g->width;
@@ -101,7 +101,7 @@ static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, 
             winding += list[i].value ? 1 : -1;
             if (winding) memset(row + list[i].key, value, list[i + 1].key - list[i].key);
         }
-        if (txp_e_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txp_e_stopped(env);
+        if (txe_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txe_stopped(env);
     }
     return TXM_OK;
 }
@@ -110,38 +110,38 @@ static txm_status txp_e_fill(const txp_e_guide *g, const txm_vec2 *p, size_t n, 
    pixel of a row first the distance to the nearest stroke in the row, then over the rows above and
    below the least sum of squares; of several as near the left, then the upper one.
    off, what: two bytes for each pixel. 0 = cancelled */
-static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uint8_t *what,
-                      txp_e_bar *bar) {
+static int txe_ring(const txe_guide *g, const int *beside, uint8_t *off, uint8_t *what,
+                    txe_bar *bar) {
     const size_t w = (size_t)g->width;
     for (int y = 0; y < g->height; y++) {
         const uint8_t *row = g->at + (size_t)y * w;
         uint8_t *distance = off + (size_t)y * w, *mark = what + (size_t)y * w;
-        int since = TXP_E_RING + 1, last = 0; /* how far back, and what */
+        int since = TXE_RING + 1, last = 0; /* how far back, and what */
         for (size_t x = 0; x < w; x++) {
-            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            since = row[x] ? 0 : since <= TXE_RING ? since + 1 : since;
             if (row[x]) last = row[x];
             distance[x] = (uint8_t)since;
             mark[x] = (uint8_t)last;
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
-        since = TXP_E_RING + 1;
+        since = TXE_RING + 1;
         for (size_t x = w; x-- > 0;) {
-            since = row[x] ? 0 : since <= TXP_E_RING ? since + 1 : since;
+            since = row[x] ? 0 : since <= TXE_RING ? since + 1 : since;
             if (row[x]) last = row[x];
             if (since < distance[x]) {
                 distance[x] = (uint8_t)since;
                 mark[x] = (uint8_t)last;
             }
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
     }
     for (int y = 0; y < g->height; y++) {
-        const int low = y > TXP_E_RING ? y - TXP_E_RING : 0;
-        const int high = y + TXP_E_RING < g->height ? y + TXP_E_RING : g->height - 1;
+        const int low = y > TXE_RING ? y - TXE_RING : 0;
+        const int high = y + TXE_RING < g->height ? y + TXE_RING : g->height - 1;
         for (size_t x = 0; x < w; x++) {
             uint8_t *at = g->at + (size_t)y * w + x;
-            int least = TXP_E_RING * TXP_E_RING + 1, mark = 0;
-            if (txp_e_tick(bar, 2)) return 0;
+            int least = TXE_RING * TXE_RING + 1, mark = 0;
+            if (txe_tick(bar, 2)) return 0;
             if (off[(size_t)y * w + x] == 0) continue; /* inside a stroke */
             for (int v = low; v <= high; v++) {
                 const int dx = off[(size_t)v * w + x], dy = v - y;
@@ -150,7 +150,7 @@ static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uin
                 mark = what[(size_t)v * w + x];
             }
             *at = (uint8_t)(mark ? beside[mark - 1] + 1 : 0);
-            if (txp_e_tick(bar, 8)) return 0;
+            if (txe_tick(bar, 8)) return 0;
         }
     }
     return 1;
@@ -158,53 +158,53 @@ static int txp_e_ring(const txp_e_guide *g, const int *beside, uint8_t *off, uin
 
 /* Draw all lines, and what is around them. mask, what: with a free background two more bytes for
    each pixel, else NULL. In the end g holds grays, mask what there is to say. */
-static txm_status txp_e_guide_make(const texpatch_control *c, const texpatch_edges *lines,
-                                   const txp_e_guide *g, uint8_t *mask, uint8_t *what,
-                                   txp_e_bar *bar, txm_env *env) {
+static txm_status txe_guide_make(const texedges_control *c, const texedges_set *lines,
+                                 const txe_guide *g, uint8_t *mask, uint8_t *what,
+                                 txe_bar *bar, txm_env *env) {
     const size_t count = (size_t)g->width * (size_t)g->height;
     for (size_t i = 0; i < lines->line_count; i++) {
-        const texpatch_polyline *line = &lines->lines[i];
+        const texedges_polyline *line = &lines->lines[i];
         txm_arena work;
         txm_arena_init(&work, env);
-        const txm_status status = txp_e_fill(g, lines->points + line->first, line->count,
-                                             line->layer + 1, &work, bar, env);
+        const txm_status status = txe_fill(g, lines->points + line->first, line->count,
+                                           line->layer + 1, &work, bar, env);
         txm_arena_free(&work);
         if (status != TXM_OK) return status;
     }
-    txp_e_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
+    txe_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
     if (mask) {
-        int beside[TEXPATCH_MAX_LEVELS];
+        int beside[TEXEDGES_MAX_LEVELS];
         for (int k = 0; k < lines->levels; k++) { /* a layer that borders on none: any other one */
             beside[k] = c->edges->beside[k];
             if (beside[k] < 0) beside[k] = k ? k - 1 : 1;
         }
-        if (!txp_e_ring(g, beside, mask, what, bar)) return txp_e_stopped(env);
+        if (!txe_ring(g, beside, mask, what, bar)) return txe_stopped(env);
     }
     for (size_t i = 0; i < count; i++) {
         const int layer = g->at[i] ? g->at[i] - 1 : mask ? 0 : c->background;
         if (mask) mask[i] = g->at[i] ? 255 : 0;
         g->at[i] = (uint8_t)layer;
-        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        if (txe_tick(bar, 1)) return txe_stopped(env);
     }
-    return txp_e_show(g->at, count, lines->levels, bar) ? TXM_OK : txp_e_stopped(env);
+    return txe_show(g->at, count, lines->levels, bar) ? TXM_OK : txe_stopped(env);
 }
 
-TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
-                                               const texpatch_edges *disturbed, txm_env *env,
-                                               const txm_image *guide, const txm_image *mask) {
-    txp_e_bar bar;
+TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
+                                       const texedges_set *disturbed, txm_env *env,
+                                       const txm_image *guide, const txm_image *mask) {
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
-    txm_status status = txp_e_check_image(guide, "guide", 1, env);
-    if (status == TXM_OK) status = txp_e_check_image(mask, "mask", 1, env);
-    txp_e_stage(&bar, "edges", 0.2, txp_e_points_of(control));
-    if (status == TXM_OK) status = txp_e_check_control(control, &bar, env);
-    if (status == TXM_OK) status = txp_e_check_edges(disturbed, "disturbed", 0, &bar, env);
+    txm_status status = txe_check_image(guide, "guide", 1, env);
+    if (status == TXM_OK) status = txe_check_image(mask, "mask", 1, env);
+    txe_stage(&bar, "edges", 0.2, txe_points_of(control));
+    if (status == TXM_OK) status = txe_check_control(control, &bar, env);
+    if (status == TXM_OK) status = txe_check_edges(disturbed, "disturbed", 0, &bar, env);
     if (status != TXM_OK) return status;
     if (guide->width != disturbed->width || guide->height != disturbed->height ||
         mask->width != disturbed->width || mask->height != disturbed->height)
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "guide and mask must have the size that texpatch_disturb was given");
+                        "guide and mask must have the size that texedges_disturb was given");
     int same = disturbed->levels == control->edges->levels &&
                disturbed->line_count == (size_t)control->stroke_count;
     for (int i = 0; i < control->stroke_count && same; i++)
@@ -216,16 +216,16 @@ TEXEDGES_API txm_status texpatch_control_guide(const texpatch_control *control,
     const size_t w = (size_t)guide->width, count = w * (size_t)guide->height;
     const int is_free = control->background < 0;
     txm_arena arena;
-    txp_e_guide g;
-    txp_e_stage(&bar, "strokes", 0.5, 30 * (double)disturbed->point_count);
+    txe_guide g;
+    txe_stage(&bar, "strokes", 0.5, 30 * (double)disturbed->point_count);
     txm_arena_init(&arena, env);
     g.width = guide->width;
     g.height = guide->height;
     g.at = (uint8_t *)txm_arena_zero(&arena, count, is_free ? 3 : 1);
     uint8_t *told = g.at && is_free ? g.at + count : NULL;
     status =
-        g.at ? txp_e_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
-             : txp_e_no_memory(env);
+        g.at ? txe_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
+             : txe_no_memory(env);
     for (int y = 0; y < g.height && g.at && status == TXM_OK; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(mask, y);
         memcpy(txm_image_row(guide, y), g.at + (size_t)y * w, w);

@@ -3,10 +3,10 @@
 
 #include "check.h"
 
-/* ---- edges: from a picture to layers ----------------------------------------------------- */
+/* ---- from a picture to layers ---------------------------------------------------------- */
 
 /* The gray of each pixel, 0..1. 0 = cancelled, -1 = a sample is not finite, 1 = done. */
-static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
+static int txe_gray(const txm_image *image, float *gray, txe_bar *bar) {
     const int is_color = image->channels >= 3;
     for (int y = 0; y < image->height; y++) {
         for (int x = 0; x < image->width; x++) {
@@ -16,7 +16,7 @@ static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
                     0.0722 * txm_image_get(image, x, y, 2);
             if (!txm_is_finite(g)) return -1;
             *gray++ = txm_float(g < 0 ? 0 : g > 1 ? 1 : g);
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
     }
     return 1;
@@ -24,8 +24,8 @@ static int txp_e_gray(const txm_image *image, float *gray, txp_e_bar *bar) {
 
 /* Blur by the weights 1 - |d| / (radius + 1), rows then columns; beyond its border the picture goes
    on as it ends. scratch: as large as gray. 0 = cancelled. */
-static int txp_e_blur(float *gray, float *scratch, int width, int height, double radius,
-                      txp_e_bar *bar) {
+static int txe_blur(float *gray, float *scratch, int width, int height, double radius,
+                    txe_bar *bar) {
     const int reach = (int)radius;
     double weight[17] = {1}, sum = 0;
     for (int d = 0; d <= reach; d++) {
@@ -48,7 +48,7 @@ static int txp_e_blur(float *gray, float *scratch, int width, int height, double
                          ((double)from[i - (size_t)back * step] + from[i + (size_t)ahead * step]);
                 }
                 to[i] = txm_float(g / sum);
-                if (txp_e_tick(bar, (size_t)reach + 1)) return 0;
+                if (txe_tick(bar, (size_t)reach + 1)) return 0;
             }
         }
     }
@@ -60,14 +60,14 @@ static int txp_e_blur(float *gray, float *scratch, int width, int height, double
    In a histogram of 256 bins, cut k lies where k / levels of the area are darker, or up to a
    quarter of a layer's area beside that, where the two bins next to the cut hold least; of a gap
    in the middle. Where one bin holds too much for that, on its nearer side. 0 = cancelled. */
-static int txp_e_divide(const float *gray, size_t count, int levels, float *thresholds,
-                        txp_e_bar *bar) {
+static int txe_divide(const float *gray, size_t count, int levels, float *thresholds,
+                      txe_bar *bar) {
     size_t bins[256], below[257];
     int previous = 0;
     memset(bins, 0, sizeof bins);
     for (size_t i = 0; i < count; i++) {
         bins[(int)((double)gray[i] * 255 + 0.5)]++;
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
     }
     below[0] = 0;
     for (int b = 0; b < 256; b++) below[b + 1] = below[b] + bins[b];
@@ -101,54 +101,54 @@ static int txp_e_divide(const float *gray, size_t count, int levels, float *thre
 
 /* The neighbour of a pixel beyond its side 0 = top, 1 = right, 2 = bottom, 3 = left; a crack is run
    through clockwise, so that its pixel lies to the right: along the top to the right, and so on. */
-static const int txp_e_side_x[4] = {0, 1, 0, -1}, txp_e_side_y[4] = {-1, 0, 1, 0};
+static const int txe_side_x[4] = {0, 1, 0, -1}, txe_side_y[4] = {-1, 0, 1, 0};
 
 /* Connected pixels of one layer are a region. It is known by one of its pixels, its root; next
    links root and boundary pixels to a circle. Two circles are joined by swapping one link each. */
-typedef struct txp_e_regions {
+typedef struct txe_regions {
     int width, height;
     int32_t *parent, *next;
     int32_t *length; /* of the root: cracks of the region's boundary */
     uint8_t *layer;  /* of the root: what the region shows now       */
-} txp_e_regions;
+} txe_regions;
 
-static int32_t txp_e_root(const txp_e_regions *r, int32_t p) {
+static int32_t txe_root(const txe_regions *r, int32_t p) {
     while (r->parent[p] != p) p = r->parent[p] = r->parent[r->parent[p]];
     return p;
 }
 
 /* Unite the regions of two roots; returns the new root. */
-static int32_t txp_e_unite(txp_e_regions *r, int32_t a, int32_t b) {
-    if (b < a) return txp_e_unite(r, b, a);
+static int32_t txe_unite(txe_regions *r, int32_t a, int32_t b) {
+    if (b < a) return txe_unite(r, b, a);
     return r->parent[b] = a;
 }
 
 /* the pixel beyond a side of p, -1: none */
-static int32_t txp_e_beyond(const txp_e_regions *r, int32_t p, int side) {
-    const int x = p % r->width + txp_e_side_x[side], y = p / r->width + txp_e_side_y[side];
+static int32_t txe_beyond(const txe_regions *r, int32_t p, int side) {
+    const int x = p % r->width + txe_side_x[side], y = p / r->width + txe_side_y[side];
     if (x < 0 || y < 0 || x >= r->width || y >= r->height) return -1;
-    return p + txp_e_side_x[side] + txp_e_side_y[side] * r->width;
+    return p + txe_side_x[side] + txe_side_y[side] * r->width;
 }
 
-static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
+static int txe_regions_make(txe_regions *r, txe_bar *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int32_t p = 0; p < count; p++) {
         r->parent[p] = r->next[p] = p;
         r->length[p] = 0;
         int32_t root = p;
         for (int side = 3; side >= 0; side -= 3) { /* left and above */
-            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t q = txe_beyond(r, p, side);
             if (q < 0 || r->layer[q] != r->layer[p]) continue;
-            const int32_t other = txp_e_root(r, q);
-            if (other != root) root = txp_e_unite(r, root, other);
+            const int32_t other = txe_root(r, q);
+            if (other != root) root = txe_unite(r, root, other);
         }
-        if (txp_e_tick(bar, 2)) return 0;
+        if (txe_tick(bar, 2)) return 0;
     }
     for (int32_t p = 0; p < count; p++) {
-        const int32_t root = txp_e_root(r, p);
+        const int32_t root = txe_root(r, p);
         int cracks = 0;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txp_e_beyond(r, p, side);
+            const int32_t q = txe_beyond(r, p, side);
             cracks += q < 0 || r->layer[q] != r->layer[p];
         }
         r->length[root] += cracks;
@@ -156,7 +156,7 @@ static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
             r->next[p] = r->next[root];
             r->next[root] = p;
         }
-        if (txp_e_tick(bar, 2)) return 0;
+        if (txe_tick(bar, 2)) return 0;
     }
     return 1;
 }
@@ -164,14 +164,14 @@ static int txp_e_regions_make(txp_e_regions *r, txp_e_bar *bar) {
 /* Give a region to the layer with which it shares most of its boundary, the darkest of several, and
    unite it with all regions of that layer around it. Returns the new root, -1 if the region is the
    whole picture. Pixels that are on no boundary any more are taken out of the circle. */
-static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
-    int32_t shared[TEXPATCH_MAX_LEVELS];
+static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
+    int32_t shared[TEXEDGES_MAX_LEVELS];
     memset(shared, 0, sizeof shared);
     for (int32_t before = region, p = region;;) {
         int inner = 1;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txp_e_beyond(r, p, side);
-            const int32_t other = q < 0 ? region : txp_e_root(r, q);
+            const int32_t q = txe_beyond(r, p, side);
+            const int32_t other = q < 0 ? region : txe_root(r, q);
             if (other == region) continue;
             inner = 0;
             shared[r->layer[other]]++;
@@ -183,7 +183,7 @@ static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
         if (p == region) break;
     }
     int target = 0;
-    for (int k = 1; k < TEXPATCH_MAX_LEVELS; k++) {
+    for (int k = 1; k < TEXEDGES_MAX_LEVELS; k++) {
         if (shared[k] > shared[target]) target = k;
     }
     if (shared[target] == 0) return -1;
@@ -191,14 +191,14 @@ static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
     for (int32_t p = region, after;; p = after) {
         after = r->next[p]; /* what is joined in behind p is not walked through */
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txp_e_beyond(r, p, side);
-            const int32_t other = q < 0 ? root : txp_e_root(r, q);
+            const int32_t q = txe_beyond(r, p, side);
+            const int32_t other = q < 0 ? root : txe_root(r, q);
             if (other == root || r->layer[other] != target) continue;
             const int32_t link = r->next[p];
             r->next[p] = r->next[other];
             r->next[other] = link;
             length += r->length[other];
-            root = txp_e_unite(r, root, other);
+            root = txe_unite(r, root, other);
         }
         ++*work;
         if (after == region) break;
@@ -211,7 +211,7 @@ static int32_t txp_e_dissolve(txp_e_regions *r, int32_t region, size_t *work) {
 /* Dissolve regions until all have a boundary of least cracks or more: first those under 8, then
    under 16 and so on, each time in raster order of the roots. A region of n cracks is one of
    O(pixels / n), so all this takes O(pixels log least). 0 = cancelled. */
-static int txp_e_regions_clean(txp_e_regions *r, int least, txp_e_bar *bar) {
+static int txe_regions_clean(txe_regions *r, int least, txe_bar *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int bound = 4; bound < least;) {
         bound = bound < least / 2 ? 2 * bound : least;
@@ -219,100 +219,100 @@ static int txp_e_regions_clean(txp_e_regions *r, int least, txp_e_bar *bar) {
             int32_t region = r->parent[p] == p ? p : -1;
             while (region >= 0 && r->length[region] < bound) {
                 size_t work = 0;
-                region = txp_e_dissolve(r, region, &work);
-                if (txp_e_tick(bar, 8 * work)) return 0;
+                region = txe_dissolve(r, region, &work);
+                if (txe_tick(bar, 8 * work)) return 0;
             }
-            if (txp_e_tick(bar, 1)) return 0;
+            if (txe_tick(bar, 1)) return 0;
         }
     }
     for (int32_t p = 0; p < count; p++) {
-        r->layer[p] = r->layer[txp_e_root(r, p)];
-        if (txp_e_tick(bar, 1)) return 0;
+        r->layer[p] = r->layer[txe_root(r, p)];
+        if (txe_tick(bar, 1)) return 0;
     }
     return 1;
 }
 
 /* The layer of each pixel. is_given: thresholds holds levels - 1 of them, else it receives them.
    to: the part of the bar that is full then. */
-static txm_status txp_e_split(const texpatch_edges_desc *desc, int levels, int is_given,
-                              float *thresholds, uint8_t *layer, double to, txp_e_bar *bar,
-                              txm_arena *arena, txm_env *env) {
+static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
+                            float *thresholds, uint8_t *layer, double to, txe_bar *bar,
+                            txm_arena *arena, txm_env *env) {
     const int width = desc->image.width, height = desc->image.height;
     const size_t count = (size_t)width * (size_t)height;
     const double smooth = desc->smooth;
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
-    if (!gray || (smooth > 0 && !scratch)) return txp_e_no_memory(env);
-    txp_e_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
-    const int good = txp_e_gray(&desc->image, gray, bar);
+    if (!gray || (smooth > 0 && !scratch)) return txe_no_memory(env);
+    txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
+    const int good = txe_gray(&desc->image, gray, bar);
     if (good < 0)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is infinite or not a number");
-    if (!good || (smooth > 0 && !txp_e_blur(gray, scratch, width, height, smooth, bar)) ||
-        (!is_given && !txp_e_divide(gray, count, levels, thresholds, bar)))
-        return txp_e_stopped(env);
+    if (!good || (smooth > 0 && !txe_blur(gray, scratch, width, height, smooth, bar)) ||
+        (!is_given && !txe_divide(gray, count, levels, thresholds, bar)))
+        return txe_stopped(env);
     for (size_t i = 0; i < count; i++) {
         int k = 0;
         while (k < levels - 1 && gray[i] >= thresholds[k]) k++;
         layer[i] = (uint8_t)k;
-        if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+        if (txe_tick(bar, 1)) return txe_stopped(env);
     }
     txm_arena_free(arena);
     if (desc->least <= 4) return TXM_OK; /* nothing is shorter */
 
-    txp_e_regions r;
+    txe_regions r;
     r.width = width;
     r.height = height;
     r.layer = layer;
     r.parent = (int32_t *)txm_arena_alloc(arena, count, 3 * sizeof(int32_t));
-    if (!r.parent) return txp_e_no_memory(env);
+    if (!r.parent) return txe_no_memory(env);
     r.next = r.parent + count;
     r.length = r.next + count;
-    txp_e_stage(bar, "regions", to, (double)count * 12);
-    if (!txp_e_regions_make(&r, bar) || !txp_e_regions_clean(&r, desc->least, bar))
-        return txp_e_stopped(env);
+    txe_stage(bar, "regions", to, (double)count * 12);
+    if (!txe_regions_make(&r, bar) || !txe_regions_clean(&r, desc->least, bar))
+        return txe_stopped(env);
     txm_arena_free(arena);
     return TXM_OK;
 }
 
 /* Turn layers into grays. 0 = cancelled. */
-static int txp_e_show(uint8_t *layer, size_t count, int levels, txp_e_bar *bar) {
-    uint8_t gray[TEXPATCH_MAX_LEVELS] = {0};
+static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
+    uint8_t gray[TEXEDGES_MAX_LEVELS] = {0};
     for (int k = 0; k < levels; k++)
         gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
     for (size_t i = 0; i < count; i++) {
         layer[i] = gray[layer[i]];
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
     }
     return 1;
 }
 
-TEXEDGES_API txm_status texpatch_layers(const texpatch_edges_desc *desc,
-                                        const texpatch_edges *edges, txm_env *env,
+TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
+                                        const texedges_set *edges, txm_env *env,
                                         const txm_image *layers) {
-    txp_e_bar bar;
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
-    txm_status status = txp_e_check_desc(desc, env);
-    if (status == TXM_OK) status = txp_e_check_image(layers, "layers", 1, env);
+    txm_status status = txe_check_desc(desc, env);
+    if (status == TXM_OK) status = txe_check_image(layers, "layers", 1, env);
     if (status == TXM_OK &&
         (layers->width != desc->image.width || layers->height != desc->image.height))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
-    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXPATCH_MAX_LEVELS ||
-                             !txp_e_thresholds_are_good(edges->thresholds, edges->levels)))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texpatch_edges_find made it");
+    if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXEDGES_MAX_LEVELS ||
+                             !txe_thresholds_are_good(edges->thresholds, edges->levels)))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texedges_find made it");
     if (status != TXM_OK) return status;
 
-    float thresholds[TEXPATCH_MAX_LEVELS];
+    float thresholds[TEXEDGES_MAX_LEVELS];
     txm_arena map, scratch;
     txm_arena_init(&map, env);
     txm_arena_init(&scratch, env);
     memcpy(thresholds, edges->thresholds, sizeof thresholds);
     const size_t width = (size_t)layers->width;
     uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
-    status = layer ? txp_e_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
-                   : txp_e_no_memory(env);
-    if (status == TXM_OK && !txp_e_show(layer, width * (size_t)layers->height, edges->levels, &bar))
-        status = txp_e_stopped(env);
+    status = layer ? txe_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+                   : txe_no_memory(env);
+    if (status == TXM_OK && !txe_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+        status = txe_stopped(env);
     for (int y = 0; y < layers->height && status == TXM_OK; y++)
         memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
     txm_arena_free(&scratch);

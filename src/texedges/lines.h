@@ -3,24 +3,24 @@
 
 #include "layers.h"
 
-/* ---- edges: from layers to lines --------------------------------------------------------- */
+/* ---- from layers to lines -------------------------------------------------------------- */
 
 /* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the
    upper four the sides of the pixel whose cracks are still to be run through. */
-typedef struct txp_e_map {
+typedef struct txe_map {
     int width, height;
     uint8_t *at;
-} txp_e_map;
+} txe_map;
 
 /* is the pixel of this layer? */
-static int txp_e_is(const txp_e_map *m, int x, int y, int layer) {
+static int txe_is(const txe_map *m, int x, int y, int layer) {
     if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
     return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
 }
 
 /* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
-static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPATCH_MAX_LEVELS],
-                      txp_e_bar *bar) {
+static int txe_mark(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_MAX_LEVELS],
+                    txe_bar *bar) {
     const int w = m->width;
     *cracks = 0;
     for (int y = 0; y < m->height; y++) {
@@ -28,14 +28,14 @@ static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPA
             uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
             const int layer = *at & 15;
             for (int side = 0; side < 4; side++) {
-                const int u = x + txp_e_side_x[side], v = y + txp_e_side_y[side];
-                if (txp_e_is(m, u, v, layer)) continue;
+                const int u = x + txe_side_x[side], v = y + txe_side_y[side];
+                if (txe_is(m, u, v, layer)) continue;
                 *at = (uint8_t)(*at | 16 << side);
                 ++*cracks;
                 if (u >= 0 && v >= 0 && u < w && v < m->height)
                     shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
             }
-            if (txp_e_tick(bar, 4)) return 0;
+            if (txe_tick(bar, 4)) return 0;
         }
     }
     return 1;
@@ -52,8 +52,8 @@ static int txp_e_mark(const txp_e_map *m, size_t *cracks, size_t (*shared)[TEXPA
    As each crack has one successor and is that of one, the way comes back to its beginning.
    points  receives the corners, or NULL; returns their number; 0 = cancelled
    area    receives the area to the right, negative if the line is a hole's                   */
-static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *points,
-                          int64_t *area, txp_e_bar *bar) {
+static size_t txe_trace(const txe_map *m, int x, int y, int side, txm_vec2 *points,
+                        int64_t *area, txe_bar *bar) {
     const int x0 = x, y0 = y, side0 = side, w = m->width;
     const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
     size_t count = 0;
@@ -67,38 +67,38 @@ static size_t txp_e_trace(const txp_e_map *m, int x, int y, int side, txm_vec2 *
         if (side == 1) *area += x + 1; /* integral of x dy */
         if (side == 3) *area -= x;
         const int ahead = (side + 1) & 3; /* the side across which a lies */
-        const int ax = x + txp_e_side_x[ahead], ay = y + txp_e_side_y[ahead];
-        if (!txp_e_is(m, ax, ay, layer)) {
+        const int ax = x + txe_side_x[ahead], ay = y + txe_side_y[ahead];
+        if (!txe_is(m, ax, ay, layer)) {
             side = ahead;
         } else {
             x = ax;
             y = ay;
-            const int lx = ax + txp_e_side_x[side], ly = ay + txp_e_side_y[side];
-            if (txp_e_is(m, lx, ly, layer)) {
+            const int lx = ax + txe_side_x[side], ly = ay + txe_side_y[side];
+            if (txe_is(m, lx, ly, layer)) {
                 x = lx;
                 y = ly;
                 side = (side + 3) & 3;
             }
         }
-        if (txp_e_tick(bar, 4)) return 0;
+        if (txe_tick(bar, 4)) return 0;
     } while (x != x0 || y != y0 || side != side0);
     return count;
 }
 
 /* All lines in raster order of where they begin: run through once to count them, once to keep
    them. */
-static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_edges *e,
-                                  txm_env *env) {
-    size_t shared[TEXPATCH_MAX_LEVELS][TEXPATCH_MAX_LEVELS], cracks;
+static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
+                                txm_env *env) {
+    size_t shared[TEXEDGES_MAX_LEVELS][TEXEDGES_MAX_LEVELS], cracks;
     for (int pass = 0; pass < 2; pass++) {
         size_t lines = 0, points = 0;
         memset(shared, 0, sizeof shared);
-        if (!txp_e_mark(m, &cracks, shared, bar)) return txp_e_stopped(env);
+        if (!txe_mark(m, &cracks, shared, bar)) return txe_stopped(env);
         if (pass == 1) {
             e->lines =
-                (texpatch_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
+                (texedges_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
             e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
-            if (!e->lines || !e->points) return txp_e_no_memory(env);
+            if (!e->lines || !e->points) return txe_no_memory(env);
         }
         for (int y = 0; y < m->height; y++) {
             for (int x = 0; x < m->width; x++) {
@@ -107,8 +107,8 @@ static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_e
                     if (!(*at & 16 << side)) continue;
                     int64_t area;
                     const size_t count =
-                        txp_e_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
-                    if (!count) return txp_e_stopped(env);
+                        txe_trace(m, x, y, side, pass ? e->points + points : NULL, &area, bar);
+                    if (!count) return txe_stopped(env);
                     if (pass) {
                         e->lines[lines].layer = *at & 15;
                         e->lines[lines].is_hole = area < 0;
@@ -118,7 +118,7 @@ static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_e
                     points += count;
                     lines++;
                 }
-                if (txp_e_tick(bar, 1)) return txp_e_stopped(env);
+                if (txe_tick(bar, 1)) return txe_stopped(env);
             }
         }
         e->line_count = lines;
@@ -134,9 +134,9 @@ static txm_status txp_e_trace_all(const txp_e_map *m, txp_e_bar *bar, texpatch_e
     return TXM_OK;
 }
 
-static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, txm_arena *layers,
-                             txm_arena *scratch, texpatch_edges *e, txm_env *env) {
-    txp_e_map map;
+static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *layers,
+                           txm_arena *scratch, texedges_set *e, txm_env *env) {
+    txe_map map;
     const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
     e->width = map.width = desc->image.width;
     e->height = map.height = desc->image.height;
@@ -144,36 +144,36 @@ static txm_status txp_e_find(const texpatch_edges_desc *desc, txp_e_bar *bar, tx
     for (int k = 0; k < e->levels - 1 && desc->thresholds; k++)
         e->thresholds[k] = desc->thresholds[k];
     map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
-    if (!map.at) return txp_e_no_memory(env);
-    const txm_status status = txp_e_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
-                                          map.at, 0.7, bar, scratch, env);
+    if (!map.at) return txe_no_memory(env);
+    const txm_status status = txe_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
+                                        map.at, 0.7, bar, scratch, env);
     if (status != TXM_OK) return status;
-    txp_e_stage(bar, "lines", 1, (double)count * 14);
-    return txp_e_trace_all(&map, bar, e, env);
+    txe_stage(bar, "lines", 1, (double)count * 14);
+    return txe_trace_all(&map, bar, e, env);
 }
 
-TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm_env *env,
-                                            texpatch_edges *out) {
-    txm_status status = txp_e_check_desc(desc, env);
+TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env,
+                                      texedges_set *out) {
+    txm_status status = txe_check_desc(desc, env);
     if (status != TXM_OK) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    if (desc->levels && (desc->levels < 2 || desc->levels > TEXPATCH_MAX_LEVELS))
+    if (desc->levels && (desc->levels < 2 || desc->levels > TEXEDGES_MAX_LEVELS))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels",
-                           "must be 0 or 2 to TEXPATCH_MAX_LEVELS");
+                           "must be 0 or 2 to TEXEDGES_MAX_LEVELS");
     if (desc->thresholds &&
-        !txp_e_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
+        !txe_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
 
     txm_arena layers, scratch;
-    txp_e_bar bar;
-    texpatch_edges e;
+    txe_bar bar;
+    texedges_set e;
     memset(&e, 0, sizeof e);
     memset(&bar, 0, sizeof bar);
     bar.env = env;
     txm_arena_init(&layers, env);
     txm_arena_init(&scratch, env);
     txm_arena_init(&e.memory, env);
-    status = txp_e_find(desc, &bar, &layers, &scratch, &e, env);
+    status = txe_find(desc, &bar, &layers, &scratch, &e, env);
     txm_arena_free(&scratch);
     txm_arena_free(&layers);
     if (status == TXM_OK) *out = e;
@@ -181,7 +181,7 @@ TEXEDGES_API txm_status texpatch_edges_find(const texpatch_edges_desc *desc, txm
     return status;
 }
 
-TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges) {
+TEXEDGES_API void texedges_set_free(texedges_set *edges) {
     if (!edges) return;
     txm_arena_free(&edges->memory);
     memset(edges, 0, sizeof *edges);
@@ -189,21 +189,21 @@ TEXEDGES_API void texpatch_edges_free(texpatch_edges *edges) {
 
 /* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
    twice a pixel. 0 = cancelled. */
-static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *line, uint8_t *marks,
-                           int width, int height, txp_e_bar *bar) {
+static int txe_draw_line(const texedges_set *e, const texedges_polyline *line, uint8_t *marks,
+                         int width, int height, txe_bar *bar) {
     const txm_vec2 *points = e->points + line->first;
     for (size_t j = 0; j < line->count; j++) {
         const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
         const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
         const double length = sqrt(dx * dx + dy * dy);
         const int steps = 2 * (int)length + 1;
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
         for (int i = 0; i < steps && length > 0; i++) {
             const double t = (i + 0.5) / steps;
             const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
             if (x >= 0 && y >= 0 && x < width && y < height)
                 marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
-            if (txp_e_tick(bar, 2)) return 0;
+            if (txe_tick(bar, 2)) return 0;
         }
     }
     return 1;
@@ -211,7 +211,7 @@ static int txp_e_draw_line(const texpatch_edges *e, const texpatch_polyline *lin
 
 /* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
    not quite black. One channel: gray. */
-static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
+static uint8_t txe_color(int layer, int levels, int channels, int channel) {
     static const int ramp[5][3] = {
         {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
     const int t = 1024 * (layer + 1) / levels; /* 0..1024: four spans of 256 */
@@ -220,18 +220,18 @@ static uint8_t txp_e_color(int layer, int levels, int channels, int channel) {
     return (uint8_t)((ramp[span][channel] * (256 - rest) + ramp[span + 1][channel] * rest) / 256);
 }
 
-TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int layer, txm_env *env,
-                                            const txm_image *image) {
-    txp_e_bar bar;
+TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
+                                      const txm_image *image) {
+    txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
-    txp_e_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
-    txm_status status = txp_e_check_image(image, "image", 0, env);
+    txe_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
+    txm_status status = txe_check_image(image, "image", 0, env);
     if (status != TXM_OK) return status;
     const int channels = image->channels ? image->channels : 1;
     if (image->sample != TXM_U8 || (channels != 1 && channels != 3))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "must be TXM_U8 with 1 or 3 channels");
-    status = txp_e_check_edges(edges, "edges", 0, &bar, env);
+    status = txe_check_edges(edges, "edges", 0, &bar, env);
     if (status != TXM_OK) return status;
     if (layer < -1 || layer >= edges->levels)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "layer", "must be -1 to levels - 1");
@@ -240,19 +240,19 @@ TEXEDGES_API txm_status texpatch_edges_draw(const texpatch_edges *edges, int lay
     txm_arena arena;
     txm_arena_init(&arena, env);
     uint8_t *marks = (uint8_t *)txm_arena_zero(&arena, (size_t)width, (size_t)height);
-    if (!marks) return txp_e_no_memory(env);
-    txp_e_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
+    if (!marks) return txe_no_memory(env);
+    txe_stage(&bar, "edges", 1, 7 * (double)edges->point_count);
     for (size_t i = 0; i < edges->line_count && status == TXM_OK; i++) {
-        const texpatch_polyline *line = &edges->lines[i];
+        const texedges_polyline *line = &edges->lines[i];
         if (layer >= 0 && line->layer != layer) continue;
-        if (!txp_e_draw_line(edges, line, marks, width, height, &bar)) status = txp_e_stopped(env);
+        if (!txe_draw_line(edges, line, marks, width, height, &bar)) status = txe_stopped(env);
     }
     for (int y = 0; y < height && status == TXM_OK; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(image, y);
         for (int x = 0; x < width; x++) {
             const int mark = marks[(size_t)y * (size_t)width + (size_t)x];
             for (int c = 0; c < channels && mark; c++)
-                row[x * channels + c] = txp_e_color(mark - 1, edges->levels, channels, c);
+                row[x * channels + c] = txe_color(mark - 1, edges->levels, channels, c);
         }
     }
     txm_arena_free(&arena);

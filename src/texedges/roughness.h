@@ -3,69 +3,69 @@
 
 #include "check.h"
 
-/* ---- control: lines as rows of points ---------------------------------------------------- */
+/* ---- lines as rows of points ----------------------------------------------------------- */
 
-typedef struct txp_e_point {
+typedef struct txe_point {
     double x, y;
-} txp_e_point;
+} txe_point;
 
-static txp_e_point txp_e_between(txp_e_point a, txp_e_point b, double t) {
-    txp_e_point p;
+static txe_point txe_between(txe_point a, txe_point b, double t) {
+    txe_point p;
     p.x = a.x + (b.x - a.x) * t;
     p.y = a.y + (b.y - a.y) * t;
     return p;
 }
 
-static double txp_e_distance(txp_e_point a, txp_e_point b) {
+static double txe_distance(txe_point a, txe_point b) {
     const double dx = b.x - a.x, dy = b.y - a.y;
     return sqrt(dx * dx + dy * dy);
 }
 
 /* Length of n points; closed: back to the first. Negative: cancelled. */
-static double txp_e_length(const txp_e_point *p, size_t n, int is_closed, txp_e_bar *bar) {
+static double txe_length(const txe_point *p, size_t n, int is_closed, txe_bar *bar) {
     double sum = 0;
     for (size_t i = 1; i < n + (is_closed != 0); i++) {
-        sum += txp_e_distance(p[i - 1], p[i < n ? i : 0]);
-        if (txp_e_tick(bar, 1)) return -1;
+        sum += txe_distance(p[i - 1], p[i < n ? i : 0]);
+        if (txe_tick(bar, 1)) return -1;
     }
     return sum;
 }
 
 /* m points at equal distances along a line of n points and this length: closed from the first point
    on, open from the first to the last. 0 = cancelled. */
-static int txp_e_resample(const txp_e_point *p, size_t n, int is_closed, double length,
-                          txp_e_point *out, size_t m, txp_e_bar *bar) {
+static int txe_resample(const txe_point *p, size_t n, int is_closed, double length,
+                        txe_point *out, size_t m, txe_bar *bar) {
     const size_t segments = is_closed ? n : n - 1;
     const double step = length / (double)(is_closed ? m : m - 1);
     size_t i = 0;
-    double from = 0, span = txp_e_distance(p[0], p[1]); /* of segment i */
+    double from = 0, span = txe_distance(p[0], p[1]); /* of segment i */
     for (size_t k = 0; k < m; k++) {
         const double at = step * (double)k;
         while (at > from + span && i + 1 < segments) {
             from += span;
             i++;
-            span = txp_e_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
-            if (txp_e_tick(bar, 1)) return 0;
+            span = txe_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
+            if (txe_tick(bar, 1)) return 0;
         }
         const double t = span > 0 ? (at - from) / span : 0;
-        out[k] = txp_e_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
-        if (txp_e_tick(bar, 1)) return 0;
+        out[k] = txe_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
+        if (txe_tick(bar, 1)) return 0;
     }
     return 1;
 }
 
 /* Blur a line by the weights radius + 1 - |d|, whole numbers. Closed: around (n > radius); open:
    near the ends with as small a radius as they need, so that they stay. 0 = cancelled. */
-static int txp_e_soften(const txp_e_point *p, size_t n, int is_closed, size_t radius,
-                        txp_e_point *out, txp_e_bar *bar) {
+static int txe_soften(const txe_point *p, size_t n, int is_closed, size_t radius,
+                      txe_point *out, txe_bar *bar) {
     for (size_t i = 0; i < n; i++) {
         size_t reach = radius;
         if (!is_closed && reach > i) reach = i;
         if (!is_closed && reach > n - 1 - i) reach = n - 1 - i;
         double x = 0, y = 0;
         for (size_t d = 1; d <= reach; d++) {
-            const txp_e_point a = p[i >= d ? i - d : i + n - d];
-            const txp_e_point b = p[i + d < n ? i + d : i + d - n];
+            const txe_point a = p[i >= d ? i - d : i + n - d];
+            const txe_point b = p[i + d < n ? i + d : i + d - n];
             const double weight = (double)(reach + 1 - d);
             x += weight * (a.x + b.x);
             y += weight * (a.y + b.y);
@@ -73,135 +73,135 @@ static int txp_e_soften(const txp_e_point *p, size_t n, int is_closed, size_t ra
         const double weight = (double)(reach + 1), sum = weight * weight;
         out[i].x = (x + weight * p[i].x) / sum;
         out[i].y = (y + weight * p[i].y) / sum;
-        if (txp_e_tick(bar, reach + 1)) return 0;
+        if (txe_tick(bar, reach + 1)) return 0;
     }
     return 1;
 }
 
 /* The unit vector from a to b; if they are one point, as it was before. */
-static void txp_e_direction(txp_e_point a, txp_e_point b, txp_e_point *direction) {
-    const double length = txp_e_distance(a, b);
+static void txe_direction(txe_point a, txe_point b, txe_point *direction) {
+    const double length = txe_distance(a, b);
     if (!(length > 1e-9)) return;
     direction->x = (b.x - a.x) / length;
     direction->y = (b.y - a.y) / length;
 }
 
-/* ---- control: the unrest of the exemplar's edges ----------------------------------------- */
+/* ---- the unrest of the exemplar's edges ------------------------------------------------ */
 
 /* One sample of a line of the exemplar, a pixel of its length from the next: how far its smooth
    course moves on meanwhile, and where the line lies from there, ahead and to the right. */
-typedef struct txp_e_sample {
+typedef struct txe_sample {
     double step, ahead, right;
     double length; /* of the line to the next sample, tamed as it is                           */
     int bin;       /* its direction against its course                                         */
-} txp_e_sample;
+} txe_sample;
 
 /* The unrest of one layer: rows of samples one behind the other, and the places at which a piece of
-   TXP_E_PIECE + TXP_E_JOIN samples can begin. */
-typedef struct txp_e_unrest {
-    txp_e_sample *samples;
+   TXE_PIECE + TXE_JOIN samples can begin. */
+typedef struct txe_unrest {
+    txe_sample *samples;
     size_t *starts;
     size_t count, start_count;
     double amount;            /* by which the exemplar's is multiplied                          */
     double step;              /* mean of all steps                                              */
-    double share[TXP_E_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
-} txp_e_unrest;
+    double share[TXE_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
+} txe_unrest;
 
 /* Room for the work on one line of up to count points. */
-typedef struct txp_e_bench {
-    txp_e_point *a, *b, *c;
-} txp_e_bench;
+typedef struct txe_bench {
+    txe_point *a, *b, *c;
+} txe_bench;
 
-static int txp_e_bench_make(txp_e_bench *bench, txm_arena *arena, size_t count) {
-    bench->a = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
-    bench->b = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
-    bench->c = (txp_e_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
+static int txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
+    bench->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
+    bench->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
+    bench->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
     return bench->a && bench->b && bench->c;
 }
 
-/* The factor that makes a vector of this length no longer than TXP_E_STRAY: 1 up to TXP_E_LINEAR,
+/* The factor that makes a vector of this length no longer than TXE_STRAY: 1 up to TXE_LINEAR,
    then the length grows slower and slower. */
-static double txp_e_tame(double length) {
-    const double room = TXP_E_STRAY - TXP_E_LINEAR, more = length - TXP_E_LINEAR;
-    return more > 0 ? (TXP_E_LINEAR + room * more / (more + room)) / length : 1;
+static double txe_tame(double length) {
+    const double room = TXE_STRAY - TXE_LINEAR, more = length - TXE_LINEAR;
+    return more > 0 ? (TXE_LINEAR + room * more / (more + room)) / length : 1;
 }
 
 /* The direction of (ahead, right), no matter which way: 0 = straight on, then every 16th of half a
    turn to the right. The table: cosine and sine of 1/2, 3/2, ... of such a step. */
-static int txp_e_bin(double ahead, double right) {
-    static const double edge[TXP_E_BINS / 2][2] = {
+static int txe_bin(double ahead, double right) {
+    static const double edge[TXE_BINS / 2][2] = {
         {0.99518473, 0.09801714}, {0.95694034, 0.29028468}, {0.88192126, 0.47139674},
         {0.77301045, 0.63439328}, {0.63439328, 0.77301045}, {0.47139674, 0.88192126},
         {0.29028468, 0.95694034}, {0.09801714, 0.99518473}};
     const double x = ahead < 0 ? -ahead : ahead, y = right < 0 ? -right : right;
     int k = 0;
-    while (k < TXP_E_BINS / 2 && y * edge[k][0] > x * edge[k][1]) k++;
-    return (ahead < 0) != (right < 0) ? (TXP_E_BINS - k) % TXP_E_BINS : k % TXP_E_BINS;
+    while (k < TXE_BINS / 2 && y * edge[k][0] > x * edge[k][1]) k++;
+    return (ahead < 0) != (right < 0) ? (TXE_BINS - k) % TXE_BINS : k % TXE_BINS;
 }
 
 /* The directions of a line of n points in bench->b against its course, its blur of radius
-   TXP_E_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
+   TXE_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
    of a line with `amount` times the unrest, or put into the samples of its points.
    0 = cancelled. */
-static int txp_e_directions(const txp_e_bench *bench, size_t n, int is_closed, size_t light,
-                            double amount, double *share, txp_e_sample *samples, txp_e_bar *bar) {
-    const txp_e_point *line = bench->a, *course = bench->c;
-    const size_t trim = is_closed || !share ? 0 : TXP_E_COURSE; /* the ends of the course are bad */
-    if (!txp_e_soften(bench->b, n, is_closed, light, bench->a, bar) ||
-        !txp_e_soften(bench->b, n, is_closed, TXP_E_COURSE, bench->c, bar))
+static int txe_directions(const txe_bench *bench, size_t n, int is_closed, size_t light,
+                          double amount, double *share, txe_sample *samples, txe_bar *bar) {
+    const txe_point *line = bench->a, *course = bench->c;
+    const size_t trim = is_closed || !share ? 0 : TXE_COURSE; /* the ends of the course are bad */
+    if (!txe_soften(bench->b, n, is_closed, light, bench->a, bar) ||
+        !txe_soften(bench->b, n, is_closed, TXE_COURSE, bench->c, bar))
         return 0;
     for (size_t i = trim; i < n - trim; i++) {
         size_t at[4]; /* the course from at[0] to at[3], the line from at[1] to at[2] */
         for (int k = 0; k < 4; k++) {
-            const size_t off = k == 0 || k == 3 ? TXP_E_CHORD : 1;
+            const size_t off = k == 0 || k == 3 ? TXE_CHORD : 1;
             if (k < 2) at[k] = i >= off ? i - off : is_closed ? i + n - off : 0;
             else at[k] = i + off < n ? i + off : is_closed ? i + off - n : n - 1;
         }
         const double cx = course[at[3]].x - course[at[0]].x, cy = course[at[3]].y - course[at[0]].y;
         const double dx = line[at[2]].x - line[at[1]].x, dy = line[at[2]].y - line[at[1]].y;
-        const int bin = txp_e_bin(cx * dx + cy * dy, amount * (cx * dy - cy * dx));
+        const int bin = txe_bin(cx * dx + cy * dy, amount * (cx * dy - cy * dx));
         if (share) share[bin] += 1;
         if (samples) {
             samples[i].bin = bin;
-            samples[i].length = txp_e_distance(line[i], line[at[2]]);
+            samples[i].length = txe_distance(line[i], line[at[2]]);
         }
-        if (txp_e_tick(bar, 4)) return 0;
+        if (txe_tick(bar, 4)) return 0;
     }
     return 1;
 }
 
 /* Take in one line: n points in bench->a, a pixel apart at most. With S the blur of radius
-   TXP_E_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
+   TXE_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
    would shrink. Ends of open lines are left out, where the course is bad. 0 = cancelled. */
-static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int is_closed,
-                        txp_e_bar *bar) {
-    txp_e_point *line = bench->b, *blurred = bench->a, *course = bench->c;
-    if (n < TXP_E_SHORT) return 1;
-    const double length = txp_e_length(bench->a, n, is_closed, bar);
+static int txe_listen(txe_unrest *u, const txe_bench *bench, size_t n, int is_closed,
+                      txe_bar *bar) {
+    txe_point *line = bench->b, *blurred = bench->a, *course = bench->c;
+    if (n < TXE_SHORT) return 1;
+    const double length = txe_length(bench->a, n, is_closed, bar);
     if (length < 0) return 0;
     const size_t m = (size_t)(length + 0.5) + !is_closed; /* at most n */
-    const size_t trim = is_closed ? 0 : TXP_E_SCALE;
-    if (m < TXP_E_SHORT + 2 * trim) return 1;
-    if (!txp_e_resample(bench->a, n, is_closed, length, line, m, bar) ||
-        !txp_e_soften(line, m, is_closed, TXP_E_SCALE, blurred, bar) ||
-        !txp_e_soften(blurred, m, is_closed, TXP_E_SCALE, course, bar))
+    const size_t trim = is_closed ? 0 : TXE_SCALE;
+    if (m < TXE_SHORT + 2 * trim) return 1;
+    if (!txe_resample(bench->a, n, is_closed, length, line, m, bar) ||
+        !txe_soften(line, m, is_closed, TXE_SCALE, blurred, bar) ||
+        !txe_soften(blurred, m, is_closed, TXE_SCALE, course, bar))
         return 0;
     for (size_t i = 0; i < m; i++) {
         course[i].x = 2 * blurred[i].x - course[i].x;
         course[i].y = 2 * blurred[i].y - course[i].y;
     }
     /* a closed line goes on beyond its end, so that pieces can begin anywhere */
-    const size_t room = TXP_E_PIECE + TXP_E_JOIN, end = is_closed ? m + room : m - trim;
-    txp_e_sample *first = u->samples + u->count;
-    txp_e_point direction;
+    const size_t room = TXE_PIECE + TXE_JOIN, end = is_closed ? m + room : m - trim;
+    txe_sample *first = u->samples + u->count;
+    txe_point direction;
     direction.x = 1;
     direction.y = 0;
     for (size_t i = trim; i < end; i++) {
-        const size_t at = i % m, back = (i + m - TXP_E_CHORD) % m, front = (i + TXP_E_CHORD) % m;
+        const size_t at = i % m, back = (i + m - TXE_CHORD) % m, front = (i + TXE_CHORD) % m;
         const double dx = line[at].x - course[at].x, dy = line[at].y - course[at].y;
-        txp_e_sample *s = &u->samples[u->count];
-        txp_e_direction(course[back], course[front], &direction);
-        s->step = txp_e_distance(course[at], course[(i + 1) % m]);
+        txe_sample *s = &u->samples[u->count];
+        txe_direction(course[back], course[front], &direction);
+        s->step = txe_distance(course[at], course[(i + 1) % m]);
         s->ahead = u->amount * (dx * direction.x + dy * direction.y);
         s->right = u->amount * (dy * direction.x - dx * direction.y);
         if (i + room <= end) {
@@ -209,9 +209,9 @@ static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int
             u->step += s->step;
         }
         u->count++;
-        if (txp_e_tick(bar, 4)) return 0;
+        if (txe_tick(bar, 4)) return 0;
     }
-    if (!txp_e_directions(bench, m, is_closed, TXP_E_LIGHT, u->amount, u->share, NULL, bar))
+    if (!txe_directions(bench, m, is_closed, TXE_LIGHT, u->amount, u->share, NULL, bar))
         return 0;
     /* Tame the unrest and count its directions once more, along a straight course; smoother than
        the exemplar's, as a line loses some when it is drawn in pixels. So as much as the exemplar
@@ -219,88 +219,88 @@ static int txp_e_listen(txp_e_unrest *u, const txp_e_bench *bench, size_t n, int
     double x = 0;
     const size_t count = end - trim;
     for (size_t i = 0; i < count; i++) {
-        txp_e_sample *s = first + i;
-        const double factor = txp_e_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
+        txe_sample *s = first + i;
+        const double factor = txe_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
         s->ahead *= factor;
         s->right *= factor;
         line[i].x = x + s->ahead;
         line[i].y = s->right;
         x += s->step;
-        if (txp_e_tick(bar, 2)) return 0;
+        if (txe_tick(bar, 2)) return 0;
     }
-    return txp_e_directions(bench, count, 0, TXP_E_LIGHT + 1, 1, NULL, first, bar);
+    return txe_directions(bench, count, 0, TXE_LIGHT + 1, 1, NULL, first, bar);
 }
 
 /* does the crack from p to q run along the picture's border? */
-static int txp_e_on_border(const texpatch_edges *e, txm_vec2 p, txm_vec2 q) {
+static int txe_on_border(const texedges_set *e, txm_vec2 p, txm_vec2 q) {
     return (p.x == q.x && (p.x == 0 || p.x == (float)e->width)) ||
            (p.y == q.y && (p.y == 0 || p.y == (float)e->height));
 }
 
 /* Take in the parts of a line that lie inside the picture. 0 = cancelled. */
-static int txp_e_listen_line(txp_e_unrest *u, const txp_e_bench *bench, const texpatch_edges *e,
-                             const texpatch_polyline *line, txp_e_bar *bar) {
+static int txe_listen_line(txe_unrest *u, const txe_bench *bench, const texedges_set *e,
+                           const texedges_polyline *line, txe_bar *bar) {
     const txm_vec2 *p = e->points + line->first;
     size_t start = line->count, n = 0;
     for (size_t j = 0; j < line->count && start == line->count; j++) { /* the first on the border */
-        if (txp_e_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
+        if (txe_tick(bar, 1)) return 0;
     }
     const int is_closed = start == line->count;
     for (size_t k = 0; k < line->count; k++) {
         const size_t j = (start + k) % line->count, next = (j + 1) % line->count;
-        if (txp_e_on_border(e, p[j], p[next])) {
-            if (!txp_e_listen(u, bench, n, 0, bar)) return 0;
+        if (txe_on_border(e, p[j], p[next])) {
+            if (!txe_listen(u, bench, n, 0, bar)) return 0;
             n = 0;
         } else { /* the middle of the crack: so a slope of one pixel in one is a straight line */
             bench->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
             bench->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
             n++;
         }
-        if (txp_e_tick(bar, 1)) return 0;
+        if (txe_tick(bar, 1)) return 0;
     }
-    return txp_e_listen(u, bench, n, is_closed, bar);
+    return txe_listen(u, bench, n, is_closed, bar);
 }
 
 /* The unrest of a layer, amount times that of the exemplar, with memory from the arena. */
-static txm_status txp_e_listen_layer(txp_e_unrest *u, const texpatch_edges *e, int layer,
-                                     double amount, txm_arena *arena, txp_e_bar *bar,
-                                     txm_env *env) {
-    const size_t room = TXP_E_PIECE + TXP_E_JOIN;
-    txp_e_bench bench;
+static txm_status txe_listen_layer(txe_unrest *u, const texedges_set *e, int layer,
+                                   double amount, txm_arena *arena, txe_bar *bar,
+                                   txm_env *env) {
+    const size_t room = TXE_PIECE + TXE_JOIN;
+    txe_bench bench;
     size_t most = 0, longest = 0;
     double sum = 0;
     memset(u, 0, sizeof *u);
     u->amount = amount;
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
+        const texedges_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXE_SHORT) continue;
         most += line->count + room;
         if (line->count > longest) longest = line->count;
     }
     if (most == 0) return TXM_OK;
-    u->samples = (txp_e_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
+    u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
-    if (!u->samples || !u->starts || !txp_e_bench_make(&bench, arena, longest + room))
-        return txp_e_no_memory(env);
+    if (!u->samples || !u->starts || !txe_bench_make(&bench, arena, longest + room))
+        return txe_no_memory(env);
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXP_E_SHORT) continue;
-        if (!txp_e_listen_line(u, &bench, e, line, bar)) return txp_e_stopped(env);
+        const texedges_polyline *line = &e->lines[i];
+        if (line->layer != layer || line->count < TXE_SHORT) continue;
+        if (!txe_listen_line(u, &bench, e, line, bar)) return txe_stopped(env);
     }
-    for (int b = 0; b < TXP_E_BINS; b++) sum += u->share[b];
-    for (int b = 0; b < TXP_E_BINS && sum > 0; b++) u->share[b] /= sum;
+    for (int b = 0; b < TXE_BINS; b++) sum += u->share[b];
+    for (int b = 0; b < TXE_BINS && sum > 0; b++) u->share[b] /= sum;
     if (u->start_count) u->step /= (double)u->start_count;
     if (u->step < 0.125) u->step = 0.125; /* of a line that turns in place */
     return TXM_OK;
 }
 
-/* ---- control: new unrest out of pieces --------------------------------------------------- */
+/* ---- new unrest out of pieces ---------------------------------------------------------- */
 
-/* How badly TXP_E_JOIN samples go together: place and, as there are several, slope. */
-static double txp_e_gap(const txp_e_sample *a, const txp_e_sample *b) {
+/* How badly TXE_JOIN samples go together: place and, as there are several, slope. */
+static double txe_gap(const txe_sample *a, const txe_sample *b) {
     double sum = 0;
-    for (int j = 0; j < TXP_E_JOIN; j++) {
+    for (int j = 0; j < TXE_JOIN; j++) {
         const double ahead = a[j].ahead - b[j].ahead, right = a[j].right - b[j].right;
         sum += ahead * ahead + right * right;
     }
@@ -308,33 +308,33 @@ static double txp_e_gap(const txp_e_sample *a, const txp_e_sample *b) {
 }
 
 /* Let a piece begin where the tail of the last one is: the difference of their first samples is
-   taken back over TXP_E_JOIN samples. Fading from one to the other would even out both. */
-static void txp_e_join(const txp_e_sample *tail, txp_e_sample *piece) {
+   taken back over TXE_JOIN samples. Fading from one to the other would even out both. */
+static void txe_join(const txe_sample *tail, txe_sample *piece) {
     const double ahead = tail->ahead - piece->ahead, right = tail->right - piece->right;
-    for (int j = 0; j < TXP_E_JOIN; j++) {
-        const double part = 1 - j / (double)TXP_E_JOIN;
+    for (int j = 0; j < TXE_JOIN; j++) {
+        const double part = 1 - j / (double)TXE_JOIN;
         piece[j].ahead += ahead * part;
         piece[j].right += right * part;
     }
 }
 
 /* What the next piece of a row is chosen by. */
-typedef struct txp_e_row {
-    const txp_e_sample *tail; /* how the last piece would go on; NULL: there is none           */
+typedef struct txe_row {
+    const txe_sample *tail; /* how the last piece would go on; NULL: there is none           */
     double length;            /* of the line so far                                            */
-    double bins[TXP_E_BINS];  /* and of its parts by direction                                 */
-} txp_e_row;
+    double bins[TXE_BINS];  /* and of its parts by direction                                 */
+} txe_row;
 
 /* How far the directions are from their shares once a piece is there. */
-static double txp_e_deviation(const txp_e_row *row, const double *share, const txp_e_sample *piece,
-                              size_t length) {
-    double bins[TXP_E_BINS], total = row->length, sum = 0;
+static double txe_deviation(const txe_row *row, const double *share, const txe_sample *piece,
+                            size_t length) {
+    double bins[TXE_BINS], total = row->length, sum = 0;
     memcpy(bins, row->bins, sizeof bins);
     for (size_t j = 0; j < length; j++) {
         bins[piece[j].bin] += piece[j].length;
         total += piece[j].length;
     }
-    for (int b = 0; b < TXP_E_BINS; b++) {
+    for (int b = 0; b < TXE_BINS; b++) {
         const double off = bins[b] - share[b] * total;
         sum += off * off / (share[b] + 0.01);
     }
@@ -344,16 +344,16 @@ static double txp_e_deviation(const txp_e_row *row, const double *share, const t
 /* Choose a piece of this length: of some taken at random those that join best, to the tail and at
    the end to head (NULL: to nothing, one of the piece itself: to its own beginning); of these the
    one that brings the directions nearest to their shares. */
-static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, const txp_e_row *row,
-                                        size_t length, int closes, const txp_e_sample *head) {
-    const txp_e_sample *good[TXP_E_GOOD + 1] = {NULL}, *best;
-    double gaps[TXP_E_GOOD + 1] = {0}, least;
+static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe_row *row,
+                                    size_t length, int closes, const txe_sample *head) {
+    const txe_sample *good[TXE_GOOD + 1] = {NULL}, *best;
+    double gaps[TXE_GOOD + 1] = {0}, least;
     int count = 0;
-    for (int i = 0; i < TXP_E_TRIES * (closes ? 4 : 1); i++) {
+    for (int i = 0; i < TXE_TRIES * (closes ? 4 : 1); i++) {
         const size_t pick = (size_t)(txm_rng_double(rng) * (double)u->start_count);
-        const txp_e_sample *piece = u->samples + u->starts[pick];
-        double gap = row->tail ? txp_e_gap(row->tail, piece) : 0;
-        if (closes) gap += txp_e_gap(piece + length, head ? head : piece);
+        const txe_sample *piece = u->samples + u->starts[pick];
+        double gap = row->tail ? txe_gap(row->tail, piece) : 0;
+        if (closes) gap += txe_gap(piece + length, head ? head : piece);
         int at = count;
         for (; at > 0 && gap < gaps[at - 1]; at--) {
             gaps[at] = gaps[at - 1];
@@ -361,12 +361,12 @@ static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, con
         }
         gaps[at] = gap;
         good[at] = piece;
-        if (count < TXP_E_GOOD) count++;
+        if (count < TXE_GOOD) count++;
     }
     best = good[0];
-    least = closes ? 0 : txp_e_deviation(row, u->share, best, length);
+    least = closes ? 0 : txe_deviation(row, u->share, best, length);
     for (int i = 1; i < count && !closes; i++) {
-        const double off = txp_e_deviation(row, u->share, good[i], length);
+        const double off = txe_deviation(row, u->share, good[i], length);
         if (off >= least) continue;
         best = good[i];
         least = off;
@@ -374,31 +374,31 @@ static const txp_e_sample *txp_e_choose(const txp_e_unrest *u, txm_rng *rng, con
     return best;
 }
 
-/* String pieces together to a closed row of m samples, m >= TXP_E_PIECE / 3. 0 = cancelled. */
-static int txp_e_weave(const txp_e_unrest *u, txm_rng *rng, txp_e_sample *samples, size_t m,
-                       txp_e_bar *bar) {
-    const size_t shortest = TXP_E_PIECE / 3;
-    txp_e_row row;
+/* String pieces together to a closed row of m samples, m >= TXE_PIECE / 3. 0 = cancelled. */
+static int txe_weave(const txe_unrest *u, txm_rng *rng, txe_sample *samples, size_t m,
+                     txe_bar *bar) {
+    const size_t shortest = TXE_PIECE / 3;
+    txe_row row;
     memset(&row, 0, sizeof row);
     for (size_t k = 0; k < m;) {
         const size_t rest = m - k;
         size_t length = rest;
-        if (rest > TXP_E_PIECE)
-            length = shortest + txm_rng_below(rng, TXP_E_PIECE - (uint32_t)shortest + 1);
+        if (rest > TXE_PIECE)
+            length = shortest + txm_rng_below(rng, TXE_PIECE - (uint32_t)shortest + 1);
         if (length < rest && rest - length < shortest) length = rest - shortest;
-        const txp_e_sample *piece =
-            txp_e_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
+        const txe_sample *piece =
+            txe_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
         memcpy(samples + k, piece, length * sizeof *samples);
-        if (row.tail) txp_e_join(row.tail, samples + k);
+        if (row.tail) txe_join(row.tail, samples + k);
         for (size_t j = 0; j < length; j++) {
             row.bins[piece[j].bin] += piece[j].length;
             row.length += piece[j].length;
         }
         row.tail = piece + length;
         k += length;
-        if (txp_e_tick(bar, 64 * TXP_E_TRIES)) return 0;
+        if (txe_tick(bar, 64 * TXE_TRIES)) return 0;
     }
-    txp_e_join(row.tail, samples);
+    txe_join(row.tail, samples);
     return 1;
 }
 

@@ -37,7 +37,7 @@ enum { OVER_BLACK, OVER_PICTURE, OVER_LAYERS };
 /* ---- lines as text ----------------------------------------------------------------------- */
 
 /* Point i of a line, counted around. */
-static txm_vec2 point_of(const texpatch_edges *e, const texpatch_polyline *line, size_t i) {
+static txm_vec2 point_of(const texedges_set *e, const texedges_polyline *line, size_t i) {
     return e->points[line->first + i % line->count];
 }
 
@@ -46,13 +46,13 @@ static int sign_of(float x) {
 }
 
 /* Does the line turn at its point i? Its steps are along the axes. */
-static int turns_at(const texpatch_edges *e, const texpatch_polyline *line, size_t i) {
+static int turns_at(const texedges_set *e, const texedges_polyline *line, size_t i) {
     const txm_vec2 p = point_of(e, line, i + line->count - 1), q = point_of(e, line, i);
     const txm_vec2 r = point_of(e, line, i + 1);
     return sign_of(q.x - p.x) != sign_of(r.x - q.x) || sign_of(q.y - p.y) != sign_of(r.y - q.y);
 }
 
-static void print_json(FILE *to, const texpatch_edges *e, int layer) {
+static void print_json(FILE *to, const texedges_set *e, int layer) {
     const char *between = "";
     fprintf(to, "{\n  \"width\": %d,\n  \"height\": %d,\n  \"levels\": %d,\n  \"thresholds\": [",
             e->width, e->height, e->levels);
@@ -60,7 +60,7 @@ static void print_json(FILE *to, const texpatch_edges *e, int layer) {
         fprintf(to, "%s%.9g", k ? ", " : "", (double)e->thresholds[k]);
     fprintf(to, "],\n  \"lines\": [");
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
+        const texedges_polyline *line = &e->lines[i];
         const char *comma = "";
         if (layer >= 0 && line->layer != layer) continue;
         fprintf(to, "%s\n    {\"layer\": %d, \"hole\": %s, \"points\": [", between, line->layer,
@@ -77,17 +77,17 @@ static void print_json(FILE *to, const texpatch_edges *e, int layer) {
     fprintf(to, "\n  ]\n}\n");
 }
 
-static void print_svg(FILE *to, const texpatch_edges *e, int layer) {
+static void print_svg(FILE *to, const texedges_set *e, int layer) {
     fprintf(to, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
             "viewBox=\"0 0 %d %d\" fill-rule=\"evenodd\" shape-rendering=\"crispEdges\">\n",
             e->width, e->height, e->width, e->height);
     for (int k = 0; k < e->levels; k++) {
-        const int gray = (255 * k + (e->levels - 1) / 2) / (e->levels - 1); /* as texpatch_layers */
+        const int gray = (255 * k + (e->levels - 1) / 2) / (e->levels - 1); /* as texedges_layers */
         if (layer >= 0 && k != layer) continue;
         fprintf(to, "<path id=\"layer-%d\" fill=\"#%02x%02x%02x\" d=\"", k, (unsigned)gray,
                 (unsigned)gray, (unsigned)gray);
         for (size_t i = 0; i < e->line_count; i++) {
-            const texpatch_polyline *line = &e->lines[i];
+            const texedges_polyline *line = &e->lines[i];
             char move = 'M';
             if (line->layer != k) continue;
             for (size_t n = 0; n < line->count; n++) {
@@ -104,7 +104,7 @@ static void print_svg(FILE *to, const texpatch_edges *e, int layer) {
 }
 
 /* The text for a free(); NULL if memory ran out. */
-static char *lines_as_text(const texpatch_edges *e, int layer, int is_svg, size_t *size) {
+static char *lines_as_text(const texedges_set *e, int layer, int is_svg, size_t *size) {
     char *text = NULL;
     FILE *to = open_memstream(&text, size);
     if (!to) return NULL;
@@ -124,7 +124,7 @@ static int new_picture(cli *run, int width, int height, int channels, txm_image 
 }
 
 /* Lines over black, over the picture (in RGB) or over its layers (gray). */
-static int draw_lines(cli *run, const texpatch_edges *e, int layer, int over,
+static int draw_lines(cli *run, const texedges_set *e, int layer, int over,
                       const txm_image *image, const txm_image *layers, txm_image *out) {
     const int status = new_picture(run, e->width, e->height, 3, out);
     if (status) return status;
@@ -136,7 +136,7 @@ static int draw_lines(cli *run, const texpatch_edges *e, int layer, int over,
                               txm_image_get(under, x, y, under->channels < 3 ? 0 : k));
         }
     }
-    const txm_status result = texpatch_edges_draw(e, layer, &run->env, out);
+    const txm_status result = texedges_draw(e, layer, &run->env, out);
     return result == TXM_OK ? CLI_DONE : fail_library(run, result, run->inputs[0]);
 }
 
@@ -147,11 +147,11 @@ static int is_text(const char *extension) {
 }
 
 /* Refuse, before any work, what does not go together. */
-static int check_options(cli *run, const options *o, texpatch_edges_desc *d, int *over,
-                         float thresholds[TEXPATCH_MAX_LEVELS]) {
+static int check_options(cli *run, const options *o, texedges_desc *d, int *over,
+                         float thresholds[TEXEDGES_MAX_LEVELS]) {
     static const char *const overs[] = {"black", "picture", "layers"};
     char extension[8];
-    double numbers[TEXPATCH_MAX_LEVELS];
+    double numbers[TEXEDGES_MAX_LEVELS];
     int status = CLI_DONE;
     file_extension(run->output, extension);
     if (!is_text(extension)) status = check_picture_path(run, run->output, 0, 0, 3);
@@ -162,7 +162,7 @@ static int check_options(cli *run, const options *o, texpatch_edges_desc *d, int
         d->smooth = (float)numbers[0];
     }
     if (o->thresholds) {
-        const int n = parse_numbers(run, "--thresholds", o->thresholds, TEXPATCH_MAX_LEVELS - 1, 0,
+        const int n = parse_numbers(run, "--thresholds", o->thresholds, TEXEDGES_MAX_LEVELS - 1, 0,
                                     1, numbers);
         if (!n) return CLI_USAGE;
         for (int k = 0; k < n; k++) {
@@ -192,12 +192,12 @@ static int check_options(cli *run, const options *o, texpatch_edges_desc *d, int
 }
 
 /* What was found, for --stats; returns how many lines OUT has. */
-static size_t set_figures(cli *run, const texpatch_edges *e, int layer) {
-    int per_layer[TEXPATCH_MAX_LEVELS] = {0};
+static size_t set_figures(cli *run, const texedges_set *e, int layer) {
+    int per_layer[TEXEDGES_MAX_LEVELS] = {0};
     size_t count = 0;
     double length = 0;
     for (size_t i = 0; i < e->line_count; i++) {
-        const texpatch_polyline *line = &e->lines[i];
+        const texedges_polyline *line = &e->lines[i];
         if (layer >= 0 && line->layer != layer) continue;
         per_layer[line->layer]++;
         count++;
@@ -212,7 +212,7 @@ static size_t set_figures(cli *run, const texpatch_edges *e, int layer) {
     return count;
 }
 
-static int write_outputs(cli *run, const options *o, const texpatch_edges *e, int over,
+static int write_outputs(cli *run, const options *o, const texedges_set *e, int over,
                          const txm_image *image, const txm_image *layers) {
     cli_file files[2] = {{0}, {0}};
     unsigned char *bytes[2] = {NULL, NULL};
@@ -249,14 +249,14 @@ static int write_outputs(cli *run, const options *o, const texpatch_edges *e, in
 static int run_edges(int argc, char **argv) {
     cli run;
     options o = {NULL, NULL, "black", NULL, -1};
-    texpatch_edges_desc desc = {0};
-    texpatch_edges edges = {0};
+    texedges_desc desc = {0};
+    texedges_set edges = {0};
     txm_image layers = {0};
-    float thresholds[TEXPATCH_MAX_LEVELS];
+    float thresholds[TEXEDGES_MAX_LEVELS];
     int over = 0, status;
     const cli_option table[] = {
         {CLI_INT, "--levels", "N", "layers, 2 to 16; default 4", &desc.levels, 2,
-         TEXPATCH_MAX_LEVELS},
+         TEXEDGES_MAX_LEVELS},
         {CLI_TEXT, "--thresholds", "T1,...", "grays 0 to 1 at which layers 1, 2, ... begin",
          &o.thresholds, 0, 0},
         {CLI_TEXT, "--smooth", "R", "blur by so many pixels beforehand, 0 to 16; default 0",
@@ -264,7 +264,7 @@ static int run_edges(int argc, char **argv) {
         {CLI_INT, "--least", "N", "leave out regions whose boundary is shorter; default 0",
          &desc.least, 0, 1 << 30},
         {CLI_INT, "--layer", "K", "only the lines of this layer", &o.layer, 0,
-         TEXPATCH_MAX_LEVELS - 1},
+         TEXEDGES_MAX_LEVELS - 1},
         {CLI_TEXT, "--over", "WHAT", "draw over black (default), the picture or its layers",
          &o.over, 0, 0},
         {CLI_OUTPUT, "--layers", "FILE", "also write the layers as grays", &o.layers, 0, 0},
@@ -279,11 +279,11 @@ static int run_edges(int argc, char **argv) {
     if (status) return status;
 
     cli_stage(&run, "find");
-    txm_status result = texpatch_edges_find(&desc, &run.env, &edges);
+    txm_status result = texedges_find(&desc, &run.env, &edges);
     if (result == TXM_OK && (o.layers || over == OVER_LAYERS)) {
         cli_stage(&run, "layers");
         status = new_picture(&run, desc.image.width, desc.image.height, 1, &layers);
-        if (!status) result = texpatch_layers(&desc, &edges, &run.env, &layers);
+        if (!status) result = texedges_layers(&desc, &edges, &run.env, &layers);
     }
     if (result != TXM_OK) status = fail_library(&run, result, run.inputs[0]);
     if (!status) {
@@ -293,7 +293,7 @@ static int run_edges(int argc, char **argv) {
             printf("%s: %lu lines of %d layers, %.1f s\n", run.output, (unsigned long)count,
                    edges.levels, cli_seconds(&run));
     }
-    texpatch_edges_free(&edges);
+    texedges_set_free(&edges);
     free(layers.pixels);
     image_free(&desc.image);
     return status;

@@ -517,9 +517,9 @@ static int read_all(job *j) {
 
 /* A file of strokes: what to find in the exemplar, and what to draw. */
 typedef struct strokes {
-    texpatch_edges_desc find;
-    texpatch_control control;
-    texpatch_stroke *list;
+    texedges_desc find;
+    texedges_control control;
+    texedges_stroke *list;
     txm_vec2 *points;
     char why[120]; /* what is wrong with the file */
 } strokes;
@@ -557,7 +557,7 @@ static int knows_fields(strokes *s, const cJSON *object, const char *const *fiel
 }
 
 /* One stroke; its points go behind those of the ones before. */
-static int parse_stroke(strokes *s, const cJSON *json, texpatch_stroke *to, txm_vec2 *points) {
+static int parse_stroke(strokes *s, const cJSON *json, texedges_stroke *to, txm_vec2 *points) {
     static const char *const fields[] = {"layer", "closed", "width", "points", NULL};
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(json, "points"), *point;
     const cJSON *closed = cJSON_GetObjectItemCaseSensitive(json, "closed");
@@ -611,7 +611,7 @@ static int parse_strokes(strokes *s, const cJSON *json) {
         return 0;
     }
     if (!knows_fields(s, json, fields) ||
-        !get_number(s, json, "levels", 2, TEXPATCH_MAX_LEVELS, 1, &levels) ||
+        !get_number(s, json, "levels", 2, TEXEDGES_MAX_LEVELS, 1, &levels) ||
         !get_number(s, json, "smooth", 0, 16, 0, &smooth) ||
         !get_number(s, json, "least", 0, 1 << 30, 1, &least) ||
         !get_number(s, json, "background", -1, levels - 1, 1, &background) ||
@@ -626,7 +626,7 @@ static int parse_strokes(strokes *s, const cJSON *json) {
         count++;
         points += (size_t)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(item, "points"));
     }
-    s->list = (texpatch_stroke *)calloc(count + 1, sizeof *s->list);
+    s->list = (texedges_stroke *)calloc(count + 1, sizeof *s->list);
     s->points = (txm_vec2 *)calloc(points + 1, sizeof *s->points);
     if (!s->list || !s->points) {
         snprintf(s->why, sizeof s->why, "out of memory");
@@ -635,7 +635,7 @@ static int parse_strokes(strokes *s, const cJSON *json) {
     s->control.strokes = s->list;
     points = 0;
     cJSON_ArrayForEach(item, list) {
-        texpatch_stroke *stroke = &s->list[s->control.stroke_count];
+        texedges_stroke *stroke = &s->list[s->control.stroke_count];
         if (!parse_stroke(s, item, stroke, s->points + points)) {
             char why[sizeof s->why];
             memcpy(why, s->why, sizeof why);
@@ -665,18 +665,18 @@ static int read_strokes(job *j, strokes *s) {
 /* Layers of the exemplars as their guides, the disturbed strokes as the guide of the output. */
 static int follow_strokes(job *j, strokes *s) {
     texpatch_desc *d = &j->desc;
-    texpatch_edges edges = {0}, disturbed = {0};
-    texpatch_control control = s->control;
+    texedges_set edges = {0}, disturbed = {0};
+    texedges_control control = s->control;
     int status = CLI_DONE;
     s->find.image = j->pictures[0][0];
-    status = check_result(j, texpatch_edges_find(&s->find, &j->run.env, &edges), j->run.inputs[0]);
+    status = check_result(j, texedges_find(&s->find, &j->run.env, &edges), j->run.inputs[0]);
     for (int e = 0; e < d->exemplar_count && !status; e++) {
         const txm_image *image = &j->pictures[e][0];
         txm_image *layers = &j->exemplars[e].guide;
         s->find.image = *image;
         status = new_picture(j, image->width, image->height, 1, TXM_U8, layers);
         if (!status)
-            status = check_result(j, texpatch_layers(&s->find, &edges, &j->run.env, layers),
+            status = check_result(j, texedges_layers(&s->find, &edges, &j->run.env, layers),
                                   j->exemplar_names.at[e]);
     }
     control.edges = &edges;
@@ -684,13 +684,13 @@ static int follow_strokes(job *j, strokes *s) {
     if (!status) status = new_picture(j, d->width, d->height, 1, TXM_U8, &d->guide);
     if (!status) status = new_picture(j, d->width, d->height, 1, TXM_U8, &d->guide_mask);
     if (!status)
-        status = check_result(j, texpatch_disturb(&control, d->width, d->height, &j->run.env,
+        status = check_result(j, texedges_disturb(&control, d->width, d->height, &j->run.env,
                                                   &disturbed), j->control);
     if (!status)
-        status = check_result(j, texpatch_control_guide(&control, &disturbed, &j->run.env,
-                                                        &d->guide, &d->guide_mask), j->control);
-    texpatch_edges_free(&edges);
-    texpatch_edges_free(&disturbed);
+        status = check_result(j, texedges_guide(&control, &disturbed, &j->run.env,
+                                                &d->guide, &d->guide_mask), j->control);
+    texedges_set_free(&edges);
+    texedges_set_free(&disturbed);
     return status;
 }
 
