@@ -4,9 +4,9 @@
    WHAT IT DOES
      From a photograph of a texture it makes as much of the same as is wanted: bricks stay in their
      courses, tiles and weaves on their lattice, gravel becomes other gravel [1]. Several maps of a
-     material (albedo, normals, height ...) in register; tileable; guided by a painted map or by
-     drawn strokes that become edges of the texture; around pixels that are to be kept; parts made
-     anew; any window of a plane without end.
+     material (albedo, normals, height ...) in register; tileable; guided by a painted map (of which
+     texedges.h makes one out of drawn strokes); around pixels that are to be kept; parts made anew;
+     any window of a plane without end.
 
    QUICK START                                 (tests build and run this very block)
      // Twice as much of a texture. cc -std=c99 quick.c -lm
@@ -45,8 +45,6 @@
      texpatch_begin ...   the same in steps with a picture after each of them; texpatch_again makes
                           a part anew, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
-     texpatch_edges_...   the layers of a picture and their boundaries, as lines and as pictures;
-                          with texedges_disturb and texedges_guide strokes become edges
      texpatch_half        coarser levels of a result
      texsyn.h makes stochastic texture out of a model of a few kB instead of pieces of the
      photograph; textiles.h cuts sets of tiles that are laid when the picture is drawn.

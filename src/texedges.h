@@ -1,5 +1,106 @@
 /* texedges.h - v0.1.0 - the gray layers of a picture, their boundaries, and strokes drawn like them
-   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)          */
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
+
+   WHAT IT DOES
+     Divides the gray values of a picture into a few layers and finds the boundaries between them,
+     as closed lines and as pictures [1, 3.2]. Strokes that a user draws are disturbed with the
+     statistics of these boundaries, so that they look like edges of the texture, and become a guide
+     picture that says which layer each pixel shall show [1, 3.3].
+
+   QUICK START                                 (tests build and run this very block)
+     // Layers of a picture, and a stroke with edges like theirs. cc -std=c99 quick.c -lm
+     #define TEXEDGES_IMPLEMENTATION          // in exactly one .c or .cpp file
+     #include "texedges.h"                    // texmath.h must lie beside it
+     #include <stdio.h>
+
+     enum { SIDE = 128 };
+     static unsigned char photo[SIDE * SIDE], layers[SIDE * SIDE];   // the caller owns all pixels
+     static unsigned char guide[SIDE * SIDE], mask[SIDE * SIDE];
+
+     static txm_image image_of(unsigned char *pixels) {
+         txm_image image = {pixels, SIDE, SIDE, 1, TXM_U8, 0};
+         return image;
+     }
+
+     int main(void) {
+         static texedges_desc desc;           // static: all zero, which means the defaults
+         static texedges_control control;
+         static texedges_stroke stroke;
+         static txm_env env;                  // malloc, silent, serial; receives the message
+         const txm_vec2 points[3] = {{16, 90}, {64, 64}, {112, 90}};
+         const txm_image layers_out = image_of(layers), guide_out = image_of(guide);
+         const txm_image mask_out = image_of(mask);
+         texedges_set *edges = NULL, *lines = NULL;
+         for (int i = 0; i < SIDE * SIDE; i++) {   // instead of a photograph: wavy stripes
+             const int x = i % SIDE, y = i / SIDE;
+             photo[i] = (unsigned char)((y + x * x / 16 % 7) / 16 % 2 ? 200 : 60);
+         }
+         desc.image = image_of(photo);
+         desc.levels = 2;
+         stroke.points = points;
+         stroke.count = 3;
+         stroke.layer = 1;                    // the bright one
+         stroke.width = 20;
+         control.strokes = &stroke;
+         control.stroke_count = 1;
+         control.background = -1;             // free: anything, away from the stroke
+         int ok = texedges_find(&desc, &env, &edges) == TXM_OK &&
+                  texedges_layers(&desc, edges, &env, &layers_out) == TXM_OK;
+         control.edges = edges;
+         ok = ok && texedges_disturb(&control, SIDE, SIDE, &env, &lines) == TXM_OK &&
+              texedges_guide(&control, lines, &env, &guide_out, &mask_out) == TXM_OK;
+         if (ok)
+             printf("%d boundaries; the stroke has gray %d\n", (int)edges->line_count,
+                    guide[SIDE * 64 + 64]);
+         else fprintf(stderr, "edges: %s\n", env.message);
+         texedges_set_free(lines);
+         texedges_set_free(edges);
+         return !ok;
+     }
+
+   WHICH CALL
+     texedges_find        the boundaries of all layers, as lines
+     texedges_layers      the layer of each pixel, as a gray picture
+     texedges_draw        lines drawn over a picture
+     texedges_disturb     strokes, disturbed like the boundaries of their layer
+     texedges_guide       the guide picture of disturbed strokes, and where it counts
+     To follow strokes in a texture made with texpatch.h: the picture of texedges_layers is the
+     guide of its exemplar, the two pictures of texedges_guide are its guide and guide_mask.
+
+   HOW IT WORKS
+     The histogram of the grays is cut into parts of about the same area, at its emptiest places;
+     small connected regions can be given to the layer around them. Lines follow the cracks between
+     pixels. The roughness of a layer is how far its lines P lie from their smooth course
+     2 S P - S S P (S a blur of 32 pixels), ahead and to the side. Along a stroke pieces of this
+     roughness, 16 to 48 pixels long, are joined end to end; of those that join well the one is
+     taken that brings the directions of the line nearest to those of the exemplar's lines. Loops
+     are cut off, and the line is filled by its winding number.
+
+   CONFIGURATION   (define before the include that has _IMPLEMENTATION)
+     TEXEDGES_STATIC       every function static to the including file (set it everywhere)
+     TEXEDGES_MAX_PIXELS   refuse larger pictures; default 2^28
+
+   MEMORY
+     5 to 13 bytes for each pixel while layers are found, 8 for each point of the lines, of which
+     there are up to four a pixel, 200 for each pixel along the longest stroke. After an error
+     nothing stays allocated, and what a call was to return is NULL.
+
+   TIME   (one core of 2023)
+     Some 0.2 us for each pixel of a picture, 1 us for each pixel along edges and strokes, 50 ns for
+     each pixel of a guide. All work is serial.
+
+   THREADS
+     No global state: calls with different env and outputs may overlap; a finished set may be read
+     by many.
+
+   SAME BYTES
+     Layers, lines, and guides are made in integers; blurs and strokes in double, by sums in a fixed
+     order and square roots, rounded to float once: the same bytes on any compiler that keeps to
+     IEEE 754 (see texmath.h), built with -ffp-contract=off.
+
+   REFERENCES
+     [1] GPU-based interactive near-regular texture synthesis for digital human models.
+         Technology and Health Care.                                                            */
 #ifndef TEXEDGES_H
 #define TEXEDGES_H
 
@@ -27,147 +128,148 @@ extern "C" {
 
 enum { TEXEDGES_MAX_LEVELS = 16 };
 
-/* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
-   value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1). */
+/* One boundary of a layer: its points are points[first .. first + count - 1] of the set, closed
+   (the last is joined to the first). */
 typedef struct texedges_polyline {
-    int layer;        /* 0..levels-1: this is a boundary of that layer                        */
-    int is_hole;      /* the layer lies outside it                                            */
-    size_t first;     /* its points are points[first .. first + count - 1], closed: the last is
-                         joined to the first                                                  */
-    size_t count;
+    int layer;    /* 0..levels-1: this is a boundary of that layer                            */
+    int is_hole;  /* the layer lies outside it                                                */
+    size_t first, count;
 } texedges_polyline;
 
-/* Found lines run along the cracks between pixels, a point at each pixel corner that they pass.
-   The layer lies to the right of the way (outer boundaries run clockwise as seen, holes the other
-   way), and what lies beyond the picture belongs to no layer. Each side of each crack between two
-   layers is part of exactly one line. Pixels that touch at a corner only do not belong together:
-   where a layer meets itself so, its line turns right, around the pixel that it came along. So
-   lines may touch at a corner but never cross, neither themselves nor others.
+/* The boundaries of the gray layers of a picture [1, 3.2]. Layer k holds the pixels whose gray
+   value g has thresholds[k-1] <= g < thresholds[k] (the first from 0, the last to 1).
+
+   Lines that texedges_find makes run along the cracks between pixels, with a point at each pixel
+   corner that they pass. The layer lies to the right of the line's direction (outer boundaries run
+   clockwise as seen, holes counter-clockwise); what lies beyond the picture belongs to no layer.
+   Each side of each crack between two layers is part of exactly one line. Pixels that touch only at
+   a corner are not connected: where a layer meets itself so, its line turns right, around the pixel
+   that it came along. So lines may touch at a corner, but never cross themselves or each other.
 
          +---+              lines are in raster order of their first points: the top left corner
          | k |              of the topmost (then leftmost) pixel of an outer boundary
      +---+---+  the two pixels of layer k have a line each; the two
-     | k |      others too, whether of one layer or not
+     | k |      others too, whether they are of one layer or not
      +---+                                                                                    */
 typedef struct texedges_set {
     int levels, width, height;
     float thresholds[TEXEDGES_MAX_LEVELS]; /* levels - 1 of them, rising, of the gray 0..1     */
-    int beside[TEXEDGES_MAX_LEVELS]; /* the layer that most of this layer's boundary borders on; -1:
+    int beside[TEXEDGES_MAX_LEVELS]; /* the layer that shares most of this layer's boundary; -1:
                                         none, it has no boundary but the picture's              */
     texedges_polyline *lines;
     size_t line_count;
     txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
                          top left pixel                                                        */
     size_t point_count;
-    txm_arena memory; /* belongs to the header                                                 */
+    txm_arena memory; /* of the set, which lies in it: for the library alone                   */
 } texedges_set;
 
 /* What to find. All zero but the image is a good default. */
 typedef struct texedges_desc {
     txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
-                        samples as they are, cut off at 0 and 1; alpha is not looked at        */
-    int levels;      /* 2..TEXEDGES_MAX_LEVELS; 0 = 4, as the paper has it                     */
+                        samples as they are, clamped to 0..1; alpha is not used                */
+    int levels;      /* 2..TEXEDGES_MAX_LEVELS; 0 = 4, as in the paper                         */
     float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
                         1 to 3                                                                 */
-    int least;       /* regions whose boundary (holes and the picture's border included) is shorter
-                        than so many pixels go to the surrounding layer that they share most of
-                        it with, the shortest first; 0 = all are kept                          */
+    int least;       /* pixels: a connected region whose boundary (holes and the picture's border
+                        included) is shorter is given to the neighbouring layer that shares most
+                        of that boundary, the shortest first; 0 = all regions are kept         */
     const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
-                        have about the same area, at the emptiest gray near there */
+                        have about the same area, each at the emptiest gray nearby             */
 } texedges_desc;
 
 /* Find the boundaries of all layers.
 
    env    NULL, or how to allocate, report and cancel
-   out    receives them; release it with texedges_set_free. Untouched after an error
+   out    receives them, or NULL on any error; release them with texedges_set_free
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
           TXM_TOO_LARGE above TEXEDGES_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
           TXM_CANCELLED
    cost   O(pixels (1 + smooth + log least)) time, about 0.2 us a pixel; 13 bytes a pixel while it
           works (9 without least, 5 without both), and the result: 8 bytes for each point, of which
           there are up to four a pixel, and 24 for each line                                   */
-TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env,
-                                      texedges_set *out);
+TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, texedges_set **out);
 
-/* Release edges, which are all zero then; NULL and all zero are allowed. Of several copies of the
-   struct only one may be released. */
-TEXEDGES_API void texedges_set_free(texedges_set *edges);
+/* Release a set; NULL is allowed. */
+TEXEDGES_API void texedges_set_free(texedges_set *set);
 
-/* The layer of each pixel of a picture, by the thresholds of edges, as a gray value: layer k is
+/* The layer of each pixel of a picture, by the thresholds of a set, as a gray value: layer k is
    255 k / (levels - 1), rounded. It serves as the guide of an exemplar (see control edges).
 
-   desc   image, smooth and least are looked at; with those that edges were found with, the layers
+   desc   image, smooth and least are used; with those that the set was found with, the layers
           change exactly where its lines run
+   edges  whose thresholds to use
    layers TXM_U8, 1 channel, the size of the picture; untouched after an error
    return as texedges_find
-   cost   as texedges_find; 13 bytes a pixel                                             */
-TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
-                                        const texedges_set *edges, txm_env *env,
-                                        const txm_image *layers);
+   cost   as texedges_find; 13 bytes a pixel                                                   */
+TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc, const texedges_set *edges,
+                                        txm_env *env, const txm_image *layers);
 
-/* Draw boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
+/* Draw the boundaries of one layer (-1: of all) over a picture (TXM_U8, 1 or 3 channels), one pixel
    wide, on the layer's own side; colours run from dark to light with the layers, in one channel the
-   gray. What lies outside of the picture is not drawn.
+   gray. What lies outside the picture is not drawn. The picture is untouched after an error.
    cost   a byte for each pixel; O(pixels + length of the lines) time                           */
 TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
                                       const txm_image *image);
 
 /* ---- control edges ----------------------------------------------------------------------- */
 
-/* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. Where it is closed,
-   its inside becomes the layer; an open one becomes a band of the layer, as wide as width says,
-   with round ends. */
+/* A stroke of the user: a line that becomes an edge of the texture [1, 3.3]. The inside of a closed
+   one becomes the layer; an open one becomes a band of the layer with round ends. */
 typedef struct texedges_stroke {
     const txm_vec2 *points; /* count of them, 2 or more (closed: 3), not all the same, in pixels of
                                the output; they may lie outside it, up to 2^20                  */
     int count;
     int is_closed;
-    int layer;   /* 0..levels-1: what lies within                                               */
-    float width; /* of an open stroke, pixels, 2..256; 0 = 8                                    */
+    int layer;   /* 0..levels-1: of the inside, or of the band                                  */
+    float width; /* of the band of an open stroke, pixels, 2..256; 0 = 8                        */
 } texedges_stroke;
 
+/* Strokes, and how to treat them. */
 typedef struct texedges_control {
-    const texedges_set *edges; /* of the exemplar, from texedges_find                   */
+    const texedges_set *edges; /* of the exemplar, from texedges_find                           */
     const texedges_stroke *strokes;
     int stroke_count;  /* 0 or more                                                             */
-    int background;    /* layer outside of all strokes; -1 = free: whatever the texture has, but
-                          next to a stroke not the stroke's own layer */
-    float disturb;     /* 0..4: how much of the exemplar's unrest the strokes take on; 0 = 1;
+    int background;    /* the layer outside all strokes; -1 = free: whatever the texture has there,
+                          but next to a stroke not the stroke's own layer                       */
+    float disturb;     /* 0..4: how much of the exemplar's roughness the strokes take on; 0 = 1;
                           -1 = none                                                             */
-    uint64_t seed;     /* another seed, another unrest                                          */
+    uint64_t seed;     /* another seed, another disturbance                                     */
 } texedges_control;
 
 /* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the
-   way in which those stray from their own smooth course are strung together along the stroke.
+   roughness of those edges, their deviation from their own smooth course, are joined end to end
+   along the stroke.
 
+   width, height  of the output, in pixels
    out    receives one closed line for each stroke, in their order (of an open stroke: around its
-          band), inside to the right; levels, thresholds and beside are the exemplar's, width and
-          height those given. Release it with texedges_set_free; untouched after an error.
-          A line strays from its stroke (the edge of its band) by 4 pixels at most; less from short
-          strokes and narrow bands, by 1/16 of the length and 7/16 of the width. Where the stroke
+          band), inside to the right; or NULL on any error. levels, thresholds and beside are the
+          exemplar's. Release it with texedges_set_free.
+          A line deviates from its stroke (the edge of its band) by 4 pixels at most; from short
+          strokes and narrow bands by less, 1/16 of the length and 7/16 of the width. Where the stroke
           turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
-          cross itself. Of a layer without edges of 64 pixels in the exemplar, and with disturb =
-          -1, it is the stroke itself
+          cross itself. If the exemplar has no edge of that layer of 64 pixels or more, and with
+          disturb = -1, it is the stroke itself
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
-          edges that texedges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26
-          pixels; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+          edges that texedges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26 pixels;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(edges + length of the strokes) time, about 1 us for each pixel of either; 200 bytes for
           each pixel of the longest stroke (its band's outline), 30 for each of all, 100 for each of
           the edges of a layer                                                                 */
 TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
-                                         txm_env *env, texedges_set *out);
+                                         txm_env *env, texedges_set **out);
 
-/* The guide that makes a job follow the strokes, for texpatch_desc.guide and .guide_mask; the
-   exemplars' counterpart is texedges_layers's picture.
+/* The guide picture of disturbed strokes, and the mask of where it counts. With texpatch.h they are
+   texpatch_desc.guide and .guide_mask, and the picture of texedges_layers is the exemplar's guide.
 
    disturbed  what texedges_disturb made of the same control
    guide  TXM_U8, 1 channel, the size given to texedges_disturb: the gray of the layer. Pixels whose
           centre lies inside a line (winding number not 0; of a centre on the line, that to its
           right or below is inside) have the stroke's layer, the last stroke on top. With
-          background = -1, up to 8 pixels outside of the strokes it is the layer that the nearest
-          stroke's layer mostly borders on in the exemplar
-   mask   the same format: 0 where the strokes say nothing (with background = -1, farther than 8
-          pixels outside of all strokes), else 255
+          background = -1, up to 8 pixels outside the strokes it is the layer that shares most of
+          the boundary of the nearest stroke's layer in the exemplar
+   mask   the same format: 0 where the guide does not count (with background = -1, farther than 8
+          pixels outside all strokes), else 255
    return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED. After an error
           guide and mask are untouched
    cost   O(pixels + area and height of the strokes) time, about 50 ns a pixel; 3 bytes a pixel and

@@ -51,16 +51,16 @@ static inline texedges_desc desc_of(txm_image image, int levels, const float *th
     return d;
 }
 
-static inline texedges_set find(const texedges_desc *desc) {
+static inline texedges_set *find(const texedges_desc *desc) {
     txm_env env = {0};
-    texedges_set e;
+    texedges_set *e = NULL;
     const txm_status status = texedges_find(desc, &env, &e);
     if (status != TXM_OK) fail_msg("find: %d, %s", status, env.message);
     return e;
 }
 
 /* edges of a picture that holds the numbers of its layers */
-static inline texedges_set find_numbers(uint8_t *pixels, int width, int height, int levels) {
+static inline texedges_set *find_numbers(uint8_t *pixels, int width, int height, int levels) {
     const texedges_desc d = desc_of(gray(pixels, width, height), levels, by_number);
     return find(&d);
 }
@@ -144,9 +144,9 @@ static inline texedges_control control_of(const texedges_set *edges, const texed
     return c;
 }
 
-static inline texedges_set disturb(const texedges_control *control, int width, int height) {
+static inline texedges_set *disturb(const texedges_control *control, int width, int height) {
     txm_env env = {0};
-    texedges_set e;
+    texedges_set *e = NULL;
     const txm_status status = texedges_disturb(control, width, height, &env, &e);
     if (status != TXM_OK) fail_msg("disturb: %d, %s", status, env.message);
     return e;

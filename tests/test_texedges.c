@@ -111,23 +111,21 @@ static void test_disc(void **state) {
         pixels[i] = x * x + y * y <= 15 * 15;
         area += pixels[i];
     }
-    texedges_set e = find_numbers(pixels, 64, 48, 2);
-    check_lines(&e, pixels);
-    check_no_crossing(&e);
-    assert_int_equal(e.line_count, 3); /* the picture's border, the hole in it, the disc */
-    assert_int_equal(e.lines[0].layer, 0);
-    assert_int_equal(e.lines[0].count, 2 * (64 + 48));
-    assert_true(e.points[0].x == 0 && e.points[0].y == 0 && e.points[1].x == 1);
-    assert_true(e.lines[1].is_hole && e.lines[1].layer == 0 && area_of(&e, &e.lines[1]) == -area);
-    assert_true(!e.lines[2].is_hole && e.lines[2].layer == 1 && area_of(&e, &e.lines[2]) == area);
-    assert_int_equal(e.lines[2].count, 4 * 31);
+    texedges_set *e = find_numbers(pixels, 64, 48, 2);
+    check_lines(e, pixels);
+    check_no_crossing(e);
+    assert_int_equal(e->line_count, 3); /* the picture's border, the hole in it, the disc */
+    assert_int_equal(e->lines[0].layer, 0);
+    assert_int_equal(e->lines[0].count, 2 * (64 + 48));
+    assert_true(e->points[0].x == 0 && e->points[0].y == 0 && e->points[1].x == 1);
+    assert_true(e->lines[1].is_hole && e->lines[1].layer == 0 && area_of(e, &e->lines[1]) == -area);
+    assert_true(!e->lines[2].is_hole && e->lines[2].layer == 1 && area_of(e, &e->lines[2]) == area);
+    assert_int_equal(e->lines[2].count, 4 * 31);
     /* the topmost, leftmost of its pixels' top left corner */
-    assert_true(e.points[e.lines[2].first].x == 30 && e.points[e.lines[2].first].y == 5);
-    assert_int_equal(e.beside[0], 1);
-    assert_int_equal(e.beside[1], 0);
-    texedges_set_free(&e);
-    assert_null(e.lines);
-    texedges_set_free(&e);
+    assert_true(e->points[e->lines[2].first].x == 30 && e->points[e->lines[2].first].y == 5);
+    assert_int_equal(e->beside[0], 1);
+    assert_int_equal(e->beside[1], 0);
+    texedges_set_free(e);
     texedges_set_free(NULL);
 }
 
@@ -140,34 +138,34 @@ static void test_rings(void **state) {
         const int r = (int)(sqrt(x * x + y * y) / 9);
         pixels[i] = (uint8_t)(r < 5 ? r % 3 : 0);
     }
-    texedges_set e = find_numbers(pixels, 96, 96, 3);
-    check_lines(&e, pixels);
-    check_no_crossing(&e);
-    assert_int_equal(e.line_count, 11);
-    for (size_t i = 0; i < e.line_count; i++) holes += e.lines[i].is_hole;
+    texedges_set *e = find_numbers(pixels, 96, 96, 3);
+    check_lines(e, pixels);
+    check_no_crossing(e);
+    assert_int_equal(e->line_count, 11);
+    for (size_t i = 0; i < e->line_count; i++) holes += e->lines[i].is_hole;
     assert_int_equal(holes, 5);
-    assert_int_equal(e.beside[2], 0); /* outside of a ring is longer than inside */
-    texedges_set_free(&e);
+    assert_int_equal(e->beside[2], 0); /* outside of a ring is longer than inside */
+    texedges_set_free(e);
 }
 
 /* Pixels that meet at a corner do not belong together, whoever asks. */
 static void test_saddles(void **state) {
     (void)state;
     uint8_t two[4] = {1, 0, 0, 1};
-    texedges_set e = find_numbers(two, 2, 2, 2);
-    check_lines(&e, two);
-    check_no_crossing(&e);
-    assert_int_equal(e.line_count, 4);
-    for (size_t i = 0; i < 4; i++) assert_int_equal(e.lines[i].count, 4);
-    texedges_set_free(&e);
+    texedges_set *e = find_numbers(two, 2, 2, 2);
+    check_lines(e, two);
+    check_no_crossing(e);
+    assert_int_equal(e->line_count, 4);
+    for (size_t i = 0; i < 4; i++) assert_int_equal(e->lines[i].count, 4);
+    texedges_set_free(e);
 
     static uint8_t board[20 * 20];
     for (int i = 0; i < 400; i++) board[i] = (uint8_t)((i % 20 + i / 20) & 1);
     e = find_numbers(board, 20, 20, 2);
-    check_lines(&e, board);
-    check_no_crossing(&e);
-    assert_int_equal(e.line_count, 400);
-    texedges_set_free(&e);
+    check_lines(e, board);
+    check_no_crossing(e);
+    assert_int_equal(e->line_count, 400);
+    texedges_set_free(e);
 
     /* a ring that closes at a corner only: inside and outside of it are one line */
     uint8_t ring[25] = {0, 0, 0, 0, 0, /* */
@@ -176,14 +174,14 @@ static void test_saddles(void **state) {
                         0, 1, 1, 1, 0, /* */
                         0, 0, 0, 0, 0};
     e = find_numbers(ring, 5, 5, 2);
-    check_lines(&e, ring);
-    check_no_crossing(&e);
+    check_lines(e, ring);
+    check_no_crossing(e);
     /* the border, the hole for the ring, the ring, the pixel within it */
-    assert_int_equal(e.line_count, 4);
+    assert_int_equal(e->line_count, 4);
     int ring_lines = 0;
-    for (size_t i = 0; i < e.line_count; i++) ring_lines += e.lines[i].layer == 1;
+    for (size_t i = 0; i < e->line_count; i++) ring_lines += e->lines[i].layer == 1;
     assert_int_equal(ring_lines, 1);
-    texedges_set_free(&e);
+    texedges_set_free(e);
 }
 
 static void test_whole_picture(void **state) {
@@ -191,11 +189,11 @@ static void test_whole_picture(void **state) {
     uint8_t one = 77;
     static uint8_t plain[30 * 20];
     texedges_desc d = desc_of(gray(&one, 1, 1), 0, NULL);
-    texedges_set e = find(&d);
-    assert_int_equal(e.levels, 4);
-    assert_int_equal(e.line_count, 1);
-    assert_int_equal(e.point_count, 4);
-    texedges_set_free(&e);
+    texedges_set *e = find(&d);
+    assert_int_equal(e->levels, 4);
+    assert_int_equal(e->line_count, 1);
+    assert_int_equal(e->point_count, 4);
+    texedges_set_free(e);
     for (int v = 0; v < 256; v += 51) { /* whatever its gray: rising thresholds, one layer */
         memset(plain, v, sizeof plain);
         for (int levels = 2; levels <= TEXEDGES_MAX_LEVELS; levels++) {
@@ -203,11 +201,12 @@ static void test_whole_picture(void **state) {
             d.smooth = 3;
             d.least = 1000000;
             e = find(&d);
-            assert_int_equal(e.line_count, 1);
-            assert_int_equal(e.lines[0].count, 100);
-            for (int k = 1; k < levels - 1; k++) assert_true(e.thresholds[k] > e.thresholds[k - 1]);
-            for (int k = 0; k < levels; k++) assert_int_equal(e.beside[k], -1);
-            texedges_set_free(&e);
+            assert_int_equal(e->line_count, 1);
+            assert_int_equal(e->lines[0].count, 100);
+            for (int k = 1; k < levels - 1; k++)
+                assert_true(e->thresholds[k] > e->thresholds[k - 1]);
+            for (int k = 0; k < levels; k++) assert_int_equal(e->beside[k], -1);
+            texedges_set_free(e);
         }
     }
 }
@@ -232,10 +231,10 @@ static void test_random_pictures(void **state) {
         const int width = txm_rng_range(&rng, 1, 64), height = txm_rng_range(&rng, 1, 64);
         const int levels = txm_rng_range(&rng, 2, TEXEDGES_MAX_LEVELS);
         draw_random(pixels, width, height, levels, txm_rng_range(&rng, 1, 4), &rng);
-        texedges_set e = find_numbers(pixels, width, height, levels);
-        check_lines(&e, pixels);
-        check_no_crossing(&e);
-        texedges_set_free(&e);
+        texedges_set *e = find_numbers(pixels, width, height, levels);
+        check_lines(e, pixels);
+        check_no_crossing(e);
+        texedges_set_free(e);
     }
 }
 
@@ -282,18 +281,18 @@ static void test_least(void **state) {
         draw_random(pixels, width, height, levels, txm_rng_range(&rng, 1, 4), &rng);
         texedges_desc d = desc_of(gray(pixels, width, height), levels, by_number);
         d.least = least;
-        texedges_set e = find(&d);
+        texedges_set *e = find(&d);
         const txm_image to = gray(shown, width, height);
-        assert_int_equal(texedges_layers(&d, &e, NULL, &to), TXM_OK);
+        assert_int_equal(texedges_layers(&d, e, NULL, &to), TXM_OK);
         for (int p = 0; p < width * height; p++) {
             numbers[p] = (uint8_t)((shown[p] * (levels - 1) + 127) / 255);
             assert_int_equal(shown[p], (int)(255.0 * numbers[p] / (levels - 1) + 0.5));
         }
         assert_int_equal(count_short(numbers, width, height, least), 0);
         if (least <= 4) assert_memory_equal(numbers, pixels, (size_t)(width * height));
-        check_lines(&e, numbers);
-        check_no_crossing(&e);
-        texedges_set_free(&e);
+        check_lines(e, numbers);
+        check_no_crossing(e);
+        texedges_set_free(e);
     }
 
     /* a small region goes to the layer that it shares most with: two sides of 3 against one each */
@@ -305,11 +304,11 @@ static void test_least(void **state) {
     one[9 * 4 + 4] = 1;
     texedges_desc d = desc_of(gray(one, 9, 9), 3, by_number);
     d.least = 5;
-    texedges_set e = find(&d);
-    assert_int_equal(e.line_count, 2);
-    assert_int_equal(e.lines[0].layer, 0);
-    assert_int_equal(e.lines[0].count, 2 * (9 + 5));
-    texedges_set_free(&e);
+    texedges_set *e = find(&d);
+    assert_int_equal(e->line_count, 2);
+    assert_int_equal(e->lines[0].layer, 0);
+    assert_int_equal(e->lines[0].count, 2 * (9 + 5));
+    texedges_set_free(e);
 }
 
 /* ---- gray and thresholds ---------------------------------------------------------------- */
@@ -321,14 +320,14 @@ static void test_thresholds(void **state) {
     for (int levels = 2; levels <= 8; levels++) {
         double area[8] = {0};
         const texedges_desc d = desc_of(gray(pixels, SIDE, SIDE), levels, NULL);
-        texedges_set e = find(&d);
-        for (size_t i = 0; i < e.line_count; i++)
-            area[e.lines[i].layer] += area_of(&e, &e.lines[i]);
+        texedges_set *e = find(&d);
+        for (size_t i = 0; i < e->line_count; i++)
+            area[e->lines[i].layer] += area_of(e, &e->lines[i]);
         for (int k = 0; k < levels; k++) { /* each threshold up to a quarter of a layer off */
             assert_true(area[k] >= 0.5 * SIDE * SIDE / levels);
             assert_true(area[k] <= 1.5 * SIDE * SIDE / levels);
         }
-        texedges_set_free(&e);
+        texedges_set_free(e);
     }
 
     /* two heaps with a gap between them, not in the middle: the gap's middle is found */
@@ -338,19 +337,19 @@ static void test_thresholds(void **state) {
         pixels[i] = (uint8_t)txm_rng_range(&rng, first ? 10 : 120, first ? 80 : 240);
     }
     texedges_desc d = desc_of(gray(pixels, SIDE, SIDE), 2, NULL);
-    texedges_set e = find(&d);
-    assert_true(e.thresholds[0] > 95 / 255.0f && e.thresholds[0] < 105 / 255.0f);
-    texedges_set_free(&e);
+    texedges_set *e = find(&d);
+    assert_true(e->thresholds[0] > 95 / 255.0f && e->thresholds[0] < 105 / 255.0f);
+    texedges_set_free(e);
 
     /* the value itself belongs to the upper layer */
     uint8_t row[3] = {127, 128, 129};
     const float half = 128 / 255.0f;
     d = desc_of(gray(row, 3, 1), 2, &half);
     e = find(&d);
-    assert_int_equal(e.line_count, 2);
-    assert_int_equal(e.lines[0].count, 4);
-    assert_int_equal(e.lines[1].count, 6);
-    texedges_set_free(&e);
+    assert_int_equal(e->line_count, 2);
+    assert_int_equal(e->lines[0].count, 4);
+    assert_int_equal(e->lines[1].count, 6);
+    texedges_set_free(e);
 }
 
 /* The same picture in all formats has the same edges. */
@@ -364,7 +363,7 @@ static void test_formats(void **state) {
     texedges_desc d = desc_of(gray(plain, W, H), 3, NULL);
     d.smooth = 1.5f;
     d.least = 12;
-    texedges_set e = find(&d);
+    texedges_set *e = find(&d);
     for (int channels = 1; channels <= 4; channels++) {
         for (int sample = 0; sample < 3; sample++) {
             txm_rng rng = txm_rng_make(1, 1);
@@ -383,15 +382,15 @@ static void test_formats(void **state) {
             void *of[3] = {bytes, words, floats};
             d.image = view(of[sample], W, H, channels, kind);
             if (sample == 0) d.image.stride = (W + 3) * channels;
-            texedges_set other = find(&d);
-            assert_int_equal(other.line_count, e.line_count);
-            assert_int_equal(other.point_count, e.point_count);
-            assert_memory_equal(other.points, e.points, e.point_count * sizeof *e.points);
-            assert_memory_equal(other.lines, e.lines, e.line_count * sizeof *e.lines);
-            texedges_set_free(&other);
+            texedges_set *other = find(&d);
+            assert_int_equal(other->line_count, e->line_count);
+            assert_int_equal(other->point_count, e->point_count);
+            assert_memory_equal(other->points, e->points, e->point_count * sizeof *e->points);
+            assert_memory_equal(other->lines, e->lines, e->line_count * sizeof *e->lines);
+            texedges_set_free(other);
         }
     }
-    texedges_set_free(&e);
+    texedges_set_free(e);
 
     /* gray is the luma, cut off at 0 and 1 */
     float rgb[4 * 3] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 9, -9, 9};
@@ -400,8 +399,8 @@ static void test_formats(void **state) {
     for (int i = 0; i < 4; i++) {
         d = desc_of(view(rgb + 3 * i, 1, 1, 3, TXM_F32), 4, marks);
         e = find(&d);
-        assert_int_equal(e.lines[0].layer, expected[i]);
-        texedges_set_free(&e);
+        assert_int_equal(e->lines[0].layer, expected[i]);
+        texedges_set_free(e);
     }
 }
 
@@ -415,10 +414,10 @@ static void test_smooth(void **state) {
         const float half = 0.5f;
         texedges_desc d = desc_of(gray(pixels, 64, 64), 2, &half);
         d.smooth = (float)r;
-        texedges_set e = find(&d);
-        assert_true(e.point_count < last);
-        last = e.point_count;
-        texedges_set_free(&e);
+        texedges_set *e = find(&d);
+        assert_true(e->point_count < last);
+        last = e->point_count;
+        texedges_set_free(e);
     }
     /* a point becomes a pyramid: with radius 2 the weights are 1/3 2/3 1 2/3 1/3 over 3 */
     memset(pixels, 0, sizeof pixels);
@@ -426,15 +425,15 @@ static void test_smooth(void **state) {
     float marks[2] = {1.5f / 81, 3.5f / 81};
     texedges_desc d = desc_of(gray(pixels, 64, 64), 3, marks);
     d.smooth = 2;
-    texedges_set e = find(&d);
+    texedges_set *e = find(&d);
     const txm_image to = gray(layers, 64, 64);
-    assert_int_equal(texedges_layers(&d, &e, NULL, &to), TXM_OK);
+    assert_int_equal(texedges_layers(&d, e, NULL, &to), TXM_OK);
     for (int i = 0; i < 64 * 64; i++) {
         const int x = abs(i % 64 - 32), y = abs(i / 64 - 32);
         const int weight = x > 2 || y > 2 ? 0 : (3 - x) * (3 - y);
         assert_int_equal(layers[i], weight < 2 ? 0 : weight < 4 ? 128 : 255);
     }
-    texedges_set_free(&e);
+    texedges_set_free(e);
 }
 
 /* ---- drawing ---------------------------------------------------------------------------- */
@@ -445,15 +444,15 @@ static void test_draw(void **state) {
     static uint8_t layer[W * H], one[W * H], three[(W + 1) * H * 3];
     txm_rng rng = txm_rng_make(4, 4);
     draw_random(layer, W, H, 3, 5, &rng);
-    texedges_set e = find_numbers(layer, W, H, 3);
+    texedges_set *e = find_numbers(layer, W, H, 3);
     for (int wanted = -1; wanted < 3; wanted++) {
         memset(one, 7, sizeof one);
         memset(three, 7, sizeof three);
         const txm_image to = gray(one, W, H);
         txm_image rgb = view(three, W, H, 3, TXM_U8);
         rgb.stride = (W + 1) * 3;
-        assert_int_equal(texedges_draw(&e, wanted, NULL, &to), TXM_OK);
-        assert_int_equal(texedges_draw(&e, wanted, NULL, &rgb), TXM_OK);
+        assert_int_equal(texedges_draw(e, wanted, NULL, &to), TXM_OK);
+        assert_int_equal(texedges_draw(e, wanted, NULL, &rgb), TXM_OK);
         for (int i = 0; i < W * H; i++) { /* the pixels along the cracks, no others */
             const int x = i % W, y = i / W, k = layer[i];
             const int inner = x > 0 && layer[i - 1] == k && x + 1 < W && layer[i + 1] == k &&
@@ -469,10 +468,10 @@ static void test_draw(void **state) {
     memset(small, 7, sizeof small);
     memset(one, 7, sizeof one);
     const txm_image to = gray(one, W, H), part = gray(small, 10, 10);
-    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_OK);
-    assert_int_equal(texedges_draw(&e, -1, NULL, &part), TXM_OK);
+    assert_int_equal(texedges_draw(e, -1, NULL, &to), TXM_OK);
+    assert_int_equal(texedges_draw(e, -1, NULL, &part), TXM_OK);
     for (int y = 0; y < 10; y++) assert_memory_equal(small + 10 * y, one + W * y, 10);
-    texedges_set_free(&e);
+    texedges_set_free(e);
 }
 
 /* ---- all tests -------------------------------------------------------------------------- */

@@ -7,13 +7,14 @@
 
 /* ---- bad input -------------------------------------------------------------------------- */
 
+static texedges_set stale; /* a call that fails sets the pointer to it to NULL */
+
 static void refuse_find(const texedges_desc *d, txm_status expected) {
     txm_env env = {0};
-    texedges_set e;
-    memset(&e, FILL, sizeof e);
+    texedges_set *e = &stale;
     const txm_status status = texedges_find(d, &env, &e);
     if (status != expected) fail_msg("%d, not %d: %s", status, expected, env.message);
-    assert_true(is_untouched(&e, sizeof e));
+    assert_null(e);
     assert_true(env.message[0] != 0);
     assert_int_equal(texedges_find(d, NULL, &e), expected);
 }
@@ -66,54 +67,53 @@ static void test_find_refuses(void **state) {
     refuse_find(&d, TXM_TOO_LARGE);
 
     /* layers and draw */
-    texedges_set e = find(&good), odd = e;
+    texedges_set *e = find(&good), odd = *e;
     memset(layers, FILL, sizeof layers);
     txm_image to = gray(layers, 16, 16);
-    assert_int_equal(texedges_layers(NULL, &e, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(NULL, e, NULL, &to), TXM_BAD_ARGUMENT);
     assert_int_equal(texedges_layers(&good, NULL, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texedges_layers(&good, &e, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, e, NULL, NULL), TXM_BAD_ARGUMENT);
     odd.levels = 1;
     assert_int_equal(texedges_layers(&good, &odd, NULL, &to), TXM_BAD_ARGUMENT);
-    odd = e;
+    odd = *e;
     odd.thresholds[1] = NAN;
     assert_int_equal(texedges_layers(&good, &odd, NULL, &to), TXM_BAD_ARGUMENT);
     to.height = 15;
-    assert_int_equal(texedges_layers(&good, &e, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, e, NULL, &to), TXM_BAD_ARGUMENT);
     to = view(layers, 16, 8, 2, TXM_U8);
-    assert_int_equal(texedges_layers(&good, &e, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_layers(&good, e, NULL, &to), TXM_BAD_ARGUMENT);
 
     to = gray(layers, 16, 16);
     assert_int_equal(texedges_draw(NULL, -1, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texedges_draw(&e, -1, NULL, NULL), TXM_BAD_ARGUMENT);
-    assert_int_equal(texedges_draw(&e, -2, NULL, &to), TXM_BAD_ARGUMENT);
-    assert_int_equal(texedges_draw(&e, 4, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(e, -1, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(e, -2, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(e, 4, NULL, &to), TXM_BAD_ARGUMENT);
     to = view(layers, 8, 8, 4, TXM_U8);
-    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_draw(e, -1, NULL, &to), TXM_BAD_ARGUMENT);
     to = gray(layers, 16, 16);
-    odd = e;
+    odd = *e;
     odd.point_count--;
     assert_int_equal(texedges_draw(&odd, -1, NULL, &to), TXM_BAD_ARGUMENT);
-    odd = e;
+    odd = *e;
     odd.lines = NULL;
     assert_int_equal(texedges_draw(&odd, -1, NULL, &to), TXM_BAD_ARGUMENT);
-    odd = e;
-    const txm_vec2 kept = e.points[3];
-    e.points[3].x = NAN;
-    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
-    e.points[3].x = 1e30f;
-    assert_int_equal(texedges_draw(&e, -1, NULL, &to), TXM_BAD_ARGUMENT);
-    e.points[3] = kept;
+    odd = *e;
+    const txm_vec2 kept = e->points[3];
+    e->points[3].x = NAN;
+    assert_int_equal(texedges_draw(e, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    e->points[3].x = 1e30f;
+    assert_int_equal(texedges_draw(e, -1, NULL, &to), TXM_BAD_ARGUMENT);
+    e->points[3] = kept;
     assert_true(is_untouched(layers, sizeof layers));
-    texedges_set_free(&e);
+    texedges_set_free(e);
 }
 
 static void refuse_control(const texedges_control *c, int width, int height, txm_status expected) {
     txm_env env = {0};
-    texedges_set e;
-    memset(&e, FILL, sizeof e);
+    texedges_set *e = &stale;
     const txm_status status = texedges_disturb(c, width, height, &env, &e);
     if (status != expected) fail_msg("%d, not %d: %s", status, expected, env.message);
-    assert_true(is_untouched(&e, sizeof e));
+    assert_null(e);
     assert_true(env.message[0] != 0);
 }
 
@@ -121,7 +121,7 @@ static void test_control_refuses(void **state) {
     (void)state;
     static uint8_t pixels[64 * 64], bytes[2][64 * 64];
     for (int i = 0; i < 64 * 64; i++) pixels[i] = (uint8_t)(i % 64 / 32);
-    texedges_set e = find_numbers(pixels, 64, 64, 2), odd = e;
+    texedges_set *e = find_numbers(pixels, 64, 64, 2), odd = *e;
     txm_vec2 points[4] = {{5, 5}, {40, 8}, {42, 44}, {9, 40}};
     texedges_stroke good_stroke, s;
     memset(&good_stroke, 0, sizeof good_stroke);
@@ -129,7 +129,7 @@ static void test_control_refuses(void **state) {
     good_stroke.count = 4;
     good_stroke.is_closed = 1;
     s = good_stroke;
-    const texedges_control good = control_of(&e, &s, 1);
+    const texedges_control good = control_of(e, &s, 1);
     texedges_control c = good;
 
     refuse_control(NULL, 64, 64, TXM_BAD_ARGUMENT);
@@ -200,36 +200,36 @@ static void test_control_refuses(void **state) {
     s = good_stroke;
 
     /* edges that nobody found */
-    odd = e;
+    odd = *e;
     odd.beside[0] = 9;
     c.edges = &odd;
     refuse_control(&c, 64, 64, TXM_BAD_ARGUMENT);
-    odd = e;
-    const txm_vec2 kept = e.points[5];
-    e.points[5].x += 0.5f;
+    odd = *e;
+    const txm_vec2 kept = e->points[5];
+    e->points[5].x += 0.5f;
     refuse_control(&good, 64, 64, TXM_BAD_ARGUMENT);
-    e.points[5] = kept;
+    e->points[5] = kept;
 
     /* the guide */
-    texedges_set lines = disturb(&good, 64, 64);
+    texedges_set *lines = disturb(&good, 64, 64);
     memset(bytes, FILL, sizeof bytes);
     txm_image guide = gray(bytes[0], 64, 64), mask = gray(bytes[1], 64, 64);
-    assert_int_equal(texedges_guide(NULL, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(NULL, lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     assert_int_equal(texedges_guide(&good, NULL, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
-    assert_int_equal(texedges_guide(&good, &lines, NULL, NULL, &mask), TXM_BAD_ARGUMENT);
-    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, lines, NULL, NULL, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, lines, NULL, &guide, NULL), TXM_BAD_ARGUMENT);
     mask.height = 63;
-    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     mask = view(bytes[1], 32, 64, 2, TXM_U8);
-    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    assert_int_equal(texedges_guide(&good, lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     mask = gray(bytes[1], 64, 64);
-    lines.lines[0].layer = 1;
-    assert_int_equal(texedges_guide(&good, &lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
-    lines.lines[0].layer = 0;
-    assert_int_equal(texedges_guide(&good, &e, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    lines->lines[0].layer = 1;
+    assert_int_equal(texedges_guide(&good, lines, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
+    lines->lines[0].layer = 0;
+    assert_int_equal(texedges_guide(&good, e, NULL, &guide, &mask), TXM_BAD_ARGUMENT);
     assert_true(is_untouched(bytes, sizeof bytes));
-    texedges_set_free(&lines);
-    texedges_set_free(&e);
+    texedges_set_free(lines);
+    texedges_set_free(e);
 }
 
 /* ---- misfortune ------------------------------------------------------------------------- */
@@ -238,7 +238,7 @@ static void test_control_refuses(void **state) {
 typedef struct task {
     int which;
     texedges_desc desc;
-    texedges_set blobs, lines;
+    texedges_set *blobs, *lines;
     texedges_stroke strokes[3];
     texedges_control control;
 } task;
@@ -246,24 +246,23 @@ typedef struct task {
 static uint8_t task_pixels[192 * 192], task_out[2][320 * 320];
 
 static txm_status run_task(task *t, txm_env *env, int *untouched) {
-    texedges_set e;
+    texedges_set *e = t->which == 0 || t->which == 3 ? &stale : NULL;
     const int side = 192;
     txm_image to = gray(task_out[0], side, side);
     txm_status status = TXM_OK;
-    memset(&e, FILL, sizeof e);
     memset(task_out, FILL, sizeof task_out);
     switch (t->which) {
     case 0: status = texedges_find(&t->desc, env, &e); break;
-    case 1: status = texedges_layers(&t->desc, &t->blobs, env, &to); break;
-    case 2: status = texedges_draw(&t->blobs, -1, env, &to); break;
+    case 1: status = texedges_layers(&t->desc, t->blobs, env, &to); break;
+    case 2: status = texedges_draw(t->blobs, -1, env, &to); break;
     case 3: status = texedges_disturb(&t->control, 320, 320, env, &e); break;
     default: {
         const txm_image guide = gray(task_out[0], 320, 320), mask = gray(task_out[1], 320, 320);
-        status = texedges_guide(&t->control, &t->lines, env, &guide, &mask);
+        status = texedges_guide(&t->control, t->lines, env, &guide, &mask);
     }
     }
-    *untouched = is_untouched(&e, sizeof e) && is_untouched(task_out, sizeof task_out);
-    if (status == TXM_OK && (t->which == 0 || t->which == 3)) texedges_set_free(&e);
+    *untouched = !e && is_untouched(task_out, sizeof task_out);
+    texedges_set_free(e);
     return status;
 }
 
@@ -274,7 +273,7 @@ static void make_task(task *t) {
     t->desc.smooth = 1;
     t->desc.least = 20;
     t->blobs = find(&t->desc);
-    t->control = control_of(&t->blobs, t->strokes, draw_strokes(t->strokes, 1));
+    t->control = control_of(t->blobs, t->strokes, draw_strokes(t->strokes, 1));
     t->strokes[0].layer = 2;
     t->control.background = -1;
     t->lines = disturb(&t->control, 320, 320);
@@ -321,8 +320,8 @@ static void test_misfortune(void **state) {
             assert_true(untouched);
         }
     }
-    texedges_set_free(&t.lines);
-    texedges_set_free(&t.blobs);
+    texedges_set_free(t.lines);
+    texedges_set_free(t.blobs);
 }
 
 /* What is held while it works, per pixel, is what the header promises. */
@@ -336,13 +335,13 @@ static void test_memory(void **state) {
         txm_env env = tk_env(&memory, NULL);
         assert_int_equal(run_task(&t, &env, &untouched), TXM_OK);
         const double pixels = 192.0 * 192, out = 320.0 * 320, peak = (double)memory.peak_bytes;
-        const double held = 8.0 * (double)t.blobs.point_count + 32.0 * (double)t.blobs.line_count;
+        const double held = 8.0 * (double)t.blobs->point_count + 32.0 * (double)t.blobs->line_count;
         if (t.which < 2) assert_true(peak < 13.5 * pixels + held + 2000);
         if (t.which == 2) assert_true(peak < 1.5 * pixels + 1000);
         if (t.which == 4) assert_true(peak < 4 * out + 1000);
     }
-    texedges_set_free(&t.lines);
-    texedges_set_free(&t.blobs);
+    texedges_set_free(t.lines);
+    texedges_set_free(t.blobs);
 }
 
 /* ---- all tests -------------------------------------------------------------------------- */

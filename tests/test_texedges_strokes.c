@@ -49,7 +49,7 @@ static int count_crossings(const txm_vec2 *p, size_t n) {
 }
 
 /* The exemplar that the strokes below take after, 4 layers. */
-static texedges_set find_blobs(uint64_t seed, double rough) {
+static texedges_set *find_blobs(uint64_t seed, double rough) {
     static uint8_t pixels[SIDE * SIDE];
     draw_blobs(pixels, SIDE, seed, rough);
     texedges_desc d = desc_of(gray(pixels, SIDE, SIDE), 4, NULL);
@@ -60,23 +60,23 @@ static texedges_set find_blobs(uint64_t seed, double rough) {
 static void test_disturb(void **state) {
     (void)state;
     static uint8_t guide[WIDE * WIDE], mask[WIDE * WIDE];
-    texedges_set blobs = find_blobs(1, 0.3);
+    texedges_set *blobs = find_blobs(1, 0.3);
     texedges_stroke strokes[3];
     for (int layer = 0; layer < 4; layer++) {
-        texedges_control c = control_of(&blobs, strokes, draw_strokes(strokes, layer));
+        texedges_control c = control_of(blobs, strokes, draw_strokes(strokes, layer));
         c.background = layer ? 0 : 3;
         c.seed = 1 + (uint64_t)layer;
-        texedges_set lines = disturb(&c, WIDE, WIDE);
-        assert_int_equal(lines.line_count, 3);
-        assert_true(lines.width == WIDE && lines.height == WIDE && lines.levels == 4);
-        assert_memory_equal(lines.thresholds, blobs.thresholds, sizeof lines.thresholds);
+        texedges_set *lines = disturb(&c, WIDE, WIDE);
+        assert_int_equal(lines->line_count, 3);
+        assert_true(lines->width == WIDE && lines->height == WIDE && lines->levels == 4);
+        assert_memory_equal(lines->thresholds, blobs->thresholds, sizeof lines->thresholds);
         double strays = 0, points = 0;
         for (int i = 0; i < 3; i++) {
-            const texedges_polyline *line = &lines.lines[i];
-            const txm_vec2 *p = lines.points + line->first;
+            const texedges_polyline *line = &lines->lines[i];
+            const txm_vec2 *p = lines->points + line->first;
             assert_int_equal(line->layer, layer);
             assert_int_equal(line->is_hole, 0);
-            assert_true(area_of(&lines, line) > 0); /* the inside lies to the right */
+            assert_true(area_of(lines, line) > 0); /* the inside lies to the right */
             double longest = 0;
             for (size_t j = 0; j < line->count; j++) {
                 const txm_vec2 q = p[(j + 1) % line->count];
@@ -94,7 +94,7 @@ static void test_disturb(void **state) {
         assert_true(strays / points > 0.3); /* and it does stray */
 
         /* the guide's edge is where the strokes are: on both sides of 90 % of their length */
-        guide_of(&c, &lines, guide, mask);
+        guide_of(&c, lines, guide, mask);
         for (int i = 0; i < 3; i++) {
             const texedges_stroke *s = &strokes[i];
             int near = 0;
@@ -115,9 +115,9 @@ static void test_disturb(void **state) {
             }
             assert_true(near >= 0.9 * s->count);
         }
-        texedges_set_free(&lines);
+        texedges_set_free(lines);
     }
-    texedges_set_free(&blobs);
+    texedges_set_free(blobs);
 }
 
 /* Strokes as people draw them: corners, hairpins, knots, out of the picture, tiny, crossing. */
@@ -125,7 +125,7 @@ static void test_disturb_anything(void **state) {
     (void)state;
     static uint8_t guide[200 * 160], mask[200 * 160];
     static txm_vec2 points[200];
-    texedges_set blobs = find_blobs(2, 0.5);
+    texedges_set *blobs = find_blobs(2, 0.5);
     txm_rng rng = txm_rng_make(3, 3);
     double worst = 0;
     for (int i = 0; i < 150; i++) {
@@ -145,55 +145,56 @@ static void test_disturb_anything(void **state) {
                                    points[j - 1].y + txm_rng_float(&rng) - 0.5f);
         }
         points[1].x += 1; /* not all the same */
-        texedges_control c = control_of(&blobs, &s, 1);
+        texedges_control c = control_of(blobs, &s, 1);
         c.disturb = i % 4 == 3 ? 4.0f : 0;
         c.background = -1;
-        texedges_set lines = disturb(&c, 200, 160);
-        assert_int_equal(lines.line_count, 1);
-        assert_true(lines.lines[0].count >= 2);
-        for (size_t j = 0; j < lines.point_count && s.is_closed; j++) {
-            const txm_vec2 p = lines.points[j];
-            const txm_vec2 q = lines.points[j + 1 < lines.point_count ? j + 1 : 0];
+        texedges_set *lines = disturb(&c, 200, 160);
+        assert_int_equal(lines->line_count, 1);
+        assert_true(lines->lines[0].count >= 2);
+        for (size_t j = 0; j < lines->point_count && s.is_closed; j++) {
+            const txm_vec2 p = lines->points[j];
+            const txm_vec2 q = lines->points[j + 1 < lines->point_count ? j + 1 : 0];
             for (int k = 0; k < 2; k++) { /* also between the points */
                 const double d = distance_to(points, s.count, 1, p.x + 0.5 * k * (q.x - p.x),
                                              p.y + 0.5 * k * (q.y - p.y));
                 if (d > worst) worst = d;
             }
         }
-        for (size_t j = 0; j < lines.point_count && !s.is_closed; j++) {
+        for (size_t j = 0; j < lines->point_count && !s.is_closed; j++) {
             const double half = 0.5 * (s.width > 0 ? s.width : 8);
-            const double d = distance_to(points, s.count, 0, lines.points[j].x, lines.points[j].y);
+            const txm_vec2 p = lines->points[j];
+            const double d = distance_to(points, s.count, 0, p.x, p.y);
             if (d - half > worst) worst = d - half;
         }
-        guide_of(&c, &lines, guide, mask);
-        texedges_set_free(&lines);
+        guide_of(&c, lines, guide, mask);
+        texedges_set_free(lines);
     }
     if (!(worst <= 4)) fail_msg("a line strays by %g", worst);
-    texedges_set_free(&blobs);
+    texedges_set_free(blobs);
 }
 
 static void test_disturb_seeds(void **state) {
     (void)state;
-    texedges_set blobs = find_blobs(1, 0.3);
+    texedges_set *blobs = find_blobs(1, 0.3);
     texedges_stroke strokes[3];
-    texedges_control c = control_of(&blobs, strokes, draw_strokes(strokes, 1));
-    texedges_set a = disturb(&c, WIDE, WIDE), b = disturb(&c, WIDE, WIDE);
-    assert_int_equal(a.point_count, b.point_count);
-    assert_memory_equal(a.points, b.points, a.point_count * sizeof *a.points);
+    texedges_control c = control_of(blobs, strokes, draw_strokes(strokes, 1));
+    texedges_set *a = disturb(&c, WIDE, WIDE), *b = disturb(&c, WIDE, WIDE);
+    assert_int_equal(a->point_count, b->point_count);
+    assert_memory_equal(a->points, b->points, a->point_count * sizeof *a->points);
     c.seed = 1;
-    texedges_set other = disturb(&c, WIDE, WIDE);
-    assert_true(other.point_count != a.point_count ||
-                memcmp(other.points, a.points, a.point_count * sizeof *a.points) != 0);
-    texedges_set_free(&b);
-    texedges_set_free(&other);
+    texedges_set *other = disturb(&c, WIDE, WIDE);
+    assert_true(other->point_count != a->point_count ||
+                memcmp(other->points, a->points, a->point_count * sizeof *a->points) != 0);
+    texedges_set_free(b);
+    texedges_set_free(other);
 
     /* a stroke's line does not depend on the others' layers, nor on how the edges were made */
     c.seed = 0;
     strokes[1].layer = 2;
     b = disturb(&c, WIDE, WIDE);
-    assert_int_equal(a.lines[0].count, b.lines[0].count);
-    assert_memory_equal(a.points, b.points, a.lines[0].count * sizeof *a.points);
-    texedges_set_free(&b);
+    assert_int_equal(a->lines[0].count, b->lines[0].count);
+    assert_memory_equal(a->points, b->points, a->lines[0].count * sizeof *a->points);
+    texedges_set_free(b);
 
     /* more and less of it */
     double stray[3];
@@ -201,21 +202,21 @@ static void test_disturb_seeds(void **state) {
         c.disturb = k == 0 ? 0.25f : k == 1 ? 1.0f : 4.0f;
         b = disturb(&c, WIDE, WIDE);
         stray[k] = 0;
-        for (size_t j = 0; j < b.lines[0].count; j++)
-            stray[k] += distance_to_stroke(&strokes[0], b.points[j].x, b.points[j].y) /
-                        (double)b.lines[0].count;
-        texedges_set_free(&b);
+        for (size_t j = 0; j < b->lines[0].count; j++)
+            stray[k] += distance_to_stroke(&strokes[0], b->points[j].x, b->points[j].y) /
+                        (double)b->lines[0].count;
+        texedges_set_free(b);
     }
     assert_true(stray[0] < 0.5 * stray[1] && stray[1] < stray[2]);
-    texedges_set_free(&a);
-    texedges_set_free(&blobs);
+    texedges_set_free(a);
+    texedges_set_free(blobs);
 }
 
 /* Without disturbance, or without edges in the exemplar, the line is the stroke itself. */
 static void test_disturb_none(void **state) {
     (void)state;
     static uint8_t plain[64 * 64];
-    texedges_set none = find_numbers(plain, 64, 64, 3), blobs = find_blobs(1, 0.3);
+    texedges_set *none = find_numbers(plain, 64, 64, 3), *blobs = find_blobs(1, 0.3);
     const txm_vec2 square[4] = {{10, 10}, {10, 50}, {50, 50}, {50, 10}}; /* counterclockwise */
     const txm_vec2 segment[2] = {{20, 30}, {60, 30}};
     texedges_stroke strokes[2];
@@ -228,28 +229,28 @@ static void test_disturb_none(void **state) {
     strokes[1].count = 2;
     strokes[1].layer = 1;
     for (int k = 0; k < 2; k++) {
-        texedges_control c = control_of(k ? &blobs : &none, strokes, 2);
+        texedges_control c = control_of(k ? blobs : none, strokes, 2);
         c.disturb = k ? -1.0f : 0;
-        texedges_set lines = disturb(&c, 80, 60);
-        assert_int_equal(lines.lines[0].count, 4);
+        texedges_set *lines = disturb(&c, 80, 60);
+        assert_int_equal(lines->lines[0].count, 4);
         for (int j = 0; j < 4; j++)
-            assert_memory_equal(&lines.points[j], &square[3 - j], sizeof *square);
-        const texedges_polyline *band = &lines.lines[1];
+            assert_memory_equal(&lines->points[j], &square[3 - j], sizeof *square);
+        const texedges_polyline *band = &lines->lines[1];
         for (size_t j = 0; j < band->count; j++) {
-            const txm_vec2 p = lines.points[band->first + j];
+            const txm_vec2 p = lines->points[band->first + j];
             assert_true(fabs(distance_to(segment, 2, 0, p.x, p.y) - 4) < 1e-3);
         }
-        const double expected = 40 * 8 + TXM_PI * 16, area = area_of(&lines, band);
+        const double expected = 40 * 8 + TXM_PI * 16, area = area_of(lines, band);
         assert_true(fabs(area - expected) < 0.01 * expected);
-        texedges_set_free(&lines);
+        texedges_set_free(lines);
     }
-    texedges_control c = control_of(&blobs, NULL, 0); /* no strokes at all */
-    texedges_set lines = disturb(&c, 80, 60);
-    assert_int_equal(lines.line_count, 0);
-    assert_int_equal(lines.point_count, 0);
-    texedges_set_free(&lines);
-    texedges_set_free(&none);
-    texedges_set_free(&blobs);
+    texedges_control c = control_of(blobs, NULL, 0); /* no strokes at all */
+    texedges_set *lines = disturb(&c, 80, 60);
+    assert_int_equal(lines->line_count, 0);
+    assert_int_equal(lines->point_count, 0);
+    texedges_set_free(lines);
+    texedges_set_free(none);
+    texedges_set_free(blobs);
 }
 
 /* ---- statistics ------------------------------------------------------------------------- */
@@ -366,32 +367,32 @@ static void test_statistics(void **state) {
         draw_blobs(pixels, 384, 5 + (uint64_t)round, 0.2 + 0.1 * round);
         texedges_desc d = desc_of(gray(pixels, 384, 384), 2, NULL);
         d.least = 24;
-        texedges_set e = find(&d);
+        texedges_set *e = find(&d);
         for (int layer = 0; layer < 2; layer++) {
             double halves[2][BINS], all[BINS], lines[BINS] = {0}, drawn[BINS] = {0}, bins[2][BINS];
             texedges_stroke strokes[3];
-            count_edges(&e, layer, halves);
+            count_edges(e, layer, halves);
             for (int b = 0; b < BINS; b++) all[b] = halves[0][b] + halves[1][b];
-            texedges_control c = control_of(&e, strokes, draw_strokes(strokes, layer));
+            texedges_control c = control_of(e, strokes, draw_strokes(strokes, layer));
             c.background = 1 - layer;
             for (c.seed = 0; c.seed < 4; c.seed++) {
-                texedges_set o = disturb(&c, WIDE, WIDE);
-                for (size_t i = 0; i < o.line_count; i++) {
+                texedges_set *o = disturb(&c, WIDE, WIDE);
+                for (size_t i = 0; i < o->line_count; i++) {
                     memset(bins, 0, sizeof bins);
-                    for (size_t j = 0; j < o.lines[i].count; j++) {
-                        x[j] = o.points[o.lines[i].first + j].x;
-                        y[j] = o.points[o.lines[i].first + j].y;
+                    for (size_t j = 0; j < o->lines[i].count; j++) {
+                        x[j] = o->points[o->lines[i].first + j].x;
+                        y[j] = o->points[o->lines[i].first + j].y;
                     }
-                    count_directions(x, y, (int)o.lines[i].count, 1, 0, bins);
+                    count_directions(x, y, (int)o->lines[i].count, 1, 0, bins);
                     for (int b = 0; b < BINS; b++) lines[b] += bins[1][b];
                 }
-                guide_of(&c, &o, guide, mask);
+                guide_of(&c, o, guide, mask);
                 const texedges_desc g = desc_of(gray(guide, WIDE, WIDE), 2, NULL);
-                texedges_set found = find(&g);
-                count_edges(&found, layer, bins);
+                texedges_set *found = find(&g);
+                count_edges(found, layer, bins);
                 for (int b = 0; b < BINS; b++) drawn[b] += bins[0][b] + bins[1][b];
-                texedges_set_free(&found);
-                texedges_set_free(&o);
+                texedges_set_free(found);
+                texedges_set_free(o);
             }
             const double own = chi_square(halves[0], halves[1]);
             const double line = chi_square(lines, all), edge = chi_square(drawn, all);
@@ -399,7 +400,7 @@ static void test_statistics(void **state) {
                 fail_msg("round %d layer %d: halves %.4f, lines %.4f, guide %.4f", round, layer,
                          own, line, edge);
         }
-        texedges_set_free(&e);
+        texedges_set_free(e);
     }
 }
 
@@ -428,7 +429,7 @@ static void test_guide_fill(void **state) {
     enum { W = 70, H = 50 };
     static uint8_t guide[W * H], mask[W * H], plain[16 * 16];
     static txm_vec2 points[4][40];
-    texedges_set none = find_numbers(plain, 16, 16, 5);
+    texedges_set *none = find_numbers(plain, 16, 16, 5);
     txm_rng rng = txm_rng_make(8, 8);
     for (int i = 0; i < 200; i++) {
         texedges_stroke strokes[4];
@@ -445,20 +446,20 @@ static void test_guide_fill(void **state) {
             }
             points[k][0].x = 30.25f;
         }
-        texedges_control c = control_of(&none, strokes, 4);
+        texedges_control c = control_of(none, strokes, 4);
         c.background = (int)txm_rng_below(&rng, 5);
-        texedges_set lines = disturb(&c, W, H);
-        guide_of(&c, &lines, guide, mask);
+        texedges_set *lines = disturb(&c, W, H);
+        guide_of(&c, lines, guide, mask);
         for (int p = 0; p < W * H; p++) {
             int layer = c.background;
             for (int k = 0; k < 4; k++) {
-                const txm_vec2 *at = lines.points + lines.lines[k].first;
+                const txm_vec2 *at = lines->points + lines->lines[k].first;
                 if (winding_of(at, strokes[k].count, p % W, p / W)) layer = strokes[k].layer;
             }
             assert_int_equal(guide[p], (int)(255.0 * layer / 4 + 0.5));
             assert_int_equal(mask[p], 255);
         }
-        texedges_set_free(&lines);
+        texedges_set_free(lines);
     }
 
     /* two squares that share a side through pixel centres: each pixel belongs to one of them */
@@ -473,16 +474,16 @@ static void test_guide_fill(void **state) {
         strokes[k].is_closed = 1;
         strokes[k].layer = k + 1;
     }
-    texedges_control c = control_of(&none, strokes, 2);
-    texedges_set lines = disturb(&c, W, H);
-    guide_of(&c, &lines, guide, mask);
+    texedges_control c = control_of(none, strokes, 2);
+    texedges_set *lines = disturb(&c, W, H);
+    guide_of(&c, lines, guide, mask);
     for (int p = 0; p < W * H; p++) counts[(guide[p] + 32) / 64]++;
     assert_int_equal(counts[1], 256);
     assert_int_equal(counts[2], 256);
     assert_int_equal(guide[4 * W + 4], 64);
     assert_int_equal(guide[20 * W + 20], 0);
-    texedges_set_free(&lines);
-    texedges_set_free(&none);
+    texedges_set_free(lines);
+    texedges_set_free(none);
 }
 
 static void test_guide_free(void **state) {
@@ -491,7 +492,7 @@ static void test_guide_free(void **state) {
     static uint8_t guide[W * H], mask[W * H], layer[96 * 96];
     for (int i = 0; i < 96 * 96; i++) layer[i] = (uint8_t)(i % 96 / 24); /* bars 0 1 2 3 */
     for (int i = 0; i < 96 * 48; i++) layer[i] = layer[i] == 1 ? 3 : layer[i];
-    texedges_set e = find_numbers(layer, 96, 96, 4);
+    texedges_set *e = find_numbers(layer, 96, 96, 4);
     const txm_vec2 a[4] = {{10, 10}, {30, 12}, {32, 30}, {12, 28}};
     const txm_vec2 b[4] = {{44, 6}, {80, 6}, {84, 50}, {70, 54}};
     texedges_stroke strokes[2];
@@ -502,11 +503,11 @@ static void test_guide_free(void **state) {
         strokes[k].is_closed = 1;
         strokes[k].layer = k ? 2 : 0;
     }
-    texedges_control c = control_of(&e, strokes, 2);
+    texedges_control c = control_of(e, strokes, 2);
     c.background = -1;
-    texedges_set lines = disturb(&c, W, H);
-    guide_of(&c, &lines, guide, mask);
-    assert_true(e.beside[0] >= 0 && e.beside[0] != 0 && e.beside[2] >= 0 && e.beside[2] != 2);
+    texedges_set *lines = disturb(&c, W, H);
+    guide_of(&c, lines, guide, mask);
+    assert_true(e->beside[0] >= 0 && e->beside[0] != 0 && e->beside[2] >= 0 && e->beside[2] != 2);
     for (int p = 0; p < W * H; p++) {
         const int x = p % W, y = p / W;
         int own = -1, near[2] = {1000, 1000};
@@ -514,9 +515,9 @@ static void test_guide_free(void **state) {
             const int d = (q % W - x) * (q % W - x) + (q / W - y) * (q / W - y);
             if (d > 64) continue;
             for (int k = 0; k < 2; k++) {
-                const texedges_polyline *line = &lines.lines[k];
+                const texedges_polyline *line = &lines->lines[k];
                 if (d >= near[k]) continue;
-                if (winding_of(lines.points + line->first, (int)line->count, q % W, q / W))
+                if (winding_of(lines->points + line->first, (int)line->count, q % W, q / W))
                     near[k] = d;
             }
         }
@@ -524,18 +525,18 @@ static void test_guide_free(void **state) {
         assert_int_equal(mask[p], near[0] <= 64 || near[1] <= 64 ? 255 : 0);
         if (!mask[p]) continue;
         if (own >= 0) assert_int_equal(guide[p], 85 * own);
-        else if (near[0] < near[1]) assert_int_equal(guide[p], 85 * e.beside[0]);
-        else if (near[1] < near[0]) assert_int_equal(guide[p], 85 * e.beside[2]);
-        else assert_true(guide[p] == 85 * e.beside[0] || guide[p] == 85 * e.beside[2]);
+        else if (near[0] < near[1]) assert_int_equal(guide[p], 85 * e->beside[0]);
+        else if (near[1] < near[0]) assert_int_equal(guide[p], 85 * e->beside[2]);
+        else assert_true(guide[p] == 85 * e->beside[0] || guide[p] == 85 * e->beside[2]);
     }
-    texedges_set_free(&lines);
+    texedges_set_free(lines);
 
     c.stroke_count = 0; /* nothing drawn, nothing said */
     lines = disturb(&c, W, H);
-    guide_of(&c, &lines, guide, mask);
+    guide_of(&c, lines, guide, mask);
     for (int p = 0; p < W * H; p++) assert_int_equal(mask[p], 0);
-    texedges_set_free(&lines);
-    texedges_set_free(&e);
+    texedges_set_free(lines);
+    texedges_set_free(e);
 }
 
 /* ---- all tests -------------------------------------------------------------------------- */

@@ -24,7 +24,7 @@ typedef struct brush {
     /* the texture and what it is made of */
     txm_image photo, layers;    /* the exemplar, and the layer of each of its pixels            */
     texpatch_exemplar exemplar; /* the two together                                             */
-    texedges_set edges;       /* the boundaries between layers                                */
+    texedges_set *edges;      /* the boundaries between layers                                */
     texpatch_job *job;
     txm_env env; /* malloc, silent, one thread: more of them would go in here                   */
     uint64_t seed;

@@ -3,9 +3,9 @@
 
    brush EXEMPLAR [--script FILE] [--screenshot OUT.png]
 
-   What an editor does with texpatch.h. A job is stepped between the frames, so the window stays
-   alive and shows the texture as it comes about. A stroke takes on the unrest of the exemplar's own
-   edges and becomes a guide of gray layers, and only what the guide changes is made anew.
+   What an editor does with texpatch.h and texedges.h. A job is stepped between the frames, so the
+   window stays alive and shows the texture as it develops. A stroke takes on the roughness of the
+   exemplar's own edges and becomes a guide of gray layers; only what the guide changes is made again.
 
      left button  draw a stroke           [ ]  narrower, wider        s    save a screenshot
      wheel, 0-9   layer, from dark        c    strokes are closed     r    another seed
@@ -16,7 +16,7 @@
 
    window.c     what is shown; keys and mouse          script.c   strokes from a file
    strokes.c    what the mouse has drawn
-   texture.c    strokes to a guide, a guide to texture: calls texpatch.h                         */
+   texture.c    strokes to a guide, a guide to texture: calls texpatch.h, texedges.h             */
 #include "brush.h"
 
 #include <stb/stb_image.h>
@@ -70,7 +70,7 @@ int main(int argc, char **argv) {
     SDL_DestroyWindow(b.window);
     SDL_Quit();
     texpatch_free(b.job);
-    texedges_set_free(&b.edges);
+    texedges_set_free(b.edges);
     free(b.layers.pixels);
     stbi_image_free(b.photo.pixels);
     if (script) fclose(script);

@@ -33,12 +33,12 @@ void begin(brush *b) {
     b->layers.pixels = malloc((size_t)b->photo.width * (size_t)b->photo.height);
     if (!b->layers.pixels) b->failed = "no memory";
     if (b->failed || !check(b, texedges_find(&find, &b->env, &b->edges)) ||
-        !check(b, texedges_layers(&find, &b->edges, &b->env, &b->layers)))
+        !check(b, texedges_layers(&find, b->edges, &b->env, &b->layers)))
         return;
     for (int k = 0; k < LEVELS; k++)
         printf("layer %d: gray %.0f to %.0f\n", k,
-               k ? 255 * (double)b->edges.thresholds[k - 1] : 0.0,
-               k < LEVELS - 1 ? 255 * (double)b->edges.thresholds[k] : 255.0);
+               k ? 255 * (double)b->edges->thresholds[k - 1] : 0.0,
+               k < LEVELS - 1 ? 255 * (double)b->edges->thresholds[k] : 255.0);
 
     texpatch_desc desc = {0}; /* zeros mean the defaults */
     b->exemplar.maps = &b->photo;
@@ -62,17 +62,17 @@ void follow_strokes(brush *b, int everywhere) {
     static uint8_t guide[SIDE * SIDE], mask[SIDE * SIDE], again[SIDE * SIDE];
     const txm_image guide_image = square(guide, 1), mask_image = square(mask, 1);
     const txm_image where = square(again, 1);
-    texedges_set disturbed = {0};
+    texedges_set *disturbed;
     texedges_control control = {0};
-    control.edges = &b->edges;
+    control.edges = b->edges;
     control.strokes = b->strokes;
     control.stroke_count = b->stroke_count;
     control.background = -1; /* away from the strokes the texture is as it likes to be */
     control.seed = b->seed;
     if (!check(b, texedges_disturb(&control, SIDE, SIDE, &b->env, &disturbed))) return;
-    const int is_made = check(b, texedges_guide(&control, &disturbed, &b->env, &guide_image,
+    const int is_made = check(b, texedges_guide(&control, disturbed, &b->env, &guide_image,
                                                 &mask_image));
-    texedges_set_free(&disturbed);
+    texedges_set_free(disturbed);
     if (!is_made) return;
 
     const SDL_Rect all = {0, 0, SIDE, SIDE};

@@ -62,4 +62,23 @@ static txm_status txe_stopped(txm_env *env) {
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
+/* ---- sets ------------------------------------------------------------------------------ */
+
+/* An empty set, which lies in its own memory; NULL: there is none. */
+static texedges_set *txe_set_make(int levels, int width, int height, const txm_env *env) {
+    txm_arena memory;
+    txm_arena_init(&memory, env);
+    texedges_set *set = (texedges_set *)txm_arena_zero(&memory, 1, sizeof *set);
+    if (!set) return NULL;
+    set->levels = levels;
+    set->width = width;
+    set->height = height;
+    set->memory = memory;
+    return set;
+}
+
+TEXEDGES_API void texedges_set_free(texedges_set *set) {
+    if (set) txm_arena_free(&set->memory);
+}
+
 #endif /* TEXEDGES_CONFIG_H */

@@ -137,10 +137,9 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
 static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *layers,
                            txm_arena *scratch, texedges_set *e, txm_env *env) {
     txe_map map;
-    const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
-    e->width = map.width = desc->image.width;
-    e->height = map.height = desc->image.height;
-    e->levels = desc->levels ? desc->levels : 4;
+    const size_t count = (size_t)e->width * (size_t)e->height;
+    map.width = e->width;
+    map.height = e->height;
     for (int k = 0; k < e->levels - 1 && desc->thresholds; k++)
         e->thresholds[k] = desc->thresholds[k];
     map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
@@ -152,39 +151,32 @@ static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *l
     return txe_trace_all(&map, bar, e, env);
 }
 
-TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env,
-                                      texedges_set *out) {
+TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, texedges_set **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
     txm_status status = txe_check_desc(desc, env);
     if (status != TXM_OK) return status;
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     if (desc->levels && (desc->levels < 2 || desc->levels > TEXEDGES_MAX_LEVELS))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels",
                            "must be 0 or 2 to TEXEDGES_MAX_LEVELS");
-    if (desc->thresholds &&
-        !txe_thresholds_are_good(desc->thresholds, desc->levels ? desc->levels : 4))
+    const int levels = desc->levels ? desc->levels : 4;
+    if (desc->thresholds && !txe_thresholds_are_good(desc->thresholds, levels))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
 
     txm_arena layers, scratch;
     txe_bar bar;
-    texedges_set e;
-    memset(&e, 0, sizeof e);
     memset(&bar, 0, sizeof bar);
     bar.env = env;
+    texedges_set *set = txe_set_make(levels, desc->image.width, desc->image.height, env);
+    if (!set) return txe_no_memory(env);
     txm_arena_init(&layers, env);
     txm_arena_init(&scratch, env);
-    txm_arena_init(&e.memory, env);
-    status = txe_find(desc, &bar, &layers, &scratch, &e, env);
+    status = txe_find(desc, &bar, &layers, &scratch, set, env);
     txm_arena_free(&scratch);
     txm_arena_free(&layers);
-    if (status == TXM_OK) *out = e;
-    else txm_arena_free(&e.memory);
+    if (status == TXM_OK) *out = set;
+    else texedges_set_free(set);
     return status;
-}
-
-TEXEDGES_API void texedges_set_free(texedges_set *edges) {
-    if (!edges) return;
-    txm_arena_free(&edges->memory);
-    memset(edges, 0, sizeof *edges);
 }
 
 /* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken

@@ -284,11 +284,12 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
 }
 
 TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
-                                         txm_env *env, texedges_set *out) {
+                                         txm_env *env, texedges_set **out) {
     txe_bar bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
     if (width < 1 || height < 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
     if (width > TXE_SIDE || height > TXE_SIDE)
@@ -308,19 +309,15 @@ TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int wi
     }
     txe_stage(&bar, "strokes", 1, work);
     txm_arena lines;
-    texedges_set e;
-    memset(&e, 0, sizeof e);
-    e.levels = control->edges->levels;
-    e.width = width;
-    e.height = height;
-    memcpy(e.thresholds, control->edges->thresholds, sizeof e.thresholds);
-    memcpy(e.beside, control->edges->beside, sizeof e.beside);
+    texedges_set *set = txe_set_make(control->edges->levels, width, height, env);
+    if (!set) return txe_no_memory(env);
+    memcpy(set->thresholds, control->edges->thresholds, sizeof set->thresholds);
+    memcpy(set->beside, control->edges->beside, sizeof set->beside);
     txm_arena_init(&lines, env);
-    txm_arena_init(&e.memory, env);
-    status = txe_disturb(control, &bar, &lines, &e, env);
+    status = txe_disturb(control, &bar, &lines, set, env);
     txm_arena_free(&lines);
-    if (status == TXM_OK) *out = e;
-    else txm_arena_free(&e.memory);
+    if (status == TXM_OK) *out = set;
+    else texedges_set_free(set);
     return status;
 }
 

@@ -250,7 +250,7 @@ static int run_edges(int argc, char **argv) {
     cli run;
     options o = {NULL, NULL, "black", NULL, -1};
     texedges_desc desc = {0};
-    texedges_set edges = {0};
+    texedges_set *edges = NULL;
     txm_image layers = {0};
     float thresholds[TEXEDGES_MAX_LEVELS];
     int over = 0, status;
@@ -283,17 +283,17 @@ static int run_edges(int argc, char **argv) {
     if (result == TXM_OK && (o.layers || over == OVER_LAYERS)) {
         cli_stage(&run, "layers");
         status = new_picture(&run, desc.image.width, desc.image.height, 1, &layers);
-        if (!status) result = texedges_layers(&desc, &edges, &run.env, &layers);
+        if (!status) result = texedges_layers(&desc, edges, &run.env, &layers);
     }
     if (result != TXM_OK) status = fail_library(&run, result, run.inputs[0]);
     if (!status) {
-        const size_t count = set_figures(&run, &edges, o.layer);
-        status = write_outputs(&run, &o, &edges, over, &desc.image, &layers);
+        const size_t count = set_figures(&run, edges, o.layer);
+        status = write_outputs(&run, &o, edges, over, &desc.image, &layers);
         if (!status && !run.quiet)
             printf("%s: %lu lines of %d layers, %.1f s\n", run.output, (unsigned long)count,
-                   edges.levels, cli_seconds(&run));
+                   edges->levels, cli_seconds(&run));
     }
-    texedges_set_free(&edges);
+    texedges_set_free(edges);
     free(layers.pixels);
     image_free(&desc.image);
     return status;

@@ -665,7 +665,7 @@ static int read_strokes(job *j, strokes *s) {
 /* Layers of the exemplars as their guides, the disturbed strokes as the guide of the output. */
 static int follow_strokes(job *j, strokes *s) {
     texpatch_desc *d = &j->desc;
-    texedges_set edges = {0}, disturbed = {0};
+    texedges_set *edges = NULL, *disturbed = NULL;
     texedges_control control = s->control;
     int status = CLI_DONE;
     s->find.image = j->pictures[0][0];
@@ -676,10 +676,10 @@ static int follow_strokes(job *j, strokes *s) {
         s->find.image = *image;
         status = new_picture(j, image->width, image->height, 1, TXM_U8, layers);
         if (!status)
-            status = check_result(j, texedges_layers(&s->find, &edges, &j->run.env, layers),
+            status = check_result(j, texedges_layers(&s->find, edges, &j->run.env, layers),
                                   j->exemplar_names.at[e]);
     }
-    control.edges = &edges;
+    control.edges = edges;
     control.seed = j->run.seed;
     if (!status) status = new_picture(j, d->width, d->height, 1, TXM_U8, &d->guide);
     if (!status) status = new_picture(j, d->width, d->height, 1, TXM_U8, &d->guide_mask);
@@ -687,10 +687,10 @@ static int follow_strokes(job *j, strokes *s) {
         status = check_result(j, texedges_disturb(&control, d->width, d->height, &j->run.env,
                                                   &disturbed), j->control);
     if (!status)
-        status = check_result(j, texedges_guide(&control, &disturbed, &j->run.env,
+        status = check_result(j, texedges_guide(&control, disturbed, &j->run.env,
                                                 &d->guide, &d->guide_mask), j->control);
-    texedges_set_free(&edges);
-    texedges_set_free(&disturbed);
+    texedges_set_free(edges);
+    texedges_set_free(disturbed);
     return status;
 }
 
