@@ -10,23 +10,26 @@
      #include the four headers cmocka wants, cmocka.h, then this file. Everything is static inline.
      Link with -lpthread where the C library keeps threads apart. Run tests from the root folder.
 
-     Every allocation in turn made to fail, alone and from there on:
+     A call under faults is one function and one line for each kind of fault; the function releases
+     what it made, and whatever it must not touch after a failure is named:
 
-       for (int onward = 0; onward < 2; onward++) {
-           for (long k = 1;; k++) {
-               tk_memory memory = {0};
-               tk_progress progress = {0};
-               memory.fail_at = k;
-               memory.fail_onward = onward;
-               txm_env env = tk_env(&memory, &progress);
-               txm_status status = the_call(&env);
-               if (memory.calls < k) { assert_int_equal(status, TXM_OK); break; } // never failed
-               assert_int_equal(status, TXM_OUT_OF_MEMORY);
-               assert_int_equal(tk_leaks(&memory), 0);
-           }
+       static txm_status make(void *context, txm_env *env) {
+           texsyn_model *model = (texsyn_model *)env; // any pointer that is not NULL
+           const txm_status status = texsyn_learn((const texsyn_learn_desc *)context, env, &model);
+           if (status != TXM_OK) assert_null(model);
+           texsyn_model_free(model);
+           return status;
        }
 
-     Every cancel point: the same with progress.cancel_at, progress.calls and TXM_CANCELLED.  */
+       assert_true(tk_sweep(make, &desc, TK_ALLOCATION) > 10); // one allocation fails, each in turn
+       assert_true(tk_sweep(make, &desc, TK_ONWARD) > 10);     // that one and all later ones
+       assert_true(tk_sweep(make, &desc, TK_CANCEL) > 4);      // one report cancels, each in turn
+       const tk_output outputs[1] = {{pixels, sizeof pixels}};
+       assert_true(tk_sweep_outputs(draw, &job, TK_CANCEL, outputs, 1) > 4);
+
+     Every place is tried with FULL=1 in the environment, as `make check` has it; else calls 1, 2, 3,
+     5, 8, 13, ... and the last. Where a call may be tried again after a fault (steps of a job), see
+     tk_places. */
 #ifndef TESTKIT_H
 #define TESTKIT_H
 
@@ -192,6 +195,97 @@ static inline txm_env tk_env(tk_memory *memory, tk_progress *progress) {
         env.progress_user = progress;
     }
     return env;
+}
+
+/* ---- sweeps over faults ------------------------------------------------------------------ */
+
+typedef enum tk_kind {
+    TK_ALLOCATION, /* one allocation fails                 */
+    TK_ONWARD,     /* one and all later ones fail          */
+    TK_CANCEL      /* one progress report asks for the end */
+} tk_kind;
+
+/* What is swept: does its work, releases what it made, returns the status of the work. */
+typedef txm_status tk_call(void *context, txm_env *env);
+
+/* Bytes that must be as they were after a call has failed. They are filled before each call. */
+typedef struct tk_output {
+    void *bytes;
+    size_t count;
+} tk_output;
+
+enum { TK_UNTOUCHED = 0x6b };
+
+/* Is everything tried (FULL=1), or a sample? */
+static inline int tk_full(void) {
+    const char *full = getenv("FULL");
+    return full && strcmp(full, "1") == 0;
+}
+
+/* The place after `place` that a sweep over 1..last tries, beginning with place 0; 0 behind the last.
+   Everything with FULL=1, else 1, 2, 3, 5, 8, 13, ... and last. */
+static inline long tk_places(long place, long last) {
+    long a = 1, b = 2;
+    if (place >= last) return 0;
+    if (tk_full()) return place + 1;
+    while (a <= place) {
+        const long next = a + b;
+        a = b;
+        b = next;
+    }
+    return a < last ? a : last;
+}
+
+static inline long tk_sweep_outputs(tk_call *call, void *context, tk_kind kind,
+                                    const tk_output *outputs, int output_count) {
+    static const char *const names[3] = {"allocation", "allocations from", "report"};
+    long last = 0, place = 0;
+    do {
+        tk_memory memory;
+        tk_progress progress;
+        const char *wrong = NULL;
+        memset(&memory, 0, sizeof memory);
+        memset(&progress, 0, sizeof progress);
+        if (kind == TK_CANCEL) progress.cancel_at = place;
+        else memory.fail_at = place;
+        memory.fail_onward = kind == TK_ONWARD && place > 0;
+        txm_env env = tk_env(&memory, &progress);
+        for (int i = 0; i < output_count; i++)
+            memset(outputs[i].bytes, TK_UNTOUCHED, outputs[i].count);
+        const txm_status status = call(context, &env);
+        const txm_status wanted = place == 0          ? TXM_OK
+                                  : kind == TK_CANCEL ? TXM_CANCELLED
+                                                      : TXM_OUT_OF_MEMORY;
+        if (status != wanted) wrong = "another status";
+        else if (place && !env.message[0]) wrong = "no message";
+        else if (tk_leaks(&memory) != 0) wrong = "a leak, or a block damaged";
+        else if (progress.errors) wrong = "a report without stage, or a fraction that is wrong";
+        else if (progress.late) wrong = "a report after the one that cancelled";
+        for (int i = 0; i < output_count && place && !wrong; i++) {
+            const unsigned char *bytes = (const unsigned char *)outputs[i].bytes;
+            for (size_t k = 0; k < outputs[i].count && !wrong; k++)
+                if (bytes[k] != TK_UNTOUCHED) wrong = "an output is touched";
+        }
+        if (wrong) {
+            printf("# sweep, %s %ld of %ld: %s (status %d: %s)\n", names[kind], place, last, wrong,
+                   (int)status, env.message);
+            return -1;
+        }
+        if (place == 0) last = kind == TK_CANCEL ? progress.calls : memory.calls;
+        place = tk_places(place, last);
+    } while (place);
+    return last;
+}
+
+/* First undisturbed, then with a fault at each place of a kind (or at a sample of them) in turn.
+   Whatever goes wrong is printed.
+
+   return  how many places of this kind the undisturbed call has: demand as many as the work must
+           have at least. -1: undisturbed it fails; or after a fault it has another status than
+           TXM_OUT_OF_MEMORY or TXM_CANCELLED, no message, a leak, a touched output, or it reports
+           again after it was cancelled                                                          */
+static inline long tk_sweep(tk_call *call, void *context, tk_kind kind) {
+    return tk_sweep_outputs(call, context, kind, NULL, 0);
 }
 
 /* ---- comparing -------------------------------------------------------------------------- */
