@@ -598,58 +598,6 @@ TRIMESH_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, 
 #define TRIMESH_ASSERT(x) assert(x)
 #endif
 
-/* ---- vectors in double -------------------------------------------------------------------- */
-
-typedef struct tmr_vec {
-    double x, y, z;
-} tmr_vec;
-
-static tmr_vec tmr_v(double x, double y, double z) {
-    tmr_vec v;
-    v.x = x;
-    v.y = y;
-    v.z = z;
-    return v;
-}
-static tmr_vec tmr_add(tmr_vec a, tmr_vec b) {
-    return tmr_v(a.x + b.x, a.y + b.y, a.z + b.z);
-}
-static tmr_vec tmr_sub(tmr_vec a, tmr_vec b) {
-    return tmr_v(a.x - b.x, a.y - b.y, a.z - b.z);
-}
-static tmr_vec tmr_scale(tmr_vec a, double s) {
-    return tmr_v(a.x * s, a.y * s, a.z * s);
-}
-static tmr_vec tmr_mad(tmr_vec a, tmr_vec b, double s) { /* a + b s */
-    return tmr_v(a.x + b.x * s, a.y + b.y * s, a.z + b.z * s);
-}
-static double tmr_dot(tmr_vec a, tmr_vec b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-static tmr_vec tmr_cross(tmr_vec a, tmr_vec b) {
-    return tmr_v(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
-static double tmr_len2(tmr_vec a) {
-    return tmr_dot(a, a);
-}
-static double tmr_len(tmr_vec a) {
-    return sqrt(tmr_dot(a, a));
-}
-static double tmr_dist2(tmr_vec a, tmr_vec b) {
-    return tmr_len2(tmr_sub(a, b));
-}
-static double tmr_dist(tmr_vec a, tmr_vec b) {
-    return sqrt(tmr_dist2(a, b));
-}
-static tmr_vec tmr_unit(tmr_vec a) { /* the zero vector stays */
-    const double n = tmr_len(a);
-    return n > 0 ? tmr_scale(a, 1 / n) : a;
-}
-/* twice the area of a triangle times its unit normal */
-static tmr_vec tmr_area2(tmr_vec a, tmr_vec b, tmr_vec c) {
-    return tmr_cross(tmr_sub(b, a), tmr_sub(c, a));
-}
-
 /* ---- corners ----------------------------------------------------------------------------- */
 
 /* A mesh is two arrays over corners. Corner c of triangle c / 3 stands for its vertex and for the
@@ -669,11 +617,11 @@ enum { TMR_PLAIN = 0, TMR_CREASE = 1, TMR_BORDER = 2 }; /* kinds of edges */
    that the bounding box has its centre at 0 and a diagonal of 1. */
 typedef struct tmr_surface {
     int32_t vertex_count, face_count;
-    tmr_vec *point;         /* 1 per vertex                                                     */
+    txm_dvec3 *point;       /* 1 per vertex                                                     */
     int32_t *vertex;        /* of each corner                                                   */
     int32_t *opposite;      /* corner on the other side of the corner's edge, -1 at the border  */
-    tmr_vec *normal;        /* 1 per face, unit; of a face without area: that of its surroundings */
-    tmr_vec *vertex_normal; /* 1 per vertex, unit, weighted by angles                           */
+    txm_dvec3 *normal;      /* 1 per face, unit; of a face without area: that of its surroundings */
+    txm_dvec3 *vertex_normal; /* 1 per vertex, unit, weighted by angles                           */
     int32_t *corner;        /* 1 per vertex: one of its corners; on the border the first one
                                counter-clockwise, so that walking on reaches all              */
     int32_t *component;     /* 1 per face, from 0                                               */
@@ -686,7 +634,7 @@ typedef struct tmr_surface {
                                - 4 for turn >= 4 (winding reversed)                             */
     float *scale;           /* 1 per vertex: wanted edge length, relative; NULL = uniform       */
     uint8_t *edge_kind;     /* 1 per corner: TMR_PLAIN, ...; found later (see features)         */
-    tmr_vec centre;         /* in the caller's units; caller's = point * diagonal + centre      */
+    txm_dvec3 centre;       /* in the caller's units; caller's = point * diagonal + centre      */
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */
 } tmr_surface;
@@ -742,7 +690,7 @@ typedef struct tmr_mend {
     txm_env *env;
     trimesh_report report;
     int32_t vertex_count, face_count;
-    tmr_vec *point;    /* 1 per input vertex, scaled                                      */
+    txm_dvec3 *point;  /* 1 per input vertex, scaled                                      */
     int32_t *rename;   /* 1 per input vertex: which one stands for it                     */
     int32_t *degree;   /* 1 per input vertex: counts, of the step at hand                 */
     int32_t *stamp;    /* 1 per input vertex: marks neighbours                            */
@@ -757,7 +705,7 @@ typedef struct tmr_mend {
     txm_pair *pairs, *spare; /* 1 per corner: edges in order                              */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
-    tmr_vec centre;
+    txm_dvec3 centre;
     double diagonal;
     double noise;      /* scaled units: where single precision ends                       */
 } tmr_mend;
@@ -880,40 +828,42 @@ static txm_status tmr_mend_scale(tmr_mend *m) {
             if (fabs(x) > largest) largest = fabs(x);
         }
     }
-    const tmr_vec size = tmr_v(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-    m->diagonal = tmr_len(size);
-    m->centre = tmr_v(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
+    const txm_dvec3 size = txm_d3(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    m->diagonal = txm_d3_len(size);
+    m->centre =
+        txm_d3(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
     if (!(m->diagonal > 0))
         return txm_fail(m->env, TXM_TOO_SMALL, "all vertices of the surface are in one place");
     m->noise = largest / m->diagonal * (1.0 / (1 << 23));
     for (int32_t i = 0; i < m->vertex_count; i++) {
         const float *p = in->positions + 3 * (size_t)i;
-        m->point[i] = tmr_v((p[0] - m->centre.x) / m->diagonal, (p[1] - m->centre.y) / m->diagonal,
-                            (p[2] - m->centre.z) / m->diagonal);
+        m->point[i] = txm_d3((p[0] - m->centre.x) / m->diagonal, (p[1] - m->centre.y) / m->diagonal,
+                             (p[2] - m->centre.z) / m->diagonal);
     }
     return TXM_OK;
 }
 
-static uint64_t tmr_hash_cell(tmr_vec cell) {
+static uint64_t tmr_hash_cell(txm_dvec3 cell) {
     uint64_t bits[3];
-    cell = tmr_add(cell, tmr_v(0, 0, 0)); /* -0 to +0 */
+    cell = txm_d3_add(cell, txm_d3(0, 0, 0)); /* -0 to +0 */
     memcpy(&bits[0], &cell.x, sizeof bits[0]);
     memcpy(&bits[1], &cell.y, sizeof bits[1]);
     memcpy(&bits[2], &cell.z, sizeof bits[2]);
     return txm_hash(txm_hash(txm_hash(bits[0]) ^ bits[1]) ^ bits[2]);
 }
 
-static tmr_vec tmr_cell(tmr_vec p, double size) {
-    return size > 0 ? tmr_v(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
+static txm_dvec3 tmr_cell(txm_dvec3 p, double size) {
+    return size > 0 ? txm_d3(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
 }
 
 /* The lowest vertex in a cell that is not farther than size from point i, or else best. */
-static int32_t tmr_weld_look(const tmr_mend *m, tmr_vec cell, int32_t i, double size,
+static int32_t tmr_weld_look(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
                              int32_t best) {
     size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
     for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
         const int32_t j = m->table[slot] - 1;
-        if ((best < 0 || j < best) && tmr_dist2(m->point[i], m->point[j]) <= size * size) best = j;
+        if ((best < 0 || j < best) && txm_d3_dist2(m->point[i], m->point[j]) <= size * size)
+            best = j;
     }
     return best;
 }
@@ -928,12 +878,12 @@ static void tmr_weld(tmr_mend *m) {
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t i = 0; i < m->vertex_count; i++) {
         if (m->rename[i] < 0) continue;
-        const tmr_vec cell = tmr_cell(m->point[i], size);
+        const txm_dvec3 cell = tmr_cell(m->point[i], size);
         int32_t best = -1;
         for (int x = -reach; x <= reach; x++) {
             for (int y = -reach; y <= reach; y++) {
                 for (int z = -reach; z <= reach; z++)
-                    best = tmr_weld_look(m, tmr_add(cell, tmr_v(x, y, z)), i, size, best);
+                    best = tmr_weld_look(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
             }
         }
         if (best >= 0) {
@@ -1085,19 +1035,19 @@ static int32_t tmr_mend_link(tmr_mend *m) {
 }
 
 /* Without area, for all that single precision can tell. */
-static int tmr_is_thin(const tmr_mend *m, const tmr_vec p[3]) {
+static int tmr_is_thin(const tmr_mend *m, const txm_dvec3 p[3]) {
     double longest = 0;
-    for (int k = 0; k < 3; k++) longest = fmax(longest, tmr_dist2(p[k], p[(k + 1) % 3]));
+    for (int k = 0; k < 3; k++) longest = fmax(longest, txm_d3_dist2(p[k], p[(k + 1) % 3]));
     longest = sqrt(longest);
-    const double height = longest > 0 ? tmr_len(tmr_area2(p[0], p[1], p[2])) / longest : 0;
+    const double height = longest > 0 ? txm_d3_len(txm_d3_area2(p[0], p[1], p[2])) / longest : 0;
     /* the height that rounding alone can make counts only where the triangle looks thin as well */
     return height <= 1e-6 * longest || (height <= m->noise && height <= 1e-3 * longest);
 }
-static void tmr_face_points(const tmr_mend *m, int32_t f, tmr_vec p[3]) {
+static void tmr_face_points(const tmr_mend *m, int32_t f, txm_dvec3 p[3]) {
     for (int k = 0; k < 3; k++) p[k] = m->point[m->vertex[3 * f + k]];
 }
 static int tmr_face_is_thin(const tmr_mend *m, int32_t f) {
-    tmr_vec p[3];
+    txm_dvec3 p[3];
     tmr_face_points(m, f, p);
     return tmr_is_thin(m, p);
 }
@@ -1163,21 +1113,21 @@ static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
     enum { MOST = 16 };
     const int32_t count = end - begin, low = tmr_edge_low(m, (int32_t)m->pairs[begin].value);
     const int32_t high = tmr_edge_high(m, (int32_t)m->pairs[begin].value);
-    const tmr_vec e = tmr_unit(tmr_sub(m->point[high], m->point[low]));
-    tmr_vec u = e, w = e;
+    const txm_dvec3 e = txm_d3_unit(txm_d3_sub(m->point[high], m->point[low]));
+    txm_dvec3 u = e, w = e;
     double angle[MOST];
     int32_t corner[MOST];
     if (count > MOST || count % 2) return 0;
     for (int32_t k = 0; k < count; k++) {
         const int32_t c = (int32_t)m->pairs[begin + k].value;
-        tmr_vec d = tmr_sub(m->point[m->vertex[c]], m->point[low]);
-        d = tmr_mad(d, e, -tmr_dot(d, e));
+        txm_dvec3 d = txm_d3_sub(m->point[m->vertex[c]], m->point[low]);
+        d = txm_d3_mad(d, e, -txm_d3_dot(d, e));
         if (tmr_face_is_thin(m, c / 3)) return 0;
         if (k == 0) {
-            u = tmr_unit(d);
-            w = tmr_cross(e, u);
+            u = txm_d3_unit(d);
+            w = txm_d3_cross(e, u);
         }
-        const double a = k ? atan2(tmr_dot(d, w), tmr_dot(d, u)) : 0;
+        const double a = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
         int32_t at = k;
         for (; at > 0 && angle[at - 1] > a; at--) {
             angle[at] = angle[at - 1];
@@ -1267,9 +1217,9 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
     m->list[count++] = first;
     for (int32_t i = 0; i < count; i++) {
         const int32_t f = m->list[i];
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_face_points(m, f, p);
-        const double area = tmr_len(tmr_area2(p[0], p[1], p[2]));
+        const double area = txm_d3_len(txm_d3_area2(p[0], p[1], p[2]));
         if (m->flag[f] == 1) stays += area;
         else turns += area;
         for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
@@ -1331,10 +1281,10 @@ static txm_status tmr_mend_orient(tmr_mend *m) {
          needle: collapse       cap: flip             edge is flipped, and both halves have area */
 static int tmr_is_needle(const tmr_mend *m, int32_t f, int32_t *shortest, int32_t *longest) {
     double least = 0, most = 0;
-    tmr_vec p[3];
+    txm_dvec3 p[3];
     tmr_face_points(m, f, p);
     for (int32_t k = 0; k < 3; k++) {
-        const double length = tmr_dist(p[(k + 1) % 3], p[(k + 2) % 3]);
+        const double length = txm_d3_dist(p[(k + 1) % 3], p[(k + 2) % 3]);
         if (k == 0 || length < least) {
             least = length;
             *shortest = 3 * f + k;
@@ -1383,9 +1333,9 @@ static void tmr_join(tmr_mend *m, int32_t a, int32_t b) {
 }
 
 /* Height over longest edge. */
-static double tmr_slimness(tmr_vec a, tmr_vec b, tmr_vec c) {
-    const double longest2 = fmax(tmr_dist2(a, b), fmax(tmr_dist2(b, c), tmr_dist2(c, a)));
-    return longest2 > 0 ? tmr_len(tmr_area2(a, b, c)) / longest2 : 0;
+static double tmr_slimness(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
+    const double longest2 = fmax(txm_d3_dist2(a, b), fmax(txm_d3_dist2(b, c), txm_d3_dist2(c, a)));
+    return longest2 > 0 ? txm_d3_len(txm_d3_area2(a, b, c)) / longest2 : 0;
 }
 
 /* Flip the edge of corner c if the worse of the two triangles gets better and none turns over. The
@@ -1394,13 +1344,13 @@ static int tmr_flip_thin(tmr_mend *m, int32_t c) {
     const int32_t o = m->opposite[c];
     if (o < 0 || m->vertex[o] == m->vertex[c]) return 0;
     const int32_t next = tmr_next(c), prev = tmr_prev(c), beyond = tmr_next(o);
-    const tmr_vec p = m->point[m->vertex[c]], q = m->point[m->vertex[o]];
-    const tmr_vec a = m->point[m->vertex[next]], b = m->point[m->vertex[prev]];
-    const tmr_vec n = tmr_add(tmr_area2(p, a, b), tmr_area2(q, b, a));
+    const txm_dvec3 p = m->point[m->vertex[c]], q = m->point[m->vertex[o]];
+    const txm_dvec3 a = m->point[m->vertex[next]], b = m->point[m->vertex[prev]];
+    const txm_dvec3 n = txm_d3_add(txm_d3_area2(p, a, b), txm_d3_area2(q, b, a));
     const double before = fmin(tmr_slimness(p, a, b), tmr_slimness(q, b, a));
     const double after = fmin(tmr_slimness(p, a, q), tmr_slimness(q, b, p));
-    if (!(after > before) || !(tmr_dot(tmr_area2(p, a, q), n) >= 0) ||
-        !(tmr_dot(tmr_area2(q, b, p), n) >= 0) || tmr_has_neighbor(m, c, m->vertex[o]))
+    if (!(after > before) || !(txm_d3_dot(txm_d3_area2(p, a, q), n) >= 0) ||
+        !(txm_d3_dot(txm_d3_area2(q, b, p), n) >= 0) || tmr_has_neighbor(m, c, m->vertex[o]))
         return 0;
     const int32_t aq = m->opposite[beyond], bp = m->opposite[next];
     m->vertex[prev] = m->vertex[o];
@@ -1456,12 +1406,13 @@ static int32_t tmr_flip_caps(tmr_mend *m, int32_t count) {
 
 /* Would moving vertex v, of these corners, to point p turn a face over that keeps its area? */
 static int tmr_move_turns(const tmr_mend *m, const int32_t *corner, int32_t n, int32_t other,
-                          tmr_vec p) {
+                          txm_dvec3 p) {
     for (int32_t k = 0; k < n; k++) {
         const int32_t i = m->vertex[tmr_next(corner[k])], j = m->vertex[tmr_prev(corner[k])];
         if (i == other || j == other || tmr_face_is_thin(m, corner[k] / 3)) continue;
-        const tmr_vec before = tmr_area2(m->point[m->vertex[corner[k]]], m->point[i], m->point[j]);
-        if (!(tmr_dot(tmr_area2(p, m->point[i], m->point[j]), before) > 0)) return 1;
+        const txm_dvec3 before =
+            txm_d3_area2(m->point[m->vertex[corner[k]]], m->point[i], m->point[j]);
+        if (!(txm_d3_dot(txm_d3_area2(p, m->point[i], m->point[j]), before) > 0)) return 1;
     }
     return 0;
 }
@@ -1604,7 +1555,7 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     /* edge_kind, which is not needed yet, marks the corners that were visited */
     s->vertex_count = tmr_count_fans(m, s->edge_kind);
     const size_t v = (size_t)s->vertex_count;
-    s->point = (tmr_vec *)txm_arena_alloc(arena, v, sizeof(tmr_vec));
+    s->point = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->corner = (int32_t *)txm_arena_alloc(arena, v, sizeof(int32_t));
     if (m->desc->scale) s->scale = (float *)txm_arena_alloc(arena, v, sizeof(float));
     if (!s->point || !s->corner || (m->desc->scale && !s->scale))
@@ -1629,21 +1580,21 @@ static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count)
         left = 0;
         for (int32_t i = 0; i < count; i++) {
             const int32_t f = thin[i];
-            tmr_vec sum = tmr_v(0, 0, 0);
-            if (tmr_len2(s->normal[f]) > 0) continue;
+            txm_dvec3 sum = txm_d3(0, 0, 0);
+            if (txm_d3_len2(s->normal[f]) > 0) continue;
             for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
-                if (s->opposite[c] >= 0) sum = tmr_add(sum, s->normal[s->opposite[c] / 3]);
+                if (s->opposite[c] >= 0) sum = txm_d3_add(sum, s->normal[s->opposite[c] / 3]);
             }
-            s->normal[f] = tmr_unit(sum);
-            left |= !(tmr_len2(sum) > 0);
+            s->normal[f] = txm_d3_unit(sum);
+            left |= !(txm_d3_len2(sum) > 0);
         }
     }
     for (int32_t i = 0; i < count; i++) { /* nothing near has a normal: its own, or any */
         const int32_t *v = s->vertex + 3 * thin[i];
-        tmr_vec *n = s->normal + thin[i];
-        if (tmr_len2(*n) > 0) continue;
-        *n = tmr_unit(tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
-        if (!(tmr_len2(*n) > 0)) *n = tmr_v(0, 0, 1);
+        txm_dvec3 *n = s->normal + thin[i];
+        if (txm_d3_len2(*n) > 0) continue;
+        *n = txm_d3_unit(txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
+        if (!(txm_d3_len2(*n) > 0)) *n = txm_d3(0, 0, 1);
     }
 }
 
@@ -1652,13 +1603,13 @@ static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, i
     s->area = 0;
     *count = 0;
     for (int32_t f = 0; f < s->face_count; f++) {
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         for (int k = 0; k < 3; k++) p[k] = s->point[s->vertex[3 * f + k]];
-        const tmr_vec n = tmr_area2(p[0], p[1], p[2]);
-        s->area += 0.5 * tmr_len(n);
-        s->normal[f] = tmr_unit(n);
+        const txm_dvec3 n = txm_d3_area2(p[0], p[1], p[2]);
+        s->area += 0.5 * txm_d3_len(n);
+        s->normal[f] = txm_d3_unit(n);
         if (tmr_is_thin(m, p)) {
-            s->normal[f] = tmr_v(0, 0, 0);
+            s->normal[f] = txm_d3(0, 0, 0);
             thin[(*count)++] = f;
         }
     }
@@ -1668,17 +1619,17 @@ static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, i
 static void tmr_vertex_normals(tmr_surface *s) {
     memset(s->vertex_normal, 0, (size_t)s->vertex_count * sizeof *s->vertex_normal);
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        const tmr_vec p = s->point[s->vertex[c]];
-        const tmr_vec a = tmr_sub(s->point[s->vertex[tmr_next(c)]], p);
-        const tmr_vec b = tmr_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        const double angle = atan2(tmr_len(tmr_cross(a, b)), tmr_dot(a, b));
-        tmr_vec *n = s->vertex_normal + s->vertex[c];
-        *n = tmr_mad(*n, s->normal[c / 3], angle);
+        const txm_dvec3 p = s->point[s->vertex[c]];
+        const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
+        const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
+        const double angle = atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b));
+        txm_dvec3 *n = s->vertex_normal + s->vertex[c];
+        *n = txm_d3_mad(*n, s->normal[c / 3], angle);
     }
     for (int32_t i = 0; i < s->vertex_count; i++) {
-        tmr_vec *n = s->vertex_normal + i;
-        *n = tmr_unit(*n);
-        if (!(tmr_len2(*n) > 0)) *n = s->normal[s->corner[i] / 3];
+        txm_dvec3 *n = s->vertex_normal + i;
+        *n = txm_d3_unit(*n);
+        if (!(txm_d3_len2(*n) > 0)) *n = s->normal[s->corner[i] / 3];
     }
 }
 
@@ -1733,8 +1684,8 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
                                       tmr_surface *s) {
     const size_t f = (size_t)s->face_count, v = (size_t)s->vertex_count;
     int32_t count = 0;
-    s->normal = (tmr_vec *)txm_arena_alloc(arena, f, sizeof(tmr_vec));
-    s->vertex_normal = (tmr_vec *)txm_arena_alloc(arena, v, sizeof(tmr_vec));
+    s->normal = (txm_dvec3 *)txm_arena_alloc(arena, f, sizeof(txm_dvec3));
+    s->vertex_normal = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->component = (int32_t *)txm_arena_alloc(arena, f, sizeof(int32_t));
     int32_t *list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
     if (!s->normal || !s->vertex_normal || !s->component || !list)
@@ -1769,7 +1720,7 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
     if (status != TXM_OK) return status;
     m->vertex_count = (int32_t)m->desc->surface.vertex_count;
     m->face_count = (int32_t)m->desc->surface.triangle_count;
-    m->point = (tmr_vec *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(tmr_vec));
+    m->point = (txm_dvec3 *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(txm_dvec3));
     if (!m->point) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     if ((status = tmr_mend_alloc(m, arena, scratch)) != TXM_OK) return status;
     if ((status = tmr_mend_cancel(m, 0)) != TXM_OK) return status;
@@ -1841,7 +1792,7 @@ static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
 /* how far the surface turns at the edge opposite to c: 1 - cosine of the angle; 0 at the border */
 static double tmr_turn_at(const tmr_surface *s, int32_t c) {
     const int32_t o = s->opposite[c];
-    return o < 0 ? 0 : 1 - tmr_dot(s->normal[c / 3], s->normal[o / 3]);
+    return o < 0 ? 0 : 1 - txm_d3_dot(s->normal[c / 3], s->normal[o / 3]);
 }
 
 /* Which edges of the surface are creases? Those at which it turns by the angle and more, and, for
@@ -1932,7 +1883,7 @@ static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double l
             for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
                 const int32_t w = tmr_far_end(s, ends->corner[e], u);
                 has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
-                length += 0.5 * tmr_dist(s->point[u], s->point[w]);
+                length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
                     seen[w] = 1;
                     stack[size++] = w;
@@ -1953,11 +1904,11 @@ static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double l
 
 /* Direction from v along the line that starts with the edge of corner c, over about the distance
    reach or up to where it branches. */
-static tmr_vec tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v, int32_t c,
-                                  double reach) {
+static txm_dvec3 tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v,
+                                    int32_t c, double reach) {
     int32_t at = tmr_far_end(s, c, v), e = c;
     for (int i = 0; i < 1000; i++) {
-        if (tmr_dist2(s->point[at], s->point[v]) >= reach * reach) break;
+        if (txm_d3_dist2(s->point[at], s->point[v]) >= reach * reach) break;
         if (ends->first[at + 1] - ends->first[at] != 2) break;
         const int32_t k = ends->first[at];
         e = ends->corner[k] == e ? ends->corner[k + 1] : ends->corner[k];
@@ -1965,7 +1916,7 @@ static tmr_vec tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, in
         if (at == v) break;
     }
     if (at == v) at = tmr_far_end(s, c, v);
-    return tmr_unit(tmr_sub(s->point[at], s->point[v]));
+    return txm_d3_unit(txm_d3_sub(s->point[at], s->point[v]));
 }
 
 /* The kind of every vertex; corners where lines meet, end, or turn by more than 40 degrees over
@@ -1984,8 +1935,8 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
         const int32_t c = ends->corner[k], d = ends->corner[k + 1];
         if (s->edge_kind[c] != s->edge_kind[d]) continue;
         kind[v] = s->edge_kind[c] == TMR_BORDER_EDGE ? TRIMESH_BORDER : TRIMESH_CREASE;
-        turn[v] = (float)(1 + tmr_dot(tmr_line_direction(s, ends, v, c, reach),
-                                      tmr_line_direction(s, ends, v, d, reach)));
+        turn[v] = (float)(1 + txm_d3_dot(tmr_line_direction(s, ends, v, c, reach),
+                                         tmr_line_direction(s, ends, v, d, reach)));
     }
     const float limit = (float)(1 - cos(40 * TXM_PI / 180));
     for (int32_t v = 0; v < n; v++) {
@@ -1995,7 +1946,7 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
             double way = 0;
             for (int i = 0; i < 1000 && sharpest; i++) {
                 const int32_t next = tmr_far_end(s, e, at);
-                way += tmr_dist(s->point[at], s->point[next]);
+                way += txm_d3_dist(s->point[at], s->point[next]);
                 at = next;
                 if (way > reach || at == v || turn[at] <= 0) break;
                 const float other = turn[at], own = turn[v];
@@ -2016,10 +1967,10 @@ enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are nea
 static void tmr_angle_defects(const tmr_surface *s, float *defect) {
     for (int32_t v = 0; v < s->vertex_count; v++) defect[v] = (float)(2 * TXM_PI);
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        const tmr_vec p = s->point[s->vertex[c]];
-        const tmr_vec a = tmr_sub(s->point[s->vertex[tmr_next(c)]], p);
-        const tmr_vec b = tmr_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        defect[s->vertex[c]] -= txm_float(atan2(tmr_len(tmr_cross(a, b)), tmr_dot(a, b)));
+        const txm_dvec3 p = s->point[s->vertex[c]];
+        const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
+        const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
+        defect[s->vertex[c]] -= txm_float(atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b)));
     }
 }
 
@@ -2034,11 +1985,11 @@ static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *
     for (int i = 0; i < count; i++) {
         const int32_t u = list[i], first = s->corner[u];
         if (kind[u] != TRIMESH_FREE) return 0;
-        if (tmr_dot(tmr_sub(s->point[u], s->point[v]), s->vertex_normal[v]) > 1e-9) return 0;
+        if (txm_d3_dot(txm_d3_sub(s->point[u], s->point[v]), s->vertex_normal[v]) > 1e-9) return 0;
         sum += defect[u];
         for (int32_t c = first; c >= 0;) {
             const int32_t x = s->vertex[tmr_next(c)];
-            int known = tmr_dist2(s->point[x], s->point[v]) > reach * reach;
+            int known = txm_d3_dist2(s->point[x], s->point[v]) > reach * reach;
             for (int j = 0; j < count && !known; j++) known = list[j] == x;
             if (!known && count == TMR_TIP_BALL) return 0;
             if (!known) list[count++] = x;
@@ -2075,7 +2026,7 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
         l->face[k] = c / 3;
         l->line[k] = id;
         l->start[k] = length;
-        length += tmr_dist(s->point[v], s->point[w]);
+        length += txm_d3_dist(s->point[v], s->point[w]);
         l->edge[c] = 1 + id;
         if (s->opposite[c] >= 0) l->edge[s->opposite[c]] = 1 + id;
         l->segment[v] = l->segment[w] = k;
@@ -2142,15 +2093,16 @@ static int32_t tmr_segment_step(const tmr_lines *l, int32_t k, int step) {
 }
 
 /* The place on the line nearest to p, walking from segment *k as long as it gets nearer. */
-static tmr_vec tmr_project_line(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t *k) {
-    tmr_vec best = p;
+static txm_dvec3 tmr_project_line(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p,
+                                  int32_t *k) {
+    txm_dvec3 best = p;
     double least = -1;
     int direction = 0;
     for (int32_t i = *k, guard = l->segment_count + 1; i >= 0 && guard > 0; guard--) {
-        const tmr_vec a = s->point[l->a[i]], ab = tmr_sub(s->point[l->b[i]], a);
-        const double t = tmr_dot(tmr_sub(p, a), ab) / (tmr_len2(ab) + 1e-300);
-        const tmr_vec q = tmr_mad(a, ab, t < 0 ? 0 : t > 1 ? 1 : t);
-        const double d = tmr_dist2(p, q);
+        const txm_dvec3 a = s->point[l->a[i]], ab = txm_d3_sub(s->point[l->b[i]], a);
+        const double t = txm_d3_dot(txm_d3_sub(p, a), ab) / (txm_d3_len2(ab) + 1e-300);
+        const txm_dvec3 q = txm_d3_mad(a, ab, t < 0 ? 0 : t > 1 ? 1 : t);
+        const double d = txm_d3_dist2(p, q);
         if (least >= 0 && d >= least) break;
         least = d;
         best = q;
@@ -2164,8 +2116,8 @@ static tmr_vec tmr_project_line(const tmr_surface *s, const tmr_lines *l, tmr_ve
 }
 
 /* the place on a line at the distance from its beginning; *k: the segment it lies on */
-static tmr_vec tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t line, double way,
-                           int32_t *k) {
+static txm_dvec3 tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t line, double way,
+                             int32_t *k) {
     int32_t low = l->first[line], high = l->first[line + 1] - 1;
     while (low < high) { /* the last segment that starts at way or before */
         const int32_t middle = (low + high + 1) / 2;
@@ -2177,13 +2129,13 @@ static tmr_vec tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t lin
     double t = span > 0 ? (way - l->start[low]) / span : 0;
     t = t < 0 ? 0 : t > 1 ? 1 : t;
     *k = low;
-    const tmr_vec a = s->point[l->a[low]];
-    return tmr_mad(a, tmr_sub(s->point[l->b[low]], a), t);
+    const txm_dvec3 a = s->point[l->a[low]];
+    return txm_d3_mad(a, txm_d3_sub(s->point[l->b[low]], a), t);
 }
 
 /* how far from the beginning of its line a place on segment k lies */
-static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t k) {
-    return l->start[k] + tmr_dist(s->point[l->a[k]], p);
+static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p, int32_t k) {
+    return l->start[k] + txm_d3_dist(s->point[l->a[k]], p);
 }
 
 /* ---- density ------------------------------------------------------------------------------ */
@@ -2199,8 +2151,8 @@ static double tmr_spacing(const tmr_surface *s, double vertices) {
     for (int32_t f = 0; f < s->face_count && s->scale; f++) {
         const int32_t *v = s->vertex + 3 * f;
         const double scale = (s->scale[v[0]] + (double)s->scale[v[1]] + s->scale[v[2]]) / 3;
-        const tmr_vec n = tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
-        sum += 0.5 * tmr_len(n) / (scale * scale);
+        const txm_dvec3 n = txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
+        sum += 0.5 * txm_d3_len(n) / (scale * scale);
     }
     return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
 }
@@ -2218,9 +2170,9 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     for (int32_t v = 0; v < s->vertex_count; v++) curvature[v] = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
-        const double length = tmr_dist(s->point[a], s->point[b]);
+        const double length = txm_d3_dist(s->point[a], s->point[b]);
         if (length <= 0) continue;
-        const float k = txm_float(tmr_dist(s->vertex_normal[a], s->vertex_normal[b]) / length);
+        const float k = txm_float(txm_d3_dist(s->vertex_normal[a], s->vertex_normal[b]) / length);
         curvature[a] = txm_maxf(curvature[a], k);
         curvature[b] = txm_maxf(curvature[b], k);
     }
@@ -2245,7 +2197,7 @@ static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_are
         for (int32_t i = 0; i < 3 * s->face_count; i++) {
             const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
             const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
-            const double d = tmr_dist(s->point[a], s->point[b]) / spacing / 3;
+            const double d = txm_d3_dist(s->point[a], s->point[b]) / spacing / 3;
             scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
             scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
         }
@@ -2278,8 +2230,8 @@ typedef struct tmr_mesh {
     int32_t vertex_limit, face_limit; /* slots there are                                        */
     int32_t live, ghosts;             /* vertices that live and are no ghosts; ghosts           */
     int32_t live_faces;               /* triangles that live, ghost triangles too               */
-    tmr_vec *p;                       /* position                                               */
-    tmr_vec *n;                       /* normal of the surface there, smooth                    */
+    txm_dvec3 *p;                     /* position                                               */
+    txm_dvec3 *n;                     /* normal of the surface there, smooth                    */
     int32_t *source; /* face of the surface that p lies in; of a vertex on a line its segment;
                         of a vertex that never moves: its vertex of the surface                */
     int32_t *corner;                  /* one corner                                             */
@@ -2529,15 +2481,15 @@ static void tmr_collapse(tmr_mesh *m, int32_t c) {
 
 /* The point of triangle a b c nearest to p, as weights of b and c; *part: 0 inside, 1 2 3 the edge
    opposite to a b c, 4 5 6 the corner a b c. */
-static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u, double *v,
-                           int *part) {
-    const tmr_vec ab = tmr_sub(b, a), ac = tmr_sub(c, a), ap = tmr_sub(p, a);
-    const double d1 = tmr_dot(ab, ap), d2 = tmr_dot(ac, ap);
+static txm_dvec3 tmr_nearest(txm_dvec3 p, txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, double *u,
+                             double *v, int *part) {
+    const txm_dvec3 ab = txm_d3_sub(b, a), ac = txm_d3_sub(c, a), ap = txm_d3_sub(p, a);
+    const double d1 = txm_d3_dot(ab, ap), d2 = txm_d3_dot(ac, ap);
     *u = *v = 0;
     *part = 4;
     if (d1 <= 0 && d2 <= 0) return a;
-    const tmr_vec bp = tmr_sub(p, b);
-    const double d3 = tmr_dot(ab, bp), d4 = tmr_dot(ac, bp);
+    const txm_dvec3 bp = txm_d3_sub(p, b);
+    const double d3 = txm_d3_dot(ab, bp), d4 = txm_d3_dot(ac, bp);
     *u = 1;
     *part = 5;
     if (d3 >= 0 && d4 <= d3) return b;
@@ -2545,10 +2497,10 @@ static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u
     if (vc <= 0 && d1 >= 0 && d3 <= 0) {
         *u = d1 > d3 ? d1 / (d1 - d3) : 0;
         *part = 3;
-        return tmr_mad(a, ab, *u);
+        return txm_d3_mad(a, ab, *u);
     }
-    const tmr_vec cp = tmr_sub(p, c);
-    const double d5 = tmr_dot(ab, cp), d6 = tmr_dot(ac, cp);
+    const txm_dvec3 cp = txm_d3_sub(p, c);
+    const double d5 = txm_d3_dot(ab, cp), d6 = txm_d3_dot(ac, cp);
     *u = 0;
     *v = 1;
     *part = 6;
@@ -2557,7 +2509,7 @@ static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u
     if (vb <= 0 && d2 >= 0 && d6 <= 0) {
         *v = d2 > d6 ? d2 / (d2 - d6) : 0;
         *part = 2;
-        return tmr_mad(a, ac, *v);
+        return txm_d3_mad(a, ac, *v);
     }
     const double va = d3 * d6 - d5 * d4;
     if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
@@ -2565,35 +2517,35 @@ static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u
         *v = n > 0 ? (d4 - d3) / n : 0;
         *u = 1 - *v;
         *part = 1;
-        return tmr_mad(b, tmr_sub(c, b), *v);
+        return txm_d3_mad(b, txm_d3_sub(c, b), *v);
     }
     const double n = va + vb + vc;
     *u = n > 0 ? vb / n : 0;
     *v = n > 0 ? vc / n : 0;
     *part = 0;
-    return tmr_add(tmr_mad(a, ab, *u), tmr_scale(ac, *v));
+    return txm_d3_add(txm_d3_mad(a, ab, *u), txm_d3_scale(ac, *v));
 }
 
 typedef struct tmr_place {
-    tmr_vec p;    /* on the surface         */
+    txm_dvec3 p;  /* on the surface         */
     int32_t face; /* in this face of it     */
     double u, v;  /* weights of corners 1, 2 */
     double d2;    /* squared distance from what was projected */
     int part;     /* as tmr_nearest has it  */
 } tmr_place;
 
-static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, tmr_vec p) {
+static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, txm_dvec3 p) {
     tmr_place at;
     const int32_t *v = s->vertex + 3 * face;
     at.face = face;
     at.p = tmr_nearest(p, s->point[v[0]], s->point[v[1]], s->point[v[2]], &at.u, &at.v, &at.part);
-    at.d2 = tmr_dist2(p, at.p);
+    at.d2 = txm_d3_dist2(p, at.p);
     return at;
 }
 
 /* Walk from a face to where the surface is nearest to p, as long as it gets nearer: linear in the
    way, and it cannot jump to another sheet. */
-static tmr_place tmr_project(const tmr_surface *s, tmr_vec p, int32_t face) {
+static tmr_place tmr_project(const tmr_surface *s, txm_dvec3 p, int32_t face) {
     tmr_place at = tmr_on_face(s, face, p);
     for (int guard = 0; guard < 4096 && at.part != 0; guard++) {
         tmr_place best = at;
@@ -2618,15 +2570,15 @@ static tmr_place tmr_project(const tmr_surface *s, tmr_vec p, int32_t face) {
 }
 
 /* the smooth normal at a place; beside a crease that of the face */
-static tmr_vec tmr_normal_at(const tmr_surface *s, const tmr_lines *l, const tmr_place *at) {
+static txm_dvec3 tmr_normal_at(const tmr_surface *s, const tmr_lines *l, const tmr_place *at) {
     const double w[3] = {1 - at->u - at->v, at->u, at->v};
-    tmr_vec n = tmr_v(0, 0, 0);
+    txm_dvec3 n = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
         const int32_t v = s->vertex[3 * at->face + k];
         const int sharp = l->kind[v] == TRIMESH_CREASE || l->kind[v] == TRIMESH_CORNER;
-        n = tmr_mad(n, sharp ? s->normal[at->face] : s->vertex_normal[v], w[k]);
+        n = txm_d3_mad(n, sharp ? s->normal[at->face] : s->vertex_normal[v], w[k]);
     }
-    return tmr_len2(n) > 0.01 ? tmr_unit(n) : s->normal[at->face];
+    return txm_d3_len2(n) > 0.01 ? txm_d3_unit(n) : s->normal[at->face];
 }
 
 static double tmr_scale_at(const tmr_surface *s, const tmr_place *at) {
@@ -2649,7 +2601,7 @@ typedef struct tmr_work {
     float *size;       /* 1 per vertex of m: edge length there relative to length               */
     double length;     /* edge length aimed at                                                  */
     double line_scale; /* along lines relative to that                                          */
-    tmr_vec *moved;    /* 1 per vertex: room for where it shall go                              */
+    txm_dvec3 *moved;  /* 1 per vertex: room for where it shall go                              */
     int32_t *landed;   /* 1 per vertex: room for the face or segment there                      */
     uint8_t *bad;      /* 1 per vertex: room for a mark                                         */
     uint8_t *flag;     /* 1 per triangle: room for a mark                                       */
@@ -2684,23 +2636,23 @@ static void tmr_stay(tmr_work *w, int32_t v) {
 }
 
 /* Put vertex v on segment k of a line. */
-static void tmr_put_on_line(tmr_work *w, int32_t v, tmr_vec p, int32_t k) {
+static void tmr_put_on_line(tmr_work *w, int32_t v, txm_dvec3 p, int32_t k) {
     const int32_t *a = w->l->a, *b = w->l->b;
     const tmr_place at = tmr_on_face(w->s, w->l->face[k], p);
     w->m.p[v] = p;
-    w->m.n[v] = tmr_unit(tmr_add(w->s->vertex_normal[a[k]], w->s->vertex_normal[b[k]]));
+    w->m.n[v] = txm_d3_unit(txm_d3_add(w->s->vertex_normal[a[k]], w->s->vertex_normal[b[k]]));
     w->m.source[v] = k;
     w->size[v] = txm_float(tmr_scale_at(w->s, &at));
 }
 
 /* the middle of the triangle of these vertices */
-static tmr_vec tmr_middle(const tmr_mesh *m, const int32_t *v) {
-    return tmr_scale(tmr_add(tmr_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
+static txm_dvec3 tmr_middle(const tmr_mesh *m, const int32_t *v) {
+    return txm_d3_scale(txm_d3_add(txm_d3_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
 }
 
 /* the place of the surface nearest to that, walking from all three vertices */
 static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
-    const tmr_vec middle = tmr_middle(&w->m, v);
+    const txm_dvec3 middle = tmr_middle(&w->m, v);
     tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
     for (int k = 1; k < 3; k++) {
         const tmr_place other = tmr_project(w->s, middle, tmr_face_of(w, v[k]));
@@ -2711,29 +2663,30 @@ static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
 
 /* The normal that a triangle should have: that of the surface around, judged by its free vertices
    only where there are any, since normals on creases say little. */
-static tmr_vec tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int32_t c) {
+static txm_dvec3 tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t v[3] = {a, b, c};
-    tmr_vec n = tmr_v(0, 0, 0);
+    txm_dvec3 n = txm_d3(0, 0, 0);
     int any = 0;
     for (int k = 0; k < 3; k++) {
         if (tmr_kind_of(m, v[k]) != TRIMESH_FREE) continue;
-        n = tmr_add(n, m->n[v[k]]);
+        n = txm_d3_add(n, m->n[v[k]]);
         any = 1;
     }
-    if (any) return tmr_unit(n);
+    if (any) return txm_d3_unit(n);
     return w->s->normal[tmr_below_middle(w, v).face];
 }
 
 /* how well a triangle at these points agrees with the normals of its vertices: -1..1, -1 also for
    one without area */
-static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, tmr_vec pa,
-                            tmr_vec pb, tmr_vec pc) {
-    const tmr_vec n = tmr_area2(pa, pb, pc);
-    const double length = tmr_len(n);
-    const double longest = fmax(tmr_dist2(pa, pb), fmax(tmr_dist2(pb, pc), tmr_dist2(pc, pa)));
+static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, txm_dvec3 pa,
+                            txm_dvec3 pb, txm_dvec3 pc) {
+    const txm_dvec3 n = txm_d3_area2(pa, pb, pc);
+    const double length = txm_d3_len(n);
+    const double longest =
+        fmax(txm_d3_dist2(pa, pb), fmax(txm_d3_dist2(pb, pc), txm_d3_dist2(pc, pa)));
     if (length <= 0.02 * longest) return -1;
-    return tmr_dot(n, tmr_expected_normal(w, a, b, c)) / length;
+    return txm_d3_dot(n, tmr_expected_normal(w, a, b, c)) / length;
 }
 
 #define TMR_LEAST_AGREEMENT 0.4 /* cosine: triangles steeper than this to the surface are avoided */
@@ -2747,8 +2700,8 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
     m->vertex_limit = vertices;
     m->face_limit = faces;
     m->vertex_count = m->live = m->face_count = m->live_faces = 0;
-    m->p = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
-    m->n = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
+    m->p = (txm_dvec3 *)txm_arena_alloc(arena, nv, sizeof(txm_dvec3));
+    m->n = (txm_dvec3 *)txm_arena_alloc(arena, nv, sizeof(txm_dvec3));
     m->source = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     m->corner = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     m->flags = (uint8_t *)txm_arena_zero(arena, nv, 1);
@@ -2757,7 +2710,7 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
     m->opposite = (int32_t *)txm_arena_alloc(arena, nc, sizeof(int32_t));
     m->edge = (int32_t *)txm_arena_zero(arena, nc, sizeof(int32_t));
     w->size = (float *)txm_arena_alloc(arena, nv, sizeof(float));
-    w->moved = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
+    w->moved = (txm_dvec3 *)txm_arena_alloc(arena, nv, sizeof(txm_dvec3));
     w->landed = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
     w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
@@ -2812,7 +2765,7 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
         TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
         const int32_t ghost = m->vertex_count++, first_face = m->face_count;
         m->flags[ghost] = TMR_GHOST;
-        m->p[ghost] = m->n[ghost] = tmr_v(0, 0, 0);
+        m->p[ghost] = m->n[ghost] = txm_d3(0, 0, 0);
         m->source[ghost] = -1;
         m->corner[ghost] = 3 * first_face;
         m->valence[ghost] = 0;
@@ -2861,11 +2814,11 @@ static trimesh_source tmr_surface_source(const tmr_surface *s, const trimesh_des
             weight[turn < 4 ? (k + turn) % 3 : (turn - 4 - k + 3) % 3] = own[k];
     } else {
         const uint32_t *i = desc->surface.indices + 3 * (size_t)source.triangle;
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         int part;
         for (int k = 0; k < 3; k++) {
             const float *q = desc->surface.positions + 3 * (size_t)i[k];
-            p[k] = tmr_scale(tmr_sub(tmr_v(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
+            p[k] = txm_d3_scale(txm_d3_sub(txm_d3(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
         }
         tmr_nearest(at->p, p[0], p[1], p[2], &weight[1], &weight[2], &part);
     }
@@ -2877,13 +2830,13 @@ static trimesh_source tmr_surface_source(const tmr_surface *s, const trimesh_des
 /* ---- flips -------------------------------------------------------------------------------- */
 
 /* 2 inradius / circumradius, 1 for an equilateral triangle; negative if it disagrees with n */
-static double tmr_quality(tmr_vec a, tmr_vec b, tmr_vec c, tmr_vec n) {
-    const tmr_vec cross = tmr_area2(a, b, c);
-    const double x = tmr_dist(b, c), y = tmr_dist(c, a), z = tmr_dist(a, b);
+static double tmr_quality(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 n) {
+    const txm_dvec3 cross = txm_d3_area2(a, b, c);
+    const double x = txm_d3_dist(b, c), y = txm_d3_dist(c, a), z = txm_d3_dist(a, b);
     const double bottom = (x + y + z) * x * y * z;
-    const double area2 = tmr_len(cross);
+    const double area2 = txm_d3_len(cross);
     const double q = bottom > 0 ? 4 * area2 * area2 / bottom : 0; /* 8 A^2 / (s a b c) */
-    return tmr_dot(cross, n) < TMR_LEAST_AGREEMENT * area2 ? -1 : q;
+    return txm_d3_dot(cross, n) < TMR_LEAST_AGREEMENT * area2 ? -1 : q;
 }
 
 /* neighbours that a vertex should have, ghosts too */
@@ -2919,7 +2872,7 @@ static int tmr_look_at_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
     q->b = m->vertex[tmr_prev(c)];
     q->d = m->vertex[c];
     q->e = m->vertex[o];
-    const tmr_vec a = m->p[q->a], b = m->p[q->b], d = m->p[q->d], e = m->p[q->e];
+    const txm_dvec3 a = m->p[q->a], b = m->p[q->b], d = m->p[q->d], e = m->p[q->e];
     q->before = fmin(tmr_quality(d, a, b, tmr_expected_normal(w, q->d, q->a, q->b)),
                      tmr_quality(e, b, a, tmr_expected_normal(w, q->e, q->b, q->a)));
     q->after = fmin(tmr_quality(d, a, e, tmr_expected_normal(w, q->d, q->a, q->e)),
@@ -2929,15 +2882,16 @@ static int tmr_look_at_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
 
 /* Is the sum of the two angles opposite to the edge of c over pi? (Delaunay) */
 static int tmr_is_wide(const tmr_mesh *m, int32_t c) {
-    const tmr_vec a = m->p[m->vertex[tmr_next(c)]], b = m->p[m->vertex[tmr_prev(c)]];
-    const tmr_vec d = m->p[m->vertex[c]], e = m->p[m->vertex[m->opposite[c]]];
-    const tmr_vec da = tmr_sub(a, d), db = tmr_sub(b, d), ea = tmr_sub(a, e), eb = tmr_sub(b, e);
-    const double cd = tmr_dot(da, db), ce = tmr_dot(ea, eb);
+    const txm_dvec3 a = m->p[m->vertex[tmr_next(c)]], b = m->p[m->vertex[tmr_prev(c)]];
+    const txm_dvec3 d = m->p[m->vertex[c]], e = m->p[m->vertex[m->opposite[c]]];
+    const txm_dvec3 da = txm_d3_sub(a, d), db = txm_d3_sub(b, d), ea = txm_d3_sub(a, e),
+                    eb = txm_d3_sub(b, e);
+    const double cd = txm_d3_dot(da, db), ce = txm_d3_dot(ea, eb);
     if (cd >= 0 && ce >= 0) return 0;
-    const double sd = tmr_len(tmr_cross(da, db)), se = tmr_len(tmr_cross(ea, eb));
+    const double sd = txm_d3_len(txm_d3_cross(da, db)), se = txm_d3_len(txm_d3_cross(ea, eb));
     /* sin(d + e) < 0, a little less so that equal diagonals stay */
-    return sd * ce + se * cd < -1e-6 * sqrt(tmr_len2(da) * tmr_len2(db) * tmr_len2(ea)
-                                            * tmr_len2(eb));
+    return sd * ce + se * cd <
+           -1e-6 * sqrt(txm_d3_len2(da) * txm_d3_len2(db) * txm_d3_len2(ea) * txm_d3_len2(eb));
 }
 
 /* Which corners' edges are wide? Bits 0 to 2 of w->flag, one byte per triangle. */
@@ -2999,22 +2953,23 @@ static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
    pull, the others are that turned by 120 degrees. The fit is the mean of the three corners turned
    back onto the first:
        pull = (A + R^-1 B + R^-2 C) / 3 = A / 2 + sqrt(3) / 6 n x (C - B)                        */
-static tmr_vec tmr_fit(const tmr_work *w, const int32_t *v, tmr_vec *centre, tmr_vec *n) {
+static txm_dvec3 tmr_fit(const tmr_work *w, const int32_t *v, txm_dvec3 *centre, txm_dvec3 *n) {
     const tmr_mesh *m = &w->m;
-    const tmr_vec a = m->p[v[0]], b = m->p[v[1]], c = m->p[v[2]];
-    *centre = tmr_scale(tmr_add(tmr_add(a, b), c), 1.0 / 3);
+    const txm_dvec3 a = m->p[v[0]], b = m->p[v[1]], c = m->p[v[2]];
+    *centre = txm_d3_scale(txm_d3_add(txm_d3_add(a, b), c), 1.0 / 3);
     *n = tmr_expected_normal(w, v[0], v[1], v[2]);
-    tmr_vec arm = tmr_sub(a, *centre);
-    arm = tmr_mad(arm, *n, -tmr_dot(arm, *n));
-    tmr_vec pull = tmr_add(tmr_scale(arm, 0.5),
-                           tmr_scale(tmr_cross(*n, tmr_sub(c, b)), 0.28867513459481287));
+    txm_dvec3 arm = txm_d3_sub(a, *centre);
+    arm = txm_d3_mad(arm, *n, -txm_d3_dot(arm, *n));
+    txm_dvec3 pull =
+        txm_d3_add(txm_d3_scale(arm, 0.5),
+                   txm_d3_scale(txm_d3_cross(*n, txm_d3_sub(c, b)), 0.28867513459481287));
     const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
-    const double radius = size * 0.57735026918962576, length = tmr_len(pull);
+    const double radius = size * 0.57735026918962576, length = txm_d3_len(pull);
     if (length < 0.1 * radius) { /* turned over or flat: start from its first corner */
-        const double arm_length = tmr_len(arm);
-        return arm_length > 0 ? tmr_scale(arm, radius / arm_length) : pull;
+        const double arm_length = txm_d3_len(arm);
+        return arm_length > 0 ? txm_d3_scale(arm, radius / arm_length) : pull;
     }
-    return tmr_scale(pull, ((1 - w->pull) * length + w->pull * radius) / length);
+    return txm_d3_scale(pull, ((1 - w->pull) * length + w->pull * radius) / length);
 }
 
 /* the two neighbours of a vertex on its line; 0 if they are not just two */
@@ -3044,28 +2999,29 @@ static void tmr_relax_vertex(tmr_work *w, int32_t v) {
         int32_t two[2];
         if (!tmr_line_neighbors(m, v, two)) return;
         const double a = 1 / (double)w->size[two[0]], b = 1 / (double)w->size[two[1]];
-        const tmr_vec p = tmr_scale(tmr_add(tmr_scale(m->p[two[0]], a), tmr_scale(m->p[two[1]], b)),
-                                    1 / (a + b));
-        w->moved[v] = tmr_project_line(w->s, w->l, tmr_scale(tmr_add(m->p[v], p), 0.5),
-                                       &w->landed[v]);
+        const txm_dvec3 p = txm_d3_scale(
+            txm_d3_add(txm_d3_scale(m->p[two[0]], a), txm_d3_scale(m->p[two[1]], b)), 1 / (a + b));
+        w->moved[v] =
+            tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[v], p), 0.5), &w->landed[v]);
         return;
     }
-    tmr_vec sum = tmr_v(0, 0, 0);
+    txm_dvec3 sum = txm_d3(0, 0, 0);
     int count = 0;
     int32_t c = m->corner[v];
     const int32_t first = c;
     do {
         const int32_t corners[3] = {v, m->vertex[tmr_next(c)], m->vertex[tmr_prev(c)]};
         if (!tmr_is_ghost(m, corners[1]) && !tmr_is_ghost(m, corners[2])) {
-            tmr_vec centre, n;
-            const tmr_vec pull = tmr_fit(w, corners, &centre, &n);
-            sum = tmr_add(sum, tmr_add(centre, pull));
+            txm_dvec3 centre, n;
+            const txm_dvec3 pull = tmr_fit(w, corners, &centre, &n);
+            sum = txm_d3_add(sum, txm_d3_add(centre, pull));
             count++;
         }
         c = tmr_swing(m, c);
     } while (c != first);
     if (count == 0) return;
-    const tmr_vec to = tmr_mad(m->p[v], tmr_sub(tmr_scale(sum, 1.0 / count), m->p[v]), w->step);
+    const txm_dvec3 to =
+        txm_d3_mad(m->p[v], txm_d3_sub(txm_d3_scale(sum, 1.0 / count), m->p[v]), w->step);
     const tmr_place at = tmr_project(w->s, to, m->source[v]);
     w->moved[v] = at.p;
     w->landed[v] = at.face;
@@ -3079,7 +3035,7 @@ static void tmr_relax_chunk(void *context, int index) {
 }
 
 static int tmr_has_moved(const tmr_work *w, int32_t v) {
-    const tmr_vec a = w->moved[v], b = w->m.p[v];
+    const txm_dvec3 a = w->moved[v], b = w->m.p[v];
     return a.x < b.x || a.x > b.x || a.y < b.y || a.y > b.y || a.z < b.z || a.z > b.z;
 }
 
@@ -3163,7 +3119,7 @@ static double tmr_ideal_length(const tmr_work *w) {
         const int32_t *v = m->vertex + 3 * f;
         if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
         const double size = (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
-        sum += 0.5 * tmr_len(tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]])) / (size * size);
+        sum += 0.5 * txm_d3_len(txm_d3_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]])) / (size * size);
         count++;
     }
     return count ? sqrt(sum / count * 2.3094010767585034) : 0; /* area = sqrt(3) / 4 L^2 */
@@ -3175,7 +3131,7 @@ static double tmr_ideal_length(const tmr_work *w) {
 static double tmr_edge_size(const tmr_work *w, int32_t c) {
     const int32_t a = w->m.vertex[tmr_next(c)], b = w->m.vertex[tmr_prev(c)];
     const double wanted = w->length * 0.5 * (w->size[a] + (double)w->size[b]);
-    return tmr_dist(w->m.p[a], w->m.p[b]) / (w->m.edge[c] ? wanted * w->line_scale : wanted);
+    return txm_d3_dist(w->m.p[a], w->m.p[b]) / (w->m.edge[c] ? wanted * w->line_scale : wanted);
 }
 
 static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
@@ -3185,12 +3141,12 @@ static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
 
 /* Where b's triangles go when b is pulled into a at position to: is each of them fair? reach: no
    edge may become longer than this, relative to what is wanted; 0 = any. */
-static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, tmr_vec to, double reach) {
+static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, double reach) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
     for (int end = 0; end < 2; end++) {
         const int32_t first = end ? tmr_next(c) : tmr_prev(c), v = m->vertex[first];
-        if (end && tmr_dist2(m->p[v], to) <= 0) break; /* a stays */
+        if (end && txm_d3_dist2(m->p[v], to) <= 0) break; /* a stays */
         int32_t i = first;
         do {
             const int32_t x = m->vertex[tmr_next(i)], y = m->vertex[tmr_prev(i)];
@@ -3201,7 +3157,7 @@ static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, tmr_vec to, double
                     return 0;
                 if (reach > 0) {
                     const double wanted = w->length * 0.5 * (w->size[v] + (double)w->size[x]);
-                    if (tmr_dist2(to, m->p[x]) > reach * reach * wanted * wanted) return 0;
+                    if (txm_d3_dist2(to, m->p[x]) > reach * reach * wanted * wanted) return 0;
                 }
             }
             i = tmr_swing(m, i);
@@ -3222,8 +3178,8 @@ static int tmr_try_collapse(tmr_work *w, int32_t c, double reach, int middle) {
     const int32_t keep = m->vertex[tmr_next(c)];
     if (!tmr_can_collapse(m, c)) return 0;
     if (rank_a == 0 && rank_b == 0 && middle) {
-        const tmr_place at = tmr_project(w->s, tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5),
-                                         m->source[keep]);
+        const tmr_place at =
+            tmr_project(w->s, txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5), m->source[keep]);
         if (tmr_collapse_is_fair(w, c, at.p, reach)) {
             tmr_collapse(m, c);
             tmr_put(w, keep, &at);
@@ -3241,35 +3197,38 @@ static int tmr_try_collapse(tmr_work *w, int32_t c, double reach, int middle) {
 }
 
 /* Would the four triangles around a vertex at p on the edge of c be fair? */
-static int tmr_split_is_fair(const tmr_work *w, int32_t c, tmr_vec p, tmr_vec n) {
+static int tmr_split_is_fair(const tmr_work *w, int32_t c, txm_dvec3 p, txm_dvec3 n) {
     const tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-    const double length2 = tmr_dist2(m->p[a], m->p[b]);
-    if (fmax(tmr_dist2(p, m->p[a]), tmr_dist2(p, m->p[b])) > 0.6 * length2) return 0;
+    const double length2 = txm_d3_dist2(m->p[a], m->p[b]);
+    if (fmax(txm_d3_dist2(p, m->p[a]), txm_d3_dist2(p, m->p[b])) > 0.6 * length2) return 0;
     for (int side = 0; side < 2; side++) {
         const int32_t i = side ? m->opposite[c] : c, d = m->vertex[i];
         const int32_t x = m->vertex[tmr_next(i)], y = m->vertex[tmr_prev(i)];
         if (tmr_is_ghost(m, d)) continue;
-        const tmr_vec one = tmr_area2(m->p[d], m->p[x], p), two = tmr_area2(m->p[d], p, m->p[y]);
+        const txm_dvec3 one = txm_d3_area2(m->p[d], m->p[x], p),
+                        two = txm_d3_area2(m->p[d], p, m->p[y]);
         const double before = tmr_agreement(w, d, x, y, m->p[d], m->p[x], m->p[y]);
-        const tmr_vec whole = tmr_area2(m->p[d], m->p[x], m->p[y]);
+        const txm_dvec3 whole = txm_d3_area2(m->p[d], m->p[x], m->p[y]);
         if (before < TMR_LEAST_AGREEMENT) continue;
-        if (tmr_dot(one, whole) <= 0 || tmr_dot(two, whole) <= 0) return 0;
+        if (txm_d3_dot(one, whole) <= 0 || txm_d3_dot(two, whole) <= 0) return 0;
         if (m->edge[c]) continue;
-        if (tmr_dot(one, n) < 0.2 * tmr_len(one) || tmr_dot(two, n) < 0.2 * tmr_len(two)) return 0;
+        if (txm_d3_dot(one, n) < 0.2 * txm_d3_len(one) ||
+            txm_d3_dot(two, n) < 0.2 * txm_d3_len(two))
+            return 0;
     }
     return 1;
 }
 
 /* The place on the line half-way between two neighbours on it, a and b; *k: its segment. Between two
    corners, which may belong to other lines too, that is the middle of the whole line. */
-static tmr_vec tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32_t b, int32_t *k) {
+static txm_dvec3 tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32_t b, int32_t *k) {
     const tmr_mesh *m = &w->m;
     const int bound_a = tmr_kind_of(m, a) == TRIMESH_CORNER;
     const int bound_b = tmr_kind_of(m, b) == TRIMESH_CORNER;
     if (bound_a && bound_b) return tmr_line_at(w->s, w->l, id, 0.5 * w->l->length[id], k);
     *k = m->source[bound_a ? b : a];
-    return tmr_project_line(w->s, w->l, tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5), k);
+    return tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5), k);
 }
 
 /* Put a vertex on the middle of the edge opposite to c, on the surface; -1 if there is no room or
@@ -3278,12 +3237,12 @@ static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t line = m->edge[c];
-    const tmr_vec middle = tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5);
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
     if (line) {
         const int32_t id = line - 1;
         int32_t k;
-        const tmr_vec p = tmr_line_middle(w, id, a, b, &k);
-        if (!tmr_split_is_fair(w, c, p, tmr_v(0, 0, 0))) return -1;
+        const txm_dvec3 p = tmr_line_middle(w, id, a, b, &k);
+        if (!tmr_split_is_fair(w, c, p, txm_d3(0, 0, 0))) return -1;
         const int32_t v = tmr_split(m, c);
         if (v < 0) return v;
         m->flags[v] = w->l->border[id] ? TRIMESH_BORDER : TRIMESH_CREASE;
@@ -3357,11 +3316,11 @@ static int32_t tmr_collapse_short(tmr_work *w, double limit, double line_limit, 
    point of the triangular lattice that these arms span. */
 typedef struct tmr_level {
     int32_t count, links;
-    tmr_vec *p, *n, *x;
+    txm_dvec3 *p, *n, *x;
     float *area;
     float *scale;       /* lattice spacing                                                 */
     double (*z)[2];     /* direction to the sixth power                                    */
-    tmr_vec *q;         /* a lattice point near p                                          */
+    txm_dvec3 *q;       /* a lattice point near p                                          */
     uint8_t *fixed;     /* 1: z and q are given (lines), 2: q is (corners)                 */
     int32_t *parent;    /* node of the next level                                          */
     int32_t *first, *to; /* neighbours of i: to[first[i]] .. to[first[i + 1] - 1]          */
@@ -3378,10 +3337,12 @@ typedef struct tmr_fields {
     int32_t *vertex; /* of each node of level 0               */
 } tmr_fields;
 
-static tmr_vec tmr_any_axis(tmr_vec n) {
+static txm_dvec3 tmr_any_axis(txm_dvec3 n) {
     const double x = fabs(n.x), y = fabs(n.y), z = fabs(n.z);
-    const tmr_vec axis = x <= y && x <= z ? tmr_v(1, 0, 0) : y <= z ? tmr_v(0, 1, 0) : tmr_v(0, 0, 1);
-    return tmr_unit(tmr_cross(n, axis));
+    const txm_dvec3 axis = x <= y && x <= z ? txm_d3(1, 0, 0)
+                           : y <= z         ? txm_d3(0, 1, 0)
+                                            : txm_d3(0, 0, 1);
+    return txm_d3_unit(txm_d3_cross(n, axis));
 }
 
 static void tmr_complex_mul(const double a[2], const double b[2], double out[2]) {
@@ -3438,13 +3399,14 @@ static void tmr_sixth_root(const double z[2], double out[2]) {
 
 /* How the frame (n1, x1) lies in (n0, x0) when n1 is turned onto n0 the short way: the complex
    number by which coordinates are multiplied. */
-static void tmr_transport(tmr_vec n0, tmr_vec x0, tmr_vec n1, tmr_vec x1, double out[2]) {
-    const tmr_vec axis = tmr_cross(n1, n0);
-    const double cosine = tmr_dot(n0, n1);
+static void tmr_transport(txm_dvec3 n0, txm_dvec3 x0, txm_dvec3 n1, txm_dvec3 x1, double out[2]) {
+    const txm_dvec3 axis = txm_d3_cross(n1, n0);
+    const double cosine = txm_d3_dot(n0, n1);
     /* R x = x cos + axis x x + axis (axis . x) / (1 + cos) */
-    const double k = tmr_dot(axis, x1) / (1 + fmax(cosine, -0.99));
-    tmr_vec x = tmr_add(tmr_add(tmr_scale(x1, cosine), tmr_cross(axis, x1)), tmr_scale(axis, k));
-    const double re = tmr_dot(x, x0), im = tmr_dot(x, tmr_cross(n0, x0));
+    const double k = txm_d3_dot(axis, x1) / (1 + fmax(cosine, -0.99));
+    txm_dvec3 x = txm_d3_add(txm_d3_add(txm_d3_scale(x1, cosine), txm_d3_cross(axis, x1)),
+                             txm_d3_scale(axis, k));
+    const double re = txm_d3_dot(x, x0), im = txm_d3_dot(x, txm_d3_cross(n0, x0));
     const double length = sqrt(re * re + im * im);
     out[0] = length > 1e-12 ? re / length : 1;
     out[1] = length > 1e-12 ? im / length : 0;
@@ -3454,10 +3416,10 @@ static int tmr_level_alloc(tmr_level *level, int32_t count, int32_t links, txm_a
     const size_t n = (size_t)count, k = (size_t)links;
     level->count = count;
     level->links = links;
-    level->p = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    level->n = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    level->x = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    level->q = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
+    level->p = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    level->n = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    level->x = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    level->q = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
     level->area = (float *)txm_arena_alloc(arena, n, sizeof(float));
     level->scale = (float *)txm_arena_alloc(arena, n, sizeof(float));
     level->z = (double(*)[2])txm_arena_zero(arena, n, 2 * sizeof(double));
@@ -3511,8 +3473,9 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         level->fixed[i] = kind == TRIMESH_FREE ? 0 : kind == TRIMESH_CORNER ? 2 : 1;
         int32_t two[2];
         if (level->fixed[i] == 1 && tmr_line_neighbors(m, v, two)) {
-            const tmr_vec d = tmr_sub(m->p[two[1]], m->p[two[0]]);
-            double a[2] = {tmr_dot(d, level->x[i]), tmr_dot(d, tmr_cross(level->n[i], level->x[i]))};
+            const txm_dvec3 d = txm_d3_sub(m->p[two[1]], m->p[two[0]]);
+            double a[2] = {txm_d3_dot(d, level->x[i]),
+                           txm_d3_dot(d, txm_d3_cross(level->n[i], level->x[i]))};
             const double n = sqrt(a[0] * a[0] + a[1] * a[1]);
             a[0] = n > 0 ? a[0] / n : 1;
             a[1] = n > 0 ? a[1] / n : 0;
@@ -3540,7 +3503,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
             const int32_t j = a->to[k];
             if (a->parent[j] >= 0) continue;
             const double x = a->area[i], y = a->area[j];
-            const double score = tmr_dot(a->n[i], a->n[j]) * (x < y ? x / y : y / x);
+            const double score = txm_d3_dot(a->n[i], a->n[j]) * (x < y ? x / y : y / x);
             if (score > best_score) {
                 best_score = score;
                 best = j;
@@ -3556,7 +3519,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
     int32_t k = 0;
     for (int32_t i = 0; i < count; i++) seen[i] = -1;
     for (int32_t i = 0; i < count; i++) {
-        tmr_vec p = tmr_v(0, 0, 0), n = p;
+        txm_dvec3 p = txm_d3(0, 0, 0), n = p;
         double area = 0, scale = 0;
         int fixed = 0, only = 1;
         const int32_t first = k;
@@ -3565,8 +3528,8 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
         for (int side = 0; side < 2; side++) {
             const int32_t c = child[2 * i + side];
             if (c < 0) continue;
-            p = tmr_mad(p, a->p[c], a->area[c]);
-            n = tmr_mad(n, a->n[c], a->area[c]);
+            p = txm_d3_mad(p, a->p[c], a->area[c]);
+            n = txm_d3_mad(n, a->n[c], a->area[c]);
             scale += (double)a->scale[c] * a->area[c];
             area += a->area[c];
             fixed |= a->fixed[c] == 1;
@@ -3583,8 +3546,8 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
                 b->weight[seen[to]] += a->weight[j];
             }
         }
-        b->p[i] = b->q[i] = tmr_scale(p, 1 / area);
-        b->n[i] = tmr_len2(n) > 1e-12 ? tmr_unit(n) : a->n[child[2 * i]];
+        b->p[i] = b->q[i] = txm_d3_scale(p, 1 / area);
+        b->n[i] = txm_d3_len2(n) > 1e-12 ? txm_d3_unit(n) : a->n[child[2 * i]];
         b->x[i] = tmr_any_axis(b->n[i]);
         b->area[i] = txm_float(area);
         b->scale[i] = txm_float(scale / area);
@@ -3677,9 +3640,9 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
         tmr_level *level = &f->level[l];
         for (int32_t i = 0; i < level->count; i++) {
             double r[2];
-            const tmr_vec y = tmr_cross(level->n[i], level->x[i]);
+            const txm_dvec3 y = txm_d3_cross(level->n[i], level->x[i]);
             tmr_sixth_root(level->z[i], r);
-            level->x[i] = tmr_add(tmr_scale(level->x[i], r[0]), tmr_scale(y, r[1]));
+            level->x[i] = txm_d3_add(txm_d3_scale(level->x[i], r[0]), txm_d3_scale(y, r[1]));
         }
     }
 }
@@ -3687,27 +3650,29 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
 /* ---- lattice points ----------------------------------------------------------------------- */
 
 /* the second arm of a lattice: x turned by 60 degrees about n */
-static tmr_vec tmr_arm(tmr_vec n, tmr_vec x) {
-    return tmr_add(tmr_scale(x, 0.5), tmr_scale(tmr_cross(n, x), 0.86602540378443865));
+static txm_dvec3 tmr_arm(txm_dvec3 n, txm_dvec3 x) {
+    return txm_d3_add(txm_d3_scale(x, 0.5), txm_d3_scale(txm_d3_cross(n, x), 0.86602540378443865));
 }
 
 /* lattice coordinates of d: d = a x + b y with the arms x and y, in units of the spacing */
-static void tmr_lattice_at(tmr_vec d, tmr_vec x, tmr_vec y, double inverse, double *a, double *b) {
-    const double dx = tmr_dot(d, x) * inverse, dy = tmr_dot(d, y) * inverse;
+static void tmr_lattice_at(txm_dvec3 d, txm_dvec3 x, txm_dvec3 y, double inverse, double *a,
+                           double *b) {
+    const double dx = txm_d3_dot(d, x) * inverse, dy = txm_d3_dot(d, y) * inverse;
     *a = (dx - 0.5 * dy) * (4.0 / 3);
     *b = (dy - 0.5 * dx) * (4.0 / 3);
 }
 
 /* the point of the lattice through q that lies nearest to p (in the tangent plane) */
-static tmr_vec tmr_lattice_round(tmr_vec q, tmr_vec x, tmr_vec y, double spacing, tmr_vec p) {
+static txm_dvec3 tmr_lattice_round(txm_dvec3 q, txm_dvec3 x, txm_dvec3 y, double spacing,
+                                   txm_dvec3 p) {
     double a, b, least = 0;
-    tmr_vec best = q;
-    tmr_lattice_at(tmr_sub(p, q), x, y, 1 / spacing, &a, &b);
+    txm_dvec3 best = q;
+    tmr_lattice_at(txm_d3_sub(p, q), x, y, 1 / spacing, &a, &b);
     const double a0 = floor(a), b0 = floor(b);
     for (int k = 0; k < 4; k++) {
-        const tmr_vec to = tmr_mad(tmr_mad(q, x, (a0 + (k & 1)) * spacing), y,
-                                   (b0 + (k >> 1)) * spacing);
-        const double d = tmr_dist2(to, p);
+        const txm_dvec3 to =
+            txm_d3_mad(txm_d3_mad(q, x, (a0 + (k & 1)) * spacing), y, (b0 + (k >> 1)) * spacing);
+        const double d = txm_d3_dist2(to, p);
         if (k == 0 || d < least) {
             least = d;
             best = to;
@@ -3717,38 +3682,39 @@ static tmr_vec tmr_lattice_round(tmr_vec q, tmr_vec x, tmr_vec y, double spacing
 }
 
 /* a point about half-way between two tangent planes: where they cross, or else the middle */
-static tmr_vec tmr_between(tmr_vec p0, tmr_vec n0, tmr_vec p1, tmr_vec n1) {
-    const double n00 = tmr_dot(n0, p0), n01 = tmr_dot(n0, p1), n10 = tmr_dot(n1, p0);
-    const double n11 = tmr_dot(n1, p1), c = tmr_dot(n0, n1);
+static txm_dvec3 tmr_between(txm_dvec3 p0, txm_dvec3 n0, txm_dvec3 p1, txm_dvec3 n1) {
+    const double n00 = txm_d3_dot(n0, p0), n01 = txm_d3_dot(n0, p1), n10 = txm_d3_dot(n1, p0);
+    const double n11 = txm_d3_dot(n1, p1), c = txm_d3_dot(n0, n1);
     const double d = 1 / (1 - c * c + 1e-4);
     const double l0 = 2 * (n01 - n00 - c * (n10 - n11)) * d;
     const double l1 = 2 * (n10 - n11 - c * (n01 - n00)) * d;
-    const tmr_vec middle = tmr_scale(tmr_add(p0, p1), 0.5);
-    return tmr_sub(middle, tmr_scale(tmr_add(tmr_scale(n0, -l0), tmr_scale(n1, -l1)), 0.25));
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(p0, p1), 0.5);
+    return txm_d3_sub(middle,
+                      txm_d3_scale(txm_d3_add(txm_d3_scale(n0, -l0), txm_d3_scale(n1, -l1)), 0.25));
 }
 
 /* Of the lattice points of two nodes about half-way between them, the pair that lies closest
    together: what both should agree on. */
-static void tmr_closest_pair(const tmr_level *level, int32_t i, tmr_vec qi, int32_t j, tmr_vec *a,
-                             tmr_vec *b) {
+static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, int32_t j,
+                             txm_dvec3 *a, txm_dvec3 *b) {
     const double spacing = 0.5 * (level->scale[i] + (double)level->scale[j]);
-    const tmr_vec middle = tmr_between(level->p[i], level->n[i], level->p[j], level->n[j]);
-    tmr_vec corner[2][4];
+    const txm_dvec3 middle = tmr_between(level->p[i], level->n[i], level->p[j], level->n[j]);
+    txm_dvec3 corner[2][4];
     double least = -1;
     for (int side = 0; side < 2; side++) {
         const int32_t v = side ? j : i;
-        const tmr_vec q = side ? level->q[j] : qi, x = level->x[v], y = tmr_arm(level->n[v], x);
+        const txm_dvec3 q = side ? level->q[j] : qi, x = level->x[v], y = tmr_arm(level->n[v], x);
         double s, t;
-        tmr_lattice_at(tmr_sub(middle, q), x, y, 1 / spacing, &s, &t);
+        tmr_lattice_at(txm_d3_sub(middle, q), x, y, 1 / spacing, &s, &t);
         s = floor(s);
         t = floor(t);
-        corner[side][0] = tmr_mad(tmr_mad(q, x, s * spacing), y, t * spacing);
-        corner[side][1] = tmr_mad(corner[side][0], x, spacing);
-        corner[side][2] = tmr_mad(corner[side][0], y, spacing);
-        corner[side][3] = tmr_mad(corner[side][1], y, spacing);
+        corner[side][0] = txm_d3_mad(txm_d3_mad(q, x, s * spacing), y, t * spacing);
+        corner[side][1] = txm_d3_mad(corner[side][0], x, spacing);
+        corner[side][2] = txm_d3_mad(corner[side][0], y, spacing);
+        corner[side][3] = txm_d3_mad(corner[side][1], y, spacing);
     }
     for (int k = 0; k < 16; k++) {
-        const double d = tmr_dist2(corner[0][k & 3], corner[1][k >> 2]);
+        const double d = txm_d3_dist2(corner[0][k & 3], corner[1][k >> 2]);
         if (least >= 0 && d >= least) continue;
         least = d;
         *a = corner[0][k & 3];
@@ -3759,17 +3725,18 @@ static void tmr_closest_pair(const tmr_level *level, int32_t i, tmr_vec qi, int3
 static void tmr_smooth_points(tmr_level *level, int sweeps) {
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int32_t i = 0; i < level->count; i++) {
-            tmr_vec q = level->q[i];
+            txm_dvec3 q = level->q[i];
             double sum = 0;
             if (level->fixed[i]) continue;
             for (int32_t k = level->first[i]; k < level->first[i + 1]; k++) {
                 const double weight = level->weight[k];
-                tmr_vec a = q, b = q;
+                txm_dvec3 a = q, b = q;
                 tmr_closest_pair(level, i, q, level->to[k], &a, &b);
-                q = tmr_add(tmr_scale(a, sum), tmr_scale(b, weight));
+                q = txm_d3_add(txm_d3_scale(a, sum), txm_d3_scale(b, weight));
                 sum += weight;
-                q = tmr_scale(q, 1 / sum);
-                q = tmr_mad(q, level->n[i], -tmr_dot(level->n[i], tmr_sub(q, level->p[i])));
+                q = txm_d3_scale(q, 1 / sum);
+                q = txm_d3_mad(q, level->n[i],
+                               -txm_d3_dot(level->n[i], txm_d3_sub(q, level->p[i])));
             }
             if (sum > 0)
                 level->q[i] = tmr_lattice_round(q, level->x[i], tmr_arm(level->n[i], level->x[i]),
@@ -3785,8 +3752,9 @@ static void tmr_solve_points(tmr_fields *f) {
             const tmr_level *up = &f->level[l + 1];
             for (int32_t i = 0; i < level->count; i++) {
                 if (level->fixed[i]) continue;
-                tmr_vec q = up->q[level->parent[i]];
-                q = tmr_mad(q, level->n[i], -tmr_dot(level->n[i], tmr_sub(q, level->p[i])));
+                txm_dvec3 q = up->q[level->parent[i]];
+                q = txm_d3_mad(q, level->n[i],
+                               -txm_d3_dot(level->n[i], txm_d3_sub(q, level->p[i])));
                 level->q[i] = tmr_lattice_round(q, level->x[i], tmr_arm(level->n[i], level->x[i]),
                                                 level->scale[i], level->p[i]);
             }
@@ -3818,8 +3786,8 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int free = tmr_kind_of(m, a) == TRIMESH_FREE;
     const double x = w->bad[a], y = w->bad[b];
-    const tmr_vec mean = tmr_scale(tmr_add(tmr_scale(w->moved[a], x), tmr_scale(w->moved[b], y)),
-                                   1 / (x + y));
+    const txm_dvec3 mean = txm_d3_scale(
+        txm_d3_add(txm_d3_scale(w->moved[a], x), txm_d3_scale(w->moved[b], y)), 1 / (x + y));
     int32_t keep = a;
     if (tmr_can_collapse(m, c) && tmr_collapse_is_fair(w, c, m->p[a], 0)) {
         tmr_collapse(m, c);
@@ -3861,11 +3829,12 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
             if (!tmr_is_real_edge(m, c)) continue;
             const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
-            const double apart = tmr_dist(w->moved[a], w->moved[b]);
+            const double apart = txm_d3_dist(w->moved[a], w->moved[b]);
             if (apart > 0.5 * spacing) continue;
             if (tmr_kind_of(m, a) != TRIMESH_FREE && tmr_kind_of(m, b) != TRIMESH_FREE) continue;
             TRIMESH_ASSERT(count < most);
-            pairs[count].key = txm_sort_key(txm_float(apart + 0.05 * tmr_dist(m->p[a], m->p[b])));
+            pairs[count].key =
+                txm_sort_key(txm_float(apart + 0.05 * txm_d3_dist(m->p[a], m->p[b])));
             pairs[count++].value = (uint32_t)c;
         }
         txm_sort_pairs(pairs, room, count);
@@ -3875,7 +3844,7 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
             int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             if (tmr_is_ghost(m, a) || tmr_is_ghost(m, b)) continue;
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
-            if (tmr_dist(w->moved[a], w->moved[b]) > 0.5 * spacing) continue;
+            if (txm_d3_dist(w->moved[a], w->moved[b]) > 0.5 * spacing) continue;
             if (tmr_kind_of(m, b) != TRIMESH_FREE) {
                 if (tmr_kind_of(m, a) != TRIMESH_FREE) continue;
                 c = m->opposite[c];
@@ -4080,10 +4049,10 @@ static void tmr_even_lines(tmr_work *w) {
                 const double w0 = tmr_line_way(w->s, w->l, m->p[to], m->source[to]);
                 if (begin >= 0) {
                     const double near = w0, far = w->l->length[line] - w0;
-                    const tmr_vec first_point = w->s->point[w->l->a[w->l->first[line]]];
-                    const tmr_vec last_point = w->s->point[w->l->b[w->l->first[line + 1] - 1]];
-                    const double d_first = tmr_dist2(first_point, m->p[begin]);
-                    const double d_last = tmr_dist2(last_point, m->p[begin]);
+                    const txm_dvec3 first_point = w->s->point[w->l->a[w->l->first[line]]];
+                    const txm_dvec3 last_point = w->s->point[w->l->b[w->l->first[line + 1] - 1]];
+                    const double d_first = txm_d3_dist2(first_point, m->p[begin]);
+                    const double d_last = txm_d3_dist2(last_point, m->p[begin]);
                     forward = d_first < d_last || (d_first <= d_last && near <= far);
                     way = forward ? 0 : w->l->length[line];
                 } else {
@@ -4128,7 +4097,7 @@ static int tmr_may_subdivide(const tmr_work *w) {
         const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
         edges++;
         /* the height of the arc over the chord is about length * tan(angle / 4) / 2 */
-        bent += tmr_dot(m->n[a], m->n[b]) < -0.2;
+        bent += txm_d3_dot(m->n[a], m->n[b]) < -0.2;
     }
     return bent * 100.0 <= edges;
 }
@@ -4185,10 +4154,12 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
         m->live++;
         m->flags[v] = 0;
         /* where an arc with these normals at its ends would have its middle */
-        const tmr_vec d = tmr_sub(old.p[b], old.p[a]);
-        tmr_vec p = tmr_scale(tmr_add(old.p[a], old.p[b]), 0.5);
-        const double na = tmr_dot(old.n[a], d), nb = tmr_dot(old.n[b], d);
-        p = tmr_add(p, tmr_scale(tmr_sub(tmr_scale(old.n[a], -na), tmr_scale(old.n[b], -nb)), 0.125));
+        const txm_dvec3 d = txm_d3_sub(old.p[b], old.p[a]);
+        txm_dvec3 p = txm_d3_scale(txm_d3_add(old.p[a], old.p[b]), 0.5);
+        const double na = txm_d3_dot(old.n[a], d), nb = txm_d3_dot(old.n[b], d);
+        p = txm_d3_add(
+            p, txm_d3_scale(txm_d3_sub(txm_d3_scale(old.n[a], -na), txm_d3_scale(old.n[b], -nb)),
+                            0.125));
         const int32_t x = number[a], y = number[b];
         if (old.edge[c]) {
             const int32_t id = old.edge[c] - 1;
@@ -4289,18 +4260,18 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
 static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
-    const tmr_vec n = tmr_unit(tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]));
-    const tmr_vec centre = tmr_middle(m, v);
+    const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]));
+    const txm_dvec3 centre = tmr_middle(m, v);
     double sum = 0;
     int32_t from = v[0];
     for (int k = 0; k < 3; k++) {
         if (tmr_kind_of(m, v[k]) != TRIMESH_FREE) continue;
         from = v[k];
         const tmr_place at = tmr_on_face(w->s, m->source[v[k]], m->p[v[k]]);
-        sum += tmr_dot(tmr_sub(at.p, m->p[v[k]]), n);
+        sum += txm_d3_dot(txm_d3_sub(at.p, m->p[v[k]]), n);
     }
     const tmr_place at = tmr_project(w->s, centre, tmr_face_of(w, from));
-    return 0.75 * tmr_dot(tmr_sub(at.p, centre), n) + 0.25 * sum / 3;
+    return 0.75 * txm_d3_dot(txm_d3_sub(at.p, centre), n) + 0.25 * sum / 3;
 }
 
 static void tmr_fit_chunk(void *context, int index) {
@@ -4324,7 +4295,7 @@ static void tmr_fit_chunk(void *context, int index) {
         } while (c != first);
         const double most = 0.15 * w->length * w->size[v];
         sum = count ? sum / count : 0;
-        w->moved[v] = tmr_mad(m->p[v], m->n[v], sum > most ? most : sum < -most ? -most : sum);
+        w->moved[v] = txm_d3_mad(m->p[v], m->n[v], sum > most ? most : sum < -most ? -most : sum);
     }
 }
 
@@ -4351,13 +4322,14 @@ static int tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
 /* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
-static int tmr_crosses(tmr_vec p, tmr_vec q, tmr_vec a, tmr_vec b, tmr_vec c, int rim) {
-    const tmr_vec e1 = tmr_sub(b, a), e2 = tmr_sub(c, a), d = tmr_sub(q, p);
-    const tmr_vec h = tmr_cross(d, e2);
-    const double det = tmr_dot(e1, h), eps = 1e-10, least = rim ? -eps : eps;
-    if (fabs(det) <= 1e-10 * tmr_len(e1) * tmr_len(e2) * tmr_len(d)) return 0;
-    const tmr_vec s = tmr_sub(p, a), k = tmr_cross(s, e1);
-    const double u = tmr_dot(s, h) / det, v = tmr_dot(d, k) / det, t = tmr_dot(e2, k) / det;
+static int tmr_crosses(txm_dvec3 p, txm_dvec3 q, txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, int rim) {
+    const txm_dvec3 e1 = txm_d3_sub(b, a), e2 = txm_d3_sub(c, a), d = txm_d3_sub(q, p);
+    const txm_dvec3 h = txm_d3_cross(d, e2);
+    const double det = txm_d3_dot(e1, h), eps = 1e-10, least = rim ? -eps : eps;
+    if (fabs(det) <= 1e-10 * txm_d3_len(e1) * txm_d3_len(e2) * txm_d3_len(d)) return 0;
+    const txm_dvec3 s = txm_d3_sub(p, a), k = txm_d3_cross(s, e1);
+    const double u = txm_d3_dot(s, h) / det, v = txm_d3_dot(d, k) / det,
+                 t = txm_d3_dot(e2, k) / det;
     return u > least && v > least && u + v < 1 - least && t > eps && t < 1 - eps;
 }
 
@@ -4375,15 +4347,15 @@ static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
         }
     }
     if (shared > 1) return 0;
-    const tmr_vec a[3] = {m->p[v[0]], m->p[v[1]], m->p[v[2]]};
-    const tmr_vec b[3] = {m->p[w[0]], m->p[w[1]], m->p[w[2]]};
+    const txm_dvec3 a[3] = {m->p[v[0]], m->p[v[1]], m->p[v[2]]};
+    const txm_dvec3 b[3] = {m->p[w[0]], m->p[w[1]], m->p[w[2]]};
     if (shared == 1)
         return tmr_crosses(a[(kf + 1) % 3], a[(kf + 2) % 3], b[0], b[1], b[2], rim) ||
                tmr_crosses(b[(kg + 1) % 3], b[(kg + 2) % 3], a[0], a[1], a[2], rim);
-    const tmr_vec n = tmr_area2(a[0], a[1], a[2]);
+    const txm_dvec3 n = txm_d3_area2(a[0], a[1], a[2]);
     double low = 0, high = 0; /* of b on either side of a's plane */
     for (int i = 0; i < 3; i++) {
-        const double d = tmr_dot(n, tmr_sub(b[i], a[0]));
+        const double d = txm_d3_dot(n, txm_d3_sub(b[i], a[0]));
         low = i == 0 || d < low ? d : low;
         high = i == 0 || d > high ? d : high;
     }
@@ -4408,17 +4380,17 @@ static uint32_t tmr_cell_key(int32_t x, int32_t y, int32_t z) {
                                0x85ebca77u * 65537u + ((uint64_t)(uint32_t)z << 40)) >> 32);
 }
 
-static void tmr_face_box(const tmr_mesh *m, int32_t f, tmr_vec *low, tmr_vec *high) {
+static void tmr_face_box(const tmr_mesh *m, int32_t f, txm_dvec3 *low, txm_dvec3 *high) {
     *low = *high = m->p[m->vertex[3 * f]];
     for (int k = 1; k < 3; k++) {
-        const tmr_vec p = m->p[m->vertex[3 * f + k]];
-        *low = tmr_v(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
-        *high = tmr_v(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
+        const txm_dvec3 p = m->p[m->vertex[3 * f + k]];
+        *low = txm_d3(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
+        *high = txm_d3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
     }
 }
 
 static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
-    tmr_vec low, high;
+    txm_dvec3 low, high;
     tmr_face_box(m, f, &low, &high);
     for (int32_t x = (int32_t)floor(low.x / g->cell); x <= (int32_t)floor(high.x / g->cell); x++) {
         for (int32_t y = (int32_t)floor(low.y / g->cell); y <= (int32_t)floor(high.y / g->cell); y++) {
@@ -4437,7 +4409,7 @@ static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
 
 enum { TMR_NEAR_CELLS = 1 << 16 }; /* coarse cells by hash that are near a marked vertex, or seem so */
 
-static uint32_t tmr_near_key(tmr_vec p, double cell, int dx, int dy, int dz) {
+static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
     return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
                         (int32_t)floor(p.z / cell) + dz) % TMR_NEAR_CELLS;
 }
@@ -4488,11 +4460,11 @@ static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_a
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
         for (size_t x = i; x < end; x++) {
             const int32_t f = (int32_t)g.entry[x].value;
-            tmr_vec low, high;
+            txm_dvec3 low, high;
             tmr_face_box(m, f, &low, &high);
             for (size_t y = x + 1; y < end; y++) {
                 const int32_t h = (int32_t)g.entry[y].value;
-                tmr_vec low2, high2;
+                txm_dvec3 low2, high2;
                 if (f == h) continue;
                 tmr_face_box(m, h, &low2, &high2);
                 if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
@@ -4512,12 +4484,13 @@ enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one s
 
 /* Does the surface face along n anywhere near the place? Looks at the faces that hang together
    with it, as far as they reach into a ball around p. */
-static int tmr_faces_along(const tmr_surface *s, tmr_vec n, int32_t face, tmr_vec p, double radius) {
+static int tmr_faces_along(const tmr_surface *s, txm_dvec3 n, int32_t face, txm_dvec3 p,
+                           double radius) {
     int32_t list[TMR_SPOT_FACES];
     int count = 1;
     list[0] = face;
     for (int i = 0; i < count; i++) {
-        if (tmr_dot(n, s->normal[list[i]]) > 0.3) return 1;
+        if (txm_d3_dot(n, s->normal[list[i]]) > 0.3) return 1;
         for (int k = 0; k < 3 && count < TMR_SPOT_FACES; k++) {
             const int32_t o = s->opposite[3 * list[i] + k];
             int known = o < 0;
@@ -4539,18 +4512,18 @@ static long tmr_count_turned(tmr_work *w, long *doubtful) {
     for (int32_t f = 0; f < m->face_count; f++) {
         const int32_t *v = m->vertex + 3 * f;
         if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
-        const tmr_vec n = tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]);
-        const double longest = fmax(tmr_dist2(m->p[v[0]], m->p[v[1]]),
-                                    fmax(tmr_dist2(m->p[v[1]], m->p[v[2]]),
-                                         tmr_dist2(m->p[v[2]], m->p[v[0]])));
-        const double area2 = tmr_len(n);
+        const txm_dvec3 n = txm_d3_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]);
+        const double longest =
+            fmax(txm_d3_dist2(m->p[v[0]], m->p[v[1]]),
+                 fmax(txm_d3_dist2(m->p[v[1]], m->p[v[2]]), txm_d3_dist2(m->p[v[2]], m->p[v[0]])));
+        const double area2 = txm_d3_len(n);
         int turned = area2 < 1e-4 * longest, doubt = 0;
         if (!turned && tmr_agreement(w, v[0], v[1], v[2], m->p[v[0]], m->p[v[1]], m->p[v[2]]) < 0.2) {
             const tmr_place at = tmr_below_middle(w, v);
-            doubt = tmr_dot(n, w->s->normal[at.face]) < 0 &&
-                    tmr_dot(n, tmr_normal_at(w->s, w->l, &at)) < 0;
-            turned = doubt && !tmr_faces_along(w->s, tmr_scale(n, 1 / area2), at.face, tmr_middle(m, v),
-                                               sqrt(at.d2) + 0.45 * w->length);
+            doubt = txm_d3_dot(n, w->s->normal[at.face]) < 0 &&
+                    txm_d3_dot(n, tmr_normal_at(w->s, w->l, &at)) < 0;
+            turned = doubt && !tmr_faces_along(w->s, txm_d3_scale(n, 1 / area2), at.face,
+                                               tmr_middle(m, v), sqrt(at.d2) + 0.45 * w->length);
         }
         if (!turned && !doubt) continue;
         found += turned;
@@ -4574,14 +4547,16 @@ static long tmr_open_folds(tmr_work *w, double share) {
         const int32_t o = m->opposite[c], d = m->vertex[c], e = m->vertex[o];
         if (tmr_is_ghost(m, d) || tmr_is_ghost(m, e)) continue;
         const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-        const tmr_vec n = tmr_unit(tmr_area2(m->p[d], m->p[a], m->p[b]));
-        if (tmr_dot(n, tmr_unit(tmr_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
+        const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[d], m->p[a], m->p[b]));
+        if (txm_d3_dot(n, txm_d3_unit(txm_d3_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
         found++;
-        const tmr_vec far = tmr_scale(tmr_add(m->p[d], m->p[e]), 0.5);
-        const tmr_vec near = tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5);
-        const tmr_vec to = tmr_scale(tmr_unit(tmr_sub(far, near)), share * w->length);
-        if (tmr_kind_of(m, a) == TRIMESH_FREE) w->moved[a] = tmr_add(w->moved[a], tmr_scale(to, w->size[a]));
-        if (tmr_kind_of(m, b) == TRIMESH_FREE) w->moved[b] = tmr_add(w->moved[b], tmr_scale(to, w->size[b]));
+        const txm_dvec3 far = txm_d3_scale(txm_d3_add(m->p[d], m->p[e]), 0.5);
+        const txm_dvec3 near = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
+        const txm_dvec3 to = txm_d3_scale(txm_d3_unit(txm_d3_sub(far, near)), share * w->length);
+        if (tmr_kind_of(m, a) == TRIMESH_FREE)
+            w->moved[a] = txm_d3_add(w->moved[a], txm_d3_scale(to, w->size[a]));
+        if (tmr_kind_of(m, b) == TRIMESH_FREE)
+            w->moved[b] = txm_d3_add(w->moved[b], txm_d3_scale(to, w->size[b]));
     }
     if (found) tmr_settle(w);
     return found;
@@ -4607,19 +4582,19 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
         const int kind = tmr_kind_of(m, v);
         if (!w->bad[v] || m->corner[v] < 0 || (m->flags[v] & (TMR_GHOST | TMR_PINNED))) continue;
         if (kind == TRIMESH_BORDER || (kind != TRIMESH_FREE && !lines_too)) continue;
-        tmr_vec sum = tmr_v(0, 0, 0);
+        txm_dvec3 sum = txm_d3(0, 0, 0);
         int32_t count = 0, c = m->corner[v];
         const int32_t first = c;
         do {
             const int32_t to = m->vertex[tmr_next(c)];
             if (!tmr_is_ghost(m, to)) {
-                sum = tmr_add(sum, m->p[to]);
+                sum = txm_d3_add(sum, m->p[to]);
                 count++;
             }
             c = tmr_swing(m, c);
         } while (c != first);
         if (count == 0) continue;
-        m->p[v] = tmr_add(tmr_scale(m->p[v], 0.5), tmr_scale(sum, 0.5 / count));
+        m->p[v] = txm_d3_add(txm_d3_scale(m->p[v], 0.5), txm_d3_scale(sum, 0.5 / count));
         if (kind != TRIMESH_FREE) continue;
         const tmr_place at = tmr_project(w->s, m->p[v], m->source[v]);
         m->source[v] = at.face;
@@ -4663,7 +4638,7 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
     const size_t count = (size_t)w->m.vertex_count;
     txm_arena arena;
     long best = -1;
-    tmr_vec *kept = NULL;
+    txm_dvec3 *kept = NULL;
     int32_t *kept_source = NULL;
     uint8_t *near;
     txm_arena_init(&arena, env);
@@ -4683,11 +4658,11 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         if (best < 0 || score < best) {
             best = score;
             if (score > 0 && !kept) {
-                kept = (tmr_vec *)txm_arena_alloc(&arena, count, sizeof(tmr_vec));
+                kept = (txm_dvec3 *)txm_arena_alloc(&arena, count, sizeof(txm_dvec3));
                 kept_source = (int32_t *)txm_arena_alloc(&arena, count, sizeof(int32_t));
                 if (!kept || !kept_source) goto no_memory;
             }
-            if (kept) memcpy(kept, w->m.p, count * sizeof(tmr_vec));
+            if (kept) memcpy(kept, w->m.p, count * sizeof(txm_dvec3));
             if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
         }
         if (score == 0 || (best < 1000 && round >= 4)) break;
@@ -4696,7 +4671,7 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         tmr_smooth_marked(w, round >= 6);
     }
     if (best > 0) {
-        memcpy(w->m.p, kept, count * sizeof(tmr_vec));
+        memcpy(w->m.p, kept, count * sizeof(txm_dvec3));
         memcpy(w->m.source, kept_source, count * sizeof(int32_t));
     }
     *faults = best / 1000;
@@ -4768,7 +4743,7 @@ static double tmr_vertex_size(const tmr_surface *s, int32_t v) {
 
 /* length of a segment in wanted edge lengths */
 static double tmr_segment_weight(const tmr_surface *s, const tmr_lines *l, int32_t k) {
-    return tmr_dist(s->point[l->a[k]], s->point[l->b[k]]) * 2 /
+    return txm_d3_dist(s->point[l->a[k]], s->point[l->b[k]]) * 2 /
            (tmr_vertex_size(s, l->a[k]) + tmr_vertex_size(s, l->b[k]));
 }
 
@@ -4783,7 +4758,8 @@ static double tmr_face_weight(const tmr_surface *s, int32_t f) {
     const int32_t *v = s->vertex + 3 * f;
     const double size = (tmr_vertex_size(s, v[0]) + tmr_vertex_size(s, v[1]) +
                          tmr_vertex_size(s, v[2])) / 3;
-    return 0.5 * tmr_len(tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]])) / (size * size);
+    return 0.5 * txm_d3_len(txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]])) /
+           (size * size);
 }
 
 /* Edge length of so many points: each has sqrt(3) / 2 L^2 of the weighted area, on the border half
@@ -4888,17 +4864,17 @@ static void tmr_legalize(tmr_strewn *t, int32_t v) {
 }
 
 /* The part of the face in which p lies, and the weights of its corners there. */
-static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, tmr_vec p, double weight[3]) {
+static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, txm_dvec3 p, double weight[3]) {
     const tmr_mesh *m = &t->w->m;
-    const tmr_vec n = t->w->s->normal[face];
+    const txm_dvec3 n = t->w->s->normal[face];
     int32_t part = t->inside[t->hint] == face ? t->hint : face;
     for (int guard = 0; guard < TMR_WALK; guard++) {
         const int32_t *v = m->vertex + 3 * part;
         double sum = 0;
         int least = 0;
         for (int k = 0; k < 3; k++) {
-            const tmr_vec a = m->p[v[(k + 1) % 3]], b = m->p[v[(k + 2) % 3]];
-            weight[k] = tmr_dot(tmr_area2(p, a, b), n);
+            const txm_dvec3 a = m->p[v[(k + 1) % 3]], b = m->p[v[(k + 2) % 3]];
+            weight[k] = txm_d3_dot(txm_d3_area2(p, a, b), n);
             sum += weight[k];
             if (weight[k] < weight[least]) least = k;
         }
@@ -4925,7 +4901,7 @@ static int32_t tmr_cut_edge(tmr_strewn *t, int32_t c) {
 /* Put a point that lies in a face of the surface into the mesh: into the triangle that holds it,
    on an edge if it lies there. Returns its vertex; -1: no room, or it lies on a line or a vertex
    that is a point already. exact: do not move the point; else it is kept off the edges. */
-static int32_t tmr_insert(tmr_strewn *t, int32_t face, tmr_vec p, int exact) {
+static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
     tmr_work *w = t->w;
     tmr_mesh *m = &w->m;
     double weight[3];
@@ -4950,8 +4926,8 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, tmr_vec p, int exact) {
         if (weight[least] < margin) { /* as far in as asked for */
             double sum = 0;
             for (int k = 0; k < 3; k++) sum += weight[k] = fmax(weight[k], margin);
-            p = tmr_v(0, 0, 0);
-            for (int k = 0; k < 3; k++) p = tmr_mad(p, m->p[corner[k]], weight[k] / sum);
+            p = txm_d3(0, 0, 0);
+            for (int k = 0; k < 3; k++) p = txm_d3_mad(p, m->p[corner[k]], weight[k] / sum);
         }
         v = tmr_split_face(m, part);
         if (v < 0) return v;
@@ -4990,8 +4966,8 @@ static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t
                 v = c < 0 ? -1 : tmr_cut_edge(t, tmr_prev(c));
                 if (v < 0) return 0;
                 w->m.flags[v] = l->border[line] ? TRIMESH_BORDER : TRIMESH_CREASE;
-                tmr_put_on_line(w, v, tmr_mad(s->point[a], tmr_sub(s->point[b], s->point[a]), u),
-                                k);
+                tmr_put_on_line(
+                    w, v, txm_d3_mad(s->point[a], txm_d3_sub(s->point[b], s->point[a]), u), k);
                 tmr_legalize(t, v);
                 left = v;
             }
@@ -5014,7 +4990,7 @@ static uint32_t tmr_spread_bits(uint32_t x) {
 }
 
 /* The order of a place on a curve that fills the box of -1/2..1/2 (Morton). */
-static uint32_t tmr_curve_key(tmr_vec p) {
+static uint32_t tmr_curve_key(txm_dvec3 p) {
     const double x[3] = {p.x, p.y, p.z};
     uint32_t key = 0;
     for (int k = 0; k < 3; k++)
@@ -5022,9 +4998,10 @@ static uint32_t tmr_curve_key(tmr_vec p) {
     return key;
 }
 
-static tmr_vec tmr_face_centre(const tmr_surface *s, int32_t f) {
+static txm_dvec3 tmr_face_centre(const tmr_surface *s, int32_t f) {
     const int32_t *v = s->vertex + 3 * f;
-    return tmr_scale(tmr_add(tmr_add(s->point[v[0]], s->point[v[1]]), s->point[v[2]]), 1.0 / 3);
+    return txm_d3_scale(txm_d3_add(txm_d3_add(s->point[v[0]], s->point[v[1]]), s->point[v[2]]),
+                        1.0 / 3);
 }
 
 /* Faces in the order of a space-filling curve, component by component, in pairs[].value. */
@@ -5045,8 +5022,8 @@ static void tmr_order_faces(const tmr_surface *s, txm_pair *pairs, txm_pair *roo
        m = 3, row 0 at the corner 0:   /\       row j has 2 j + 1 parts, up and down in turn
                                       /\/\
                                      /\/\/\                                                    */
-static tmr_vec tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
-                               txm_rng *rng) {
+static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
+                                 txm_rng *rng) {
     const int32_t *v = s->vertex + 3 * face;
     int32_t m = (int32_t)floor(sqrt((double)count));
     if (m < 1) m = 1;
@@ -5072,9 +5049,9 @@ static tmr_vec tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, in
         across = column + y;
     }
     const double u = (down - across) / m, w = across / m;
-    return tmr_add(s->point[v[0]],
-                   tmr_add(tmr_scale(tmr_sub(s->point[v[1]], s->point[v[0]]), u),
-                           tmr_scale(tmr_sub(s->point[v[2]], s->point[v[0]]), w)));
+    return txm_d3_add(s->point[v[0]],
+                      txm_d3_add(txm_d3_scale(txm_d3_sub(s->point[v[1]], s->point[v[0]]), u),
+                                 txm_d3_scale(txm_d3_sub(s->point[v[2]], s->point[v[0]]), w)));
 }
 
 /* Strew the points that are on no line: each component is cut into as many runs of equal weight
@@ -5313,7 +5290,7 @@ static int tmr_find_near(const tmr_work *w, int32_t v, int32_t near[TMR_NEAR]) {
         const int32_t first = c;
         do {
             const int32_t x = m->vertex[tmr_next(c)];
-            int known = tmr_is_ghost(m, x) || tmr_dist2(m->p[x], m->p[v]) > reach * reach;
+            int known = tmr_is_ghost(m, x) || txm_d3_dist2(m->p[x], m->p[v]) > reach * reach;
             for (int k = 0; k < count && !known; k++) known = near[k] == x;
             if (!known && count < TMR_NEAR) near[count++] = x;
             c = tmr_swing(m, c);
@@ -5335,25 +5312,27 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
     int32_t near[TMR_NEAR];
-    tmr_vec push = tmr_v(0, 0, 0);
+    txm_dvec3 push = txm_d3(0, 0, 0);
     tmr_stay(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
     const int count = tmr_find_near(w, v, near);
     for (int i = 1; i < count; i++) {
         const int32_t x = near[i];
         if (kind != TRIMESH_FREE && tmr_kind_of(m, x) == TRIMESH_FREE) continue;
-        tmr_vec d = tmr_sub(m->p[v], m->p[x]);
+        txm_dvec3 d = txm_d3_sub(m->p[v], m->p[x]);
         const double r = TMR_REACH * w->length * 0.5 * (w->size[v] + (double)w->size[x]);
-        const double chord = tmr_len(d), length = chord * tmr_arc(tmr_dot(m->n[v], m->n[x]));
+        const double chord = txm_d3_len(d), length = chord * tmr_arc(txm_d3_dot(m->n[v], m->n[x]));
         if (length >= r) continue;
-        if (chord > 0) d = tmr_scale(d, 1 / chord);
-        else d = tmr_scale(tmr_unit(tmr_cross(m->n[v], tmr_v(0.6, 0.64, 0.48))), v < x ? 1 : -1);
-        push = tmr_mad(push, d, w->step * (r - length));
+        if (chord > 0) d = txm_d3_scale(d, 1 / chord);
+        else
+            d = txm_d3_scale(txm_d3_unit(txm_d3_cross(m->n[v], txm_d3(0.6, 0.64, 0.48))),
+                             v < x ? 1 : -1);
+        push = txm_d3_mad(push, d, w->step * (r - length));
     }
     /* not farther than to where others push the other way */
-    const double limit = 0.5 * w->length * w->size[v], way = tmr_len(push);
-    if (way > limit) push = tmr_scale(push, limit / way);
-    const tmr_vec to = tmr_add(m->p[v], push);
+    const double limit = 0.5 * w->length * w->size[v], way = txm_d3_len(push);
+    if (way > limit) push = txm_d3_scale(push, limit / way);
+    const txm_dvec3 to = txm_d3_add(m->p[v], push);
     if (kind != TRIMESH_FREE) {
         w->moved[v] = tmr_project_line(w->s, w->l, to, &w->landed[v]);
         return;
@@ -5375,12 +5354,12 @@ static void tmr_repel_chunk(void *context, int index) {
 static int tmr_would_turn(const tmr_work *w, int32_t face) {
     const int32_t *v = w->m.vertex + 3 * face;
     if (v[0] < 0 || tmr_is_ghost_face(&w->m, face)) return 0;
-    const tmr_vec *p = w->moved, *q = w->m.p;
-    const tmr_vec after = tmr_area2(p[v[0]], p[v[1]], p[v[2]]);
-    const tmr_vec before = tmr_area2(q[v[0]], q[v[1]], q[v[2]]);
-    if (tmr_dot(after, before) > 0) return 0;
-    const tmr_vec n = tmr_expected_normal(w, v[0], v[1], v[2]);
-    return tmr_dot(after, n) <= 0 && tmr_dot(before, n) >= 0;
+    const txm_dvec3 *p = w->moved, *q = w->m.p;
+    const txm_dvec3 after = txm_d3_area2(p[v[0]], p[v[1]], p[v[2]]);
+    const txm_dvec3 before = txm_d3_area2(q[v[0]], q[v[1]], q[v[2]]);
+    if (txm_d3_dot(after, before) > 0) return 0;
+    const txm_dvec3 n = tmr_expected_normal(w, v[0], v[1], v[2]);
+    return txm_d3_dot(after, n) <= 0 && txm_d3_dot(before, n) >= 0;
 }
 
 static void tmr_hold_turning(tmr_work *w) {
@@ -5415,7 +5394,7 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
     txm_parallel_for(w->env, chunks, tmr_repel_chunk, w);
     for (int32_t v = 0; v < m->vertex_count; v++) {
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
-        const double d = tmr_dist(w->moved[v], m->p[v]) / (w->length * w->size[v]);
+        const double d = txm_d3_dist(w->moved[v], m->p[v]) / (w->length * w->size[v]);
         sum += d;
         if (d > most) most = d;
     }
@@ -5560,7 +5539,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
         TRIMESH_ASSERT(mesh->vertex_count < (size_t)m->live);
         const size_t k = mesh->vertex_count++;
-        const tmr_vec p = tmr_add(tmr_scale(m->p[v], s->diagonal), s->centre);
+        const txm_dvec3 p = txm_d3_add(txm_d3_scale(m->p[v], s->diagonal), s->centre);
         number[v] = (int32_t)k;
         mesh->positions[3 * k] = txm_float(p.x);
         mesh->positions[3 * k + 1] = txm_float(p.y);
@@ -5896,7 +5875,7 @@ static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_sta
     state->positions = p;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         if (number[v] < 0) continue;
-        const tmr_vec at = tmr_add(tmr_scale(m->p[v], job->s.diagonal), job->s.centre);
+        const txm_dvec3 at = txm_d3_add(txm_d3_scale(m->p[v], job->s.diagonal), job->s.centre);
         *p++ = txm_float(at.x);
         *p++ = txm_float(at.y);
         *p++ = txm_float(at.z);
@@ -6068,19 +6047,19 @@ enum { TMR_LEAF = 4 }; /* triangles in a leaf of the tree */
 /* Triangles in a tree of boxes: in the order of a space-filling curve, leaves of TMR_LEAF, a full
    binary tree over them. Node i has children 2 i + 1, 2 i + 2. */
 typedef struct tmr_tree {
-    const tmr_vec *point;
+    const txm_dvec3 *point;
     const int32_t *vertex; /* 3 per triangle */
     txm_pair *order;       /* .value: triangle */
     int32_t count, leaves; /* leaves: a power of two */
-    tmr_vec *low, *high;   /* 1 per node */
+    txm_dvec3 *low, *high; /* 1 per node */
 } tmr_tree;
 
-static void tmr_grow_box(tmr_vec *low, tmr_vec *high, tmr_vec p) {
-    *low = tmr_v(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
-    *high = tmr_v(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
+static void tmr_grow_box(txm_dvec3 *low, txm_dvec3 *high, txm_dvec3 p) {
+    *low = txm_d3(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
+    *high = txm_d3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
 }
 
-static int tmr_tree_build(tmr_tree *t, const tmr_vec *point, const int32_t *vertex, int32_t count,
+static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *vertex, int32_t count,
                           txm_arena *arena) {
     t->point = point;
     t->vertex = vertex;
@@ -6090,18 +6069,18 @@ static int tmr_tree_build(tmr_tree *t, const tmr_vec *point, const int32_t *vert
     const size_t nodes = 2 * (size_t)t->leaves;
     t->order = (txm_pair *)txm_arena_alloc(arena, (size_t)count, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(arena, (size_t)count, sizeof(txm_pair));
-    t->low = (tmr_vec *)txm_arena_alloc(arena, nodes, sizeof(tmr_vec));
-    t->high = (tmr_vec *)txm_arena_alloc(arena, nodes, sizeof(tmr_vec));
+    t->low = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
+    t->high = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
     if (!t->order || !room || !t->low || !t->high) return 0;
     for (int32_t f = 0; f < count; f++) {
         const int32_t *v = vertex + 3 * f;
         t->order[f].value = (uint32_t)f;
         t->order[f].key = tmr_curve_key(
-            tmr_scale(tmr_add(tmr_add(point[v[0]], point[v[1]]), point[v[2]]), 1.0 / 3));
+            txm_d3_scale(txm_d3_add(txm_d3_add(point[v[0]], point[v[1]]), point[v[2]]), 1.0 / 3));
     }
     txm_sort_pairs(t->order, room, (size_t)count);
     for (int32_t i = 2 * t->leaves - 2; i >= 0; i--) {
-        tmr_vec low = tmr_v(1e300, 1e300, 1e300), high = tmr_v(-1e300, -1e300, -1e300);
+        txm_dvec3 low = txm_d3(1e300, 1e300, 1e300), high = txm_d3(-1e300, -1e300, -1e300);
         if (i < t->leaves - 1) {
             low = t->low[2 * i + 1];
             high = t->high[2 * i + 1];
@@ -6124,7 +6103,7 @@ static int tmr_tree_build(tmr_tree *t, const tmr_vec *point, const int32_t *vert
 }
 
 /* squared distance from p to the box of a node */
-static double tmr_box_dist2(const tmr_tree *t, int32_t i, tmr_vec p) {
+static double tmr_box_dist2(const tmr_tree *t, int32_t i, txm_dvec3 p) {
     const double x = fmax(fmax(t->low[i].x - p.x, p.x - t->high[i].x), 0);
     const double y = fmax(fmax(t->low[i].y - p.y, p.y - t->high[i].y), 0);
     const double z = fmax(fmax(t->low[i].z - p.z, p.z - t->high[i].z), 0);
@@ -6133,7 +6112,7 @@ static double tmr_box_dist2(const tmr_tree *t, int32_t i, tmr_vec p) {
 
 /* The triangle nearest to p within reach whose normal agrees with n to the cosine `agree`; -1:
    none. *at: the place on it. */
-static int32_t tmr_tree_nearest(const tmr_tree *t, tmr_vec p, tmr_vec n, double agree,
+static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, double agree,
                                 double reach, tmr_place *at) {
     int32_t stack[64], size = 0, best = -1;
     double least = reach * reach;
@@ -6151,13 +6130,13 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, tmr_vec p, tmr_vec n, double 
         for (int32_t k = first; k < first + TMR_LEAF && k < t->count; k++) {
             tmr_place here;
             const int32_t f = (int32_t)t->order[k].value, *v = t->vertex + 3 * f;
-            const tmr_vec a = t->point[v[0]], b = t->point[v[1]], c = t->point[v[2]];
+            const txm_dvec3 a = t->point[v[0]], b = t->point[v[1]], c = t->point[v[2]];
             here.face = f;
             here.p = tmr_nearest(p, a, b, c, &here.u, &here.v, &here.part);
-            here.d2 = tmr_dist2(p, here.p);
+            here.d2 = txm_d3_dist2(p, here.p);
             if (here.d2 > least || (best >= 0 && here.d2 >= least)) continue;
-            const tmr_vec across = tmr_area2(a, b, c);
-            if (tmr_dot(across, n) < agree * tmr_len(across)) continue;
+            const txm_dvec3 across = txm_d3_area2(a, b, c);
+            if (txm_d3_dot(across, n) < agree * txm_d3_len(across)) continue;
             least = here.d2;
             best = f;
             *at = here;
@@ -6194,7 +6173,7 @@ static int tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vert
     return 1;
 }
 
-static void tmr_grid_add(tmr_grid *g, tmr_vec p, int32_t v) {
+static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
     int32_t *head = g->head + tmr_grid_slot(g, floor(p.x / g->cell), floor(p.y / g->cell),
                                             floor(p.z / g->cell));
     TRIMESH_ASSERT(*head != v); /* no point twice: it would be the one before itself */
@@ -6204,8 +6183,8 @@ static void tmr_grid_add(tmr_grid *g, tmr_vec p, int32_t v) {
 
 /* Is a point of the grid nearer to p than reach, on the same side of a sheet? was: NULL, or points
    with a number there do not count. */
-static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, tmr_vec p,
-                          tmr_vec n, double reach) {
+static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, txm_dvec3 p,
+                          txm_dvec3 n, double reach) {
     const double k = fmin(ceil(reach / g->cell), 8);
     const double x = floor(p.x / g->cell), y = floor(p.y / g->cell), z = floor(p.z / g->cell);
     for (double i = -k; i <= k; i++) {
@@ -6214,7 +6193,8 @@ static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *w
                 int32_t v = g->head[tmr_grid_slot(g, x + i, y + j, z + l)];
                 for (; v >= 0; v = g->next[v]) {
                     if (was && was[v] >= 0) continue;
-                    if (tmr_dist2(w->m.p[v], p) < reach * reach && tmr_dot(w->m.n[v], n) > -0.1)
+                    if (txm_d3_dist2(w->m.p[v], p) < reach * reach &&
+                        txm_d3_dot(w->m.n[v], n) > -0.1)
                         return 1;
                 }
             }
@@ -6236,12 +6216,13 @@ typedef struct tmr_update {
     tmr_tree tree;       /* of the surface                                                       */
     tmr_tree old_tree;
     tmr_grid grid;
-    tmr_vec *old_point;  /* 1 per vertex of the old mesh, scaled                                  */
+    txm_dvec3
+        *old_point;      /* 1 per vertex of the old mesh, scaled                                  */
     int32_t *old_vertex; /* 3 per triangle of the old mesh                                       */
     int32_t *now;        /* 1 per vertex of the old mesh: its vertex in the new one, -1            */
     int32_t *was;        /* 1 per vertex of the new one: its vertex in the old one, -1            */
     int32_t *face;       /* 1 per vertex of the old mesh: the face it lies in, -1                 */
-    tmr_vec *place;      /* 1 per vertex of the old mesh: where                                  */
+    txm_dvec3 *place;    /* 1 per vertex of the old mesh: where                                  */
     int32_t *segment;    /* 1 per corner of the surface: the segment that its edge is, -1          */
     double *way;         /* 1 per vertex of the old mesh on a line: distance from its beginning  */
     int32_t *level;      /* 1 per vertex of the mesh: edges to the nearest new one                 */
@@ -6249,9 +6230,9 @@ typedef struct tmr_update {
 } tmr_update;
 
 /* a vertex of the old mesh: its normal */
-static tmr_vec tmr_old_normal(const tmr_update *u, int32_t i) {
+static txm_dvec3 tmr_old_normal(const tmr_update *u, int32_t i) {
     const float *n = u->old->normals + 3 * (size_t)i;
-    return tmr_v(n[0], n[1], n[2]);
+    return txm_d3(n[0], n[1], n[2]);
 }
 
 /* Segments by the corners opposite to them. */
@@ -6271,10 +6252,10 @@ static void tmr_map_segments(tmr_update *u) {
 /* Take segment k for old vertex i if it is nearer than *least and of the right kind. */
 static void tmr_try_segment(tmr_update *u, int32_t i, int32_t k, double *least) {
     if (k < 0 || (u->l.border[u->l.line[k]] != 0) != (u->old->kinds[i] == TRIMESH_BORDER)) return;
-    const tmr_vec a = u->s.point[u->l.a[k]], b = u->s.point[u->l.b[k]], ab = tmr_sub(b, a);
-    double t = tmr_dot(tmr_sub(u->old_point[i], a), ab) / (tmr_len2(ab) + 1e-300);
+    const txm_dvec3 a = u->s.point[u->l.a[k]], b = u->s.point[u->l.b[k]], ab = txm_d3_sub(b, a);
+    double t = txm_d3_dot(txm_d3_sub(u->old_point[i], a), ab) / (txm_d3_len2(ab) + 1e-300);
     t = t < 0 ? 0 : t > 1 ? 1 : t;
-    const double d2 = tmr_dist2(u->old_point[i], tmr_mad(a, ab, t));
+    const double d2 = txm_d3_dist2(u->old_point[i], txm_d3_mad(a, ab, t));
     if (d2 > *least) return;
     *least = d2;
     u->face[i] = k;
@@ -6307,7 +6288,7 @@ static void tmr_find_corner(tmr_update *u, int32_t i, int32_t face) {
     for (int k = 0; k < 3; k++) {
         const int32_t v = u->s.vertex[3 * face + k];
         if (u->l.kind[v] != TRIMESH_CORNER || u->was[v] >= 0) continue;
-        if (tmr_dist2(u->s.point[v], u->old_point[i]) > reach * reach) continue;
+        if (txm_d3_dist2(u->s.point[v], u->old_point[i]) > reach * reach) continue;
         u->now[i] = v;
         u->was[v] = i;
     }
@@ -6445,7 +6426,7 @@ static int tmr_update_old(tmr_update *u) {
         if (u->old->kinds[i] != TRIMESH_FREE || u->face[i] < 0) continue;
         const tmr_place at = tmr_on_face(&u->s, u->face[i], u->place[i]);
         const double reach = 0.6 * u->t.length * tmr_scale_at(&u->s, &at);
-        const tmr_vec normal = u->s.normal[u->face[i]];
+        const txm_dvec3 normal = u->s.normal[u->face[i]];
         if (tmr_is_crowded(&u->grid, &u->w, u->was, u->place[i], normal, reach)) continue;
         pairs[count].key = (uint32_t)u->face[i];
         pairs[count++].value = (uint32_t)i;
@@ -6464,7 +6445,7 @@ static int tmr_update_old(tmr_update *u) {
 
 /* Is a place of the new surface covered by a triangle of the old mesh all of whose corners are
    still there? */
-static int tmr_is_covered(const tmr_update *u, tmr_vec p, tmr_vec n, double length) {
+static int tmr_is_covered(const tmr_update *u, txm_dvec3 p, txm_dvec3 n, double length) {
     tmr_place at;
     const int32_t f = tmr_tree_nearest(&u->old_tree, p, n, 0.5, 0.5 * length, &at);
     if (f < 0) return 0;
@@ -6486,7 +6467,7 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
         const int32_t tries = run < 1 ? 0 : run > 1e8 ? 100000000 : (int32_t)run;
         run -= tries;
         for (int32_t k = 0; k < tries && *live < limit; k++) {
-            const tmr_vec p = tmr_strew_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
+            const txm_dvec3 p = tmr_strew_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
             const tmr_place at = tmr_on_face(&u->s, f, p);
             const double length = u->t.length * tmr_scale_at(&u->s, &at);
             if (tmr_is_crowded(&u->grid, &u->w, NULL, p, n, distance * length)) continue;
@@ -6598,8 +6579,8 @@ static int tmr_update_alloc(tmr_update *u) {
     const size_t n = u->old->vertex_count, t = u->old->triangle_count;
     const size_t room = (size_t)u->w.m.vertex_limit;
     txm_arena *arena = &u->first;
-    u->old_point = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    u->place = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
+    u->old_point = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    u->place = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
     u->now = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
     u->face = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
     u->way = (double *)txm_arena_zero(arena, n, sizeof(double));
@@ -6612,7 +6593,8 @@ static int tmr_update_alloc(tmr_update *u) {
         return 0;
     for (size_t i = 0; i < n; i++) {
         const float *p = u->old->positions + 3 * i;
-        u->old_point[i] = tmr_scale(tmr_sub(tmr_v(p[0], p[1], p[2]), u->s.centre), 1 / u->s.diagonal);
+        u->old_point[i] =
+            txm_d3_scale(txm_d3_sub(txm_d3(p[0], p[1], p[2]), u->s.centre), 1 / u->s.diagonal);
     }
     for (size_t c = 0; c < 3 * t; c++) u->old_vertex[c] = (int32_t)u->old->indices[c];
     for (size_t v = 0; v < room; v++) u->was[v] = -1;
@@ -6852,11 +6834,11 @@ static txm_status tmr_tx_check(const trimesh_view *mesh, int positions, txm_env 
     return TXM_OK;
 }
 
-static tmr_vec tmr_tx_vec(const float *p) {
-    return tmr_v(p[0], p[1], p[2]);
+static txm_dvec3 tmr_tx_vec(const float *p) {
+    return txm_d3(p[0], p[1], p[2]);
 }
 
-static void tmr_tx_corners(const trimesh_view *mesh, size_t triangle, tmr_vec p[3]) {
+static void tmr_tx_corners(const trimesh_view *mesh, size_t triangle, txm_dvec3 p[3]) {
     for (size_t k = 0; k < 3; k++)
         p[k] = tmr_tx_vec(mesh->positions + 3 * (size_t)mesh->indices[3 * triangle + k]);
 }
@@ -6908,10 +6890,11 @@ TRIMESH_API trimesh_view trimesh_as_view(const trimesh_mesh *mesh) {
 /* The sum of the weighted normals at each vertex; sum holds 3 zeros for each. */
 static void tmr_tx_sum_normals(const trimesh_view *mesh, double *sum) {
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_tx_corners(mesh, t, p);
-        const tmr_vec n = tmr_area2(p[0], p[1], p[2]);
-        const double d[3] = {tmr_dist2(p[0], p[1]), tmr_dist2(p[1], p[2]), tmr_dist2(p[2], p[0])};
+        const txm_dvec3 n = txm_d3_area2(p[0], p[1], p[2]);
+        const double d[3] = {txm_d3_dist2(p[0], p[1]), txm_d3_dist2(p[1], p[2]),
+                             txm_d3_dist2(p[2], p[0])};
         for (size_t k = 0; k < 3; k++) {
             const double weight = d[k] * d[(k + 2) % 3];
             double *to = sum + 3 * (size_t)mesh->indices[3 * t + k];
@@ -6937,7 +6920,7 @@ TRIMESH_API txm_status trimesh_normals(const trimesh_view *mesh, txm_env *env, f
     } else {
         tmr_tx_sum_normals(mesh, sum);
         for (size_t v = 0; v < mesh->vertex_count; v++) {
-            const tmr_vec n = tmr_unit(tmr_v(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
+            const txm_dvec3 n = txm_d3_unit(txm_d3(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
             normals[3 * v] = txm_float(n.x);
             normals[3 * v + 1] = txm_float(n.y);
             normals[3 * v + 2] = txm_float(n.z);
@@ -7116,10 +7099,10 @@ typedef struct tmr_tx_place {
     double u, v;
 } tmr_tx_place;
 
-static tmr_vec tmr_tx_point(const trimesh_view *input, tmr_tx_place at) {
-    tmr_vec p[3];
+static txm_dvec3 tmr_tx_point(const trimesh_view *input, tmr_tx_place at) {
+    txm_dvec3 p[3];
     tmr_tx_corners(input, at.triangle, p);
-    return tmr_mad(tmr_mad(p[0], tmr_sub(p[1], p[0]), at.u), tmr_sub(p[2], p[0]), at.v);
+    return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
 /* Number vertices in equal places alike. pairs: room for 2 per vertex. */
@@ -7183,7 +7166,7 @@ static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env 
 
 /* A path: from `start` towards `end` in the plane through both along `up`. */
 typedef struct tmr_tx_path {
-    tmr_vec start, ahead, across; /* ahead: to the end; across: normal of the plane           */
+    txm_dvec3 start, ahead, across; /* ahead: to the end; across: normal of the plane           */
     double reach;                 /* |ahead|^2                                                */
     size_t goal;                  /* the triangle of the end; SIZE_MAX = not known            */
     int through;                  /* cross seams                                              */
@@ -7191,9 +7174,9 @@ typedef struct tmr_tx_path {
 
 /* Where the plane meets a side, as a share of it. The values on both sides of the plane are computed
    from the vertex alone, so that all triangles there agree. */
-static double tmr_tx_cut(const tmr_tx_path *w, const tmr_vec c[3], size_t k) {
-    const double f = tmr_dot(tmr_sub(c[k], w->start), w->across);
-    const double g = tmr_dot(tmr_sub(c[(k + 1) % 3], w->start), w->across);
+static double tmr_tx_cut(const tmr_tx_path *w, const txm_dvec3 c[3], size_t k) {
+    const double f = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across);
+    const double g = txm_d3_dot(txm_d3_sub(c[(k + 1) % 3], w->start), w->across);
     return f / (f - g);
 }
 
@@ -7207,23 +7190,23 @@ static tmr_tx_place tmr_tx_on_side(size_t triangle, size_t k, double s) {
     return at;
 }
 
-static double tmr_tx_along(const tmr_tx_path *w, tmr_vec x) {
-    return tmr_dot(tmr_sub(x, w->start), w->ahead);
+static double tmr_tx_along(const tmr_tx_path *w, txm_dvec3 x) {
+    return txm_d3_dot(txm_d3_sub(x, w->start), w->ahead);
 }
 
 /* The side by which the path leaves a triangle: the one that the plane meets, other than the side
    `from` (0..2, or 3: at the start, then the one further ahead). 3 if there is none. */
-static size_t tmr_tx_exit(const tmr_tx_path *w, const tmr_vec c[3], size_t from) {
+static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t from) {
     int above[3];
     size_t best = 3;
     double furthest = 0;
     for (size_t k = 0; k < 3; k++)
-        above[k] = tmr_dot(tmr_sub(c[k], w->start), w->across) >= 0;
+        above[k] = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across) >= 0;
     for (size_t k = 0; k < 3; k++) {
         const size_t n = (k + 1) % 3;
         if (above[k] == above[n] || k == from) continue;
         const double s = tmr_tx_cut(w, c, k);
-        const double along = tmr_tx_along(w, tmr_mad(c[k], tmr_sub(c[n], c[k]), s));
+        const double along = tmr_tx_along(w, txm_d3_mad(c[k], txm_d3_sub(c[n], c[k]), s));
         if (best != 3 && along <= furthest) continue;
         best = k;
         furthest = along;
@@ -7237,13 +7220,13 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
     size_t triangle = at->triangle, from = 3;
     int reached = 0;
     for (int step = 0; step < 1 << 16; step++) {
-        tmr_vec c[3];
+        txm_dvec3 c[3];
         if (triangle == w->goal) return 1;
         tmr_tx_corners(&p->input, triangle, c);
         const size_t k = tmr_tx_exit(w, c, from);
         if (k == 3) return 0;
         const double s = tmr_tx_cut(w, c, k);
-        const tmr_vec x = tmr_mad(c[k], tmr_sub(c[(k + 1) % 3], c[k]), s);
+        const txm_dvec3 x = txm_d3_mad(c[k], txm_d3_sub(c[(k + 1) % 3], c[k]), s);
         const double along = tmr_tx_along(w, x), least = -0.5 * w->reach;
         const tmr_tx_place out = tmr_tx_on_side(triangle, k, s);
         if (!reached && along >= w->reach) {
@@ -7256,9 +7239,9 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
             at->triangle = triangle;
             at->u = in.u + t * (out.u - in.u);
             at->v = in.v + t * (out.v - in.v);
-            const tmr_vec gap = tmr_sub(tmr_tx_point(&p->input, *at),
-                                        tmr_add(w->start, w->ahead));
-            if (w->goal == SIZE_MAX || tmr_len2(gap) <= 1e-12 * w->reach) return 0;
+            const txm_dvec3 gap =
+                txm_d3_sub(tmr_tx_point(&p->input, *at), txm_d3_add(w->start, w->ahead));
+            if (w->goal == SIZE_MAX || txm_d3_len2(gap) <= 1e-12 * w->reach) return 0;
             reached = 1;
         }
         if (!reached) *at = out;
@@ -7273,15 +7256,15 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
 
 /* A path from a place, which is first moved a little into its triangle: so the plane certainly cuts
    two sides of it, and a start in a corner needs no search of the fan. */
-static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, tmr_vec end,
-                                    tmr_vec up, size_t goal, int through) {
+static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, txm_dvec3 end,
+                                    txm_dvec3 up, size_t goal, int through) {
     tmr_tx_path w;
     at->u += 1e-3 * (1.0 / 3 - at->u);
     at->v += 1e-3 * (1.0 / 3 - at->v);
     w.start = tmr_tx_point(&p->input, *at);
-    w.ahead = tmr_sub(end, w.start);
-    w.across = tmr_cross(up, w.ahead);
-    w.reach = tmr_len2(w.ahead);
+    w.ahead = txm_d3_sub(end, w.start);
+    w.across = txm_d3_cross(up, w.ahead);
+    w.reach = txm_d3_len2(w.ahead);
     w.goal = goal;
     w.through = through;
     return w;
@@ -7290,7 +7273,7 @@ static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, tmr
 /* The values at the corners of one triangle of the mesh. */
 static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
     tmr_tx_place from[3];
-    tmr_vec c[3];
+    txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
         const trimesh_source *s = &p->sources[p->mesh->indices[3 * t + k]];
         from[k].triangle = s->triangle;
@@ -7298,8 +7281,8 @@ static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
         from[k].v = s->v;
         c[k] = tmr_tx_point(&p->input, from[k]);
     }
-    const tmr_vec up = tmr_unit(tmr_area2(c[0], c[1], c[2]));
-    const tmr_vec middle = tmr_scale(tmr_add(tmr_add(c[0], c[1]), c[2]), 1.0 / 3);
+    const txm_dvec3 up = txm_d3_unit(txm_d3_area2(c[0], c[1], c[2]));
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(c[0], c[1]), c[2]), 1.0 / 3);
     tmr_tx_place centre = from[0];
     const tmr_tx_path way = tmr_tx_path_make(p, &centre, middle, up, SIZE_MAX, 1);
     if (way.reach > 0) tmr_tx_walk(p, &way, &centre);
@@ -7889,8 +7872,8 @@ static int tmr_tx_owns(const tmr_tx_scatter *s, size_t t, size_t rotation, const
 /* ---- geometry on triangles: how many where --------------------------------------------------- */
 
 /* The edge length of the triangle, as heights and scales take it. */
-static double tmr_tx_unit(const tmr_tx_scatter *s, tmr_vec area2) {
-    return s->desc->unit > 0 ? s->desc->unit : sqrt(tmr_len(area2) / TMR_TX_H);
+static double tmr_tx_unit(const tmr_tx_scatter *s, txm_dvec3 area2) {
+    return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMR_TX_H);
 }
 
 static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
@@ -7898,17 +7881,17 @@ static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
     const trimesh_view *mesh = &s->desc->mesh;
     const double height = s->desc->inside ? -s->desc->height : s->desc->height;
     for (size_t t = first; t < end; t++) {
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_tx_corners(mesh, t, p);
-        const tmr_vec flat = tmr_area2(p[0], p[1], p[2]);
+        const txm_dvec3 flat = txm_d3_area2(p[0], p[1], p[2]);
         const double up = height * tmr_tx_unit(s, flat);
         for (size_t k = 0; k < 3; k++) {
             const float *n = s->normals + 3 * (size_t)mesh->indices[3 * t + k];
-            p[k] = tmr_mad(p[k], tmr_tx_vec(n), up);
+            p[k] = txm_d3_mad(p[k], tmr_tx_vec(n), up);
         }
-        const tmr_vec there = tmr_area2(p[0], p[1], p[2]);
+        const txm_dvec3 there = txm_d3_area2(p[0], p[1], p[2]);
         /* beyond the centre of a bend the triangle is turned over: no room there */
-        s->area[t] = tmr_dot(there, flat) > 0 ? 0.5 * tmr_len(there) : 0;
+        s->area[t] = txm_d3_dot(there, flat) > 0 ? 0.5 * txm_d3_len(there) : 0;
     }
 }
 
@@ -7929,9 +7912,9 @@ static void tmr_tx_morton(const trimesh_view *mesh, txm_pair *pairs) {
         if (mesh->positions[i] - low[i % 3] > size) size = mesh->positions[i] - low[i % 3];
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         uint32_t key = 0;
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_tx_corners(mesh, t, p);
-        const tmr_vec sum = tmr_add(tmr_add(p[0], p[1]), p[2]);
+        const txm_dvec3 sum = txm_d3_add(txm_d3_add(p[0], p[1]), p[2]);
         const double at[3] = {sum.x / 3 - low[0], sum.y / 3 - low[1], sum.z / 3 - low[2]};
         for (int k = 0; k < 3; k++) {
             const int cell = size > 0 ? (int)(at[k] / size * 1023.5) : 0;
@@ -8010,7 +7993,7 @@ static void tmr_tx_quat_mul(const double a[4], const double b[4], double out[4])
 }
 
 /* The quaternion of the frame x, y, z, by its largest component [Shepperd 1978]; not of length 1. */
-static void tmr_tx_quat_frame(tmr_vec x, tmr_vec y, tmr_vec z, double q[4]) {
+static void tmr_tx_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
     const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
                          1 + x.x + y.y + z.z};
     int k = 3;
@@ -8024,20 +8007,20 @@ static void tmr_tx_quat_frame(tmr_vec x, tmr_vec y, tmr_vec z, double q[4]) {
 }
 
 /* A unit vector at a right angle to the unit vector n, near x if there is one. */
-static tmr_vec tmr_tx_tangent(tmr_vec x, tmr_vec n) {
-    x = tmr_mad(x, n, -tmr_dot(x, n));
-    if (tmr_len2(x) > 0) return tmr_unit(x);
+static txm_dvec3 tmr_tx_tangent(txm_dvec3 x, txm_dvec3 n) {
+    x = txm_d3_mad(x, n, -txm_d3_dot(x, n));
+    if (txm_d3_len2(x) > 0) return txm_d3_unit(x);
     const txm_vec3 p = txm_vec3_perpendicular(
         txm_v3(txm_float(n.x), txm_float(n.y), txm_float(n.z)));
-    x = tmr_v(p.x, p.y, p.z);
-    return tmr_unit(tmr_mad(x, n, -tmr_dot(x, n)));
+    x = txm_d3(p.x, p.y, p.z);
+    return txm_d3_unit(txm_d3_mad(x, n, -txm_d3_dot(x, n)));
 }
 
 /* A triangle that a patch lies on. */
 typedef struct tmr_tx_base {
-    tmr_vec p[3], n[3]; /* by the corner of the patch                     */
-    tmr_vec ex, ey;     /* images of the patch's axes                     */
-    tmr_vec up;         /* twice the area times the normal                */
+    txm_dvec3 p[3], n[3]; /* by the corner of the patch                     */
+    txm_dvec3 ex, ey;     /* images of the patch's axes                     */
+    txm_dvec3 up;         /* twice the area times the normal                */
     double unit, edge;  /* for heights and scales; the triangle's own     */
 } tmr_tx_base;
 
@@ -8048,24 +8031,25 @@ static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation,
         b->p[to] = tmr_tx_vec(mesh->positions + 3 * v);
         b->n[to] = tmr_tx_vec(s->normals + 3 * v);
     }
-    b->up = tmr_area2(b->p[0], b->p[1], b->p[2]);
-    b->ex = tmr_sub(b->p[1], b->p[0]);
-    b->ey = tmr_scale(tmr_sub(b->p[2], tmr_scale(tmr_add(b->p[0], b->p[1]), 0.5)), 1 / TMR_TX_H);
+    b->up = txm_d3_area2(b->p[0], b->p[1], b->p[2]);
+    b->ex = txm_d3_sub(b->p[1], b->p[0]);
+    b->ey = txm_d3_scale(txm_d3_sub(b->p[2], txm_d3_scale(txm_d3_add(b->p[0], b->p[1]), 0.5)),
+                         1 / TMR_TX_H);
     b->unit = tmr_tx_unit(s, b->up);
-    b->edge = sqrt(tmr_len(b->up) / TMR_TX_H);
+    b->edge = sqrt(txm_d3_len(b->up) / TMR_TX_H);
 }
 
 /* Phong tessellation [Boubekeur, Alexa 2008]: the point p of the triangle moves towards its feet on
    the tangent planes at the corners, here half the way, which on a sphere leads back to it:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
-static tmr_vec tmr_tx_bulge(const tmr_tx_base *b, const double w[3], tmr_vec p, double curve) {
-    tmr_vec sum = tmr_v(0, 0, 0);
+static txm_dvec3 tmr_tx_bulge(const tmr_tx_base *b, const double w[3], txm_dvec3 p, double curve) {
+    txm_dvec3 sum = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++)
-        sum = tmr_mad(sum, b->n[k], w[k] * tmr_dot(tmr_sub(b->p[k], p), b->n[k]));
-    sum = tmr_scale(sum, 0.5 * curve);
-    const double length = tmr_len(sum);
-    return length > b->edge ? tmr_scale(sum, b->edge / length) : sum;
+        sum = txm_d3_mad(sum, b->n[k], w[k] * txm_d3_dot(txm_d3_sub(b->p[k], p), b->n[k]));
+    sum = txm_d3_scale(sum, 0.5 * curve);
+    const double length = txm_d3_len(sum);
+    return length > b->edge ? txm_d3_scale(sum, b->edge / length) : sum;
 }
 
 /* A random turn about z: half the angle is that of a random point of the disc. */
@@ -8094,22 +8078,22 @@ static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, con
                               uint64_t h, trimesh_instance *out) {
     const trimesh_scatter_desc *d = s->desc;
     const double *w = item->w, side = d->inside ? -1 : 1;
-    tmr_vec p = tmr_scale(b->p[0], w[0]), n = tmr_scale(b->n[0], w[0]);
+    txm_dvec3 p = txm_d3_scale(b->p[0], w[0]), n = txm_d3_scale(b->n[0], w[0]);
     for (int k = 1; k < 3; k++) {
-        p = tmr_mad(p, b->p[k], w[k]);
-        n = tmr_mad(n, b->n[k], w[k]);
+        p = txm_d3_mad(p, b->p[k], w[k]);
+        n = txm_d3_mad(n, b->n[k], w[k]);
     }
-    n = tmr_unit(tmr_len2(n) > 0 ? n : b->up);
-    if (!(tmr_len2(n) > 0)) n = tmr_v(0, 0, 1);
-    if (d->curve > 0) p = tmr_add(p, tmr_tx_bulge(b, w, p, d->curve));
-    p = tmr_mad(p, n, side * (item->height + d->height) * b->unit);
+    n = txm_d3_unit(txm_d3_len2(n) > 0 ? n : b->up);
+    if (!(txm_d3_len2(n) > 0)) n = txm_d3(0, 0, 1);
+    if (d->curve > 0) p = txm_d3_add(p, tmr_tx_bulge(b, w, p, d->curve));
+    p = txm_d3_mad(p, n, side * (item->height + d->height) * b->unit);
     /* In the plane of the triangle the nearest rotation takes x to ex + ey turned back by 90 degrees;
        seen from below, where the winding is the other one, turned forth. */
-    const double back = tmr_dot(n, b->up) < 0 ? -1 : 1;
-    const tmr_vec x = tmr_tx_tangent(tmr_mad(b->ex, tmr_cross(b->ey, n), back), n);
-    const tmr_vec z = tmr_scale(n, side);
+    const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
+    const txm_dvec3 x = tmr_tx_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
+    const txm_dvec3 z = txm_d3_scale(n, side);
     double q[4], r[4], spin[4];
-    tmr_tx_quat_frame(x, tmr_cross(z, x), z, q);
+    tmr_tx_quat_frame(x, txm_d3_cross(z, x), z, q);
     tmr_tx_quat_mul(q, item->turn, r);
     if (d->spin) {
         tmr_tx_spin(h, spin);
@@ -8281,10 +8265,10 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
 TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
                                         float out[3]) {
     const double x = instance->rotation[0], y = instance->rotation[1], z = instance->rotation[2];
-    const tmr_vec axis = tmr_v(x, y, z), p = tmr_scale(tmr_tx_vec(point), instance->scale);
-    const tmr_vec t = tmr_scale(tmr_cross(axis, p), 2);
-    const tmr_vec turned =
-        tmr_add(tmr_mad(p, t, instance->rotation[3]), tmr_cross(axis, t));
+    const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(tmr_tx_vec(point), instance->scale);
+    const txm_dvec3 t = txm_d3_scale(txm_d3_cross(axis, p), 2);
+    const txm_dvec3 turned =
+        txm_d3_add(txm_d3_mad(p, t, instance->rotation[3]), txm_d3_cross(axis, t));
     out[0] = txm_float(turned.x + instance->position[0]);
     out[1] = txm_float(turned.y + instance->position[1]);
     out[2] = txm_float(turned.z + instance->position[2]);

@@ -90,8 +90,8 @@ static void check_vertices(const tmr_surface *s) {
             found++;
             k = tmr_ccw(s->opposite, k);
         } while (k >= 0 && k != s->corner[i]);
-        assert_true(fabs(tmr_len(s->vertex_normal[i]) - 1) < 1e-9);
-        assert_true(tmr_len(s->point[i]) < 0.500001);
+        assert_true(fabs(txm_d3_len(s->vertex_normal[i]) - 1) < 1e-9);
+        assert_true(txm_d3_len(s->point[i]) < 0.500001);
     }
     assert_int_equal(found, 3 * s->face_count);
 }
@@ -101,16 +101,17 @@ static void check_faces(const tmr_surface *s, double weld) {
     for (int32_t f = 0; f < s->face_count; f++) {
         const int32_t *v = s->vertex + 3 * f;
         const int turned = s->turn[f] >= 4;
-        area += 0.5 * tmr_len(tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
-        assert_true(fabs(tmr_len(s->normal[f]) - 1) < 1e-9);
+        area += 0.5 * txm_d3_len(txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
+        assert_true(fabs(txm_d3_len(s->normal[f]) - 1) < 1e-9);
         assert_in_range(s->component[f], 0, s->component_count - 1);
         assert_true(s->origin[f] < in.triangles);
         if (s->turn[f] == TMR_MAPPED) continue;
         for (int k = 0; k < 3; k++) {
             const int theirs = turned ? (s->turn[f] - 4 - k + 3) % 3 : (k + s->turn[f]) % 3;
             const float *p = in.at + 3 * (size_t)in.t[3 * s->origin[f] + (uint32_t)theirs];
-            const tmr_vec at = tmr_mad(s->centre, s->point[v[k]], s->diagonal);
-            assert_true(tmr_dist(at, tmr_v(p[0], p[1], p[2])) <= (1e-5 + 2 * weld) * s->diagonal);
+            const txm_dvec3 at = txm_d3_mad(s->centre, s->point[v[k]], s->diagonal);
+            assert_true(txm_d3_dist(at, txm_d3(p[0], p[1], p[2])) <=
+                        (1e-5 + 2 * weld) * s->diagonal);
         }
     }
     assert_true(fabs(area - s->area) < 1e-9);
@@ -207,15 +208,15 @@ static void test_measures(void **state) {
     txm_arena_init(&arena, NULL);
     assert_int_equal(tmr_surface_build(&desc, NULL, &arena, NULL, &s), TXM_OK);
     assert_true(fabs(s.diagonal - sqrt(3.0)) < 1e-12);
-    assert_true(tmr_dist(s.centre, tmr_v(1.5, 2.5, 3.5)) < 1e-12);
+    assert_true(txm_d3_dist(s.centre, txm_d3(1.5, 2.5, 3.5)) < 1e-12);
     assert_true(fabs(s.area - 6 / 3.0) < 1e-12);
     for (int32_t i = 0; i < 8; i++) {
         assert_true(s.scale[i] == in.scale[i + 1]);
         /* weighted by angles, they point away from the centre, however the sides are cut */
-        assert_true(tmr_dist(s.vertex_normal[i], tmr_unit(s.point[i])) < 1e-9);
+        assert_true(txm_d3_dist(s.vertex_normal[i], txm_d3_unit(s.point[i])) < 1e-9);
     }
     for (int32_t f = 0; f < 12; f++)
-        assert_true(tmr_dot(s.normal[f], s.point[s.vertex[3 * f]]) > 0.2);
+        assert_true(txm_d3_dot(s.normal[f], s.point[s.vertex[3 * f]]) > 0.2);
     txm_arena_free(&arena);
 }
 

@@ -115,10 +115,10 @@ typedef struct tmr_tx_place {
     double u, v;
 } tmr_tx_place;
 
-static tmr_vec tmr_tx_point(const trimesh_view *input, tmr_tx_place at) {
-    tmr_vec p[3];
+static txm_dvec3 tmr_tx_point(const trimesh_view *input, tmr_tx_place at) {
+    txm_dvec3 p[3];
     tmr_tx_corners(input, at.triangle, p);
-    return tmr_mad(tmr_mad(p[0], tmr_sub(p[1], p[0]), at.u), tmr_sub(p[2], p[0]), at.v);
+    return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
 /* Number vertices in equal places alike. pairs: room for 2 per vertex. */
@@ -182,7 +182,7 @@ static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env 
 
 /* A path: from `start` towards `end` in the plane through both along `up`. */
 typedef struct tmr_tx_path {
-    tmr_vec start, ahead, across; /* ahead: to the end; across: normal of the plane           */
+    txm_dvec3 start, ahead, across; /* ahead: to the end; across: normal of the plane           */
     double reach;                 /* |ahead|^2                                                */
     size_t goal;                  /* the triangle of the end; SIZE_MAX = not known            */
     int through;                  /* cross seams                                              */
@@ -190,9 +190,9 @@ typedef struct tmr_tx_path {
 
 /* Where the plane meets a side, as a share of it. The values on both sides of the plane are computed
    from the vertex alone, so that all triangles there agree. */
-static double tmr_tx_cut(const tmr_tx_path *w, const tmr_vec c[3], size_t k) {
-    const double f = tmr_dot(tmr_sub(c[k], w->start), w->across);
-    const double g = tmr_dot(tmr_sub(c[(k + 1) % 3], w->start), w->across);
+static double tmr_tx_cut(const tmr_tx_path *w, const txm_dvec3 c[3], size_t k) {
+    const double f = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across);
+    const double g = txm_d3_dot(txm_d3_sub(c[(k + 1) % 3], w->start), w->across);
     return f / (f - g);
 }
 
@@ -206,23 +206,23 @@ static tmr_tx_place tmr_tx_on_side(size_t triangle, size_t k, double s) {
     return at;
 }
 
-static double tmr_tx_along(const tmr_tx_path *w, tmr_vec x) {
-    return tmr_dot(tmr_sub(x, w->start), w->ahead);
+static double tmr_tx_along(const tmr_tx_path *w, txm_dvec3 x) {
+    return txm_d3_dot(txm_d3_sub(x, w->start), w->ahead);
 }
 
 /* The side by which the path leaves a triangle: the one that the plane meets, other than the side
    `from` (0..2, or 3: at the start, then the one further ahead). 3 if there is none. */
-static size_t tmr_tx_exit(const tmr_tx_path *w, const tmr_vec c[3], size_t from) {
+static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t from) {
     int above[3];
     size_t best = 3;
     double furthest = 0;
     for (size_t k = 0; k < 3; k++)
-        above[k] = tmr_dot(tmr_sub(c[k], w->start), w->across) >= 0;
+        above[k] = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across) >= 0;
     for (size_t k = 0; k < 3; k++) {
         const size_t n = (k + 1) % 3;
         if (above[k] == above[n] || k == from) continue;
         const double s = tmr_tx_cut(w, c, k);
-        const double along = tmr_tx_along(w, tmr_mad(c[k], tmr_sub(c[n], c[k]), s));
+        const double along = tmr_tx_along(w, txm_d3_mad(c[k], txm_d3_sub(c[n], c[k]), s));
         if (best != 3 && along <= furthest) continue;
         best = k;
         furthest = along;
@@ -236,13 +236,13 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
     size_t triangle = at->triangle, from = 3;
     int reached = 0;
     for (int step = 0; step < 1 << 16; step++) {
-        tmr_vec c[3];
+        txm_dvec3 c[3];
         if (triangle == w->goal) return 1;
         tmr_tx_corners(&p->input, triangle, c);
         const size_t k = tmr_tx_exit(w, c, from);
         if (k == 3) return 0;
         const double s = tmr_tx_cut(w, c, k);
-        const tmr_vec x = tmr_mad(c[k], tmr_sub(c[(k + 1) % 3], c[k]), s);
+        const txm_dvec3 x = txm_d3_mad(c[k], txm_d3_sub(c[(k + 1) % 3], c[k]), s);
         const double along = tmr_tx_along(w, x), least = -0.5 * w->reach;
         const tmr_tx_place out = tmr_tx_on_side(triangle, k, s);
         if (!reached && along >= w->reach) {
@@ -255,9 +255,9 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
             at->triangle = triangle;
             at->u = in.u + t * (out.u - in.u);
             at->v = in.v + t * (out.v - in.v);
-            const tmr_vec gap = tmr_sub(tmr_tx_point(&p->input, *at),
-                                        tmr_add(w->start, w->ahead));
-            if (w->goal == SIZE_MAX || tmr_len2(gap) <= 1e-12 * w->reach) return 0;
+            const txm_dvec3 gap =
+                txm_d3_sub(tmr_tx_point(&p->input, *at), txm_d3_add(w->start, w->ahead));
+            if (w->goal == SIZE_MAX || txm_d3_len2(gap) <= 1e-12 * w->reach) return 0;
             reached = 1;
         }
         if (!reached) *at = out;
@@ -272,15 +272,15 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
 
 /* A path from a place, which is first moved a little into its triangle: so the plane certainly cuts
    two sides of it, and a start in a corner needs no search of the fan. */
-static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, tmr_vec end,
-                                    tmr_vec up, size_t goal, int through) {
+static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, txm_dvec3 end,
+                                    txm_dvec3 up, size_t goal, int through) {
     tmr_tx_path w;
     at->u += 1e-3 * (1.0 / 3 - at->u);
     at->v += 1e-3 * (1.0 / 3 - at->v);
     w.start = tmr_tx_point(&p->input, *at);
-    w.ahead = tmr_sub(end, w.start);
-    w.across = tmr_cross(up, w.ahead);
-    w.reach = tmr_len2(w.ahead);
+    w.ahead = txm_d3_sub(end, w.start);
+    w.across = txm_d3_cross(up, w.ahead);
+    w.reach = txm_d3_len2(w.ahead);
     w.goal = goal;
     w.through = through;
     return w;
@@ -289,7 +289,7 @@ static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, tmr
 /* The values at the corners of one triangle of the mesh. */
 static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
     tmr_tx_place from[3];
-    tmr_vec c[3];
+    txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
         const trimesh_source *s = &p->sources[p->mesh->indices[3 * t + k]];
         from[k].triangle = s->triangle;
@@ -297,8 +297,8 @@ static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
         from[k].v = s->v;
         c[k] = tmr_tx_point(&p->input, from[k]);
     }
-    const tmr_vec up = tmr_unit(tmr_area2(c[0], c[1], c[2]));
-    const tmr_vec middle = tmr_scale(tmr_add(tmr_add(c[0], c[1]), c[2]), 1.0 / 3);
+    const txm_dvec3 up = txm_d3_unit(txm_d3_area2(c[0], c[1], c[2]));
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(c[0], c[1]), c[2]), 1.0 / 3);
     tmr_tx_place centre = from[0];
     const tmr_tx_path way = tmr_tx_path_make(p, &centre, middle, up, SIZE_MAX, 1);
     if (way.reach > 0) tmr_tx_walk(p, &way, &centre);

@@ -71,11 +71,11 @@ static txm_status tmr_tx_check(const trimesh_view *mesh, int positions, txm_env 
     return TXM_OK;
 }
 
-static tmr_vec tmr_tx_vec(const float *p) {
-    return tmr_v(p[0], p[1], p[2]);
+static txm_dvec3 tmr_tx_vec(const float *p) {
+    return txm_d3(p[0], p[1], p[2]);
 }
 
-static void tmr_tx_corners(const trimesh_view *mesh, size_t triangle, tmr_vec p[3]) {
+static void tmr_tx_corners(const trimesh_view *mesh, size_t triangle, txm_dvec3 p[3]) {
     for (size_t k = 0; k < 3; k++)
         p[k] = tmr_tx_vec(mesh->positions + 3 * (size_t)mesh->indices[3 * triangle + k]);
 }
@@ -127,10 +127,11 @@ TRIMESH_API trimesh_view trimesh_as_view(const trimesh_mesh *mesh) {
 /* The sum of the weighted normals at each vertex; sum holds 3 zeros for each. */
 static void tmr_tx_sum_normals(const trimesh_view *mesh, double *sum) {
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_tx_corners(mesh, t, p);
-        const tmr_vec n = tmr_area2(p[0], p[1], p[2]);
-        const double d[3] = {tmr_dist2(p[0], p[1]), tmr_dist2(p[1], p[2]), tmr_dist2(p[2], p[0])};
+        const txm_dvec3 n = txm_d3_area2(p[0], p[1], p[2]);
+        const double d[3] = {txm_d3_dist2(p[0], p[1]), txm_d3_dist2(p[1], p[2]),
+                             txm_d3_dist2(p[2], p[0])};
         for (size_t k = 0; k < 3; k++) {
             const double weight = d[k] * d[(k + 2) % 3];
             double *to = sum + 3 * (size_t)mesh->indices[3 * t + k];
@@ -156,7 +157,7 @@ TRIMESH_API txm_status trimesh_normals(const trimesh_view *mesh, txm_env *env, f
     } else {
         tmr_tx_sum_normals(mesh, sum);
         for (size_t v = 0; v < mesh->vertex_count; v++) {
-            const tmr_vec n = tmr_unit(tmr_v(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
+            const txm_dvec3 n = txm_d3_unit(txm_d3(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
             normals[3 * v] = txm_float(n.x);
             normals[3 * v + 1] = txm_float(n.y);
             normals[3 * v + 2] = txm_float(n.z);

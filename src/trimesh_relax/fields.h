@@ -11,11 +11,11 @@
    point of the triangular lattice that these arms span. */
 typedef struct tmr_level {
     int32_t count, links;
-    tmr_vec *p, *n, *x;
+    txm_dvec3 *p, *n, *x;
     float *area;
     float *scale;       /* lattice spacing                                                 */
     double (*z)[2];     /* direction to the sixth power                                    */
-    tmr_vec *q;         /* a lattice point near p                                          */
+    txm_dvec3 *q;       /* a lattice point near p                                          */
     uint8_t *fixed;     /* 1: z and q are given (lines), 2: q is (corners)                 */
     int32_t *parent;    /* node of the next level                                          */
     int32_t *first, *to; /* neighbours of i: to[first[i]] .. to[first[i + 1] - 1]          */
@@ -32,10 +32,12 @@ typedef struct tmr_fields {
     int32_t *vertex; /* of each node of level 0               */
 } tmr_fields;
 
-static tmr_vec tmr_any_axis(tmr_vec n) {
+static txm_dvec3 tmr_any_axis(txm_dvec3 n) {
     const double x = fabs(n.x), y = fabs(n.y), z = fabs(n.z);
-    const tmr_vec axis = x <= y && x <= z ? tmr_v(1, 0, 0) : y <= z ? tmr_v(0, 1, 0) : tmr_v(0, 0, 1);
-    return tmr_unit(tmr_cross(n, axis));
+    const txm_dvec3 axis = x <= y && x <= z ? txm_d3(1, 0, 0)
+                           : y <= z         ? txm_d3(0, 1, 0)
+                                            : txm_d3(0, 0, 1);
+    return txm_d3_unit(txm_d3_cross(n, axis));
 }
 
 static void tmr_complex_mul(const double a[2], const double b[2], double out[2]) {
@@ -92,13 +94,14 @@ static void tmr_sixth_root(const double z[2], double out[2]) {
 
 /* How the frame (n1, x1) lies in (n0, x0) when n1 is turned onto n0 the short way: the complex
    number by which coordinates are multiplied. */
-static void tmr_transport(tmr_vec n0, tmr_vec x0, tmr_vec n1, tmr_vec x1, double out[2]) {
-    const tmr_vec axis = tmr_cross(n1, n0);
-    const double cosine = tmr_dot(n0, n1);
+static void tmr_transport(txm_dvec3 n0, txm_dvec3 x0, txm_dvec3 n1, txm_dvec3 x1, double out[2]) {
+    const txm_dvec3 axis = txm_d3_cross(n1, n0);
+    const double cosine = txm_d3_dot(n0, n1);
     /* R x = x cos + axis x x + axis (axis . x) / (1 + cos) */
-    const double k = tmr_dot(axis, x1) / (1 + fmax(cosine, -0.99));
-    tmr_vec x = tmr_add(tmr_add(tmr_scale(x1, cosine), tmr_cross(axis, x1)), tmr_scale(axis, k));
-    const double re = tmr_dot(x, x0), im = tmr_dot(x, tmr_cross(n0, x0));
+    const double k = txm_d3_dot(axis, x1) / (1 + fmax(cosine, -0.99));
+    txm_dvec3 x = txm_d3_add(txm_d3_add(txm_d3_scale(x1, cosine), txm_d3_cross(axis, x1)),
+                             txm_d3_scale(axis, k));
+    const double re = txm_d3_dot(x, x0), im = txm_d3_dot(x, txm_d3_cross(n0, x0));
     const double length = sqrt(re * re + im * im);
     out[0] = length > 1e-12 ? re / length : 1;
     out[1] = length > 1e-12 ? im / length : 0;
@@ -108,10 +111,10 @@ static int tmr_level_alloc(tmr_level *level, int32_t count, int32_t links, txm_a
     const size_t n = (size_t)count, k = (size_t)links;
     level->count = count;
     level->links = links;
-    level->p = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    level->n = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    level->x = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    level->q = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
+    level->p = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    level->n = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    level->x = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    level->q = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
     level->area = (float *)txm_arena_alloc(arena, n, sizeof(float));
     level->scale = (float *)txm_arena_alloc(arena, n, sizeof(float));
     level->z = (double(*)[2])txm_arena_zero(arena, n, 2 * sizeof(double));
@@ -165,8 +168,9 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         level->fixed[i] = kind == TRIMESH_FREE ? 0 : kind == TRIMESH_CORNER ? 2 : 1;
         int32_t two[2];
         if (level->fixed[i] == 1 && tmr_line_neighbors(m, v, two)) {
-            const tmr_vec d = tmr_sub(m->p[two[1]], m->p[two[0]]);
-            double a[2] = {tmr_dot(d, level->x[i]), tmr_dot(d, tmr_cross(level->n[i], level->x[i]))};
+            const txm_dvec3 d = txm_d3_sub(m->p[two[1]], m->p[two[0]]);
+            double a[2] = {txm_d3_dot(d, level->x[i]),
+                           txm_d3_dot(d, txm_d3_cross(level->n[i], level->x[i]))};
             const double n = sqrt(a[0] * a[0] + a[1] * a[1]);
             a[0] = n > 0 ? a[0] / n : 1;
             a[1] = n > 0 ? a[1] / n : 0;
@@ -194,7 +198,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
             const int32_t j = a->to[k];
             if (a->parent[j] >= 0) continue;
             const double x = a->area[i], y = a->area[j];
-            const double score = tmr_dot(a->n[i], a->n[j]) * (x < y ? x / y : y / x);
+            const double score = txm_d3_dot(a->n[i], a->n[j]) * (x < y ? x / y : y / x);
             if (score > best_score) {
                 best_score = score;
                 best = j;
@@ -210,7 +214,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
     int32_t k = 0;
     for (int32_t i = 0; i < count; i++) seen[i] = -1;
     for (int32_t i = 0; i < count; i++) {
-        tmr_vec p = tmr_v(0, 0, 0), n = p;
+        txm_dvec3 p = txm_d3(0, 0, 0), n = p;
         double area = 0, scale = 0;
         int fixed = 0, only = 1;
         const int32_t first = k;
@@ -219,8 +223,8 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
         for (int side = 0; side < 2; side++) {
             const int32_t c = child[2 * i + side];
             if (c < 0) continue;
-            p = tmr_mad(p, a->p[c], a->area[c]);
-            n = tmr_mad(n, a->n[c], a->area[c]);
+            p = txm_d3_mad(p, a->p[c], a->area[c]);
+            n = txm_d3_mad(n, a->n[c], a->area[c]);
             scale += (double)a->scale[c] * a->area[c];
             area += a->area[c];
             fixed |= a->fixed[c] == 1;
@@ -237,8 +241,8 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
                 b->weight[seen[to]] += a->weight[j];
             }
         }
-        b->p[i] = b->q[i] = tmr_scale(p, 1 / area);
-        b->n[i] = tmr_len2(n) > 1e-12 ? tmr_unit(n) : a->n[child[2 * i]];
+        b->p[i] = b->q[i] = txm_d3_scale(p, 1 / area);
+        b->n[i] = txm_d3_len2(n) > 1e-12 ? txm_d3_unit(n) : a->n[child[2 * i]];
         b->x[i] = tmr_any_axis(b->n[i]);
         b->area[i] = txm_float(area);
         b->scale[i] = txm_float(scale / area);
@@ -331,9 +335,9 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
         tmr_level *level = &f->level[l];
         for (int32_t i = 0; i < level->count; i++) {
             double r[2];
-            const tmr_vec y = tmr_cross(level->n[i], level->x[i]);
+            const txm_dvec3 y = txm_d3_cross(level->n[i], level->x[i]);
             tmr_sixth_root(level->z[i], r);
-            level->x[i] = tmr_add(tmr_scale(level->x[i], r[0]), tmr_scale(y, r[1]));
+            level->x[i] = txm_d3_add(txm_d3_scale(level->x[i], r[0]), txm_d3_scale(y, r[1]));
         }
     }
 }
@@ -341,27 +345,29 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
 /* ---- lattice points ----------------------------------------------------------------------- */
 
 /* the second arm of a lattice: x turned by 60 degrees about n */
-static tmr_vec tmr_arm(tmr_vec n, tmr_vec x) {
-    return tmr_add(tmr_scale(x, 0.5), tmr_scale(tmr_cross(n, x), 0.86602540378443865));
+static txm_dvec3 tmr_arm(txm_dvec3 n, txm_dvec3 x) {
+    return txm_d3_add(txm_d3_scale(x, 0.5), txm_d3_scale(txm_d3_cross(n, x), 0.86602540378443865));
 }
 
 /* lattice coordinates of d: d = a x + b y with the arms x and y, in units of the spacing */
-static void tmr_lattice_at(tmr_vec d, tmr_vec x, tmr_vec y, double inverse, double *a, double *b) {
-    const double dx = tmr_dot(d, x) * inverse, dy = tmr_dot(d, y) * inverse;
+static void tmr_lattice_at(txm_dvec3 d, txm_dvec3 x, txm_dvec3 y, double inverse, double *a,
+                           double *b) {
+    const double dx = txm_d3_dot(d, x) * inverse, dy = txm_d3_dot(d, y) * inverse;
     *a = (dx - 0.5 * dy) * (4.0 / 3);
     *b = (dy - 0.5 * dx) * (4.0 / 3);
 }
 
 /* the point of the lattice through q that lies nearest to p (in the tangent plane) */
-static tmr_vec tmr_lattice_round(tmr_vec q, tmr_vec x, tmr_vec y, double spacing, tmr_vec p) {
+static txm_dvec3 tmr_lattice_round(txm_dvec3 q, txm_dvec3 x, txm_dvec3 y, double spacing,
+                                   txm_dvec3 p) {
     double a, b, least = 0;
-    tmr_vec best = q;
-    tmr_lattice_at(tmr_sub(p, q), x, y, 1 / spacing, &a, &b);
+    txm_dvec3 best = q;
+    tmr_lattice_at(txm_d3_sub(p, q), x, y, 1 / spacing, &a, &b);
     const double a0 = floor(a), b0 = floor(b);
     for (int k = 0; k < 4; k++) {
-        const tmr_vec to = tmr_mad(tmr_mad(q, x, (a0 + (k & 1)) * spacing), y,
-                                   (b0 + (k >> 1)) * spacing);
-        const double d = tmr_dist2(to, p);
+        const txm_dvec3 to =
+            txm_d3_mad(txm_d3_mad(q, x, (a0 + (k & 1)) * spacing), y, (b0 + (k >> 1)) * spacing);
+        const double d = txm_d3_dist2(to, p);
         if (k == 0 || d < least) {
             least = d;
             best = to;
@@ -371,38 +377,39 @@ static tmr_vec tmr_lattice_round(tmr_vec q, tmr_vec x, tmr_vec y, double spacing
 }
 
 /* a point about half-way between two tangent planes: where they cross, or else the middle */
-static tmr_vec tmr_between(tmr_vec p0, tmr_vec n0, tmr_vec p1, tmr_vec n1) {
-    const double n00 = tmr_dot(n0, p0), n01 = tmr_dot(n0, p1), n10 = tmr_dot(n1, p0);
-    const double n11 = tmr_dot(n1, p1), c = tmr_dot(n0, n1);
+static txm_dvec3 tmr_between(txm_dvec3 p0, txm_dvec3 n0, txm_dvec3 p1, txm_dvec3 n1) {
+    const double n00 = txm_d3_dot(n0, p0), n01 = txm_d3_dot(n0, p1), n10 = txm_d3_dot(n1, p0);
+    const double n11 = txm_d3_dot(n1, p1), c = txm_d3_dot(n0, n1);
     const double d = 1 / (1 - c * c + 1e-4);
     const double l0 = 2 * (n01 - n00 - c * (n10 - n11)) * d;
     const double l1 = 2 * (n10 - n11 - c * (n01 - n00)) * d;
-    const tmr_vec middle = tmr_scale(tmr_add(p0, p1), 0.5);
-    return tmr_sub(middle, tmr_scale(tmr_add(tmr_scale(n0, -l0), tmr_scale(n1, -l1)), 0.25));
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(p0, p1), 0.5);
+    return txm_d3_sub(middle,
+                      txm_d3_scale(txm_d3_add(txm_d3_scale(n0, -l0), txm_d3_scale(n1, -l1)), 0.25));
 }
 
 /* Of the lattice points of two nodes about half-way between them, the pair that lies closest
    together: what both should agree on. */
-static void tmr_closest_pair(const tmr_level *level, int32_t i, tmr_vec qi, int32_t j, tmr_vec *a,
-                             tmr_vec *b) {
+static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, int32_t j,
+                             txm_dvec3 *a, txm_dvec3 *b) {
     const double spacing = 0.5 * (level->scale[i] + (double)level->scale[j]);
-    const tmr_vec middle = tmr_between(level->p[i], level->n[i], level->p[j], level->n[j]);
-    tmr_vec corner[2][4];
+    const txm_dvec3 middle = tmr_between(level->p[i], level->n[i], level->p[j], level->n[j]);
+    txm_dvec3 corner[2][4];
     double least = -1;
     for (int side = 0; side < 2; side++) {
         const int32_t v = side ? j : i;
-        const tmr_vec q = side ? level->q[j] : qi, x = level->x[v], y = tmr_arm(level->n[v], x);
+        const txm_dvec3 q = side ? level->q[j] : qi, x = level->x[v], y = tmr_arm(level->n[v], x);
         double s, t;
-        tmr_lattice_at(tmr_sub(middle, q), x, y, 1 / spacing, &s, &t);
+        tmr_lattice_at(txm_d3_sub(middle, q), x, y, 1 / spacing, &s, &t);
         s = floor(s);
         t = floor(t);
-        corner[side][0] = tmr_mad(tmr_mad(q, x, s * spacing), y, t * spacing);
-        corner[side][1] = tmr_mad(corner[side][0], x, spacing);
-        corner[side][2] = tmr_mad(corner[side][0], y, spacing);
-        corner[side][3] = tmr_mad(corner[side][1], y, spacing);
+        corner[side][0] = txm_d3_mad(txm_d3_mad(q, x, s * spacing), y, t * spacing);
+        corner[side][1] = txm_d3_mad(corner[side][0], x, spacing);
+        corner[side][2] = txm_d3_mad(corner[side][0], y, spacing);
+        corner[side][3] = txm_d3_mad(corner[side][1], y, spacing);
     }
     for (int k = 0; k < 16; k++) {
-        const double d = tmr_dist2(corner[0][k & 3], corner[1][k >> 2]);
+        const double d = txm_d3_dist2(corner[0][k & 3], corner[1][k >> 2]);
         if (least >= 0 && d >= least) continue;
         least = d;
         *a = corner[0][k & 3];
@@ -413,17 +420,18 @@ static void tmr_closest_pair(const tmr_level *level, int32_t i, tmr_vec qi, int3
 static void tmr_smooth_points(tmr_level *level, int sweeps) {
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int32_t i = 0; i < level->count; i++) {
-            tmr_vec q = level->q[i];
+            txm_dvec3 q = level->q[i];
             double sum = 0;
             if (level->fixed[i]) continue;
             for (int32_t k = level->first[i]; k < level->first[i + 1]; k++) {
                 const double weight = level->weight[k];
-                tmr_vec a = q, b = q;
+                txm_dvec3 a = q, b = q;
                 tmr_closest_pair(level, i, q, level->to[k], &a, &b);
-                q = tmr_add(tmr_scale(a, sum), tmr_scale(b, weight));
+                q = txm_d3_add(txm_d3_scale(a, sum), txm_d3_scale(b, weight));
                 sum += weight;
-                q = tmr_scale(q, 1 / sum);
-                q = tmr_mad(q, level->n[i], -tmr_dot(level->n[i], tmr_sub(q, level->p[i])));
+                q = txm_d3_scale(q, 1 / sum);
+                q = txm_d3_mad(q, level->n[i],
+                               -txm_d3_dot(level->n[i], txm_d3_sub(q, level->p[i])));
             }
             if (sum > 0)
                 level->q[i] = tmr_lattice_round(q, level->x[i], tmr_arm(level->n[i], level->x[i]),
@@ -439,8 +447,9 @@ static void tmr_solve_points(tmr_fields *f) {
             const tmr_level *up = &f->level[l + 1];
             for (int32_t i = 0; i < level->count; i++) {
                 if (level->fixed[i]) continue;
-                tmr_vec q = up->q[level->parent[i]];
-                q = tmr_mad(q, level->n[i], -tmr_dot(level->n[i], tmr_sub(q, level->p[i])));
+                txm_dvec3 q = up->q[level->parent[i]];
+                q = txm_d3_mad(q, level->n[i],
+                               -txm_d3_dot(level->n[i], txm_d3_sub(q, level->p[i])));
                 level->q[i] = tmr_lattice_round(q, level->x[i], tmr_arm(level->n[i], level->x[i]),
                                                 level->scale[i], level->p[i]);
             }
@@ -472,8 +481,8 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int free = tmr_kind_of(m, a) == TRIMESH_FREE;
     const double x = w->bad[a], y = w->bad[b];
-    const tmr_vec mean = tmr_scale(tmr_add(tmr_scale(w->moved[a], x), tmr_scale(w->moved[b], y)),
-                                   1 / (x + y));
+    const txm_dvec3 mean = txm_d3_scale(
+        txm_d3_add(txm_d3_scale(w->moved[a], x), txm_d3_scale(w->moved[b], y)), 1 / (x + y));
     int32_t keep = a;
     if (tmr_can_collapse(m, c) && tmr_collapse_is_fair(w, c, m->p[a], 0)) {
         tmr_collapse(m, c);
@@ -515,11 +524,12 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
             if (!tmr_is_real_edge(m, c)) continue;
             const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
-            const double apart = tmr_dist(w->moved[a], w->moved[b]);
+            const double apart = txm_d3_dist(w->moved[a], w->moved[b]);
             if (apart > 0.5 * spacing) continue;
             if (tmr_kind_of(m, a) != TRIMESH_FREE && tmr_kind_of(m, b) != TRIMESH_FREE) continue;
             TRIMESH_ASSERT(count < most);
-            pairs[count].key = txm_sort_key(txm_float(apart + 0.05 * tmr_dist(m->p[a], m->p[b])));
+            pairs[count].key =
+                txm_sort_key(txm_float(apart + 0.05 * txm_d3_dist(m->p[a], m->p[b])));
             pairs[count++].value = (uint32_t)c;
         }
         txm_sort_pairs(pairs, room, count);
@@ -529,7 +539,7 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
             int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             if (tmr_is_ghost(m, a) || tmr_is_ghost(m, b)) continue;
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
-            if (tmr_dist(w->moved[a], w->moved[b]) > 0.5 * spacing) continue;
+            if (txm_d3_dist(w->moved[a], w->moved[b]) > 0.5 * spacing) continue;
             if (tmr_kind_of(m, b) != TRIMESH_FREE) {
                 if (tmr_kind_of(m, a) != TRIMESH_FREE) continue;
                 c = m->opposite[c];

@@ -310,7 +310,7 @@ static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_sta
     state->positions = p;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         if (number[v] < 0) continue;
-        const tmr_vec at = tmr_add(tmr_scale(m->p[v], job->s.diagonal), job->s.centre);
+        const txm_dvec3 at = txm_d3_add(txm_d3_scale(m->p[v], job->s.diagonal), job->s.centre);
         *p++ = txm_float(at.x);
         *p++ = txm_float(at.y);
         *p++ = txm_float(at.z);

@@ -64,7 +64,7 @@ static double tmr_vertex_size(const tmr_surface *s, int32_t v) {
 
 /* length of a segment in wanted edge lengths */
 static double tmr_segment_weight(const tmr_surface *s, const tmr_lines *l, int32_t k) {
-    return tmr_dist(s->point[l->a[k]], s->point[l->b[k]]) * 2 /
+    return txm_d3_dist(s->point[l->a[k]], s->point[l->b[k]]) * 2 /
            (tmr_vertex_size(s, l->a[k]) + tmr_vertex_size(s, l->b[k]));
 }
 
@@ -79,7 +79,8 @@ static double tmr_face_weight(const tmr_surface *s, int32_t f) {
     const int32_t *v = s->vertex + 3 * f;
     const double size = (tmr_vertex_size(s, v[0]) + tmr_vertex_size(s, v[1]) +
                          tmr_vertex_size(s, v[2])) / 3;
-    return 0.5 * tmr_len(tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]])) / (size * size);
+    return 0.5 * txm_d3_len(txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]])) /
+           (size * size);
 }
 
 /* Edge length of so many points: each has sqrt(3) / 2 L^2 of the weighted area, on the border half
@@ -184,17 +185,17 @@ static void tmr_legalize(tmr_strewn *t, int32_t v) {
 }
 
 /* The part of the face in which p lies, and the weights of its corners there. */
-static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, tmr_vec p, double weight[3]) {
+static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, txm_dvec3 p, double weight[3]) {
     const tmr_mesh *m = &t->w->m;
-    const tmr_vec n = t->w->s->normal[face];
+    const txm_dvec3 n = t->w->s->normal[face];
     int32_t part = t->inside[t->hint] == face ? t->hint : face;
     for (int guard = 0; guard < TMR_WALK; guard++) {
         const int32_t *v = m->vertex + 3 * part;
         double sum = 0;
         int least = 0;
         for (int k = 0; k < 3; k++) {
-            const tmr_vec a = m->p[v[(k + 1) % 3]], b = m->p[v[(k + 2) % 3]];
-            weight[k] = tmr_dot(tmr_area2(p, a, b), n);
+            const txm_dvec3 a = m->p[v[(k + 1) % 3]], b = m->p[v[(k + 2) % 3]];
+            weight[k] = txm_d3_dot(txm_d3_area2(p, a, b), n);
             sum += weight[k];
             if (weight[k] < weight[least]) least = k;
         }
@@ -221,7 +222,7 @@ static int32_t tmr_cut_edge(tmr_strewn *t, int32_t c) {
 /* Put a point that lies in a face of the surface into the mesh: into the triangle that holds it,
    on an edge if it lies there. Returns its vertex; -1: no room, or it lies on a line or a vertex
    that is a point already. exact: do not move the point; else it is kept off the edges. */
-static int32_t tmr_insert(tmr_strewn *t, int32_t face, tmr_vec p, int exact) {
+static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
     tmr_work *w = t->w;
     tmr_mesh *m = &w->m;
     double weight[3];
@@ -246,8 +247,8 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, tmr_vec p, int exact) {
         if (weight[least] < margin) { /* as far in as asked for */
             double sum = 0;
             for (int k = 0; k < 3; k++) sum += weight[k] = fmax(weight[k], margin);
-            p = tmr_v(0, 0, 0);
-            for (int k = 0; k < 3; k++) p = tmr_mad(p, m->p[corner[k]], weight[k] / sum);
+            p = txm_d3(0, 0, 0);
+            for (int k = 0; k < 3; k++) p = txm_d3_mad(p, m->p[corner[k]], weight[k] / sum);
         }
         v = tmr_split_face(m, part);
         if (v < 0) return v;
@@ -286,8 +287,8 @@ static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t
                 v = c < 0 ? -1 : tmr_cut_edge(t, tmr_prev(c));
                 if (v < 0) return 0;
                 w->m.flags[v] = l->border[line] ? TRIMESH_BORDER : TRIMESH_CREASE;
-                tmr_put_on_line(w, v, tmr_mad(s->point[a], tmr_sub(s->point[b], s->point[a]), u),
-                                k);
+                tmr_put_on_line(
+                    w, v, txm_d3_mad(s->point[a], txm_d3_sub(s->point[b], s->point[a]), u), k);
                 tmr_legalize(t, v);
                 left = v;
             }
@@ -310,7 +311,7 @@ static uint32_t tmr_spread_bits(uint32_t x) {
 }
 
 /* The order of a place on a curve that fills the box of -1/2..1/2 (Morton). */
-static uint32_t tmr_curve_key(tmr_vec p) {
+static uint32_t tmr_curve_key(txm_dvec3 p) {
     const double x[3] = {p.x, p.y, p.z};
     uint32_t key = 0;
     for (int k = 0; k < 3; k++)
@@ -318,9 +319,10 @@ static uint32_t tmr_curve_key(tmr_vec p) {
     return key;
 }
 
-static tmr_vec tmr_face_centre(const tmr_surface *s, int32_t f) {
+static txm_dvec3 tmr_face_centre(const tmr_surface *s, int32_t f) {
     const int32_t *v = s->vertex + 3 * f;
-    return tmr_scale(tmr_add(tmr_add(s->point[v[0]], s->point[v[1]]), s->point[v[2]]), 1.0 / 3);
+    return txm_d3_scale(txm_d3_add(txm_d3_add(s->point[v[0]], s->point[v[1]]), s->point[v[2]]),
+                        1.0 / 3);
 }
 
 /* Faces in the order of a space-filling curve, component by component, in pairs[].value. */
@@ -341,8 +343,8 @@ static void tmr_order_faces(const tmr_surface *s, txm_pair *pairs, txm_pair *roo
        m = 3, row 0 at the corner 0:   /\       row j has 2 j + 1 parts, up and down in turn
                                       /\/\
                                      /\/\/\                                                    */
-static tmr_vec tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
-                               txm_rng *rng) {
+static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
+                                 txm_rng *rng) {
     const int32_t *v = s->vertex + 3 * face;
     int32_t m = (int32_t)floor(sqrt((double)count));
     if (m < 1) m = 1;
@@ -368,9 +370,9 @@ static tmr_vec tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, in
         across = column + y;
     }
     const double u = (down - across) / m, w = across / m;
-    return tmr_add(s->point[v[0]],
-                   tmr_add(tmr_scale(tmr_sub(s->point[v[1]], s->point[v[0]]), u),
-                           tmr_scale(tmr_sub(s->point[v[2]], s->point[v[0]]), w)));
+    return txm_d3_add(s->point[v[0]],
+                      txm_d3_add(txm_d3_scale(txm_d3_sub(s->point[v[1]], s->point[v[0]]), u),
+                                 txm_d3_scale(txm_d3_sub(s->point[v[2]], s->point[v[0]]), w)));
 }
 
 /* Strew the points that are on no line: each component is cut into as many runs of equal weight

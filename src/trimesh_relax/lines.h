@@ -33,7 +33,7 @@ static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
 /* how far the surface turns at the edge opposite to c: 1 - cosine of the angle; 0 at the border */
 static double tmr_turn_at(const tmr_surface *s, int32_t c) {
     const int32_t o = s->opposite[c];
-    return o < 0 ? 0 : 1 - tmr_dot(s->normal[c / 3], s->normal[o / 3]);
+    return o < 0 ? 0 : 1 - txm_d3_dot(s->normal[c / 3], s->normal[o / 3]);
 }
 
 /* Which edges of the surface are creases? Those at which it turns by the angle and more, and, for
@@ -124,7 +124,7 @@ static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double l
             for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
                 const int32_t w = tmr_far_end(s, ends->corner[e], u);
                 has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
-                length += 0.5 * tmr_dist(s->point[u], s->point[w]);
+                length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
                     seen[w] = 1;
                     stack[size++] = w;
@@ -145,11 +145,11 @@ static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double l
 
 /* Direction from v along the line that starts with the edge of corner c, over about the distance
    reach or up to where it branches. */
-static tmr_vec tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v, int32_t c,
-                                  double reach) {
+static txm_dvec3 tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v,
+                                    int32_t c, double reach) {
     int32_t at = tmr_far_end(s, c, v), e = c;
     for (int i = 0; i < 1000; i++) {
-        if (tmr_dist2(s->point[at], s->point[v]) >= reach * reach) break;
+        if (txm_d3_dist2(s->point[at], s->point[v]) >= reach * reach) break;
         if (ends->first[at + 1] - ends->first[at] != 2) break;
         const int32_t k = ends->first[at];
         e = ends->corner[k] == e ? ends->corner[k + 1] : ends->corner[k];
@@ -157,7 +157,7 @@ static tmr_vec tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, in
         if (at == v) break;
     }
     if (at == v) at = tmr_far_end(s, c, v);
-    return tmr_unit(tmr_sub(s->point[at], s->point[v]));
+    return txm_d3_unit(txm_d3_sub(s->point[at], s->point[v]));
 }
 
 /* The kind of every vertex; corners where lines meet, end, or turn by more than 40 degrees over
@@ -176,8 +176,8 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
         const int32_t c = ends->corner[k], d = ends->corner[k + 1];
         if (s->edge_kind[c] != s->edge_kind[d]) continue;
         kind[v] = s->edge_kind[c] == TMR_BORDER_EDGE ? TRIMESH_BORDER : TRIMESH_CREASE;
-        turn[v] = (float)(1 + tmr_dot(tmr_line_direction(s, ends, v, c, reach),
-                                      tmr_line_direction(s, ends, v, d, reach)));
+        turn[v] = (float)(1 + txm_d3_dot(tmr_line_direction(s, ends, v, c, reach),
+                                         tmr_line_direction(s, ends, v, d, reach)));
     }
     const float limit = (float)(1 - cos(40 * TXM_PI / 180));
     for (int32_t v = 0; v < n; v++) {
@@ -187,7 +187,7 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
             double way = 0;
             for (int i = 0; i < 1000 && sharpest; i++) {
                 const int32_t next = tmr_far_end(s, e, at);
-                way += tmr_dist(s->point[at], s->point[next]);
+                way += txm_d3_dist(s->point[at], s->point[next]);
                 at = next;
                 if (way > reach || at == v || turn[at] <= 0) break;
                 const float other = turn[at], own = turn[v];
@@ -208,10 +208,10 @@ enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are nea
 static void tmr_angle_defects(const tmr_surface *s, float *defect) {
     for (int32_t v = 0; v < s->vertex_count; v++) defect[v] = (float)(2 * TXM_PI);
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        const tmr_vec p = s->point[s->vertex[c]];
-        const tmr_vec a = tmr_sub(s->point[s->vertex[tmr_next(c)]], p);
-        const tmr_vec b = tmr_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        defect[s->vertex[c]] -= txm_float(atan2(tmr_len(tmr_cross(a, b)), tmr_dot(a, b)));
+        const txm_dvec3 p = s->point[s->vertex[c]];
+        const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
+        const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
+        defect[s->vertex[c]] -= txm_float(atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b)));
     }
 }
 
@@ -226,11 +226,11 @@ static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *
     for (int i = 0; i < count; i++) {
         const int32_t u = list[i], first = s->corner[u];
         if (kind[u] != TRIMESH_FREE) return 0;
-        if (tmr_dot(tmr_sub(s->point[u], s->point[v]), s->vertex_normal[v]) > 1e-9) return 0;
+        if (txm_d3_dot(txm_d3_sub(s->point[u], s->point[v]), s->vertex_normal[v]) > 1e-9) return 0;
         sum += defect[u];
         for (int32_t c = first; c >= 0;) {
             const int32_t x = s->vertex[tmr_next(c)];
-            int known = tmr_dist2(s->point[x], s->point[v]) > reach * reach;
+            int known = txm_d3_dist2(s->point[x], s->point[v]) > reach * reach;
             for (int j = 0; j < count && !known; j++) known = list[j] == x;
             if (!known && count == TMR_TIP_BALL) return 0;
             if (!known) list[count++] = x;
@@ -267,7 +267,7 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
         l->face[k] = c / 3;
         l->line[k] = id;
         l->start[k] = length;
-        length += tmr_dist(s->point[v], s->point[w]);
+        length += txm_d3_dist(s->point[v], s->point[w]);
         l->edge[c] = 1 + id;
         if (s->opposite[c] >= 0) l->edge[s->opposite[c]] = 1 + id;
         l->segment[v] = l->segment[w] = k;
@@ -334,15 +334,16 @@ static int32_t tmr_segment_step(const tmr_lines *l, int32_t k, int step) {
 }
 
 /* The place on the line nearest to p, walking from segment *k as long as it gets nearer. */
-static tmr_vec tmr_project_line(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t *k) {
-    tmr_vec best = p;
+static txm_dvec3 tmr_project_line(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p,
+                                  int32_t *k) {
+    txm_dvec3 best = p;
     double least = -1;
     int direction = 0;
     for (int32_t i = *k, guard = l->segment_count + 1; i >= 0 && guard > 0; guard--) {
-        const tmr_vec a = s->point[l->a[i]], ab = tmr_sub(s->point[l->b[i]], a);
-        const double t = tmr_dot(tmr_sub(p, a), ab) / (tmr_len2(ab) + 1e-300);
-        const tmr_vec q = tmr_mad(a, ab, t < 0 ? 0 : t > 1 ? 1 : t);
-        const double d = tmr_dist2(p, q);
+        const txm_dvec3 a = s->point[l->a[i]], ab = txm_d3_sub(s->point[l->b[i]], a);
+        const double t = txm_d3_dot(txm_d3_sub(p, a), ab) / (txm_d3_len2(ab) + 1e-300);
+        const txm_dvec3 q = txm_d3_mad(a, ab, t < 0 ? 0 : t > 1 ? 1 : t);
+        const double d = txm_d3_dist2(p, q);
         if (least >= 0 && d >= least) break;
         least = d;
         best = q;
@@ -356,8 +357,8 @@ static tmr_vec tmr_project_line(const tmr_surface *s, const tmr_lines *l, tmr_ve
 }
 
 /* the place on a line at the distance from its beginning; *k: the segment it lies on */
-static tmr_vec tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t line, double way,
-                           int32_t *k) {
+static txm_dvec3 tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t line, double way,
+                             int32_t *k) {
     int32_t low = l->first[line], high = l->first[line + 1] - 1;
     while (low < high) { /* the last segment that starts at way or before */
         const int32_t middle = (low + high + 1) / 2;
@@ -369,13 +370,13 @@ static tmr_vec tmr_line_at(const tmr_surface *s, const tmr_lines *l, int32_t lin
     double t = span > 0 ? (way - l->start[low]) / span : 0;
     t = t < 0 ? 0 : t > 1 ? 1 : t;
     *k = low;
-    const tmr_vec a = s->point[l->a[low]];
-    return tmr_mad(a, tmr_sub(s->point[l->b[low]], a), t);
+    const txm_dvec3 a = s->point[l->a[low]];
+    return txm_d3_mad(a, txm_d3_sub(s->point[l->b[low]], a), t);
 }
 
 /* how far from the beginning of its line a place on segment k lies */
-static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, tmr_vec p, int32_t k) {
-    return l->start[k] + tmr_dist(s->point[l->a[k]], p);
+static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p, int32_t k) {
+    return l->start[k] + txm_d3_dist(s->point[l->a[k]], p);
 }
 
 /* ---- density ------------------------------------------------------------------------------ */
@@ -391,8 +392,8 @@ static double tmr_spacing(const tmr_surface *s, double vertices) {
     for (int32_t f = 0; f < s->face_count && s->scale; f++) {
         const int32_t *v = s->vertex + 3 * f;
         const double scale = (s->scale[v[0]] + (double)s->scale[v[1]] + s->scale[v[2]]) / 3;
-        const tmr_vec n = tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
-        sum += 0.5 * tmr_len(n) / (scale * scale);
+        const txm_dvec3 n = txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]);
+        sum += 0.5 * txm_d3_len(n) / (scale * scale);
     }
     return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
 }
@@ -410,9 +411,9 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     for (int32_t v = 0; v < s->vertex_count; v++) curvature[v] = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
-        const double length = tmr_dist(s->point[a], s->point[b]);
+        const double length = txm_d3_dist(s->point[a], s->point[b]);
         if (length <= 0) continue;
-        const float k = txm_float(tmr_dist(s->vertex_normal[a], s->vertex_normal[b]) / length);
+        const float k = txm_float(txm_d3_dist(s->vertex_normal[a], s->vertex_normal[b]) / length);
         curvature[a] = txm_maxf(curvature[a], k);
         curvature[b] = txm_maxf(curvature[b], k);
     }
@@ -437,7 +438,7 @@ static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_are
         for (int32_t i = 0; i < 3 * s->face_count; i++) {
             const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
             const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
-            const double d = tmr_dist(s->point[a], s->point[b]) / spacing / 3;
+            const double d = txm_d3_dist(s->point[a], s->point[b]) / spacing / 3;
             scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
             scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
         }

@@ -23,7 +23,7 @@ typedef struct tmr_mend {
     txm_env *env;
     trimesh_report report;
     int32_t vertex_count, face_count;
-    tmr_vec *point;    /* 1 per input vertex, scaled                                      */
+    txm_dvec3 *point;  /* 1 per input vertex, scaled                                      */
     int32_t *rename;   /* 1 per input vertex: which one stands for it                     */
     int32_t *degree;   /* 1 per input vertex: counts, of the step at hand                 */
     int32_t *stamp;    /* 1 per input vertex: marks neighbours                            */
@@ -38,7 +38,7 @@ typedef struct tmr_mend {
     txm_pair *pairs, *spare; /* 1 per corner: edges in order                              */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
-    tmr_vec centre;
+    txm_dvec3 centre;
     double diagonal;
     double noise;      /* scaled units: where single precision ends                       */
 } tmr_mend;
@@ -161,40 +161,42 @@ static txm_status tmr_mend_scale(tmr_mend *m) {
             if (fabs(x) > largest) largest = fabs(x);
         }
     }
-    const tmr_vec size = tmr_v(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-    m->diagonal = tmr_len(size);
-    m->centre = tmr_v(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
+    const txm_dvec3 size = txm_d3(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    m->diagonal = txm_d3_len(size);
+    m->centre =
+        txm_d3(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]));
     if (!(m->diagonal > 0))
         return txm_fail(m->env, TXM_TOO_SMALL, "all vertices of the surface are in one place");
     m->noise = largest / m->diagonal * (1.0 / (1 << 23));
     for (int32_t i = 0; i < m->vertex_count; i++) {
         const float *p = in->positions + 3 * (size_t)i;
-        m->point[i] = tmr_v((p[0] - m->centre.x) / m->diagonal, (p[1] - m->centre.y) / m->diagonal,
-                            (p[2] - m->centre.z) / m->diagonal);
+        m->point[i] = txm_d3((p[0] - m->centre.x) / m->diagonal, (p[1] - m->centre.y) / m->diagonal,
+                             (p[2] - m->centre.z) / m->diagonal);
     }
     return TXM_OK;
 }
 
-static uint64_t tmr_hash_cell(tmr_vec cell) {
+static uint64_t tmr_hash_cell(txm_dvec3 cell) {
     uint64_t bits[3];
-    cell = tmr_add(cell, tmr_v(0, 0, 0)); /* -0 to +0 */
+    cell = txm_d3_add(cell, txm_d3(0, 0, 0)); /* -0 to +0 */
     memcpy(&bits[0], &cell.x, sizeof bits[0]);
     memcpy(&bits[1], &cell.y, sizeof bits[1]);
     memcpy(&bits[2], &cell.z, sizeof bits[2]);
     return txm_hash(txm_hash(txm_hash(bits[0]) ^ bits[1]) ^ bits[2]);
 }
 
-static tmr_vec tmr_cell(tmr_vec p, double size) {
-    return size > 0 ? tmr_v(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
+static txm_dvec3 tmr_cell(txm_dvec3 p, double size) {
+    return size > 0 ? txm_d3(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
 }
 
 /* The lowest vertex in a cell that is not farther than size from point i, or else best. */
-static int32_t tmr_weld_look(const tmr_mend *m, tmr_vec cell, int32_t i, double size,
+static int32_t tmr_weld_look(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
                              int32_t best) {
     size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
     for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
         const int32_t j = m->table[slot] - 1;
-        if ((best < 0 || j < best) && tmr_dist2(m->point[i], m->point[j]) <= size * size) best = j;
+        if ((best < 0 || j < best) && txm_d3_dist2(m->point[i], m->point[j]) <= size * size)
+            best = j;
     }
     return best;
 }
@@ -209,12 +211,12 @@ static void tmr_weld(tmr_mend *m) {
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t i = 0; i < m->vertex_count; i++) {
         if (m->rename[i] < 0) continue;
-        const tmr_vec cell = tmr_cell(m->point[i], size);
+        const txm_dvec3 cell = tmr_cell(m->point[i], size);
         int32_t best = -1;
         for (int x = -reach; x <= reach; x++) {
             for (int y = -reach; y <= reach; y++) {
                 for (int z = -reach; z <= reach; z++)
-                    best = tmr_weld_look(m, tmr_add(cell, tmr_v(x, y, z)), i, size, best);
+                    best = tmr_weld_look(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
             }
         }
         if (best >= 0) {
@@ -366,19 +368,19 @@ static int32_t tmr_mend_link(tmr_mend *m) {
 }
 
 /* Without area, for all that single precision can tell. */
-static int tmr_is_thin(const tmr_mend *m, const tmr_vec p[3]) {
+static int tmr_is_thin(const tmr_mend *m, const txm_dvec3 p[3]) {
     double longest = 0;
-    for (int k = 0; k < 3; k++) longest = fmax(longest, tmr_dist2(p[k], p[(k + 1) % 3]));
+    for (int k = 0; k < 3; k++) longest = fmax(longest, txm_d3_dist2(p[k], p[(k + 1) % 3]));
     longest = sqrt(longest);
-    const double height = longest > 0 ? tmr_len(tmr_area2(p[0], p[1], p[2])) / longest : 0;
+    const double height = longest > 0 ? txm_d3_len(txm_d3_area2(p[0], p[1], p[2])) / longest : 0;
     /* the height that rounding alone can make counts only where the triangle looks thin as well */
     return height <= 1e-6 * longest || (height <= m->noise && height <= 1e-3 * longest);
 }
-static void tmr_face_points(const tmr_mend *m, int32_t f, tmr_vec p[3]) {
+static void tmr_face_points(const tmr_mend *m, int32_t f, txm_dvec3 p[3]) {
     for (int k = 0; k < 3; k++) p[k] = m->point[m->vertex[3 * f + k]];
 }
 static int tmr_face_is_thin(const tmr_mend *m, int32_t f) {
-    tmr_vec p[3];
+    txm_dvec3 p[3];
     tmr_face_points(m, f, p);
     return tmr_is_thin(m, p);
 }
@@ -444,21 +446,21 @@ static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
     enum { MOST = 16 };
     const int32_t count = end - begin, low = tmr_edge_low(m, (int32_t)m->pairs[begin].value);
     const int32_t high = tmr_edge_high(m, (int32_t)m->pairs[begin].value);
-    const tmr_vec e = tmr_unit(tmr_sub(m->point[high], m->point[low]));
-    tmr_vec u = e, w = e;
+    const txm_dvec3 e = txm_d3_unit(txm_d3_sub(m->point[high], m->point[low]));
+    txm_dvec3 u = e, w = e;
     double angle[MOST];
     int32_t corner[MOST];
     if (count > MOST || count % 2) return 0;
     for (int32_t k = 0; k < count; k++) {
         const int32_t c = (int32_t)m->pairs[begin + k].value;
-        tmr_vec d = tmr_sub(m->point[m->vertex[c]], m->point[low]);
-        d = tmr_mad(d, e, -tmr_dot(d, e));
+        txm_dvec3 d = txm_d3_sub(m->point[m->vertex[c]], m->point[low]);
+        d = txm_d3_mad(d, e, -txm_d3_dot(d, e));
         if (tmr_face_is_thin(m, c / 3)) return 0;
         if (k == 0) {
-            u = tmr_unit(d);
-            w = tmr_cross(e, u);
+            u = txm_d3_unit(d);
+            w = txm_d3_cross(e, u);
         }
-        const double a = k ? atan2(tmr_dot(d, w), tmr_dot(d, u)) : 0;
+        const double a = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
         int32_t at = k;
         for (; at > 0 && angle[at - 1] > a; at--) {
             angle[at] = angle[at - 1];

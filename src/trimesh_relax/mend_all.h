@@ -13,21 +13,21 @@ static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count)
         left = 0;
         for (int32_t i = 0; i < count; i++) {
             const int32_t f = thin[i];
-            tmr_vec sum = tmr_v(0, 0, 0);
-            if (tmr_len2(s->normal[f]) > 0) continue;
+            txm_dvec3 sum = txm_d3(0, 0, 0);
+            if (txm_d3_len2(s->normal[f]) > 0) continue;
             for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
-                if (s->opposite[c] >= 0) sum = tmr_add(sum, s->normal[s->opposite[c] / 3]);
+                if (s->opposite[c] >= 0) sum = txm_d3_add(sum, s->normal[s->opposite[c] / 3]);
             }
-            s->normal[f] = tmr_unit(sum);
-            left |= !(tmr_len2(sum) > 0);
+            s->normal[f] = txm_d3_unit(sum);
+            left |= !(txm_d3_len2(sum) > 0);
         }
     }
     for (int32_t i = 0; i < count; i++) { /* nothing near has a normal: its own, or any */
         const int32_t *v = s->vertex + 3 * thin[i];
-        tmr_vec *n = s->normal + thin[i];
-        if (tmr_len2(*n) > 0) continue;
-        *n = tmr_unit(tmr_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
-        if (!(tmr_len2(*n) > 0)) *n = tmr_v(0, 0, 1);
+        txm_dvec3 *n = s->normal + thin[i];
+        if (txm_d3_len2(*n) > 0) continue;
+        *n = txm_d3_unit(txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
+        if (!(txm_d3_len2(*n) > 0)) *n = txm_d3(0, 0, 1);
     }
 }
 
@@ -36,13 +36,13 @@ static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, i
     s->area = 0;
     *count = 0;
     for (int32_t f = 0; f < s->face_count; f++) {
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         for (int k = 0; k < 3; k++) p[k] = s->point[s->vertex[3 * f + k]];
-        const tmr_vec n = tmr_area2(p[0], p[1], p[2]);
-        s->area += 0.5 * tmr_len(n);
-        s->normal[f] = tmr_unit(n);
+        const txm_dvec3 n = txm_d3_area2(p[0], p[1], p[2]);
+        s->area += 0.5 * txm_d3_len(n);
+        s->normal[f] = txm_d3_unit(n);
         if (tmr_is_thin(m, p)) {
-            s->normal[f] = tmr_v(0, 0, 0);
+            s->normal[f] = txm_d3(0, 0, 0);
             thin[(*count)++] = f;
         }
     }
@@ -52,17 +52,17 @@ static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, i
 static void tmr_vertex_normals(tmr_surface *s) {
     memset(s->vertex_normal, 0, (size_t)s->vertex_count * sizeof *s->vertex_normal);
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        const tmr_vec p = s->point[s->vertex[c]];
-        const tmr_vec a = tmr_sub(s->point[s->vertex[tmr_next(c)]], p);
-        const tmr_vec b = tmr_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        const double angle = atan2(tmr_len(tmr_cross(a, b)), tmr_dot(a, b));
-        tmr_vec *n = s->vertex_normal + s->vertex[c];
-        *n = tmr_mad(*n, s->normal[c / 3], angle);
+        const txm_dvec3 p = s->point[s->vertex[c]];
+        const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
+        const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
+        const double angle = atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b));
+        txm_dvec3 *n = s->vertex_normal + s->vertex[c];
+        *n = txm_d3_mad(*n, s->normal[c / 3], angle);
     }
     for (int32_t i = 0; i < s->vertex_count; i++) {
-        tmr_vec *n = s->vertex_normal + i;
-        *n = tmr_unit(*n);
-        if (!(tmr_len2(*n) > 0)) *n = s->normal[s->corner[i] / 3];
+        txm_dvec3 *n = s->vertex_normal + i;
+        *n = txm_d3_unit(*n);
+        if (!(txm_d3_len2(*n) > 0)) *n = s->normal[s->corner[i] / 3];
     }
 }
 
@@ -117,8 +117,8 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
                                       tmr_surface *s) {
     const size_t f = (size_t)s->face_count, v = (size_t)s->vertex_count;
     int32_t count = 0;
-    s->normal = (tmr_vec *)txm_arena_alloc(arena, f, sizeof(tmr_vec));
-    s->vertex_normal = (tmr_vec *)txm_arena_alloc(arena, v, sizeof(tmr_vec));
+    s->normal = (txm_dvec3 *)txm_arena_alloc(arena, f, sizeof(txm_dvec3));
+    s->vertex_normal = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->component = (int32_t *)txm_arena_alloc(arena, f, sizeof(int32_t));
     int32_t *list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
     if (!s->normal || !s->vertex_normal || !s->component || !list)
@@ -153,7 +153,7 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
     if (status != TXM_OK) return status;
     m->vertex_count = (int32_t)m->desc->surface.vertex_count;
     m->face_count = (int32_t)m->desc->surface.triangle_count;
-    m->point = (tmr_vec *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(tmr_vec));
+    m->point = (txm_dvec3 *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(txm_dvec3));
     if (!m->point) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     if ((status = tmr_mend_alloc(m, arena, scratch)) != TXM_OK) return status;
     if ((status = tmr_mend_cancel(m, 0)) != TXM_OK) return status;

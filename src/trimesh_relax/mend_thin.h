@@ -16,9 +16,9 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
     m->list[count++] = first;
     for (int32_t i = 0; i < count; i++) {
         const int32_t f = m->list[i];
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_face_points(m, f, p);
-        const double area = tmr_len(tmr_area2(p[0], p[1], p[2]));
+        const double area = txm_d3_len(txm_d3_area2(p[0], p[1], p[2]));
         if (m->flag[f] == 1) stays += area;
         else turns += area;
         for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
@@ -80,10 +80,10 @@ static txm_status tmr_mend_orient(tmr_mend *m) {
          needle: collapse       cap: flip             edge is flipped, and both halves have area */
 static int tmr_is_needle(const tmr_mend *m, int32_t f, int32_t *shortest, int32_t *longest) {
     double least = 0, most = 0;
-    tmr_vec p[3];
+    txm_dvec3 p[3];
     tmr_face_points(m, f, p);
     for (int32_t k = 0; k < 3; k++) {
-        const double length = tmr_dist(p[(k + 1) % 3], p[(k + 2) % 3]);
+        const double length = txm_d3_dist(p[(k + 1) % 3], p[(k + 2) % 3]);
         if (k == 0 || length < least) {
             least = length;
             *shortest = 3 * f + k;
@@ -132,9 +132,9 @@ static void tmr_join(tmr_mend *m, int32_t a, int32_t b) {
 }
 
 /* Height over longest edge. */
-static double tmr_slimness(tmr_vec a, tmr_vec b, tmr_vec c) {
-    const double longest2 = fmax(tmr_dist2(a, b), fmax(tmr_dist2(b, c), tmr_dist2(c, a)));
-    return longest2 > 0 ? tmr_len(tmr_area2(a, b, c)) / longest2 : 0;
+static double tmr_slimness(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
+    const double longest2 = fmax(txm_d3_dist2(a, b), fmax(txm_d3_dist2(b, c), txm_d3_dist2(c, a)));
+    return longest2 > 0 ? txm_d3_len(txm_d3_area2(a, b, c)) / longest2 : 0;
 }
 
 /* Flip the edge of corner c if the worse of the two triangles gets better and none turns over. The
@@ -143,13 +143,13 @@ static int tmr_flip_thin(tmr_mend *m, int32_t c) {
     const int32_t o = m->opposite[c];
     if (o < 0 || m->vertex[o] == m->vertex[c]) return 0;
     const int32_t next = tmr_next(c), prev = tmr_prev(c), beyond = tmr_next(o);
-    const tmr_vec p = m->point[m->vertex[c]], q = m->point[m->vertex[o]];
-    const tmr_vec a = m->point[m->vertex[next]], b = m->point[m->vertex[prev]];
-    const tmr_vec n = tmr_add(tmr_area2(p, a, b), tmr_area2(q, b, a));
+    const txm_dvec3 p = m->point[m->vertex[c]], q = m->point[m->vertex[o]];
+    const txm_dvec3 a = m->point[m->vertex[next]], b = m->point[m->vertex[prev]];
+    const txm_dvec3 n = txm_d3_add(txm_d3_area2(p, a, b), txm_d3_area2(q, b, a));
     const double before = fmin(tmr_slimness(p, a, b), tmr_slimness(q, b, a));
     const double after = fmin(tmr_slimness(p, a, q), tmr_slimness(q, b, p));
-    if (!(after > before) || !(tmr_dot(tmr_area2(p, a, q), n) >= 0) ||
-        !(tmr_dot(tmr_area2(q, b, p), n) >= 0) || tmr_has_neighbor(m, c, m->vertex[o]))
+    if (!(after > before) || !(txm_d3_dot(txm_d3_area2(p, a, q), n) >= 0) ||
+        !(txm_d3_dot(txm_d3_area2(q, b, p), n) >= 0) || tmr_has_neighbor(m, c, m->vertex[o]))
         return 0;
     const int32_t aq = m->opposite[beyond], bp = m->opposite[next];
     m->vertex[prev] = m->vertex[o];
@@ -205,12 +205,13 @@ static int32_t tmr_flip_caps(tmr_mend *m, int32_t count) {
 
 /* Would moving vertex v, of these corners, to point p turn a face over that keeps its area? */
 static int tmr_move_turns(const tmr_mend *m, const int32_t *corner, int32_t n, int32_t other,
-                          tmr_vec p) {
+                          txm_dvec3 p) {
     for (int32_t k = 0; k < n; k++) {
         const int32_t i = m->vertex[tmr_next(corner[k])], j = m->vertex[tmr_prev(corner[k])];
         if (i == other || j == other || tmr_face_is_thin(m, corner[k] / 3)) continue;
-        const tmr_vec before = tmr_area2(m->point[m->vertex[corner[k]]], m->point[i], m->point[j]);
-        if (!(tmr_dot(tmr_area2(p, m->point[i], m->point[j]), before) > 0)) return 1;
+        const txm_dvec3 before =
+            txm_d3_area2(m->point[m->vertex[corner[k]]], m->point[i], m->point[j]);
+        if (!(txm_d3_dot(txm_d3_area2(p, m->point[i], m->point[j]), before) > 0)) return 1;
     }
     return 0;
 }
@@ -353,7 +354,7 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     /* edge_kind, which is not needed yet, marks the corners that were visited */
     s->vertex_count = tmr_count_fans(m, s->edge_kind);
     const size_t v = (size_t)s->vertex_count;
-    s->point = (tmr_vec *)txm_arena_alloc(arena, v, sizeof(tmr_vec));
+    s->point = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->corner = (int32_t *)txm_arena_alloc(arena, v, sizeof(int32_t));
     if (m->desc->scale) s->scale = (float *)txm_arena_alloc(arena, v, sizeof(float));
     if (!s->point || !s->corner || (m->desc->scale && !s->scale))

@@ -27,8 +27,8 @@ typedef struct tmr_mesh {
     int32_t vertex_limit, face_limit; /* slots there are                                        */
     int32_t live, ghosts;             /* vertices that live and are no ghosts; ghosts           */
     int32_t live_faces;               /* triangles that live, ghost triangles too               */
-    tmr_vec *p;                       /* position                                               */
-    tmr_vec *n;                       /* normal of the surface there, smooth                    */
+    txm_dvec3 *p;                     /* position                                               */
+    txm_dvec3 *n;                     /* normal of the surface there, smooth                    */
     int32_t *source; /* face of the surface that p lies in; of a vertex on a line its segment;
                         of a vertex that never moves: its vertex of the surface                */
     int32_t *corner;                  /* one corner                                             */

@@ -7,15 +7,15 @@
 
 /* The point of triangle a b c nearest to p, as weights of b and c; *part: 0 inside, 1 2 3 the edge
    opposite to a b c, 4 5 6 the corner a b c. */
-static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u, double *v,
-                           int *part) {
-    const tmr_vec ab = tmr_sub(b, a), ac = tmr_sub(c, a), ap = tmr_sub(p, a);
-    const double d1 = tmr_dot(ab, ap), d2 = tmr_dot(ac, ap);
+static txm_dvec3 tmr_nearest(txm_dvec3 p, txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, double *u,
+                             double *v, int *part) {
+    const txm_dvec3 ab = txm_d3_sub(b, a), ac = txm_d3_sub(c, a), ap = txm_d3_sub(p, a);
+    const double d1 = txm_d3_dot(ab, ap), d2 = txm_d3_dot(ac, ap);
     *u = *v = 0;
     *part = 4;
     if (d1 <= 0 && d2 <= 0) return a;
-    const tmr_vec bp = tmr_sub(p, b);
-    const double d3 = tmr_dot(ab, bp), d4 = tmr_dot(ac, bp);
+    const txm_dvec3 bp = txm_d3_sub(p, b);
+    const double d3 = txm_d3_dot(ab, bp), d4 = txm_d3_dot(ac, bp);
     *u = 1;
     *part = 5;
     if (d3 >= 0 && d4 <= d3) return b;
@@ -23,10 +23,10 @@ static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u
     if (vc <= 0 && d1 >= 0 && d3 <= 0) {
         *u = d1 > d3 ? d1 / (d1 - d3) : 0;
         *part = 3;
-        return tmr_mad(a, ab, *u);
+        return txm_d3_mad(a, ab, *u);
     }
-    const tmr_vec cp = tmr_sub(p, c);
-    const double d5 = tmr_dot(ab, cp), d6 = tmr_dot(ac, cp);
+    const txm_dvec3 cp = txm_d3_sub(p, c);
+    const double d5 = txm_d3_dot(ab, cp), d6 = txm_d3_dot(ac, cp);
     *u = 0;
     *v = 1;
     *part = 6;
@@ -35,7 +35,7 @@ static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u
     if (vb <= 0 && d2 >= 0 && d6 <= 0) {
         *v = d2 > d6 ? d2 / (d2 - d6) : 0;
         *part = 2;
-        return tmr_mad(a, ac, *v);
+        return txm_d3_mad(a, ac, *v);
     }
     const double va = d3 * d6 - d5 * d4;
     if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
@@ -43,35 +43,35 @@ static tmr_vec tmr_nearest(tmr_vec p, tmr_vec a, tmr_vec b, tmr_vec c, double *u
         *v = n > 0 ? (d4 - d3) / n : 0;
         *u = 1 - *v;
         *part = 1;
-        return tmr_mad(b, tmr_sub(c, b), *v);
+        return txm_d3_mad(b, txm_d3_sub(c, b), *v);
     }
     const double n = va + vb + vc;
     *u = n > 0 ? vb / n : 0;
     *v = n > 0 ? vc / n : 0;
     *part = 0;
-    return tmr_add(tmr_mad(a, ab, *u), tmr_scale(ac, *v));
+    return txm_d3_add(txm_d3_mad(a, ab, *u), txm_d3_scale(ac, *v));
 }
 
 typedef struct tmr_place {
-    tmr_vec p;    /* on the surface         */
+    txm_dvec3 p;  /* on the surface         */
     int32_t face; /* in this face of it     */
     double u, v;  /* weights of corners 1, 2 */
     double d2;    /* squared distance from what was projected */
     int part;     /* as tmr_nearest has it  */
 } tmr_place;
 
-static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, tmr_vec p) {
+static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, txm_dvec3 p) {
     tmr_place at;
     const int32_t *v = s->vertex + 3 * face;
     at.face = face;
     at.p = tmr_nearest(p, s->point[v[0]], s->point[v[1]], s->point[v[2]], &at.u, &at.v, &at.part);
-    at.d2 = tmr_dist2(p, at.p);
+    at.d2 = txm_d3_dist2(p, at.p);
     return at;
 }
 
 /* Walk from a face to where the surface is nearest to p, as long as it gets nearer: linear in the
    way, and it cannot jump to another sheet. */
-static tmr_place tmr_project(const tmr_surface *s, tmr_vec p, int32_t face) {
+static tmr_place tmr_project(const tmr_surface *s, txm_dvec3 p, int32_t face) {
     tmr_place at = tmr_on_face(s, face, p);
     for (int guard = 0; guard < 4096 && at.part != 0; guard++) {
         tmr_place best = at;
@@ -96,15 +96,15 @@ static tmr_place tmr_project(const tmr_surface *s, tmr_vec p, int32_t face) {
 }
 
 /* the smooth normal at a place; beside a crease that of the face */
-static tmr_vec tmr_normal_at(const tmr_surface *s, const tmr_lines *l, const tmr_place *at) {
+static txm_dvec3 tmr_normal_at(const tmr_surface *s, const tmr_lines *l, const tmr_place *at) {
     const double w[3] = {1 - at->u - at->v, at->u, at->v};
-    tmr_vec n = tmr_v(0, 0, 0);
+    txm_dvec3 n = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
         const int32_t v = s->vertex[3 * at->face + k];
         const int sharp = l->kind[v] == TRIMESH_CREASE || l->kind[v] == TRIMESH_CORNER;
-        n = tmr_mad(n, sharp ? s->normal[at->face] : s->vertex_normal[v], w[k]);
+        n = txm_d3_mad(n, sharp ? s->normal[at->face] : s->vertex_normal[v], w[k]);
     }
-    return tmr_len2(n) > 0.01 ? tmr_unit(n) : s->normal[at->face];
+    return txm_d3_len2(n) > 0.01 ? txm_d3_unit(n) : s->normal[at->face];
 }
 
 static double tmr_scale_at(const tmr_surface *s, const tmr_place *at) {

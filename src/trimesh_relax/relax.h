@@ -6,13 +6,13 @@
 /* ---- flips -------------------------------------------------------------------------------- */
 
 /* 2 inradius / circumradius, 1 for an equilateral triangle; negative if it disagrees with n */
-static double tmr_quality(tmr_vec a, tmr_vec b, tmr_vec c, tmr_vec n) {
-    const tmr_vec cross = tmr_area2(a, b, c);
-    const double x = tmr_dist(b, c), y = tmr_dist(c, a), z = tmr_dist(a, b);
+static double tmr_quality(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 n) {
+    const txm_dvec3 cross = txm_d3_area2(a, b, c);
+    const double x = txm_d3_dist(b, c), y = txm_d3_dist(c, a), z = txm_d3_dist(a, b);
     const double bottom = (x + y + z) * x * y * z;
-    const double area2 = tmr_len(cross);
+    const double area2 = txm_d3_len(cross);
     const double q = bottom > 0 ? 4 * area2 * area2 / bottom : 0; /* 8 A^2 / (s a b c) */
-    return tmr_dot(cross, n) < TMR_LEAST_AGREEMENT * area2 ? -1 : q;
+    return txm_d3_dot(cross, n) < TMR_LEAST_AGREEMENT * area2 ? -1 : q;
 }
 
 /* neighbours that a vertex should have, ghosts too */
@@ -48,7 +48,7 @@ static int tmr_look_at_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
     q->b = m->vertex[tmr_prev(c)];
     q->d = m->vertex[c];
     q->e = m->vertex[o];
-    const tmr_vec a = m->p[q->a], b = m->p[q->b], d = m->p[q->d], e = m->p[q->e];
+    const txm_dvec3 a = m->p[q->a], b = m->p[q->b], d = m->p[q->d], e = m->p[q->e];
     q->before = fmin(tmr_quality(d, a, b, tmr_expected_normal(w, q->d, q->a, q->b)),
                      tmr_quality(e, b, a, tmr_expected_normal(w, q->e, q->b, q->a)));
     q->after = fmin(tmr_quality(d, a, e, tmr_expected_normal(w, q->d, q->a, q->e)),
@@ -58,15 +58,16 @@ static int tmr_look_at_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
 
 /* Is the sum of the two angles opposite to the edge of c over pi? (Delaunay) */
 static int tmr_is_wide(const tmr_mesh *m, int32_t c) {
-    const tmr_vec a = m->p[m->vertex[tmr_next(c)]], b = m->p[m->vertex[tmr_prev(c)]];
-    const tmr_vec d = m->p[m->vertex[c]], e = m->p[m->vertex[m->opposite[c]]];
-    const tmr_vec da = tmr_sub(a, d), db = tmr_sub(b, d), ea = tmr_sub(a, e), eb = tmr_sub(b, e);
-    const double cd = tmr_dot(da, db), ce = tmr_dot(ea, eb);
+    const txm_dvec3 a = m->p[m->vertex[tmr_next(c)]], b = m->p[m->vertex[tmr_prev(c)]];
+    const txm_dvec3 d = m->p[m->vertex[c]], e = m->p[m->vertex[m->opposite[c]]];
+    const txm_dvec3 da = txm_d3_sub(a, d), db = txm_d3_sub(b, d), ea = txm_d3_sub(a, e),
+                    eb = txm_d3_sub(b, e);
+    const double cd = txm_d3_dot(da, db), ce = txm_d3_dot(ea, eb);
     if (cd >= 0 && ce >= 0) return 0;
-    const double sd = tmr_len(tmr_cross(da, db)), se = tmr_len(tmr_cross(ea, eb));
+    const double sd = txm_d3_len(txm_d3_cross(da, db)), se = txm_d3_len(txm_d3_cross(ea, eb));
     /* sin(d + e) < 0, a little less so that equal diagonals stay */
-    return sd * ce + se * cd < -1e-6 * sqrt(tmr_len2(da) * tmr_len2(db) * tmr_len2(ea)
-                                            * tmr_len2(eb));
+    return sd * ce + se * cd <
+           -1e-6 * sqrt(txm_d3_len2(da) * txm_d3_len2(db) * txm_d3_len2(ea) * txm_d3_len2(eb));
 }
 
 /* Which corners' edges are wide? Bits 0 to 2 of w->flag, one byte per triangle. */
@@ -128,22 +129,23 @@ static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
    pull, the others are that turned by 120 degrees. The fit is the mean of the three corners turned
    back onto the first:
        pull = (A + R^-1 B + R^-2 C) / 3 = A / 2 + sqrt(3) / 6 n x (C - B)                        */
-static tmr_vec tmr_fit(const tmr_work *w, const int32_t *v, tmr_vec *centre, tmr_vec *n) {
+static txm_dvec3 tmr_fit(const tmr_work *w, const int32_t *v, txm_dvec3 *centre, txm_dvec3 *n) {
     const tmr_mesh *m = &w->m;
-    const tmr_vec a = m->p[v[0]], b = m->p[v[1]], c = m->p[v[2]];
-    *centre = tmr_scale(tmr_add(tmr_add(a, b), c), 1.0 / 3);
+    const txm_dvec3 a = m->p[v[0]], b = m->p[v[1]], c = m->p[v[2]];
+    *centre = txm_d3_scale(txm_d3_add(txm_d3_add(a, b), c), 1.0 / 3);
     *n = tmr_expected_normal(w, v[0], v[1], v[2]);
-    tmr_vec arm = tmr_sub(a, *centre);
-    arm = tmr_mad(arm, *n, -tmr_dot(arm, *n));
-    tmr_vec pull = tmr_add(tmr_scale(arm, 0.5),
-                           tmr_scale(tmr_cross(*n, tmr_sub(c, b)), 0.28867513459481287));
+    txm_dvec3 arm = txm_d3_sub(a, *centre);
+    arm = txm_d3_mad(arm, *n, -txm_d3_dot(arm, *n));
+    txm_dvec3 pull =
+        txm_d3_add(txm_d3_scale(arm, 0.5),
+                   txm_d3_scale(txm_d3_cross(*n, txm_d3_sub(c, b)), 0.28867513459481287));
     const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
-    const double radius = size * 0.57735026918962576, length = tmr_len(pull);
+    const double radius = size * 0.57735026918962576, length = txm_d3_len(pull);
     if (length < 0.1 * radius) { /* turned over or flat: start from its first corner */
-        const double arm_length = tmr_len(arm);
-        return arm_length > 0 ? tmr_scale(arm, radius / arm_length) : pull;
+        const double arm_length = txm_d3_len(arm);
+        return arm_length > 0 ? txm_d3_scale(arm, radius / arm_length) : pull;
     }
-    return tmr_scale(pull, ((1 - w->pull) * length + w->pull * radius) / length);
+    return txm_d3_scale(pull, ((1 - w->pull) * length + w->pull * radius) / length);
 }
 
 /* the two neighbours of a vertex on its line; 0 if they are not just two */
@@ -173,28 +175,29 @@ static void tmr_relax_vertex(tmr_work *w, int32_t v) {
         int32_t two[2];
         if (!tmr_line_neighbors(m, v, two)) return;
         const double a = 1 / (double)w->size[two[0]], b = 1 / (double)w->size[two[1]];
-        const tmr_vec p = tmr_scale(tmr_add(tmr_scale(m->p[two[0]], a), tmr_scale(m->p[two[1]], b)),
-                                    1 / (a + b));
-        w->moved[v] = tmr_project_line(w->s, w->l, tmr_scale(tmr_add(m->p[v], p), 0.5),
-                                       &w->landed[v]);
+        const txm_dvec3 p = txm_d3_scale(
+            txm_d3_add(txm_d3_scale(m->p[two[0]], a), txm_d3_scale(m->p[two[1]], b)), 1 / (a + b));
+        w->moved[v] =
+            tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[v], p), 0.5), &w->landed[v]);
         return;
     }
-    tmr_vec sum = tmr_v(0, 0, 0);
+    txm_dvec3 sum = txm_d3(0, 0, 0);
     int count = 0;
     int32_t c = m->corner[v];
     const int32_t first = c;
     do {
         const int32_t corners[3] = {v, m->vertex[tmr_next(c)], m->vertex[tmr_prev(c)]};
         if (!tmr_is_ghost(m, corners[1]) && !tmr_is_ghost(m, corners[2])) {
-            tmr_vec centre, n;
-            const tmr_vec pull = tmr_fit(w, corners, &centre, &n);
-            sum = tmr_add(sum, tmr_add(centre, pull));
+            txm_dvec3 centre, n;
+            const txm_dvec3 pull = tmr_fit(w, corners, &centre, &n);
+            sum = txm_d3_add(sum, txm_d3_add(centre, pull));
             count++;
         }
         c = tmr_swing(m, c);
     } while (c != first);
     if (count == 0) return;
-    const tmr_vec to = tmr_mad(m->p[v], tmr_sub(tmr_scale(sum, 1.0 / count), m->p[v]), w->step);
+    const txm_dvec3 to =
+        txm_d3_mad(m->p[v], txm_d3_sub(txm_d3_scale(sum, 1.0 / count), m->p[v]), w->step);
     const tmr_place at = tmr_project(w->s, to, m->source[v]);
     w->moved[v] = at.p;
     w->landed[v] = at.face;
@@ -208,7 +211,7 @@ static void tmr_relax_chunk(void *context, int index) {
 }
 
 static int tmr_has_moved(const tmr_work *w, int32_t v) {
-    const tmr_vec a = w->moved[v], b = w->m.p[v];
+    const txm_dvec3 a = w->moved[v], b = w->m.p[v];
     return a.x < b.x || a.x > b.x || a.y < b.y || a.y > b.y || a.z < b.z || a.z > b.z;
 }
 
@@ -292,7 +295,7 @@ static double tmr_ideal_length(const tmr_work *w) {
         const int32_t *v = m->vertex + 3 * f;
         if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
         const double size = (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
-        sum += 0.5 * tmr_len(tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]])) / (size * size);
+        sum += 0.5 * txm_d3_len(txm_d3_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]])) / (size * size);
         count++;
     }
     return count ? sqrt(sum / count * 2.3094010767585034) : 0; /* area = sqrt(3) / 4 L^2 */

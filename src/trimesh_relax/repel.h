@@ -16,7 +16,7 @@ static int tmr_find_near(const tmr_work *w, int32_t v, int32_t near[TMR_NEAR]) {
         const int32_t first = c;
         do {
             const int32_t x = m->vertex[tmr_next(c)];
-            int known = tmr_is_ghost(m, x) || tmr_dist2(m->p[x], m->p[v]) > reach * reach;
+            int known = tmr_is_ghost(m, x) || txm_d3_dist2(m->p[x], m->p[v]) > reach * reach;
             for (int k = 0; k < count && !known; k++) known = near[k] == x;
             if (!known && count < TMR_NEAR) near[count++] = x;
             c = tmr_swing(m, c);
@@ -38,25 +38,27 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
     int32_t near[TMR_NEAR];
-    tmr_vec push = tmr_v(0, 0, 0);
+    txm_dvec3 push = txm_d3(0, 0, 0);
     tmr_stay(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
     const int count = tmr_find_near(w, v, near);
     for (int i = 1; i < count; i++) {
         const int32_t x = near[i];
         if (kind != TRIMESH_FREE && tmr_kind_of(m, x) == TRIMESH_FREE) continue;
-        tmr_vec d = tmr_sub(m->p[v], m->p[x]);
+        txm_dvec3 d = txm_d3_sub(m->p[v], m->p[x]);
         const double r = TMR_REACH * w->length * 0.5 * (w->size[v] + (double)w->size[x]);
-        const double chord = tmr_len(d), length = chord * tmr_arc(tmr_dot(m->n[v], m->n[x]));
+        const double chord = txm_d3_len(d), length = chord * tmr_arc(txm_d3_dot(m->n[v], m->n[x]));
         if (length >= r) continue;
-        if (chord > 0) d = tmr_scale(d, 1 / chord);
-        else d = tmr_scale(tmr_unit(tmr_cross(m->n[v], tmr_v(0.6, 0.64, 0.48))), v < x ? 1 : -1);
-        push = tmr_mad(push, d, w->step * (r - length));
+        if (chord > 0) d = txm_d3_scale(d, 1 / chord);
+        else
+            d = txm_d3_scale(txm_d3_unit(txm_d3_cross(m->n[v], txm_d3(0.6, 0.64, 0.48))),
+                             v < x ? 1 : -1);
+        push = txm_d3_mad(push, d, w->step * (r - length));
     }
     /* not farther than to where others push the other way */
-    const double limit = 0.5 * w->length * w->size[v], way = tmr_len(push);
-    if (way > limit) push = tmr_scale(push, limit / way);
-    const tmr_vec to = tmr_add(m->p[v], push);
+    const double limit = 0.5 * w->length * w->size[v], way = txm_d3_len(push);
+    if (way > limit) push = txm_d3_scale(push, limit / way);
+    const txm_dvec3 to = txm_d3_add(m->p[v], push);
     if (kind != TRIMESH_FREE) {
         w->moved[v] = tmr_project_line(w->s, w->l, to, &w->landed[v]);
         return;
@@ -78,12 +80,12 @@ static void tmr_repel_chunk(void *context, int index) {
 static int tmr_would_turn(const tmr_work *w, int32_t face) {
     const int32_t *v = w->m.vertex + 3 * face;
     if (v[0] < 0 || tmr_is_ghost_face(&w->m, face)) return 0;
-    const tmr_vec *p = w->moved, *q = w->m.p;
-    const tmr_vec after = tmr_area2(p[v[0]], p[v[1]], p[v[2]]);
-    const tmr_vec before = tmr_area2(q[v[0]], q[v[1]], q[v[2]]);
-    if (tmr_dot(after, before) > 0) return 0;
-    const tmr_vec n = tmr_expected_normal(w, v[0], v[1], v[2]);
-    return tmr_dot(after, n) <= 0 && tmr_dot(before, n) >= 0;
+    const txm_dvec3 *p = w->moved, *q = w->m.p;
+    const txm_dvec3 after = txm_d3_area2(p[v[0]], p[v[1]], p[v[2]]);
+    const txm_dvec3 before = txm_d3_area2(q[v[0]], q[v[1]], q[v[2]]);
+    if (txm_d3_dot(after, before) > 0) return 0;
+    const txm_dvec3 n = tmr_expected_normal(w, v[0], v[1], v[2]);
+    return txm_d3_dot(after, n) <= 0 && txm_d3_dot(before, n) >= 0;
 }
 
 static void tmr_hold_turning(tmr_work *w) {
@@ -118,7 +120,7 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
     txm_parallel_for(w->env, chunks, tmr_repel_chunk, w);
     for (int32_t v = 0; v < m->vertex_count; v++) {
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
-        const double d = tmr_dist(w->moved[v], m->p[v]) / (w->length * w->size[v]);
+        const double d = txm_d3_dist(w->moved[v], m->p[v]) / (w->length * w->size[v]);
         sum += d;
         if (d > most) most = d;
     }

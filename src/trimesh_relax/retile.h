@@ -138,7 +138,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
         TRIMESH_ASSERT(mesh->vertex_count < (size_t)m->live);
         const size_t k = mesh->vertex_count++;
-        const tmr_vec p = tmr_add(tmr_scale(m->p[v], s->diagonal), s->centre);
+        const txm_dvec3 p = txm_d3_add(txm_d3_scale(m->p[v], s->diagonal), s->centre);
         number[v] = (int32_t)k;
         mesh->positions[3 * k] = txm_float(p.x);
         mesh->positions[3 * k + 1] = txm_float(p.y);

@@ -164,8 +164,8 @@ static int tmr_tx_owns(const tmr_tx_scatter *s, size_t t, size_t rotation, const
 /* ---- geometry on triangles: how many where --------------------------------------------------- */
 
 /* The edge length of the triangle, as heights and scales take it. */
-static double tmr_tx_unit(const tmr_tx_scatter *s, tmr_vec area2) {
-    return s->desc->unit > 0 ? s->desc->unit : sqrt(tmr_len(area2) / TMR_TX_H);
+static double tmr_tx_unit(const tmr_tx_scatter *s, txm_dvec3 area2) {
+    return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMR_TX_H);
 }
 
 static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
@@ -173,17 +173,17 @@ static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
     const trimesh_view *mesh = &s->desc->mesh;
     const double height = s->desc->inside ? -s->desc->height : s->desc->height;
     for (size_t t = first; t < end; t++) {
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_tx_corners(mesh, t, p);
-        const tmr_vec flat = tmr_area2(p[0], p[1], p[2]);
+        const txm_dvec3 flat = txm_d3_area2(p[0], p[1], p[2]);
         const double up = height * tmr_tx_unit(s, flat);
         for (size_t k = 0; k < 3; k++) {
             const float *n = s->normals + 3 * (size_t)mesh->indices[3 * t + k];
-            p[k] = tmr_mad(p[k], tmr_tx_vec(n), up);
+            p[k] = txm_d3_mad(p[k], tmr_tx_vec(n), up);
         }
-        const tmr_vec there = tmr_area2(p[0], p[1], p[2]);
+        const txm_dvec3 there = txm_d3_area2(p[0], p[1], p[2]);
         /* beyond the centre of a bend the triangle is turned over: no room there */
-        s->area[t] = tmr_dot(there, flat) > 0 ? 0.5 * tmr_len(there) : 0;
+        s->area[t] = txm_d3_dot(there, flat) > 0 ? 0.5 * txm_d3_len(there) : 0;
     }
 }
 
@@ -204,9 +204,9 @@ static void tmr_tx_morton(const trimesh_view *mesh, txm_pair *pairs) {
         if (mesh->positions[i] - low[i % 3] > size) size = mesh->positions[i] - low[i % 3];
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         uint32_t key = 0;
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         tmr_tx_corners(mesh, t, p);
-        const tmr_vec sum = tmr_add(tmr_add(p[0], p[1]), p[2]);
+        const txm_dvec3 sum = txm_d3_add(txm_d3_add(p[0], p[1]), p[2]);
         const double at[3] = {sum.x / 3 - low[0], sum.y / 3 - low[1], sum.z / 3 - low[2]};
         for (int k = 0; k < 3; k++) {
             const int cell = size > 0 ? (int)(at[k] / size * 1023.5) : 0;
@@ -285,7 +285,7 @@ static void tmr_tx_quat_mul(const double a[4], const double b[4], double out[4])
 }
 
 /* The quaternion of the frame x, y, z, by its largest component [Shepperd 1978]; not of length 1. */
-static void tmr_tx_quat_frame(tmr_vec x, tmr_vec y, tmr_vec z, double q[4]) {
+static void tmr_tx_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
     const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
                          1 + x.x + y.y + z.z};
     int k = 3;
@@ -299,20 +299,20 @@ static void tmr_tx_quat_frame(tmr_vec x, tmr_vec y, tmr_vec z, double q[4]) {
 }
 
 /* A unit vector at a right angle to the unit vector n, near x if there is one. */
-static tmr_vec tmr_tx_tangent(tmr_vec x, tmr_vec n) {
-    x = tmr_mad(x, n, -tmr_dot(x, n));
-    if (tmr_len2(x) > 0) return tmr_unit(x);
+static txm_dvec3 tmr_tx_tangent(txm_dvec3 x, txm_dvec3 n) {
+    x = txm_d3_mad(x, n, -txm_d3_dot(x, n));
+    if (txm_d3_len2(x) > 0) return txm_d3_unit(x);
     const txm_vec3 p = txm_vec3_perpendicular(
         txm_v3(txm_float(n.x), txm_float(n.y), txm_float(n.z)));
-    x = tmr_v(p.x, p.y, p.z);
-    return tmr_unit(tmr_mad(x, n, -tmr_dot(x, n)));
+    x = txm_d3(p.x, p.y, p.z);
+    return txm_d3_unit(txm_d3_mad(x, n, -txm_d3_dot(x, n)));
 }
 
 /* A triangle that a patch lies on. */
 typedef struct tmr_tx_base {
-    tmr_vec p[3], n[3]; /* by the corner of the patch                     */
-    tmr_vec ex, ey;     /* images of the patch's axes                     */
-    tmr_vec up;         /* twice the area times the normal                */
+    txm_dvec3 p[3], n[3]; /* by the corner of the patch                     */
+    txm_dvec3 ex, ey;     /* images of the patch's axes                     */
+    txm_dvec3 up;         /* twice the area times the normal                */
     double unit, edge;  /* for heights and scales; the triangle's own     */
 } tmr_tx_base;
 
@@ -323,24 +323,25 @@ static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation,
         b->p[to] = tmr_tx_vec(mesh->positions + 3 * v);
         b->n[to] = tmr_tx_vec(s->normals + 3 * v);
     }
-    b->up = tmr_area2(b->p[0], b->p[1], b->p[2]);
-    b->ex = tmr_sub(b->p[1], b->p[0]);
-    b->ey = tmr_scale(tmr_sub(b->p[2], tmr_scale(tmr_add(b->p[0], b->p[1]), 0.5)), 1 / TMR_TX_H);
+    b->up = txm_d3_area2(b->p[0], b->p[1], b->p[2]);
+    b->ex = txm_d3_sub(b->p[1], b->p[0]);
+    b->ey = txm_d3_scale(txm_d3_sub(b->p[2], txm_d3_scale(txm_d3_add(b->p[0], b->p[1]), 0.5)),
+                         1 / TMR_TX_H);
     b->unit = tmr_tx_unit(s, b->up);
-    b->edge = sqrt(tmr_len(b->up) / TMR_TX_H);
+    b->edge = sqrt(txm_d3_len(b->up) / TMR_TX_H);
 }
 
 /* Phong tessellation [Boubekeur, Alexa 2008]: the point p of the triangle moves towards its feet on
    the tangent planes at the corners, here half the way, which on a sphere leads back to it:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
-static tmr_vec tmr_tx_bulge(const tmr_tx_base *b, const double w[3], tmr_vec p, double curve) {
-    tmr_vec sum = tmr_v(0, 0, 0);
+static txm_dvec3 tmr_tx_bulge(const tmr_tx_base *b, const double w[3], txm_dvec3 p, double curve) {
+    txm_dvec3 sum = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++)
-        sum = tmr_mad(sum, b->n[k], w[k] * tmr_dot(tmr_sub(b->p[k], p), b->n[k]));
-    sum = tmr_scale(sum, 0.5 * curve);
-    const double length = tmr_len(sum);
-    return length > b->edge ? tmr_scale(sum, b->edge / length) : sum;
+        sum = txm_d3_mad(sum, b->n[k], w[k] * txm_d3_dot(txm_d3_sub(b->p[k], p), b->n[k]));
+    sum = txm_d3_scale(sum, 0.5 * curve);
+    const double length = txm_d3_len(sum);
+    return length > b->edge ? txm_d3_scale(sum, b->edge / length) : sum;
 }
 
 /* A random turn about z: half the angle is that of a random point of the disc. */
@@ -369,22 +370,22 @@ static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, con
                               uint64_t h, trimesh_instance *out) {
     const trimesh_scatter_desc *d = s->desc;
     const double *w = item->w, side = d->inside ? -1 : 1;
-    tmr_vec p = tmr_scale(b->p[0], w[0]), n = tmr_scale(b->n[0], w[0]);
+    txm_dvec3 p = txm_d3_scale(b->p[0], w[0]), n = txm_d3_scale(b->n[0], w[0]);
     for (int k = 1; k < 3; k++) {
-        p = tmr_mad(p, b->p[k], w[k]);
-        n = tmr_mad(n, b->n[k], w[k]);
+        p = txm_d3_mad(p, b->p[k], w[k]);
+        n = txm_d3_mad(n, b->n[k], w[k]);
     }
-    n = tmr_unit(tmr_len2(n) > 0 ? n : b->up);
-    if (!(tmr_len2(n) > 0)) n = tmr_v(0, 0, 1);
-    if (d->curve > 0) p = tmr_add(p, tmr_tx_bulge(b, w, p, d->curve));
-    p = tmr_mad(p, n, side * (item->height + d->height) * b->unit);
+    n = txm_d3_unit(txm_d3_len2(n) > 0 ? n : b->up);
+    if (!(txm_d3_len2(n) > 0)) n = txm_d3(0, 0, 1);
+    if (d->curve > 0) p = txm_d3_add(p, tmr_tx_bulge(b, w, p, d->curve));
+    p = txm_d3_mad(p, n, side * (item->height + d->height) * b->unit);
     /* In the plane of the triangle the nearest rotation takes x to ex + ey turned back by 90 degrees;
        seen from below, where the winding is the other one, turned forth. */
-    const double back = tmr_dot(n, b->up) < 0 ? -1 : 1;
-    const tmr_vec x = tmr_tx_tangent(tmr_mad(b->ex, tmr_cross(b->ey, n), back), n);
-    const tmr_vec z = tmr_scale(n, side);
+    const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
+    const txm_dvec3 x = tmr_tx_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
+    const txm_dvec3 z = txm_d3_scale(n, side);
     double q[4], r[4], spin[4];
-    tmr_tx_quat_frame(x, tmr_cross(z, x), z, q);
+    tmr_tx_quat_frame(x, txm_d3_cross(z, x), z, q);
     tmr_tx_quat_mul(q, item->turn, r);
     if (d->spin) {
         tmr_tx_spin(h, spin);
@@ -556,10 +557,10 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
 TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
                                         float out[3]) {
     const double x = instance->rotation[0], y = instance->rotation[1], z = instance->rotation[2];
-    const tmr_vec axis = tmr_v(x, y, z), p = tmr_scale(tmr_tx_vec(point), instance->scale);
-    const tmr_vec t = tmr_scale(tmr_cross(axis, p), 2);
-    const tmr_vec turned =
-        tmr_add(tmr_mad(p, t, instance->rotation[3]), tmr_cross(axis, t));
+    const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(tmr_tx_vec(point), instance->scale);
+    const txm_dvec3 t = txm_d3_scale(txm_d3_cross(axis, p), 2);
+    const txm_dvec3 turned =
+        txm_d3_add(txm_d3_mad(p, t, instance->rotation[3]), txm_d3_cross(axis, t));
     out[0] = txm_float(turned.x + instance->position[0]);
     out[1] = txm_float(turned.y + instance->position[1]);
     out[2] = txm_float(turned.z + instance->position[2]);

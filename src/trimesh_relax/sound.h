@@ -6,13 +6,14 @@
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
 /* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
-static int tmr_crosses(tmr_vec p, tmr_vec q, tmr_vec a, tmr_vec b, tmr_vec c, int rim) {
-    const tmr_vec e1 = tmr_sub(b, a), e2 = tmr_sub(c, a), d = tmr_sub(q, p);
-    const tmr_vec h = tmr_cross(d, e2);
-    const double det = tmr_dot(e1, h), eps = 1e-10, least = rim ? -eps : eps;
-    if (fabs(det) <= 1e-10 * tmr_len(e1) * tmr_len(e2) * tmr_len(d)) return 0;
-    const tmr_vec s = tmr_sub(p, a), k = tmr_cross(s, e1);
-    const double u = tmr_dot(s, h) / det, v = tmr_dot(d, k) / det, t = tmr_dot(e2, k) / det;
+static int tmr_crosses(txm_dvec3 p, txm_dvec3 q, txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, int rim) {
+    const txm_dvec3 e1 = txm_d3_sub(b, a), e2 = txm_d3_sub(c, a), d = txm_d3_sub(q, p);
+    const txm_dvec3 h = txm_d3_cross(d, e2);
+    const double det = txm_d3_dot(e1, h), eps = 1e-10, least = rim ? -eps : eps;
+    if (fabs(det) <= 1e-10 * txm_d3_len(e1) * txm_d3_len(e2) * txm_d3_len(d)) return 0;
+    const txm_dvec3 s = txm_d3_sub(p, a), k = txm_d3_cross(s, e1);
+    const double u = txm_d3_dot(s, h) / det, v = txm_d3_dot(d, k) / det,
+                 t = txm_d3_dot(e2, k) / det;
     return u > least && v > least && u + v < 1 - least && t > eps && t < 1 - eps;
 }
 
@@ -30,15 +31,15 @@ static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
         }
     }
     if (shared > 1) return 0;
-    const tmr_vec a[3] = {m->p[v[0]], m->p[v[1]], m->p[v[2]]};
-    const tmr_vec b[3] = {m->p[w[0]], m->p[w[1]], m->p[w[2]]};
+    const txm_dvec3 a[3] = {m->p[v[0]], m->p[v[1]], m->p[v[2]]};
+    const txm_dvec3 b[3] = {m->p[w[0]], m->p[w[1]], m->p[w[2]]};
     if (shared == 1)
         return tmr_crosses(a[(kf + 1) % 3], a[(kf + 2) % 3], b[0], b[1], b[2], rim) ||
                tmr_crosses(b[(kg + 1) % 3], b[(kg + 2) % 3], a[0], a[1], a[2], rim);
-    const tmr_vec n = tmr_area2(a[0], a[1], a[2]);
+    const txm_dvec3 n = txm_d3_area2(a[0], a[1], a[2]);
     double low = 0, high = 0; /* of b on either side of a's plane */
     for (int i = 0; i < 3; i++) {
-        const double d = tmr_dot(n, tmr_sub(b[i], a[0]));
+        const double d = txm_d3_dot(n, txm_d3_sub(b[i], a[0]));
         low = i == 0 || d < low ? d : low;
         high = i == 0 || d > high ? d : high;
     }
@@ -63,17 +64,17 @@ static uint32_t tmr_cell_key(int32_t x, int32_t y, int32_t z) {
                                0x85ebca77u * 65537u + ((uint64_t)(uint32_t)z << 40)) >> 32);
 }
 
-static void tmr_face_box(const tmr_mesh *m, int32_t f, tmr_vec *low, tmr_vec *high) {
+static void tmr_face_box(const tmr_mesh *m, int32_t f, txm_dvec3 *low, txm_dvec3 *high) {
     *low = *high = m->p[m->vertex[3 * f]];
     for (int k = 1; k < 3; k++) {
-        const tmr_vec p = m->p[m->vertex[3 * f + k]];
-        *low = tmr_v(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
-        *high = tmr_v(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
+        const txm_dvec3 p = m->p[m->vertex[3 * f + k]];
+        *low = txm_d3(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
+        *high = txm_d3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
     }
 }
 
 static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
-    tmr_vec low, high;
+    txm_dvec3 low, high;
     tmr_face_box(m, f, &low, &high);
     for (int32_t x = (int32_t)floor(low.x / g->cell); x <= (int32_t)floor(high.x / g->cell); x++) {
         for (int32_t y = (int32_t)floor(low.y / g->cell); y <= (int32_t)floor(high.y / g->cell); y++) {
@@ -92,7 +93,7 @@ static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
 
 enum { TMR_NEAR_CELLS = 1 << 16 }; /* coarse cells by hash that are near a marked vertex, or seem so */
 
-static uint32_t tmr_near_key(tmr_vec p, double cell, int dx, int dy, int dz) {
+static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
     return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
                         (int32_t)floor(p.z / cell) + dz) % TMR_NEAR_CELLS;
 }
@@ -143,11 +144,11 @@ static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_a
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
         for (size_t x = i; x < end; x++) {
             const int32_t f = (int32_t)g.entry[x].value;
-            tmr_vec low, high;
+            txm_dvec3 low, high;
             tmr_face_box(m, f, &low, &high);
             for (size_t y = x + 1; y < end; y++) {
                 const int32_t h = (int32_t)g.entry[y].value;
-                tmr_vec low2, high2;
+                txm_dvec3 low2, high2;
                 if (f == h) continue;
                 tmr_face_box(m, h, &low2, &high2);
                 if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
@@ -167,12 +168,13 @@ enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one s
 
 /* Does the surface face along n anywhere near the place? Looks at the faces that hang together
    with it, as far as they reach into a ball around p. */
-static int tmr_faces_along(const tmr_surface *s, tmr_vec n, int32_t face, tmr_vec p, double radius) {
+static int tmr_faces_along(const tmr_surface *s, txm_dvec3 n, int32_t face, txm_dvec3 p,
+                           double radius) {
     int32_t list[TMR_SPOT_FACES];
     int count = 1;
     list[0] = face;
     for (int i = 0; i < count; i++) {
-        if (tmr_dot(n, s->normal[list[i]]) > 0.3) return 1;
+        if (txm_d3_dot(n, s->normal[list[i]]) > 0.3) return 1;
         for (int k = 0; k < 3 && count < TMR_SPOT_FACES; k++) {
             const int32_t o = s->opposite[3 * list[i] + k];
             int known = o < 0;
@@ -194,18 +196,18 @@ static long tmr_count_turned(tmr_work *w, long *doubtful) {
     for (int32_t f = 0; f < m->face_count; f++) {
         const int32_t *v = m->vertex + 3 * f;
         if (v[0] < 0 || tmr_is_ghost_face(m, f)) continue;
-        const tmr_vec n = tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]);
-        const double longest = fmax(tmr_dist2(m->p[v[0]], m->p[v[1]]),
-                                    fmax(tmr_dist2(m->p[v[1]], m->p[v[2]]),
-                                         tmr_dist2(m->p[v[2]], m->p[v[0]])));
-        const double area2 = tmr_len(n);
+        const txm_dvec3 n = txm_d3_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]);
+        const double longest =
+            fmax(txm_d3_dist2(m->p[v[0]], m->p[v[1]]),
+                 fmax(txm_d3_dist2(m->p[v[1]], m->p[v[2]]), txm_d3_dist2(m->p[v[2]], m->p[v[0]])));
+        const double area2 = txm_d3_len(n);
         int turned = area2 < 1e-4 * longest, doubt = 0;
         if (!turned && tmr_agreement(w, v[0], v[1], v[2], m->p[v[0]], m->p[v[1]], m->p[v[2]]) < 0.2) {
             const tmr_place at = tmr_below_middle(w, v);
-            doubt = tmr_dot(n, w->s->normal[at.face]) < 0 &&
-                    tmr_dot(n, tmr_normal_at(w->s, w->l, &at)) < 0;
-            turned = doubt && !tmr_faces_along(w->s, tmr_scale(n, 1 / area2), at.face, tmr_middle(m, v),
-                                               sqrt(at.d2) + 0.45 * w->length);
+            doubt = txm_d3_dot(n, w->s->normal[at.face]) < 0 &&
+                    txm_d3_dot(n, tmr_normal_at(w->s, w->l, &at)) < 0;
+            turned = doubt && !tmr_faces_along(w->s, txm_d3_scale(n, 1 / area2), at.face,
+                                               tmr_middle(m, v), sqrt(at.d2) + 0.45 * w->length);
         }
         if (!turned && !doubt) continue;
         found += turned;
@@ -229,14 +231,16 @@ static long tmr_open_folds(tmr_work *w, double share) {
         const int32_t o = m->opposite[c], d = m->vertex[c], e = m->vertex[o];
         if (tmr_is_ghost(m, d) || tmr_is_ghost(m, e)) continue;
         const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-        const tmr_vec n = tmr_unit(tmr_area2(m->p[d], m->p[a], m->p[b]));
-        if (tmr_dot(n, tmr_unit(tmr_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
+        const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[d], m->p[a], m->p[b]));
+        if (txm_d3_dot(n, txm_d3_unit(txm_d3_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
         found++;
-        const tmr_vec far = tmr_scale(tmr_add(m->p[d], m->p[e]), 0.5);
-        const tmr_vec near = tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5);
-        const tmr_vec to = tmr_scale(tmr_unit(tmr_sub(far, near)), share * w->length);
-        if (tmr_kind_of(m, a) == TRIMESH_FREE) w->moved[a] = tmr_add(w->moved[a], tmr_scale(to, w->size[a]));
-        if (tmr_kind_of(m, b) == TRIMESH_FREE) w->moved[b] = tmr_add(w->moved[b], tmr_scale(to, w->size[b]));
+        const txm_dvec3 far = txm_d3_scale(txm_d3_add(m->p[d], m->p[e]), 0.5);
+        const txm_dvec3 near = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
+        const txm_dvec3 to = txm_d3_scale(txm_d3_unit(txm_d3_sub(far, near)), share * w->length);
+        if (tmr_kind_of(m, a) == TRIMESH_FREE)
+            w->moved[a] = txm_d3_add(w->moved[a], txm_d3_scale(to, w->size[a]));
+        if (tmr_kind_of(m, b) == TRIMESH_FREE)
+            w->moved[b] = txm_d3_add(w->moved[b], txm_d3_scale(to, w->size[b]));
     }
     if (found) tmr_settle(w);
     return found;
@@ -262,19 +266,19 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
         const int kind = tmr_kind_of(m, v);
         if (!w->bad[v] || m->corner[v] < 0 || (m->flags[v] & (TMR_GHOST | TMR_PINNED))) continue;
         if (kind == TRIMESH_BORDER || (kind != TRIMESH_FREE && !lines_too)) continue;
-        tmr_vec sum = tmr_v(0, 0, 0);
+        txm_dvec3 sum = txm_d3(0, 0, 0);
         int32_t count = 0, c = m->corner[v];
         const int32_t first = c;
         do {
             const int32_t to = m->vertex[tmr_next(c)];
             if (!tmr_is_ghost(m, to)) {
-                sum = tmr_add(sum, m->p[to]);
+                sum = txm_d3_add(sum, m->p[to]);
                 count++;
             }
             c = tmr_swing(m, c);
         } while (c != first);
         if (count == 0) continue;
-        m->p[v] = tmr_add(tmr_scale(m->p[v], 0.5), tmr_scale(sum, 0.5 / count));
+        m->p[v] = txm_d3_add(txm_d3_scale(m->p[v], 0.5), txm_d3_scale(sum, 0.5 / count));
         if (kind != TRIMESH_FREE) continue;
         const tmr_place at = tmr_project(w->s, m->p[v], m->source[v]);
         m->source[v] = at.face;
@@ -318,7 +322,7 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
     const size_t count = (size_t)w->m.vertex_count;
     txm_arena arena;
     long best = -1;
-    tmr_vec *kept = NULL;
+    txm_dvec3 *kept = NULL;
     int32_t *kept_source = NULL;
     uint8_t *near;
     txm_arena_init(&arena, env);
@@ -338,11 +342,11 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         if (best < 0 || score < best) {
             best = score;
             if (score > 0 && !kept) {
-                kept = (tmr_vec *)txm_arena_alloc(&arena, count, sizeof(tmr_vec));
+                kept = (txm_dvec3 *)txm_arena_alloc(&arena, count, sizeof(txm_dvec3));
                 kept_source = (int32_t *)txm_arena_alloc(&arena, count, sizeof(int32_t));
                 if (!kept || !kept_source) goto no_memory;
             }
-            if (kept) memcpy(kept, w->m.p, count * sizeof(tmr_vec));
+            if (kept) memcpy(kept, w->m.p, count * sizeof(txm_dvec3));
             if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
         }
         if (score == 0 || (best < 1000 && round >= 4)) break;
@@ -351,7 +355,7 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         tmr_smooth_marked(w, round >= 6);
     }
     if (best > 0) {
-        memcpy(w->m.p, kept, count * sizeof(tmr_vec));
+        memcpy(w->m.p, kept, count * sizeof(txm_dvec3));
         memcpy(w->m.source, kept_source, count * sizeof(int32_t));
     }
     *faults = best / 1000;

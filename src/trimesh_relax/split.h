@@ -9,7 +9,7 @@
 static double tmr_edge_size(const tmr_work *w, int32_t c) {
     const int32_t a = w->m.vertex[tmr_next(c)], b = w->m.vertex[tmr_prev(c)];
     const double wanted = w->length * 0.5 * (w->size[a] + (double)w->size[b]);
-    return tmr_dist(w->m.p[a], w->m.p[b]) / (w->m.edge[c] ? wanted * w->line_scale : wanted);
+    return txm_d3_dist(w->m.p[a], w->m.p[b]) / (w->m.edge[c] ? wanted * w->line_scale : wanted);
 }
 
 static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
@@ -19,12 +19,12 @@ static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
 
 /* Where b's triangles go when b is pulled into a at position to: is each of them fair? reach: no
    edge may become longer than this, relative to what is wanted; 0 = any. */
-static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, tmr_vec to, double reach) {
+static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, double reach) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
     for (int end = 0; end < 2; end++) {
         const int32_t first = end ? tmr_next(c) : tmr_prev(c), v = m->vertex[first];
-        if (end && tmr_dist2(m->p[v], to) <= 0) break; /* a stays */
+        if (end && txm_d3_dist2(m->p[v], to) <= 0) break; /* a stays */
         int32_t i = first;
         do {
             const int32_t x = m->vertex[tmr_next(i)], y = m->vertex[tmr_prev(i)];
@@ -35,7 +35,7 @@ static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, tmr_vec to, double
                     return 0;
                 if (reach > 0) {
                     const double wanted = w->length * 0.5 * (w->size[v] + (double)w->size[x]);
-                    if (tmr_dist2(to, m->p[x]) > reach * reach * wanted * wanted) return 0;
+                    if (txm_d3_dist2(to, m->p[x]) > reach * reach * wanted * wanted) return 0;
                 }
             }
             i = tmr_swing(m, i);
@@ -56,8 +56,8 @@ static int tmr_try_collapse(tmr_work *w, int32_t c, double reach, int middle) {
     const int32_t keep = m->vertex[tmr_next(c)];
     if (!tmr_can_collapse(m, c)) return 0;
     if (rank_a == 0 && rank_b == 0 && middle) {
-        const tmr_place at = tmr_project(w->s, tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5),
-                                         m->source[keep]);
+        const tmr_place at =
+            tmr_project(w->s, txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5), m->source[keep]);
         if (tmr_collapse_is_fair(w, c, at.p, reach)) {
             tmr_collapse(m, c);
             tmr_put(w, keep, &at);
@@ -75,35 +75,38 @@ static int tmr_try_collapse(tmr_work *w, int32_t c, double reach, int middle) {
 }
 
 /* Would the four triangles around a vertex at p on the edge of c be fair? */
-static int tmr_split_is_fair(const tmr_work *w, int32_t c, tmr_vec p, tmr_vec n) {
+static int tmr_split_is_fair(const tmr_work *w, int32_t c, txm_dvec3 p, txm_dvec3 n) {
     const tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-    const double length2 = tmr_dist2(m->p[a], m->p[b]);
-    if (fmax(tmr_dist2(p, m->p[a]), tmr_dist2(p, m->p[b])) > 0.6 * length2) return 0;
+    const double length2 = txm_d3_dist2(m->p[a], m->p[b]);
+    if (fmax(txm_d3_dist2(p, m->p[a]), txm_d3_dist2(p, m->p[b])) > 0.6 * length2) return 0;
     for (int side = 0; side < 2; side++) {
         const int32_t i = side ? m->opposite[c] : c, d = m->vertex[i];
         const int32_t x = m->vertex[tmr_next(i)], y = m->vertex[tmr_prev(i)];
         if (tmr_is_ghost(m, d)) continue;
-        const tmr_vec one = tmr_area2(m->p[d], m->p[x], p), two = tmr_area2(m->p[d], p, m->p[y]);
+        const txm_dvec3 one = txm_d3_area2(m->p[d], m->p[x], p),
+                        two = txm_d3_area2(m->p[d], p, m->p[y]);
         const double before = tmr_agreement(w, d, x, y, m->p[d], m->p[x], m->p[y]);
-        const tmr_vec whole = tmr_area2(m->p[d], m->p[x], m->p[y]);
+        const txm_dvec3 whole = txm_d3_area2(m->p[d], m->p[x], m->p[y]);
         if (before < TMR_LEAST_AGREEMENT) continue;
-        if (tmr_dot(one, whole) <= 0 || tmr_dot(two, whole) <= 0) return 0;
+        if (txm_d3_dot(one, whole) <= 0 || txm_d3_dot(two, whole) <= 0) return 0;
         if (m->edge[c]) continue;
-        if (tmr_dot(one, n) < 0.2 * tmr_len(one) || tmr_dot(two, n) < 0.2 * tmr_len(two)) return 0;
+        if (txm_d3_dot(one, n) < 0.2 * txm_d3_len(one) ||
+            txm_d3_dot(two, n) < 0.2 * txm_d3_len(two))
+            return 0;
     }
     return 1;
 }
 
 /* The place on the line half-way between two neighbours on it, a and b; *k: its segment. Between two
    corners, which may belong to other lines too, that is the middle of the whole line. */
-static tmr_vec tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32_t b, int32_t *k) {
+static txm_dvec3 tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32_t b, int32_t *k) {
     const tmr_mesh *m = &w->m;
     const int bound_a = tmr_kind_of(m, a) == TRIMESH_CORNER;
     const int bound_b = tmr_kind_of(m, b) == TRIMESH_CORNER;
     if (bound_a && bound_b) return tmr_line_at(w->s, w->l, id, 0.5 * w->l->length[id], k);
     *k = m->source[bound_a ? b : a];
-    return tmr_project_line(w->s, w->l, tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5), k);
+    return tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5), k);
 }
 
 /* Put a vertex on the middle of the edge opposite to c, on the surface; -1 if there is no room or
@@ -112,12 +115,12 @@ static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t line = m->edge[c];
-    const tmr_vec middle = tmr_scale(tmr_add(m->p[a], m->p[b]), 0.5);
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
     if (line) {
         const int32_t id = line - 1;
         int32_t k;
-        const tmr_vec p = tmr_line_middle(w, id, a, b, &k);
-        if (!tmr_split_is_fair(w, c, p, tmr_v(0, 0, 0))) return -1;
+        const txm_dvec3 p = tmr_line_middle(w, id, a, b, &k);
+        if (!tmr_split_is_fair(w, c, p, txm_d3(0, 0, 0))) return -1;
         const int32_t v = tmr_split(m, c);
         if (v < 0) return v;
         m->flags[v] = w->l->border[id] ? TRIMESH_BORDER : TRIMESH_CREASE;

@@ -14,7 +14,7 @@ static int tmr_may_subdivide(const tmr_work *w) {
         const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
         edges++;
         /* the height of the arc over the chord is about length * tan(angle / 4) / 2 */
-        bent += tmr_dot(m->n[a], m->n[b]) < -0.2;
+        bent += txm_d3_dot(m->n[a], m->n[b]) < -0.2;
     }
     return bent * 100.0 <= edges;
 }
@@ -71,10 +71,12 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
         m->live++;
         m->flags[v] = 0;
         /* where an arc with these normals at its ends would have its middle */
-        const tmr_vec d = tmr_sub(old.p[b], old.p[a]);
-        tmr_vec p = tmr_scale(tmr_add(old.p[a], old.p[b]), 0.5);
-        const double na = tmr_dot(old.n[a], d), nb = tmr_dot(old.n[b], d);
-        p = tmr_add(p, tmr_scale(tmr_sub(tmr_scale(old.n[a], -na), tmr_scale(old.n[b], -nb)), 0.125));
+        const txm_dvec3 d = txm_d3_sub(old.p[b], old.p[a]);
+        txm_dvec3 p = txm_d3_scale(txm_d3_add(old.p[a], old.p[b]), 0.5);
+        const double na = txm_d3_dot(old.n[a], d), nb = txm_d3_dot(old.n[b], d);
+        p = txm_d3_add(
+            p, txm_d3_scale(txm_d3_sub(txm_d3_scale(old.n[a], -na), txm_d3_scale(old.n[b], -nb)),
+                            0.125));
         const int32_t x = number[a], y = number[b];
         if (old.edge[c]) {
             const int32_t id = old.edge[c] - 1;
@@ -175,18 +177,18 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
 static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
-    const tmr_vec n = tmr_unit(tmr_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]));
-    const tmr_vec centre = tmr_middle(m, v);
+    const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[v[0]], m->p[v[1]], m->p[v[2]]));
+    const txm_dvec3 centre = tmr_middle(m, v);
     double sum = 0;
     int32_t from = v[0];
     for (int k = 0; k < 3; k++) {
         if (tmr_kind_of(m, v[k]) != TRIMESH_FREE) continue;
         from = v[k];
         const tmr_place at = tmr_on_face(w->s, m->source[v[k]], m->p[v[k]]);
-        sum += tmr_dot(tmr_sub(at.p, m->p[v[k]]), n);
+        sum += txm_d3_dot(txm_d3_sub(at.p, m->p[v[k]]), n);
     }
     const tmr_place at = tmr_project(w->s, centre, tmr_face_of(w, from));
-    return 0.75 * tmr_dot(tmr_sub(at.p, centre), n) + 0.25 * sum / 3;
+    return 0.75 * txm_d3_dot(txm_d3_sub(at.p, centre), n) + 0.25 * sum / 3;
 }
 
 static void tmr_fit_chunk(void *context, int index) {
@@ -210,7 +212,7 @@ static void tmr_fit_chunk(void *context, int index) {
         } while (c != first);
         const double most = 0.15 * w->length * w->size[v];
         sum = count ? sum / count : 0;
-        w->moved[v] = tmr_mad(m->p[v], m->n[v], sum > most ? most : sum < -most ? -most : sum);
+        w->moved[v] = txm_d3_mad(m->p[v], m->n[v], sum > most ? most : sum < -most ? -most : sum);
     }
 }
 

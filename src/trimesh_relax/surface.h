@@ -11,11 +11,11 @@ enum { TMR_PLAIN = 0, TMR_CREASE = 1, TMR_BORDER = 2 }; /* kinds of edges */
    that the bounding box has its centre at 0 and a diagonal of 1. */
 typedef struct tmr_surface {
     int32_t vertex_count, face_count;
-    tmr_vec *point;         /* 1 per vertex                                                     */
+    txm_dvec3 *point;       /* 1 per vertex                                                     */
     int32_t *vertex;        /* of each corner                                                   */
     int32_t *opposite;      /* corner on the other side of the corner's edge, -1 at the border  */
-    tmr_vec *normal;        /* 1 per face, unit; of a face without area: that of its surroundings */
-    tmr_vec *vertex_normal; /* 1 per vertex, unit, weighted by angles                           */
+    txm_dvec3 *normal;      /* 1 per face, unit; of a face without area: that of its surroundings */
+    txm_dvec3 *vertex_normal; /* 1 per vertex, unit, weighted by angles                           */
     int32_t *corner;        /* 1 per vertex: one of its corners; on the border the first one
                                counter-clockwise, so that walking on reaches all              */
     int32_t *component;     /* 1 per face, from 0                                               */
@@ -28,7 +28,7 @@ typedef struct tmr_surface {
                                - 4 for turn >= 4 (winding reversed)                             */
     float *scale;           /* 1 per vertex: wanted edge length, relative; NULL = uniform       */
     uint8_t *edge_kind;     /* 1 per corner: TMR_PLAIN, ...; found later (see features)         */
-    tmr_vec centre;         /* in the caller's units; caller's = point * diagonal + centre      */
+    txm_dvec3 centre;       /* in the caller's units; caller's = point * diagonal + centre      */
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */
 } tmr_surface;

@@ -16,19 +16,19 @@ enum { TMR_LEAF = 4 }; /* triangles in a leaf of the tree */
 /* Triangles in a tree of boxes: in the order of a space-filling curve, leaves of TMR_LEAF, a full
    binary tree over them. Node i has children 2 i + 1, 2 i + 2. */
 typedef struct tmr_tree {
-    const tmr_vec *point;
+    const txm_dvec3 *point;
     const int32_t *vertex; /* 3 per triangle */
     txm_pair *order;       /* .value: triangle */
     int32_t count, leaves; /* leaves: a power of two */
-    tmr_vec *low, *high;   /* 1 per node */
+    txm_dvec3 *low, *high; /* 1 per node */
 } tmr_tree;
 
-static void tmr_grow_box(tmr_vec *low, tmr_vec *high, tmr_vec p) {
-    *low = tmr_v(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
-    *high = tmr_v(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
+static void tmr_grow_box(txm_dvec3 *low, txm_dvec3 *high, txm_dvec3 p) {
+    *low = txm_d3(fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z));
+    *high = txm_d3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
 }
 
-static int tmr_tree_build(tmr_tree *t, const tmr_vec *point, const int32_t *vertex, int32_t count,
+static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *vertex, int32_t count,
                           txm_arena *arena) {
     t->point = point;
     t->vertex = vertex;
@@ -38,18 +38,18 @@ static int tmr_tree_build(tmr_tree *t, const tmr_vec *point, const int32_t *vert
     const size_t nodes = 2 * (size_t)t->leaves;
     t->order = (txm_pair *)txm_arena_alloc(arena, (size_t)count, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(arena, (size_t)count, sizeof(txm_pair));
-    t->low = (tmr_vec *)txm_arena_alloc(arena, nodes, sizeof(tmr_vec));
-    t->high = (tmr_vec *)txm_arena_alloc(arena, nodes, sizeof(tmr_vec));
+    t->low = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
+    t->high = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
     if (!t->order || !room || !t->low || !t->high) return 0;
     for (int32_t f = 0; f < count; f++) {
         const int32_t *v = vertex + 3 * f;
         t->order[f].value = (uint32_t)f;
         t->order[f].key = tmr_curve_key(
-            tmr_scale(tmr_add(tmr_add(point[v[0]], point[v[1]]), point[v[2]]), 1.0 / 3));
+            txm_d3_scale(txm_d3_add(txm_d3_add(point[v[0]], point[v[1]]), point[v[2]]), 1.0 / 3));
     }
     txm_sort_pairs(t->order, room, (size_t)count);
     for (int32_t i = 2 * t->leaves - 2; i >= 0; i--) {
-        tmr_vec low = tmr_v(1e300, 1e300, 1e300), high = tmr_v(-1e300, -1e300, -1e300);
+        txm_dvec3 low = txm_d3(1e300, 1e300, 1e300), high = txm_d3(-1e300, -1e300, -1e300);
         if (i < t->leaves - 1) {
             low = t->low[2 * i + 1];
             high = t->high[2 * i + 1];
@@ -72,7 +72,7 @@ static int tmr_tree_build(tmr_tree *t, const tmr_vec *point, const int32_t *vert
 }
 
 /* squared distance from p to the box of a node */
-static double tmr_box_dist2(const tmr_tree *t, int32_t i, tmr_vec p) {
+static double tmr_box_dist2(const tmr_tree *t, int32_t i, txm_dvec3 p) {
     const double x = fmax(fmax(t->low[i].x - p.x, p.x - t->high[i].x), 0);
     const double y = fmax(fmax(t->low[i].y - p.y, p.y - t->high[i].y), 0);
     const double z = fmax(fmax(t->low[i].z - p.z, p.z - t->high[i].z), 0);
@@ -81,7 +81,7 @@ static double tmr_box_dist2(const tmr_tree *t, int32_t i, tmr_vec p) {
 
 /* The triangle nearest to p within reach whose normal agrees with n to the cosine `agree`; -1:
    none. *at: the place on it. */
-static int32_t tmr_tree_nearest(const tmr_tree *t, tmr_vec p, tmr_vec n, double agree,
+static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, double agree,
                                 double reach, tmr_place *at) {
     int32_t stack[64], size = 0, best = -1;
     double least = reach * reach;
@@ -99,13 +99,13 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, tmr_vec p, tmr_vec n, double 
         for (int32_t k = first; k < first + TMR_LEAF && k < t->count; k++) {
             tmr_place here;
             const int32_t f = (int32_t)t->order[k].value, *v = t->vertex + 3 * f;
-            const tmr_vec a = t->point[v[0]], b = t->point[v[1]], c = t->point[v[2]];
+            const txm_dvec3 a = t->point[v[0]], b = t->point[v[1]], c = t->point[v[2]];
             here.face = f;
             here.p = tmr_nearest(p, a, b, c, &here.u, &here.v, &here.part);
-            here.d2 = tmr_dist2(p, here.p);
+            here.d2 = txm_d3_dist2(p, here.p);
             if (here.d2 > least || (best >= 0 && here.d2 >= least)) continue;
-            const tmr_vec across = tmr_area2(a, b, c);
-            if (tmr_dot(across, n) < agree * tmr_len(across)) continue;
+            const txm_dvec3 across = txm_d3_area2(a, b, c);
+            if (txm_d3_dot(across, n) < agree * txm_d3_len(across)) continue;
             least = here.d2;
             best = f;
             *at = here;
@@ -142,7 +142,7 @@ static int tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vert
     return 1;
 }
 
-static void tmr_grid_add(tmr_grid *g, tmr_vec p, int32_t v) {
+static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
     int32_t *head = g->head + tmr_grid_slot(g, floor(p.x / g->cell), floor(p.y / g->cell),
                                             floor(p.z / g->cell));
     TRIMESH_ASSERT(*head != v); /* no point twice: it would be the one before itself */
@@ -152,8 +152,8 @@ static void tmr_grid_add(tmr_grid *g, tmr_vec p, int32_t v) {
 
 /* Is a point of the grid nearer to p than reach, on the same side of a sheet? was: NULL, or points
    with a number there do not count. */
-static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, tmr_vec p,
-                          tmr_vec n, double reach) {
+static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, txm_dvec3 p,
+                          txm_dvec3 n, double reach) {
     const double k = fmin(ceil(reach / g->cell), 8);
     const double x = floor(p.x / g->cell), y = floor(p.y / g->cell), z = floor(p.z / g->cell);
     for (double i = -k; i <= k; i++) {
@@ -162,7 +162,8 @@ static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *w
                 int32_t v = g->head[tmr_grid_slot(g, x + i, y + j, z + l)];
                 for (; v >= 0; v = g->next[v]) {
                     if (was && was[v] >= 0) continue;
-                    if (tmr_dist2(w->m.p[v], p) < reach * reach && tmr_dot(w->m.n[v], n) > -0.1)
+                    if (txm_d3_dist2(w->m.p[v], p) < reach * reach &&
+                        txm_d3_dot(w->m.n[v], n) > -0.1)
                         return 1;
                 }
             }
@@ -184,12 +185,13 @@ typedef struct tmr_update {
     tmr_tree tree;       /* of the surface                                                       */
     tmr_tree old_tree;
     tmr_grid grid;
-    tmr_vec *old_point;  /* 1 per vertex of the old mesh, scaled                                  */
+    txm_dvec3
+        *old_point;      /* 1 per vertex of the old mesh, scaled                                  */
     int32_t *old_vertex; /* 3 per triangle of the old mesh                                       */
     int32_t *now;        /* 1 per vertex of the old mesh: its vertex in the new one, -1            */
     int32_t *was;        /* 1 per vertex of the new one: its vertex in the old one, -1            */
     int32_t *face;       /* 1 per vertex of the old mesh: the face it lies in, -1                 */
-    tmr_vec *place;      /* 1 per vertex of the old mesh: where                                  */
+    txm_dvec3 *place;    /* 1 per vertex of the old mesh: where                                  */
     int32_t *segment;    /* 1 per corner of the surface: the segment that its edge is, -1          */
     double *way;         /* 1 per vertex of the old mesh on a line: distance from its beginning  */
     int32_t *level;      /* 1 per vertex of the mesh: edges to the nearest new one                 */
@@ -197,9 +199,9 @@ typedef struct tmr_update {
 } tmr_update;
 
 /* a vertex of the old mesh: its normal */
-static tmr_vec tmr_old_normal(const tmr_update *u, int32_t i) {
+static txm_dvec3 tmr_old_normal(const tmr_update *u, int32_t i) {
     const float *n = u->old->normals + 3 * (size_t)i;
-    return tmr_v(n[0], n[1], n[2]);
+    return txm_d3(n[0], n[1], n[2]);
 }
 
 /* Segments by the corners opposite to them. */
@@ -219,10 +221,10 @@ static void tmr_map_segments(tmr_update *u) {
 /* Take segment k for old vertex i if it is nearer than *least and of the right kind. */
 static void tmr_try_segment(tmr_update *u, int32_t i, int32_t k, double *least) {
     if (k < 0 || (u->l.border[u->l.line[k]] != 0) != (u->old->kinds[i] == TRIMESH_BORDER)) return;
-    const tmr_vec a = u->s.point[u->l.a[k]], b = u->s.point[u->l.b[k]], ab = tmr_sub(b, a);
-    double t = tmr_dot(tmr_sub(u->old_point[i], a), ab) / (tmr_len2(ab) + 1e-300);
+    const txm_dvec3 a = u->s.point[u->l.a[k]], b = u->s.point[u->l.b[k]], ab = txm_d3_sub(b, a);
+    double t = txm_d3_dot(txm_d3_sub(u->old_point[i], a), ab) / (txm_d3_len2(ab) + 1e-300);
     t = t < 0 ? 0 : t > 1 ? 1 : t;
-    const double d2 = tmr_dist2(u->old_point[i], tmr_mad(a, ab, t));
+    const double d2 = txm_d3_dist2(u->old_point[i], txm_d3_mad(a, ab, t));
     if (d2 > *least) return;
     *least = d2;
     u->face[i] = k;
@@ -255,7 +257,7 @@ static void tmr_find_corner(tmr_update *u, int32_t i, int32_t face) {
     for (int k = 0; k < 3; k++) {
         const int32_t v = u->s.vertex[3 * face + k];
         if (u->l.kind[v] != TRIMESH_CORNER || u->was[v] >= 0) continue;
-        if (tmr_dist2(u->s.point[v], u->old_point[i]) > reach * reach) continue;
+        if (txm_d3_dist2(u->s.point[v], u->old_point[i]) > reach * reach) continue;
         u->now[i] = v;
         u->was[v] = i;
     }
@@ -393,7 +395,7 @@ static int tmr_update_old(tmr_update *u) {
         if (u->old->kinds[i] != TRIMESH_FREE || u->face[i] < 0) continue;
         const tmr_place at = tmr_on_face(&u->s, u->face[i], u->place[i]);
         const double reach = 0.6 * u->t.length * tmr_scale_at(&u->s, &at);
-        const tmr_vec normal = u->s.normal[u->face[i]];
+        const txm_dvec3 normal = u->s.normal[u->face[i]];
         if (tmr_is_crowded(&u->grid, &u->w, u->was, u->place[i], normal, reach)) continue;
         pairs[count].key = (uint32_t)u->face[i];
         pairs[count++].value = (uint32_t)i;
@@ -412,7 +414,7 @@ static int tmr_update_old(tmr_update *u) {
 
 /* Is a place of the new surface covered by a triangle of the old mesh all of whose corners are
    still there? */
-static int tmr_is_covered(const tmr_update *u, tmr_vec p, tmr_vec n, double length) {
+static int tmr_is_covered(const tmr_update *u, txm_dvec3 p, txm_dvec3 n, double length) {
     tmr_place at;
     const int32_t f = tmr_tree_nearest(&u->old_tree, p, n, 0.5, 0.5 * length, &at);
     if (f < 0) return 0;
@@ -434,7 +436,7 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
         const int32_t tries = run < 1 ? 0 : run > 1e8 ? 100000000 : (int32_t)run;
         run -= tries;
         for (int32_t k = 0; k < tries && *live < limit; k++) {
-            const tmr_vec p = tmr_strew_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
+            const txm_dvec3 p = tmr_strew_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
             const tmr_place at = tmr_on_face(&u->s, f, p);
             const double length = u->t.length * tmr_scale_at(&u->s, &at);
             if (tmr_is_crowded(&u->grid, &u->w, NULL, p, n, distance * length)) continue;
@@ -546,8 +548,8 @@ static int tmr_update_alloc(tmr_update *u) {
     const size_t n = u->old->vertex_count, t = u->old->triangle_count;
     const size_t room = (size_t)u->w.m.vertex_limit;
     txm_arena *arena = &u->first;
-    u->old_point = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
-    u->place = (tmr_vec *)txm_arena_alloc(arena, n, sizeof(tmr_vec));
+    u->old_point = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    u->place = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
     u->now = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
     u->face = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
     u->way = (double *)txm_arena_zero(arena, n, sizeof(double));
@@ -560,7 +562,8 @@ static int tmr_update_alloc(tmr_update *u) {
         return 0;
     for (size_t i = 0; i < n; i++) {
         const float *p = u->old->positions + 3 * i;
-        u->old_point[i] = tmr_scale(tmr_sub(tmr_v(p[0], p[1], p[2]), u->s.centre), 1 / u->s.diagonal);
+        u->old_point[i] =
+            txm_d3_scale(txm_d3_sub(txm_d3(p[0], p[1], p[2]), u->s.centre), 1 / u->s.diagonal);
     }
     for (size_t c = 0; c < 3 * t; c++) u->old_vertex[c] = (int32_t)u->old->indices[c];
     for (size_t v = 0; v < room; v++) u->was[v] = -1;

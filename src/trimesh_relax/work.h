@@ -18,7 +18,7 @@ typedef struct tmr_work {
     float *size;       /* 1 per vertex of m: edge length there relative to length               */
     double length;     /* edge length aimed at                                                  */
     double line_scale; /* along lines relative to that                                          */
-    tmr_vec *moved;    /* 1 per vertex: room for where it shall go                              */
+    txm_dvec3 *moved;  /* 1 per vertex: room for where it shall go                              */
     int32_t *landed;   /* 1 per vertex: room for the face or segment there                      */
     uint8_t *bad;      /* 1 per vertex: room for a mark                                         */
     uint8_t *flag;     /* 1 per triangle: room for a mark                                       */
@@ -53,23 +53,23 @@ static void tmr_stay(tmr_work *w, int32_t v) {
 }
 
 /* Put vertex v on segment k of a line. */
-static void tmr_put_on_line(tmr_work *w, int32_t v, tmr_vec p, int32_t k) {
+static void tmr_put_on_line(tmr_work *w, int32_t v, txm_dvec3 p, int32_t k) {
     const int32_t *a = w->l->a, *b = w->l->b;
     const tmr_place at = tmr_on_face(w->s, w->l->face[k], p);
     w->m.p[v] = p;
-    w->m.n[v] = tmr_unit(tmr_add(w->s->vertex_normal[a[k]], w->s->vertex_normal[b[k]]));
+    w->m.n[v] = txm_d3_unit(txm_d3_add(w->s->vertex_normal[a[k]], w->s->vertex_normal[b[k]]));
     w->m.source[v] = k;
     w->size[v] = txm_float(tmr_scale_at(w->s, &at));
 }
 
 /* the middle of the triangle of these vertices */
-static tmr_vec tmr_middle(const tmr_mesh *m, const int32_t *v) {
-    return tmr_scale(tmr_add(tmr_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
+static txm_dvec3 tmr_middle(const tmr_mesh *m, const int32_t *v) {
+    return txm_d3_scale(txm_d3_add(txm_d3_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
 }
 
 /* the place of the surface nearest to that, walking from all three vertices */
 static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
-    const tmr_vec middle = tmr_middle(&w->m, v);
+    const txm_dvec3 middle = tmr_middle(&w->m, v);
     tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
     for (int k = 1; k < 3; k++) {
         const tmr_place other = tmr_project(w->s, middle, tmr_face_of(w, v[k]));
@@ -80,29 +80,30 @@ static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
 
 /* The normal that a triangle should have: that of the surface around, judged by its free vertices
    only where there are any, since normals on creases say little. */
-static tmr_vec tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int32_t c) {
+static txm_dvec3 tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t v[3] = {a, b, c};
-    tmr_vec n = tmr_v(0, 0, 0);
+    txm_dvec3 n = txm_d3(0, 0, 0);
     int any = 0;
     for (int k = 0; k < 3; k++) {
         if (tmr_kind_of(m, v[k]) != TRIMESH_FREE) continue;
-        n = tmr_add(n, m->n[v[k]]);
+        n = txm_d3_add(n, m->n[v[k]]);
         any = 1;
     }
-    if (any) return tmr_unit(n);
+    if (any) return txm_d3_unit(n);
     return w->s->normal[tmr_below_middle(w, v).face];
 }
 
 /* how well a triangle at these points agrees with the normals of its vertices: -1..1, -1 also for
    one without area */
-static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, tmr_vec pa,
-                            tmr_vec pb, tmr_vec pc) {
-    const tmr_vec n = tmr_area2(pa, pb, pc);
-    const double length = tmr_len(n);
-    const double longest = fmax(tmr_dist2(pa, pb), fmax(tmr_dist2(pb, pc), tmr_dist2(pc, pa)));
+static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, txm_dvec3 pa,
+                            txm_dvec3 pb, txm_dvec3 pc) {
+    const txm_dvec3 n = txm_d3_area2(pa, pb, pc);
+    const double length = txm_d3_len(n);
+    const double longest =
+        fmax(txm_d3_dist2(pa, pb), fmax(txm_d3_dist2(pb, pc), txm_d3_dist2(pc, pa)));
     if (length <= 0.02 * longest) return -1;
-    return tmr_dot(n, tmr_expected_normal(w, a, b, c)) / length;
+    return txm_d3_dot(n, tmr_expected_normal(w, a, b, c)) / length;
 }
 
 #define TMR_LEAST_AGREEMENT 0.4 /* cosine: triangles steeper than this to the surface are avoided */
@@ -116,8 +117,8 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
     m->vertex_limit = vertices;
     m->face_limit = faces;
     m->vertex_count = m->live = m->face_count = m->live_faces = 0;
-    m->p = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
-    m->n = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
+    m->p = (txm_dvec3 *)txm_arena_alloc(arena, nv, sizeof(txm_dvec3));
+    m->n = (txm_dvec3 *)txm_arena_alloc(arena, nv, sizeof(txm_dvec3));
     m->source = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     m->corner = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     m->flags = (uint8_t *)txm_arena_zero(arena, nv, 1);
@@ -126,7 +127,7 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
     m->opposite = (int32_t *)txm_arena_alloc(arena, nc, sizeof(int32_t));
     m->edge = (int32_t *)txm_arena_zero(arena, nc, sizeof(int32_t));
     w->size = (float *)txm_arena_alloc(arena, nv, sizeof(float));
-    w->moved = (tmr_vec *)txm_arena_alloc(arena, nv, sizeof(tmr_vec));
+    w->moved = (txm_dvec3 *)txm_arena_alloc(arena, nv, sizeof(txm_dvec3));
     w->landed = (int32_t *)txm_arena_alloc(arena, nv, sizeof(int32_t));
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
     w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
@@ -181,7 +182,7 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
         TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
         const int32_t ghost = m->vertex_count++, first_face = m->face_count;
         m->flags[ghost] = TMR_GHOST;
-        m->p[ghost] = m->n[ghost] = tmr_v(0, 0, 0);
+        m->p[ghost] = m->n[ghost] = txm_d3(0, 0, 0);
         m->source[ghost] = -1;
         m->corner[ghost] = 3 * first_face;
         m->valence[ghost] = 0;
@@ -230,11 +231,11 @@ static trimesh_source tmr_surface_source(const tmr_surface *s, const trimesh_des
             weight[turn < 4 ? (k + turn) % 3 : (turn - 4 - k + 3) % 3] = own[k];
     } else {
         const uint32_t *i = desc->surface.indices + 3 * (size_t)source.triangle;
-        tmr_vec p[3];
+        txm_dvec3 p[3];
         int part;
         for (int k = 0; k < 3; k++) {
             const float *q = desc->surface.positions + 3 * (size_t)i[k];
-            p[k] = tmr_scale(tmr_sub(tmr_v(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
+            p[k] = txm_d3_scale(txm_d3_sub(txm_d3(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
         }
         tmr_nearest(at->p, p[0], p[1], p[2], &weight[1], &weight[2], &part);
     }
