@@ -1105,7 +1105,7 @@ static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, i
     s->histogram = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->histogram);
     s->integral = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->integral);
     s->counts = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n * TXS_TASKS, sizeof *s->counts);
-    if (!s->tables || !s->histogram || !s->integral || !s->counts) return NULL;
+    if (arena->failed) return NULL;
     for (int k = 0; k < level->type_count; k++)
         for (int i = 0; i < TXS_BINS; i++)
             s->integral[k][i] = level->types[k].potential[i] * TXS_PRECISE;
@@ -1620,7 +1620,7 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
         (int64_t(*)[TXS_BINS])txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof *sum);
     txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, a->canvas, bands, noise,
                                       txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
-    if (!a->candidates || !sum || !s) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
     }
@@ -1987,7 +1987,7 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         (txs_type *)txm_arena_alloc(&arena, TXS_MAX_TYPES * TXS_MAX_LEVELS, sizeof *types);
     texsyn_model *copy = (texsyn_model *)txm_arena_alloc(&arena, 1, sizeof *copy);
     txm_status status = TXM_OK;
-    if (!z || !types || !copy) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to save the model");
         goto done;
     }
@@ -2166,7 +2166,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.stride = s->width;
         s->canvas.plane = (ptrdiff_t)pixels;
         s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels);
-        if (!s->value || (desc->mask.pixels && !s->mask) || !s->canvas.pixels)
+        if (arena->failed)
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
             for (int y = 0; y < s->height && s->mask; y++)
@@ -2220,7 +2220,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
 
     int16_t *noise = (int16_t *)txm_arena_alloc(&arena, TXS_NOISE + TXS_VALUES, sizeof *noise);
     m = (texsyn_model *)txm_arena_zero(&arena, 1, sizeof *m);
-    if (!noise || !m) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
     }
@@ -2351,7 +2351,7 @@ TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, 
     txm_arena_init(&arena, env);
     texsyn_job *job = (texsyn_job *)txm_arena_zero(&arena, 1, sizeof *job);
     int16_t *noise = (int16_t *)txm_arena_alloc(&arena, TXS_NOISE + TXS_VALUES, sizeof *noise);
-    if (!job || !noise) {
+    if (arena.failed) {
         txm_arena_free(&arena);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the job");
     }

@@ -317,7 +317,7 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
         (int64_t(*)[TXS_BINS])txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof *sum);
     txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, a->canvas, bands, noise,
                                       txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
-    if (!a->candidates || !sum || !s) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
     }

@@ -69,7 +69,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.stride = s->width;
         s->canvas.plane = (ptrdiff_t)pixels;
         s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels);
-        if (!s->value || (desc->mask.pixels && !s->mask) || !s->canvas.pixels)
+        if (arena->failed)
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
             for (int y = 0; y < s->height && s->mask; y++)
@@ -123,7 +123,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
 
     int16_t *noise = (int16_t *)txm_arena_alloc(&arena, TXS_NOISE + TXS_VALUES, sizeof *noise);
     m = (texsyn_model *)txm_arena_zero(&arena, 1, sizeof *m);
-    if (!noise || !m) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
     }

@@ -421,7 +421,7 @@ static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, i
     s->histogram = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->histogram);
     s->integral = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->integral);
     s->counts = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n * TXS_TASKS, sizeof *s->counts);
-    if (!s->tables || !s->histogram || !s->integral || !s->counts) return NULL;
+    if (arena->failed) return NULL;
     for (int k = 0; k < level->type_count; k++)
         for (int i = 0; i < TXS_BINS; i++)
             s->integral[k][i] = level->types[k].potential[i] * TXS_PRECISE;

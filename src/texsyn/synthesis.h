@@ -88,7 +88,7 @@ TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, 
     txm_arena_init(&arena, env);
     texsyn_job *job = (texsyn_job *)txm_arena_zero(&arena, 1, sizeof *job);
     int16_t *noise = (int16_t *)txm_arena_alloc(&arena, TXS_NOISE + TXS_VALUES, sizeof *noise);
-    if (!job || !noise) {
+    if (arena.failed) {
         txm_arena_free(&arena);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the job");
     }
