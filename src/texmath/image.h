@@ -121,4 +121,45 @@ static inline int txm_image_is_finite(const txm_image *image) {
     return 1;
 }
 
+/* ---- kernel: half size ------------------------------------------------------------------ */
+
+/* One step of an image pyramid: each pixel of half is the mean of the 2x2 pixels of image below
+   it. Of an odd width the last column is averaged by itself, of an odd height the last row: no
+   pixel is lost. In linear values if the caller's are; nothing is decoded.
+
+   image, half  float, the same channels, not overlapping; half is (width + 1) / 2 x
+                (height + 1) / 2 and receives the result, or is untouched after an error
+   return       TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                    */
+static inline txm_status txm_image_halve(const txm_image *image, const txm_image *half,
+                                         txm_env *env) {
+    txm_status status = txm_image_check(image, "image", 0, env);
+    if (status == TXM_OK) status = txm_image_check(half, "half", 0, env);
+    if (status != TXM_OK) return status;
+    const txm_image from = txm_image_resolve(*image), to = txm_image_resolve(*half);
+    if (from.sample != TXM_F32 || to.sample != TXM_F32 || from.channels != to.channels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
+                           "image and half must both be TXM_F32 with the same channels");
+    if (to.width != from.width / 2 + from.width % 2 ||
+        to.height != from.height / 2 + from.height % 2)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
+                           "its sides must be half those of image, rounded up");
+    const size_t n = (size_t)from.channels;
+    for (int y = 0; y < to.height; y++) {
+        const int rows = 2 * y + 1 < from.height ? 2 : 1;
+        const float *upper = (const float *)txm_image_row_const(&from, 2 * y);
+        const float *lower = (const float *)txm_image_row_const(&from, 2 * y + rows - 1);
+        float *out = (float *)txm_image_row(&to, y);
+        for (int x = 0; x < to.width; x++) {
+            /* at an odd border the same pixel is simply taken twice */
+            const size_t left = 2 * (size_t)x * n, right = 2 * x + 1 < from.width ? left + n : left;
+            for (size_t c = 0; c < n; c++) {
+                const double sum = ((double)upper[left + c] + upper[right + c]) +
+                                   ((double)lower[left + c] + lower[right + c]);
+                out[(size_t)x * n + c] = txm_float(sum * 0.25);
+            }
+        }
+    }
+    return TXM_OK;
+}
+
 #endif /* TEXMATH_IMAGE_H */
