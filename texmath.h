@@ -4,10 +4,10 @@
    WHAT IT DOES
      Small things that every texkit header needs: status codes, the environment (allocator,
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
-     generator, a sort, vectors, matrices, quaternions and colour spaces; and the few kernels that
-     more than one of them uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the
-     minimum cut of a grid, the halving of an image, the Poisson equation on a masked image, and
-     which sides of a mesh share an edge.
+     generator, a sort, vectors, quaternions, sRGB; and the few kernels that more than one of them
+     uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the minimum cut of a grid,
+     the halving of an image, the Poisson equation on a masked image, and which sides of a mesh
+     share an edge.
 
    QUICK START                                 (tests build and run this very block)
      // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
@@ -44,11 +44,10 @@
      wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
 
    CONVENTIONS
-     Vectors are columns; matrices are stored column by column, as OpenGL and glTF have them:
-     m[rows * column + row]; the product a b applies b first. Right-handed space; a camera looks
-     along -z; clip space is -1..1 on all axes. Angles are in radians. A quaternion (x, y, z, w) has
-     its scalar last. Colours are linear unless the name says srgb; see each function for ranges.
-     Image rows go from top to bottom, x to the right.
+     Vectors are columns; a matrix is stored column by column, as OpenGL and glTF have it:
+     m[3 * column + row]; the product a b applies b first. Right-handed space. Angles are in
+     radians. A quaternion (x, y, z, w) has its scalar last. Image rows go from top to bottom, x to
+     the right.
 
    MEMORY
      Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
@@ -66,8 +65,8 @@
      makes necessary (vectors in double are not rounded). That gives the same bits wherever
      arithmetic is IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it)
      and without -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one
-     result of 10^8 (txm_sincos and txm_exp2 do not): use it to show colours and place cameras, not
-     to decide. Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
+     result of 10^8 (txm_sincos and txm_exp2 do not): use it for what is only shown, not to decide.
+     Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
@@ -76,17 +75,15 @@
    REFERENCES
      [1] M. O'Neill. PCG: a family of simple fast space-efficient statistically good algorithms for
          random number generation. Harvey Mudd College HMC-CS-2014-0905, 2014.
-     [2] Y. Ohta, T. Kanade, T. Sakai. Color information for region segmentation. Computer Graphics
-         and Image Processing 13, 1980.
-     [3] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
+     [2] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
          SIGGRAPH 2001.
-     [4] P. Perez, M. Gangnet, A. Blake. Poisson image editing. SIGGRAPH 2003.
-     [5] R. Bridson. Fluid simulation for computer graphics, section 4.3 (the preconditioner
+     [3] P. Perez, M. Gangnet, A. Blake. Poisson image editing. SIGGRAPH 2003.
+     [4] R. Bridson. Fluid simulation for computer graphics, section 4.3 (the preconditioner
          MIC(0) of I. Gustafsson. A class of first order factorization methods. BIT 18, 1978).
-     [6] IEC 61966-2-1:1999 (sRGB); CIE 15:2004 (XYZ, L*a*b*).
-     [7] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
-     [8] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.
-     [9] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
+     [5] IEC 61966-2-1:1999 (sRGB).
+     [6] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
+     [7] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.
+     [8] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
          energy minimization in vision. IEEE PAMI 26(9), 2004.                                 */
 #ifndef TEXMATH_H
 #define TEXMATH_H
@@ -513,6 +510,17 @@ static inline int txm_image_is_finite(const txm_image *image) {
     return 1;
 }
 
+/* ---- colour ----------------------------------------------------------------------------- */
+
+/* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, values go on along the
+   same curves (below 0: the straight part), nothing is clamped. */
+static inline float txm_srgb_to_linear(float s) {
+    return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+}
+static inline float txm_linear_to_srgb(float l) {
+    return txm_float(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
+}
+
 /* ---- kernel: half size ------------------------------------------------------------------ */
 
 /* One step of an image pyramid: each pixel of half is the mean of the 2x2 pixels of image below
@@ -666,9 +674,6 @@ typedef struct txm_vec2 {
 typedef struct txm_vec3 {
     float x, y, z;
 } txm_vec3;
-typedef struct txm_vec4 {
-    float x, y, z, w;
-} txm_vec4;
 
 /* Makers; C++11 has no compound literals. */
 static inline txm_vec2 txm_v2(float x, float y) {
@@ -679,62 +684,17 @@ static inline txm_vec3 txm_v3(float x, float y, float z) {
     const txm_vec3 v = {x, y, z};
     return v;
 }
-static inline txm_vec4 txm_v4(float x, float y, float z, float w) {
-    const txm_vec4 v = {x, y, z, w};
-    return v;
-}
 
-/* Component by component: a + b, a - b, a * b, a s, the smaller, the larger, a (1 - t) + b t. Dot
-   product; length; length 1 in the same direction, the zero vector for the zero vector. */
-static inline txm_vec2 txm_vec2_add(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(a.x + b.x, a.y + b.y);
-}
-static inline txm_vec2 txm_vec2_sub(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(a.x - b.x, a.y - b.y);
-}
-static inline txm_vec2 txm_vec2_mul(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(a.x * b.x, a.y * b.y);
-}
-static inline txm_vec2 txm_vec2_scale(txm_vec2 a, float s) {
-    return txm_v2(a.x * s, a.y * s);
-}
-static inline txm_vec2 txm_vec2_min(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(txm_minf(a.x, b.x), txm_minf(a.y, b.y));
-}
-static inline txm_vec2 txm_vec2_max(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y));
-}
-static inline txm_vec2 txm_vec2_lerp(txm_vec2 a, txm_vec2 b, float t) {
-    return txm_v2(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t));
-}
-static inline float txm_vec2_dot(txm_vec2 a, txm_vec2 b) {
-    return txm_float((double)a.x * b.x + (double)a.y * b.y);
-}
-static inline float txm_vec2_length(txm_vec2 a) {
-    return txm_float(sqrt((double)a.x * a.x + (double)a.y * a.y));
-}
-static inline txm_vec2 txm_vec2_normalize(txm_vec2 a) {
-    const double n = sqrt((double)a.x * a.x + (double)a.y * a.y);
-    return n > 0 ? txm_v2(txm_float(a.x / n), txm_float(a.y / n)) : a;
-}
-
+/* Component by component: a + b, a - b, a s, a (1 - t) + b t. Dot product; length; length 1 in the
+   same direction, the zero vector for the zero vector; cross product. */
 static inline txm_vec3 txm_vec3_add(txm_vec3 a, txm_vec3 b) {
     return txm_v3(a.x + b.x, a.y + b.y, a.z + b.z);
 }
 static inline txm_vec3 txm_vec3_sub(txm_vec3 a, txm_vec3 b) {
     return txm_v3(a.x - b.x, a.y - b.y, a.z - b.z);
 }
-static inline txm_vec3 txm_vec3_mul(txm_vec3 a, txm_vec3 b) {
-    return txm_v3(a.x * b.x, a.y * b.y, a.z * b.z);
-}
 static inline txm_vec3 txm_vec3_scale(txm_vec3 a, float s) {
     return txm_v3(a.x * s, a.y * s, a.z * s);
-}
-static inline txm_vec3 txm_vec3_min(txm_vec3 a, txm_vec3 b) {
-    return txm_v3(txm_minf(a.x, b.x), txm_minf(a.y, b.y), txm_minf(a.z, b.z));
-}
-static inline txm_vec3 txm_vec3_max(txm_vec3 a, txm_vec3 b) {
-    return txm_v3(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z));
 }
 static inline txm_vec3 txm_vec3_lerp(txm_vec3 a, txm_vec3 b, float t) {
     return txm_v3(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t));
@@ -748,47 +708,6 @@ static inline float txm_vec3_length(txm_vec3 a) {
 static inline txm_vec3 txm_vec3_normalize(txm_vec3 a) {
     const double n = sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z);
     return n > 0 ? txm_v3(txm_float(a.x / n), txm_float(a.y / n), txm_float(a.z / n)) : a;
-}
-
-static inline txm_vec4 txm_vec4_add(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
-}
-static inline txm_vec4 txm_vec4_sub(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w);
-}
-static inline txm_vec4 txm_vec4_mul(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w);
-}
-static inline txm_vec4 txm_vec4_scale(txm_vec4 a, float s) {
-    return txm_v4(a.x * s, a.y * s, a.z * s, a.w * s);
-}
-static inline txm_vec4 txm_vec4_min(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(txm_minf(a.x, b.x), txm_minf(a.y, b.y), txm_minf(a.z, b.z), txm_minf(a.w, b.w));
-}
-static inline txm_vec4 txm_vec4_max(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z), txm_maxf(a.w, b.w));
-}
-static inline txm_vec4 txm_vec4_lerp(txm_vec4 a, txm_vec4 b, float t) {
-    return txm_v4(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t),
-                  txm_lerpf(a.w, b.w, t));
-}
-static inline float txm_vec4_dot(txm_vec4 a, txm_vec4 b) {
-    return txm_float((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w);
-}
-static inline float txm_vec4_length(txm_vec4 a) {
-    return txm_float(
-        sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z + (double)a.w * a.w));
-}
-static inline txm_vec4 txm_vec4_normalize(txm_vec4 a) {
-    const double n =
-        sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z + (double)a.w * a.w);
-    return n > 0 ? txm_v4(txm_float(a.x / n), txm_float(a.y / n), txm_float(a.z / n),
-                          txm_float(a.w / n))
-                 : a;
-}
-/* z of the cross product: positive if b lies counter-clockwise of a (y up) */
-static inline float txm_vec2_cross(txm_vec2 a, txm_vec2 b) {
-    return txm_float((double)a.x * b.y - (double)a.y * b.x);
 }
 static inline txm_vec3 txm_vec3_cross(txm_vec3 a, txm_vec3 b) {
     return txm_v3(txm_float((double)a.y * b.z - (double)a.z * b.y),
@@ -871,165 +790,10 @@ static inline txm_dvec3 txm_d3_area2(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
 
 /* ---- matrices --------------------------------------------------------------------------- */
 
-/* Stored column by column: row r of column c is m[3 * c + r], of a mat4 m[4 * c + r]. */
+/* Stored column by column: row r of column c is m[3 * c + r]. */
 typedef struct txm_mat3 {
     float m[9];
 } txm_mat3;
-typedef struct txm_mat4 {
-    float m[16];
-} txm_mat4;
-
-/* out = a b, n x n; the helper of the two below */
-static inline void txm_matrix_mul(int n, const float *a, const float *b, float *out) {
-    for (int c = 0; c < n; c++) {
-        for (int r = 0; r < n; r++) {
-            double sum = 0;
-            for (int k = 0; k < n; k++) sum += (double)a[n * k + r] * b[n * c + k];
-            out[n * c + r] = txm_float(sum);
-        }
-    }
-}
-
-/* out = inverse of m, n x n, n <= 4: Gauss and Jordan with row scaling and partial pivoting.
-   A pivot below 2^-40 of its column counts as 0: by then a float matrix has no rank left. */
-static inline txm_status txm_matrix_inverse(int n, const float *m, float *out) {
-    double a[4][8], largest[4] = {0, 0, 0, 0};
-    for (int r = 0; r < n; r++) {
-        double scale = 0;
-        for (int c = 0; c < n; c++) {
-            if (!txm_is_finite(m[n * c + r])) return TXM_BAD_ARGUMENT;
-            scale = fmax(scale, fabs((double)m[n * c + r]));
-        }
-        if (scale <= 0) return TXM_BAD_ARGUMENT;
-        for (int c = 0; c < n; c++) {
-            a[r][c] = m[n * c + r] / scale;
-            a[r][n + c] = r == c ? 1 / scale : 0;
-            largest[c] = fmax(largest[c], fabs(a[r][c]));
-        }
-    }
-    for (int k = 0; k < n; k++) {
-        int p = k;
-        for (int r = k + 1; r < n; r++) {
-            if (fabs(a[r][k]) > fabs(a[p][k])) p = r;
-        }
-        const double pivot = a[p][k];
-        if (fabs(pivot) <= largest[k] * (1.0 / 1099511627776.0)) return TXM_BAD_ARGUMENT;
-        for (int c = 0; c < 2 * n; c++) {
-            const double t = a[p][c];
-            a[p][c] = a[k][c];
-            a[k][c] = t / pivot;
-        }
-        for (int r = 0; r < n; r++) {
-            const double f = a[r][k];
-            for (int c = 0; c < 2 * n && r != k; c++) a[r][c] -= f * a[k][c];
-        }
-    }
-    for (int i = 0; i < n * n; i++) {
-        if (fabs(a[i % n][n + i / n]) > 3.4e38) return TXM_BAD_ARGUMENT; /* no float */
-    }
-    for (int i = 0; i < n * n; i++) out[i] = txm_float(a[i % n][n + i / n]);
-    return TXM_OK;
-}
-
-static inline txm_mat3 txm_mat3_identity(void) {
-    const txm_mat3 m = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    return m;
-}
-static inline txm_mat3 txm_mat3_mul(txm_mat3 a, txm_mat3 b) {
-    txm_mat3 out = {{0}};
-    txm_matrix_mul(3, a.m, b.m, out.m);
-    return out;
-}
-static inline txm_mat3 txm_mat3_transpose(txm_mat3 m) {
-    txm_mat3 out;
-    for (int i = 0; i < 9; i++) out.m[i] = m.m[3 * (i % 3) + i / 3];
-    return out;
-}
-/* TXM_BAD_ARGUMENT, and *out untouched, if m is singular to float precision or not finite */
-static inline txm_status txm_mat3_inverse(txm_mat3 m, txm_mat3 *out) {
-    return txm_matrix_inverse(3, m.m, out->m);
-}
-/* m v */
-static inline txm_vec3 txm_mat3_vec(txm_mat3 m, txm_vec3 v) {
-    float r[3];
-    for (int i = 0; i < 3; i++)
-        r[i] =
-            txm_float((double)m.m[i] * v.x + (double)m.m[3 + i] * v.y + (double)m.m[6 + i] * v.z);
-    return txm_v3(r[0], r[1], r[2]);
-}
-
-static inline txm_mat4 txm_mat4_identity(void) {
-    const txm_mat4 m = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
-    return m;
-}
-static inline txm_mat4 txm_mat4_mul(txm_mat4 a, txm_mat4 b) {
-    txm_mat4 out = {{0}};
-    txm_matrix_mul(4, a.m, b.m, out.m);
-    return out;
-}
-static inline txm_mat4 txm_mat4_transpose(txm_mat4 m) {
-    txm_mat4 out;
-    for (int i = 0; i < 16; i++) out.m[i] = m.m[4 * (i % 4) + i / 4];
-    return out;
-}
-/* as txm_mat3_inverse */
-static inline txm_status txm_mat4_inverse(txm_mat4 m, txm_mat4 *out) {
-    return txm_matrix_inverse(4, m.m, out->m);
-}
-/* m v */
-static inline txm_vec4 txm_mat4_vec(txm_mat4 m, txm_vec4 v) {
-    float r[4];
-    for (int i = 0; i < 4; i++)
-        r[i] = txm_float((double)m.m[i] * v.x + (double)m.m[4 + i] * v.y +
-                         (double)m.m[8 + i] * v.z + (double)m.m[12 + i] * v.w);
-    return txm_v4(r[0], r[1], r[2], r[3]);
-}
-/* the point p moved by m, divided by its w (unless that is 0) */
-static inline txm_vec3 txm_mat4_point(txm_mat4 m, txm_vec3 p) {
-    const txm_vec4 q = txm_mat4_vec(m, txm_v4(p.x, p.y, p.z, 1));
-    const float w = q.w < 0 || q.w > 0 ? q.w : 1;
-    return txm_v3(q.x / w, q.y / w, q.z / w);
-}
-/* the direction v turned by m; translation does not move it */
-static inline txm_vec3 txm_mat4_vector(txm_mat4 m, txm_vec3 v) {
-    const txm_vec4 q = txm_mat4_vec(m, txm_v4(v.x, v.y, v.z, 0));
-    return txm_v3(q.x, q.y, q.z);
-}
-/* the linear part; for normals take its inverse transposed */
-static inline txm_mat3 txm_mat4_mat3(txm_mat4 m) {
-    txm_mat3 out;
-    for (int i = 0; i < 9; i++) out.m[i] = m.m[4 * (i / 3) + i % 3];
-    return out;
-}
-static inline txm_mat4 txm_mat4_translation(txm_vec3 t) {
-    const txm_mat4 m = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, t.x, t.y, t.z, 1}};
-    return m;
-}
-static inline txm_mat4 txm_mat4_scale(txm_vec3 s) {
-    const txm_mat4 m = {{s.x, 0, 0, 0, 0, s.y, 0, 0, 0, 0, s.z, 0, 0, 0, 0, 1}};
-    return m;
-}
-/* World to camera: eye goes to the origin, target onto the -z axis, up to the upper half. Any up
-   will do, also one along the line of sight. */
-static inline txm_mat4 txm_mat4_look_at(txm_vec3 eye, txm_vec3 target, txm_vec3 up) {
-    txm_vec3 z = txm_vec3_normalize(txm_vec3_sub(eye, target));
-    if (txm_vec3_dot(z, z) <= 0) z = txm_v3(0, 0, 1);
-    txm_vec3 x = txm_vec3_cross(txm_vec3_normalize(up), z);
-    x = txm_vec3_length(x) > 1e-6f ? txm_vec3_normalize(x) : txm_vec3_perpendicular(z);
-    const txm_vec3 y = txm_vec3_cross(z, x);
-    const txm_mat4 m = {{x.x, y.x, z.x, 0, x.y, y.y, z.y, 0, x.z, y.z, z.z, 0,
-                         -txm_vec3_dot(x, eye), -txm_vec3_dot(y, eye), -txm_vec3_dot(z, eye), 1}};
-    return m;
-}
-/* Camera to clip space: fov_y between 0 and pi, aspect = width / height > 0, 0 < near < far;
-   z = -near goes to -1, z = -far to 1. (near_z, far_z: near and far are macros on Windows.) */
-static inline txm_mat4 txm_mat4_perspective(float fov_y, float aspect, float near_z, float far_z) {
-    const double f = cos(0.5 * fov_y) / sin(0.5 * fov_y), d = (double)near_z - far_z;
-    const txm_mat4 m = {{txm_float(f / aspect), 0, 0, 0, 0, txm_float(f), 0, 0, 0, 0,
-                         txm_float(((double)far_z + near_z) / d), -1, 0, 0,
-                         txm_float(2.0 * far_z * near_z / d), 0}};
-    return m;
-}
 
 /* ---- quaternions ------------------------------------------------------------------------ */
 
@@ -1079,15 +843,6 @@ static inline txm_mat3 txm_quat_mat3(txm_quat q) {
                          txm_float(1 - 2 * (x * x + y * y))}};
     return m;
 }
-static inline txm_mat4 txm_quat_mat4(txm_quat q) {
-    const txm_mat3 r = txm_quat_mat3(q);
-    txm_mat4 m = txm_mat4_identity();
-    for (int i = 0; i < 9; i++) m.m[4 * (i / 3) + i % 3] = r.m[i];
-    return m;
-}
-static inline txm_mat4 txm_mat4_rotation(txm_vec3 axis, float angle) {
-    return txm_quat_mat4(txm_quat_axis_angle(axis, angle));
-}
 /* v turned by the unit quaternion q: v + 2 w (u x v) + 2 u x (u x v), u = (x, y, z) */
 static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
     const double x = q.x, y = q.y, z = q.z, w = q.w;
@@ -1097,7 +852,7 @@ static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
                   txm_float(v.y + w * ty + (z * tx - x * tz)),
                   txm_float(v.z + w * tz + (x * ty - y * tx)));
 }
-/* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [8] takes the one whose
+/* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [7] takes the one whose
    component is largest: that one never divides by something small. */
 static inline txm_quat txm_quat_from_mat3(txm_mat3 m) {
     const double xx = m.m[0], yy = m.m[4], zz = m.m[8];
@@ -1140,100 +895,6 @@ static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
     return txm_quat_blend(a, b, s, d < 0 ? -u : u); /* blend divides by sin(angle) */
 }
 
-/* ---- colour ----------------------------------------------------------------------------- */
-
-/* sRGB code value to linear light and back [6]; 0..1 to 0..1. Outside, values go on along the
-   same curves (below 0: the straight part), nothing is clamped. */
-static inline float txm_srgb_to_linear(float s) {
-    return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
-}
-static inline float txm_linear_to_srgb(float l) {
-    return txm_float(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
-}
-static inline txm_vec3 txm_srgb_to_linear3(txm_vec3 s) {
-    return txm_v3(txm_srgb_to_linear(s.x), txm_srgb_to_linear(s.y), txm_srgb_to_linear(s.z));
-}
-static inline txm_vec3 txm_linear_to_srgb3(txm_vec3 l) {
-    return txm_v3(txm_linear_to_srgb(l.x), txm_linear_to_srgb(l.y), txm_linear_to_srgb(l.z));
-}
-
-/* Linear RGB of the sRGB primaries to CIE XYZ and back; white (1, 1, 1) is D65, XYZ (0.95047, 1,
-   1.08883). Linear maps: any range. */
-static inline txm_vec3 txm_rgb_to_xyz(txm_vec3 c) {
-    return txm_v3(txm_float(0.4124564 * c.x + 0.3575761 * c.y + 0.1804375 * c.z),
-                  txm_float(0.2126729 * c.x + 0.7151522 * c.y + 0.0721750 * c.z),
-                  txm_float(0.0193339 * c.x + 0.1191920 * c.y + 0.9503041 * c.z));
-}
-static inline txm_vec3 txm_xyz_to_rgb(txm_vec3 c) {
-    return txm_v3(txm_float(3.2404542 * c.x - 1.5371385 * c.y - 0.4985314 * c.z),
-                  txm_float(-0.9692660 * c.x + 1.8760108 * c.y + 0.0415560 * c.z),
-                  txm_float(0.0556434 * c.x - 0.2040259 * c.y + 1.0572252 * c.z));
-}
-
-/* f of CIE L*a*b*: cube root, straight below (6/29)^3; and its inverse */
-static inline double txm_lab_f(double t) {
-    return t > 216.0 / 24389.0 ? pow(t, 1.0 / 3.0) : (24389.0 / 27.0 * t + 16.0) / 116.0;
-}
-static inline double txm_lab_f_inverse(double f) {
-    return f > 6.0 / 29.0 ? f * f * f : (116.0 * f - 16.0) * (27.0 / 24389.0);
-}
-/* CIE XYZ to L*a*b* under D65 and back [6]: L 0..100; a, b about -128..128; for sRGB colours
-   a lies in -86.2..98.3, b in -107.9..94.5. The Euclidean distance is Delta E 1976. */
-static inline txm_vec3 txm_xyz_to_lab(txm_vec3 c) {
-    const double x = txm_lab_f(c.x / 0.95047), y = txm_lab_f(c.y), z = txm_lab_f(c.z / 1.08883);
-    return txm_v3(txm_float(116 * y - 16), txm_float(500 * (x - y)), txm_float(200 * (y - z)));
-}
-static inline txm_vec3 txm_lab_to_xyz(txm_vec3 c) {
-    const double y = (c.x + 16.0) / 116, x = y + c.y / 500.0, z = y - c.z / 200.0;
-    return txm_v3(txm_float(0.95047 * txm_lab_f_inverse(x)), txm_float(txm_lab_f_inverse(y)),
-                  txm_float(1.08883 * txm_lab_f_inverse(z)));
-}
-/* linear RGB to L*a*b* and back in one go */
-static inline txm_vec3 txm_rgb_to_lab(txm_vec3 c) {
-    return txm_xyz_to_lab(txm_rgb_to_xyz(c));
-}
-static inline txm_vec3 txm_lab_to_rgb(txm_vec3 c) {
-    return txm_xyz_to_rgb(txm_lab_to_xyz(c));
-}
-
-/* RGB to opponent space and back: I1 = (R + G + B) / 3, I2 = (R - B) / 2, I3 = (2 G - R - B) / 4
-   [2]. The three axes are at right angles and nearly uncorrelated in photographs. For RGB in
-   0..1: I1 in 0..1, I2 and I3 in -0.5..0.5. A linear map of whatever RGB it is given. */
-static inline txm_vec3 txm_rgb_to_opponent(txm_vec3 c) {
-    const double r = c.x, g = c.y, b = c.z;
-    return txm_v3(txm_float((r + g + b) / 3), txm_float((r - b) / 2),
-                  txm_float((2 * g - r - b) / 4));
-}
-static inline txm_vec3 txm_opponent_to_rgb(txm_vec3 c) {
-    const double i1 = c.x, i2 = c.y, i3 = c.z / 1.5;
-    return txm_v3(txm_float(i1 + i2 - i3), txm_float(i1 + 2 * i3), txm_float(i1 - i2 - i3));
-}
-
-/* RGB in 0..1 to hue, saturation, value and back. Hue in turns: [0, 1), red 0, green 1/3, blue 2/3,
-   0 for grays; going back, whole turns do not matter. Saturation and value 0..1. */
-static inline txm_vec3 txm_rgb_to_hsv(txm_vec3 c) {
-    const double r = c.x, g = c.y, b = c.z;
-    const double v = fmax(r, fmax(g, b)), d = v - fmin(r, fmin(g, b));
-    double h = 0;
-    if (d > 0) {
-        h = (r >= v ? (g - b) / d : g >= v ? 2 + (b - r) / d : 4 + (r - g) / d) / 6;
-        if (h < 0) h += 1;
-    }
-    const float hue = txm_float(h);
-    return txm_v3(hue < 1 ? hue : 0, v > 0 ? txm_float(d / v) : 0, txm_float(v));
-}
-static inline txm_vec3 txm_hsv_to_rgb(txm_vec3 c) {
-    float out[3];
-    for (int i = 0; i < 3; i++) {
-        /* a trapezoid over the circle, shifted by a third for each channel */
-        double t = c.x + (3 - i) / 3.0;
-        t = fabs(6 * (t - floor(t)) - 3) - 1;
-        t = t < 0 ? 0 : t > 1 ? 1 : t;
-        out[i] = txm_float(c.z * (1 + c.y * (t - 1)));
-    }
-    return txm_v3(out[0], out[1], out[2]);
-}
-
 /* ---- kernel: symmetric 3x3 eigensystem -------------------------------------------------- */
 
 /* Eigenvalues and eigenvectors of
@@ -1242,7 +903,7 @@ static inline txm_vec3 txm_hsv_to_rgb(txm_vec3 c) {
    A = | a[1] a[3] a[4] |      A vectors[k] = values[k] vectors[k]
        | a[2] a[4] a[5] |
 
-   by cyclic Jacobi rotations in double [7]; the covariance of points is the usual A.
+   by cyclic Jacobi rotations in double [6]; the covariance of points is the usual A.
 
    values   falling
    vectors  unit length, at right angles, vectors[2] = vectors[0] x vectors[1]; of the first two
@@ -1317,7 +978,7 @@ static inline txm_status txm_eigen3(const double a[6], double values[3], double 
 /* ---- kernel: minimum-error cut ---------------------------------------------------------- */
 
 /* The cheapest path through a strip from its first line to its last, moving at most one pixel
-   sideways per line [3]:
+   sideways per line [2]:
 
        E(i, j) = e(i, j) + min(E(i-1, j-1), E(i-1, j), E(i-1, j+1)),  path(last) = argmin E(last, .)
 
@@ -1367,7 +1028,7 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
 /* ---- kernel: minimum cut on a grid ------------------------------------------------------ */
 
 /* The cheapest way to part the nodes of a grid into those of a source and those of a sink, which is
-   what graph cuts ask for: maximum flow by two growing search trees [9]. A node is a place of the
+   what graph cuts ask for: maximum flow by two growing search trees [8]. A node is a place of the
    grid, with a margin of one on all sides whose capacities stay zero. Arc d of node p goes to
    p + step[d]; the opposite arc is d + directions / 2 there.
 
@@ -1375,7 +1036,8 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
    txm_flow_solve, and look at tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
    capacities at a node must stay below 2^30. Integers only, so the same cut everywhere. */
 enum { TXM_FLOW_FREE = 0, TXM_FLOW_SOURCE = 1, TXM_FLOW_SINK = 2 };
-enum { TXM_FLOW_TERMINAL = 6, TXM_FLOW_NONE = 7, TXM_FLOW_ORPHAN = 8 }; /* parents that are no arc */
+/* parents that are no arc */
+enum { TXM_FLOW_TERMINAL = 6, TXM_FLOW_NONE = 7, TXM_FLOW_ORPHAN = 8 };
 
 typedef struct txm_flow {
     int directions; /* 4 or 6 */
@@ -1462,16 +1124,18 @@ static inline void txm_flow_augment(txm_flow *g, int p, int d) {
 
 /* Capacity of the arc by which p hangs on its neighbour in direction d, in p's tree. */
 static inline int32_t txm_flow_hold(const txm_flow *g, int p, int d) {
-    return g->tree[p] == TXM_FLOW_SOURCE ? g->arc[txm_flow_opposite(g, d)][p + g->step[d]] : g->arc[d][p];
+    if (g->tree[p] != TXM_FLOW_SOURCE) return g->arc[d][p];
+    return g->arc[txm_flow_opposite(g, d)][p + g->step[d]];
 }
 
-/* Find a new parent for an orphan, the nearest to the terminal, or set it and its children free. */
+/* Find a new parent for an orphan, the nearest to the terminal, or free it and its children. */
 static inline void txm_flow_adopt(txm_flow *g, int p) {
     int best = TXM_FLOW_NONE, least = INT_MAX;
     const uint8_t tree = g->tree[p];
     for (int d = 0; d < g->directions; d++) {
         const int q = p + g->step[d];
-        if (g->tree[q] != tree || g->parent[q] == TXM_FLOW_NONE || txm_flow_hold(g, p, d) == 0) continue;
+        if (g->tree[q] != tree || g->parent[q] == TXM_FLOW_NONE || txm_flow_hold(g, p, d) == 0)
+            continue;
         int length = 0, x = q;
         for (;;) { /* does q still hang on the terminal? */
             if (g->stamp[x] == g->time) {
@@ -1541,8 +1205,8 @@ static inline int txm_flow_grow(txm_flow *g, int p, int *from, int *direction) {
     return 0;
 }
 
-/* Push all the flow there is. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut; the
-   arcs and excess hold what is left.
+/* Push all the flow there is. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut;
+   the arcs and excess hold what is left.
    cost  linear in practice, some 0.1 us per node; polynomial at worst                        */
 static inline void txm_flow_solve(txm_flow *g) {
     g->first = g->last = -1;
@@ -1586,8 +1250,8 @@ static inline void txm_flow_solve(txm_flow *g) {
     }
 }
 
-/* Memory for up to most nodes with 4 or 6 directions, 22 + 4 * directions bytes each, from the arena.
-   0: there is none. */
+/* Memory for up to most nodes with 4 or 6 directions, 22 + 4 * directions bytes each, from the
+   arena. 0: there is none. */
 static inline int txm_flow_make(txm_flow *g, txm_arena *arena, int directions, int most) {
     const size_t n = (size_t)most;
     g->directions = directions;
@@ -1712,7 +1376,7 @@ static inline txm_status txm_poisson_solve(const txm_poisson_grid *g, const txm_
 /* Number the unknowns, link them, and build diagonal and factor. above: width numbers of scratch.
 
    MIC(0): an incomplete factor with the stencil of A; what it drops is taken off the diagonal to
-   0.97, so that smooth vectors pass almost unchanged. For rows of five points this is [5]
+   0.97, so that smooth vectors pass almost unchanged. For rows of five points this is [4]
 
        e = d - f_left^2 (1 + 0.97 [left has a lower neighbour])
              - f_up^2   (1 + 0.97 [upper has a right neighbour]),   f = 1 / sqrt(e),
@@ -1819,7 +1483,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
     return TXM_OK;
 }
 
-/* Solve the (screened) Poisson equation inside a mask, with known values around it [4]:
+/* Solve the (screened) Poisson equation inside a mask, with known values around it [3]:
 
        screen (u - u0) - Lu = -target,   Lu(x) = sum over the neighbours y of x: u(y) - u(x)
 
@@ -1828,7 +1492,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
    target and screen 0 this is the membrane through the known values. To paste gradients, let
    target(x) be the sum of the wanted differences u(y) - u(x).
 
-   The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [5].
+   The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [4].
    desc    nothing in it is written but the pixels of desc->image, and those only on success
    env     NULL, or how to allocate, report and cancel
    return  TXM_OK (also where no pixel is masked, or max_iterations was reached);

@@ -104,10 +104,11 @@ static void render_row(const floor_texture *t, int row, unsigned char *out) {
             }
             sum = txm_vec3_add(sum, color);
         }
-        const txm_vec3 shown = txm_linear_to_srgb3(txm_vec3_scale(sum, 1.0f / SAMPLES));
-        out[3 * x] = (unsigned char)(txm_clampf(shown.x, 0, 1) * 255.0f + 0.5f);
-        out[3 * x + 1] = (unsigned char)(txm_clampf(shown.y, 0, 1) * 255.0f + 0.5f);
-        out[3 * x + 2] = (unsigned char)(txm_clampf(shown.z, 0, 1) * 255.0f + 0.5f);
+        const float light[3] = {sum.x / SAMPLES, sum.y / SAMPLES, sum.z / SAMPLES};
+        for (int c = 0; c < 3; c++) {
+            const float shown = txm_clampf(txm_linear_to_srgb(light[c]), 0, 1);
+            out[3 * x + c] = (unsigned char)(shown * 255.0f + 0.5f);
+        }
     }
 }
 

@@ -4,10 +4,10 @@
    WHAT IT DOES
      Small things that every texkit header needs: status codes, the environment (allocator,
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
-     generator, a sort, vectors, matrices, quaternions and colour spaces; and the few kernels that
-     more than one of them uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the
-     minimum cut of a grid, the halving of an image, the Poisson equation on a masked image, and
-     which sides of a mesh share an edge.
+     generator, a sort, vectors, quaternions, sRGB; and the few kernels that more than one of them
+     uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the minimum cut of a grid,
+     the halving of an image, the Poisson equation on a masked image, and which sides of a mesh
+     share an edge.
 
    QUICK START                                 (tests build and run this very block)
      // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
@@ -44,11 +44,10 @@
      wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
 
    CONVENTIONS
-     Vectors are columns; matrices are stored column by column, as OpenGL and glTF have them:
-     m[rows * column + row]; the product a b applies b first. Right-handed space; a camera looks
-     along -z; clip space is -1..1 on all axes. Angles are in radians. A quaternion (x, y, z, w) has
-     its scalar last. Colours are linear unless the name says srgb; see each function for ranges.
-     Image rows go from top to bottom, x to the right.
+     Vectors are columns; a matrix is stored column by column, as OpenGL and glTF have it:
+     m[3 * column + row]; the product a b applies b first. Right-handed space. Angles are in
+     radians. A quaternion (x, y, z, w) has its scalar last. Image rows go from top to bottom, x to
+     the right.
 
    MEMORY
      Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
@@ -66,8 +65,8 @@
      makes necessary (vectors in double are not rounded). That gives the same bits wherever
      arithmetic is IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it)
      and without -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one
-     result of 10^8 (txm_sincos and txm_exp2 do not): use it to show colours and place cameras, not
-     to decide. Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
+     result of 10^8 (txm_sincos and txm_exp2 do not): use it for what is only shown, not to decide.
+     Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
@@ -76,17 +75,15 @@
    REFERENCES
      [1] M. O'Neill. PCG: a family of simple fast space-efficient statistically good algorithms for
          random number generation. Harvey Mudd College HMC-CS-2014-0905, 2014.
-     [2] Y. Ohta, T. Kanade, T. Sakai. Color information for region segmentation. Computer Graphics
-         and Image Processing 13, 1980.
-     [3] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
+     [2] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
          SIGGRAPH 2001.
-     [4] P. Perez, M. Gangnet, A. Blake. Poisson image editing. SIGGRAPH 2003.
-     [5] R. Bridson. Fluid simulation for computer graphics, section 4.3 (the preconditioner
+     [3] P. Perez, M. Gangnet, A. Blake. Poisson image editing. SIGGRAPH 2003.
+     [4] R. Bridson. Fluid simulation for computer graphics, section 4.3 (the preconditioner
          MIC(0) of I. Gustafsson. A class of first order factorization methods. BIT 18, 1978).
-     [6] IEC 61966-2-1:1999 (sRGB); CIE 15:2004 (XYZ, L*a*b*).
-     [7] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
-     [8] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.
-     [9] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
+     [5] IEC 61966-2-1:1999 (sRGB).
+     [6] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
+     [7] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.
+     [8] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
          energy minimization in vision. IEEE PAMI 26(9), 2004.                                 */
 #ifndef TEXMATH_H
 #define TEXMATH_H
@@ -102,8 +99,6 @@ extern "C" {
 #include "texmath/random.h"
 #include "texmath/vector.h"
 #include "texmath/matrix.h"
-#include "texmath/color.h"
-#include "texmath/eigen.h"
 #include "texmath/cut.h"
 #include "texmath/poisson.h"
 #include "texmath/mesh.h"

@@ -233,8 +233,8 @@ typedef struct texsyn_job texsyn_job;
 TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, texsyn_job **job);
 
 /* Do one sweep; the environment is told how much of the whole job is done. After TXM_OUT_OF_MEMORY
-   the step may be tried again; after TXM_CANCELLED also, but a sweep was interrupted and the picture
-   will not be the one of the same seed.
+   the step may be tried again; after TXM_CANCELLED also, but a sweep was interrupted and the
+   picture will not be the one of the same seed.
    more   receives 1, or 0 once nothing is left to do; untouched after an error; NULL is allowed */
 TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, int *more);
 

@@ -1,4 +1,4 @@
-/* test_texmath_image.c - image views, half size, the Poisson equation on a mask
+/* test_texmath_image.c - image views, sRGB, half size, the Poisson equation on a mask
    SPDX-License-Identifier: MIT OR Unlicense
 
    cc -std=c99 -I. -Itests tests/test_texmath_image.c -lcmocka -lpthread -lm                  */
@@ -176,6 +176,32 @@ static void test_image_finite(void **state) {
     assert_int_equal(im.stride, 12);
     im = txm_image_resolve(view(floats, 3, 4, 2, TXM_U16));
     assert_int_equal(im.stride, 12);
+}
+
+/* ---- colour ----------------------------------------------------------------------------- */
+
+static void test_colour_known(void **state) {
+    (void)state;
+    assert_near(txm_srgb_to_linear(0.5f), 0.21404114, 1e-7);
+    assert_near(txm_srgb_to_linear(0.02f), 0.00154799, 1e-8);
+    assert_near(txm_linear_to_srgb(0.18f), 0.46135613, 1e-6);
+    assert_near(txm_linear_to_srgb(0.001f), 0.01292, 1e-7);
+    assert_true(txm_srgb_to_linear(0) == 0 && txm_srgb_to_linear(1) == 1);
+    assert_true(txm_linear_to_srgb(0) == 0);
+    assert_near(txm_linear_to_srgb(1), 1, 1e-7);
+}
+
+static void test_colour_back(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(13, 0);
+    for (int i = 0; i < 20000; i++) {
+        const float c = random_float(&rng, 0, 1);
+        assert_near(txm_linear_to_srgb(txm_srgb_to_linear(c)), c, 1e-6);
+    }
+    for (int v = 0; v < 256; v++) { /* every code value survives linear light */
+        const float s = (float)v / 255.0f;
+        assert_int_equal((int)(txm_linear_to_srgb(txm_srgb_to_linear(s)) * 255 + 0.5f), v);
+    }
 }
 
 /* ---- half size -------------------------------------------------------------------------- */
@@ -516,23 +542,20 @@ static void test_same_bytes(void **state) {
     for (int i = 0; i < 1000; i++) {
         const txm_vec3 a = random_vec3(&rng, 3), b = random_vec3(&rng, 3);
         const txm_quat q = random_quat(&rng);
-        const txm_mat4 m = txm_mat4_mul(txm_mat4_translation(a), txm_quat_mat4(q));
-        const txm_vec3 v[5] = {txm_vec3_cross(a, b), txm_vec3_normalize(a), txm_quat_rotate(q, a),
-                               txm_mat4_point(m, b), txm_rgb_to_opponent(a)};
+        const txm_mat3 m = txm_quat_mat3(q);
+        const txm_vec3 v[3] = {txm_vec3_cross(a, b), txm_vec3_normalize(a), txm_quat_rotate(q, a)};
         const double s[6] = {a.x, a.y, a.z, b.x, b.y, b.z};
         double values[3], vectors[3][3];
-        txm_mat4 inverse;
         txm_eigen3(s, values, vectors);
-        txm_mat4_inverse(m, &inverse);
         hash = tk_hash(hash, v, sizeof v);
-        hash = tk_hash(hash, &inverse, sizeof inverse);
+        hash = tk_hash(hash, &m, sizeof m);
         hash = tk_hash(hash, values, sizeof values);
         hash = tk_hash(hash, vectors, sizeof vectors);
     }
     poisson_setup(&p, 1, 4);
     assert_int_equal(txm_poisson(&p.desc, NULL), TXM_OK);
     hash = tk_hash(hash, p.pixels, sizeof p.pixels);
-    if (hash != 0xb2baf780e6ad5d97u) fail_msg("hash is 0x%016llxu", (unsigned long long)hash);
+    if (hash != 0xe84d1de8544bab52u) fail_msg("hash is 0x%016llxu", (unsigned long long)hash);
 }
 
 int main(void) {
@@ -540,6 +563,8 @@ int main(void) {
         cmocka_unit_test(test_image_check),
         cmocka_unit_test(test_image_samples),
         cmocka_unit_test(test_image_finite),
+        cmocka_unit_test(test_colour_known),
+        cmocka_unit_test(test_colour_back),
         cmocka_unit_test(test_halve),
         cmocka_unit_test(test_poisson_harmonic),
         cmocka_unit_test(test_poisson_equation),

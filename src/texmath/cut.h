@@ -6,7 +6,7 @@
 /* ---- kernel: minimum-error cut ---------------------------------------------------------- */
 
 /* The cheapest path through a strip from its first line to its last, moving at most one pixel
-   sideways per line [3]:
+   sideways per line [2]:
 
        E(i, j) = e(i, j) + min(E(i-1, j-1), E(i-1, j), E(i-1, j+1)),  path(last) = argmin E(last, .)
 
@@ -56,7 +56,7 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
 /* ---- kernel: minimum cut on a grid ------------------------------------------------------ */
 
 /* The cheapest way to part the nodes of a grid into those of a source and those of a sink, which is
-   what graph cuts ask for: maximum flow by two growing search trees [9]. A node is a place of the
+   what graph cuts ask for: maximum flow by two growing search trees [8]. A node is a place of the
    grid, with a margin of one on all sides whose capacities stay zero. Arc d of node p goes to
    p + step[d]; the opposite arc is d + directions / 2 there.
 
@@ -64,7 +64,8 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
    txm_flow_solve, and look at tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
    capacities at a node must stay below 2^30. Integers only, so the same cut everywhere. */
 enum { TXM_FLOW_FREE = 0, TXM_FLOW_SOURCE = 1, TXM_FLOW_SINK = 2 };
-enum { TXM_FLOW_TERMINAL = 6, TXM_FLOW_NONE = 7, TXM_FLOW_ORPHAN = 8 }; /* parents that are no arc */
+/* parents that are no arc */
+enum { TXM_FLOW_TERMINAL = 6, TXM_FLOW_NONE = 7, TXM_FLOW_ORPHAN = 8 };
 
 typedef struct txm_flow {
     int directions; /* 4 or 6 */
@@ -151,16 +152,18 @@ static inline void txm_flow_augment(txm_flow *g, int p, int d) {
 
 /* Capacity of the arc by which p hangs on its neighbour in direction d, in p's tree. */
 static inline int32_t txm_flow_hold(const txm_flow *g, int p, int d) {
-    return g->tree[p] == TXM_FLOW_SOURCE ? g->arc[txm_flow_opposite(g, d)][p + g->step[d]] : g->arc[d][p];
+    if (g->tree[p] != TXM_FLOW_SOURCE) return g->arc[d][p];
+    return g->arc[txm_flow_opposite(g, d)][p + g->step[d]];
 }
 
-/* Find a new parent for an orphan, the nearest to the terminal, or set it and its children free. */
+/* Find a new parent for an orphan, the nearest to the terminal, or free it and its children. */
 static inline void txm_flow_adopt(txm_flow *g, int p) {
     int best = TXM_FLOW_NONE, least = INT_MAX;
     const uint8_t tree = g->tree[p];
     for (int d = 0; d < g->directions; d++) {
         const int q = p + g->step[d];
-        if (g->tree[q] != tree || g->parent[q] == TXM_FLOW_NONE || txm_flow_hold(g, p, d) == 0) continue;
+        if (g->tree[q] != tree || g->parent[q] == TXM_FLOW_NONE || txm_flow_hold(g, p, d) == 0)
+            continue;
         int length = 0, x = q;
         for (;;) { /* does q still hang on the terminal? */
             if (g->stamp[x] == g->time) {
@@ -230,8 +233,8 @@ static inline int txm_flow_grow(txm_flow *g, int p, int *from, int *direction) {
     return 0;
 }
 
-/* Push all the flow there is. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut; the
-   arcs and excess hold what is left.
+/* Push all the flow there is. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut;
+   the arcs and excess hold what is left.
    cost  linear in practice, some 0.1 us per node; polynomial at worst                        */
 static inline void txm_flow_solve(txm_flow *g) {
     g->first = g->last = -1;
@@ -275,8 +278,8 @@ static inline void txm_flow_solve(txm_flow *g) {
     }
 }
 
-/* Memory for up to most nodes with 4 or 6 directions, 22 + 4 * directions bytes each, from the arena.
-   0: there is none. */
+/* Memory for up to most nodes with 4 or 6 directions, 22 + 4 * directions bytes each, from the
+   arena. 0: there is none. */
 static inline int txm_flow_make(txm_flow *g, txm_arena *arena, int directions, int most) {
     const size_t n = (size_t)most;
     g->directions = directions;

@@ -121,6 +121,17 @@ static inline int txm_image_is_finite(const txm_image *image) {
     return 1;
 }
 
+/* ---- colour ----------------------------------------------------------------------------- */
+
+/* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, values go on along the
+   same curves (below 0: the straight part), nothing is clamped. */
+static inline float txm_srgb_to_linear(float s) {
+    return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+}
+static inline float txm_linear_to_srgb(float l) {
+    return txm_float(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
+}
+
 /* ---- kernel: half size ------------------------------------------------------------------ */
 
 /* One step of an image pyramid: each pixel of half is the mean of the 2x2 pixels of image below

@@ -6,165 +6,10 @@
 
 /* ---- matrices --------------------------------------------------------------------------- */
 
-/* Stored column by column: row r of column c is m[3 * c + r], of a mat4 m[4 * c + r]. */
+/* Stored column by column: row r of column c is m[3 * c + r]. */
 typedef struct txm_mat3 {
     float m[9];
 } txm_mat3;
-typedef struct txm_mat4 {
-    float m[16];
-} txm_mat4;
-
-/* out = a b, n x n; the helper of the two below */
-static inline void txm_matrix_mul(int n, const float *a, const float *b, float *out) {
-    for (int c = 0; c < n; c++) {
-        for (int r = 0; r < n; r++) {
-            double sum = 0;
-            for (int k = 0; k < n; k++) sum += (double)a[n * k + r] * b[n * c + k];
-            out[n * c + r] = txm_float(sum);
-        }
-    }
-}
-
-/* out = inverse of m, n x n, n <= 4: Gauss and Jordan with row scaling and partial pivoting.
-   A pivot below 2^-40 of its column counts as 0: by then a float matrix has no rank left. */
-static inline txm_status txm_matrix_inverse(int n, const float *m, float *out) {
-    double a[4][8], largest[4] = {0, 0, 0, 0};
-    for (int r = 0; r < n; r++) {
-        double scale = 0;
-        for (int c = 0; c < n; c++) {
-            if (!txm_is_finite(m[n * c + r])) return TXM_BAD_ARGUMENT;
-            scale = fmax(scale, fabs((double)m[n * c + r]));
-        }
-        if (scale <= 0) return TXM_BAD_ARGUMENT;
-        for (int c = 0; c < n; c++) {
-            a[r][c] = m[n * c + r] / scale;
-            a[r][n + c] = r == c ? 1 / scale : 0;
-            largest[c] = fmax(largest[c], fabs(a[r][c]));
-        }
-    }
-    for (int k = 0; k < n; k++) {
-        int p = k;
-        for (int r = k + 1; r < n; r++) {
-            if (fabs(a[r][k]) > fabs(a[p][k])) p = r;
-        }
-        const double pivot = a[p][k];
-        if (fabs(pivot) <= largest[k] * (1.0 / 1099511627776.0)) return TXM_BAD_ARGUMENT;
-        for (int c = 0; c < 2 * n; c++) {
-            const double t = a[p][c];
-            a[p][c] = a[k][c];
-            a[k][c] = t / pivot;
-        }
-        for (int r = 0; r < n; r++) {
-            const double f = a[r][k];
-            for (int c = 0; c < 2 * n && r != k; c++) a[r][c] -= f * a[k][c];
-        }
-    }
-    for (int i = 0; i < n * n; i++) {
-        if (fabs(a[i % n][n + i / n]) > 3.4e38) return TXM_BAD_ARGUMENT; /* no float */
-    }
-    for (int i = 0; i < n * n; i++) out[i] = txm_float(a[i % n][n + i / n]);
-    return TXM_OK;
-}
-
-static inline txm_mat3 txm_mat3_identity(void) {
-    const txm_mat3 m = {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    return m;
-}
-static inline txm_mat3 txm_mat3_mul(txm_mat3 a, txm_mat3 b) {
-    txm_mat3 out = {{0}};
-    txm_matrix_mul(3, a.m, b.m, out.m);
-    return out;
-}
-static inline txm_mat3 txm_mat3_transpose(txm_mat3 m) {
-    txm_mat3 out;
-    for (int i = 0; i < 9; i++) out.m[i] = m.m[3 * (i % 3) + i / 3];
-    return out;
-}
-/* TXM_BAD_ARGUMENT, and *out untouched, if m is singular to float precision or not finite */
-static inline txm_status txm_mat3_inverse(txm_mat3 m, txm_mat3 *out) {
-    return txm_matrix_inverse(3, m.m, out->m);
-}
-/* m v */
-static inline txm_vec3 txm_mat3_vec(txm_mat3 m, txm_vec3 v) {
-    float r[3];
-    for (int i = 0; i < 3; i++)
-        r[i] =
-            txm_float((double)m.m[i] * v.x + (double)m.m[3 + i] * v.y + (double)m.m[6 + i] * v.z);
-    return txm_v3(r[0], r[1], r[2]);
-}
-
-static inline txm_mat4 txm_mat4_identity(void) {
-    const txm_mat4 m = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
-    return m;
-}
-static inline txm_mat4 txm_mat4_mul(txm_mat4 a, txm_mat4 b) {
-    txm_mat4 out = {{0}};
-    txm_matrix_mul(4, a.m, b.m, out.m);
-    return out;
-}
-static inline txm_mat4 txm_mat4_transpose(txm_mat4 m) {
-    txm_mat4 out;
-    for (int i = 0; i < 16; i++) out.m[i] = m.m[4 * (i % 4) + i / 4];
-    return out;
-}
-/* as txm_mat3_inverse */
-static inline txm_status txm_mat4_inverse(txm_mat4 m, txm_mat4 *out) {
-    return txm_matrix_inverse(4, m.m, out->m);
-}
-/* m v */
-static inline txm_vec4 txm_mat4_vec(txm_mat4 m, txm_vec4 v) {
-    float r[4];
-    for (int i = 0; i < 4; i++)
-        r[i] = txm_float((double)m.m[i] * v.x + (double)m.m[4 + i] * v.y +
-                         (double)m.m[8 + i] * v.z + (double)m.m[12 + i] * v.w);
-    return txm_v4(r[0], r[1], r[2], r[3]);
-}
-/* the point p moved by m, divided by its w (unless that is 0) */
-static inline txm_vec3 txm_mat4_point(txm_mat4 m, txm_vec3 p) {
-    const txm_vec4 q = txm_mat4_vec(m, txm_v4(p.x, p.y, p.z, 1));
-    const float w = q.w < 0 || q.w > 0 ? q.w : 1;
-    return txm_v3(q.x / w, q.y / w, q.z / w);
-}
-/* the direction v turned by m; translation does not move it */
-static inline txm_vec3 txm_mat4_vector(txm_mat4 m, txm_vec3 v) {
-    const txm_vec4 q = txm_mat4_vec(m, txm_v4(v.x, v.y, v.z, 0));
-    return txm_v3(q.x, q.y, q.z);
-}
-/* the linear part; for normals take its inverse transposed */
-static inline txm_mat3 txm_mat4_mat3(txm_mat4 m) {
-    txm_mat3 out;
-    for (int i = 0; i < 9; i++) out.m[i] = m.m[4 * (i / 3) + i % 3];
-    return out;
-}
-static inline txm_mat4 txm_mat4_translation(txm_vec3 t) {
-    const txm_mat4 m = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, t.x, t.y, t.z, 1}};
-    return m;
-}
-static inline txm_mat4 txm_mat4_scale(txm_vec3 s) {
-    const txm_mat4 m = {{s.x, 0, 0, 0, 0, s.y, 0, 0, 0, 0, s.z, 0, 0, 0, 0, 1}};
-    return m;
-}
-/* World to camera: eye goes to the origin, target onto the -z axis, up to the upper half. Any up
-   will do, also one along the line of sight. */
-static inline txm_mat4 txm_mat4_look_at(txm_vec3 eye, txm_vec3 target, txm_vec3 up) {
-    txm_vec3 z = txm_vec3_normalize(txm_vec3_sub(eye, target));
-    if (txm_vec3_dot(z, z) <= 0) z = txm_v3(0, 0, 1);
-    txm_vec3 x = txm_vec3_cross(txm_vec3_normalize(up), z);
-    x = txm_vec3_length(x) > 1e-6f ? txm_vec3_normalize(x) : txm_vec3_perpendicular(z);
-    const txm_vec3 y = txm_vec3_cross(z, x);
-    const txm_mat4 m = {{x.x, y.x, z.x, 0, x.y, y.y, z.y, 0, x.z, y.z, z.z, 0,
-                         -txm_vec3_dot(x, eye), -txm_vec3_dot(y, eye), -txm_vec3_dot(z, eye), 1}};
-    return m;
-}
-/* Camera to clip space: fov_y between 0 and pi, aspect = width / height > 0, 0 < near < far;
-   z = -near goes to -1, z = -far to 1. (near_z, far_z: near and far are macros on Windows.) */
-static inline txm_mat4 txm_mat4_perspective(float fov_y, float aspect, float near_z, float far_z) {
-    const double f = cos(0.5 * fov_y) / sin(0.5 * fov_y), d = (double)near_z - far_z;
-    const txm_mat4 m = {{txm_float(f / aspect), 0, 0, 0, 0, txm_float(f), 0, 0, 0, 0,
-                         txm_float(((double)far_z + near_z) / d), -1, 0, 0,
-                         txm_float(2.0 * far_z * near_z / d), 0}};
-    return m;
-}
 
 /* ---- quaternions ------------------------------------------------------------------------ */
 
@@ -214,15 +59,6 @@ static inline txm_mat3 txm_quat_mat3(txm_quat q) {
                          txm_float(1 - 2 * (x * x + y * y))}};
     return m;
 }
-static inline txm_mat4 txm_quat_mat4(txm_quat q) {
-    const txm_mat3 r = txm_quat_mat3(q);
-    txm_mat4 m = txm_mat4_identity();
-    for (int i = 0; i < 9; i++) m.m[4 * (i / 3) + i % 3] = r.m[i];
-    return m;
-}
-static inline txm_mat4 txm_mat4_rotation(txm_vec3 axis, float angle) {
-    return txm_quat_mat4(txm_quat_axis_angle(axis, angle));
-}
 /* v turned by the unit quaternion q: v + 2 w (u x v) + 2 u x (u x v), u = (x, y, z) */
 static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
     const double x = q.x, y = q.y, z = q.z, w = q.w;
@@ -232,7 +68,7 @@ static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
                   txm_float(v.y + w * ty + (z * tx - x * tz)),
                   txm_float(v.z + w * tz + (x * ty - y * tx)));
 }
-/* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [8] takes the one whose
+/* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [7] takes the one whose
    component is largest: that one never divides by something small. */
 static inline txm_quat txm_quat_from_mat3(txm_mat3 m) {
     const double xx = m.m[0], yy = m.m[4], zz = m.m[8];
@@ -273,6 +109,86 @@ static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
     if (cosine > 0.9995) return txm_quat_nlerp(a, b, t); /* the sine would be too small */
     const double angle = acos(cosine), s = sin((1.0 - t) * angle), u = sin(t * angle);
     return txm_quat_blend(a, b, s, d < 0 ? -u : u); /* blend divides by sin(angle) */
+}
+
+/* ---- kernel: symmetric 3x3 eigensystem -------------------------------------------------- */
+
+/* Eigenvalues and eigenvectors of
+
+       | a[0] a[1] a[2] |
+   A = | a[1] a[3] a[4] |      A vectors[k] = values[k] vectors[k]
+       | a[2] a[4] a[5] |
+
+   by cyclic Jacobi rotations in double [6]; the covariance of points is the usual A.
+
+   values   falling
+   vectors  unit length, at right angles, vectors[2] = vectors[0] x vectors[1]; of the first two
+            the component of largest magnitude (the first such) is positive. For equal values any
+            basis of their space is right; this one depends on the bits of A only.
+   return   TXM_OK, or TXM_BAD_ARGUMENT (nothing written) if an entry is not finite         */
+static inline txm_status txm_eigen3(const double a[6], double values[3], double vectors[3][3]) {
+    double m[3][3] = {{a[0], a[1], a[2]}, {a[1], a[3], a[4]}, {a[2], a[4], a[5]}};
+    double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; /* columns become the vectors */
+    double scale = 0;
+    int order[3] = {0, 1, 2};
+    for (int i = 0; i < 6; i++) {
+        if (!txm_is_finite(a[i])) return TXM_BAD_ARGUMENT;
+        scale = fmax(scale, fabs(a[i]));
+    }
+    for (int i = 0; i < 9 && scale > 0; i++) m[i / 3][i % 3] /= scale; /* squares cannot overflow */
+
+    /* Each rotation zeroes m[p][q]; what is left off the diagonal shrinks quadratically, 6 sweeps
+       are the rule and 32 never needed. Rotations that no longer change the diagonal end it. */
+    for (int sweep = 0, turned = 1; turned && sweep < 32; sweep++) {
+        turned = 0;
+        for (int k = 0; k < 3; k++) {
+            const int p = k == 2 ? 1 : 0, q = k == 0 ? 1 : 2, r = 3 - p - q;
+            if (fabs(m[p][q]) <= 1e-18) {
+                m[p][q] = m[q][p] = 0;
+                continue;
+            }
+            turned = 1;
+            const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+            const double t = (theta < 0 ? -1 : 1) / (fabs(theta) + sqrt(theta * theta + 1));
+            const double c = 1 / sqrt(t * t + 1), s = t * c;
+            const double rp = m[r][p], rq = m[r][q];
+            m[p][p] -= t * m[p][q];
+            m[q][q] += t * m[p][q];
+            m[p][q] = m[q][p] = 0;
+            m[r][p] = m[p][r] = c * rp - s * rq;
+            m[r][q] = m[q][r] = s * rp + c * rq;
+            for (int i = 0; i < 3; i++) {
+                const double ip = v[i][p], iq = v[i][q];
+                v[i][p] = c * ip - s * iq;
+                v[i][q] = s * ip + c * iq;
+            }
+        }
+    }
+    for (int k = 0; k < 3; k++) { /* three compare-and-swaps that keep the order of equals */
+        const int i = k == 1 ? 1 : 0, x = order[i], y = order[i + 1];
+        if (m[y][y] > m[x][x]) {
+            order[i] = y;
+            order[i + 1] = x;
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        const int o = order[k];
+        double sign = 0, most = 0;
+        for (int i = 0; i < 3; i++) {
+            /* nearly equal magnitudes count as equal, so that rounding does not choose the sign */
+            if (fabs(v[i][o]) > most * (1 + 1e-9)) {
+                most = fabs(v[i][o]);
+                sign = v[i][o] < 0 ? -1 : 1;
+            }
+        }
+        values[k] = m[o][o] * scale;
+        for (int i = 0; i < 3; i++) vectors[k][i] = sign * v[i][o];
+    }
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        vectors[2][i] = vectors[0][j] * vectors[1][k] - vectors[0][k] * vectors[1][j];
+    }
+    return TXM_OK;
 }
 
 #endif /* TEXMATH_MATRIX_H */

@@ -107,7 +107,7 @@ static inline txm_status txm_poisson_solve(const txm_poisson_grid *g, const txm_
 /* Number the unknowns, link them, and build diagonal and factor. above: width numbers of scratch.
 
    MIC(0): an incomplete factor with the stencil of A; what it drops is taken off the diagonal to
-   0.97, so that smooth vectors pass almost unchanged. For rows of five points this is [5]
+   0.97, so that smooth vectors pass almost unchanged. For rows of five points this is [4]
 
        e = d - f_left^2 (1 + 0.97 [left has a lower neighbour])
              - f_up^2   (1 + 0.97 [upper has a right neighbour]),   f = 1 / sqrt(e),
@@ -214,7 +214,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
     return TXM_OK;
 }
 
-/* Solve the (screened) Poisson equation inside a mask, with known values around it [4]:
+/* Solve the (screened) Poisson equation inside a mask, with known values around it [3]:
 
        screen (u - u0) - Lu = -target,   Lu(x) = sum over the neighbours y of x: u(y) - u(x)
 
@@ -223,7 +223,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
    target and screen 0 this is the membrane through the known values. To paste gradients, let
    target(x) be the sum of the wanted differences u(y) - u(x).
 
-   The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [5].
+   The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [4].
    desc    nothing in it is written but the pixels of desc->image, and those only on success
    env     NULL, or how to allocate, report and cancel
    return  TXM_OK (also where no pixel is masked, or max_iterations was reached);

@@ -11,9 +11,6 @@ typedef struct txm_vec2 {
 typedef struct txm_vec3 {
     float x, y, z;
 } txm_vec3;
-typedef struct txm_vec4 {
-    float x, y, z, w;
-} txm_vec4;
 
 /* Makers; C++11 has no compound literals. */
 static inline txm_vec2 txm_v2(float x, float y) {
@@ -24,62 +21,17 @@ static inline txm_vec3 txm_v3(float x, float y, float z) {
     const txm_vec3 v = {x, y, z};
     return v;
 }
-static inline txm_vec4 txm_v4(float x, float y, float z, float w) {
-    const txm_vec4 v = {x, y, z, w};
-    return v;
-}
 
-/* Component by component: a + b, a - b, a * b, a s, the smaller, the larger, a (1 - t) + b t. Dot
-   product; length; length 1 in the same direction, the zero vector for the zero vector. */
-static inline txm_vec2 txm_vec2_add(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(a.x + b.x, a.y + b.y);
-}
-static inline txm_vec2 txm_vec2_sub(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(a.x - b.x, a.y - b.y);
-}
-static inline txm_vec2 txm_vec2_mul(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(a.x * b.x, a.y * b.y);
-}
-static inline txm_vec2 txm_vec2_scale(txm_vec2 a, float s) {
-    return txm_v2(a.x * s, a.y * s);
-}
-static inline txm_vec2 txm_vec2_min(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(txm_minf(a.x, b.x), txm_minf(a.y, b.y));
-}
-static inline txm_vec2 txm_vec2_max(txm_vec2 a, txm_vec2 b) {
-    return txm_v2(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y));
-}
-static inline txm_vec2 txm_vec2_lerp(txm_vec2 a, txm_vec2 b, float t) {
-    return txm_v2(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t));
-}
-static inline float txm_vec2_dot(txm_vec2 a, txm_vec2 b) {
-    return txm_float((double)a.x * b.x + (double)a.y * b.y);
-}
-static inline float txm_vec2_length(txm_vec2 a) {
-    return txm_float(sqrt((double)a.x * a.x + (double)a.y * a.y));
-}
-static inline txm_vec2 txm_vec2_normalize(txm_vec2 a) {
-    const double n = sqrt((double)a.x * a.x + (double)a.y * a.y);
-    return n > 0 ? txm_v2(txm_float(a.x / n), txm_float(a.y / n)) : a;
-}
-
+/* Component by component: a + b, a - b, a s, a (1 - t) + b t. Dot product; length; length 1 in the
+   same direction, the zero vector for the zero vector; cross product. */
 static inline txm_vec3 txm_vec3_add(txm_vec3 a, txm_vec3 b) {
     return txm_v3(a.x + b.x, a.y + b.y, a.z + b.z);
 }
 static inline txm_vec3 txm_vec3_sub(txm_vec3 a, txm_vec3 b) {
     return txm_v3(a.x - b.x, a.y - b.y, a.z - b.z);
 }
-static inline txm_vec3 txm_vec3_mul(txm_vec3 a, txm_vec3 b) {
-    return txm_v3(a.x * b.x, a.y * b.y, a.z * b.z);
-}
 static inline txm_vec3 txm_vec3_scale(txm_vec3 a, float s) {
     return txm_v3(a.x * s, a.y * s, a.z * s);
-}
-static inline txm_vec3 txm_vec3_min(txm_vec3 a, txm_vec3 b) {
-    return txm_v3(txm_minf(a.x, b.x), txm_minf(a.y, b.y), txm_minf(a.z, b.z));
-}
-static inline txm_vec3 txm_vec3_max(txm_vec3 a, txm_vec3 b) {
-    return txm_v3(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z));
 }
 static inline txm_vec3 txm_vec3_lerp(txm_vec3 a, txm_vec3 b, float t) {
     return txm_v3(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t));
@@ -93,47 +45,6 @@ static inline float txm_vec3_length(txm_vec3 a) {
 static inline txm_vec3 txm_vec3_normalize(txm_vec3 a) {
     const double n = sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z);
     return n > 0 ? txm_v3(txm_float(a.x / n), txm_float(a.y / n), txm_float(a.z / n)) : a;
-}
-
-static inline txm_vec4 txm_vec4_add(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w);
-}
-static inline txm_vec4 txm_vec4_sub(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w);
-}
-static inline txm_vec4 txm_vec4_mul(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w);
-}
-static inline txm_vec4 txm_vec4_scale(txm_vec4 a, float s) {
-    return txm_v4(a.x * s, a.y * s, a.z * s, a.w * s);
-}
-static inline txm_vec4 txm_vec4_min(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(txm_minf(a.x, b.x), txm_minf(a.y, b.y), txm_minf(a.z, b.z), txm_minf(a.w, b.w));
-}
-static inline txm_vec4 txm_vec4_max(txm_vec4 a, txm_vec4 b) {
-    return txm_v4(txm_maxf(a.x, b.x), txm_maxf(a.y, b.y), txm_maxf(a.z, b.z), txm_maxf(a.w, b.w));
-}
-static inline txm_vec4 txm_vec4_lerp(txm_vec4 a, txm_vec4 b, float t) {
-    return txm_v4(txm_lerpf(a.x, b.x, t), txm_lerpf(a.y, b.y, t), txm_lerpf(a.z, b.z, t),
-                  txm_lerpf(a.w, b.w, t));
-}
-static inline float txm_vec4_dot(txm_vec4 a, txm_vec4 b) {
-    return txm_float((double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w);
-}
-static inline float txm_vec4_length(txm_vec4 a) {
-    return txm_float(
-        sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z + (double)a.w * a.w));
-}
-static inline txm_vec4 txm_vec4_normalize(txm_vec4 a) {
-    const double n =
-        sqrt((double)a.x * a.x + (double)a.y * a.y + (double)a.z * a.z + (double)a.w * a.w);
-    return n > 0 ? txm_v4(txm_float(a.x / n), txm_float(a.y / n), txm_float(a.z / n),
-                          txm_float(a.w / n))
-                 : a;
-}
-/* z of the cross product: positive if b lies counter-clockwise of a (y up) */
-static inline float txm_vec2_cross(txm_vec2 a, txm_vec2 b) {
-    return txm_float((double)a.x * b.y - (double)a.y * b.x);
 }
 static inline txm_vec3 txm_vec3_cross(txm_vec3 a, txm_vec3 b) {
     return txm_v3(txm_float((double)a.y * b.z - (double)a.z * b.y),
