@@ -100,33 +100,57 @@ static inline uint32_t txm_mesh_high(const txm_mesh *mesh, size_t i) {
 }
 
 /* Which sides share an edge, that is, have the same two vertices: sort the sides by the lower, then
-   by the higher vertex of their edge. Those of one edge lie together, by number. value = the side,
-   key = the lower vertex.
+   by the higher vertex of their edge. Those of one edge lie together, the lowest number first.
 
        for (size_t i = 0, end; i < sides; i = end) {
-           end = txm_mesh_edge_end(mesh, pairs, i);
-           ...  pairs[i].value to pairs[end - 1].value are the sides of one edge
+           end = txm_mesh_edge_end(mesh, sorted, i);
+           ...  sorted[i] to sorted[end - 1] are the sides of one edge
        }
 
-   pairs  room for 2 pairs for each side; the upper half is scratch
-   cost   O(faces); the mesh must have passed txm_mesh_check                               */
-static inline void txm_mesh_sort_sides(const txm_mesh *mesh, txm_pair *pairs) {
+   sorted  receives the numbers of the sides; room for 2 for each, the upper half is scratch
+   cost    O(faces); the mesh must have passed txm_mesh_check                              */
+static inline void txm_mesh_sort_sides(const txm_mesh *mesh, uint32_t *sorted) {
     const size_t sides = txm_mesh_sides(mesh);
+    uint32_t *from = sorted, *to = sorted + sides;
+    size_t next[8][256]; /* a radix sort by the 4 bytes of the higher vertex, then of the lower */
+    memset(next, 0, sizeof next);
     for (size_t i = 0; i < sides; i++) {
-        pairs[i].key = txm_mesh_high(mesh, i);
-        pairs[i].value = (uint32_t)i;
+        const uint32_t high = txm_mesh_high(mesh, i), low = txm_mesh_low(mesh, i);
+        sorted[i] = (uint32_t)i;
+        for (int b = 0; b < 4; b++) {
+            next[b][(high >> (8 * b)) & 255]++;
+            next[4 + b][(low >> (8 * b)) & 255]++;
+        }
     }
-    txm_sort_pairs(pairs, pairs + sides, sides);
-    for (size_t i = 0; i < sides; i++) pairs[i].key = txm_mesh_low(mesh, pairs[i].value);
-    txm_sort_pairs(pairs, pairs + sides, sides);
+    for (int b = 0; b < 8; b++) {
+        const int shift = b % 4 * 8;
+        size_t sum = 0, most = 0;
+        for (int d = 0; d < 256; d++) { /* from how many to where the first goes */
+            const size_t n = next[b][d];
+            if (n > most) most = n;
+            next[b][d] = sum;
+            sum += n;
+        }
+        if (most == sides) continue; /* all the same in this byte */
+        for (size_t i = 0; i < sides; i++) {
+            const uint32_t side = from[i];
+            const uint32_t v = b < 4 ? txm_mesh_high(mesh, side) : txm_mesh_low(mesh, side);
+            to[next[b][(v >> shift) & 255]++] = side;
+        }
+        uint32_t *t = from;
+        from = to;
+        to = t;
+    }
+    if (from != sorted) memcpy(sorted, from, sides * sizeof *sorted);
 }
 
-/* one past the last of the sorted sides that share the edge of pairs[i] */
-static inline size_t txm_mesh_edge_end(const txm_mesh *mesh, const txm_pair *pairs, size_t i) {
+/* one past the last of the sorted sides that share the edge of sorted[i] */
+static inline size_t txm_mesh_edge_end(const txm_mesh *mesh, const uint32_t *sorted, size_t i) {
     const size_t sides = txm_mesh_sides(mesh);
-    const uint32_t low = pairs[i].key, high = txm_mesh_high(mesh, pairs[i].value);
+    const uint32_t low = txm_mesh_low(mesh, sorted[i]), high = txm_mesh_high(mesh, sorted[i]);
     do i++;
-    while (i < sides && pairs[i].key == low && txm_mesh_high(mesh, pairs[i].value) == high);
+    while (i < sides && txm_mesh_low(mesh, sorted[i]) == low &&
+           txm_mesh_high(mesh, sorted[i]) == high);
     return i;
 }
 
@@ -139,21 +163,21 @@ enum {
 /* Link the sides of each edge into a ring: next[side] is the next higher side there, after the
    highest the lowest; a side without another, or from a vertex to itself, is its own next.
 
-   pairs  the sides as txm_mesh_sort_sides left them
-   flags  0, or what to do otherwise
-   next   receives one side for each                                                       */
-static inline void txm_mesh_link(const txm_mesh *mesh, const txm_pair *pairs, int flags,
+   sorted  the sides as txm_mesh_sort_sides left them
+   flags   0, or what to do otherwise
+   next    receives one side for each; may be sorted + sides                               */
+static inline void txm_mesh_link(const txm_mesh *mesh, const uint32_t *sorted, int flags,
                                  uint32_t *next) {
     const size_t sides = txm_mesh_sides(mesh);
     for (size_t i = 0, end; i < sides; i = end) {
-        end = txm_mesh_edge_end(mesh, pairs, i);
-        const int is_point = pairs[i].key == txm_mesh_high(mesh, pairs[i].value);
+        end = txm_mesh_edge_end(mesh, sorted, i);
+        const int is_point = txm_mesh_low(mesh, sorted[i]) == txm_mesh_high(mesh, sorted[i]);
         for (size_t k = i; k < end; k++) {
             const size_t up = k + 1 < end ? k + 1 : i, down = k > i ? k - 1 : end - 1;
             const size_t other = is_point && !(flags & TXM_LINK_POINTS) ? k
                                  : flags & TXM_LINK_DOWN                ? down
                                                                         : up;
-            next[pairs[k].value] = pairs[other].value;
+            next[sorted[k]] = sorted[other];
         }
     }
 }
