@@ -1,12 +1,13 @@
-/* treepieces.h - v0.1.0 - animated trees out of interlocking pieces
+/* treepieces.h - v0.1.0 - animated trees made of interlocking pieces
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     Grows trees by a small grammar out of a handful of pieces - tube, forks, side branches, tip, root
-     flare - that meet in hexagonal rims. A tree is no mesh but a list of pieces on one connected
-     skeleton: a thousand distinct trees are drawn by one instanced call per kind of piece, sway in the
-     wind joint by joint, are tessellated without cracks where the eye is near, and carry bark that
-     goes on across every joint. Those who want a mesh get one, welded, with skin and leaves.
+     Grows trees by a small grammar from a few kinds of pieces - tube, forks, side branches, tip,
+     root flare - that join at hexagonal rims. A tree is not stored as a mesh but as a list of
+     pieces on one connected skeleton: a thousand different trees are drawn with one instanced call
+     per kind of piece. They sway in the wind joint by joint, are tessellated without cracks near
+     the camera, and have bark textures that continue across every joint. A tree can also be baked
+     into an ordinary welded mesh with skinning weights and leaf cards.
 
    QUICK START                                 (tests build and run this very block)
      // Grow an oak, let the wind blow, write it as OBJ. cc -std=c99 quick.c -lm
@@ -34,7 +35,7 @@
          desc.kit = kit;
          desc.species = &oak;
          desc.species_count = 1;
-         desc.tree_count = 1;                 // or 10000; each differs
+         desc.tree_count = 1;                 // or 10000, all different
          desc.seed = 7;
          if (treepieces_forest_make(&desc, &env, &tree) != TXM_OK) {
              fprintf(stderr, "tree: %s\n", env.message);
@@ -45,8 +46,9 @@
          if (!bones || !sway) return 1;
          wind.speed = 8;
          wind.gusts = 0.6f;
-         for (int i = 0; i < 60; i++)         // a second at 60 frames; upload bones, draw batches
+         for (int i = 0; i < 60; i++)         // one second at 60 frames per second
              treepieces_sway(tree, &wind, i / 60.0, 1 / 60.0, NULL, &env, sway, bones);
+         // a renderer uploads the bones and draws tree->batches after each step
          bake.forest = tree;
          bake.bones = bones;
          if (treepieces_bake(&bake, &env, &mesh) != TXM_OK) {
@@ -68,52 +70,54 @@
      }
 
    HOW IT WORKS
-     Pieces are quad meshes whose borders are rims: one hexagon, with one set of normals, at the root and
-     one at each leaf rim, moved there by a building transform. A rim belongs to one bone alone, and a
-     parent keeps the vertices of its leaf rims in the frame of the child: so both compute the same
-     numbers, and no pose opens a gap or shows a crease. A child fits in six rotations. Each piece
-     has one bone of its own, which scales it across and along; its leaf rims follow the bones of its
-     children, all in one buffer [1, 4.1 to 4.3].
-     The thickest rims that wait are served first, so a limit on the pieces of a tree thins out its twigs
-     and leaves its shape: it is the coarse level of detail. The fine one is tessellation by distance,
-     symmetric along each edge [1, 4.4]. Wind is a sum of gusts that travel over the land; every joint
-     answers as a damped oscillator, the thinner the faster, solved exactly over each step.
-     Bark: all tiles of a set share one frame, so any of them fits beside any other, and rectangles of
-     them fit too. A quad shows 1 to 8 of them a side, as its size asks for, and blended ones in the
-     crotches, where the directions of growth meet [1, 5].
+     Pieces are quad meshes whose borders are rims: hexagons of one shape and with one set of
+     normals. The root rim is a canonical hexagon; each leaf rim is that hexagon moved by a building
+     transform. The vertices of a rim follow a single bone, and a parent piece stores the vertices
+     of its leaf rims in the frame of the child: both pieces compute the same numbers, so that no
+     pose opens a gap or shows a crease. A child can be attached in six rotations. Each piece has
+     one bone of its own, which scales it across and along the stem; its leaf rims follow the bones
+     of its children, all in one buffer [1, 4.1 to 4.3].
+     Open rims get their pieces in order of decreasing radius, so that a limit on the number of
+     pieces thins out the twigs and keeps the shape of the tree: this is the coarse level of detail.
+     The fine one is tessellation by distance, symmetric along each edge [1, 4.4]. Wind is a sum of
+     gusts that travel across the land; each joint responds as a damped oscillator, the thinner the
+     faster, solved exactly over each time step.
+     Bark: all tiles of a set share one frame, so that any tile, and any rectangle of tiles, fits
+     beside any other. A quad shows 1 to 16 of them across and 1 to 8 along, depending on its size,
+     and blended tiles in the crotches, where directions of growth meet [1, 5].
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TREEPIECES_STATIC     every function static to the including file (set it everywhere)
 
    MEMORY
-     A forest takes some 60 bytes a piece, and its bones and sway, which the caller owns, 64 more:
-     20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. While it grows: 300 bytes
-     for each piece of 64 trees.
+     A forest takes about 60 bytes per piece; bones and sway state, which the caller owns, take 64
+     more: 20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. Growing takes 300
+     more bytes for each piece of the 64 trees that grow at a time, which are released afterwards.
 
    TIME   (one core of 2023; make bench measures yours)
-     About 0.2 microseconds to grow a piece in memory that is already there (fresh memory may cost as much
-     again), 0.06 to move its bone in the wind. The parallel-for hook spreads trees.
+     About 0.2 microseconds to grow a piece if the memory was in use before (first access to fresh
+     memory may take as long again), 0.06 to move its bone in the wind. The parallel-for hook
+     distributes trees.
 
    THREADS
-     No global state. Calls with different env and outputs may overlap; a kit and a forest may be used by
-     many.
+     No global state. Calls with different env and outputs may overlap; a kit and a forest may be
+     read by many threads.
 
    SAME BYTES
-     All that shapes a tree is sums, products, quotients and square roots in a fixed order: the same
-     bytes on any number of threads and on any compiler that keeps to IEEE 754 (see texmath.h), built
-     with -ffp-contract=off. Bones, skin and tessellation as well.
+     Trees are computed by sums, products, quotients and square roots in a fixed order: the same
+     bytes on any number of threads and with any compiler that keeps to IEEE 754 (see texmath.h),
+     built with -ffp-contract=off. The same holds for bones, skinning and tessellation.
 
    LIMITS
-     Up to 3 leaf rims, 255 vertices and 255 quads a piece, 16 kinds of pieces, 65,535 pieces a tree,
-     2^31 a forest. Branches do not avoid each other. Wind bends joints and does not push leaves by
-     themselves. Thick limbs should bend by less than 60 degrees from piece to piece, which is the most
-     that is done.
+     Up to 3 leaf rims, 255 vertices and 255 quads per piece, 16 kinds of pieces, 65,535 pieces per
+     tree, 2^31 per forest. Branches do not avoid each other. Wind bends joints; leaves do not move
+     on their own. A stem bends by at most 60 degrees from one piece to the next.
 
    REFERENCES
      [1] V. Burkus, A. Karpati, L. Szecsi. Animated trees with interlocking pieces.
      [2] T. Boubekeur, M. Alexa. Phong tessellation. ACM Transactions on Graphics 27(5), 2008.
      [3] G. Szijarto, J. Koloszar. Real-time hardware accelerated rendering of forests at human scale.
-         Journal of WSCG 12(1-3), 2004 (impostors of 2.5 dimensions).                            */
+         Journal of WSCG 12(1-3), 2004 (2.5D impostors).                                         */
 #ifndef TREEPIECES_H
 #define TREEPIECES_H
 
@@ -143,52 +147,53 @@ enum {
     TREEPIECES_MAX_VERTICES = 255, /* of a piece                                                 */
     TREEPIECES_MAX_QUADS = 255,    /* of a piece                                                 */
     TREEPIECES_MAX_TYPES = 16,     /* of a kit, the built-in ones included                       */
-    TREEPIECES_BANDS = 4,          /* groups of quads of a piece that are textured alike         */
+    TREEPIECES_BANDS = 4,          /* groups of quads of a piece with the same numbers of tiles  */
     TREEPIECES_BONE = 12           /* floats of a bone: three rows of four, see treepieces_bones */
 };
 
-/* The built-in pieces; those registered by the user follow. */
+/* The built-in pieces; those of the caller are numbered after them. */
 typedef enum treepieces_type {
     TREEPIECES_I = 0,   /* a tube                                                    1 leaf rim  */
     TREEPIECES_Y,       /* a symmetric fork                                          2 leaf rims */
     TREEPIECES_SIDE,    /* a tube (rim 0) with a branch (rim 1)                      2           */
-    TREEPIECES_PLANAR,  /* a tube (rim 0) with two branches across from each other   3           */
+    TREEPIECES_PLANAR,  /* a tube (rim 0) with two opposite branches                 3           */
     TREEPIECES_SPATIAL, /* a fork in three                                           3           */
     TREEPIECES_TIP,     /* a closed end                                              none        */
-    TREEPIECES_FLARE,   /* the foot of a trunk, with the beginnings of roots         1           */
-    TREEPIECES_BUILTIN  /* how many these are                                                    */
+    TREEPIECES_FLARE,   /* the foot of a trunk, where the roots begin                1           */
+    TREEPIECES_BUILTIN  /* number of built-in pieces                                             */
 } treepieces_type;
 
-/* What lies on a quad. The library derives 1 to 4 from tiles of class 0; see treepieces_bark. */
+/* Which kind of tile a quad shows. treepieces_bark derives 1 to 4 from tiles of class 0. */
 typedef enum treepieces_class {
     TREEPIECES_BARK = 0,   /* neighbours match on all four sides                                 */
-    TREEPIECES_FOLD,       /* its south side meets the south side of a quad that is folded too   */
+    TREEPIECES_FOLD,       /* its south side meets the south side of another folded quad         */
     TREEPIECES_TURN_LEFT,  /* its south side meets the east side of a plain quad                 */
     TREEPIECES_TURN_RIGHT, /* its south side meets the west side of a plain quad                 */
     TREEPIECES_HALVING,    /* half as many tiles across its north side as across its south side;
-                              set by the assembly, not by pieces                                 */
-    TREEPIECES_OWN         /* and up: own classes of user pieces                                 */
+                              assigned while a tree grows, never by a piece                      */
+    TREEPIECES_OWN         /* and above: classes defined by the caller's pieces                  */
 } treepieces_class;
 
-/* A vertex of a piece, 48 bytes, as the GPU gets it. Model space: the root rim has radius 1 about
-   the origin in the plane y = 0, the stem goes up (+y). */
+/* A vertex of a piece, 48 bytes, laid out for the GPU. Model space: the root rim has radius 1 about
+   the origin in the plane y = 0, the stem points up (+y). */
 typedef struct treepieces_vertex {
     float position[3];
     int32_t rim;      /* out: 6 leaf + place if on a leaf rim, else -1                           */
     float normal[3];  /* unit length                                                             */
     float reserved;   /* 0                                                                       */
-    float weights[4]; /* of the piece's own bone (the root joint), then of the terminal joints at
-                         leaf rims 0, 1, 2; each >= 0, sum 1. Root rim: 1 0 0 0; leaf rim k: 1 at
-                         place 1 + k                                                             */
+    float weights[4]; /* of the piece's own bone (the root joint), then of the bones of the children
+                         at leaf rims 0, 1, 2; each >= 0, sum 1. On the root rim 1 0 0 0; on leaf rim
+                         k weights[1 + k] is 1                                                   */
 } treepieces_vertex;
 
-/* A quad, seen from outside: corners nw, sw, se, ne of its tile, that is counter-clockwise. North is
-   towards the leaves. */
+/* A quad, seen from outside: the corners nw, sw, se, ne of its tile, counter-clockwise. North is
+   towards the leaf rims. */
 typedef struct treepieces_quad {
     uint8_t corners[4];
     uint8_t tile_class; /* treepieces_class                                                      */
-    uint8_t band;       /* 0..TREEPIECES_BANDS-1: quads of one band have as many tiles each. Band 0
-                           touches the root rim, band 1 + k leaf rim k (an I: 0 below, 1 above)  */
+    uint8_t band;       /* 0..TREEPIECES_BANDS-1: all quads of a band show the same numbers of
+                           tiles. Band 0 touches the root rim, band 1 + k leaf rim k (of an I: 0
+                           is the lower half, 1 the upper)                                       */
 } treepieces_quad;
 
 /* A similarity: p -> translation + scale * rotate(rotation, p). */
@@ -198,10 +203,11 @@ typedef struct treepieces_similarity {
     float scale;       /* > 0                     */
 } treepieces_similarity;
 
-/* A piece [1, 4.1 to 4.3]: a quad mesh whose boundary is its rims. Place k of a rim lies at
-   (cos 60k, 0, -sin 60k) of the rim's frame, with the normal (10 cos 60k, 1, -10 sin 60k) / sqrt(101):
-   all rims are the mouths of cones of one aperture. Seen from outside with y up, k + 1 is to the
-   right of k. building maps the root rim's frame to that of a leaf rim (section 4.2). */
+/* A piece [1, 4.1 to 4.3]: a quad mesh whose boundary is its rims. Vertex k of a rim lies at
+   (cos 60k, 0, -sin 60k) in the rim's frame, with the normal (10 cos 60k, 1, -10 sin 60k) / sqrt(101),
+   so that all rims are cross-sections of cones of one opening angle. Seen from outside with y up,
+   vertex k + 1 is to the right of vertex k. building maps the root rim's frame to that of a leaf
+   rim. */
 typedef struct treepieces_piece {
     const char *name;
     const treepieces_vertex *vertices;
@@ -215,24 +221,26 @@ typedef struct treepieces_piece {
 /* A set of pieces; never changed after it is made. */
 typedef struct treepieces_kit treepieces_kit;
 
-/* The built-in pieces and, numbered from TREEPIECES_BUILTIN, own ones. Everything is copied.
+/* Make a kit: the built-in pieces and, numbered from TREEPIECES_BUILTIN, copies of the caller's.
 
-   pieces  count own pieces, or NULL. What a piece must be is checked: counts and numbers in range;
-           rims where the canonical hexagon says, to 1e-4 of their radius (they are then moved onto
-           it), with its normals; weights; a surface of one component, oriented, manifold, its only
-           borders the rims, no vertex unused; a building transform of each leaf rim
+   pieces  the caller's pieces, `count` of them, or NULL. Each is checked: counts and indices in range;
+           rim vertices within 1e-4 of their radius of the canonical hexagon (they are then moved onto
+           it), with its normals; weights; a connected, oriented, manifold surface whose only borders
+           are the rims, without unused vertices; a building transform for each leaf rim
    out     receives the kit, or NULL on any error; release it with treepieces_kit_free
-   return  TXM_OK; TXM_BAD_ARGUMENT, the message naming piece and vertex; TXM_TOO_LARGE;
+   return  TXM_OK; TXM_BAD_ARGUMENT, the message names piece and vertex; TXM_TOO_LARGE;
            TXM_OUT_OF_MEMORY                                                                     */
 TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, int count,
                                               txm_env *env, treepieces_kit **out);
 
-/* Release a kit by the allocator it was made with; NULL is allowed. No forest may use it any more. */
+/* Release a kit with the allocator it was made with; NULL is allowed. Forests made with it must not
+   be used any more. */
 TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit);
 
+/* Number of pieces in a kit, the built-in ones included; 0 for NULL. */
 TREEPIECES_API int treepieces_kit_count(const treepieces_kit *kit);
 
-/* Piece `type` as the kit has it; NULL for a bad number. Valid as long as the kit. */
+/* Piece `type` of a kit; NULL for a number out of range. Valid as long as the kit. */
 TREEPIECES_API const treepieces_piece *treepieces_kit_piece(const treepieces_kit *kit, int type);
 
 /* ---- species ----------------------------------------------------------------------------- */
@@ -242,41 +250,41 @@ enum {
     TREEPIECES_MAX_NAME = 32
 };
 
-/* The axes of one order: 0 the trunk, 1 the branches on it, 2 those on them, ... An axis is a chain
-   of pieces; a fork splits it into axes of the same order. */
+/* The axes of one order: 0 is the trunk, 1 the branches on it, 2 the branches on those, ... An axis
+   is a chain of pieces; a fork splits it into axes of the same order. */
 typedef struct treepieces_order {
-    float length;         /* order 0: metres; else as a ratio to the length of the parent axis     */
-    float length_spread;  /* 0..1: uniform within length * (1 -+ spread)                           */
-    float radius;         /* at its foot: order 0 as a ratio to its length; else to the radius of the
-                             stem there                                                            */
-    float taper;          /* radius at its end over that at its foot, 0.02..1                      */
-    float segments;       /* pieces along an axis of full length, 1..64                            */
-    float start;          /* 0..1: how much of the axis is bare of branches                        */
-    float side, pair;     /* probabilities of a piece beyond start to bear one or two branches     */
-    float fork, triple;   /* ... to split the axis in two or three                                 */
-    float fork_angle;     /* degrees between a fork's arm and the axis below                       */
-    float fork_ratio;     /* how much of the remaining length an arm has, 0.1..1                   */
-    float angle_base, angle_top; /* degrees between a branch of this order and its stem, at the foot
-                             and at the end of the stem                                            */
-    float angle_spread;   /* degrees, uniform -+                                                   */
-    float profile[3];     /* length of a branch of this order that stands at the start, in the middle
-                             or at the end of its stem, times `length`; parabola through the three */
-    float roll;           /* degrees about the stem from one branch on it to the next; pieces turn by
-                             60, the rest is twist                                                 */
-    float wander;         /* degrees, by which the axis turns at random from piece to piece        */
-    float tropism;        /* -1..1: share by which a piece turns to the sky (> 0) or the ground    */
-    float sag;            /* degrees that the axis's end would hang below its foot's direction if it
-                             were level: weight; < 0 lifts the end                                 */
-    float gravimorphism;  /* -1..1: branches of this order on the upper (> 0) or lower side of a
-                             slanting stem grow longer                                             */
-    float flatten;        /* 0..1: how far branches of this order keep to the horizontal plane     */
-    float leaves;         /* 0..1: probability of a piece to bear a leaf cloud                     */
-    float leaves_start;   /* 0..1: how much of the axis is bare of leaves                          */
+    float length;         /* order 0: metres; else ratio to the length of the parent axis         */
+    float length_spread;  /* 0..1: uniform within length * (1 -+ spread)                          */
+    float radius;         /* at the base: order 0: ratio to its length; else to the radius of the
+                             parent stem there                                                    */
+    float taper;          /* radius at the end over radius at the base, 0.02..1                   */
+    float segments;       /* pieces along an axis of full length, 1..64                           */
+    float start;          /* 0..1: fraction of the axis, from its base, without branches          */
+    float side, pair;     /* probabilities that a piece beyond start bears one or two branches    */
+    float fork, triple;   /* probabilities that it splits the axis in two or three                */
+    float fork_angle;     /* degrees between an arm of a fork and the axis below                  */
+    float fork_ratio;     /* fraction of the remaining length that an arm gets, 0.1..1            */
+    float angle_base, angle_top; /* degrees between a branch of this order and its parent stem, at
+                             the base and at the end of the stem                                  */
+    float angle_spread;   /* degrees, uniform -+                                                  */
+    float profile[3];     /* length of a branch of this order at the start, the middle and the end
+                             of its parent stem, times `length`; a parabola in between            */
+    float roll;           /* degrees about the stem from one branch to the next; pieces turn by
+                             multiples of 60, the rest is twist                                   */
+    float wander;         /* degrees by which the axis turns at random from piece to piece        */
+    float tropism;        /* -1..1: how strongly each piece turns up (> 0) or down (< 0)          */
+    float sag;            /* degrees by which the end of a horizontal axis hangs below the
+                             direction of its base: weight; < 0 lifts the end                     */
+    float gravimorphism;  /* -1..1: branches of this order on the upper (> 0) or lower (< 0) side
+                             of a slanting stem grow longer                                       */
+    float flatten;        /* 0..1: how much branches of this order are turned to the horizontal   */
+    float leaves;         /* 0..1: probability that a piece bears a leaf cloud                    */
+    float leaves_start;   /* 0..1: fraction of the axis, from its base, without leaves            */
 } treepieces_order;
 
 typedef enum treepieces_envelope {
-    TREEPIECES_FREE = 0,
-    TREEPIECES_ELLIPSOID, /* of crown_width, between crown_base and crown_top */
+    TREEPIECES_FREE = 0,  /* none; the others are crown_width wide, from crown_base to crown_top */
+    TREEPIECES_ELLIPSOID,
     TREEPIECES_CONE,
     TREEPIECES_CYLINDER
 } treepieces_envelope;
@@ -290,104 +298,106 @@ typedef enum treepieces_leaf_shape {
     TREEPIECES_LEAF_BLOSSOM /* almond    */
 } treepieces_leaf_shape;
 
-/* A kind of tree. The text form is documented at treepieces_species_parse. */
+/* A kind of tree. For the text form see treepieces_species_parse. */
 typedef struct treepieces_species {
     char name[TREEPIECES_MAX_NAME];
     int order_count; /* 1..TREEPIECES_MAX_ORDERS */
     treepieces_order orders[TREEPIECES_MAX_ORDERS];
-    float flare;      /* radius at the ground over that of the trunk, 1..4                         */
-    int envelope;     /* treepieces_envelope: axes end where they leave it                         */
-    float crown_base, crown_top, crown_width; /* of the trunk's length; the width as a diameter    */
-    float shade;      /* 0 = none; else axes end at places with more than so much foliage and wood
-                         above them, in pieces per m^2 of sky: pruning by light                    */
-    float stiffness;  /* 1 = as most trees; wind bends by its inverse                              */
-    int leaf_shape;   /* treepieces_leaf_shape                                                     */
-    int leaf_count;   /* cards of a leaf cloud, 1..256; 0 = bare                                   */
-    float leaf_size;  /* side of a card, in radii of the cloud                                     */
-    float cloud;      /* radius of a leaf cloud, metres                                            */
-    float cloud_flat; /* height of a cloud over its width, 0.1..2                                  */
-    float leaf_color[3], bark_color[3]; /* sRGB 0..1: the built-in pictures are tinted so          */
+    float flare;      /* radius at the ground over that of the trunk, 1..4                        */
+    int envelope;     /* treepieces_envelope: axes end where they leave it                        */
+    float crown_base, crown_top, crown_width; /* in lengths of the trunk; the width is a diameter */
+    float shade;      /* pruning by light: axes end where there are more than this many pieces above
+                         them per m^2 of ground; 0 = no pruning                                   */
+    float stiffness;  /* wind bends joints by its inverse; 1 = an average tree                    */
+    int leaf_shape;   /* treepieces_leaf_shape                                                    */
+    int leaf_count;   /* cards per leaf cloud, 1..256; 0 = no leaves                              */
+    float leaf_size;  /* side of a card, in radii of the cloud                                    */
+    float cloud;      /* radius of a leaf cloud, metres                                           */
+    float cloud_flat; /* height of a cloud over its width, 0.1..2                                 */
+    float leaf_color[3], bark_color[3]; /* sRGB 0..1: tint of the drawn leaves and bark           */
 } treepieces_species;
 
-/* Built-in species: 0..treepieces_preset_count()-1. The text is in the form that
-   treepieces_species_parse reads; NULL for a bad number. */
+/* Built-in species, 0..treepieces_preset_count()-1, as text for treepieces_species_parse; NULL for
+   a number out of range. */
 TREEPIECES_API int treepieces_preset_count(void);
 TREEPIECES_API const char *treepieces_preset_text(int index);
 
-/* The built-in species of that name. TXM_BAD_ARGUMENT (message: the names) if there is none. */
+/* The built-in species of that name. TXM_BAD_ARGUMENT if there is none; the message lists the
+   names. */
 TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
                                             treepieces_species *species);
 
 /* Read a species from text: lines "key value ..."; "order N" begins the keys of that order; "like
-   NAME" starts from a built-in species; # begins a comment. Keys are the fields' names.
-   return TXM_OK; TXM_BAD_DATA, the message with line and key; *species untouched then          */
+   NAME" starts from a built-in species; # begins a comment. The keys are the names of the fields;
+   those that are missing keep the values of a small round tree.
+   return TXM_OK; TXM_BAD_DATA, the message names line and key; *species is untouched then       */
 TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size, txm_env *env,
                                                    treepieces_species *species);
 
-/* The text of a species, with a 0 at the end if it fits; returns its length without. */
+/* Write a species as text, cut to fit, with a 0 at the end; returns the length of all of it. */
 TREEPIECES_API size_t treepieces_species_print(const treepieces_species *species, char *text,
                                                size_t capacity);
 
 /* ---- growing ----------------------------------------------------------------------------- */
 
-/* A rim that waits for a piece. */
+/* An open rim, to which a piece is to be attached. */
 typedef struct treepieces_site {
-    int depth;               /* pieces between it and the ground                                    */
-    int order;               /* of the axis                                                         */
-    int parent, rim;         /* type of the piece that it belongs to (-1: the ground) and leaf rim  */
-    int tree;                /* number of the tree                                                  */
-    float position[3], direction[3]; /* metres, as the tree stands; unit length                     */
-    float radius;            /* metres                                                              */
-    float along;             /* 0..1: how much of its axis lies behind it                           */
-    float length;            /* of its axis, metres                                                 */
+    int depth;               /* pieces between it and the ground                                  */
+    int order;               /* of the axis                                                       */
+    int parent, rim;         /* type of the parent piece (-1: the ground) and number of its rim   */
+    int tree;                /* number of the tree                                                */
+    float position[3], direction[3]; /* world space, metres; unit length                          */
+    float radius;            /* metres                                                            */
+    float along;             /* 0..1: position along its axis                                     */
+    float length;            /* of its axis, metres                                               */
 } treepieces_site;
 
-/* What is put on it. */
+/* The piece to attach. */
 typedef struct treepieces_choice {
-    int type;         /* of the kit; one without leaf rims ends the axis                            */
-    int turn;         /* 0..5: the piece turned by so many sixths about its stem; -1: as the roll of
-                         the branches wants it                                                      */
-    float direction[3]; /* of the stem, as the tree stands; need not have unit length. Held within 60
-                         degrees of the site's                                                      */
-    float length;     /* of the piece, metres                                                       */
-    float ratios[TREEPIECES_MAX_LEAVES]; /* radius at leaf rim k over that of the site, 0.02..1     */
-    int leaves;       /* 1: bears a leaf cloud                                                      */
+    int type;           /* of the kit; a piece without leaf rims ends the axis                    */
+    int turn;           /* 0..5: multiples of 60 degrees about the stem; -1: as the roll of the
+                           branches asks for                                                      */
+    float direction[3]; /* of the stem, world space, of any length; limited to 60 degrees from the
+                           direction of the site                                                  */
+    float length;       /* of the piece, metres                                                   */
+    float ratios[TREEPIECES_MAX_LEAVES]; /* radius at leaf rim k over that of the site, 0.02..1   */
+    int leaves;         /* 1: bears a leaf cloud                                                  */
 } treepieces_choice;
 
-/* A rule of the user: fill *choice, which holds that of the grammar, or leave it. Must depend on its
-   arguments and rng alone, which is the tree's; is called for different trees at once if env has
-   threads. */
+/* A rule of the caller: change *choice, which holds that of the grammar, or leave it as it is. Must
+   depend only on its arguments and on rng, which belongs to the tree; with a parallel-for hook it
+   is called for several trees at the same time. */
 typedef void treepieces_rule_function(void *user, const treepieces_site *site, txm_rng *rng,
                                       treepieces_choice *choice);
 
 typedef enum treepieces_rule {
-    TREEPIECES_GRAMMAR = 0, /* the species' probabilities                                           */
-    TREEPIECES_ALTERNATE,   /* I and Y in turn [1, 8]                                               */
-    TREEPIECES_RANDOM       /* I and Y with equal chances [1, 8]                                    */
+    TREEPIECES_GRAMMAR = 0, /* the probabilities of the species                                   */
+    TREEPIECES_ALTERNATE,   /* I and Y alternate [1, 8]                                           */
+    TREEPIECES_RANDOM       /* I or Y with equal probability [1, 8]                               */
 } treepieces_rule;
 
 /* Where a tree stands. */
 typedef struct treepieces_place {
-    float position[3]; /* metres                                                                    */
-    float turn;        /* radians about y                                                           */
-    float scale;       /* 0 = 1                                                                     */
+    float position[3]; /* metres                                                                  */
+    float turn;        /* radians about y                                                         */
+    float scale;       /* 0 = 1                                                                   */
     int species;
     uint64_t seed;
 } treepieces_place;
 
 typedef struct treepieces_forest_desc {
-    const treepieces_kit *kit;         /* must outlive the forest                                   */
-    const treepieces_species *species; /* species_count of them; copied                             */
+    const treepieces_kit *kit;         /* must outlive the forest                                 */
+    const treepieces_species *species; /* species_count of them; copied                           */
     int species_count;
-    const treepieces_place *places; /* tree_count of them; NULL = on a jittered grid about the origin,
-                                       species in turn by the seed                                  */
+    const treepieces_place *places; /* tree_count of them; NULL = a jittered grid about the origin,
+                                       with random species and sizes                              */
     int tree_count;
-    float spacing;  /* of that grid, metres; 0 = 0.6 times the height of the tallest species        */
-    int max_pieces; /* of a tree, 8..65535; 0 = 600. The thickest grow first, so that fewer pieces
-                       make a sparser tree of the same shape                                        */
-    int rule;       /* treepieces_rule                                                              */
-    treepieces_rule_function *own_rule; /* NULL, or is asked at every site                          */
-    void *own_user;
+    float spacing;  /* of that grid, metres; 0 = 0.6 times the trunk length of the tallest species */
+    int max_pieces; /* per tree, 8..65535; 0 = 600. The thickest grow first, so that fewer pieces
+                       make a sparser tree of the same shape                                      */
+    int rule;       /* treepieces_rule                                                            */
+    treepieces_rule_function *own_rule; /* NULL, or called for each open rim                      */
+    void *own_user; /* its first argument                                                         */
     uint64_t seed;
 } treepieces_forest_desc;
 
@@ -399,24 +409,25 @@ enum { TREEPIECES_NONE = -1 };
        position = B_parent * translation of the parent's building transform,
        R = R_parent * rotation, rotation = building rotation * turn * joint transform  [1, 4.2, 4.3]
 
-   so that neither radius nor length of a piece pass on to its children. Of the first node position and
-   rotation are the tree's. */
+   so that the scale of a piece does not affect its children. For the first node of a tree, position and
+   rotation are those of the tree. */
 typedef struct treepieces_node {
-    float rotation[4];     /* from the parent's frame, unit quaternion                              */
-    float radius, length;  /* metres                                                                */
-    int32_t parent;        /* node number in its tree, less than its own; the first: TREEPIECES_NONE */
+    float rotation[4];    /* from the parent's frame, unit quaternion                             */
+    float radius, length; /* metres                                                               */
+    int32_t parent;       /* node number within its tree, lower than its own; TREEPIECES_NONE for
+                             the first                                                            */
     uint8_t type;
-    uint8_t joint;         /* leaf rim of the parent * 8 + turn                                     */
-    uint8_t order;         /* of its axis                                                           */
-    uint8_t sway;          /* class of its oscillator, see treepieces_sway                          */
+    uint8_t joint;        /* 8 * leaf rim of the parent + turn                                    */
+    uint8_t order;        /* of its axis                                                          */
+    uint8_t sway;         /* class of its oscillator, see treepieces_sway                         */
 } treepieces_node;
 
-/* A leaf cloud: a sphere of foliage about a point of a piece's axis, 16 bytes. */
+/* A leaf cloud: a sphere of foliage about a point on the axis of a piece, 16 bytes. */
 typedef struct treepieces_cluster {
-    uint32_t node; /* of the forest, as the bones are numbered                                      */
-    float along;   /* 0..1 of the piece's length                                                    */
-    float radius;  /* metres                                                                        */
-    uint32_t look; /* random bits: which of the clouds is shown and how it is turned                */
+    uint32_t node; /* number in the forest, which is that of the bone                             */
+    float along;   /* 0..1 of the length of the piece                                             */
+    float radius;  /* metres                                                                      */
+    uint32_t look; /* random bits: which cloud is shown and how it is turned                      */
 } treepieces_cluster;
 
 typedef struct treepieces_tree {
@@ -425,53 +436,53 @@ typedef struct treepieces_tree {
     float position[3], turn, scale;
     int species;
     uint32_t seed;
-    float height; /* of its highest joint above its foot, metres                                    */
+    float height; /* of its highest joint above its base, metres                                  */
 } treepieces_tree;
 
-/* All pieces of one type: `count` records of `stride` 32-bit words each. A record:
+/* All pieces of one type, for one instanced draw call: `count` records of `stride` 32-bit words:
 
        word 0    number of the piece's own bone
-       word 1    bone of the child at leaf rim 0, less the own; that of rim 1 << 16
-       word 2    bone at rim 2, less the own; turns of the children << 16, 4 bits each
+       word 1    bone of the child at leaf rim 0, minus word 0; the same for rim 1, << 16
+       word 2    the same for rim 2; turns of the children << 16, 4 bits each
        word 3    one byte per band, band 0 lowest: bits 0..2 log2 of the tiles across a quad (0..4),
                  3..4 log2 of those along it, 5: halving
-       word 4... one byte per quad, lowest first: column + 8 row of its first tile in the sheet     */
+       word 4... one byte per quad, lowest first: column + 8 * row of its first tile in the sheet */
 typedef struct treepieces_batch {
     const uint32_t *words;
     uint32_t count, stride;
     int quad_count;
 } treepieces_batch;
 
-/* A forest, or a single tree: arrays ready for the GPU. Read only. */
+/* A forest, or a single tree: arrays that can be uploaded as they are. Read only. */
 typedef struct treepieces_forest {
     const treepieces_kit *kit;
     const treepieces_species *species;
     const treepieces_tree *trees;
-    const treepieces_node *nodes;       /* tree after tree, parents before children                 */
-    const treepieces_cluster *clusters; /* tree after tree                                          */
-    treepieces_batch batches[TREEPIECES_MAX_TYPES]; /* by type                                      */
+    const treepieces_node *nodes;       /* tree after tree, parents before children               */
+    const treepieces_cluster *clusters; /* tree after tree                                        */
+    treepieces_batch batches[TREEPIECES_MAX_TYPES]; /* by type                                    */
     int species_count, tree_count, type_count;
     uint32_t node_count, cluster_count;
-    size_t bytes; /* memory of all this                                                             */
+    size_t bytes; /* allocated for all this                                                       */
 } treepieces_forest;
 
-/* Grow trees. Each from its own seed, so that a tree is the same in any company and on any number of
-   threads.
+/* Grow trees, each from its own seed: a tree is the same whatever other trees are in the forest and
+   however many threads are used.
 
-   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range (the message names it), or a choice of
-          own_rule that cannot be; TXM_TOO_LARGE above 2^31 pieces; TXM_OUT_OF_MEMORY; TXM_CANCELLED
-   cost   O(pieces); about 130 bytes a piece with its bone and sway                              */
+   return TXM_OK; TXM_BAD_ARGUMENT for a field out of range (the message names it), or an invalid choice
+          of own_rule; TXM_TOO_LARGE above 2^31 pieces; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(pieces); about 130 bytes per piece with its bone and sway state                      */
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out);
 TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
 
 /* ---- poses and wind ---------------------------------------------------------------------- */
 
-/* A pose: every joint turned further. All zero is the tree as it grew. */
+/* A pose: additional rotations of the joints. All zero is the tree as it grew. */
 typedef struct treepieces_pose {
     uint64_t seed;
-    float amount;        /* radians: each joint turns by up to so much about a random level axis    */
-    const float *joints; /* NULL, or a unit quaternion per node that turns it further               */
+    float amount;        /* radians: each joint turns by up to this about a random axis across it */
+    const float *joints; /* NULL, or a unit quaternion per node, applied to it in addition        */
 } treepieces_pose;
 
 /* The bones of all trees: TREEPIECES_BONE floats for each node of the forest, the rows of the 3 x 4
@@ -480,25 +491,27 @@ typedef struct treepieces_pose {
 TREEPIECES_API txm_status treepieces_bones(const treepieces_forest *forest,
                                            const treepieces_pose *pose, txm_env *env, float *bones);
 
-/* Wind: a mean and gusts, waves that travel over the land with it. */
+/* Wind: a mean speed, and gusts that travel with it across the land. */
 typedef struct treepieces_wind {
-    float direction; /* radians from +x towards -z, where it blows to                               */
-    float speed;     /* metres a second; bends by its square                                        */
-    float gusts;     /* 0..1: how much it rises and falls; 0 = steady                               */
+    float direction; /* radians from +x towards -z: where it blows to                             */
+    float speed;     /* metres per second, 0..100; bends by its square                            */
+    float gusts;     /* 0..1: how much the pressure varies; 0 = steady                            */
     uint32_t seed;
 } treepieces_wind;
 
-/* The pressure of the wind, 1 = that of 10 m/s, at a place and time (seconds): the sum of travelling
-   gusts. */
+/* The pressure of the wind at a position and time (seconds), gusts included; 1 = that of 10 m/s. 0
+   if an argument is out of range. */
 TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float position[3],
                                      double time);
 
-/* One step of the trees' sway: each joint is a damped oscillator in two directions that the wind
-   drives, solved exactly over the step, so that any step is stable; then the bones.
+/* Advance the sway of all trees by one time step and compute their bones. Each joint is a damped
+   oscillator in two directions, driven by the wind and solved exactly over the step, so that steps of
+   any length are stable.
 
    time   seconds at the end of the step; dt: its length, >= 0
+   pose   NULL, or the pose about which the trees sway
    state  4 floats per node, all 0 at the start; in and out
-   bones  as treepieces_bones; pose (may be NULL) is what the trees sway about                   */
+   bones  out, as of treepieces_bones                                                            */
 TREEPIECES_API txm_status treepieces_sway(const treepieces_forest *forest,
                                           const treepieces_wind *wind, double time, double dt,
                                           const treepieces_pose *pose, txm_env *env, float *state,
@@ -506,12 +519,13 @@ TREEPIECES_API txm_status treepieces_sway(const treepieces_forest *forest,
 
 /* ---- skinning ---------------------------------------------------------------------------- */
 
-/* The vertices of one instance in the world, by linear blend skinning; the reference for shaders. A
-   vertex at place j of leaf rim k is place (j - turn) mod 6 of the child's own rim, moved by the
-   child's bone alone: the same expression of the same numbers as the child's, so that both are equal
-   to the bit. Others blend: their position in model space by the own bone, and their position in the
-   frame of terminal joint k by the child's bone with the own piece's stretch.
+/* The vertices of one instance in world space by linear blend skinning; the reference for shaders.
+   Vertex j of leaf rim k is vertex (j - turn) mod 6 of the child's root rim, moved by the child's bone
+   alone: the same expression of the same numbers as in the child, so that both are equal to the bit.
+   Other vertices blend: their position in model space moved by the own bone, and their position in the
+   frame of each child moved by the child's bone, with the stretch of the own piece.
 
+   type, instance      one record of forest->batches[type]
    positions, normals  3 floats per vertex of the piece; normals (may be NULL) of unit length     */
 TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
                                     uint32_t instance, float *positions, float *normals);
@@ -520,55 +534,63 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
 
 typedef struct treepieces_lod {
     float eye[3];
-    float max_level;     /* at the eye, 1..64; 0 = 1: no tessellation                               */
-    float half_distance; /* metres over which levels halve; 0 = 10                                  */
+    float max_level;     /* tessellation level at the eye, 1..64; 0 = 1: no tessellation          */
+    float half_distance; /* metres over which the level halves; 0 = 10                            */
     float shape;         /* of Phong tessellation, 0..1; 0 = 0.6, which rounds hexagons; < 0: flat  */
 } treepieces_lod;
 
-/* ceil(max_level * 2^(-d / half_distance)), at least 1, with d from the eye to the middle of the edge:
-   symmetric in a and b to the bit [1, 4.4]; and the same for the middle of a quad, corner after
-   corner. */
+/* The tessellation level of an edge and of the inside of a quad (corner after corner):
+   ceil(max_level * 2^(-d / half_distance)), at least 1, where d is the distance from the eye to the
+   middle of the edge or quad. Symmetric in a and b to the bit [1, 4.4]. */
 TREEPIECES_API int treepieces_edge_level(const treepieces_lod *lod, const float a[3],
                                          const float b[3]);
 TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float corners[12]);
 
-/* The pattern of a quad with levels 1..64 for the edges from corner 0 to 1, 1 to 2, 2 to 3, 3 to 0 and
-   the inside, as OpenGL's equal_spacing has it. coords: u v pairs, corner 0 (0, 0), 1 (0, 1), 2 (1, 1),
-   3 (1, 0); both may be NULL to count only.
-   return the vertices; *triangles receives how many there are                                    */
+/* The triangles of a quad with levels 1..64 for the edges from corner 0 to 1, 1 to 2, 2 to 3, 3 to 0 and
+   for the inside; vertices are spaced as OpenGL's equal_spacing has them.
+   coords   u, v of each vertex: corner 0 (0, 0), 1 (0, 1), 2 (1, 1), 3 (1, 0); NULL = not wanted
+   indices  3 per triangle; NULL = not wanted
+   return   the number of vertices; *triangles receives that of triangles                         */
 TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coords,
                                       uint16_t *indices, int *triangles);
 
-/* Phong tessellation of a quad [2, here bilinear]: p = sum w_i p_i with w = (1-u)(1-v), (1-u)v, uv,
-   u(1-v), moved towards the mean of its projections onto the corners' tangent planes:
-   (1 - shape) p + shape * sum w_i (p - n_i . (p - p_i) n_i). Corner after corner; normal may be NULL. */
+/* Phong tessellation [2] of a quad instead of a triangle: the bilinear point p = sum w_i p_i with
+   w = (1-u)(1-v), (1-u)v, uv, u(1-v), moved towards the mean of its projections onto the tangent
+   planes of the corners: (1 - shape) p + shape * sum w_i (p - n_i . (p - p_i) n_i). Corner after
+   corner; normal may be NULL. */
 TREEPIECES_API void treepieces_patch_point(const float positions[12], const float normals[12],
                                            float shape, float u, float v, float position[3],
                                            float normal[3]);
 
 /* ---- baked meshes ------------------------------------------------------------------------ */
 
-/* Plain triangles. Vertices are welded: those of neighbouring quads and pieces are the same. */
+/* Triangles with skinning weights. Neighbouring quads and pieces share their vertices. */
 typedef struct treepieces_mesh {
     size_t vertex_count, triangle_count;
-    float *positions, *normals; /* 3 per vertex                                                     */
-    uint32_t *joints;           /* 4 per vertex: node numbers in the tree; weight 0: joint 0        */
-    float *weights;             /* 4 per vertex, sum 1                                              */
-    uint32_t *indices;          /* 3 per triangle, counter-clockwise from outside                   */
+    float *positions, *normals; /* 3 per vertex                                                   */
+    uint32_t *joints;           /* 4 per vertex: nodes of the tree; 0 where the weight is 0       */
+    float *weights;             /* 4 per vertex, sum 1                                            */
+    uint32_t *indices;          /* 3 per triangle, counter-clockwise from outside                 */
     float *uvs;                 /* 2 per corner, so 6 per triangle; v downwards. Into the sheet of
-                                   treepieces_bark, or into the leaf picture                        */
+                                   treepieces_bark, or into the leaf image                        */
 } treepieces_mesh;
 
 typedef struct treepieces_bake_desc {
     const treepieces_forest *forest;
-    int tree;
-    const float *bones;       /* of the forest                                                      */
-    const treepieces_lod *lod; /* NULL = no tessellation                                            */
-    int capped;               /* close the foot as well                                             */
-    int sheet_size;           /* pixels across the sheet, which uvs keep half a pixel inside of; 0 = 512 */
-    int sheet_layers;         /* 0 = TREEPIECES_OWN                                                 */
+    int tree;                  /* which of them                                                   */
+    const float *bones;        /* of the whole forest                                             */
+    const treepieces_lod *lod; /* NULL = no tessellation                                          */
+    int capped;                /* close the base as well                                          */
+    int sheet_size;            /* width of the bark sheet in pixels, as v stays half a pixel inside the
+                                  tiles; 0 = 512                                                  */
+    int sheet_layers;          /* 0 = TREEPIECES_OWN                                              */
 } treepieces_bake_desc;
 
+/* One tree of a forest as a welded mesh: bark only, see treepieces_bake_leaves.
+   out     receives the mesh, or NULL on any error; release it with treepieces_mesh_free
+   return  TXM_OK; TXM_BAD_ARGUMENT, also for bones that are not finite; TXM_TOO_LARGE;
+           TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost    O(vertices); nothing stays allocated but the mesh                                      */
 TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
                                           treepieces_mesh **out);
 TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh);
@@ -577,65 +599,68 @@ TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh);
 
 enum { TREEPIECES_SHEET = 8 }; /* tiles across and down a layer of the sheet */
 
-/* Sheets of bark out of framed tiles [1, 5]: as all tiles of class 0 have one frame, any rectangle of
-   tiles laid side by side fits any other. Layer 0 is 8 x 8 of them, without end in both directions;
-   a quad shows a rectangle of 1 to 16 tiles across, round the sheet twice if need be, and 1 to 8
-   along, so that texels are about as large on the trunk as on twigs. The lowest rows of layers FOLD to HALVING are blended so that they meet what
-   their names say; quads on them lie on the bottom. Layers from OWN have one class each: 4 x 4 tiles, each in
-   the middle of 2 x 2 cells and continued around it by its own border; a quad shows one of them. */
+/* Bark sheets made of framed tiles [1, 5]. All tiles of class 0 have the same frame, so that any
+   rectangle of adjoining tiles fits beside any other. Layer 0 is 8 x 8 of them and repeats
+   seamlessly both ways; a quad shows a rectangle of 1 to 16 tiles across (16 go round the sheet
+   twice) and 1 to 8 along, so that texels have about the same size on the trunk and on twigs. The
+   lowest rows of layers FOLD to HALVING are blended so that they match the sides that
+   treepieces_class says; the south side of a quad of these classes lies at the bottom of its layer.
+   Each layer from OWN holds one class: 4 x 4 tiles, each in the middle of 2 x 2 cells and extended
+   around by its own border; a quad shows one of them. */
 typedef struct treepieces_bark_desc {
-    const txm_image *tiles; /* square, one size, sample type and number of channels                 */
-    const int *classes;     /* of each: 0, or from TREEPIECES_OWN; NULL = all 0                     */
-    int tile_count;         /* one of class 0 at least                                              */
+    const txm_image *tiles; /* square, all of one size, sample type and number of channels        */
+    const int *classes;     /* of each tile: 0, or from TREEPIECES_OWN; NULL = all 0              */
+    int tile_count;         /* at least one of class 0                                            */
     uint64_t seed;
 } treepieces_bark_desc;
 
-/* Layers of the sheet: TREEPIECES_OWN and one for each own class, up to the highest. */
+/* Number of layers: TREEPIECES_OWN and one for each class above, up to the highest in use. */
 TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc);
 
-/* Draw the sheet: out is 8 tiles wide and 8 per layer high, layers one under the other, of the tiles'
-   channels and sample type. */
+/* Draw the sheet. out is 8 tiles wide and 8 tiles per layer high, the layers one below the other,
+   with the channels and sample type of the tiles. */
 TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
                                           txm_image out);
 
-/* Where a quad's corner (0..3) lies in its layer, 0..1, v downwards; returns the layer. bands: word 3
-   of its record, cell: its byte, pixels: across the sheet, of which half a one is kept away. */
+/* Texture coordinates of corner 0..3 of a quad in its layer, 0..1, v downwards; returns the layer.
+   bands: word 3 of its record; cell: its byte in word 4 or later; pixels: width of the sheet, as v
+   stays half a pixel inside the tiles. */
 TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,
                                       int pixels, int corner, float uv[2]);
 
-/* A bark of our own, for those who have no photograph: `tile_count` tiles that share a frame. */
+/* Draw bark procedurally: tile_count tiles that share a frame, square, of 3 or 4 channels. */
 TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species, uint64_t seed,
                                                txm_env *env, const txm_image *tiles,
                                                int tile_count);
 
 /* ---- foliage ----------------------------------------------------------------------------- */
 
-/* A leaf card of a cloud whose sphere has radius 1 about the origin. */
+/* A leaf card of a cloud with radius 1 about the origin. */
 typedef struct treepieces_card {
     float center[3];
-    float right[3], up[3]; /* half the card's width and height                                      */
-    float normal[3];       /* for shading: mostly away from the cloud's middle                      */
+    float right[3], up[3]; /* half the width and height of the card                               */
+    float normal[3];       /* for shading: mostly away from the centre of the cloud               */
 } treepieces_card;
 
-/* The leaf cloud number `look` of a species: species->leaf_count cards. Returns how many; cards may be
-   NULL. */
+/* Leaf cloud number `look` of a species: species->leaf_count cards. Returns that count; cards may
+   be NULL. */
 TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t look,
                                     treepieces_card *cards);
 
-/* A picture of a spray of leaves for the cards, RGBA, drawn for those who have none. out: any size,
-   4 channels of 8 bits; partly drawn after TXM_CANCELLED. */
+/* Draw a spray of leaves procedurally, as the RGBA image of the cards. out: any size, 4 channels of
+   8 bits; partly drawn after TXM_CANCELLED. */
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out);
 
-/* 2.5D impostor [1, 6]: a leaf cloud as seen along a direction, by parallel rays.
+/* 2.5D impostor [3; 1, 6]: colour and depth of a leaf cloud in an orthographic view.
 
    cards      card_count of them
-   leaves     their picture, RGBA, 8 bits; alpha below 1/2 is not there
-   right, up, forward  unit vectors of the view, at right angles; forward away from the eye
-   color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255. Its
-              square shows -1..1 along right and up
-   depth      float, 1 channel, size of color: along -forward, that is towards the eye, from the
-              cloud's middle in its radii; -2 where there is nothing                               */
+   leaves     their image, RGBA, 8 bits; texels with alpha below 1/2 are transparent
+   right, up, forward  axes of the view: orthogonal unit vectors; forward points away from the eye
+   color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255.
+              Covers -1..1 along right and up
+   depth      float, 1 channel, size of color: distance from the centre of the cloud towards the eye, in
+              radii of the cloud; -2 where nothing is                                            */
 typedef struct treepieces_impostor_desc {
     const treepieces_card *cards;
     int card_count;
@@ -646,9 +671,9 @@ typedef struct treepieces_impostor_desc {
 TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *desc, txm_env *env,
                                               txm_image color, txm_image depth);
 
-/* Plain leaf cards for those without impostors: the clouds of a tree as a mesh of two triangles a card,
-   each bound to its cluster's bone. joints and weights as in bake. looks: how many different clouds
-   are in use, 1..64; cluster.look mod looks chooses. */
+/* The leaf cards of a tree as a mesh, for renderers without impostors: two triangles per card,
+   bound to the bone of its cluster. joints and weights as in treepieces_bake. looks: how many
+   different clouds are used, 1..64; a cluster takes cloud number look mod looks. */
 TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
                                                  const float *bones, int looks, txm_env *env,
                                                  treepieces_mesh **out);
