@@ -16,10 +16,10 @@
 
      int main(void) {
          static unsigned char photo[64 * 64], pixels[128 * 128];   // the caller owns all pixels
-         texpatch_desc desc = {0};            // zero = the default, for every field
-         texpatch_exemplar exemplar = {0};
-         txm_env env = {0};                   // malloc, silent, serial; receives the message
-         txm_image picture = {0}, out = {0};
+         static texpatch_desc desc;           // static: all zero, which means the defaults
+         static texpatch_exemplar exemplar;
+         static txm_env env;                  // malloc, silent, serial; receives the message
+         static txm_image picture, out;
          for (int i = 0; i < 64 * 64; i++)    // instead of a photograph: bricks
              photo[i] = (unsigned char)(i / 64 % 16 < 2 || (i + i / 1024 % 2 * 16) % 32 < 2 ? 220
                                                                         : 90 + i * i % 31);
@@ -211,11 +211,9 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
 
 /* One step of the work, coarse first: at 512 x 512 some 5 to 60 ms. After an error (cancelling
    included) the job is as before the step and the step may be tried again.
+   env    its progress callback receives how much of all steps is done
    more   receives 0 once nothing is left to do; NULL is allowed                              */
 TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
-
-/* 0..1: how much of the work is done; 1 when texpatch_step has nothing left */
-TEXPATCH_API float texpatch_done(const texpatch_job *job);
 
 /* Draw a map as it is now. Possible after any step but no step at all: before the first,
    TXM_BAD_ARGUMENT. A window of the output may be drawn: out's top left pixel is pixel (x, y) of
@@ -2218,6 +2216,18 @@ static void txp_setup_steps(texpatch_job *job) {
     t->cost = 0.5f;
 }
 
+/* How much of a job's steps is done, 0..1: reported before each stage of a step. */
+static txm_status txp_report(const texpatch_job *job, txm_env *env, const char *stage) {
+    double all = 0, done = 0;
+    for (int i = 0; i < job->step_count; i++) {
+        all += (double)job->steps[i].cost;
+        if (i < job->next_step) done += (double)job->steps[i].cost;
+    }
+    return txm_progress(env, txm_float(done / all), stage)
+               ? txm_fail(env, TXM_CANCELLED, "cancelled")
+               : TXM_OK;
+}
+
 static inline int txp_half(int x, int level) {
     return (x + (1 << level) - 1) >> level;
 }
@@ -2408,10 +2418,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         txp_canvas_close(s, &t->canvas, t->known);
         txp_canvas_close(s, &t->canvas, t->canvas.pixels);
     }
-    if (txm_progress(env, texpatch_done(job), "patches")) {
-        status = txm_fail(env, TXM_CANCELLED, "cancelled");
-        goto done;
-    }
+    status = txp_report(job, env, "patches");
+    if (status != TXM_OK) goto done;
     txm_parallel_for(env, starts, txp_quilt_one, q);
     for (int i = 0; i < starts; i++) {
         if (q[i].failed) {
@@ -2519,23 +2527,22 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     txp_count_use(c, &p.use);
     txp_canvas_close(s, c, c->pixels);
     for (p.first_row = 0; p.first_row < p.rows; p.first_row += 32) {
-        if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
+        status = txp_report(job, env, "optimising");
+        if (status != TXM_OK) goto done;
         txm_parallel_for(env, p.rows - p.first_row < 32 ? p.rows - p.first_row : 32, txp_match_row,
                          &p);
     }
     txp_weigh(&p);
     memcpy(c->next, c->at, (size_t)c->width * (size_t)c->height * sizeof *c->next);
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
-        if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
+        status = txp_report(job, env, "optimising");
+        if (status != TXM_OK) goto done;
         txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
                          txp_choose_band, &p);
     }
 done:
     txm_arena_free(&scratch);
     return status;
-cancelled:
-    txm_arena_free(&scratch);
-    return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
 static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, txm_env *env) {
@@ -2546,8 +2553,8 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
     txp_canvas_close(p.source, c, c->pixels);
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
-        if (txm_progress(env, texpatch_done(job), "polishing"))
-            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        const txm_status status = txp_report(job, env, "polishing");
+        if (status != TXM_OK) return status;
         txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
                          txp_polish_band, &p);
     }
@@ -2897,8 +2904,7 @@ TEXPATCH_API void texpatch_free(texpatch_job *job) {
     txm_arena_free(&job->canvas_memory);
     txm_arena_free(&job->finish_memory);
     txm_arena_free(&job->source_memory);
-    txm_arena memory = job->memory; /* the job lies in it */
-    txm_arena_free(&memory);
+    txm_arena_free(&job->memory); /* the job lies in it */
 }
 
 TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
@@ -3003,20 +3009,16 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
         const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
         for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
             const int count = (end - seams.first_band + 1) / 2;
-            if (txm_progress(env, texpatch_done(job), "blending")) {
-                status = txm_fail(env, TXM_CANCELLED, "cancelled");
-                goto done;
-            }
+            status = txp_report(job, env, "blending");
+            if (status != TXM_OK) goto done;
             txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
         }
     }
     txp_field_spread(&bend);
     txp_field_spread(&tone);
     for (int i = 0; i < TXP_ROUNDS; i++) {
-        if (txm_progress(env, texpatch_done(job), "blending")) {
-            status = txm_fail(env, TXM_CANCELLED, "cancelled");
-            goto done;
-        }
+        status = txp_report(job, env, "blending");
+        if (status != TXM_OK) goto done;
         txp_relax_field(&bend, env);
         txp_relax_field(&tone, env);
     }
@@ -3105,17 +3107,6 @@ TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more
     if (status == TXM_OK && job->part && at->next_step == at->step_count) txp_part_join(job);
     if (more) *more = job->part || job->next_step < job->step_count;
     return status;
-}
-
-TEXPATCH_API float texpatch_done(const texpatch_job *job) {
-    double all = 0, done = 0;
-    if (!job) return 1;
-    if (job->part) return texpatch_done(job->part);
-    for (int i = 0; i < job->step_count; i++) {
-        all += (double)job->steps[i].cost;
-        if (i < job->next_step) done += (double)job->steps[i].cost;
-    }
-    return job->next_step < job->step_count ? txm_float(done / all) : 1;
 }
 
 TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {
@@ -3796,8 +3787,7 @@ TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane) {
 TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
     if (!plane) return;
     txm_arena_free(&plane->source_memory);
-    txm_arena memory = plane->memory; /* the plane lies in it */
-    txm_arena_free(&memory);
+    txm_arena_free(&plane->memory); /* the plane lies in it */
 }
 
 /* The part of a window that lies on a done cell, its pixel (0, 0) at (cx, cy) of the window. */

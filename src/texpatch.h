@@ -16,10 +16,10 @@
 
      int main(void) {
          static unsigned char photo[64 * 64], pixels[128 * 128];   // the caller owns all pixels
-         texpatch_desc desc = {0};            // zero = the default, for every field
-         texpatch_exemplar exemplar = {0};
-         txm_env env = {0};                   // malloc, silent, serial; receives the message
-         txm_image picture = {0}, out = {0};
+         static texpatch_desc desc;           // static: all zero, which means the defaults
+         static texpatch_exemplar exemplar;
+         static txm_env env;                  // malloc, silent, serial; receives the message
+         static txm_image picture, out;
          for (int i = 0; i < 64 * 64; i++)    // instead of a photograph: bricks
              photo[i] = (unsigned char)(i / 64 % 16 < 2 || (i + i / 1024 % 2 * 16) % 32 < 2 ? 220
                                                                         : 90 + i * i % 31);
@@ -211,11 +211,9 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
 
 /* One step of the work, coarse first: at 512 x 512 some 5 to 60 ms. After an error (cancelling
    included) the job is as before the step and the step may be tried again.
+   env    its progress callback receives how much of all steps is done
    more   receives 0 once nothing is left to do; NULL is allowed                              */
 TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
-
-/* 0..1: how much of the work is done; 1 when texpatch_step has nothing left */
-TEXPATCH_API float texpatch_done(const texpatch_job *job);
 
 /* Draw a map as it is now. Possible after any step but no step at all: before the first,
    TXM_BAD_ARGUMENT. A window of the output may be drawn: out's top left pixel is pixel (x, y) of

@@ -347,8 +347,7 @@ TEXPATCH_API void texpatch_free(texpatch_job *job) {
     txm_arena_free(&job->canvas_memory);
     txm_arena_free(&job->finish_memory);
     txm_arena_free(&job->source_memory);
-    txm_arena memory = job->memory; /* the job lies in it */
-    txm_arena_free(&memory);
+    txm_arena_free(&job->memory); /* the job lies in it */
 }
 
 TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
@@ -453,20 +452,16 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
         const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
         for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
             const int count = (end - seams.first_band + 1) / 2;
-            if (txm_progress(env, texpatch_done(job), "blending")) {
-                status = txm_fail(env, TXM_CANCELLED, "cancelled");
-                goto done;
-            }
+            status = txp_report(job, env, "blending");
+            if (status != TXM_OK) goto done;
             txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
         }
     }
     txp_field_spread(&bend);
     txp_field_spread(&tone);
     for (int i = 0; i < TXP_ROUNDS; i++) {
-        if (txm_progress(env, texpatch_done(job), "blending")) {
-            status = txm_fail(env, TXM_CANCELLED, "cancelled");
-            goto done;
-        }
+        status = txp_report(job, env, "blending");
+        if (status != TXM_OK) goto done;
         txp_relax_field(&bend, env);
         txp_relax_field(&tone, env);
     }
@@ -555,17 +550,6 @@ TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more
     if (status == TXM_OK && job->part && at->next_step == at->step_count) txp_part_join(job);
     if (more) *more = job->part || job->next_step < job->step_count;
     return status;
-}
-
-TEXPATCH_API float texpatch_done(const texpatch_job *job) {
-    double all = 0, done = 0;
-    if (!job) return 1;
-    if (job->part) return texpatch_done(job->part);
-    for (int i = 0; i < job->step_count; i++) {
-        all += (double)job->steps[i].cost;
-        if (i < job->next_step) done += (double)job->steps[i].cost;
-    }
-    return job->next_step < job->step_count ? txm_float(done / all) : 1;
 }
 
 TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {

@@ -89,6 +89,18 @@ static void txp_setup_steps(texpatch_job *job) {
     t->cost = 0.5f;
 }
 
+/* How much of a job's steps is done, 0..1: reported before each stage of a step. */
+static txm_status txp_report(const texpatch_job *job, txm_env *env, const char *stage) {
+    double all = 0, done = 0;
+    for (int i = 0; i < job->step_count; i++) {
+        all += (double)job->steps[i].cost;
+        if (i < job->next_step) done += (double)job->steps[i].cost;
+    }
+    return txm_progress(env, txm_float(done / all), stage)
+               ? txm_fail(env, TXM_CANCELLED, "cancelled")
+               : TXM_OK;
+}
+
 static inline int txp_half(int x, int level) {
     return (x + (1 << level) - 1) >> level;
 }
@@ -279,10 +291,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         txp_canvas_close(s, &t->canvas, t->known);
         txp_canvas_close(s, &t->canvas, t->canvas.pixels);
     }
-    if (txm_progress(env, texpatch_done(job), "patches")) {
-        status = txm_fail(env, TXM_CANCELLED, "cancelled");
-        goto done;
-    }
+    status = txp_report(job, env, "patches");
+    if (status != TXM_OK) goto done;
     txm_parallel_for(env, starts, txp_quilt_one, q);
     for (int i = 0; i < starts; i++) {
         if (q[i].failed) {
@@ -390,23 +400,22 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     txp_count_use(c, &p.use);
     txp_canvas_close(s, c, c->pixels);
     for (p.first_row = 0; p.first_row < p.rows; p.first_row += 32) {
-        if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
+        status = txp_report(job, env, "optimising");
+        if (status != TXM_OK) goto done;
         txm_parallel_for(env, p.rows - p.first_row < 32 ? p.rows - p.first_row : 32, txp_match_row,
                          &p);
     }
     txp_weigh(&p);
     memcpy(c->next, c->at, (size_t)c->width * (size_t)c->height * sizeof *c->next);
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
-        if (txm_progress(env, texpatch_done(job), "optimising")) goto cancelled;
+        status = txp_report(job, env, "optimising");
+        if (status != TXM_OK) goto done;
         txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
                          txp_choose_band, &p);
     }
 done:
     txm_arena_free(&scratch);
     return status;
-cancelled:
-    txm_arena_free(&scratch);
-    return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
 static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, txm_env *env) {
@@ -417,8 +426,8 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
     txp_canvas_close(p.source, c, c->pixels);
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
-        if (txm_progress(env, texpatch_done(job), "polishing"))
-            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        const txm_status status = txp_report(job, env, "polishing");
+        if (status != TXM_OK) return status;
         txm_parallel_for(env, bands - p.first_band < TXP_LANES ? bands - p.first_band : TXP_LANES,
                          txp_polish_band, &p);
     }

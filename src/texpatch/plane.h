@@ -263,8 +263,7 @@ TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane) {
 TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
     if (!plane) return;
     txm_arena_free(&plane->source_memory);
-    txm_arena memory = plane->memory; /* the plane lies in it */
-    txm_arena_free(&memory);
+    txm_arena_free(&plane->memory); /* the plane lies in it */
 }
 
 /* The part of a window that lies on a done cell, its pixel (0, 0) at (cx, cy) of the window. */
