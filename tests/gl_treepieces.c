@@ -96,7 +96,7 @@ static EGLDisplay display;
 
 static forest_gl *new_scene(int trees, int pieces) {
     memset(&scene, 0, sizeof scene);
-    scene.o = defaults();
+    scene.o = default_options();
     scene.o.shaders = "shaders";
     scene.o.count = trees;
     scene.o.pieces = pieces;
@@ -117,7 +117,7 @@ static void close_scene(forest_gl *f) {
 
 /* As the example has it, with all that takes. */
 static forest_gl *open_scene(forest_gl *f) {
-    must(read_species(f) && grow(f) && make_pictures(f) && prepare(f, "forest_gl"), f);
+    must(read_species(f) && grow_trees(f) && make_pictures(f) && upload_scene(f, "forest_gl"), f);
     choose_view(f);
     upload_bones(f);
     return f;
@@ -712,7 +712,7 @@ static void raster_clouds(forest_gl *f, picture *p) {
 static picture draw_depth(forest_gl *f) {
     picture p = new_picture(f);
     const GLuint target = make_target(p.width, p.height);
-    aim(f, p.width, p.height);
+    aim_camera(f, p.width, p.height);
     if (!f->o.is_bare) draw_impostors(f);
     glBindFramebuffer(GL_FRAMEBUFFER, target);
     glViewport(0, 0, p.width, p.height);
@@ -761,7 +761,7 @@ static void test_impostors(void) {
     depth.channels = 1;
     depth.sample = TXM_F32;
     int either = 0, both = 0, same = 0, alike = 0;
-    aim(f, 64, 64);
+    aim_camera(f, 64, 64);
     draw_impostors(f);
     glActiveTexture(GL_TEXTURE0 + IMPOSTORS);
     glGetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_UNSIGNED_BYTE, colors);

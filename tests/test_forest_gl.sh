@@ -74,7 +74,7 @@ fi
 
 bad() {
     refuses "preset\|species" --species fern && refuses "cannot\|species" --species ./none.txt &&
-        refuses "no set of tiles" --bark . && refuses "cannot read" --leaf none.png &&
+        refuses "not a set of tiles" --bark . && refuses "cannot read" --leaf none.png &&
         refuses usage --count 0 && refuses usage --size 8 && refuses usage --orbit 1 &&
         refuses usage --frames 2 && refuses usage --nonsense && refuses usage --count &&
         refuses "cannot find" --shaders . && refuses usage --wind wet

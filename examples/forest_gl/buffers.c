@@ -1,4 +1,4 @@
-/* buffers.c - the forest in buffers and textures of OpenGL
+/* buffers.c - buffers and textures: what the shaders read
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
@@ -14,7 +14,7 @@ static void fill_buffer(forest_gl *f, int binding, const void *data, size_t byte
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, (GLuint)binding, f->buffers[binding]);
 }
 
-/* The pieces themselves: their vertices, quads and building transforms, and all records. */
+/* The pieces: vertices, quads, building transforms, and the records of all instances. */
 int upload_pieces(forest_gl *f) {
     const int types = f->forest->type_count;
     kind_data kinds[TREEPIECES_MAX_TYPES];
@@ -26,10 +26,10 @@ int upload_pieces(forest_gl *f) {
         quads += (size_t)p->quad_count;
         words += (size_t)f->forest->batches[t].count * f->forest->batches[t].stride;
     }
-    treepieces_vertex *all = (treepieces_vertex *)need(f, vertices, sizeof *all);
-    uint16_t *corners = (uint16_t *)need(f, quads, 4 * sizeof *corners);
-    uint32_t *looks = (uint32_t *)need(f, quads, sizeof *looks);
-    uint32_t *records = (uint32_t *)need(f, words, sizeof *records);
+    treepieces_vertex *all = (treepieces_vertex *)allocate(f, vertices, sizeof *all);
+    uint16_t *corners = (uint16_t *)allocate(f, quads, 4 * sizeof *corners);
+    uint32_t *looks = (uint32_t *)allocate(f, quads, sizeof *looks);
+    uint32_t *records = (uint32_t *)allocate(f, words, sizeof *records);
     if (all && corners && looks && records) {
         vertices = quads = words = 0;
         for (int t = 0; t < types; t++) {
@@ -80,11 +80,11 @@ int upload_pieces(forest_gl *f) {
     return !f->failed[0];
 }
 
-/* What belongs to nodes and clusters, and the cards of the leaf clouds. */
+/* Data per node and per cluster, and the cards of the leaf clouds. */
 int upload_trees(forest_gl *f) {
     const treepieces_forest *forest = f->forest;
-    uint32_t *looks = (uint32_t *)need(f, forest->node_count, sizeof *looks);
-    card_data *cards = (card_data *)need(f, (size_t)f->species_count * CLOUDS * 256, sizeof *cards);
+    uint32_t *looks = (uint32_t *)allocate(f, forest->node_count, sizeof *looks);
+    card_data *cards = (card_data *)allocate(f, (size_t)f->species_count * CLOUDS * 256, sizeof *cards);
     treepieces_card made[256];
     if (looks && cards) {
         for (int t = 0; t < forest->tree_count; t++) {
@@ -119,7 +119,7 @@ void upload_bones(forest_gl *f) {
     fill_buffer(f, BONES, f->bones, f->forest->node_count * TREEPIECES_BONE * sizeof(float));
 }
 
-/* An array texture of layers of one size. */
+/* An array texture. */
 static void make_array(forest_gl *f, int number, GLenum format, int width, int height, int layers,
                        GLenum filter) {
     const int is_depth = format == GL_DEPTH_COMPONENT24;
@@ -150,24 +150,22 @@ static int upload_pictures(forest_gl *f) {
         glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, s, width, height, 1, GL_RGBA, GL_UNSIGNED_BYTE,
                         f->leaves[s].pixels);
 
-    /* impostors and what they are rendered with */
-    const GLenum both[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+    /* the impostors, and the frame buffer that renders them */
+    const GLenum targets[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
     make_array(f, IMPOSTORS, GL_RGBA8, CLOUD_SIDE, CLOUD_SIDE, n * CLOUDS, GL_LINEAR_MIPMAP_LINEAR);
     make_array(f, DEPTHS, GL_R32F, CLOUD_SIDE, CLOUD_SIDE, n * CLOUDS, GL_NEAREST);
     make_array(f, CARD_DEPTHS, GL_DEPTH_COMPONENT24, CLOUD_SIDE, CLOUD_SIDE, n * CLOUDS, GL_NEAREST);
     glBindFramebuffer(GL_FRAMEBUFFER, f->card_frame);
-    glFramebufferTexture(GL_FRAMEBUFFER, both[0], f->textures[IMPOSTORS], 0);
-    glFramebufferTexture(GL_FRAMEBUFFER, both[1], f->textures[DEPTHS], 0);
+    glFramebufferTexture(GL_FRAMEBUFFER, targets[0], f->textures[IMPOSTORS], 0);
+    glFramebufferTexture(GL_FRAMEBUFFER, targets[1], f->textures[DEPTHS], 0);
     glFramebufferTexture(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, f->textures[CARD_DEPTHS], 0);
-    glDrawBuffers(2, both);
+    glDrawBuffers(2, targets);
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
         return fail(f, "this OpenGL cannot render into array textures");
     return 1;
 }
 
-static void make_objects(forest_gl *f) {
-    const float to_sun[3] = {0.53f, 0.62f, 0.58f}, length = sqrtf(dot(to_sun, to_sun));
-    for (int k = 0; k < 3; k++) f->frame.sun[k] = to_sun[k] / length;
+static void create_objects(forest_gl *f) {
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     glGenBuffers(BUFFERS, f->buffers);
@@ -181,9 +179,9 @@ static void make_objects(forest_gl *f) {
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, f->block);
 }
 
-/* Everything that OpenGL needs; program: argv[0]. */
-int prepare(forest_gl *f, const char *program) {
-    make_objects(f);
+/* All OpenGL objects, filled; program: argv[0]. */
+int upload_scene(forest_gl *f, const char *program) {
+    create_objects(f);
     return make_programs(f, program) && upload_pieces(f) && upload_trees(f) && upload_pictures(f) &&
            make_light(f);
 }

@@ -1,10 +1,10 @@
-/* camera.c - where the eye is
+/* camera.c - the view of a frame
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
-static const float degree = 0.0174532925f, half_view = 19; /* degrees up and down */
+static const float degree = 0.0174532925f, half_view = 19; /* degrees; the field of view is twice that, vertically */
 
-/* Where --orbit and --at leave it open: as far from the middle as shows it all. */
+/* Without --at look at the middle of the forest; without a distance, from where all of it is visible. */
 void choose_view(forest_gl *f) {
     const float tall = f->high[1] - f->low[1], tan_up = tanf(half_view * degree);
     const float wide = 0.5f * (f->high[0] - f->low[0] + f->high[2] - f->low[2]);
@@ -14,8 +14,8 @@ void choose_view(forest_gl *f) {
     f->o.orbit[2] = 0.53f * txm_maxf(tall / tan_up, wide / tan_right) + 0.2f * wide;
 }
 
-/* Look at the forest from --orbit. */
-void aim(forest_gl *f, int width, int height) {
+/* The uniform block of a frame: the camera orbits o.at. */
+void aim_camera(forest_gl *f, int width, int height) {
     frame_data *d = &f->frame;
     const float a = f->o.orbit[0] * degree, e = f->o.orbit[1] * degree, distance = f->o.orbit[2];
     const float tan_up = tanf(half_view * degree), tan_right = tan_up * (float)width / (float)height;
@@ -44,7 +44,7 @@ void aim(forest_gl *f, int width, int height) {
     const float n = f->near_plane, far = f->far_plane;
     const float z[2] = {-(far + n) / (far - n), -2 * far * n / (far - n)};
     for (int column = 0; column < 4; column++) {
-        /* the column of the view: right, up and back in its rows */
+        /* a column of the view matrix, whose rows are right, up and back */
         const float v[3] = {column < 3 ? right[column] : -dot(right, d->eye),
                             column < 3 ? up[column] : -dot(up, d->eye),
                             column < 3 ? back[column] : -dot(back, d->eye)};

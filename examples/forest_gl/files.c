@@ -1,4 +1,4 @@
-/* files.c - what can fail for want of memory or of a file
+/* files.c - errors, memory and files
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
@@ -18,8 +18,8 @@ int check(forest_gl *f, txm_status status) {
     return status == TXM_OK ? 1 : fail(f, "%s", f->env.message);
 }
 
-/* count things of so many bytes, zeroed, or NULL with the failure noted */
-void *need(forest_gl *f, size_t count, size_t bytes) {
+/* count * bytes zeroed bytes; NULL with f->failed set */
+void *allocate(forest_gl *f, size_t count, size_t bytes) {
     void *memory = calloc(count ? count : 1, bytes);
     if (!memory) fail(f, "no memory");
     return memory;
@@ -30,8 +30,8 @@ txm_image image_of(void *pixels, int width, int height, int channels) {
     return image;
 }
 
-/* The whole file with a 0 at its end, for free(); NULL if it cannot be read. */
-char *read_text(const char *path) {
+/* The contents of a file, terminated by a 0, to be released with free; NULL if it cannot be read. */
+char *read_file(const char *path) {
     FILE *file = fopen(path, "rb");
     size_t size = 0, capacity = 1 << 14;
     char *text = NULL;
@@ -49,7 +49,7 @@ char *read_text(const char *path) {
 }
 
 int new_image(forest_gl *f, txm_image *image, int width, int height, int channels) {
-    void *pixels = need(f, (size_t)width * (size_t)height, (size_t)channels);
+    void *pixels = allocate(f, (size_t)width * (size_t)height, (size_t)channels);
     *image = image_of(pixels, width, height, channels);
     return pixels != NULL;
 }

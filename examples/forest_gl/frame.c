@@ -1,4 +1,4 @@
-/* frame.c - all draw calls of a picture
+/* frame.c - the draw calls of a frame
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
@@ -8,17 +8,17 @@ static void draw_strips(forest_gl *f, int program, int count) {
     f->draws++;
 }
 
-/* The leaf clouds as seen along the view, if it has turned. */
+/* Render all leaf clouds as seen along the view, if the view has turned since the last time. */
 static void draw_impostors(forest_gl *f) {
-    static const float clear[4] = {0, 0, 0, 0}, nothing[4] = {-2, 0, 0, 0}, away = 1;
+    static const float transparent[4] = {0, 0, 0, 0}, no_depth[4] = {-2, 0, 0, 0}, far = 1;
     const float turned = 1 - dot(f->seen_from, f->frame.forward);
     if (!f->card_count || (f->has_impostors && turned < 1e-6f)) return;
     glBindFramebuffer(GL_FRAMEBUFFER, f->card_frame);
     glViewport(0, 0, CLOUD_SIDE, CLOUD_SIDE);
     glEnable(GL_DEPTH_TEST);
-    glClearBufferfv(GL_COLOR, 0, clear);
-    glClearBufferfv(GL_COLOR, 1, nothing);
-    glClearBufferfv(GL_DEPTH, 0, &away);
+    glClearBufferfv(GL_COLOR, 0, transparent);
+    glClearBufferfv(GL_COLOR, 1, no_depth);
+    glClearBufferfv(GL_DEPTH, 0, &far);
     draw_strips(f, CARD, f->card_count);
     glActiveTexture(GL_TEXTURE0 + IMPOSTORS);
     glGenerateMipmap(GL_TEXTURE_2D_ARRAY);
@@ -41,10 +41,10 @@ static void draw_pieces(forest_gl *f, GLuint program) {
     }
 }
 
-/* The whole picture into a frame buffer of that size. */
+/* Draw everything into a frame buffer of the given size. */
 void draw_frame(forest_gl *f, GLuint target, int width, int height) {
     f->draws = 0;
-    aim(f, width, height);
+    aim_camera(f, width, height);
     draw_impostors(f);
     glBindFramebuffer(GL_FRAMEBUFFER, target);
     glViewport(0, 0, width, height);
@@ -56,7 +56,7 @@ void draw_frame(forest_gl *f, GLuint target, int width, int height) {
     glDisable(GL_CULL_FACE);
     if (f->forest->cluster_count && !f->o.is_bare)
         draw_strips(f, CLOUD, (int)f->forest->cluster_count);
-    glUseProgram(f->programs[LAND]); /* last: most of it is covered by then */
+    glUseProgram(f->programs[LAND]); /* last, because most of it is hidden */
     glDrawArrays(GL_TRIANGLES, 0, 3);
     f->draws++;
 }

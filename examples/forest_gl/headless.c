@@ -12,7 +12,7 @@ int open_headless(forest_gl *f) {
     const EGLint profile[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 3,
                               EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
                               EGL_NONE};
-    /* a cast between a function's and another function's type */
+    /* a cast from one function type to another */
     const get_display get = (get_display)eglGetProcAddress("eglGetPlatformDisplayEXT");
     f->display = get ? get(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL) : EGL_NO_DISPLAY;
     if (f->display == EGL_NO_DISPLAY || !eglInitialize(f->display, NULL, NULL) ||
@@ -26,7 +26,7 @@ int open_headless(forest_gl *f) {
     return 1;
 }
 
-/* A frame buffer to render into. */
+/* An off-screen frame buffer. */
 static GLuint make_target(int width, int height) {
     GLuint frame, color, depth;
     glGenFramebuffers(1, &frame);
@@ -42,8 +42,9 @@ static GLuint make_target(int width, int height) {
     return frame;
 }
 
-/* The name of picture `number`: %d or %0Nd in the pattern is replaced. 0: it has another %. */
-static int name_picture(const char *pattern, int number, char *path, size_t capacity) {
+/* The file name of a picture: %d or %0Nd in the pattern is replaced by its number. 0: the pattern has
+   another %. */
+static int picture_path(const char *pattern, int number, char *path, size_t capacity) {
     const char *percent = strchr(pattern, '%');
     size_t digits = 0;
     if (!percent) return (size_t)snprintf(path, capacity, "%s", pattern) < capacity;
@@ -54,8 +55,8 @@ static int name_picture(const char *pattern, int number, char *path, size_t capa
                             (int)digits, number, at + 1) < capacity;
 }
 
-/* Means of smooth x smooth pixels, with the first row on top. */
-static void reduce(const uint8_t *rgba, int width, int height, int smooth, uint8_t *rgb) {
+/* Average smooth x smooth samples for each pixel, and flip: OpenGL's first row is the lowest. */
+static void downsample(const uint8_t *rgba, int width, int height, int smooth, uint8_t *rgb) {
     const int samples = smooth * smooth;
     for (int y = 0; y < height; y++) {
         for (int x = 0; x < 3 * width; x++) {
@@ -79,18 +80,18 @@ static double seconds(void) {
 
 int render_pictures(forest_gl *f) {
     const int width = f->o.width * f->o.smooth, height = f->o.height * f->o.smooth;
-    uint8_t *pixels = (uint8_t *)need(f, (size_t)width * (size_t)height, 4);
-    uint8_t *rgb = (uint8_t *)need(f, (size_t)f->o.width * (size_t)f->o.height, 3);
+    uint8_t *pixels = (uint8_t *)allocate(f, (size_t)width * (size_t)height, 4);
+    uint8_t *rgb = (uint8_t *)allocate(f, (size_t)f->o.width * (size_t)f->o.height, 3);
     const GLuint target = make_target(width, height);
     const double start = seconds();
     for (int i = 0; i < f->o.frames && pixels && rgb && !f->failed[0]; i++) {
         char path[1024];
-        if (i > 0 && !blow(f, f->o.time + i / 25.0)) break;
+        if (i > 0 && !advance_wind(f, f->o.time + i / 25.0)) break;
         upload_bones(f);
         draw_frame(f, target, width, height);
         glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, pixels);
-        reduce(pixels, f->o.width, f->o.height, f->o.smooth, rgb);
-        if (!name_picture(f->o.headless, i, path, sizeof path) ||
+        downsample(pixels, f->o.width, f->o.height, f->o.smooth, rgb);
+        if (!picture_path(f->o.headless, i, path, sizeof path) ||
             !stbi_write_png(path, f->o.width, f->o.height, 3, rgb, 3 * f->o.width))
             fail(f, "cannot write '%s'", f->o.headless);
         else if (i == 0)

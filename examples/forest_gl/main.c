@@ -7,31 +7,32 @@
              [--orbit AZIMUTH,ELEVATION,DISTANCE] [--at X,Y,Z] [--size WxH] [--shaders DIR]
              [--headless OUT.png [--frames N] [--smooth N]]
 
-   What a game does with treepieces.h and shaders/treepieces.glsl. All arrays of the forest go to the
-   graphics card once, its bones once a frame. A frame is one instanced draw for each type of piece, one
-   for all leaf clouds, one for ground and sky, and one more if the view has turned, which renders the
-   clouds' impostors anew: never more than 10, however many trees there are.
+   How a game uses treepieces.h and shaders/treepieces.glsl. The arrays of the forest are uploaded once,
+   the bones once a frame. A frame is one instanced draw call for each type of piece, one for all leaf
+   clouds, one for ground and sky, and, if the view has turned, one that renders the impostors of the
+   clouds again: at most 10 for any number of trees.
 
-   In the window: drag to turn, wheel to come nearer, right button to move, w shows the levels of
-   tessellation, l the leaves, space stops the time, Esc quits. --headless needs neither window nor
-   graphics card; OUT with %d or %03d in it takes --frames pictures, 25 a second.
+   In the window: drag to turn, wheel to zoom, right button to move, w shows the levels of tessellation,
+   l toggles the leaves, space pauses the wind, Esc quits. --headless needs neither a window nor a
+   graphics card; if OUT contains %d or %03d, it writes --frames pictures, 25 a second.
 
-   --bark    a set of framed tiles made by 'texkit tiles --kind frame', or a sheet of treepieces_bark
+   --bark    a set of framed tiles from 'texkit tiles --kind frame', or a sheet of treepieces_bark
    --leaf    a picture with transparency, for all species
-   --level, --half   tessellation at the eye, and the distance over which it halves
-   --orbit   degrees about the middle of the forest, and metres from there; --at: another middle
-   --smooth  samples across and down a pixel
+   --level   the level of tessellation at the eye; --half: the distance over which it halves
+   --orbit   azimuth and elevation of the camera, and its distance from the middle of the forest or
+             from --at
+   --smooth  samples of a pixel, horizontally and vertically
 
-   The program in its files; calls go down only:
+   The files of the program; each calls only those below it:
 
-                    main.c                  options, then a window or pictures
-              window.c  headless.c          SDL 2; EGL without a window, PNG files
-                   frame.c                  the draw calls of a frame
-             buffers.c  camera.c            buffers and textures; the matrix
-              light.c  shaders.c            shadows of crowns on a grid; programs
-                  pictures.c                bark and leaves
-                   trees.c                  species, forest, wind: calls treepieces.h
-             options.c  files.c             the command line; errors, files
+     main.c                   options, then a window or pictures
+     window.c  headless.c     SDL 2; EGL without a window, PNG files
+     frame.c                  the draw calls of a frame
+     buffers.c  camera.c      buffers and textures; the view
+     light.c  shaders.c       shadows of the crowns on a grid; OpenGL programs
+     pictures.c               bark and leaves
+     trees.c                  species, forest, wind: calls treepieces.h
+     options.c  files.c       the command line; errors, memory, files
 
    forest_gl.h has the struct that they share.                                                   */
 #include "forest_gl.h"
@@ -53,10 +54,10 @@ static void close_forest(forest_gl *f) {
 int main(int argc, char **argv) {
     static forest_gl f;
     int step = 1;
-    f.o = defaults();
+    f.o = default_options();
     for (int i = 1; i < argc && step; i += step)
         step = read_option(&f.o, argv[i], i + 1 < argc ? argv[i + 1] : NULL);
-    if (!step || !is_sound(&f.o)) {
+    if (!step || !options_are_valid(&f.o)) {
         fprintf(stderr,
                 "usage: forest_gl [--species NAME|FILE,...] [--count N] [--seed N] [--pieces N]\n"
                 "  [--bare] [--bark DIR|SHEET.png] [--leaf PNG] [--time T] [--wind SPEED]\n"
@@ -65,10 +66,10 @@ int main(int argc, char **argv) {
                 "  [--headless OUT.png [--frames N, with %%d in OUT] [--smooth N]]\n");
         return 2;
     }
-    if (read_species(&f) && grow(&f) && make_pictures(&f)) {
+    if (read_species(&f) && grow_trees(&f) && make_pictures(&f)) {
         choose_view(&f);
         if (f.o.headless) {
-            if (open_headless(&f) && prepare(&f, argv[0])) render_pictures(&f);
+            if (open_headless(&f) && upload_scene(&f, argv[0])) render_pictures(&f);
         } else {
 #ifdef FOREST_WINDOW
             run_window(&f, argv[0]);

@@ -1,8 +1,9 @@
-/* options.c - the words of the command line
+/* options.c - the command line
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
-/* up to `count` numbers parted by `separator`; returns how many there are, 0 if there is anything else */
+/* Read up to `count` numbers separated by `separator`; returns how many there are, 0 if the text is
+   malformed. */
 static int read_numbers(const char *text, char separator, float *numbers, int count) {
     int n = 0;
     for (; n < count; n++) {
@@ -16,7 +17,7 @@ static int read_numbers(const char *text, char separator, float *numbers, int co
     return 0;
 }
 
-/* One option and its value; returns how many words it took, 0: it is wrong. */
+/* Read one option and its value; returns how many arguments it used, 0 if it is not valid. */
 int read_option(options *o, const char *name, const char *value) {
     float v[3] = {0, 0, 0};
     if (strcmp(name, "--bare") == 0) return o->is_bare = 1;
@@ -52,7 +53,7 @@ int read_option(options *o, const char *name, const char *value) {
     return 2;
 }
 
-options defaults(void) {
+options default_options(void) {
     options o;
     memset(&o, 0, sizeof o);
     o.species = "oak";
@@ -68,7 +69,7 @@ options defaults(void) {
     return o;
 }
 
-int is_sound(const options *o) {
+int options_are_valid(const options *o) {
     return o->count >= 1 && o->count <= 1000000 && o->frames >= 1 && o->frames <= 100000 &&
            o->width >= 16 && o->width <= 8192 && o->height >= 16 && o->height <= 8192 &&
            o->smooth >= 1 && o->smooth <= 4 && o->level >= 1 && o->level <= 64 && o->half > 0 &&

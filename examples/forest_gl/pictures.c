@@ -11,7 +11,7 @@ static int number_of(const cJSON *json, const char *name) {
     return cJSON_IsNumber(item) ? item->valueint : -1;
 }
 
-/* Tiles of a set that have the edges of the first, as views into its atlas. */
+/* The tiles of a set whose edges are those of the first, as views into its atlas. */
 static int list_tiles(const cJSON *json, const txm_image *atlas, txm_image tiles[BARK_TILES]) {
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(json, "tiles"), *tile, *first = NULL;
     const int size = number_of(json, "size") & ~1;
@@ -33,7 +33,7 @@ static int list_tiles(const cJSON *json, const txm_image *atlas, txm_image tiles
     return count;
 }
 
-static int lay_sheet(forest_gl *f, const txm_image *tiles, int count, txm_image *sheet) {
+static int make_sheet(forest_gl *f, const txm_image *tiles, int count, txm_image *sheet) {
     treepieces_bark_desc desc = {0};
     desc.tiles = tiles;
     desc.tile_count = count;
@@ -47,15 +47,15 @@ static int read_tiles(forest_gl *f, const char *folder, txm_image *sheet) {
     char path[1024];
     txm_image atlas = {0}, tiles[BARK_TILES];
     snprintf(path, sizeof path, "%s/tiles.json", folder);
-    char *text = read_text(path);
+    char *text = read_file(path);
     cJSON *json = text ? cJSON_Parse(text) : NULL;
     snprintf(path, sizeof path, "%s/atlas.png", folder);
     int good = json ? read_picture(f, path, 3, &atlas)
-                    : fail(f, "'%s' is no set of tiles of 'texkit tiles'", folder);
+                    : fail(f, "'%s' is not a set of tiles of 'texkit tiles'", folder);
     if (good) {
         const int count = list_tiles(json, &atlas, tiles);
-        good = count ? lay_sheet(f, tiles, count, sheet)
-                     : fail(f, "'%s' holds no tiles that fit into its atlas", folder);
+        good = count ? make_sheet(f, tiles, count, sheet)
+                     : fail(f, "'%s' has no tiles that lie inside its atlas", folder);
     }
     stbi_image_free(atlas.pixels);
     cJSON_Delete(json);
@@ -63,15 +63,15 @@ static int read_tiles(forest_gl *f, const char *folder, txm_image *sheet) {
     return good;
 }
 
-static int draw_tiles(forest_gl *f, const treepieces_species *species, txm_image *sheet) {
-    uint8_t *block = (uint8_t *)need(f, BARK_TILES, 3 * BARK_SIDE * BARK_SIDE);
+static int draw_bark(forest_gl *f, const treepieces_species *species, txm_image *sheet) {
+    uint8_t *block = (uint8_t *)allocate(f, BARK_TILES, 3 * BARK_SIDE * BARK_SIDE);
     txm_image tiles[BARK_TILES];
     if (!block) return 0;
     for (int i = 0; i < BARK_TILES; i++)
         tiles[i] = image_of(block + 3 * BARK_SIDE * BARK_SIDE * i, BARK_SIDE, BARK_SIDE, 3);
     const int good =
         check(f, treepieces_draw_bark(species, f->o.seed, &f->env, tiles, BARK_TILES)) &&
-        lay_sheet(f, tiles, BARK_TILES, sheet);
+        make_sheet(f, tiles, BARK_TILES, sheet);
     free(block);
     return good;
 }
@@ -83,12 +83,12 @@ int make_pictures(forest_gl *f) {
     for (int s = 0; s < f->species_count; s++) {
         txm_image *sheet = &f->sheets[s], *leaf = &f->leaves[s];
         int good;
-        if (!f->o.bark) good = draw_tiles(f, &f->species[s], sheet);
+        if (!f->o.bark) good = draw_bark(f, &f->species[s], sheet);
         else if (is_sheet) good = read_picture(f, f->o.bark, 3, sheet);
         else good = read_tiles(f, f->o.bark, sheet);
         if (!good) return 0;
         if (sheet->width % TREEPIECES_SHEET || sheet->height != sheet->width * TREEPIECES_OWN)
-            return fail(f, "'%s' is no sheet of bark: it must be 5 times as high as wide", f->o.bark);
+            return fail(f, "'%s' is not a sheet of bark: it must be 5 times as high as wide", f->o.bark);
         if (f->o.leaf) good = read_picture(f, f->o.leaf, 4, leaf);
         else good = new_image(f, leaf, LEAF_SIDE, LEAF_SIDE, 4) &&
                     check(f, treepieces_draw_leaves(&f->species[s], f->o.seed, &f->env, *leaf));

@@ -1,4 +1,4 @@
-/* shaders.c - programs of OpenGL from treepieces.glsl and forest.glsl
+/* shaders.c - OpenGL programs, built from treepieces.glsl and forest.glsl
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
@@ -8,7 +8,8 @@
 #define FOREST_SHADERS "/usr/local/share/texkit/shaders"
 #endif
 
-/* Text of a shader file: where --shaders says, else beside the source or where it was installed. */
+/* The text of a shader file, from the folder of --shaders, else from the source tree or from where
+   make install puts it. */
 char *read_shader(forest_gl *f, const char *name, const char *program) {
     char path[1024];
     const char *slash = strrchr(program, '/');
@@ -19,7 +20,7 @@ char *read_shader(forest_gl *f, const char *name, const char *program) {
             snprintf(path, sizeof path, "%.*s/../../shaders/%s", length, slash ? program : ".", name);
         else if (i == 1) snprintf(path, sizeof path, "shaders/%s", name);
         else snprintf(path, sizeof path, "%s/%s", FOREST_SHADERS, name);
-        char *text = read_text(path);
+        char *text = read_file(path);
         if (text) return text;
     }
     fail(f, "cannot find shaders/%s; --shaders says where it is", name);
@@ -46,9 +47,7 @@ int add_stage(forest_gl *f, GLuint program, GLenum type, const char *stage,
     return good;
 }
 
-/* count names of what the last stage before the fragments puts out is to be recorded; 0: none */
-static GLuint make_program(forest_gl *f, int number, const char *library, const char *body,
-                           const char *defines, const char *const *recorded, int count) {
+static GLuint make_program(forest_gl *f, int number, const char *library, const char *body) {
     static const struct {
         int program;
         GLenum type;
@@ -75,8 +74,7 @@ static GLuint make_program(forest_gl *f, int number, const char *library, const 
     GLint good = 1;
     for (size_t i = 0; i < sizeof stages / sizeof stages[0] && good; i++)
         if (stages[i].program == number)
-            good = add_stage(f, program, stages[i].type, stages[i].name, defines, library, body);
-    if (count) glTransformFeedbackVaryings(program, count, recorded, GL_INTERLEAVED_ATTRIBS);
+            good = add_stage(f, program, stages[i].type, stages[i].name, "", library, body);
     if (good) {
         glLinkProgram(program);
         glGetProgramiv(program, GL_LINK_STATUS, &good);
@@ -93,7 +91,7 @@ int make_programs(forest_gl *f, const char *path) {
     char *library = read_shader(f, "treepieces.glsl", path);
     char *body = library ? read_shader(f, "forest.glsl", path) : NULL;
     for (int i = 0; i < PROGRAMS && body && !f->failed[0]; i++)
-        f->programs[i] = make_program(f, i, library, body, "", NULL, 0);
+        f->programs[i] = make_program(f, i, library, body);
     free(library);
     free(body);
     return !f->failed[0];

@@ -1,4 +1,4 @@
-/* trees.c - species, the forest, its bones in the wind, the box around it
+/* trees.c - species, the forest, its bones in the wind, its bounding box
    SPDX-License-Identifier: MIT OR Unlicense  */
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
@@ -15,7 +15,7 @@ int read_species(forest_gl *f) {
         name[length] = 0;
         at += length;
         treepieces_species *species = &f->species[f->species_count++];
-        char *text = strpbrk(name, "./") ? read_text(name) : NULL;
+        char *text = strpbrk(name, "./") ? read_file(name) : NULL;
         const txm_status status = text
             ? treepieces_species_parse(text, strlen(text), &f->env, species)
             : treepieces_preset(name, &f->env, species);
@@ -26,8 +26,8 @@ int read_species(forest_gl *f) {
     return f->species_count ? 1 : fail(f, "no species");
 }
 
-/* Move on to a time: in steps that the sway's springs can follow. */
-int blow(forest_gl *f, double time) {
+/* Advance the wind to a time, in steps of 1/30 s at most (up to 10 s). */
+int advance_wind(forest_gl *f, double time) {
     const treepieces_wind wind = {0.4f, f->o.wind, 0.7f, 7};
     const double from = f->now;
     const int steps = txm_clampi((int)((time - from) * 30 + 0.999), 1, 300);
@@ -39,20 +39,20 @@ int blow(forest_gl *f, double time) {
     return 1;
 }
 
-static void include(forest_gl *f, const float p[3], float radius) {
+static void extend_box(forest_gl *f, const float p[3], float radius) {
     for (int k = 0; k < 3; k++) {
         f->low[k] = txm_minf(f->low[k], p[k] - radius);
         f->high[k] = txm_maxf(f->high[k], p[k] + radius);
     }
 }
 
-/* a + along * (length of the node's piece) in the world */
+/* The point at `along` (0..1) of the axis of a node's piece, in world coordinates. */
 void axis_point(const forest_gl *f, uint32_t node, float along, float p[3]) {
     const float *b = f->bones + (size_t)TREEPIECES_BONE * node;
     for (int k = 0; k < 3; k++) p[k] = b[4 * k + 3] + along * b[4 * k + 1];
 }
 
-int grow(forest_gl *f) {
+int grow_trees(forest_gl *f) {
     treepieces_forest_desc desc = {0};
     if (!check(f, treepieces_kit_make(NULL, 0, &f->env, &f->kit))) return 0;
     const treepieces_place alone = {{0, 0, 0}, 0, 0, 0, f->o.seed};
@@ -64,11 +64,11 @@ int grow(forest_gl *f) {
     desc.max_pieces = f->o.pieces;
     desc.seed = f->o.seed;
     if (!check(f, treepieces_forest_make(&desc, &f->env, &f->forest))) return 0;
-    f->bones = (float *)need(f, f->forest->node_count, TREEPIECES_BONE * sizeof(float));
-    f->sway = (float *)need(f, f->forest->node_count, 4 * sizeof(float));
+    f->bones = (float *)allocate(f, f->forest->node_count, TREEPIECES_BONE * sizeof(float));
+    f->sway = (float *)allocate(f, f->forest->node_count, 4 * sizeof(float));
     if (!f->bones || !f->sway) return 0;
-    f->now = f->o.time - 10; /* for the sway to settle */
-    if (!blow(f, f->o.time)) return 0;
+    f->now = f->o.time - 10; /* the sway settles in 10 seconds */
+    if (!advance_wind(f, f->o.time)) return 0;
     for (int k = 0; k < 3; k++) {
         f->low[k] = k == 1 ? 0 : 1e9f;
         f->high[k] = -1e9f;
@@ -76,13 +76,13 @@ int grow(forest_gl *f) {
     for (uint32_t i = 0; i < f->forest->node_count; i++) {
         float p[3];
         axis_point(f, i, 1, p);
-        include(f, p, 0.1f);
+        extend_box(f, p, 0.1f);
     }
     for (uint32_t i = 0; i < f->forest->cluster_count; i++) {
         const treepieces_cluster *c = &f->forest->clusters[i];
         float p[3];
         axis_point(f, c->node, c->along, p);
-        include(f, p, c->radius);
+        extend_box(f, p, c->radius);
     }
     return 1;
 }

@@ -1,4 +1,4 @@
-/* window.c - a window by SDL 2, if that is there
+/* window.c - a window, with SDL 2; left out without it
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "forest_gl.h"
 
@@ -6,8 +6,8 @@
 #include <SDL2/SDL.h>
 #include <stdio.h>
 
-/* 0: the window is to be closed */
-static int handle(forest_gl *f, const SDL_Event *e, int *is_still) {
+/* Returns 0 if the window is to be closed. */
+static int handle_event(forest_gl *f, const SDL_Event *e, int *is_paused) {
     float *orbit = f->o.orbit;
     if (e->type == SDL_QUIT) return 0;
     if (e->type == SDL_MOUSEWHEEL) orbit[2] *= powf(0.9f, (float)e->wheel.y);
@@ -24,7 +24,7 @@ static int handle(forest_gl *f, const SDL_Event *e, int *is_still) {
         if (key == SDLK_ESCAPE) return 0;
         if (key == SDLK_w) f->o.is_wire = !f->o.is_wire;
         if (key == SDLK_l) f->o.is_bare = !f->o.is_bare;
-        if (key == SDLK_SPACE) *is_still = !*is_still;
+        if (key == SDLK_SPACE) *is_paused = !*is_paused;
     }
     return 1;
 }
@@ -44,18 +44,18 @@ void run_window(forest_gl *f, const char *program) {
                                     SDL_WINDOW_OPENGL | SDL_WINDOW_RESIZABLE)) ||
         !(context = SDL_GL_CreateContext(window)))
         fail(f, "%s", SDL_GetError());
-    else prepare(f, program);
+    else upload_scene(f, program);
     if (!f->failed[0]) SDL_GL_SetSwapInterval(1);
     Uint64 before = SDL_GetPerformanceCounter();
-    int is_open = !f->failed[0], is_still = 0, shown = 0;
+    int is_open = !f->failed[0], is_paused = 0, shown = 0;
     while (is_open && !f->failed[0]) {
         SDL_Event e;
         int width, height;
-        while (is_open && SDL_PollEvent(&e)) is_open = handle(f, &e, &is_still);
+        while (is_open && SDL_PollEvent(&e)) is_open = handle_event(f, &e, &is_paused);
         const Uint64 now = SDL_GetPerformanceCounter();
         const double step = (double)(now - before) / (double)SDL_GetPerformanceFrequency();
         before = now;
-        if (!is_still && !blow(f, f->now + (step < 0.2 ? step : 0.2))) break;
+        if (!is_paused && !advance_wind(f, f->now + (step < 0.2 ? step : 0.2))) break;
         upload_bones(f);
         SDL_GL_GetDrawableSize(window, &width, &height);
         draw_frame(f, 0, width, height);
