@@ -110,13 +110,13 @@ static void builder_free(builder *b) {
 }
 
 /* Say what is wrong, after "line 12: " if the line is not 0. Returns 0. */
-static int fail(const builder *b, size_t line, const char *format, ...)
+static int builder_fail(const builder *b, size_t line, const char *format, ...)
 #ifdef __GNUC__
     __attribute__((format(printf, 3, 4)))
 #endif
     ;
 
-static int fail(const builder *b, size_t line, const char *format, ...) {
+static int builder_fail(const builder *b, size_t line, const char *format, ...) {
     char *text = b->mesh->message;
     const size_t room = sizeof b->mesh->message;
     int n = line ? snprintf(text, room, "line %lu: ", (unsigned long)line) : 0;
@@ -128,8 +128,8 @@ static int fail(const builder *b, size_t line, const char *format, ...) {
     return 0;
 }
 
-static int fail_memory(const builder *b) {
-    return fail(b, 0, "not enough memory for this mesh");
+static int builder_fail_memory(const builder *b) {
+    return builder_fail(b, 0, "not enough memory for this mesh");
 }
 
 /* ---- polygons to triangles ---------------------------------------------------------------- */
@@ -191,7 +191,7 @@ static int is_ear(const point *flat, const size_t *around, size_t left, size_t i
 
 static int add_triangle(builder *b, corner x, corner y, corner z) {
     corner *t = (corner *)list_add(&b->triangles, 1);
-    if (!t) return fail_memory(b);
+    if (!t) return builder_fail_memory(b);
     t[0] = x;
     t[1] = y;
     t[2] = z;
@@ -206,7 +206,7 @@ static int triangulate(builder *b, const corner *p, size_t n) {
         b->flat.count = b->around.count = 0;
         point *flat = (point *)list_add(&b->flat, n);
         around = (size_t *)list_add(&b->around, n);
-        if (!flat || !around) return fail_memory(b);
+        if (!flat || !around) return builder_fail_memory(b);
         for (size_t i = 0; i < n; i++) around[i] = i;
         flatten((const float *)b->positions.items, p, n, flat);
         if (!is_convex((const point *)flat, n)) {
@@ -234,20 +234,21 @@ static int triangulate(builder *b, const corner *p, size_t n) {
 }
 
 /* Check what the polygons refer to, now that all of the file is known, and make triangles. */
-static int triangulate_all(builder *b) {
+static int builder_triangulate(builder *b) {
     const polygon *polygons = (const polygon *)b->polygons.items;
     const corner *corners = (const corner *)b->corners.items;
-    if (!list_reserve(&b->triangles, b->polygons.count)) return fail_memory(b);
+    if (!list_reserve(&b->triangles, b->polygons.count)) return builder_fail_memory(b);
     for (size_t i = 0; i < b->polygons.count; i++) {
         const polygon *f = &polygons[i];
         for (size_t k = f->first; k < f->first + f->count; k++) {
             if (corners[k].vertex >= b->positions.count)
-                return fail(b, f->line, "a face with vertex %lu, but there are only %lu",
-                            (unsigned long)corners[k].vertex + 1,
-                            (unsigned long)b->positions.count);
+                return builder_fail(b, f->line, "a face with vertex %lu, but there are only %lu",
+                                    (unsigned long)corners[k].vertex + 1,
+                                    (unsigned long)b->positions.count);
             if (corners[k].uv != NO_UV && corners[k].uv >= b->uvs.count)
-                return fail(b, f->line, "a face with texture vertex %lu, but there are only %lu",
-                            (unsigned long)corners[k].uv + 1, (unsigned long)b->uvs.count);
+                return builder_fail(b, f->line,
+                                    "a face with texture vertex %lu, but there are only %lu",
+                                    (unsigned long)corners[k].uv + 1, (unsigned long)b->uvs.count);
         }
         if (!triangulate(b, corners + f->first, f->count)) return 0;
     }
@@ -262,7 +263,7 @@ static void *take(list *l) {
 }
 
 /* The lists as a mesh. */
-static int build(builder *b) {
+static int builder_finish(builder *b) {
     mesh_data *mesh = b->mesh;
     const size_t count = b->triangles.count;
     const corner *corners = (const corner *)b->triangles.items;
@@ -270,10 +271,10 @@ static int build(builder *b) {
     size_t bytes;
     for (size_t i = 0; i < 3 * count && !has_uvs; i++) has_uvs = corners[i].uv != NO_UV;
     if (count) {
-        if (!txm_mul(count, 6, sizeof(float), &bytes)) return fail_memory(b);
+        if (!txm_mul(count, 6, sizeof(float), &bytes)) return builder_fail_memory(b);
         mesh->indices = (uint32_t *)malloc(bytes / 2);
         if (has_uvs) mesh->uvs = (float *)malloc(bytes);
-        if (!mesh->indices || (has_uvs && !mesh->uvs)) return fail_memory(b);
+        if (!mesh->indices || (has_uvs && !mesh->uvs)) return builder_fail_memory(b);
     }
     for (size_t i = 0; i < 3 * count; i++) {
         mesh->indices[i] = corners[i].vertex;
@@ -307,7 +308,7 @@ static int is_digit(char c) {
 }
 
 /* To the next word of this line; a backslash at the end of a line joins the next one on. */
-static void skip_blanks(text *in) {
+static void text_skip_blanks(text *in) {
     while (in->at < in->end) {
         if (is_blank(*in->at)) {
             in->at++;
@@ -324,7 +325,7 @@ static void skip_blanks(text *in) {
 }
 
 /* To the beginning of the next line. */
-static void skip_line(text *in) {
+static void text_skip_line(text *in) {
     for (;;) {
         const char *newline = (const char *)memchr(in->at, '\n', (size_t)(in->end - in->at));
         if (!newline) {
@@ -341,14 +342,14 @@ static void skip_line(text *in) {
 }
 
 /* To the next word, on whichever line. */
-static void skip_space(text *in) {
+static void text_skip_space(text *in) {
     while (in->at < in->end && (is_blank(*in->at) || *in->at == '\n')) {
         if (*in->at == '\n') in->line++;
         in->at++;
     }
 }
 
-static int at_word_end(const char *p, const char *end) {
+static int text_at_word_end(const char *p, const char *end) {
     return p == end || is_blank(*p) || *p == '\n' || *p == '\\';
 }
 
@@ -356,7 +357,7 @@ static int at_word_end(const char *p, const char *end) {
 static int read_number_slowly(text *in, double *value) {
     char word[512], *stop;
     size_t n = 0;
-    while (!at_word_end(in->at + n, in->end)) {
+    while (!text_at_word_end(in->at + n, in->end)) {
         if (n + 1 == sizeof word) return 0;
         word[n] = in->at[n];
         n++;
@@ -370,7 +371,7 @@ static int read_number_slowly(text *in, double *value) {
 
 /* The number that begins here, correctly rounded to double. A decimal number of up to 15 digits is an
    integer times or over a power of ten that doubles hold exactly: one operation, one rounding. */
-static int read_number(text *in, double *value) {
+static int text_number(text *in, double *value) {
     static const double powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                     1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                     1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -393,7 +394,7 @@ static int read_number(text *in, double *value) {
         for (; p < in->end && is_digit(*p) && e < 1000; p++, any = 1) e = 10 * e + (*p - '0');
         exponent += down ? -e : e;
     }
-    if (!any || digits >= exact || exponent < -22 || exponent > 22 || !at_word_end(p, in->end))
+    if (!any || digits >= exact || exponent < -22 || exponent > 22 || !text_at_word_end(p, in->end))
         return read_number_slowly(in, value);
     const double d = (double)digits;
     const double v = exponent < 0 ? d / powers[-exponent] : d * powers[exponent];
@@ -403,7 +404,7 @@ static int read_number(text *in, double *value) {
 }
 
 /* The same for a number that must be finite as a float. */
-static int to_float(double value, float *to) {
+static int text_to_float(double value, float *to) {
     *to = (float)value; /* beyond the largest: infinite, IEEE has no traps here */
     return txm_is_finite((double)*to);
 }
@@ -414,9 +415,9 @@ static int to_float(double value, float *to) {
 static int read_numbers(text *in, double *values, int most) {
     int n = 0;
     for (;;) {
-        skip_blanks(in);
+        text_skip_blanks(in);
         if (in->at == in->end || *in->at == '\n' || *in->at == '#' || n == most) return n;
-        if (!read_number(in, &values[n++])) return -1;
+        if (!text_number(in, &values[n++])) return -1;
     }
 }
 
@@ -425,22 +426,23 @@ static int read_obj_vertex(builder *b, text *in, list *colors) {
     double v[7];
     const size_t line = in->line;
     const int n = read_numbers(in, v, 7);
-    if (n < 0) return fail(b, line, "a coordinate is not a number");
-    if (n < 3) return fail(b, line, "a vertex has less than three coordinates");
+    if (n < 0) return builder_fail(b, line, "a coordinate is not a number");
+    if (n < 3) return builder_fail(b, line, "a vertex has less than three coordinates");
     float *p = (float *)list_add(&b->positions, 1);
-    if (!p) return fail_memory(b);
+    if (!p) return builder_fail_memory(b);
     for (int k = 0; k < 3; k++) {
-        if (!to_float(v[k], &p[k])) return fail(b, line, "a coordinate is not a finite number");
+        if (!text_to_float(v[k], &p[k]))
+            return builder_fail(b, line, "a coordinate is not a finite number");
     }
     if (n < 6) return 1;
     while (colors->count < b->positions.count) { /* white for those before that had none */
         float *c = (float *)list_add(colors, 1);
-        if (!c) return fail_memory(b);
+        if (!c) return builder_fail_memory(b);
         c[0] = c[1] = c[2] = 1;
         if (colors->count < b->positions.count) continue;
         for (int k = 0; k < 3; k++) {
-            if (!to_float(v[n - 3 + k], &c[k]))
-                return fail(b, line, "a color is not a finite number");
+            if (!text_to_float(v[n - 3 + k], &c[k]))
+                return builder_fail(b, line, "a color is not a finite number");
         }
     }
     return 1;
@@ -451,10 +453,10 @@ static int read_obj_uv(builder *b, text *in) {
     const size_t line = in->line;
     const int n = read_numbers(in, v, 3);
     float *uv = (float *)list_add(&b->uvs, 1);
-    if (!uv) return fail_memory(b);
+    if (!uv) return builder_fail_memory(b);
     uv[1] = 0;
-    if (n < 1 || !to_float(v[0], &uv[0]) || (n > 1 && !to_float(v[1], &uv[1])))
-        return fail(b, line, "a texture coordinate is not a finite number");
+    if (n < 1 || !text_to_float(v[0], &uv[0]) || (n > 1 && !text_to_float(v[1], &uv[1])))
+        return builder_fail(b, line, "a texture coordinate is not a finite number");
     return 1;
 }
 
@@ -478,35 +480,35 @@ static int read_obj_face(builder *b, text *in) {
     const size_t line = in->line, first = b->corners.count;
     for (;;) {
         uint32_t vertex, uv = NO_UV, normal;
-        skip_blanks(in);
+        text_skip_blanks(in);
         if (in->at == in->end || *in->at == '\n' || *in->at == '#') break;
         int ok = read_obj_index(in, b->positions.count, &vertex);
         if (ok && in->at < in->end && *in->at == '/') {
             in->at++;
-            if (in->at < in->end && *in->at != '/' && !at_word_end(in->at, in->end))
+            if (in->at < in->end && *in->at != '/' && !text_at_word_end(in->at, in->end))
                 ok = read_obj_index(in, b->uvs.count, &uv);
             if (ok && in->at < in->end && *in->at == '/') {
                 in->at++; /* how many normals there are nobody counts */
-                if (!at_word_end(in->at, in->end)) ok = read_obj_index(in, SIZE_MAX, &normal);
+                if (!text_at_word_end(in->at, in->end)) ok = read_obj_index(in, SIZE_MAX, &normal);
             }
         }
-        if (!ok || !at_word_end(in->at, in->end))
-            return fail(b, line, "a face with an index that is out of range or no number");
+        if (!ok || !text_at_word_end(in->at, in->end))
+            return builder_fail(b, line, "a face with an index that is out of range or no number");
         corner *c = (corner *)list_add(&b->corners, 1);
-        if (!c) return fail_memory(b);
+        if (!c) return builder_fail_memory(b);
         c->vertex = vertex;
         c->uv = uv;
     }
     polygon *f = (polygon *)list_add(&b->polygons, 1);
-    if (!f) return fail_memory(b);
+    if (!f) return builder_fail_memory(b);
     f->first = first;
     f->count = b->corners.count - first;
     f->line = line;
-    return f->count >= 3 ? 1 : fail(b, line, "a face with less than three corners");
+    return f->count >= 3 ? 1 : builder_fail(b, line, "a face with less than three corners");
 }
 
 /* Colors to bytes; all 0..1, or if any is above, all 0..255. */
-static int finish_colors(builder *b, const list *colors) {
+static int obj_colors_to_bytes(builder *b, const list *colors) {
     const float *from = (const float *)colors->items;
     float most = 1;
     if (colors->count == 0) return 1;
@@ -515,7 +517,7 @@ static int finish_colors(builder *b, const list *colors) {
     }
     const float scale = most > 1 ? 1 : 255;
     unsigned char *to = (unsigned char *)list_add(&b->colors, b->positions.count);
-    if (!to) return fail_memory(b);
+    if (!to) return builder_fail_memory(b);
     memset(to, 255, 4 * b->positions.count);
     for (size_t i = 0; i < colors->count; i++) {
         for (size_t k = 0; k < 3; k++)
@@ -524,24 +526,25 @@ static int finish_colors(builder *b, const list *colors) {
     return 1;
 }
 
-static int read_obj(builder *b, text *in) {
+static int mesh_read_obj(builder *b, text *in) {
     list colors = list_of(3 * sizeof(float));
     int ok = 1;
     while (ok && in->at < in->end) {
-        skip_blanks(in);
+        text_skip_blanks(in);
         const char *word = in->at;
-        while (!at_word_end(in->at, in->end)) in->at++;
+        while (!text_at_word_end(in->at, in->end)) in->at++;
         const ptrdiff_t n = in->at - word;
         if (n == 1 && word[0] == 'v') ok = read_obj_vertex(b, in, &colors);
         else if (n == 2 && word[0] == 'v' && word[1] == 't') ok = read_obj_uv(b, in);
         else if (n == 1 && word[0] == 'f') ok = read_obj_face(b, in);
-        if (ok) skip_line(in);
+        if (ok) text_skip_line(in);
     }
-    ok = ok && finish_colors(b, &colors);
+    ok = ok && obj_colors_to_bytes(b, &colors);
     list_free(&colors);
     if (ok && b->polygons.count == 0)
-        return fail(b, 0, b->positions.count ? "no faces in it"
-                                             : "no vertices in it; give an OBJ or PLY file");
+        return builder_fail(b, 0, "%s", b->positions.count
+                                            ? "no faces in it"
+                                            : "no vertices in it; give an OBJ or PLY file");
     return ok;
 }
 
@@ -627,7 +630,7 @@ static const char *next_word(text *in, char word[32]) {
 
 static int read_ply_element(builder *b, ply *h, text *in) {
     char word[32], *stop;
-    if (h->element_count == MAX_ELEMENTS) return fail(b, in->line, "too many elements");
+    if (h->element_count == MAX_ELEMENTS) return builder_fail(b, in->line, "too many elements");
     ply_element *e = &h->elements[h->element_count++];
     memset(e, 0, sizeof *e);
     e->first = h->property_count;
@@ -638,15 +641,16 @@ static int read_ply_element(builder *b, ply *h, text *in) {
     errno = 0;
     const unsigned long long count = is_digit(word[0]) ? strtoull(word, &stop, 10) : 0;
     if (!is_digit(word[0]) || *stop || errno || count > 0x7fffffff)
-        return fail(b, in->line, "an element without a proper count");
+        return builder_fail(b, in->line, "an element without a proper count");
     e->count = (size_t)count;
     return 1;
 }
 
 static int read_ply_property(builder *b, ply *h, text *in) {
     char word[32];
-    if (h->element_count == 0) return fail(b, in->line, "a property of nothing");
-    if (h->property_count == MAX_PROPERTIES) return fail(b, in->line, "too many properties");
+    if (h->element_count == 0) return builder_fail(b, in->line, "a property of nothing");
+    if (h->property_count == MAX_PROPERTIES)
+        return builder_fail(b, in->line, "too many properties");
     ply_element *e = &h->elements[h->element_count - 1];
     ply_property *p = &h->properties[h->property_count++];
     p->counted = PLY_NONE;
@@ -654,12 +658,12 @@ static int read_ply_property(builder *b, ply *h, text *in) {
     if (!strcmp(word, "list")) {
         p->counted = ply_type_of(next_word(in, word));
         if (p->counted >= PLY_FLOAT)
-            return fail(b, in->line, "a list with a length of no known type");
+            return builder_fail(b, in->line, "a list with a length of no known type");
         next_word(in, word);
         e->has_list = 1;
     }
     p->type = ply_type_of(word);
-    if (p->type == PLY_NONE) return fail(b, in->line, "a property of no known type");
+    if (p->type == PLY_NONE) return builder_fail(b, in->line, "a property of no known type");
     p->role = ply_role_of(e, p, next_word(in, word));
     e->properties++;
     if (h->format == PLY_ASCII) e->least += e->properties > 1 ? 2 : 1; /* a digit and a blank */
@@ -670,10 +674,10 @@ static int read_ply_property(builder *b, ply *h, text *in) {
 static int read_ply_header(builder *b, ply *h, text *in) {
     int has_format = 0, ok = 1;
     memset(h, 0, sizeof *h);
-    skip_line(in);
+    text_skip_line(in);
     while (ok) {
         char word[32];
-        if (in->at == in->end) return fail(b, in->line, "the header has no end");
+        if (in->at == in->end) return builder_fail(b, in->line, "the header has no end");
         next_word(in, word);
         if (!strcmp(word, "end_header")) break;
         if (!strcmp(word, "format")) {
@@ -683,7 +687,8 @@ static int read_ply_header(builder *b, ply *h, text *in) {
                                                               : PLY_ASCII;
             has_format = h->format != PLY_ASCII || !strcmp(word, "ascii");
         } else if (!strcmp(word, "element") || !strcmp(word, "property")) {
-            if (!has_format) return fail(b, in->line, "no known format; ascii or binary is read");
+            if (!has_format)
+                return builder_fail(b, in->line, "no known format; ascii or binary is read");
             ok = word[0] == 'e' ? read_ply_element(b, h, in) : read_ply_property(b, h, in);
         }
         const char *newline = (const char *)memchr(in->at, '\n', (size_t)(in->end - in->at));
@@ -704,8 +709,8 @@ static int read_scalar(const ply *h, text *in, ply_type type, double *value) {
     unsigned char raw[8];
     uint64_t bits = 0;
     if (h->format == PLY_ASCII) {
-        skip_space(in);
-        return read_number(in, value);
+        text_skip_space(in);
+        return text_number(in, value);
     }
     const size_t n = ply_bytes[type];
     if ((size_t)(in->end - in->at) < n) return 0;
@@ -731,9 +736,11 @@ static int read_scalar(const ply *h, text *in, ply_type type, double *value) {
 }
 
 static int fail_body(const builder *b, const ply *h, const text *in) {
-    if (h->format != PLY_ASCII) return fail(b, 0, "the file ends too early; get a whole copy");
-    if (in->at == in->end) return fail(b, in->line, "the file ends too early; get a whole copy");
-    return fail(b, in->line, "not a number");
+    if (h->format != PLY_ASCII)
+        return builder_fail(b, 0, "the file ends too early; get a whole copy");
+    if (in->at == in->end)
+        return builder_fail(b, in->line, "the file ends too early; get a whole copy");
+    return builder_fail(b, in->line, "not a number");
 }
 
 /* The length of a list, which must fit into what is left of the file. */
@@ -743,8 +750,8 @@ static int read_length(const builder *b, const ply *h, text *in, const ply_prope
     const size_t left = (size_t)(in->end - in->at);
     const size_t room = h->format == PLY_ASCII ? left : left / ply_bytes[p->type];
     if (!(value >= 0 && value <= (double)room) || value != floor(value))
-        return fail(b, h->format == PLY_ASCII ? in->line : 0,
-                    "a list is longer than the file; get a whole copy");
+        return builder_fail(b, h->format == PLY_ASCII ? in->line : 0,
+                            "a list is longer than the file; get a whole copy");
     *n = (size_t)value;
     return 1;
 }
@@ -788,7 +795,7 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
         has[properties[i].role] = 1;
         types[properties[i].role] = properties[i].type;
     }
-    if (!has_roles(has, PLY_X, 3)) return fail(b, 0, "its vertices have no x, y and z");
+    if (!has_roles(has, PLY_X, 3)) return builder_fail(b, 0, "its vertices have no x, y and z");
     const int has_normal = has_roles(has, PLY_NX, 3), has_color = has_roles(has, PLY_RED, 3);
     const int has_uv = has_roles(has, PLY_U, 2), has_rotation = has_roles(has, PLY_QX, 4);
     float *position = (float *)list_add(&b->positions, e->count);
@@ -798,7 +805,7 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
     unsigned char *color = has_color ? (unsigned char *)list_add(&b->colors, e->count) : NULL;
     if (!position || (has_normal && !normal) || (has_uv && !uv) || (has_color && !color) ||
         (has_rotation && !rotation))
-        return fail_memory(b);
+        return builder_fail_memory(b);
 
     for (size_t i = 0; i < e->count; i++) {
         int ok = 1;
@@ -809,13 +816,16 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
                 return fail_body(b, h, in);
             }
         }
-        for (int k = 0; k < 3; k++) ok &= to_float(v[PLY_X + k], &position[3 * i + (size_t)k]);
+        for (int k = 0; k < 3; k++) ok &= text_to_float(v[PLY_X + k], &position[3 * i + (size_t)k]);
         for (int k = 0; k < 3 && has_normal; k++)
-            ok &= to_float(v[PLY_NX + k], &normal[3 * i + (size_t)k]);
-        for (int k = 0; k < 2 && has_uv; k++) ok &= to_float(v[PLY_U + k], &uv[2 * i + (size_t)k]);
+            ok &= text_to_float(v[PLY_NX + k], &normal[3 * i + (size_t)k]);
+        for (int k = 0; k < 2 && has_uv; k++)
+            ok &= text_to_float(v[PLY_U + k], &uv[2 * i + (size_t)k]);
         for (int k = 0; k < 4 && has_rotation; k++)
-            ok &= to_float(v[PLY_QX + k], &rotation[4 * i + (size_t)k]);
-        if (!ok) return fail(b, 0, "vertex %lu has a number that is not finite", (unsigned long)i);
+            ok &= text_to_float(v[PLY_QX + k], &rotation[4 * i + (size_t)k]);
+        if (!ok)
+            return builder_fail(b, 0, "vertex %lu has a number that is not finite",
+                                (unsigned long)i);
         for (int k = 0; k < 4 && has_color; k++)
             color[4 * i + (size_t)k] = k == 3 && !has[PLY_ALPHA]
                                            ? 255
@@ -826,24 +836,24 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
 
 static int read_ply_face(builder *b, const ply *h, const ply_property *p, text *in, size_t index) {
     size_t n;
-    if (h->format == PLY_ASCII) skip_space(in);
+    if (h->format == PLY_ASCII) text_skip_space(in);
     const size_t line = h->format == PLY_ASCII ? in->line : 0;
     if (!read_length(b, h, in, p, &n)) return 0;
     if (n < 3)
-        return fail(b, line, "face %lu has less than three corners", (unsigned long)index);
+        return builder_fail(b, line, "face %lu has less than three corners", (unsigned long)index);
     polygon *f = (polygon *)list_add(&b->polygons, 1);
-    if (!f) return fail_memory(b);
+    if (!f) return builder_fail_memory(b);
     f->first = b->corners.count;
     f->count = n;
     f->line = line;
     corner *c = (corner *)list_add(&b->corners, n);
-    if (!c) return fail_memory(b);
+    if (!c) return builder_fail_memory(b);
     for (size_t k = 0; k < n; k++) {
         double value;
         if (!read_scalar(h, in, p->type, &value)) return fail_body(b, h, in);
         if (!(value >= 0 && value < 2147483648.0) || value != floor(value))
-            return fail(b, line, "face %lu has an index that is out of range",
-                        (unsigned long)index);
+            return builder_fail(b, line, "face %lu has an index that is out of range",
+                                (unsigned long)index);
         c[k].vertex = c[k].uv = (uint32_t)value;
     }
     return 1;
@@ -853,14 +863,14 @@ static int read_ply_elements(builder *b, const ply *h, const ply_element *e, tex
     const size_t left = (size_t)(in->end - in->at);
     if (e->properties == 0 || e->count == 0) return 1;
     if (e->count > left / e->least + (h->format == PLY_ASCII)) /* no blank after the last number */
-        return fail(b, 0, "the file ends too early; get a whole copy");
+        return builder_fail(b, 0, "the file ends too early; get a whole copy");
     if (e->is_vertex && b->positions.count == 0) return read_ply_vertices(b, h, e, in);
     if (!e->has_list && h->format != PLY_ASCII) {
         in->at += e->count * e->least;
         return 1;
     }
     if (e->is_face && !list_reserve(&b->corners, b->corners.count + 3 * e->count))
-        return fail_memory(b);
+        return builder_fail_memory(b);
     for (size_t i = 0; i < e->count; i++) {
         for (int k = 0; k < e->properties; k++) {
             const ply_property *p = &h->properties[e->first + k];
@@ -872,14 +882,14 @@ static int read_ply_elements(builder *b, const ply *h, const ply_element *e, tex
     return 1;
 }
 
-static int read_ply(builder *b, text *in, int points_too) {
+static int mesh_read_ply(builder *b, text *in, int points_too) {
     ply h;
     if (!read_ply_header(b, &h, in)) return 0;
     for (int i = 0; i < h.element_count; i++) {
         if (!read_ply_elements(b, &h, &h.elements[i], in)) return 0;
     }
-    if (b->positions.count == 0) return fail(b, 0, "no vertices in it");
-    if (b->polygons.count == 0 && !points_too) return fail(b, 0, "no faces in it");
+    if (b->positions.count == 0) return builder_fail(b, 0, "no vertices in it");
+    if (b->polygons.count == 0 && !points_too) return builder_fail(b, 0, "no faces in it");
     if (b->uvs.count) return 1;
     corner *c = (corner *)b->corners.items;
     for (size_t i = 0; i < b->corners.count; i++) c[i].uv = NO_UV;
@@ -895,16 +905,16 @@ int mesh_decode(const unsigned char *bytes, size_t size, int points_too, mesh_da
     int ok;
     memset(mesh, 0, sizeof *mesh);
     builder_init(&b, mesh, why);
-    if (size == 0) return fail(&b, 0, "the file is empty");
+    if (size == 0) return builder_fail(&b, 0, "the file is empty");
     in.at = (const char *)bytes;
     in.end = in.at + size;
     in.line = 1;
     if (size >= 4 && !memcmp(bytes, "glTF", 4))
-        return fail(&b, 0, "glTF is only written, not read; convert it to OBJ or PLY");
+        return builder_fail(&b, 0, "glTF is only written, not read; convert it to OBJ or PLY");
     if (size >= 4 && !memcmp(bytes, "ply", 3) && (bytes[3] == '\n' || bytes[3] == '\r'))
-        ok = read_ply(&b, &in, points_too);
-    else ok = read_obj(&b, &in);
-    ok = ok && triangulate_all(&b) && build(&b);
+        ok = mesh_read_ply(&b, &in, points_too);
+    else ok = mesh_read_obj(&b, &in);
+    ok = ok && builder_triangulate(&b) && builder_finish(&b);
     if (!ok) mesh_free(mesh);
     builder_free(&b);
     return ok;
@@ -941,54 +951,54 @@ typedef struct sink {
     int failed;
 } sink;
 
-static sink new_sink(void) {
+static sink sink_new(void) {
     sink s = {{NULL, 0, 0, 1}, 0};
     return s;
 }
 
-static void put(sink *s, const void *bytes, size_t n) {
+static void sink_put(sink *s, const void *bytes, size_t n) {
     void *place = s->failed || n == 0 ? NULL : list_add(&s->bytes, n);
     if (place) memcpy(place, bytes, n);
     else if (n) s->failed = 1;
 }
 
 /* Text; formatted numbers and our own words, at most 200 characters. */
-static void print(sink *s, const char *format, ...)
+static void sink_print(sink *s, const char *format, ...)
 #ifdef __GNUC__
     __attribute__((format(printf, 2, 3)))
 #endif
     ;
 
-static void print(sink *s, const char *format, ...) {
+static void sink_print(sink *s, const char *format, ...) {
     char line[256];
     va_list arguments;
     va_start(arguments, format);
     const int n = vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
-    put(s, line, n < 0 ? 0 : n < (int)sizeof line ? (size_t)n : sizeof line - 1);
+    sink_put(s, line, n < 0 ? 0 : n < (int)sizeof line ? (size_t)n : sizeof line - 1);
 }
 
 /* Little-endian numbers. */
-static void put_u16(sink *s, uint32_t v) {
+static void sink_u16(sink *s, uint32_t v) {
     const unsigned char raw[2] = {(unsigned char)(v & 255), (unsigned char)(v >> 8 & 255)};
-    put(s, raw, 2);
+    sink_put(s, raw, 2);
 }
 
-static void put_u32(sink *s, uint32_t v) {
+static void sink_u32(sink *s, uint32_t v) {
     const unsigned char raw[4] = {(unsigned char)(v & 255), (unsigned char)(v >> 8 & 255),
                                   (unsigned char)(v >> 16 & 255), (unsigned char)(v >> 24)};
-    put(s, raw, 4);
+    sink_put(s, raw, 4);
 }
 
-static void put_floats(sink *s, const float *v, size_t n) {
+static void sink_floats(sink *s, const float *v, size_t n) {
     for (size_t i = 0; i < n; i++) {
         uint32_t bits;
         memcpy(&bits, &v[i], 4);
-        put_u32(s, bits);
+        sink_u32(s, bits);
     }
 }
 
-static int finish_sink(sink *s, unsigned char **bytes, size_t *size, const char **why) {
+static int sink_finish(sink *s, unsigned char **bytes, size_t *size, const char **why) {
     *bytes = NULL;
     if (s->failed) {
         list_free(&s->bytes);
@@ -1109,12 +1119,12 @@ static uint32_t flat_index(const flat_mesh *f, size_t corner_index) {
 /* ---- writing: what a scene holds -------------------------------------------------------------- */
 
 /* The surface is a part as well, the first. */
-static int part_count(const mesh_scene *scene) {
+static int scene_part_count(const mesh_scene *scene) {
     return scene->part_count + (scene->surface != NULL);
 }
 
 /* Its material, if it is the surface, is made in *own. */
-static mesh_part part_at(const mesh_scene *scene, int i, mesh_material *own) {
+static mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own) {
     mesh_part part;
     if (!scene->surface) return scene->parts[i];
     if (i > 0) return scene->parts[i - 1];
@@ -1134,9 +1144,9 @@ static mesh_part part_at(const mesh_scene *scene, int i, mesh_material *own) {
 static void print_name(sink *s, const char *name) {
     for (; *name; name++) {
         const unsigned char c = (unsigned char)*name;
-        put(s, c < 32 || c == 127 ? "_" : name, 1);
+        sink_put(s, c < 32 || c == 127 ? "_" : name, 1);
     }
-    put(s, "\n", 1);
+    sink_put(s, "\n", 1);
 }
 
 /* How many positions, texture coordinates and normals the file has so far: it counts on. */
@@ -1148,18 +1158,19 @@ static void print_obj_vertices(sink *s, const mesh_data *m, const split *uvs, co
                                size_t normal_count) {
     for (size_t i = 0; i < m->vertex_count; i++) {
         const float *p = m->positions + 3 * i;
-        print(s, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
-        for (size_t k = 0; k < 3 && m->colors; k++) print(s, " %.4g", m->colors[4 * i + k] / 255.0);
-        put(s, "\n", 1);
+        sink_print(s, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
+        for (size_t k = 0; k < 3 && m->colors; k++)
+            sink_print(s, " %.4g", m->colors[4 * i + k] / 255.0);
+        sink_put(s, "\n", 1);
     }
     for (size_t i = 0; i < uvs->count; i++) {
         const float *uv = m->uvs + 2 * (size_t)uvs->first[i];
-        print(s, "vt %.9g %.9g\n", (double)uv[0], (double)turn_v(uv[1]));
+        sink_print(s, "vt %.9g %.9g\n", (double)uv[0], (double)turn_v(uv[1]));
     }
     for (size_t i = 0; i < normal_count; i++) {
         const float *n = normals->index ? m->corner_normals + 3 * (size_t)normals->first[i]
                                         : m->normals + 3 * i;
-        print(s, "vn %.6g %.6g %.6g\n", (double)n[0], (double)n[1], (double)n[2]);
+        sink_print(s, "vn %.6g %.6g %.6g\n", (double)n[0], (double)n[1], (double)n[2]);
     }
 }
 
@@ -1176,17 +1187,16 @@ static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_c
     }
     const int has_normals = m->normals || m->corner_normals;
     const size_t normal_count = normals.index ? normals.count : m->normals ? m->vertex_count : 0;
-    if (scene->part_count) print(s, "o %.60s\n", part->material->name);
+    if (scene->part_count) sink_print(s, "o %.60s\n", part->material->name);
     print_obj_vertices(s, m, &uvs, &normals, normal_count);
-    if (scene->library) print(s, "usemtl %.60s\n", part->material->name);
+    if (scene->library) sink_print(s, "usemtl %.60s\n", part->material->name);
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
         const size_t v = m->indices[c] + 1;
-        print(s, "%s%lu", c % 3 ? " " : "f ", (unsigned long)(counts->vertices + v));
-        if (uvs.index) print(s, "/%lu", (unsigned long)(counts->uvs + uvs.index[c] + 1));
-        if (has_normals)
-            print(s, uvs.index ? "/%lu" : "//%lu",
-                  (unsigned long)(counts->normals + (normals.index ? normals.index[c] + 1 : v)));
-        if (c % 3 == 2) put(s, "\n", 1);
+        sink_print(s, "%s%lu", c % 3 ? " " : "f ", (unsigned long)(counts->vertices + v));
+        if (uvs.index) sink_print(s, "/%lu", (unsigned long)(counts->uvs + uvs.index[c] + 1));
+        const size_t normal = counts->normals + (normals.index ? normals.index[c] + 1 : v);
+        if (has_normals) sink_print(s, uvs.index ? "/%lu" : "//%lu", (unsigned long)normal);
+        if (c % 3 == 2) sink_put(s, "\n", 1);
     }
     counts->vertices += m->vertex_count;
     counts->uvs += uvs.count;
@@ -1196,15 +1206,15 @@ static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_c
     return 1;
 }
 
-static int encode_obj(const mesh_scene *scene, sink *s) {
+static int mesh_write_obj(const mesh_scene *scene, sink *s) {
     obj_counts counts = {0, 0, 0};
     mesh_material own;
     if (scene->library) {
-        print(s, "mtllib ");
+        sink_print(s, "mtllib ");
         print_name(s, scene->library);
     }
-    for (int i = 0; i < part_count(scene); i++) {
-        const mesh_part part = part_at(scene, i, &own);
+    for (int i = 0; i < scene_part_count(scene); i++) {
+        const mesh_part part = scene_part(scene, i, &own);
         if (!encode_obj_part(scene, &part, &counts, s)) return 0;
     }
     return 1;
@@ -1212,50 +1222,51 @@ static int encode_obj(const mesh_scene *scene, sink *s) {
 
 int mesh_encode_mtl(const mesh_scene *scene, unsigned char **bytes, size_t *size,
                     const char **why) {
-    sink s = new_sink();
+    sink s = sink_new();
     mesh_material own;
-    for (int i = 0; i < part_count(scene); i++) {
-        const mesh_material *m = part_at(scene, i, &own).material;
-        print(&s, "newmtl %.60s\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n", m->name);
+    for (int i = 0; i < scene_part_count(scene); i++) {
+        const mesh_material *m = scene_part(scene, i, &own).material;
+        sink_print(&s, "newmtl %.60s\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n", m->name);
         if (!m->texture) continue;
-        print(&s, "map_Kd ");
+        sink_print(&s, "map_Kd ");
         print_name(&s, m->texture);
         if (!m->is_cut_out) continue;
-        print(&s, "map_d ");
+        sink_print(&s, "map_d ");
         print_name(&s, m->texture);
     }
-    return finish_sink(&s, bytes, size, why);
+    return sink_finish(&s, bytes, size, why);
 }
 
 /* ---- writing: PLY --------------------------------------------------------------------------- */
 
-static int encode_ply(const mesh_data *m, sink *s) {
+static int mesh_write_ply(const mesh_data *m, sink *s) {
     flat_mesh f;
     if (!flat_make(m, 0, &f)) return 0;
-    print(s, "ply\nformat binary_little_endian 1.0\nelement vertex %lu\n", (unsigned long)f.count);
-    print(s, "property float x\nproperty float y\nproperty float z\n");
-    if (m->normals) print(s, "property float nx\nproperty float ny\nproperty float nz\n");
+    sink_print(s, "ply\nformat binary_little_endian 1.0\nelement vertex %lu\n",
+               (unsigned long)f.count);
+    sink_print(s, "property float x\nproperty float y\nproperty float z\n");
+    if (m->normals) sink_print(s, "property float nx\nproperty float ny\nproperty float nz\n");
     if (m->colors)
-        print(s, "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                 "property uchar alpha\n");
-    if (m->uvs) print(s, "property float s\nproperty float t\n");
+        sink_print(s, "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                      "property uchar alpha\n");
+    if (m->uvs) sink_print(s, "property float s\nproperty float t\n");
     if (m->triangle_count)
-        print(s, "element face %lu\nproperty list uchar int vertex_indices\n",
-              (unsigned long)m->triangle_count);
-    print(s, "end_header\n");
+        sink_print(s, "element face %lu\nproperty list uchar int vertex_indices\n",
+                   (unsigned long)m->triangle_count);
+    sink_print(s, "end_header\n");
     for (size_t i = 0; i < f.count; i++) {
         const size_t v = flat_vertex(&f, i);
-        put_floats(s, m->positions + 3 * v, 3);
-        if (m->normals) put_floats(s, m->normals + 3 * v, 3);
-        if (m->colors) put(s, m->colors + 4 * v, 4);
+        sink_floats(s, m->positions + 3 * v, 3);
+        if (m->normals) sink_floats(s, m->normals + 3 * v, 3);
+        if (m->colors) sink_put(s, m->colors + 4 * v, 4);
         if (m->uvs) {
             const float uv[2] = {flat_uv(&f, i)[0], turn_v(flat_uv(&f, i)[1])};
-            put_floats(s, uv, 2);
+            sink_floats(s, uv, 2);
         }
     }
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
-        if (c % 3 == 0) put(s, "\3", 1);
-        put_u32(s, flat_index(&f, c));
+        if (c % 3 == 0) sink_put(s, "\3", 1);
+        sink_u32(s, flat_index(&f, c));
     }
     split_free(&f.split);
     return 1;
@@ -1281,18 +1292,18 @@ typedef struct glb {
 static int glb_view(glb *g, size_t start, int target) {
     sink *s = &g->views;
     const size_t length = g->binary.bytes.count - start;
-    print(s, "%s{\"buffer\":0,\"byteOffset\":%lu,\"byteLength\":%lu", g->view_count ? "," : "",
-          (unsigned long)start, (unsigned long)length);
-    if (target) print(s, ",\"target\":%d", target);
-    print(s, "}");
-    while (g->binary.bytes.count % 4 && !g->binary.failed) put(&g->binary, "\0", 1);
+    sink_print(s, "%s{\"buffer\":0,\"byteOffset\":%lu,\"byteLength\":%lu", g->view_count ? "," : "",
+               (unsigned long)start, (unsigned long)length);
+    if (target) sink_print(s, ",\"target\":%d", target);
+    sink_print(s, "}");
+    while (g->binary.bytes.count % 4 && !g->binary.failed) sink_put(&g->binary, "\0", 1);
     return g->view_count++;
 }
 
 static void print_list(sink *s, const char *name, const float *values, int count) {
-    print(s, ",\"%s\":[", name);
-    for (int i = 0; i < count; i++) print(s, "%s%.9g", i ? "," : "", (double)values[i]);
-    print(s, "]");
+    sink_print(s, ",\"%s\":[", name);
+    for (int i = 0; i < count; i++) sink_print(s, "%s%.9g", i ? "," : "", (double)values[i]);
+    sink_print(s, "]");
 }
 
 /* Close a view and describe what lies in it. bounds: minima and maxima of a SCALAR or VEC3, or NULL.
@@ -1301,14 +1312,15 @@ static int glb_accessor(glb *g, size_t start, int target, int component, size_t 
                         const char *type, const float *bounds) {
     sink *s = &g->accessors;
     const int view = glb_view(g, start, target), width = type[0] == 'S' ? 1 : 3;
-    print(s, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%lu,\"type\":\"%s\"",
-          g->accessor_count ? "," : "", view, component & ~NORMALIZED, (unsigned long)count, type);
-    if (component & NORMALIZED) print(s, ",\"normalized\":true");
+    sink_print(s, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%lu,\"type\":\"%s\"",
+               g->accessor_count ? "," : "", view, component & ~NORMALIZED, (unsigned long)count,
+               type);
+    if (component & NORMALIZED) sink_print(s, ",\"normalized\":true");
     if (bounds) {
         print_list(s, "min", bounds, width);
         print_list(s, "max", bounds + width, width);
     }
-    print(s, "}");
+    sink_print(s, "}");
     return g->accessor_count++;
 }
 
@@ -1331,16 +1343,16 @@ static void put_normal(sink *s, const float *n) {
         unit[1] = (float)(y / length);
         unit[2] = (float)(z / length);
     }
-    put_floats(s, unit, 3);
+    sink_floats(s, unit, 3);
 }
 
 /* sRGB to linear, in 16 bits lest dark colors run together. */
 static void put_color(sink *s, const unsigned char *c) {
     for (int k = 0; k < 3; k++) {
         const float linear = txm_srgb_to_linear((float)c[k] / 255.0f);
-        put_u16(s, (uint32_t)(txm_clampf(linear, 0, 1) * 65535.0f + 0.5f));
+        sink_u16(s, (uint32_t)(txm_clampf(linear, 0, 1) * 65535.0f + 0.5f));
     }
-    put_u16(s, (uint32_t)c[3] * 257);
+    sink_u16(s, (uint32_t)c[3] * 257);
 }
 
 /* Joints and weights. The rounded weights of a vertex need not sum up to 1: the largest takes up the
@@ -1350,10 +1362,10 @@ static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
     size_t start = bin->bytes.count;
     for (size_t i = 0; i < f->count; i++) {
         const size_t v = 4 * flat_vertex(f, i);
-        for (size_t k = 0; k < 4; k++) put_u16(bin, m->weights[v + k] > 0 ? m->joints[v + k] : 0);
+        for (size_t k = 0; k < 4; k++) sink_u16(bin, m->weights[v + k] > 0 ? m->joints[v + k] : 0);
     }
-    print(s, ",\"JOINTS_0\":%d",
-          glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT, f->count, "VEC4", NULL));
+    sink_print(s, ",\"JOINTS_0\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT, f->count, "VEC4", NULL));
     start = bin->bytes.count;
     for (size_t i = 0; i < f->count; i++) {
         const float *w = m->weights + 4 * flat_vertex(f, i);
@@ -1364,10 +1376,10 @@ static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
         unit[largest] = 1;
         for (int k = 0; k < 4; k++)
             if (k != largest) unit[largest] -= unit[k];
-        put_floats(bin, unit, 4);
+        sink_floats(bin, unit, 4);
     }
-    print(s, ",\"WEIGHTS_0\":%d",
-          glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f->count, "VEC4", NULL));
+    sink_print(s, ",\"WEIGHTS_0\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f->count, "VEC4", NULL));
 }
 
 /* A primitive of the mesh that is being written. */
@@ -1384,58 +1396,58 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
             if (i == 0 || p[k] < bounds[k]) bounds[k] = p[k];
             if (i == 0 || p[k] > bounds[3 + k]) bounds[3 + k] = p[k];
         }
-        put_floats(bin, p, 3);
+        sink_floats(bin, p, 3);
     }
-    print(s, "{\"attributes\":{\"POSITION\":%d",
-          glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
+    sink_print(s, "{\"attributes\":{\"POSITION\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
     if (m->normals || m->corner_normals) {
         start = bin->bytes.count;
         for (size_t i = 0; i < f.count; i++)
             put_normal(bin, m->corner_normals ? m->corner_normals + 3 * (size_t)f.split.first[i]
                                               : m->normals + 3 * flat_vertex(&f, i));
-        print(s, ",\"NORMAL\":%d",
-              glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", NULL));
+        sink_print(s, ",\"NORMAL\":%d",
+                   glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", NULL));
     }
     if (m->uvs) {
         start = bin->bytes.count;
-        for (size_t i = 0; i < f.count; i++) put_floats(bin, flat_uv(&f, i), 2);
-        print(s, ",\"TEXCOORD_0\":%d",
-              glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
+        for (size_t i = 0; i < f.count; i++) sink_floats(bin, flat_uv(&f, i), 2);
+        sink_print(s, ",\"TEXCOORD_0\":%d",
+                   glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
     }
     if (m->colors) {
         start = bin->bytes.count;
         for (size_t i = 0; i < f.count; i++) put_color(bin, m->colors + 4 * flat_vertex(&f, i));
-        print(s, ",\"COLOR_0\":%d",
-              glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT | NORMALIZED, f.count, "VEC4",
-                           NULL));
+        sink_print(s, ",\"COLOR_0\":%d",
+                   glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT | NORMALIZED, f.count, "VEC4",
+                                NULL));
     }
     if (m->joints) glb_weights(g, m, &f);
     start = bin->bytes.count;
     const int is_short = f.count < 65535; /* 65535 itself is not an index */
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
-        if (is_short) put_u16(bin, flat_index(&f, c));
-        else put_u32(bin, flat_index(&f, c));
+        if (is_short) sink_u16(bin, flat_index(&f, c));
+        else sink_u32(bin, flat_index(&f, c));
     }
-    print(s, "},\"indices\":%d,\"material\":%d}",
-          glb_accessor(g, start, GL_ELEMENTS, is_short ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT,
-                       3 * m->triangle_count, "SCALAR", NULL),
-          glb_material(g, material));
+    sink_print(s, "},\"indices\":%d,\"material\":%d}",
+               glb_accessor(g, start, GL_ELEMENTS, is_short ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT,
+                            3 * m->triangle_count, "SCALAR", NULL),
+               glb_material(g, material));
     split_free(&f.split);
     return 1;
 }
 
 static void glb_open_mesh(glb *g) {
-    print(&g->meshes, "%s{\"primitives\":[", g->mesh_count++ ? "," : "");
+    sink_print(&g->meshes, "%s{\"primitives\":[", g->mesh_count++ ? "," : "");
 }
 
 static void glb_close_mesh(glb *g) {
-    print(&g->meshes, "]}");
+    sink_print(&g->meshes, "]}");
 }
 
 /* Begin a node; what follows is more of its fields and the closing brace. */
 static void glb_node(glb *g, const char *name) {
-    print(&g->nodes, "%s{", g->node_count++ ? "," : "");
-    if (name) print(&g->nodes, "\"name\":\"%.60s\",", name);
+    sink_print(&g->nodes, "%s{", g->node_count++ ? "," : "");
+    if (name) sink_print(&g->nodes, "\"name\":\"%.60s\",", name);
 }
 
 /* A node with copies of a mesh of their own. */
@@ -1452,14 +1464,14 @@ static int glb_instances(glb *g, const mesh_instances *t) {
     if (!glb_primitive(g, t->mesh, t->material)) return 0;
     glb_close_mesh(g);
     glb_node(g, t->name);
-    print(s, "\"mesh\":%d,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{",
-          g->mesh_count - 1);
+    sink_print(s, "\"mesh\":%d,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{",
+               g->mesh_count - 1);
     for (int k = 0, written = 0; k < 3; k++) {
         if (!lists[k].values) continue;
         const size_t start = bin->bytes.count;
-        put_floats(bin, lists[k].values, lists[k].count * t->count);
-        print(s, "%s\"%s\":%d", written++ ? "," : "", lists[k].name,
-              glb_accessor(g, start, 0, GL_FLOAT, t->count, lists[k].type, NULL));
+        sink_floats(bin, lists[k].values, lists[k].count * t->count);
+        sink_print(s, "%s\"%s\":%d", written++ ? "," : "", lists[k].name,
+                   glb_accessor(g, start, 0, GL_FLOAT, t->count, lists[k].type, NULL));
     }
     if (t->colors) { /* three floats: what viewers that know it at all can read */
         const size_t start = bin->bytes.count;
@@ -1467,11 +1479,12 @@ static int glb_instances(glb *g, const mesh_instances *t) {
             float linear[3];
             for (size_t k = 0; k < 3; k++)
                 linear[k] = txm_srgb_to_linear((float)t->colors[4 * i + k] / 255.0f);
-            put_floats(bin, linear, 3);
+            sink_floats(bin, linear, 3);
         }
-        print(s, ",\"_COLOR_0\":%d", glb_accessor(g, start, 0, GL_FLOAT, t->count, "VEC3", NULL));
+        sink_print(s, ",\"_COLOR_0\":%d",
+                   glb_accessor(g, start, 0, GL_FLOAT, t->count, "VEC3", NULL));
     }
-    print(s, "}}}}");
+    sink_print(s, "}}}}");
     return 1;
 }
 
@@ -1491,15 +1504,15 @@ static int glb_joints(glb *g, const mesh_skeleton *k) {
         const mesh_joint *j = &k->joints[i];
         glb_node(g, j->name);
         if (child[i] >= 0) {
-            print(s, "\"children\":[");
+            sink_print(s, "\"children\":[");
             for (int c = child[i]; c >= 0; c = sibling[c])
-                print(s, "%s%d", c == child[i] ? "" : ",", first + c);
-            print(s, "],");
+                sink_print(s, "%s%d", c == child[i] ? "" : ",", first + c);
+            sink_print(s, "],");
         }
-        print(s, "\"translation\":[%.9g,%.9g,%.9g]", (double)j->translation[0],
-              (double)j->translation[1], (double)j->translation[2]);
+        sink_print(s, "\"translation\":[%.9g,%.9g,%.9g]", (double)j->translation[0],
+                   (double)j->translation[1], (double)j->translation[2]);
         print_list(s, "rotation", j->rotation, 4);
-        print(s, "}");
+        sink_print(s, "}");
     }
     free(child);
     return 1;
@@ -1509,29 +1522,29 @@ static int glb_joints(glb *g, const mesh_skeleton *k) {
 static void glb_skin(glb *g, const mesh_skeleton *k, int first) {
     sink *s = &g->more, *bin = &g->binary;
     size_t start = bin->bytes.count;
-    for (int i = 0; i < k->joint_count; i++) put_floats(bin, k->joints[i].bind, 16);
-    print(s, ",\"skins\":[{\"skeleton\":%d,\"inverseBindMatrices\":%d,\"joints\":[", first,
-          glb_accessor(g, start, 0, GL_FLOAT, (size_t)k->joint_count, "MAT4", NULL));
-    for (int i = 0; i < k->joint_count; i++) print(s, "%s%d", i ? "," : "", first + i);
-    print(s, "]}]");
+    for (int i = 0; i < k->joint_count; i++) sink_floats(bin, k->joints[i].bind, 16);
+    sink_print(s, ",\"skins\":[{\"skeleton\":%d,\"inverseBindMatrices\":%d,\"joints\":[", first,
+               glb_accessor(g, start, 0, GL_FLOAT, (size_t)k->joint_count, "MAT4", NULL));
+    for (int i = 0; i < k->joint_count; i++) sink_print(s, "%s%d", i ? "," : "", first + i);
+    sink_print(s, "]}]");
     if (k->key_count == 0) return;
     const size_t keys = (size_t)k->key_count;
     const float bounds[2] = {k->times[0], k->times[keys - 1]};
     start = bin->bytes.count;
-    put_floats(bin, k->times, keys);
+    sink_floats(bin, k->times, keys);
     const int times = glb_accessor(g, start, 0, GL_FLOAT, keys, "SCALAR", bounds);
-    print(s, ",\"animations\":[{\"name\":\"%.60s\",\"samplers\":[", k->clip);
+    sink_print(s, ",\"animations\":[{\"name\":\"%.60s\",\"samplers\":[", k->clip);
     for (int i = 0; i < k->joint_count; i++) {
         start = bin->bytes.count;
-        put_floats(bin, k->turns + 4 * keys * (size_t)i, 4 * keys);
-        print(s, "%s{\"input\":%d,\"output\":%d}", i ? "," : "", times,
-              glb_accessor(g, start, 0, GL_FLOAT, keys, "VEC4", NULL));
+        sink_floats(bin, k->turns + 4 * keys * (size_t)i, 4 * keys);
+        sink_print(s, "%s{\"input\":%d,\"output\":%d}", i ? "," : "", times,
+                   glb_accessor(g, start, 0, GL_FLOAT, keys, "VEC4", NULL));
     }
-    print(s, "],\"channels\":[");
+    sink_print(s, "],\"channels\":[");
     for (int i = 0; i < k->joint_count; i++)
-        print(s, "%s{\"sampler\":%d,\"target\":{\"node\":%d,\"path\":\"rotation\"}}",
-              i ? "," : "", i, first + i);
-    print(s, "]}]");
+        sink_print(s, "%s{\"sampler\":%d,\"target\":{\"node\":%d,\"path\":\"rotation\"}}",
+                   i ? "," : "", i, first + i);
+    sink_print(s, "]}]");
 }
 
 /* A file name as a URI in a JSON string. */
@@ -1540,8 +1553,8 @@ static void print_uri(sink *s, const char *name) {
         const unsigned char c = (unsigned char)*name;
         const int is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
                              (c >= '0' && c <= '9') || strchr("/._-~", c) != NULL;
-        if (is_plain) put(s, name, 1);
-        else print(s, "%%%02X", c);
+        if (is_plain) sink_put(s, name, 1);
+        else sink_print(s, "%%%02X", c);
     }
 }
 
@@ -1550,7 +1563,7 @@ static void print_uri(sink *s, const char *name) {
 static void put_png(sink *s, const unsigned char *png, size_t size) {
     static const char *const kept[] = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"};
     size_t at = 8;
-    put(s, png, size < at ? size : at);
+    sink_put(s, png, size < at ? size : at);
     while (at < size) {
         const unsigned char *p = png + at;
         size_t n = size - at;
@@ -1564,87 +1577,88 @@ static void put_png(sink *s, const unsigned char *png, size_t size) {
                 for (int k = 0; k < 5; k++) keep |= !memcmp(p + 4, kept[k], 4);
             }
         }
-        if (keep) put(s, p, n);
+        if (keep) sink_put(s, p, n);
         at += n;
     }
 }
 
 static void append(sink *to, const sink *from) {
-    put(to, from->bytes.items, from->bytes.count);
+    sink_put(to, from->bytes.items, from->bytes.count);
     to->failed |= from->failed;
 }
 
 static void print_materials(glb *g, sink *json) {
     int textures = 0;
-    print(json, ",\"materials\":[");
+    sink_print(json, ",\"materials\":[");
     for (int i = 0; i < g->material_count; i++) {
         const mesh_material *m = g->materials[i];
-        print(json, "%s{", i ? "," : "");
-        if (m && m->name) print(json, "\"name\":\"%.60s\",", m->name);
-        print(json, "\"pbrMetallicRoughness\":{");
+        sink_print(json, "%s{", i ? "," : "");
+        if (m && m->name) sink_print(json, "\"name\":\"%.60s\",", m->name);
+        sink_print(json, "\"pbrMetallicRoughness\":{");
         if (m && (m->png || m->texture))
-            print(json, "\"baseColorTexture\":{\"index\":%d},", textures++);
-        print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}");
-        if (m && m->is_cut_out) print(json, ",\"alphaMode\":\"MASK\",\"doubleSided\":true");
-        print(json, "}");
+            sink_print(json, "\"baseColorTexture\":{\"index\":%d},", textures++);
+        sink_print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}");
+        if (m && m->is_cut_out) sink_print(json, ",\"alphaMode\":\"MASK\",\"doubleSided\":true");
+        sink_print(json, "}");
     }
-    print(json, "]");
+    sink_print(json, "]");
     if (!textures) return;
-    print(json, ",\"textures\":[");
+    sink_print(json, ",\"textures\":[");
     for (int i = 0; i < textures; i++)
-        print(json, "%s{\"sampler\":%d,\"source\":%d}", i ? "," : "", i, i);
-    print(json, "],\"samplers\":[");
+        sink_print(json, "%s{\"sampler\":%d,\"source\":%d}", i ? "," : "", i, i);
+    sink_print(json, "],\"samplers\":[");
     for (int i = 0, written = 0; i < g->material_count; i++) {
         const mesh_material *m = g->materials[i];
         if (!m || !(m->png || m->texture)) continue;
-        print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":33071}",
-              written++ ? "," : "", m->repeats ? 10497 : 33071);
+        sink_print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":33071}",
+                   written++ ? "," : "", m->repeats ? 10497 : 33071);
     }
-    print(json, "],\"images\":[");
+    sink_print(json, "],\"images\":[");
     for (int i = 0, written = 0; i < g->material_count; i++) {
         const mesh_material *m = g->materials[i];
         if (!m || !(m->png || m->texture)) continue;
-        print(json, "%s{", written++ ? "," : "");
+        sink_print(json, "%s{", written++ ? "," : "");
         if (m->png) {
             const size_t start = g->binary.bytes.count;
             put_png(&g->binary, m->png, m->png_size);
-            print(json, "\"bufferView\":%d,\"mimeType\":\"image/png\"}", glb_view(g, start, 0));
+            sink_print(json, "\"bufferView\":%d,\"mimeType\":\"image/png\"}",
+                       glb_view(g, start, 0));
         } else {
-            print(json, "\"uri\":\"");
+            sink_print(json, "\"uri\":\"");
             print_uri(json, m->texture);
-            print(json, "\"}");
+            sink_print(json, "\"}");
         }
     }
-    print(json, "]");
+    sink_print(json, "]");
 }
 
 /* joint: node of the skeleton's root, or 0 */
 static void print_document(glb *g, const mesh_scene *scene, int instanced, int joint, sink *json) {
     const int roots = joint ? joint + 1 : g->node_count;
-    print(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"texkit\"},\"scene\":0");
+    sink_print(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"texkit\"},\"scene\":0");
     if (instanced)
-        print(json, ",\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],"
-                    "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"]");
-    print(json, ",\"scenes\":[{\"nodes\":[");
-    for (int i = 0; i < roots; i++) print(json, "%s%d", i ? "," : "", i);
-    print(json, "]");
+        sink_print(json, ",\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],"
+                         "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"]");
+    sink_print(json, ",\"scenes\":[{\"nodes\":[");
+    for (int i = 0; i < roots; i++) sink_print(json, "%s%d", i ? "," : "", i);
+    sink_print(json, "]");
     if (scene->extras) {
-        print(json, ",\"extras\":");
-        put(json, scene->extras, strlen(scene->extras));
+        sink_print(json, ",\"extras\":");
+        sink_put(json, scene->extras, strlen(scene->extras));
     }
-    print(json, "}],\"nodes\":[");
+    sink_print(json, "}],\"nodes\":[");
     append(json, &g->nodes);
-    print(json, "],\"meshes\":[");
+    sink_print(json, "],\"meshes\":[");
     append(json, &g->meshes);
-    print(json, "]");
+    sink_print(json, "]");
     append(json, &g->more);
     print_materials(g, json);
-    print(json, ",\"accessors\":[");
+    sink_print(json, ",\"accessors\":[");
     append(json, &g->accessors);
-    print(json, "],\"bufferViews\":[");
+    sink_print(json, "],\"bufferViews\":[");
     append(json, &g->views);
-    print(json, "],\"buffers\":[{\"byteLength\":%lu}]}", (unsigned long)g->binary.bytes.count);
-    while (json->bytes.count % 4 && !json->failed) put(json, " ", 1);
+    sink_print(json, "],\"buffers\":[{\"byteLength\":%lu}]}", (unsigned long)g->binary.bytes.count);
+    while (json->bytes.count % 4 && !json->failed) sink_put(json, " ", 1);
 }
 
 /* All surfaces as one mesh, instances, joints: nodes in this order. Returns the first joint's node,
@@ -1652,16 +1666,16 @@ static void print_document(glb *g, const mesh_scene *scene, int instanced, int j
 static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
     const mesh_skeleton *k = scene->skeleton;
     int joint = 0;
-    for (int i = 0; i < part_count(scene); i++) {
-        const mesh_part part = part_at(scene, i, own);
+    for (int i = 0; i < scene_part_count(scene); i++) {
+        const mesh_part part = scene_part(scene, i, own);
         if (i == 0) glb_open_mesh(g);
-        else print(&g->meshes, ",");
+        else sink_print(&g->meshes, ",");
         if (!glb_primitive(g, part.mesh, part.material)) return -1;
     }
-    if (part_count(scene)) {
+    if (scene_part_count(scene)) {
         glb_close_mesh(g);
         glb_node(g, k ? k->name : NULL);
-        print(&g->nodes, k ? "\"mesh\":0,\"skin\":0}" : "\"mesh\":0}");
+        sink_print(&g->nodes, k ? "\"mesh\":0,\"skin\":0}" : "\"mesh\":0}");
     }
     for (int i = 0; i < scene->instance_count; i++) {
         if (scene->instances[i].count && !glb_instances(g, &scene->instances[i])) return -1;
@@ -1674,27 +1688,27 @@ static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
     return joint;
 }
 
-static int encode_glb(const mesh_scene *scene, sink *s) {
+static int mesh_write_glb(const mesh_scene *scene, sink *s) {
     glb g;
     mesh_material own;
-    sink json = new_sink();
+    sink json = sink_new();
     int instanced = 0;
     memset(&g, 0, sizeof g);
-    g.binary = g.views = g.accessors = g.meshes = g.nodes = g.more = new_sink();
+    g.binary = g.views = g.accessors = g.meshes = g.nodes = g.more = sink_new();
     const int joint = glb_scene(&g, scene, &own);
     for (int i = 0; i < scene->instance_count; i++) instanced |= scene->instances[i].count > 0;
     if (joint >= 0) print_document(&g, scene, instanced, joint, &json);
     const int ok = joint >= 0 && g.binary.bytes.count <= 0x7fffffff; /* lengths are 32 bits */
     if (ok) {
         const size_t total = 12 + 8 + json.bytes.count + 8 + g.binary.bytes.count;
-        put(s, "glTF", 4);
-        put_u32(s, 2);
-        put_u32(s, (uint32_t)total);
-        put_u32(s, (uint32_t)json.bytes.count);
-        put(s, "JSON", 4);
+        sink_put(s, "glTF", 4);
+        sink_u32(s, 2);
+        sink_u32(s, (uint32_t)total);
+        sink_u32(s, (uint32_t)json.bytes.count);
+        sink_put(s, "JSON", 4);
         append(s, &json);
-        put_u32(s, (uint32_t)g.binary.bytes.count);
-        put(s, "BIN\0", 4);
+        sink_u32(s, (uint32_t)g.binary.bytes.count);
+        sink_put(s, "BIN\0", 4);
         append(s, &g.binary);
     }
     list_free(&json.bytes);
@@ -1717,17 +1731,18 @@ int mesh_can_write(const char *extension, const char **why) {
 
 int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
                 const char **why) {
-    sink s = new_sink();
+    sink s = sink_new();
     mesh_material own;
     const int is_glb = !strcmp(extension, ".glb");
     *bytes = NULL;
     if (!mesh_can_write(extension, why)) return 0;
-    if (!is_glb && !part_count(scene)) return *why = "there is no surface to write", 0;
-    const int ok = is_glb                        ? encode_glb(scene, &s)
-                   : !strcmp(extension, ".ply") ? encode_ply(part_at(scene, 0, &own).mesh, &s)
-                                                : encode_obj(scene, &s);
+    if (!is_glb && !scene_part_count(scene)) return *why = "there is no surface to write", 0;
+    int ok;
+    if (is_glb) ok = mesh_write_glb(scene, &s);
+    else if (!strcmp(extension, ".ply")) ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &s);
+    else ok = mesh_write_obj(scene, &s);
     if (!ok) s.failed = 1;
-    return finish_sink(&s, bytes, size, why);
+    return sink_finish(&s, bytes, size, why);
 }
 
 /* ---- normals and spheres ------------------------------------------------------------------- */
