@@ -23,7 +23,7 @@ unit() {
     source=tests/test_$1.c
     # shellcheck disable=SC2086 # flags are words
     if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests -Itools "$source" \
-        $(sed -n 's/^   Built with: \([a-z_./ ]*[a-z]\).*/\1/p' "$source") \
+        $(sed -n 's/^   Built with: \([a-z_./* ]*[a-z]\).*/\1/p' "$source") \
         -o "$OUT/test_$1" -lcmocka -lpthread -lm >"$OUT/$1.log" 2>&1; then
         "$OUT/test_$1" >>"$OUT/$1.log" 2>&1
         echo $? >"$OUT/$1.status"

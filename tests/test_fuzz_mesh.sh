@@ -66,10 +66,10 @@ end_header
 0.5 0.75 0 0 0.5 0 0.5
 END
 
-with="tools/files/mesh_io.c tools/files/image_io.c tools/files/stb.c"
+with="tools/files/*.c"
 runs=30000
 [ "$FULL" = 1 ] && runs=300000
-# shellcheck disable=SC2086 # flags and files are words
+# shellcheck disable=SC2086 # flags are words, files a pattern
 check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. -Itools \
     tests/fuzz/fuzz_mesh_decode.c $with -o "$OUT/fuzz_mesh" -lm &&
     check "$runs mutated meshes" "$OUT/fuzz_mesh" $runs "$tmp"/seeds/*

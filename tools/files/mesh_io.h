@@ -6,7 +6,7 @@
    fits behind "cannot read 'x.obj': "; the phrase may lie in the mesh's own message.
 
    Texture coordinates: in memory v runs downwards, as rows of pictures do, and as glTF and
-   textiles.h have it. In OBJ and PLY files v runs upwards. One function in mesh_io.c, turn_v,
+   textiles.h have it. In OBJ and PLY files v runs upwards. One function in mesh_file.h, turn_v,
    stands between the two, and nothing else converts.
 
    Colors: 8 bits as in pictures, that is sRGB; GLB, which has them linear, gets them so.         */

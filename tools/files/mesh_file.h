@@ -1,0 +1,176 @@
+/* mesh_file.h - what the readers and writers of mesh files share; users include mesh_io.h
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   A reader gathers in a builder what a file has, polygons included; builder_triangulate and
+   builder_finish make the mesh. A writer puts its bytes into a sink. mesh.c calls both.          */
+#ifndef MESH_FILE_H
+#define MESH_FILE_H
+
+#include "mesh_io.h"
+
+static const uint32_t NO_UV = 0xffffffffu;
+
+/* Rows of pictures run down, v in OBJ and PLY files runs up: from either to the other. */
+static inline float turn_v(float v) {
+    return 1 - v;
+}
+
+/* ---- lists that grow: mesh_bytes.c ------------------------------------------------------- */
+
+typedef struct list {
+    void *items;
+    size_t count, capacity, size; /* size: bytes of an item */
+} list;
+
+list list_of(size_t size);
+
+/* Room for exactly so many items in all, or more. */
+int list_reserve(list *l, size_t capacity);
+
+/* Room for more items at the end, to be filled; NULL if there is no memory. */
+void *list_add(list *l, size_t more);
+
+void list_free(list *l);
+
+/* ---- what a reader has gathered: mesh_build.c -------------------------------------------- */
+
+typedef struct corner {
+    uint32_t vertex, uv; /* uv: into the list of texture coordinates, or NO_UV */
+} corner;
+
+typedef struct polygon {
+    size_t first, count, line; /* its corners; line of the file */
+} polygon;
+
+typedef struct builder {
+    list positions, normals, rotations, colors, uvs; /* 3, 3, 4 floats, 4 bytes, 2 floats */
+    list corners, polygons;                          /* as they stand in the file         */
+    list triangles;                                  /* 3 corners each                    */
+    list flat, around;                               /* scratch of triangulate            */
+    mesh_data *mesh;
+    const char **why;
+} builder;
+
+void builder_init(builder *b, mesh_data *mesh, const char **why);
+void builder_free(builder *b);
+
+/* Say what is wrong, after "line 12: " if the line is not 0. Returns 0. */
+int builder_fail(const builder *b, size_t line, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__((format(printf, 3, 4)))
+#endif
+    ;
+
+int builder_fail_memory(const builder *b);
+
+/* Check what the polygons refer to, now that all of the file is known, and make triangles. */
+int builder_triangulate(builder *b);
+
+/* The lists as a mesh. */
+int builder_finish(builder *b);
+
+/* ---- text: mesh_text.c ------------------------------------------------------------------- */
+
+typedef struct text {
+    const char *at, *end;
+    size_t line; /* from 1 */
+} text;
+
+static inline int is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+}
+
+static inline int is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+
+/* To the next word of this line; a backslash at the end of a line joins the next one on. */
+void text_skip_blanks(text *in);
+
+/* To the beginning of the next line. */
+void text_skip_line(text *in);
+
+/* To the next word, on whichever line. */
+void text_skip_space(text *in);
+
+int text_at_word_end(const char *p, const char *end);
+
+/* The number that begins here, correctly rounded to double; 0: there is none. */
+int text_number(text *in, double *value);
+
+/* The same for a number that must be finite as a float. */
+int text_to_float(double value, float *to);
+
+/* ---- a file in the making: mesh_bytes.c -------------------------------------------------- */
+
+/* A file in the making; a failed allocation is seen at the end. */
+typedef struct sink {
+    list bytes;
+    int failed;
+} sink;
+
+sink sink_new(void);
+void sink_put(sink *s, const void *bytes, size_t n);
+
+/* Text; formatted numbers and our own words, at most 200 characters. */
+void sink_print(sink *s, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__((format(printf, 2, 3)))
+#endif
+    ;
+
+/* Little-endian numbers. */
+void sink_u16(sink *s, uint32_t v);
+void sink_u32(sink *s, uint32_t v);
+void sink_floats(sink *s, const float *v, size_t n);
+
+/* Its bytes for free(). */
+int sink_finish(sink *s, unsigned char **bytes, size_t *size, const char **why);
+
+/* ---- equal corners share a vertex: mesh_corners.c ---------------------------------------- */
+
+/* What makes corners differ. */
+enum { BY_VERTEX = 1, BY_UV = 2, BY_NORMAL = 4 };
+
+/* Of each corner, which of the distinct ones it is; and of each distinct one a corner that has it. */
+typedef struct split {
+    uint32_t *index; /* 1 per corner            */
+    uint32_t *first; /* 1 per distinct corner   */
+    size_t count;    /* of distinct corners     */
+} split;
+
+void split_free(split *s);
+
+/* 0: no memory */
+int split_corners(const mesh_data *m, int by, split *s);
+
+/* A mesh as PLY and GLB have it: all is per vertex. Where nothing is per corner it is the mesh itself;
+   else vertices are doubled as need be, and unused ones left out. */
+typedef struct flat_mesh {
+    const mesh_data *mesh;
+    split split;
+    size_t count; /* of vertices */
+} flat_mesh;
+
+int flat_make(const mesh_data *m, int with_corner_normals, flat_mesh *f);
+size_t flat_vertex(const flat_mesh *f, size_t i);
+const float *flat_uv(const flat_mesh *f, size_t i);
+uint32_t flat_index(const flat_mesh *f, size_t corner_index);
+
+/* ---- what a scene holds: mesh.c ---------------------------------------------------------- */
+
+/* The surface is a part as well, the first. */
+int scene_part_count(const mesh_scene *scene);
+
+/* Its material, if it is the surface, is made in *own. */
+mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own);
+
+/* ---- the formats ------------------------------------------------------------------------- */
+
+int mesh_read_obj(builder *b, text *in);                  /* mesh_obj.c */
+int mesh_read_ply(builder *b, text *in, int points_too);  /* mesh_ply.c */
+int mesh_write_obj(const mesh_scene *scene, sink *s);
+int mesh_write_ply(const mesh_data *m, sink *s);
+int mesh_write_glb(const mesh_scene *scene, sink *s);     /* mesh_glb.c */
+
+#endif /* MESH_FILE_H */

@@ -1,0 +1,450 @@
+/* mesh_glb.c - GLB files: glTF 2.0 in one piece
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "mesh_file.h"
+
+enum { GL_UNSIGNED_SHORT = 5123, GL_UNSIGNED_INT = 5125, GL_FLOAT = 5126 };
+enum { NORMALIZED = 1 << 16 }; /* with a component type: 0..65535 means 0..1 */
+enum { GL_ARRAY = 34962, GL_ELEMENTS = 34963 };
+enum { MAX_MATERIALS = 64 };
+
+/* The parts of the document are written side by side and put together at the end. */
+typedef struct glb {
+    sink binary, views, accessors, meshes, nodes;
+    sink more; /* skins and animations, each after a comma */
+    int view_count, accessor_count, mesh_count, node_count;
+    const mesh_material *materials[MAX_MATERIALS]; /* NULL: plain white */
+    int material_count;
+} glb;
+
+/* The bytes since start become a view; target 0: none. Returns its number. */
+static int glb_view(glb *g, size_t start, int target) {
+    sink *s = &g->views;
+    const size_t length = g->binary.bytes.count - start;
+    sink_print(s, "%s{\"buffer\":0,\"byteOffset\":%lu,\"byteLength\":%lu", g->view_count ? "," : "",
+               (unsigned long)start, (unsigned long)length);
+    if (target) sink_print(s, ",\"target\":%d", target);
+    sink_print(s, "}");
+    while (g->binary.bytes.count % 4 && !g->binary.failed) sink_put(&g->binary, "\0", 1);
+    return g->view_count++;
+}
+
+static void print_list(sink *s, const char *name, const float *values, int count) {
+    sink_print(s, ",\"%s\":[", name);
+    for (int i = 0; i < count; i++) sink_print(s, "%s%.9g", i ? "," : "", (double)values[i]);
+    sink_print(s, "]");
+}
+
+/* Close a view and describe what lies in it. bounds: minima and maxima of a SCALAR or VEC3, or NULL.
+   Returns the accessor's number. */
+static int glb_accessor(glb *g, size_t start, int target, int component, size_t count,
+                        const char *type, const float *bounds) {
+    sink *s = &g->accessors;
+    const int view = glb_view(g, start, target), width = type[0] == 'S' ? 1 : 3;
+    sink_print(s, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%lu,\"type\":\"%s\"",
+               g->accessor_count ? "," : "", view, component & ~NORMALIZED, (unsigned long)count,
+               type);
+    if (component & NORMALIZED) sink_print(s, ",\"normalized\":true");
+    if (bounds) {
+        print_list(s, "min", bounds, width);
+        print_list(s, "max", bounds + width, width);
+    }
+    sink_print(s, "}");
+    return g->accessor_count++;
+}
+
+/* Its number among the materials of the document; past the last there is room for no more. */
+static int glb_material(glb *g, const mesh_material *material) {
+    int i = 0;
+    while (i < g->material_count && g->materials[i] != material) i++;
+    if (i == MAX_MATERIALS) return i - 1;
+    if (i == g->material_count) g->materials[g->material_count++] = material;
+    return i;
+}
+
+/* glTF wants unit normals, and finds fault with zero. */
+static void put_normal(sink *s, const float *n) {
+    const double x = (double)n[0], y = (double)n[1], z = (double)n[2];
+    const double length = sqrt(x * x + y * y + z * z);
+    float unit[3] = {0, 0, 1};
+    if (length > 1e-30) {
+        unit[0] = (float)(x / length);
+        unit[1] = (float)(y / length);
+        unit[2] = (float)(z / length);
+    }
+    sink_floats(s, unit, 3);
+}
+
+/* sRGB to linear, in 16 bits lest dark colors run together. */
+static void put_color(sink *s, const unsigned char *c) {
+    for (int k = 0; k < 3; k++) {
+        const float linear = txm_srgb_to_linear((float)c[k] / 255.0f);
+        sink_u16(s, (uint32_t)(txm_clampf(linear, 0, 1) * 65535.0f + 0.5f));
+    }
+    sink_u16(s, (uint32_t)c[3] * 257);
+}
+
+/* Joints and weights. The rounded weights of a vertex need not sum up to 1: the largest takes up the
+   rest. A joint without weight is joint 0, lest validators warn. */
+static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
+    sink *bin = &g->binary, *s = &g->meshes;
+    size_t start = bin->bytes.count;
+    for (size_t i = 0; i < f->count; i++) {
+        const size_t v = 4 * flat_vertex(f, i);
+        for (size_t k = 0; k < 4; k++) sink_u16(bin, m->weights[v + k] > 0 ? m->joints[v + k] : 0);
+    }
+    sink_print(s, ",\"JOINTS_0\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT, f->count, "VEC4", NULL));
+    start = bin->bytes.count;
+    for (size_t i = 0; i < f->count; i++) {
+        const float *w = m->weights + 4 * flat_vertex(f, i);
+        float unit[4] = {w[0], w[1], w[2], w[3]};
+        int largest = 0;
+        for (int k = 1; k < 4; k++)
+            if (w[k] > w[largest]) largest = k;
+        unit[largest] = 1;
+        for (int k = 0; k < 4; k++)
+            if (k != largest) unit[largest] -= unit[k];
+        sink_floats(bin, unit, 4);
+    }
+    sink_print(s, ",\"WEIGHTS_0\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f->count, "VEC4", NULL));
+}
+
+/* A primitive of the mesh that is being written. */
+static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *material) {
+    flat_mesh f;
+    sink *bin = &g->binary, *s = &g->meshes;
+    float bounds[6] = {0, 0, 0, 0, 0, 0};
+    size_t start = bin->bytes.count;
+    if (!flat_make(m, 1, &f)) return 0;
+
+    for (size_t i = 0; i < f.count; i++) {
+        const float *p = m->positions + 3 * flat_vertex(&f, i);
+        for (int k = 0; k < 3; k++) {
+            if (i == 0 || p[k] < bounds[k]) bounds[k] = p[k];
+            if (i == 0 || p[k] > bounds[3 + k]) bounds[3 + k] = p[k];
+        }
+        sink_floats(bin, p, 3);
+    }
+    sink_print(s, "{\"attributes\":{\"POSITION\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
+    if (m->normals || m->corner_normals) {
+        start = bin->bytes.count;
+        for (size_t i = 0; i < f.count; i++)
+            put_normal(bin, m->corner_normals ? m->corner_normals + 3 * (size_t)f.split.first[i]
+                                              : m->normals + 3 * flat_vertex(&f, i));
+        sink_print(s, ",\"NORMAL\":%d",
+                   glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", NULL));
+    }
+    if (m->uvs) {
+        start = bin->bytes.count;
+        for (size_t i = 0; i < f.count; i++) sink_floats(bin, flat_uv(&f, i), 2);
+        sink_print(s, ",\"TEXCOORD_0\":%d",
+                   glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
+    }
+    if (m->colors) {
+        start = bin->bytes.count;
+        for (size_t i = 0; i < f.count; i++) put_color(bin, m->colors + 4 * flat_vertex(&f, i));
+        sink_print(s, ",\"COLOR_0\":%d",
+                   glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT | NORMALIZED, f.count, "VEC4",
+                                NULL));
+    }
+    if (m->joints) glb_weights(g, m, &f);
+    start = bin->bytes.count;
+    const int is_short = f.count < 65535; /* 65535 itself is not an index */
+    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
+        if (is_short) sink_u16(bin, flat_index(&f, c));
+        else sink_u32(bin, flat_index(&f, c));
+    }
+    sink_print(s, "},\"indices\":%d,\"material\":%d}",
+               glb_accessor(g, start, GL_ELEMENTS, is_short ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT,
+                            3 * m->triangle_count, "SCALAR", NULL),
+               glb_material(g, material));
+    split_free(&f.split);
+    return 1;
+}
+
+static void glb_open_mesh(glb *g) {
+    sink_print(&g->meshes, "%s{\"primitives\":[", g->mesh_count++ ? "," : "");
+}
+
+static void glb_close_mesh(glb *g) {
+    sink_print(&g->meshes, "]}");
+}
+
+/* Begin a node; what follows is more of its fields and the closing brace. */
+static void glb_node(glb *g, const char *name) {
+    sink_print(&g->nodes, "%s{", g->node_count++ ? "," : "");
+    if (name) sink_print(&g->nodes, "\"name\":\"%.60s\",", name);
+}
+
+/* A node with copies of a mesh of their own. */
+static int glb_instances(glb *g, const mesh_instances *t) {
+    sink *s = &g->nodes, *bin = &g->binary;
+    const struct {
+        const char *name, *type;
+        const float *values;
+        size_t count;
+    } lists[] = {{"TRANSLATION", "VEC3", t->translations, 3},
+                 {"ROTATION", "VEC4", t->rotations, 4},
+                 {"SCALE", "VEC3", t->scales, 3}};
+    glb_open_mesh(g);
+    if (!glb_primitive(g, t->mesh, t->material)) return 0;
+    glb_close_mesh(g);
+    glb_node(g, t->name);
+    sink_print(s, "\"mesh\":%d,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{",
+               g->mesh_count - 1);
+    for (int k = 0, written = 0; k < 3; k++) {
+        if (!lists[k].values) continue;
+        const size_t start = bin->bytes.count;
+        sink_floats(bin, lists[k].values, lists[k].count * t->count);
+        sink_print(s, "%s\"%s\":%d", written++ ? "," : "", lists[k].name,
+                   glb_accessor(g, start, 0, GL_FLOAT, t->count, lists[k].type, NULL));
+    }
+    if (t->colors) { /* three floats: what viewers that know it at all can read */
+        const size_t start = bin->bytes.count;
+        for (size_t i = 0; i < t->count; i++) {
+            float linear[3];
+            for (size_t k = 0; k < 3; k++)
+                linear[k] = txm_srgb_to_linear((float)t->colors[4 * i + k] / 255.0f);
+            sink_floats(bin, linear, 3);
+        }
+        sink_print(s, ",\"_COLOR_0\":%d",
+                   glb_accessor(g, start, 0, GL_FLOAT, t->count, "VEC3", NULL));
+    }
+    sink_print(s, "}}}}");
+    return 1;
+}
+
+/* The joints as nodes from the next one on, with their children; 0: no memory. */
+static int glb_joints(glb *g, const mesh_skeleton *k) {
+    sink *s = &g->nodes;
+    const int n = k->joint_count, first = g->node_count;
+    int *child = (int *)malloc(2 * sizeof(int) * ((size_t)n + 1));
+    if (!child) return 0;
+    int *sibling = child + n;
+    for (int i = 0; i < n; i++) child[i] = sibling[i] = -1;
+    for (int i = n - 1; i > 0; i--) { /* backwards, so that the lists run forwards */
+        sibling[i] = child[k->joints[i].parent];
+        child[k->joints[i].parent] = i;
+    }
+    for (int i = 0; i < n; i++) {
+        const mesh_joint *j = &k->joints[i];
+        glb_node(g, j->name);
+        if (child[i] >= 0) {
+            sink_print(s, "\"children\":[");
+            for (int c = child[i]; c >= 0; c = sibling[c])
+                sink_print(s, "%s%d", c == child[i] ? "" : ",", first + c);
+            sink_print(s, "],");
+        }
+        sink_print(s, "\"translation\":[%.9g,%.9g,%.9g]", (double)j->translation[0],
+                   (double)j->translation[1], (double)j->translation[2]);
+        print_list(s, "rotation", j->rotation, 4);
+        sink_print(s, "}");
+    }
+    free(child);
+    return 1;
+}
+
+/* The skin, and the animation if there is one; first: node of joint 0. */
+static void glb_skin(glb *g, const mesh_skeleton *k, int first) {
+    sink *s = &g->more, *bin = &g->binary;
+    size_t start = bin->bytes.count;
+    for (int i = 0; i < k->joint_count; i++) sink_floats(bin, k->joints[i].bind, 16);
+    sink_print(s, ",\"skins\":[{\"skeleton\":%d,\"inverseBindMatrices\":%d,\"joints\":[", first,
+               glb_accessor(g, start, 0, GL_FLOAT, (size_t)k->joint_count, "MAT4", NULL));
+    for (int i = 0; i < k->joint_count; i++) sink_print(s, "%s%d", i ? "," : "", first + i);
+    sink_print(s, "]}]");
+    if (k->key_count == 0) return;
+    const size_t keys = (size_t)k->key_count;
+    const float bounds[2] = {k->times[0], k->times[keys - 1]};
+    start = bin->bytes.count;
+    sink_floats(bin, k->times, keys);
+    const int times = glb_accessor(g, start, 0, GL_FLOAT, keys, "SCALAR", bounds);
+    sink_print(s, ",\"animations\":[{\"name\":\"%.60s\",\"samplers\":[", k->clip);
+    for (int i = 0; i < k->joint_count; i++) {
+        start = bin->bytes.count;
+        sink_floats(bin, k->turns + 4 * keys * (size_t)i, 4 * keys);
+        sink_print(s, "%s{\"input\":%d,\"output\":%d}", i ? "," : "", times,
+                   glb_accessor(g, start, 0, GL_FLOAT, keys, "VEC4", NULL));
+    }
+    sink_print(s, "],\"channels\":[");
+    for (int i = 0; i < k->joint_count; i++)
+        sink_print(s, "%s{\"sampler\":%d,\"target\":{\"node\":%d,\"path\":\"rotation\"}}",
+                   i ? "," : "", i, first + i);
+    sink_print(s, "]}]");
+}
+
+/* A file name as a URI in a JSON string. */
+static void print_uri(sink *s, const char *name) {
+    for (; *name; name++) {
+        const unsigned char c = (unsigned char)*name;
+        const int is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                             (c >= '0' && c <= '9') || strchr("/._-~", c) != NULL;
+        if (is_plain) sink_put(s, name, 1);
+        else sink_print(s, "%%%02X", c);
+    }
+}
+
+/* A PNG with nothing but its pixels: glTF ignores what it says of color spaces and pixel shapes, and
+   a validator warns of that. What is no whole PNG stays as it is. */
+static void put_png(sink *s, const unsigned char *png, size_t size) {
+    static const char *const kept[] = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"};
+    size_t at = 8;
+    sink_put(s, png, size < at ? size : at);
+    while (at < size) {
+        const unsigned char *p = png + at;
+        size_t n = size - at;
+        int keep = 1;
+        if (n >= 12) {
+            const size_t length =
+                (size_t)p[0] << 24 | (size_t)p[1] << 16 | (size_t)p[2] << 8 | p[3];
+            if (length <= n - 12) {
+                n = length + 12; /* length, name and checksum around it */
+                keep = 0;
+                for (int k = 0; k < 5; k++) keep |= !memcmp(p + 4, kept[k], 4);
+            }
+        }
+        if (keep) sink_put(s, p, n);
+        at += n;
+    }
+}
+
+static void append(sink *to, const sink *from) {
+    sink_put(to, from->bytes.items, from->bytes.count);
+    to->failed |= from->failed;
+}
+
+static void print_materials(glb *g, sink *json) {
+    int textures = 0;
+    sink_print(json, ",\"materials\":[");
+    for (int i = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i];
+        sink_print(json, "%s{", i ? "," : "");
+        if (m && m->name) sink_print(json, "\"name\":\"%.60s\",", m->name);
+        sink_print(json, "\"pbrMetallicRoughness\":{");
+        if (m && (m->png || m->texture))
+            sink_print(json, "\"baseColorTexture\":{\"index\":%d},", textures++);
+        sink_print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}");
+        if (m && m->is_cut_out) sink_print(json, ",\"alphaMode\":\"MASK\",\"doubleSided\":true");
+        sink_print(json, "}");
+    }
+    sink_print(json, "]");
+    if (!textures) return;
+    sink_print(json, ",\"textures\":[");
+    for (int i = 0; i < textures; i++)
+        sink_print(json, "%s{\"sampler\":%d,\"source\":%d}", i ? "," : "", i, i);
+    sink_print(json, "],\"samplers\":[");
+    for (int i = 0, written = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i];
+        if (!m || !(m->png || m->texture)) continue;
+        sink_print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":33071}",
+                   written++ ? "," : "", m->repeats ? 10497 : 33071);
+    }
+    sink_print(json, "],\"images\":[");
+    for (int i = 0, written = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i];
+        if (!m || !(m->png || m->texture)) continue;
+        sink_print(json, "%s{", written++ ? "," : "");
+        if (m->png) {
+            const size_t start = g->binary.bytes.count;
+            put_png(&g->binary, m->png, m->png_size);
+            sink_print(json, "\"bufferView\":%d,\"mimeType\":\"image/png\"}",
+                       glb_view(g, start, 0));
+        } else {
+            sink_print(json, "\"uri\":\"");
+            print_uri(json, m->texture);
+            sink_print(json, "\"}");
+        }
+    }
+    sink_print(json, "]");
+}
+
+/* joint: node of the skeleton's root, or 0 */
+static void print_document(glb *g, const mesh_scene *scene, int instanced, int joint, sink *json) {
+    const int roots = joint ? joint + 1 : g->node_count;
+    sink_print(json, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"texkit\"},\"scene\":0");
+    if (instanced)
+        sink_print(json, ",\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],"
+                         "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"]");
+    sink_print(json, ",\"scenes\":[{\"nodes\":[");
+    for (int i = 0; i < roots; i++) sink_print(json, "%s%d", i ? "," : "", i);
+    sink_print(json, "]");
+    if (scene->extras) {
+        sink_print(json, ",\"extras\":");
+        sink_put(json, scene->extras, strlen(scene->extras));
+    }
+    sink_print(json, "}],\"nodes\":[");
+    append(json, &g->nodes);
+    sink_print(json, "],\"meshes\":[");
+    append(json, &g->meshes);
+    sink_print(json, "]");
+    append(json, &g->more);
+    print_materials(g, json);
+    sink_print(json, ",\"accessors\":[");
+    append(json, &g->accessors);
+    sink_print(json, "],\"bufferViews\":[");
+    append(json, &g->views);
+    sink_print(json, "],\"buffers\":[{\"byteLength\":%lu}]}", (unsigned long)g->binary.bytes.count);
+    while (json->bytes.count % 4 && !json->failed) sink_put(json, " ", 1);
+}
+
+/* All surfaces as one mesh, instances, joints: nodes in this order. Returns the first joint's node,
+   0 if there is none, -1 without memory. */
+static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
+    const mesh_skeleton *k = scene->skeleton;
+    int joint = 0;
+    for (int i = 0; i < scene_part_count(scene); i++) {
+        const mesh_part part = scene_part(scene, i, own);
+        if (i == 0) glb_open_mesh(g);
+        else sink_print(&g->meshes, ",");
+        if (!glb_primitive(g, part.mesh, part.material)) return -1;
+    }
+    if (scene_part_count(scene)) {
+        glb_close_mesh(g);
+        glb_node(g, k ? k->name : NULL);
+        sink_print(&g->nodes, k ? "\"mesh\":0,\"skin\":0}" : "\"mesh\":0}");
+    }
+    for (int i = 0; i < scene->instance_count; i++) {
+        if (scene->instances[i].count && !glb_instances(g, &scene->instances[i])) return -1;
+    }
+    if (k) {
+        joint = g->node_count;
+        if (!glb_joints(g, k)) return -1;
+        glb_skin(g, k, joint);
+    }
+    return joint;
+}
+
+int mesh_write_glb(const mesh_scene *scene, sink *s) {
+    glb g;
+    mesh_material own;
+    sink json = sink_new();
+    int instanced = 0;
+    memset(&g, 0, sizeof g);
+    g.binary = g.views = g.accessors = g.meshes = g.nodes = g.more = sink_new();
+    const int joint = glb_scene(&g, scene, &own);
+    for (int i = 0; i < scene->instance_count; i++) instanced |= scene->instances[i].count > 0;
+    if (joint >= 0) print_document(&g, scene, instanced, joint, &json);
+    const int ok = joint >= 0 && g.binary.bytes.count <= 0x7fffffff; /* lengths are 32 bits */
+    if (ok) {
+        const size_t total = 12 + 8 + json.bytes.count + 8 + g.binary.bytes.count;
+        sink_put(s, "glTF", 4);
+        sink_u32(s, 2);
+        sink_u32(s, (uint32_t)total);
+        sink_u32(s, (uint32_t)json.bytes.count);
+        sink_put(s, "JSON", 4);
+        append(s, &json);
+        sink_u32(s, (uint32_t)g.binary.bytes.count);
+        sink_put(s, "BIN\0", 4);
+        append(s, &g.binary);
+    }
+    list_free(&json.bytes);
+    list_free(&g.binary.bytes);
+    list_free(&g.views.bytes);
+    list_free(&g.accessors.bytes);
+    list_free(&g.meshes.bytes);
+    list_free(&g.nodes.bytes);
+    list_free(&g.more.bytes);
+    return ok;
+}

@@ -1,0 +1,241 @@
+/* mesh_obj.c - OBJ files and their materials
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "mesh_file.h"
+
+/* ---- reading ----------------------------------------------------------------------------- */
+
+/* The numbers of the rest of the line, at most so many; -1 if one of them is none. */
+static int read_numbers(text *in, double *values, int most) {
+    int n = 0;
+    for (;;) {
+        text_skip_blanks(in);
+        if (in->at == in->end || *in->at == '\n' || *in->at == '#' || n == most) return n;
+        if (!text_number(in, &values[n++])) return -1;
+    }
+}
+
+/* v x y z [w] [r g b]; colors are gathered as floats, for some write them 0..255. */
+static int read_obj_vertex(builder *b, text *in, list *colors) {
+    double v[7];
+    const size_t line = in->line;
+    const int n = read_numbers(in, v, 7);
+    if (n < 0) return builder_fail(b, line, "a coordinate is not a number");
+    if (n < 3) return builder_fail(b, line, "a vertex has less than three coordinates");
+    float *p = (float *)list_add(&b->positions, 1);
+    if (!p) return builder_fail_memory(b);
+    for (int k = 0; k < 3; k++) {
+        if (!text_to_float(v[k], &p[k]))
+            return builder_fail(b, line, "a coordinate is not a finite number");
+    }
+    if (n < 6) return 1;
+    while (colors->count < b->positions.count) { /* white for those before that had none */
+        float *c = (float *)list_add(colors, 1);
+        if (!c) return builder_fail_memory(b);
+        c[0] = c[1] = c[2] = 1;
+        if (colors->count < b->positions.count) continue;
+        for (int k = 0; k < 3; k++) {
+            if (!text_to_float(v[n - 3 + k], &c[k]))
+                return builder_fail(b, line, "a color is not a finite number");
+        }
+    }
+    return 1;
+}
+
+static int read_obj_uv(builder *b, text *in) {
+    double v[3];
+    const size_t line = in->line;
+    const int n = read_numbers(in, v, 3);
+    float *uv = (float *)list_add(&b->uvs, 1);
+    if (!uv) return builder_fail_memory(b);
+    uv[1] = 0;
+    if (n < 1 || !text_to_float(v[0], &uv[0]) || (n > 1 && !text_to_float(v[1], &uv[1])))
+        return builder_fail(b, line, "a texture coordinate is not a finite number");
+    return 1;
+}
+
+/* An index as OBJ has it, from 1, or from -1 backwards from the last of count. */
+static int read_obj_index(text *in, size_t count, uint32_t *index) {
+    const int backwards = in->at < in->end && *in->at == '-';
+    uint64_t v = 0;
+    if (backwards) in->at++;
+    if (in->at == in->end || !is_digit(*in->at)) return 0;
+    while (in->at < in->end && is_digit(*in->at)) {
+        v = 10 * v + (uint64_t)(*in->at++ - '0');
+        if (v > 0x7fffffff) return 0;
+    }
+    if (v == 0 || (backwards && v > count)) return 0;
+    *index = (uint32_t)(backwards ? (uint64_t)count - v : v - 1);
+    return 1;
+}
+
+/* f v v v, f v/vt ..., f v//vn ..., f v/vt/vn ... */
+static int read_obj_face(builder *b, text *in) {
+    const size_t line = in->line, first = b->corners.count;
+    for (;;) {
+        uint32_t vertex, uv = NO_UV, normal;
+        text_skip_blanks(in);
+        if (in->at == in->end || *in->at == '\n' || *in->at == '#') break;
+        int ok = read_obj_index(in, b->positions.count, &vertex);
+        if (ok && in->at < in->end && *in->at == '/') {
+            in->at++;
+            if (in->at < in->end && *in->at != '/' && !text_at_word_end(in->at, in->end))
+                ok = read_obj_index(in, b->uvs.count, &uv);
+            if (ok && in->at < in->end && *in->at == '/') {
+                in->at++; /* how many normals there are nobody counts */
+                if (!text_at_word_end(in->at, in->end)) ok = read_obj_index(in, SIZE_MAX, &normal);
+            }
+        }
+        if (!ok || !text_at_word_end(in->at, in->end))
+            return builder_fail(b, line, "a face with an index that is out of range or no number");
+        corner *c = (corner *)list_add(&b->corners, 1);
+        if (!c) return builder_fail_memory(b);
+        c->vertex = vertex;
+        c->uv = uv;
+    }
+    polygon *f = (polygon *)list_add(&b->polygons, 1);
+    if (!f) return builder_fail_memory(b);
+    f->first = first;
+    f->count = b->corners.count - first;
+    f->line = line;
+    return f->count >= 3 ? 1 : builder_fail(b, line, "a face with less than three corners");
+}
+
+/* Colors to bytes; all 0..1, or if any is above, all 0..255. */
+static int obj_colors_to_bytes(builder *b, const list *colors) {
+    const float *from = (const float *)colors->items;
+    float most = 1;
+    if (colors->count == 0) return 1;
+    for (size_t i = 0; i < 3 * colors->count; i++) {
+        if (from[i] > most) most = from[i];
+    }
+    const float scale = most > 1 ? 1 : 255;
+    unsigned char *to = (unsigned char *)list_add(&b->colors, b->positions.count);
+    if (!to) return builder_fail_memory(b);
+    memset(to, 255, 4 * b->positions.count);
+    for (size_t i = 0; i < colors->count; i++) {
+        for (size_t k = 0; k < 3; k++)
+            to[4 * i + k] = (unsigned char)(txm_clampf(from[3 * i + k] * scale, 0, 255) + 0.5f);
+    }
+    return 1;
+}
+
+int mesh_read_obj(builder *b, text *in) {
+    list colors = list_of(3 * sizeof(float));
+    int ok = 1;
+    while (ok && in->at < in->end) {
+        text_skip_blanks(in);
+        const char *word = in->at;
+        while (!text_at_word_end(in->at, in->end)) in->at++;
+        const ptrdiff_t n = in->at - word;
+        if (n == 1 && word[0] == 'v') ok = read_obj_vertex(b, in, &colors);
+        else if (n == 2 && word[0] == 'v' && word[1] == 't') ok = read_obj_uv(b, in);
+        else if (n == 1 && word[0] == 'f') ok = read_obj_face(b, in);
+        if (ok) text_skip_line(in);
+    }
+    ok = ok && obj_colors_to_bytes(b, &colors);
+    list_free(&colors);
+    if (ok && b->polygons.count == 0)
+        return builder_fail(b, 0, "%s", b->positions.count
+                                            ? "no faces in it"
+                                            : "no vertices in it; give an OBJ or PLY file");
+    return ok;
+}
+
+/* ---- writing ----------------------------------------------------------------------------- */
+
+/* A name on a line of its own: no control characters. */
+static void print_name(sink *s, const char *name) {
+    for (; *name; name++) {
+        const unsigned char c = (unsigned char)*name;
+        sink_put(s, c < 32 || c == 127 ? "_" : name, 1);
+    }
+    sink_put(s, "\n", 1);
+}
+
+/* How many positions, texture coordinates and normals the file has so far: it counts on. */
+typedef struct obj_counts {
+    size_t vertices, uvs, normals;
+} obj_counts;
+
+static void print_obj_vertices(sink *s, const mesh_data *m, const split *uvs, const split *normals,
+                               size_t normal_count) {
+    for (size_t i = 0; i < m->vertex_count; i++) {
+        const float *p = m->positions + 3 * i;
+        sink_print(s, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
+        for (size_t k = 0; k < 3 && m->colors; k++)
+            sink_print(s, " %.4g", m->colors[4 * i + k] / 255.0);
+        sink_put(s, "\n", 1);
+    }
+    for (size_t i = 0; i < uvs->count; i++) {
+        const float *uv = m->uvs + 2 * (size_t)uvs->first[i];
+        sink_print(s, "vt %.9g %.9g\n", (double)uv[0], (double)turn_v(uv[1]));
+    }
+    for (size_t i = 0; i < normal_count; i++) {
+        const float *n = normals->index ? m->corner_normals + 3 * (size_t)normals->first[i]
+                                        : m->normals + 3 * i;
+        sink_print(s, "vn %.6g %.6g %.6g\n", (double)n[0], (double)n[1], (double)n[2]);
+    }
+}
+
+static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_counts *counts,
+                           sink *s) {
+    const mesh_data *m = part->mesh;
+    split uvs, normals; /* of normals per vertex, none */
+    memset(&uvs, 0, sizeof uvs);
+    memset(&normals, 0, sizeof normals);
+    if (m->uvs && !split_corners(m, BY_UV, &uvs)) return 0;
+    if (m->corner_normals && !split_corners(m, BY_NORMAL, &normals)) {
+        split_free(&uvs);
+        return 0;
+    }
+    const int has_normals = m->normals || m->corner_normals;
+    const size_t normal_count = normals.index ? normals.count : m->normals ? m->vertex_count : 0;
+    if (scene->part_count) sink_print(s, "o %.60s\n", part->material->name);
+    print_obj_vertices(s, m, &uvs, &normals, normal_count);
+    if (scene->library) sink_print(s, "usemtl %.60s\n", part->material->name);
+    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
+        const size_t v = m->indices[c] + 1;
+        sink_print(s, "%s%lu", c % 3 ? " " : "f ", (unsigned long)(counts->vertices + v));
+        if (uvs.index) sink_print(s, "/%lu", (unsigned long)(counts->uvs + uvs.index[c] + 1));
+        const size_t normal = counts->normals + (normals.index ? normals.index[c] + 1 : v);
+        if (has_normals) sink_print(s, uvs.index ? "/%lu" : "//%lu", (unsigned long)normal);
+        if (c % 3 == 2) sink_put(s, "\n", 1);
+    }
+    counts->vertices += m->vertex_count;
+    counts->uvs += uvs.count;
+    counts->normals += normal_count;
+    split_free(&uvs);
+    split_free(&normals);
+    return 1;
+}
+
+int mesh_write_obj(const mesh_scene *scene, sink *s) {
+    obj_counts counts = {0, 0, 0};
+    mesh_material own;
+    if (scene->library) {
+        sink_print(s, "mtllib ");
+        print_name(s, scene->library);
+    }
+    for (int i = 0; i < scene_part_count(scene); i++) {
+        const mesh_part part = scene_part(scene, i, &own);
+        if (!encode_obj_part(scene, &part, &counts, s)) return 0;
+    }
+    return 1;
+}
+
+int mesh_encode_mtl(const mesh_scene *scene, unsigned char **bytes, size_t *size,
+                    const char **why) {
+    sink s = sink_new();
+    mesh_material own;
+    for (int i = 0; i < scene_part_count(scene); i++) {
+        const mesh_material *m = scene_part(scene, i, &own).material;
+        sink_print(&s, "newmtl %.60s\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n", m->name);
+        if (!m->texture) continue;
+        sink_print(&s, "map_Kd ");
+        print_name(&s, m->texture);
+        if (!m->is_cut_out) continue;
+        sink_print(&s, "map_d ");
+        print_name(&s, m->texture);
+    }
+    return sink_finish(&s, bytes, size, why);
+}
