@@ -61,12 +61,12 @@
 
    SAME BYTES
      Integers, 8- and 16-bit samples, generator, hash and sort: the same bits everywhere. All else
-     is computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
-     makes necessary (vectors in double are not rounded). That gives the same bits wherever
-     arithmetic is IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it)
-     and without -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one
-     result of 10^8 (txm_sincos and txm_exp2 do not): use it for what is only shown, not to decide.
-     Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
+     is computed in double in a fixed order and rounded once, by txm_float, which a bug of gcc makes
+     necessary (vectors in double are not rounded). That gives the same bits wherever arithmetic is
+     IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it) and without
+     -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one result of
+     10^8 (txm_sincos and txm_exp2 do not): use it for what is only displayed, not for decisions.
+     Sort, cut, eigenvectors and the sides of a mesh are the same also where there are ties.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
@@ -134,15 +134,15 @@ static inline const char *txm_status_text(txm_status status) {
 
 /* ---- environment ------------------------------------------------------------------------ */
 
-/* How a call allocates, reports and spreads its work. All zero (or a NULL pointer) means
+/* How a call allocates, reports progress and runs in parallel. All zero (or a NULL pointer) means
    malloc/free, silent, serial. An env belongs to one call at a time; a model or job copies
    what it needs of the allocator, so the env need not outlive it, the user pointer must. */
 typedef struct txm_env {
     void *(*allocate)(void *user, size_t bytes); /* NULL = malloc; may return NULL           */
     void (*release)(void *user, void *block);    /* NULL = free; never called with NULL      */
     void *memory_user;                           /* first argument of the two                */
-    /* Called from the calling thread only. fraction 0..1 of the whole call, never falling;
-       stage: a short English word or two. Returning non-zero cancels. NULL = silent.        */
+    /* Called from the calling thread only. fraction 0..1 of the whole call, never decreasing;
+       stage: one or two short English words. Returning non-zero cancels. NULL = silent.     */
     int (*progress)(void *user, float fraction, const char *stage);
     void *progress_user;
     /* Must call body(context, i) once for each i in 0..count-1, in any order, on any threads,
@@ -329,10 +329,10 @@ static inline int txm_is_finite(double x) {
     return ((bits >> 52) & 0x7ff) != 0x7ff;
 }
 
-/* x rounded to float, for good. gcc 12 drops the rounding of neighbouring values that are widened
-   again ((double)(float)x becomes x, from -O2 on), so results would depend on what was inlined
-   where. Code that needs the same bits everywhere rounds with this and not with a cast: the empty
-   asm might have changed f, for all that gcc knows, and costs nothing. */
+/* x rounded to float, in all cases. From -O2 on gcc 12 drops the rounding of neighbouring values
+   that are widened again ((double)(float)x becomes x), so that results depend on what was inlined.
+   Code that needs the same bits everywhere rounds with this, not with a cast: gcc must assume that
+   the empty asm changes f, and it costs nothing. */
 static inline float txm_float(double x) {
     float f = (float)x;
 #if defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__)
@@ -883,11 +883,11 @@ static inline txm_quat txm_quat_blend(txm_quat a, txm_quat b, double s, double t
 static inline double txm_quat_dot(txm_quat a, txm_quat b) {
     return (double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w;
 }
-/* From a (t = 0) to b (t = 1) the shorter way round; cheap, speed not quite even. */
+/* From a (t = 0) to b (t = 1) the shorter way round; fast, at nearly constant angular speed. */
 static inline txm_quat txm_quat_nlerp(txm_quat a, txm_quat b, float t) {
     return txm_quat_blend(a, b, 1.0 - t, txm_quat_dot(a, b) < 0 ? -(double)t : t);
 }
-/* The same at even speed. */
+/* The same at constant angular speed. */
 static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
     const double d = txm_quat_dot(a, b), cosine = fabs(d);
     if (cosine > 0.9995) return txm_quat_nlerp(a, b, t); /* the sine would be too small */
@@ -988,8 +988,8 @@ static inline txm_status txm_eigen3(const double a[6], double values[3], double 
            2 . # . . .                  from left to right:       along = 1, across = row
            3 . . # . .
 
-   Of equal sums straight on wins, then the smaller j; of equal ends the smaller j.
-   error    >= 0; INFINITY forbids a pixel as long as there is a way round it
+   Of equal sums the same j wins, then the smaller j; of equal ends the smaller j.
+   error    >= 0; INFINITY excludes a pixel as long as the path can avoid it
    path     receives j for each line, length of them
    scratch  room for length * width doubles
    return   the sum of the errors on the path; 0 (nothing written) if length or width is below 1
@@ -1027,10 +1027,10 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
 
 /* ---- kernel: minimum cut on a grid ------------------------------------------------------ */
 
-/* The cheapest way to part the nodes of a grid into those of a source and those of a sink, which is
-   what graph cuts ask for: maximum flow by two growing search trees [8]. A node is a place of the
-   grid, with a margin of one on all sides whose capacities stay zero. Arc d of node p goes to
-   p + step[d]; the opposite arc is d + directions / 2 there.
+/* The minimum cut that separates the nodes of a grid into those of a source and those of a sink:
+   maximum flow by two growing search trees [8]. A node is a cell of the grid, which has a margin of
+   one cell on all sides whose capacities stay zero. Arc d of node p goes to p + step[d]; the
+   opposite arc is d + directions / 2 there.
 
    txm_flow_make gives the memory. Then set step[] and count, fill arc[][] and excess[], call
    txm_flow_solve, and look at tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
@@ -1122,7 +1122,8 @@ static inline void txm_flow_augment(txm_flow *g, int p, int d) {
     }
 }
 
-/* Capacity of the arc by which p hangs on its neighbour in direction d, in p's tree. */
+/* Capacity of the arc that connects p to its neighbour in direction d, in the direction of p's
+   tree. */
 static inline int32_t txm_flow_hold(const txm_flow *g, int p, int d) {
     if (g->tree[p] != TXM_FLOW_SOURCE) return g->arc[d][p];
     return g->arc[txm_flow_opposite(g, d)][p + g->step[d]];
@@ -1137,7 +1138,7 @@ static inline void txm_flow_adopt(txm_flow *g, int p) {
         if (g->tree[q] != tree || g->parent[q] == TXM_FLOW_NONE || txm_flow_hold(g, p, d) == 0)
             continue;
         int length = 0, x = q;
-        for (;;) { /* does q still hang on the terminal? */
+        for (;;) { /* is q still connected to the terminal? */
             if (g->stamp[x] == g->time) {
                 length += g->distance[x];
                 break;
@@ -1197,7 +1198,7 @@ static inline int txm_flow_grow(txm_flow *g, int p, int *from, int *direction) {
             *direction = is_source ? d : back;
             return 1;
         } else if (g->stamp[q] <= g->stamp[p] && g->distance[q] > g->distance[p]) {
-            g->parent[q] = (uint8_t)back; /* a shorter way */
+            g->parent[q] = (uint8_t)back; /* a shorter path */
             g->stamp[q] = g->stamp[p];
             g->distance[q] = g->distance[p] + 1;
         }
@@ -1227,7 +1228,7 @@ static inline void txm_flow_solve(txm_flow *g) {
     for (;;) {
         int p = current, from, d;
         if (p < 0 || g->parent[p] == TXM_FLOW_NONE) {
-            do { /* the next active node that still hangs on a tree */
+            do { /* the next active node that still belongs to a tree */
                 p = g->first;
                 if (p < 0) return;
                 g->first = g->next[p];
@@ -1325,7 +1326,7 @@ static inline double txm_poisson_apply(const txm_poisson_grid *g, const double *
     return sum;
 }
 
-/* The bar of channel c, which is reached (0..1) of its way to the goal. */
+/* Report that the share reached (0..1) of channel c is done. */
 static inline int txm_poisson_report(const txm_poisson_desc *desc, const txm_env *env, int c,
                                      double reached) {
     const double from = desc->progress_from, to = desc->progress_to > 0 ? desc->progress_to : 1;
@@ -1476,7 +1477,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
     if (*unknown > INT32_MAX)
         return txm_fail_at(env, TXM_TOO_LARGE, "mask",
                            "more than 2^31 - 1 unknown pixels; use tiles");
-    /* Pixels of an image hang together, so one known pixel is enough to hold every unknown one. */
+    /* The pixels of an image are connected, so one known pixel determines the unknown ones. */
     if (!(desc->screen > 0) && *unknown == (size_t)mask->width * (size_t)mask->height)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "mask",
                            "every pixel is unknown; leave one known, or set screen");

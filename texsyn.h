@@ -2,10 +2,10 @@
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     Reads one photograph of a texture and keeps, for some dozens of ways in which two to four
-     pixels can lie to each other ("clique types"), how often each difference of their values
-     occurs: two to four thousand bytes. From that alone it makes new texture of any size, seamless
-     if wanted. No pixel of the photograph is kept, so none can be copied.
+     Reads one photograph of a texture and keeps, for some dozens of relative positions of two to
+     four pixels ("clique types"), how often each difference of their values occurs: two to four
+     thousand bytes. From these alone it makes new texture of any size, seamless if wanted. No pixel
+     of the photograph is kept, so none can be copied.
 
    QUICK START                                 (tests build and run this very block)
      // Learn a texture and make a larger one. cc -std=c99 quick.c -lm
@@ -43,21 +43,22 @@
      }
 
    WHAT IT IS GOOD FOR
-     Bark, grass, gravel, sand, litter, rust, plaster, coarse weaves: what repeats without order.
-     It cannot draw closed contours, long thin lines or exact layouts: cobbles merge, bricks lose
-     their courses. A photograph whose light or material drifts gives a texture with patches of
-     both; a mask leaves out what does not belong. About 256 x 256 pixels that show the largest
-     element a few dozen times are enough; fewer than 64 x 64 are too few to tell much.
+     Bark, grass, gravel, sand, litter, rust, plaster, coarse weaves: irregular textures. It cannot
+     reproduce closed contours, long thin lines or exact layouts: cobbles merge, bricks lose their
+     rows. A photograph whose lighting or material changes gives a texture with patches of both; a
+     mask leaves out what does not belong. About 256 x 256 pixels that show the largest element a
+     few dozen times are enough; 64 x 64 are hardly enough for any statistics.
 
    HOW IT WORKS
      The example is split into decorrelated colour bands of at most 32 values and into pyramid
      levels. On each level, coarse first, a canvas is synthesised with the clique types so far, the
-     histograms of all others are compared with the example's, the worst are added, and so on [1].
-     Synthesis is Gibbs sampling [4] in which the potentials of the clique types are controlled so
-     that the histograms of the canvas follow those of the example.
-     Beyond [1], which has pairs: values beside each other as a coarse table, which tells a rare
-     value from a frequent one; and kinds of three and four pixels (corners, parallel differences,
-     differences along with those of the coarser level), which hold what pairs cannot tell.
+     histograms of all others are compared with the example's, those that differ most are added, and
+     so on [1]. Synthesis is Gibbs sampling [4] in which the potentials of the clique types are
+     controlled so that the histograms of the canvas follow those of the example.
+     Beyond [1], which has pairs: a coarse joint histogram of two neighbouring values, which
+     distinguishes rare values from frequent ones; and cliques of three and four pixels (corners,
+     parallel differences, differences together with those of the coarser level), for what pairs
+     cannot express.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
@@ -68,9 +69,9 @@
    MEMORY
      A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
      sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
-     takes 2 bytes per band and pixel for the level in work and the one above, margins aside: 8 to 9
-     bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from a canvas of at
-     least 64 x 64. After an error nothing stays allocated and *out is NULL.
+     takes 2 bytes per band and pixel for the current level and the next coarser one, without
+     margins: 8 to 9 bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from
+     a canvas of at least 64 x 64. After an error nothing stays allocated and *out is NULL.
 
    TIME   (one core of 2023; make bench measures yours)
      Learning 256 x 256 RGB about 1.3 s; synthesis about 1.5 s per RGB megapixel. Both grow with
@@ -82,14 +83,14 @@
 
    SAME BYTES
      Learning and synthesis give the same bytes for the same input, options and seed: whatever the
-     number of threads, with or without SIMD, on any compiler that keeps to IEEE 754 (see
-     texmath.h). Synthesis works in integers up to the last step.
+     number of threads, with or without SIMD, on any compiler that follows IEEE 754 (see
+     texmath.h). Synthesis uses integers up to the last step.
 
    LIMITS
      Sides of the example 16 pixels or more, images and canvases up to TEXSYN_MAX_PIXELS, which may
-     be lowered; float samples up to a million. Differences under 1/255 are not seen, so scale a
+     be lowered; float samples up to a million. Differences under 1/255 are not resolved, so scale a
      float or 16-bit example of narrow range first. A model file is refused unless every number in
-     it makes sense. Build with -ffp-contract=off if the bytes of learned models must agree
+     it is in range. Build with -ffp-contract=off if the bytes of learned models must agree
      everywhere.
 
    REFERENCES
@@ -129,15 +130,15 @@ extern "C" {
 
 /* ---- learning --------------------------------------------------------------------------- */
 
-/* A learned texture; a value of its own, never changed after it is made. */
+/* A learned texture. It holds all it needs and never changes once it is made. */
 typedef struct texsyn_model texsyn_model;
 
 typedef struct texsyn_learn_desc {
     txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
                           outlive the call                                                       */
     txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
-    int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Finer levels look
-                          no further than 10 pixels: what is beyond, the coarsest sees           */
+    int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Levels other than
+                          the coarsest use pairs of at most 10 of their pixels                   */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
                           36 for a gray example                                                   */
     int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
@@ -202,7 +203,7 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
                                   size_t capacity, size_t *size);
 
 /* Read a model back. *out receives it, or NULL on any error; release it with texsyn_model_free.
-   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model with sensible numbers;
+   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model whose numbers are in range;
           TXM_BAD_ARGUMENT for NULL; TXM_OUT_OF_MEMORY                                        */
 TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, texsyn_model **out);
 
@@ -216,7 +217,7 @@ typedef struct texsyn_synth_desc {
     uint64_t seed;             /* another seed, another picture                                  */
 } texsyn_synth_desc;
 
-/* The simple way: one call. out is the caller's: desc->width x desc->height, the channels of the
+/* Synthesise in one call. out is the caller's: desc->width x desc->height, the channels of the
    model (or 3 where it has 1, or 4 = opaque), 8 or 16 bits, or float, which is not clamped to 0..1.
    Untouched after an error.
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or a picture that does not fit;
@@ -224,8 +225,8 @@ typedef struct texsyn_synth_desc {
    cost   O(width * height * clique types); see MEMORY and TIME above                         */
 TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env, txm_image out);
 
-/* The stepping way, for progressive display: begin, step while there is more to do, draw whenever a
-   picture is wanted, free. The picture is the same as that of the one call. */
+/* Synthesise in steps, for progressive display: begin, step while there is more to do, draw
+   whenever a picture is wanted, free. The picture is the same as that of the single call. */
 typedef struct texsyn_job texsyn_job;
 
 /* Check the description and make the job; *job is NULL on any error (as texsyn_synthesize has
@@ -278,7 +279,7 @@ enum {
     TXS_MAX_TYPES = 96, /* clique types of one level                                        */
     TXS_MAX_ENDS = 112, /* ends of cliques at one pixel of one band: keeps energies 16 bit  */
     TXS_MAX_REACH = 60, /* pixels                                                           */
-    TXS_NEAR = 10,      /* pixels: the finer levels look no further, coarser ones see the rest */
+    TXS_NEAR = 10,      /* pixels: reach of all levels but the coarsest                     */
     TXS_ROW = 64,       /* bytes of a table row for a difference                            */
     TXS_TABLE = (2 * TXS_CLASSES + TXS_DIFFERENCES) * TXS_ROW, /* bytes of one type's tables  */
     TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
@@ -304,9 +305,9 @@ enum {
 };
 
 /* Learning. Ours, by the medians of several measures over the stochastic exemplars: the kinds of
-   three and four pixels hold the shapes and are preferred. */
+   three and four pixels describe shapes and are preferred. */
 #define TXS_THRESHOLD 0.005f   /* smallest distance of histograms that is worth a clique type    */
-#define TXS_NOISE_SHARE 0.75f  /* and that in units of what two samples of one source differ by  */
+#define TXS_NOISE_SHARE 0.75f  /* the same in units of the expected sampling noise               */
 #define TXS_CORNER_WEIGHT 2.0f /* of distances, pairs having 1                                   */
 #define TXS_EDGE_WEIGHT 2.5f
 
@@ -569,7 +570,7 @@ static const uint8_t txs_no_energy[TXS_VALUES] = {
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO,
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO};
 
-/* The value with the least energy
+/* The value with the lowest energy
 
        e(v) = TXS_FINE * (sum of rows at v - TXS_ZERO count) + single(v) + noise
 
@@ -694,14 +695,14 @@ static txs_pick *txs_best_pick(void) {
 
        V = integral + proportional gain * (h - h_ref),
 
-   h the canvas's histogram now, h_ref the example's, so that values that are too frequent get
-   dearer; the integral part follows the error once a sweep. [1] derives the potentials from the
-   statistics; controlling them is how to get there in few sweeps.
+   h the current histogram of the canvas, h_ref the example's, so that the energy of values that are
+   too frequent rises; the integral part follows the error once a sweep. [1] derives the potentials
+   from the statistics; controlling them needs far fewer sweeps.
 
-   Order and threads. A sweep visits the pixels of one sub-lattice (x, y modulo 8) after the
-   other. The canvas is cut into an even number of strips at least as high as a clique; even
-   strips are worked on at the same time, then odd ones, so that no pixel changes while another
-   thread looks at it, and the result does not depend on the number of threads.              */
+   Order and threads. A sweep visits one sub-lattice (x, y modulo 8) after another. The canvas is
+   divided into an even number of strips at least as high as a clique; all even strips are processed
+   in parallel, then all odd ones, so that no pixel changes while another thread reads it, and the
+   result does not depend on the number of threads.                                          */
 
 /* The ends of cliques at a pixel, and the clique types that have a tail there. */
 typedef struct txs_list {
@@ -927,9 +928,10 @@ static int txs_is_counted(const txs_sampler *s, int x, int y) {
     return s->skip == 1 || (unsigned)(x / TXS_GRID + 3 * (y / TXS_GRID)) % (unsigned)s->skip == 0;
 }
 
-/* Draw new values for count pixels of a row, TXS_GRID apart. No clique joins two of them (but
-   across the border of a torus whose width is no multiple of the grid), so it is as if one came
-   after the other; doing them together keeps what an end needs in registers. */
+/* Draw new values for count pixels of a row, TXS_GRID apart. No clique contains two of them
+   (except across the border of a torus whose width is not a multiple of the grid), so the result
+   is the same as drawing one after another; drawing them together keeps the data of an end in
+   registers. */
 static void txs_visit(const txs_sampler *s, int x, int y, int count, txm_rng *rng) {
     const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
     const uint8_t *p = txs_at(s->canvas, 0, x, y);
@@ -1025,8 +1027,8 @@ static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, flo
         if (txm_progress(env, from + (to - from) * (float)group / (float)groups, stage))
             return txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
         memcpy(s->sublattice, order + group * TXS_GROUP, sizeof s->sublattice);
-        /* Both phases with the same potentials: were they set in between, even strips would be
-           drawn against what odd ones just did and the two could part for good. */
+        /* Both phases use the same potentials: if they were updated in between, even and odd strips
+           would compensate for each other and could drift apart permanently. */
         for (s->phase = 0; s->phase < phases; s->phase++)
             txm_parallel_for(env, s->tasks, txs_work, s);
         txs_gather(s, groups);
@@ -1064,7 +1066,7 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
 static void txs_sampler_start(txs_sampler *s) {
     const txs_canvas *c = s->canvas;
     const int types = s->level->type_count;
-    int reach = 16; /* a strip is at least that high: less is too little work for a thread */
+    int reach = 16; /* a strip is at least this high: less is too little work for a thread */
     for (int k = 0; k < types; k++)
         if (txs_reach(&s->level->types[k]) > reach) reach = txs_reach(&s->level->types[k]);
     memset(s->list, 0, sizeof s->list);
@@ -1075,7 +1077,7 @@ static void txs_sampler_start(txs_sampler *s) {
     s->tasks = s->strips > 1 ? s->strips / 2 : 1;
     if (s->tasks > TXS_TASKS) s->tasks = TXS_TASKS;
     s->skip = pixels > TXS_SAMPLES ? (int)(pixels / TXS_SAMPLES) : 1;
-    if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find next to none */
+    if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find almost none */
 
     memset(s->histogram, 0, sizeof *s->histogram * (size_t)types);
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
@@ -1153,7 +1155,7 @@ static void txs_find_bands(texsyn_model *m, const txm_image *im, const txs_sourc
     }
     txm_eigen3(cov, values, vectors);
     m->bands = 0;
-    for (int k = 0; k < colours; k++) { /* bands that nobody sees are left out */
+    for (int k = 0; k < colours; k++) { /* bands with no visible variance are left out */
         if (values[k] < 0.05 && m->bands > 0) break;
         for (int c = 0; c < colours; c++)
             m->basis[m->bands][c] =
@@ -1253,9 +1255,10 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
 }
 
 /* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: the nearest
-   pixel, the one on the other side, and as the result the weight of that in quarters. An odd torus
-   lies on one that is half a pixel too long, which is squeezed lest there be a seam: by a quarter
-   each at two places far from the border. From the first on, parities swap. */
+   pixel, its neighbour on the other side, and as the result the weight of the latter in quarters. A
+   torus of odd width lies on a coarse one that is half a pixel too long, so positions are
+   compressed by a quarter of a pixel at each of two places far from the border, which avoids a seam
+   there. From the first of these places on, parities swap. */
 static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
     int at = 2 * x + 1; /* in quarters of a coarse pixel, from the border */
     if (fine == 2 * coarse - 1) at = (int)(((int64_t)at * 2 * coarse + coarse - 1) / fine);
@@ -1267,9 +1270,10 @@ static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
 }
 
 /* Fill the parent planes of a canvas with the coarser level above, bilinearly, in this level's
-   steps. At the borders the coarse canvas wraps if it has a margin, else its last row counts. */
-static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, const txs_level *level,
-                           txs_canvas *canvas, int bands) {
+   steps. At the borders the coarse canvas wraps if it has a margin, else its last row is
+   repeated. */
+static void txs_fill_parent(const txs_level *above, const txs_canvas *coarse,
+                            const txs_level *level, txs_canvas *canvas, int bands) {
     if (canvas->width == 2 * coarse->width - 1) canvas->slip_x = coarse->width / 2;
     if (canvas->height == 2 * coarse->height - 1) canvas->slip_y = coarse->height / 2;
     for (int b = 0; b < bands; b++) {
@@ -1293,8 +1297,8 @@ static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, con
 }
 
 /* Start the synthesis of a level: from what is above, or from even noise (step 2 of [1]). */
-static void txs_lay_start(const txs_level *level, const txs_canvas *canvas, int bands,
-                          int has_parent, uint64_t seed) {
+static void txs_start_canvas(const txs_level *level, const txs_canvas *canvas, int bands,
+                             int has_parent, uint64_t seed) {
     txm_rng rng = txm_rng_make(seed, 3);
     for (int b = 0; b < bands; b++) {
         for (int y = 0; y < canvas->height; y++) {
@@ -1501,7 +1505,7 @@ static int txs_add_worst(txs_learner *a, int count, float threshold) {
             break;
         }
         a->candidates[worst] = a->candidates[--a->candidate_count];
-        for (int i = 0; i < a->candidate_count; i++) { /* its neighbours tell much the same */
+        for (int i = 0; i < a->candidate_count; i++) { /* its neighbours are redundant */
             txs_type *t = &a->candidates[i].type;
             if (t->kind == chosen.kind && t->kind < TEXSYN_CORNER && t->band == chosen.band &&
                 t->other == chosen.other && abs(t->dx - chosen.dx) <= 1 &&
@@ -1511,8 +1515,8 @@ static int txs_add_worst(txs_learner *a, int count, float threshold) {
     }
     return added;
 }
-/* A share h is kept as its square root in steps of 1/scale: the sampling noise of a count is the
-   same for all roots, and this step about as large. */
+/* A share h is kept as its square root in steps of 1/scale: the sampling noise of the root is the
+   same for all shares, and the step about as large. */
 static int txs_root_scale(int kind, int level) {
     return kind == TEXSYN_SINGLE ? 160 : level == 0 ? 48 : level == 1 ? 36 : 26;
 }
@@ -1550,7 +1554,7 @@ static void txs_preselect(txs_learner *a) {
         txs_type t = a->level->types[k];
         if (txs_measure(&a->source->canvas, a->source->mask, 0, a->source->step, bands, a->level,
                         &t, t.share) > 0)
-            a->level->types[kept++] = t; /* a ragged mask may hold none of them */
+            a->level->types[kept++] = t; /* an irregular mask may contain none of them */
     }
     a->level->type_count = kept;
 }
@@ -1569,8 +1573,8 @@ static float txs_visibility(const txs_level *l, int band) {
     return txm_float(deviation / (deviation + 4) * sqrt(l->values[band] / (double)TXS_VALUES));
 }
 
-/* The sums of the potentials over some sweeps become the model's: a steadier value than the last.
-   Where the example has nothing, and in difference from any constant, they are free. */
+/* The model's potentials: the mean over some sweeps, which varies less than the last value. They
+   are arbitrary up to a constant, and where the example has no clique. */
 static void txs_keep_potentials(txs_level *l, int64_t (*sum)[TXS_BINS], int sweeps) {
     for (int k = 0; k < l->type_count; k++) {
         txs_type *t = &l->types[k];
@@ -1587,7 +1591,7 @@ static void txs_keep_potentials(txs_level *l, int64_t (*sum)[TXS_BINS], int swee
     }
 }
 
-/* Learn one level on a canvas whose parent planes are laid. Fraction from..to of the whole. */
+/* Learn one level on a canvas whose parent planes are filled. Fraction from..to of the whole. */
 static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env *env, float from,
                                   float to) {
     const int max_types = a->desc->max_types     ? a->desc->max_types
@@ -1629,7 +1633,8 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
     for (int b = 0; b < bands; b++) seen[b] = txs_visibility(a->level, b);
     txs_list_candidates(a, reach, seen);
     txm_parallel_for(env, a->candidate_count, txs_measure_example, a);
-    txs_lay_start(a->level, a->canvas, bands, !top, txm_hash(a->desc->seed) + (uint64_t)a->index);
+    txs_start_canvas(a->level, a->canvas, bands, !top,
+                     txm_hash(a->desc->seed) + (uint64_t)a->index);
 
     /* steps 3 to 6 of [1]; what was synthesised so far, and its potentials, are kept */
     for (;;) {
@@ -1659,9 +1664,9 @@ done:
 
 /* ---- the model as bytes -------------------------------------------------------------------
 
-   An adaptive binary arithmetic code (a range coder in the manner of LZMA's). One description of
-   the model, txs_code_model, serves both ways: a coder either writes the value that it is given
-   or returns the one that it reads. docs/model-format.md describes the bytes.               */
+   An adaptive binary arithmetic code (a range coder as LZMA has it). One description of the model,
+   txs_code_model, serves for both directions: a coder either writes the value that it is given or
+   returns the one that it reads. docs/model-format.md describes the bytes.                  */
 
 enum { TXS_MAGIC_BYTES = 4, TXS_CRC_BYTES = 4, TXS_MAX_FILE = 1 << 20, TXS_UNARY = 14 };
 
@@ -1710,14 +1715,15 @@ static void txs_coder_finish(txs_coder *c) {
     for (int i = 0; i < 5; i++) txs_shift(c);
 }
 
-/* The probability of a 0 in 1/65536, and how often it was asked: it learns fast at first. */
+/* The probability of a 0 in 1/65536, and how many bits were coded with it, up to 24: it adapts
+   faster at first. */
 typedef struct txs_chance {
     uint16_t zero, seen;
 } txs_chance;
 
 static const txs_chance txs_even = {32768, 0};
 
-/* One bit, at the cost of its chance. */
+/* Code one bit with its probability, and adapt that. */
 static int txs_bit(txs_coder *c, txs_chance *p, int bit) {
     const uint32_t bound = (uint32_t)(((uint64_t)c->range * p->zero) >> 16);
     if (c->reading) bit = c->code >= bound;
@@ -1788,9 +1794,9 @@ static int txs_number(txs_coder *c, txs_context *x, int value) {
 
 typedef enum txs_mirror { TXS_NONE, TXS_REVERSED, TXS_DIAGONAL } txs_mirror;
 
-/* A sequence, each entry told from what is expected there: what the sequence most alike has,
-   shifted as the entry before was, and what stands at the mirrored place if that is known already.
-   Contexts by the last surprise. */
+/* A sequence, each entry coded as its difference from a prediction: the entry of the most similar
+   sequence, shifted by most of the shift of the entry before, and mixed with the entry at the
+   mirrored place if that is known already. The last difference chooses the context. */
 static void txs_sequence(txs_coder *c, txs_context *x, int16_t *v, const int16_t *like, int count,
                          int low, int high, txs_mirror mirror) {
     int surprise = 0, drift = 0;
@@ -1815,9 +1821,9 @@ typedef struct txs_codec {
     int16_t used[TXS_BINS]; /* the potential, where it is kept */
 } txs_codec;
 
-/* The inverse of txs_round_statistics. A potential is kept only where the example has something;
-   elsewhere values are dear, and the control makes them dearer if they turn up. Returns 0 for an
-   empty histogram. */
+/* The inverse of txs_round_statistics. A potential is kept only for bins that occur in the example;
+   other bins get a high energy, which the control raises if they occur nevertheless. Returns 0 for
+   an empty histogram. */
 static int txs_unround_statistics(txs_type *t) {
     int32_t total = 0;
     for (int i = 0; i < TXS_BINS; i++) total += t->root[i] * t->root[i];
@@ -1884,7 +1890,7 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
         t->ex = txs_number(c, &z->place[2][t->kind], t->ex);
         t->ey = txs_number(c, &z->place[3][t->kind], t->ey);
     }
-    /* members that coincide would see each other change */
+    /* members that coincide would change together */
     const int same_d = t->dx == 0 && t->dy == 0, same_e = t->ex == 0 && t->ey == 0;
     const int equal = t->ex == t->dx && t->ey == t->dy,
               opposite = t->ex == -t->dx && t->ey == -t->dy;
@@ -1893,7 +1899,7 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     if (t->kind == TEXSYN_CORNER && (same_e || equal)) c->bad = 1;
     if (t->kind == TEXSYN_PARALLEL && t->band == t->other && (same_e || equal || opposite))
         c->bad = 1;
-    /* and so would members that are drawn together, see txs_visit */
+    /* and so would members that are drawn at the same time, see txs_visit */
     int at[4][2], drawn = t->kind == TEXSYN_SCALE ? 2 : txs_members(t, at);
     txs_members(t, at);
     for (int i = 0; i < drawn; i++) {
@@ -2184,7 +2190,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
             size_t seen = 0;
             for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
             if (s->mask && seen < 256) {
-                m->levels = i; /* the region is too ragged to be seen from further away */
+                m->levels = i; /* too little of an irregular region is left at this level */
                 break;
             }
         }
@@ -2194,7 +2200,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         }
     }
     for (int i = m->levels - 2; i >= 0; i--)
-        txs_lay_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
+        txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
                        m->bands);
     return TXM_OK;
 }
@@ -2245,7 +2251,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
             goto done;
         }
-        if (above.pixels) txs_lay_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+        if (above.pixels) txs_fill_parent(a.level + 1, &above, a.level, &canvas, m->bands);
         txs_canvas_free(&above, env);
         const float to = from + 1.0f / (float)(1 << 2 * i) / total;
         if ((status = txs_learn_level(&a, noise, env, from, to)) != TXM_OK) goto done;
@@ -2254,7 +2260,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
         canvas.pixels = NULL;
     }
 
-    /* what is handed out has been through the file format: saving it loses nothing more */
+    /* the model returned has been through the file format, so that saving it loses nothing more */
     if ((status = texsyn_save(m, env, NULL, 0, &size)) != TXM_OK) goto done;
     bytes = (uint8_t *)txm_arena_alloc(&arena, size, 1);
     if (!bytes) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
@@ -2275,13 +2281,13 @@ struct texsyn_job {
     txm_arena arena; /* holds the job; what a level needs lies in level_arena */
     txm_arena level_arena;
     int16_t *noise;
-    txs_canvas canvas; /* of the level in work, or of the finished level 0      */
+    txs_canvas canvas; /* of the current level, or of the finished level 0      */
     txs_sampler *sampler;
-    int level, sweep;  /* being worked on; level -1: finished                   */
+    int level, sweep;  /* current ones; level -1: finished                      */
     double work, done; /* pixel visits in all, so far                           */
 };
 
-/* sweeps of a level: the coarser ones are cheap, and decide more */
+/* sweeps of a level: the coarser ones cost little and matter more */
 static int txs_sweeps(const texsyn_synth_desc *d, int level) {
     static const int sweeps[5][3] = {{2, 4, 8}, {3, 6, 10}, {5, 8, 16}, {6, 12, 24}, {10, 20, 32}};
     return sweeps[d->quality + 2][level > 2 ? 2 : level];
@@ -2327,9 +2333,9 @@ static txm_status txs_enter_level(texsyn_job *job, txm_env *env) {
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the sampler");
     }
-    if (coarse.pixels) txs_lay_parent(l + 1, &coarse, l, &job->canvas, m->bands);
-    txs_lay_start(l, &job->canvas, m->bands, coarse.pixels != NULL,
-                  txm_hash(job->desc.seed) + (uint64_t)i);
+    if (coarse.pixels) txs_fill_parent(l + 1, &coarse, l, &job->canvas, m->bands);
+    txs_start_canvas(l, &job->canvas, m->bands, coarse.pixels != NULL,
+                     txm_hash(job->desc.seed) + (uint64_t)i);
     txs_canvas_free(&coarse, &job->memory);
     txs_sampler_start(job->sampler);
     return TXM_OK;
@@ -2403,8 +2409,8 @@ TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, int *more) {
     return TXM_OK;
 }
 
-/* A canvas as pixels: back from bands to channels. Within its step a value is placed by what is
-   around it where that is smooth, at random where it is not. */
+/* A canvas as pixels: back from bands to channels. Within its quantisation step a value is placed
+   by its neighbours where these are smooth, at random where they are not. */
 typedef struct txs_painter {
     const texsyn_job *job;
     const txm_image *out;

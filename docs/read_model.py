@@ -24,8 +24,8 @@ def require(condition, what):
         raise BadModel(what)
 
 
-def cut(a, b):
-    """a / b, cut towards zero as in C"""
+def quotient(a, b):
+    """a / b, truncated towards zero as in C"""
     return abs(a) // b * (1 if a >= 0 else -1)
 
 
@@ -50,7 +50,7 @@ class Coder:
             self.shift_in()
 
     def shift_in(self):
-        require(self.at < len(self.body), "cut short")
+        require(self.at < len(self.body), "too short")
         self.code = (self.code << 8 | self.body[self.at]) & 0xFFFFFFFF
         self.at += 1
 
@@ -63,7 +63,7 @@ class Coder:
         else:
             self.range = bound
         target = 512 if bit else 65024
-        chance.zero += cut((target - chance.zero) * 2, 2 * chance.seen + 3)
+        chance.zero += quotient((target - chance.zero) * 2, 2 * chance.seen + 3)
         chance.seen = min(chance.seen + 1, 24)
         while self.range < 1 << 24:
             self.range <<= 8
@@ -100,9 +100,9 @@ class Coder:
         v, surprise, drift = [], 0, 0
         for i in range(count):
             twin = [i, count - 1 - i, i % 9 * 9 + i // 9][mirror]
-            expected = like[i] + cut(drift * 3, 4) if like else drift
+            expected = like[i] + quotient(drift * 3, 4) if like else drift
             if twin < i:
-                expected = cut(expected + 3 * v[twin] + 2, 4)
+                expected = quotient(expected + 3 * v[twin] + 2, 4)
             expected = min(max(expected, low), high)
             context = contexts[min(abs(surprise), 3) + (4 if expected == low else 0)]
             surprise = self.number(context)
@@ -192,7 +192,7 @@ class Model:
     def __init__(self, data):
         require(data[:4] == b"TXS1", "not a texsyn model")
         require(8 <= len(data) <= (1 << 20) + 4, "of a wrong size")
-        require(zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0], "damaged or cut short")
+        require(zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0], "damaged or too short")
         coder = Coder(data[4:-4])
         self.channels = [1, 3, 4][coder.limited(2, 0, 2)]
         self.bands = coder.limited(2, 1, self.channels)

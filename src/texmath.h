@@ -61,12 +61,12 @@
 
    SAME BYTES
      Integers, 8- and 16-bit samples, generator, hash and sort: the same bits everywhere. All else
-     is computed in double in a fixed order and rounded once, by txm_float, which a fault of gcc
-     makes necessary (vectors in double are not rounded). That gives the same bits wherever
-     arithmetic is IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it)
-     and without -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one
-     result of 10^8 (txm_sincos and txm_exp2 do not): use it for what is only shown, not to decide.
-     Sort, cut, eigenvectors and the sides of a mesh leave no ties open.
+     is computed in double in a fixed order and rounded once, by txm_float, which a bug of gcc makes
+     necessary (vectors in double are not rounded). That gives the same bits wherever arithmetic is
+     IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it) and without
+     -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one result of
+     10^8 (txm_sincos and txm_exp2 do not): use it for what is only displayed, not for decisions.
+     Sort, cut, eigenvectors and the sides of a mesh are the same also where there are ties.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions

@@ -2,10 +2,10 @@
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     Reads one photograph of a texture and keeps, for some dozens of ways in which two to four
-     pixels can lie to each other ("clique types"), how often each difference of their values
-     occurs: two to four thousand bytes. From that alone it makes new texture of any size, seamless
-     if wanted. No pixel of the photograph is kept, so none can be copied.
+     Reads one photograph of a texture and keeps, for some dozens of relative positions of two to
+     four pixels ("clique types"), how often each difference of their values occurs: two to four
+     thousand bytes. From these alone it makes new texture of any size, seamless if wanted. No pixel
+     of the photograph is kept, so none can be copied.
 
    QUICK START                                 (tests build and run this very block)
      // Learn a texture and make a larger one. cc -std=c99 quick.c -lm
@@ -43,21 +43,22 @@
      }
 
    WHAT IT IS GOOD FOR
-     Bark, grass, gravel, sand, litter, rust, plaster, coarse weaves: what repeats without order.
-     It cannot draw closed contours, long thin lines or exact layouts: cobbles merge, bricks lose
-     their courses. A photograph whose light or material drifts gives a texture with patches of
-     both; a mask leaves out what does not belong. About 256 x 256 pixels that show the largest
-     element a few dozen times are enough; fewer than 64 x 64 are too few to tell much.
+     Bark, grass, gravel, sand, litter, rust, plaster, coarse weaves: irregular textures. It cannot
+     reproduce closed contours, long thin lines or exact layouts: cobbles merge, bricks lose their
+     rows. A photograph whose lighting or material changes gives a texture with patches of both; a
+     mask leaves out what does not belong. About 256 x 256 pixels that show the largest element a
+     few dozen times are enough; 64 x 64 are hardly enough for any statistics.
 
    HOW IT WORKS
      The example is split into decorrelated colour bands of at most 32 values and into pyramid
      levels. On each level, coarse first, a canvas is synthesised with the clique types so far, the
-     histograms of all others are compared with the example's, the worst are added, and so on [1].
-     Synthesis is Gibbs sampling [4] in which the potentials of the clique types are controlled so
-     that the histograms of the canvas follow those of the example.
-     Beyond [1], which has pairs: values beside each other as a coarse table, which tells a rare
-     value from a frequent one; and kinds of three and four pixels (corners, parallel differences,
-     differences along with those of the coarser level), which hold what pairs cannot tell.
+     histograms of all others are compared with the example's, those that differ most are added, and
+     so on [1]. Synthesis is Gibbs sampling [4] in which the potentials of the clique types are
+     controlled so that the histograms of the canvas follow those of the example.
+     Beyond [1], which has pairs: a coarse joint histogram of two neighbouring values, which
+     distinguishes rare values from frequent ones; and cliques of three and four pixels (corners,
+     parallel differences, differences together with those of the coarser level), for what pairs
+     cannot express.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
@@ -68,9 +69,9 @@
    MEMORY
      A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
      sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
-     takes 2 bytes per band and pixel for the level in work and the one above, margins aside: 8 to 9
-     bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from a canvas of at
-     least 64 x 64. After an error nothing stays allocated and *out is NULL.
+     takes 2 bytes per band and pixel for the current level and the next coarser one, without
+     margins: 8 to 9 bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from
+     a canvas of at least 64 x 64. After an error nothing stays allocated and *out is NULL.
 
    TIME   (one core of 2023; make bench measures yours)
      Learning 256 x 256 RGB about 1.3 s; synthesis about 1.5 s per RGB megapixel. Both grow with
@@ -82,14 +83,14 @@
 
    SAME BYTES
      Learning and synthesis give the same bytes for the same input, options and seed: whatever the
-     number of threads, with or without SIMD, on any compiler that keeps to IEEE 754 (see
-     texmath.h). Synthesis works in integers up to the last step.
+     number of threads, with or without SIMD, on any compiler that follows IEEE 754 (see
+     texmath.h). Synthesis uses integers up to the last step.
 
    LIMITS
      Sides of the example 16 pixels or more, images and canvases up to TEXSYN_MAX_PIXELS, which may
-     be lowered; float samples up to a million. Differences under 1/255 are not seen, so scale a
+     be lowered; float samples up to a million. Differences under 1/255 are not resolved, so scale a
      float or 16-bit example of narrow range first. A model file is refused unless every number in
-     it makes sense. Build with -ffp-contract=off if the bytes of learned models must agree
+     it is in range. Build with -ffp-contract=off if the bytes of learned models must agree
      everywhere.
 
    REFERENCES
@@ -129,15 +130,15 @@ extern "C" {
 
 /* ---- learning --------------------------------------------------------------------------- */
 
-/* A learned texture; a value of its own, never changed after it is made. */
+/* A learned texture. It holds all it needs and never changes once it is made. */
 typedef struct texsyn_model texsyn_model;
 
 typedef struct texsyn_learn_desc {
     txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
                           outlive the call                                                       */
     txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
-    int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Finer levels look
-                          no further than 10 pixels: what is beyond, the coarsest sees           */
+    int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Levels other than
+                          the coarsest use pairs of at most 10 of their pixels                   */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
                           36 for a gray example                                                   */
     int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
@@ -202,7 +203,7 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
                                   size_t capacity, size_t *size);
 
 /* Read a model back. *out receives it, or NULL on any error; release it with texsyn_model_free.
-   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model with sensible numbers;
+   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model whose numbers are in range;
           TXM_BAD_ARGUMENT for NULL; TXM_OUT_OF_MEMORY                                        */
 TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, texsyn_model **out);
 
@@ -216,7 +217,7 @@ typedef struct texsyn_synth_desc {
     uint64_t seed;             /* another seed, another picture                                  */
 } texsyn_synth_desc;
 
-/* The simple way: one call. out is the caller's: desc->width x desc->height, the channels of the
+/* Synthesise in one call. out is the caller's: desc->width x desc->height, the channels of the
    model (or 3 where it has 1, or 4 = opaque), 8 or 16 bits, or float, which is not clamped to 0..1.
    Untouched after an error.
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or a picture that does not fit;
@@ -224,8 +225,8 @@ typedef struct texsyn_synth_desc {
    cost   O(width * height * clique types); see MEMORY and TIME above                         */
 TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env, txm_image out);
 
-/* The stepping way, for progressive display: begin, step while there is more to do, draw whenever a
-   picture is wanted, free. The picture is the same as that of the one call. */
+/* Synthesise in steps, for progressive display: begin, step while there is more to do, draw
+   whenever a picture is wanted, free. The picture is the same as that of the single call. */
 typedef struct texsyn_job texsyn_job;
 
 /* Check the description and make the job; *job is NULL on any error (as texsyn_synthesize has

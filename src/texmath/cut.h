@@ -16,8 +16,8 @@
            2 . # . . .                  from left to right:       along = 1, across = row
            3 . . # . .
 
-   Of equal sums straight on wins, then the smaller j; of equal ends the smaller j.
-   error    >= 0; INFINITY forbids a pixel as long as there is a way round it
+   Of equal sums the same j wins, then the smaller j; of equal ends the smaller j.
+   error    >= 0; INFINITY excludes a pixel as long as the path can avoid it
    path     receives j for each line, length of them
    scratch  room for length * width doubles
    return   the sum of the errors on the path; 0 (nothing written) if length or width is below 1
@@ -55,10 +55,10 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
 
 /* ---- kernel: minimum cut on a grid ------------------------------------------------------ */
 
-/* The cheapest way to part the nodes of a grid into those of a source and those of a sink, which is
-   what graph cuts ask for: maximum flow by two growing search trees [8]. A node is a place of the
-   grid, with a margin of one on all sides whose capacities stay zero. Arc d of node p goes to
-   p + step[d]; the opposite arc is d + directions / 2 there.
+/* The minimum cut that separates the nodes of a grid into those of a source and those of a sink:
+   maximum flow by two growing search trees [8]. A node is a cell of the grid, which has a margin of
+   one cell on all sides whose capacities stay zero. Arc d of node p goes to p + step[d]; the
+   opposite arc is d + directions / 2 there.
 
    txm_flow_make gives the memory. Then set step[] and count, fill arc[][] and excess[], call
    txm_flow_solve, and look at tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
@@ -150,7 +150,8 @@ static inline void txm_flow_augment(txm_flow *g, int p, int d) {
     }
 }
 
-/* Capacity of the arc by which p hangs on its neighbour in direction d, in p's tree. */
+/* Capacity of the arc that connects p to its neighbour in direction d, in the direction of p's
+   tree. */
 static inline int32_t txm_flow_hold(const txm_flow *g, int p, int d) {
     if (g->tree[p] != TXM_FLOW_SOURCE) return g->arc[d][p];
     return g->arc[txm_flow_opposite(g, d)][p + g->step[d]];
@@ -165,7 +166,7 @@ static inline void txm_flow_adopt(txm_flow *g, int p) {
         if (g->tree[q] != tree || g->parent[q] == TXM_FLOW_NONE || txm_flow_hold(g, p, d) == 0)
             continue;
         int length = 0, x = q;
-        for (;;) { /* does q still hang on the terminal? */
+        for (;;) { /* is q still connected to the terminal? */
             if (g->stamp[x] == g->time) {
                 length += g->distance[x];
                 break;
@@ -225,7 +226,7 @@ static inline int txm_flow_grow(txm_flow *g, int p, int *from, int *direction) {
             *direction = is_source ? d : back;
             return 1;
         } else if (g->stamp[q] <= g->stamp[p] && g->distance[q] > g->distance[p]) {
-            g->parent[q] = (uint8_t)back; /* a shorter way */
+            g->parent[q] = (uint8_t)back; /* a shorter path */
             g->stamp[q] = g->stamp[p];
             g->distance[q] = g->distance[p] + 1;
         }
@@ -255,7 +256,7 @@ static inline void txm_flow_solve(txm_flow *g) {
     for (;;) {
         int p = current, from, d;
         if (p < 0 || g->parent[p] == TXM_FLOW_NONE) {
-            do { /* the next active node that still hangs on a tree */
+            do { /* the next active node that still belongs to a tree */
                 p = g->first;
                 if (p < 0) return;
                 g->first = g->next[p];

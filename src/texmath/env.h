@@ -32,15 +32,15 @@ static inline const char *txm_status_text(txm_status status) {
 
 /* ---- environment ------------------------------------------------------------------------ */
 
-/* How a call allocates, reports and spreads its work. All zero (or a NULL pointer) means
+/* How a call allocates, reports progress and runs in parallel. All zero (or a NULL pointer) means
    malloc/free, silent, serial. An env belongs to one call at a time; a model or job copies
    what it needs of the allocator, so the env need not outlive it, the user pointer must. */
 typedef struct txm_env {
     void *(*allocate)(void *user, size_t bytes); /* NULL = malloc; may return NULL           */
     void (*release)(void *user, void *block);    /* NULL = free; never called with NULL      */
     void *memory_user;                           /* first argument of the two                */
-    /* Called from the calling thread only. fraction 0..1 of the whole call, never falling;
-       stage: a short English word or two. Returning non-zero cancels. NULL = silent.        */
+    /* Called from the calling thread only. fraction 0..1 of the whole call, never decreasing;
+       stage: one or two short English words. Returning non-zero cancels. NULL = silent.     */
     int (*progress)(void *user, float fraction, const char *stage);
     void *progress_user;
     /* Must call body(context, i) once for each i in 0..count-1, in any order, on any threads,

@@ -99,11 +99,11 @@ static inline txm_quat txm_quat_blend(txm_quat a, txm_quat b, double s, double t
 static inline double txm_quat_dot(txm_quat a, txm_quat b) {
     return (double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w;
 }
-/* From a (t = 0) to b (t = 1) the shorter way round; cheap, speed not quite even. */
+/* From a (t = 0) to b (t = 1) the shorter way round; fast, at nearly constant angular speed. */
 static inline txm_quat txm_quat_nlerp(txm_quat a, txm_quat b, float t) {
     return txm_quat_blend(a, b, 1.0 - t, txm_quat_dot(a, b) < 0 ? -(double)t : t);
 }
-/* The same at even speed. */
+/* The same at constant angular speed. */
 static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
     const double d = txm_quat_dot(a, b), cosine = fabs(d);
     if (cosine > 0.9995) return txm_quat_nlerp(a, b, t); /* the sine would be too small */

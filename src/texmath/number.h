@@ -12,10 +12,10 @@ static inline int txm_is_finite(double x) {
     return ((bits >> 52) & 0x7ff) != 0x7ff;
 }
 
-/* x rounded to float, for good. gcc 12 drops the rounding of neighbouring values that are widened
-   again ((double)(float)x becomes x, from -O2 on), so results would depend on what was inlined
-   where. Code that needs the same bits everywhere rounds with this and not with a cast: the empty
-   asm might have changed f, for all that gcc knows, and costs nothing. */
+/* x rounded to float, in all cases. From -O2 on gcc 12 drops the rounding of neighbouring values
+   that are widened again ((double)(float)x becomes x), so that results depend on what was inlined.
+   Code that needs the same bits everywhere rounds with this, not with a cast: gcc must assume that
+   the empty asm changes f, and it costs nothing. */
 static inline float txm_float(double x) {
     float f = (float)x;
 #if defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__)

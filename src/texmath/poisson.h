@@ -56,7 +56,7 @@ static inline double txm_poisson_apply(const txm_poisson_grid *g, const double *
     return sum;
 }
 
-/* The bar of channel c, which is reached (0..1) of its way to the goal. */
+/* Report that the share reached (0..1) of channel c is done. */
 static inline int txm_poisson_report(const txm_poisson_desc *desc, const txm_env *env, int c,
                                      double reached) {
     const double from = desc->progress_from, to = desc->progress_to > 0 ? desc->progress_to : 1;
@@ -207,7 +207,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
     if (*unknown > INT32_MAX)
         return txm_fail_at(env, TXM_TOO_LARGE, "mask",
                            "more than 2^31 - 1 unknown pixels; use tiles");
-    /* Pixels of an image hang together, so one known pixel is enough to hold every unknown one. */
+    /* The pixels of an image are connected, so one known pixel determines the unknown ones. */
     if (!(desc->screen > 0) && *unknown == (size_t)mask->width * (size_t)mask->height)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "mask",
                            "every pixel is unknown; leave one known, or set screen");

@@ -28,7 +28,7 @@ enum {
     TXS_MAX_TYPES = 96, /* clique types of one level                                        */
     TXS_MAX_ENDS = 112, /* ends of cliques at one pixel of one band: keeps energies 16 bit  */
     TXS_MAX_REACH = 60, /* pixels                                                           */
-    TXS_NEAR = 10,      /* pixels: the finer levels look no further, coarser ones see the rest */
+    TXS_NEAR = 10,      /* pixels: reach of all levels but the coarsest                     */
     TXS_ROW = 64,       /* bytes of a table row for a difference                            */
     TXS_TABLE = (2 * TXS_CLASSES + TXS_DIFFERENCES) * TXS_ROW, /* bytes of one type's tables  */
     TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
@@ -54,9 +54,9 @@ enum {
 };
 
 /* Learning. Ours, by the medians of several measures over the stochastic exemplars: the kinds of
-   three and four pixels hold the shapes and are preferred. */
+   three and four pixels describe shapes and are preferred. */
 #define TXS_THRESHOLD 0.005f   /* smallest distance of histograms that is worth a clique type    */
-#define TXS_NOISE_SHARE 0.75f  /* and that in units of what two samples of one source differ by  */
+#define TXS_NOISE_SHARE 0.75f  /* the same in units of the expected sampling noise               */
 #define TXS_CORNER_WEIGHT 2.0f /* of distances, pairs having 1                                   */
 #define TXS_EDGE_WEIGHT 2.5f
 

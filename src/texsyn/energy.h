@@ -27,7 +27,7 @@ static const uint8_t txs_no_energy[TXS_VALUES] = {
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO,
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO};
 
-/* The value with the least energy
+/* The value with the lowest energy
 
        e(v) = TXS_FINE * (sum of rows at v - TXS_ZERO count) + single(v) + noise
 

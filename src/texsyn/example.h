@@ -44,7 +44,7 @@ static void txs_find_bands(texsyn_model *m, const txm_image *im, const txs_sourc
     }
     txm_eigen3(cov, values, vectors);
     m->bands = 0;
-    for (int k = 0; k < colours; k++) { /* bands that nobody sees are left out */
+    for (int k = 0; k < colours; k++) { /* bands with no visible variance are left out */
         if (values[k] < 0.05 && m->bands > 0) break;
         for (int c = 0; c < colours; c++)
             m->basis[m->bands][c] =
@@ -144,9 +144,10 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
 }
 
 /* Where pixel x of a row of `fine` lies on a row of `coarse` that is half as long: the nearest
-   pixel, the one on the other side, and as the result the weight of that in quarters. An odd torus
-   lies on one that is half a pixel too long, which is squeezed lest there be a seam: by a quarter
-   each at two places far from the border. From the first on, parities swap. */
+   pixel, its neighbour on the other side, and as the result the weight of the latter in quarters. A
+   torus of odd width lies on a coarse one that is half a pixel too long, so positions are
+   compressed by a quarter of a pixel at each of two places far from the border, which avoids a seam
+   there. From the first of these places on, parities swap. */
 static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
     int at = 2 * x + 1; /* in quarters of a coarse pixel, from the border */
     if (fine == 2 * coarse - 1) at = (int)(((int64_t)at * 2 * coarse + coarse - 1) / fine);
@@ -158,9 +159,10 @@ static int txs_place(int x, int fine, int coarse, int wrap, int where[2]) {
 }
 
 /* Fill the parent planes of a canvas with the coarser level above, bilinearly, in this level's
-   steps. At the borders the coarse canvas wraps if it has a margin, else its last row counts. */
-static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, const txs_level *level,
-                           txs_canvas *canvas, int bands) {
+   steps. At the borders the coarse canvas wraps if it has a margin, else its last row is
+   repeated. */
+static void txs_fill_parent(const txs_level *above, const txs_canvas *coarse,
+                            const txs_level *level, txs_canvas *canvas, int bands) {
     if (canvas->width == 2 * coarse->width - 1) canvas->slip_x = coarse->width / 2;
     if (canvas->height == 2 * coarse->height - 1) canvas->slip_y = coarse->height / 2;
     for (int b = 0; b < bands; b++) {
@@ -184,8 +186,8 @@ static void txs_lay_parent(const txs_level *above, const txs_canvas *coarse, con
 }
 
 /* Start the synthesis of a level: from what is above, or from even noise (step 2 of [1]). */
-static void txs_lay_start(const txs_level *level, const txs_canvas *canvas, int bands,
-                          int has_parent, uint64_t seed) {
+static void txs_start_canvas(const txs_level *level, const txs_canvas *canvas, int bands,
+                             int has_parent, uint64_t seed) {
     txm_rng rng = txm_rng_make(seed, 3);
     for (int b = 0; b < bands; b++) {
         for (int y = 0; y < canvas->height; y++) {

@@ -5,9 +5,9 @@
 
 /* ---- the model as bytes -------------------------------------------------------------------
 
-   An adaptive binary arithmetic code (a range coder in the manner of LZMA's). One description of
-   the model, txs_code_model, serves both ways: a coder either writes the value that it is given
-   or returns the one that it reads. docs/model-format.md describes the bytes.               */
+   An adaptive binary arithmetic code (a range coder as LZMA has it). One description of the model,
+   txs_code_model, serves for both directions: a coder either writes the value that it is given or
+   returns the one that it reads. docs/model-format.md describes the bytes.                  */
 
 enum { TXS_MAGIC_BYTES = 4, TXS_CRC_BYTES = 4, TXS_MAX_FILE = 1 << 20, TXS_UNARY = 14 };
 
@@ -56,14 +56,15 @@ static void txs_coder_finish(txs_coder *c) {
     for (int i = 0; i < 5; i++) txs_shift(c);
 }
 
-/* The probability of a 0 in 1/65536, and how often it was asked: it learns fast at first. */
+/* The probability of a 0 in 1/65536, and how many bits were coded with it, up to 24: it adapts
+   faster at first. */
 typedef struct txs_chance {
     uint16_t zero, seen;
 } txs_chance;
 
 static const txs_chance txs_even = {32768, 0};
 
-/* One bit, at the cost of its chance. */
+/* Code one bit with its probability, and adapt that. */
 static int txs_bit(txs_coder *c, txs_chance *p, int bit) {
     const uint32_t bound = (uint32_t)(((uint64_t)c->range * p->zero) >> 16);
     if (c->reading) bit = c->code >= bound;
@@ -134,9 +135,9 @@ static int txs_number(txs_coder *c, txs_context *x, int value) {
 
 typedef enum txs_mirror { TXS_NONE, TXS_REVERSED, TXS_DIAGONAL } txs_mirror;
 
-/* A sequence, each entry told from what is expected there: what the sequence most alike has,
-   shifted as the entry before was, and what stands at the mirrored place if that is known already.
-   Contexts by the last surprise. */
+/* A sequence, each entry coded as its difference from a prediction: the entry of the most similar
+   sequence, shifted by most of the shift of the entry before, and mixed with the entry at the
+   mirrored place if that is known already. The last difference chooses the context. */
 static void txs_sequence(txs_coder *c, txs_context *x, int16_t *v, const int16_t *like, int count,
                          int low, int high, txs_mirror mirror) {
     int surprise = 0, drift = 0;
@@ -161,9 +162,9 @@ typedef struct txs_codec {
     int16_t used[TXS_BINS]; /* the potential, where it is kept */
 } txs_codec;
 
-/* The inverse of txs_round_statistics. A potential is kept only where the example has something;
-   elsewhere values are dear, and the control makes them dearer if they turn up. Returns 0 for an
-   empty histogram. */
+/* The inverse of txs_round_statistics. A potential is kept only for bins that occur in the example;
+   other bins get a high energy, which the control raises if they occur nevertheless. Returns 0 for
+   an empty histogram. */
 static int txs_unround_statistics(txs_type *t) {
     int32_t total = 0;
     for (int i = 0; i < TXS_BINS; i++) total += t->root[i] * t->root[i];
@@ -230,7 +231,7 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
         t->ex = txs_number(c, &z->place[2][t->kind], t->ex);
         t->ey = txs_number(c, &z->place[3][t->kind], t->ey);
     }
-    /* members that coincide would see each other change */
+    /* members that coincide would change together */
     const int same_d = t->dx == 0 && t->dy == 0, same_e = t->ex == 0 && t->ey == 0;
     const int equal = t->ex == t->dx && t->ey == t->dy,
               opposite = t->ex == -t->dx && t->ey == -t->dy;
@@ -239,7 +240,7 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     if (t->kind == TEXSYN_CORNER && (same_e || equal)) c->bad = 1;
     if (t->kind == TEXSYN_PARALLEL && t->band == t->other && (same_e || equal || opposite))
         c->bad = 1;
-    /* and so would members that are drawn together, see txs_visit */
+    /* and so would members that are drawn at the same time, see txs_visit */
     int at[4][2], drawn = t->kind == TEXSYN_SCALE ? 2 : txs_members(t, at);
     txs_members(t, at);
     for (int i = 0; i < drawn; i++) {

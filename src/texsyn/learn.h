@@ -198,7 +198,7 @@ static int txs_add_worst(txs_learner *a, int count, float threshold) {
             break;
         }
         a->candidates[worst] = a->candidates[--a->candidate_count];
-        for (int i = 0; i < a->candidate_count; i++) { /* its neighbours tell much the same */
+        for (int i = 0; i < a->candidate_count; i++) { /* its neighbours are redundant */
             txs_type *t = &a->candidates[i].type;
             if (t->kind == chosen.kind && t->kind < TEXSYN_CORNER && t->band == chosen.band &&
                 t->other == chosen.other && abs(t->dx - chosen.dx) <= 1 &&
@@ -208,8 +208,8 @@ static int txs_add_worst(txs_learner *a, int count, float threshold) {
     }
     return added;
 }
-/* A share h is kept as its square root in steps of 1/scale: the sampling noise of a count is the
-   same for all roots, and this step about as large. */
+/* A share h is kept as its square root in steps of 1/scale: the sampling noise of the root is the
+   same for all shares, and the step about as large. */
 static int txs_root_scale(int kind, int level) {
     return kind == TEXSYN_SINGLE ? 160 : level == 0 ? 48 : level == 1 ? 36 : 26;
 }
@@ -247,7 +247,7 @@ static void txs_preselect(txs_learner *a) {
         txs_type t = a->level->types[k];
         if (txs_measure(&a->source->canvas, a->source->mask, 0, a->source->step, bands, a->level,
                         &t, t.share) > 0)
-            a->level->types[kept++] = t; /* a ragged mask may hold none of them */
+            a->level->types[kept++] = t; /* an irregular mask may contain none of them */
     }
     a->level->type_count = kept;
 }
@@ -266,8 +266,8 @@ static float txs_visibility(const txs_level *l, int band) {
     return txm_float(deviation / (deviation + 4) * sqrt(l->values[band] / (double)TXS_VALUES));
 }
 
-/* The sums of the potentials over some sweeps become the model's: a steadier value than the last.
-   Where the example has nothing, and in difference from any constant, they are free. */
+/* The model's potentials: the mean over some sweeps, which varies less than the last value. They
+   are arbitrary up to a constant, and where the example has no clique. */
 static void txs_keep_potentials(txs_level *l, int64_t (*sum)[TXS_BINS], int sweeps) {
     for (int k = 0; k < l->type_count; k++) {
         txs_type *t = &l->types[k];
@@ -284,7 +284,7 @@ static void txs_keep_potentials(txs_level *l, int64_t (*sum)[TXS_BINS], int swee
     }
 }
 
-/* Learn one level on a canvas whose parent planes are laid. Fraction from..to of the whole. */
+/* Learn one level on a canvas whose parent planes are filled. Fraction from..to of the whole. */
 static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env *env, float from,
                                   float to) {
     const int max_types = a->desc->max_types     ? a->desc->max_types
@@ -326,7 +326,8 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
     for (int b = 0; b < bands; b++) seen[b] = txs_visibility(a->level, b);
     txs_list_candidates(a, reach, seen);
     txm_parallel_for(env, a->candidate_count, txs_measure_example, a);
-    txs_lay_start(a->level, a->canvas, bands, !top, txm_hash(a->desc->seed) + (uint64_t)a->index);
+    txs_start_canvas(a->level, a->canvas, bands, !top,
+                     txm_hash(a->desc->seed) + (uint64_t)a->index);
 
     /* steps 3 to 6 of [1]; what was synthesised so far, and its potentials, are kept */
     for (;;) {

@@ -87,7 +87,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
             size_t seen = 0;
             for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
             if (s->mask && seen < 256) {
-                m->levels = i; /* the region is too ragged to be seen from further away */
+                m->levels = i; /* too little of an irregular region is left at this level */
                 break;
             }
         }
@@ -97,7 +97,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         }
     }
     for (int i = m->levels - 2; i >= 0; i--)
-        txs_lay_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
+        txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
                        m->bands);
     return TXM_OK;
 }
@@ -148,7 +148,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
             goto done;
         }
-        if (above.pixels) txs_lay_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+        if (above.pixels) txs_fill_parent(a.level + 1, &above, a.level, &canvas, m->bands);
         txs_canvas_free(&above, env);
         const float to = from + 1.0f / (float)(1 << 2 * i) / total;
         if ((status = txs_learn_level(&a, noise, env, from, to)) != TXM_OK) goto done;
@@ -157,7 +157,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
         canvas.pixels = NULL;
     }
 
-    /* what is handed out has been through the file format: saving it loses nothing more */
+    /* the model returned has been through the file format, so that saving it loses nothing more */
     if ((status = texsyn_save(m, env, NULL, 0, &size)) != TXM_OK) goto done;
     bytes = (uint8_t *)txm_arena_alloc(&arena, size, 1);
     if (!bytes) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");

@@ -10,14 +10,14 @@
 
        V = integral + proportional gain * (h - h_ref),
 
-   h the canvas's histogram now, h_ref the example's, so that values that are too frequent get
-   dearer; the integral part follows the error once a sweep. [1] derives the potentials from the
-   statistics; controlling them is how to get there in few sweeps.
+   h the current histogram of the canvas, h_ref the example's, so that the energy of values that are
+   too frequent rises; the integral part follows the error once a sweep. [1] derives the potentials
+   from the statistics; controlling them needs far fewer sweeps.
 
-   Order and threads. A sweep visits the pixels of one sub-lattice (x, y modulo 8) after the
-   other. The canvas is cut into an even number of strips at least as high as a clique; even
-   strips are worked on at the same time, then odd ones, so that no pixel changes while another
-   thread looks at it, and the result does not depend on the number of threads.              */
+   Order and threads. A sweep visits one sub-lattice (x, y modulo 8) after another. The canvas is
+   divided into an even number of strips at least as high as a clique; all even strips are processed
+   in parallel, then all odd ones, so that no pixel changes while another thread reads it, and the
+   result does not depend on the number of threads.                                          */
 
 /* The ends of cliques at a pixel, and the clique types that have a tail there. */
 typedef struct txs_list {
@@ -243,9 +243,10 @@ static int txs_is_counted(const txs_sampler *s, int x, int y) {
     return s->skip == 1 || (unsigned)(x / TXS_GRID + 3 * (y / TXS_GRID)) % (unsigned)s->skip == 0;
 }
 
-/* Draw new values for count pixels of a row, TXS_GRID apart. No clique joins two of them (but
-   across the border of a torus whose width is no multiple of the grid), so it is as if one came
-   after the other; doing them together keeps what an end needs in registers. */
+/* Draw new values for count pixels of a row, TXS_GRID apart. No clique contains two of them
+   (except across the border of a torus whose width is not a multiple of the grid), so the result
+   is the same as drawing one after another; drawing them together keeps the data of an end in
+   registers. */
 static void txs_visit(const txs_sampler *s, int x, int y, int count, txm_rng *rng) {
     const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
     const uint8_t *p = txs_at(s->canvas, 0, x, y);
@@ -341,8 +342,8 @@ static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, flo
         if (txm_progress(env, from + (to - from) * (float)group / (float)groups, stage))
             return txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
         memcpy(s->sublattice, order + group * TXS_GROUP, sizeof s->sublattice);
-        /* Both phases with the same potentials: were they set in between, even strips would be
-           drawn against what odd ones just did and the two could part for good. */
+        /* Both phases use the same potentials: if they were updated in between, even and odd strips
+           would compensate for each other and could drift apart permanently. */
         for (s->phase = 0; s->phase < phases; s->phase++)
             txm_parallel_for(env, s->tasks, txs_work, s);
         txs_gather(s, groups);
@@ -380,7 +381,7 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
 static void txs_sampler_start(txs_sampler *s) {
     const txs_canvas *c = s->canvas;
     const int types = s->level->type_count;
-    int reach = 16; /* a strip is at least that high: less is too little work for a thread */
+    int reach = 16; /* a strip is at least this high: less is too little work for a thread */
     for (int k = 0; k < types; k++)
         if (txs_reach(&s->level->types[k]) > reach) reach = txs_reach(&s->level->types[k]);
     memset(s->list, 0, sizeof s->list);
@@ -391,7 +392,7 @@ static void txs_sampler_start(txs_sampler *s) {
     s->tasks = s->strips > 1 ? s->strips / 2 : 1;
     if (s->tasks > TXS_TASKS) s->tasks = TXS_TASKS;
     s->skip = pixels > TXS_SAMPLES ? (int)(pixels / TXS_SAMPLES) : 1;
-    if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find next to none */
+    if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find almost none */
 
     memset(s->histogram, 0, sizeof *s->histogram * (size_t)types);
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));

@@ -12,13 +12,13 @@ struct texsyn_job {
     txm_arena arena; /* holds the job; what a level needs lies in level_arena */
     txm_arena level_arena;
     int16_t *noise;
-    txs_canvas canvas; /* of the level in work, or of the finished level 0      */
+    txs_canvas canvas; /* of the current level, or of the finished level 0      */
     txs_sampler *sampler;
-    int level, sweep;  /* being worked on; level -1: finished                   */
+    int level, sweep;  /* current ones; level -1: finished                      */
     double work, done; /* pixel visits in all, so far                           */
 };
 
-/* sweeps of a level: the coarser ones are cheap, and decide more */
+/* sweeps of a level: the coarser ones cost little and matter more */
 static int txs_sweeps(const texsyn_synth_desc *d, int level) {
     static const int sweeps[5][3] = {{2, 4, 8}, {3, 6, 10}, {5, 8, 16}, {6, 12, 24}, {10, 20, 32}};
     return sweeps[d->quality + 2][level > 2 ? 2 : level];
@@ -64,9 +64,9 @@ static txm_status txs_enter_level(texsyn_job *job, txm_env *env) {
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the sampler");
     }
-    if (coarse.pixels) txs_lay_parent(l + 1, &coarse, l, &job->canvas, m->bands);
-    txs_lay_start(l, &job->canvas, m->bands, coarse.pixels != NULL,
-                  txm_hash(job->desc.seed) + (uint64_t)i);
+    if (coarse.pixels) txs_fill_parent(l + 1, &coarse, l, &job->canvas, m->bands);
+    txs_start_canvas(l, &job->canvas, m->bands, coarse.pixels != NULL,
+                     txm_hash(job->desc.seed) + (uint64_t)i);
     txs_canvas_free(&coarse, &job->memory);
     txs_sampler_start(job->sampler);
     return TXM_OK;
@@ -140,8 +140,8 @@ TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, int *more) {
     return TXM_OK;
 }
 
-/* A canvas as pixels: back from bands to channels. Within its step a value is placed by what is
-   around it where that is smooth, at random where it is not. */
+/* A canvas as pixels: back from bands to channels. Within its quantisation step a value is placed
+   by its neighbours where these are smooth, at random where they are not. */
 typedef struct txs_painter {
     const texsyn_job *job;
     const txm_image *out;
