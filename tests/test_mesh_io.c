@@ -1,7 +1,7 @@
 /* test_mesh_io.c - mesh files read, written, read again; and files that are none
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Built with: tools/files/*.c                                                                    */
+   Built with: tools/files/mesh*.c tools/files/image_io.c tools/files/stb.c                       */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
