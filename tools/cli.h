@@ -13,7 +13,7 @@
 
 #define TEXKIT_VERSION "0.1.0"
 
-/* "0.1.0 (texmath 0.1.0, ...)" for --version; defined by texkit.c, which knows the headers. */
+/* "0.1.0 (texmath 0.1.0, ...)" for --version; defined by texkit.c, which includes the headers. */
 extern const char cli_versions[];
 
 /* Exit status of the program, as the manual promises. */

@@ -12,11 +12,12 @@ typedef struct command {
     int (*run)(int argc, char **argv); /* the arguments behind the command's name; exit status */
 } command;
 
-extern const command learn_command, synth_command; /* texkit.c */
-extern const command tiles_command;                /* tiles.c  */
-extern const command retile_command;               /* retile.c */
+/* commands/ */
+extern const command learn_command, synth_command; /* clique.c */
 extern const command patch_command;                /* patch.c  */
 extern const command edges_command;                /* edges.c  */
+extern const command tiles_command;                /* tiles.c  */
+extern const command retile_command;               /* retile.c */
 extern const command tree_command, forest_command; /* tree.c   */
 
 /* A call into the library failed: say so in its own words. */

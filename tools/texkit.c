@@ -1,23 +1,19 @@
 /* texkit.c - the texkit headers on the command line
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Each command is a manual (cli_manual), a table of options and one function that calls the
-   library; the table at the end lists them. learn and synth are here, each of the others is in a
-   file of its name. What commands share is in command.c and cli.c; image files are in image_io.c,
-   mesh files in mesh_io.c. Read run_learn first: it shows all there is to embedding a header.    */
+   The table below lists the commands; each is in a file of commands/. What they share is in
+   command.c and cli.c; files/ reads and writes pictures and meshes. Begin with commands/clique.c:
+   run_learn shows all there is to embedding a header.                                          */
 #define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
 #include "command.h"
-#include "files/image_io.h"
 
-#define TEXSYN_IMPLEMENTATION
-#include "texsyn.h"
 #include "texedges.h"
 #include "texpatch.h"
+#include "texsyn.h"
 #include "textiles.h"
 #include "treepieces.h"
 #include "trimesh_relax.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <unistd.h>
 
@@ -27,195 +23,7 @@ const char cli_versions[] =
                    ", textiles " TEXTILES_VERSION ", trimesh_relax " TRIMESH_RELAX_VERSION
                    ", treepieces " TREEPIECES_VERSION ")";
 
-enum { MAX_SIDE = 1 << 24 };
-
-/* ---- texkit learn ------------------------------------------------------------------------ */
-
-static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
-    cli_figure(run, "model_bytes", (double)bytes);
-    int per_level[CLI_MAX_LIST] = {0}; /* full resolution first */
-    texsyn_clique clique;
-    for (int i = 0; texsyn_clique_at(model, i, &clique, NULL, 0) > 0; i++)
-        per_level[clique.level]++;
-    cli_figure(run, "clique_types", texsyn_clique_count(model));
-    cli_figures(run, "clique_types_per_level", per_level, texsyn_level_count(model));
-    cli_figure(run, "levels", texsyn_level_count(model));
-    cli_figure(run, "bands", texsyn_band_count(model));
-}
-
-static const cli_manual learn_manual = {
-    "learn", "EXEMPLAR -o MODEL.txs [options]", "learn a small model of a texture from a picture",
-    "EXEMPLAR is a PNG, JPEG, BMP, TGA or binary PNM picture of the texture, at least\n"
-    "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is taken as RGBA). About\n"
-    "256 x 256 pixels that show the largest element some dozens of times are enough. The\n"
-    "model holds statistics, no pixels; 'texkit synth' makes new texture from it.\n",
-    "  texkit learn gravel.jpg -o gravel.txs\n"
-    "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
-    1, "exemplar", 0};
-
-static int run_learn(int argc, char **argv) {
-    cli run;
-    texsyn_learn_desc desc = {0};
-    const char *mask_path = NULL;
-    const cli_option options[] = {
-        {CLI_INT, "--max-distance", "D", "longest pair in pixels, 2 to 60; default 40",
-         &desc.max_distance, 2, 60},
-        {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 24, gray 36",
-         &desc.max_types, 1, 60},
-        {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: by the size",
-         &desc.levels, 1, 6},
-        {CLI_INPUT, "--mask", "M", "learn only where this picture, of the same size, is not black",
-         &mask_path, 0, 0},
-        {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
-    };
-    char extension[8];
-    texsyn_model *model = NULL;
-    unsigned char *bytes = NULL;
-    size_t size = 0;
-    int status;
-
-    if (cli_begin(&run, &learn_manual, options, argc, argv, &status)) return status;
-    file_extension(run.output, extension);
-    if (strcmp(extension, ".txs") != 0)
-        return cli_fail(&run, CLI_USAGE, "cannot write '%s': end the model's name in .txs",
-                        run.output);
-
-    cli_stage(&run, "read");
-    status = read_image(&run, run.inputs[0], 0, &desc.example);
-    if (!status && mask_path) status = read_image(&run, mask_path, 1, &desc.mask);
-    if (!status && mask_path &&
-        (desc.mask.width != desc.example.width || desc.mask.height != desc.example.height))
-        status = cli_fail(&run, CLI_FAILED, "the mask '%s' is %d x %d; make it %d x %d as '%s'",
-                          mask_path, desc.mask.width, desc.mask.height, desc.example.width,
-                          desc.example.height, run.inputs[0]);
-    if (status) goto done;
-
-    cli_stage(&run, "learn");
-    desc.seed = run.seed;
-    txm_status result = texsyn_learn(&desc, &run.env, &model);
-    if (result == TXM_OK) result = texsyn_save(model, &run.env, NULL, 0, &size);
-    if (result == TXM_OK && !(bytes = (unsigned char *)malloc(size))) result = TXM_OUT_OF_MEMORY;
-    if (result == TXM_OK) result = texsyn_save(model, &run.env, bytes, size, &size);
-    if (result != TXM_OK) {
-        status = fail_library(&run, result, run.inputs[0]);
-        goto done;
-    }
-
-    model_figures(&run, model, size);
-    status = cli_finish(&run, bytes, size);
-    if (!status && !run.quiet)
-        printf("%s: %d clique types on %d levels, %zu bytes, %.1f s\n", run.output,
-               texsyn_clique_count(model), texsyn_level_count(model), size, cli_seconds(&run));
-done:
-    free(bytes);
-    texsyn_model_free(model);
-    image_free(&desc.example);
-    image_free(&desc.mask);
-    return status;
-}
-
-/* ---- texkit synth ------------------------------------------------------------------------ */
-
-static const cli_manual synth_manual = {
-    "synth", "EXEMPLAR|MODEL.txs -o OUT --size WxH [options]",
-    "make new texture from a model or a picture",
-    "The input is a model of 'texkit learn', or a picture to learn from first (the file's\n"
-    "content decides, not its name). OUT ends in .png, .tga, .bmp or .jpg; it has the\n"
-    "channels of the exemplar. JPEG and BMP hold gray as RGB; JPEG takes no alpha. A\n"
-    "higher --quality sweeps over the picture more often: statistics closer to the\n"
-    "exemplar's, and more time.\n",
-    "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
-    "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
-    1, "exemplar or model", 0};
-
-/* The input as a model: loaded if it is one, else learned from the picture. */
-static int get_model(cli *run, texsyn_model **model) {
-    const char *path = run->inputs[0], *why;
-    texsyn_learn_desc learn = {0};
-    char extension[8];
-    size_t size;
-    txm_status result;
-    int status = CLI_DONE;
-
-    cli_stage(run, "read");
-    unsigned char *bytes = file_read(path, &size);
-    if (!bytes) return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, strerror(errno));
-    file_extension(path, extension);
-    result = texsyn_load(bytes, size, &run->env, model);
-    if (result == TXM_OK) {
-        model_figures(run, *model, size);
-    } else if (!strcmp(extension, ".txs") && !image_is_known(bytes, size)) {
-        status = fail_library(run, result, path);
-    } else if (!image_decode(bytes, size, 0, &learn.example, &why)) {
-        status = cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
-    } else if (!(status = check_picture_path(run, run->output, 0, 0, learn.example.channels))) {
-        cli_stage(run, "learn");
-        learn.seed = run->seed;
-        result = texsyn_learn(&learn, &run->env, model);
-        if (result == TXM_OK) result = texsyn_save(*model, &run->env, NULL, 0, &size);
-        if (result == TXM_OK) model_figures(run, *model, size);
-        else status = fail_library(run, result, path);
-    }
-    image_free(&learn.example);
-    free(bytes);
-    return status;
-}
-
-static int run_synth(int argc, char **argv) {
-    cli run;
-    int extent[2] = {0, 0}, tileable = 0, quality = 0, status;
-    const cli_option options[] = {
-        {CLI_EXTENT, "--size", "WxH", "width and height of the result in pixels", extent, 1,
-         MAX_SIDE},
-        {CLI_FLAG, "--tileable", NULL, "the result continues across its own borders", &tileable, 0,
-         0},
-        {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0", &quality, -2, 2},
-        {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
-    };
-    texsyn_model *model = NULL;
-    txm_image out = {0};
-
-    if (cli_begin(&run, &synth_manual, options, argc, argv, &status)) return status;
-    if (extent[0] == 0)
-        return cli_fail(&run, CLI_USAGE, "no size given; add --size WxH, such as --size 512x512");
-    if (extent[0] > TEXSYN_MAX_PIXELS / extent[1])
-        return cli_fail(&run, CLI_USAGE, "--size %dx%d: at most %d pixels in all", extent[0],
-                        extent[1], TEXSYN_MAX_PIXELS);
-    status = check_picture_path(&run, run.output, extent[0], extent[1], 0);
-    if (!status) status = get_model(&run, &model);
-    if (!status)
-        status = check_picture_path(&run, run.output, extent[0], extent[1], texsyn_channels(model));
-    if (status) goto done;
-
-    cli_stage(&run, "synthesise");
-    out.width = extent[0];
-    out.height = extent[1];
-    out.channels = texsyn_channels(model);
-    out.pixels = malloc((size_t)out.width * (size_t)out.height * (size_t)out.channels);
-    texsyn_synth_desc desc = {model, out.width, out.height, tileable, quality, run.seed};
-    txm_status result = out.pixels ? texsyn_synthesize(&desc, &run.env, out) : TXM_OUT_OF_MEMORY;
-    if (result != TXM_OK) {
-        status = fail_library(&run, result, run.inputs[0]);
-        goto done;
-    }
-
-    cli_figure(&run, "width", out.width);
-    cli_figure(&run, "height", out.height);
-    cli_figure(&run, "channels", out.channels);
-    status = finish_with_picture(&run, &out);
-    if (!status && !run.quiet)
-        printf("%s: %d x %d pixels, %.1f s\n", run.output, out.width, out.height,
-               cli_seconds(&run));
-done:
-    free(out.pixels);
-    texsyn_model_free(model);
-    return status;
-}
-
 /* ---- the table of commands ---------------------------------------------------------------- */
-
-const command learn_command = {&learn_manual, run_learn};
-const command synth_command = {&synth_manual, run_synth};
 
 static const command *const commands[] = {&learn_command, &synth_command, &patch_command,
                                          &edges_command, &tiles_command, &retile_command,
@@ -228,7 +36,7 @@ static int print_overview(void) {
     for (int i = 0; i < COMMAND_COUNT; i++)
         printf("  %-10s %s\n", commands[i]->manual->name, commands[i]->manual->summary);
     printf("\n'texkit COMMAND --help' shows the options of one. Exit status: 0 done, 1 the work\n"
-           "failed, 2 the command line was wrong.\n\nExample:\n%s", synth_manual.example);
+           "failed, 2 the command line was wrong.\n\nExample:\n%s", synth_command.manual->example);
     return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
 }
 
