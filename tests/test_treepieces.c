@@ -1,60 +1,10 @@
 /* test_treepieces.c - trees: how they grow, their records, poses, wind and skin
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
-
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
-#include "testkit.h"
+
+#include "growkit.h"
 #include "treekit.h"
-
-static treepieces_kit *kit;
-static treepieces_species oak;
-
-static int set_up(void **state) {
-    (void)state;
-    return treepieces_kit_make(NULL, 0, NULL, &kit) != TXM_OK ||
-           treepieces_preset("oak", NULL, &oak) != TXM_OK;
-}
-static int tear_down(void **state) {
-    (void)state;
-    treepieces_kit_free(kit);
-    return 0;
-}
-
-static treepieces_forest_desc describe(int trees, int pieces) {
-    treepieces_forest_desc d;
-    memset(&d, 0, sizeof d);
-    d.kit = kit;
-    d.species = &oak;
-    d.species_count = 1;
-    d.tree_count = trees;
-    d.max_pieces = pieces;
-    d.seed = 5;
-    return d;
-}
-
-static treepieces_forest *grow(const treepieces_forest_desc *d) {
-    txm_env env = tk_env(NULL, NULL);
-    treepieces_forest *f;
-    if (treepieces_forest_make(d, &env, &f) != TXM_OK) fail_msg("%s", env.message);
-    return f;
-}
-
-static void *room(size_t count, size_t size) {
-    void *p = calloc(count, size);
-    assert_non_null(p);
-    return p;
-}
-
-static float *make_bones(const treepieces_forest *f, const treepieces_pose *pose) {
-    float *bones = (float *)room(f->node_count, TREEPIECES_BONE * sizeof(float));
-    assert_int_equal(treepieces_bones(f, pose, NULL, bones), TXM_OK);
-    return bones;
-}
 
 /* ---- rims -------------------------------------------------------------------------------- */
 
@@ -577,39 +527,24 @@ static void test_arguments(void **state) {
     treepieces_forest_free(NULL);
 }
 
-/* Every allocation in turn fails, every report cancels: nothing leaks, nothing is made. */
+/* Under failing allocations and cancelled reports nothing leaks and nothing is made. */
+static txm_status make_forest(void *context, txm_env *env) {
+    treepieces_forest *f = (treepieces_forest *)env;
+    const txm_status status = treepieces_forest_make((const treepieces_forest_desc *)context, env, &f);
+    if (status != TXM_OK) assert_null(f);
+    treepieces_forest_free(f);
+    return status;
+}
+
 static void test_faults(void **state) {
     (void)state;
-    for (int kind = 0; kind < 3; kind++) {
-        for (long k = 1;; k++) {
-            tk_memory memory;
-            tk_progress progress;
-            memset(&memory, 0, sizeof memory);
-            memset(&progress, 0, sizeof progress);
-            if (kind < 2) memory.fail_at = k;
-            memory.fail_onward = kind;
-            if (kind == 2) progress.cancel_at = k;
-            txm_env env = tk_env(&memory, &progress);
-            treepieces_forest_desc d = describe(65, 60); /* in blocks of 64 */
-            treepieces_species small = oak;
-            small.order_count = 1;
-            d.species = &small;
-            treepieces_forest *f = (treepieces_forest *)1;
-            const txm_status status = treepieces_forest_make(&d, &env, &f);
-            assert_int_equal(progress.errors, 0);
-            const int past = kind < 2 ? memory.calls < k : progress.calls < k;
-            if (past) {
-                assert_int_equal(status, TXM_OK);
-                treepieces_forest_free(f);
-                assert_int_equal(tk_leaks(&memory), 0);
-                break;
-            }
-            assert_int_equal(status, kind < 2 ? TXM_OUT_OF_MEMORY : TXM_CANCELLED);
-            assert_null(f);
-            assert_int_equal(progress.late, 0);
-            assert_int_equal(tk_leaks(&memory), 0);
-        }
-    }
+    treepieces_forest_desc d = describe(65, 60); /* in blocks of 64 */
+    treepieces_species small = oak;
+    small.order_count = 1;
+    d.species = &small;
+    assert_true(tk_sweep(make_forest, &d, TK_ALLOCATION) > 300);
+    assert_true(tk_sweep(make_forest, &d, TK_ONWARD) > 300);
+    assert_true(tk_sweep(make_forest, &d, TK_CANCEL) == 4);
 }
 
 /* What a forest says it takes is what it takes, and 1,000 trees of 4,000 triangles stay below 24 KB

@@ -1,36 +1,11 @@
 /* test_treepieces_looks.c - trees: leaf clouds, drawn leaves, impostors, baked cards and bark
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
-
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
-#include "testkit.h"
+
+#include "growkit.h"
 
 enum { SHAPES = TREEPIECES_LEAF_BLOSSOM + 1, SIDE = 96, VIEW = 72, MOST_CARDS = 256 };
-
-static treepieces_kit *kit;
-static treepieces_species oak;
-
-static int set_up(void **state) {
-    (void)state;
-    return treepieces_kit_make(NULL, 0, NULL, &kit) != TXM_OK ||
-           treepieces_preset("oak", NULL, &oak) != TXM_OK;
-}
-static int tear_down(void **state) {
-    (void)state;
-    treepieces_kit_free(kit);
-    return 0;
-}
-
-static void *room(size_t count, size_t size) {
-    void *p = calloc(count, size);
-    assert_non_null(p);
-    return p;
-}
 
 static txm_image make_image(int width, int height, int channels, txm_sample sample) {
     txm_image image;
@@ -72,16 +47,16 @@ static txm_image draw_shape(int shape, uint64_t seed) {
 /* ---- leaf clouds ------------------------------------------------------------------------- */
 
 static void check_card(const treepieces_card *c) {
-    const float width = tpc_dot(c->right, c->right), height = tpc_dot(c->up, c->up);
+    const float width = dot(c->right, c->right), height = dot(c->up, c->up);
     assert_true(width > 0 && height > 0);
-    assert_true(fabsf(tpc_dot(c->right, c->up)) < 1e-5f * (width + height));
-    assert_true(fabsf(tpc_dot(c->normal, c->normal) - 1) < 1e-4f);
+    assert_true(fabsf(dot(c->right, c->up)) < 1e-5f * (width + height));
+    assert_true(fabsf(dot(c->normal, c->normal) - 1) < 1e-4f);
     for (int k = 0; k < 4; k++) { /* all of it lies in the sphere, where impostors see it */
         float p[3];
         for (int a = 0; a < 3; a++)
             p[a] = c->center[a] + (k & 1 ? c->right[a] : -c->right[a]) +
                    (k & 2 ? c->up[a] : -c->up[a]);
-        assert_true(tpc_dot(p, p) < 1.0001f);
+        assert_true(dot(p, p) < 1.0001f);
     }
 }
 
@@ -102,7 +77,7 @@ static void test_cloud(void **state) {
             for (int k = 0; k < s.leaf_count; k++) {
                 check_card(&cards[k]);
                 /* the cards' size is what the species says */
-                assert_true(fabsf(sqrtf(tpc_dot(cards[k].up, cards[k].up)) - s.leaf_size / 2) <
+                assert_true(fabsf(sqrtf(dot(cards[k].up, cards[k].up)) - s.leaf_size / 2) <
                             0.26f * s.leaf_size);
             }
         }
@@ -155,7 +130,7 @@ static void test_cloud_spread(void **state) {
                 }
                 const float *c = cards[k].center;
                 outside += c[0] * c[0] + 4 * c[1] * c[1] + c[2] * c[2] > 0.16f;
-                outwards += tpc_dot(cards[k].normal, c) > 0;
+                outwards += dot(cards[k].normal, c) > 0;
             }
         }
         for (int a = 0; a < 3; a++) assert_true(fabs(sum[a]) < 0.06 * (double)all);
@@ -250,6 +225,10 @@ static void test_leaves_sizes(void **state) {
     }
 }
 
+static txm_status draw_leaves(void *context, txm_env *env) {
+    return treepieces_draw_leaves(&oak, 1, env, *(const txm_image *)context);
+}
+
 static void test_leaves_refusals(void **state) {
     (void)state;
     txm_image good = make_image(32, 32, 4, TXM_U8);
@@ -272,27 +251,13 @@ static void test_leaves_refusals(void **state) {
         assert_int_equal(memory.blocks, 0);
         assert_true(hash_image(&good) == hash);
     }
-    for (int kind = 0; kind < 2; kind++) { /* out of memory, cancelled */
-        for (long k = 1;; k++) {
-            tk_memory memory;
-            tk_progress progress;
-            memset(&memory, 0, sizeof memory);
-            memset(&progress, 0, sizeof progress);
-            if (kind) progress.cancel_at = k;
-            else memory.fail_at = k;
-            txm_env env = tk_env(&memory, &progress);
-            const txm_status status = treepieces_draw_leaves(&oak, 1, &env, good);
-            assert_int_equal(tk_leaks(&memory), 0);
-            assert_int_equal(progress.errors, 0);
-            assert_int_equal(progress.late, 0);
-            if ((kind ? progress.calls : memory.calls) < k) {
-                assert_int_equal(status, TXM_OK);
-                assert_true(k > 1);
-                break;
-            }
-            assert_int_equal(status, kind ? TXM_CANCELLED : TXM_OUT_OF_MEMORY);
-        }
-    }
+    const tk_output pixels[1] = {{good.pixels, image_bytes(&good)}};
+    assert_int_equal(tk_sweep_outputs(draw_leaves, &good, TK_ALLOCATION, pixels, 1), 1);
+    assert_int_equal(tk_sweep_outputs(draw_leaves, &good, TK_ONWARD, pixels, 1), 1);
+    assert_int_equal(tk_sweep(draw_leaves, &good, TK_CANCEL), 1);
+    txm_image tall = make_image(4, 300, 4, TXM_U8);
+    assert_int_equal(tk_sweep(draw_leaves, &tall, TK_CANCEL), 5);
+    free(tall.pixels);
     free(good.pixels);
 }
 
@@ -312,7 +277,7 @@ static void set_view(treepieces_impostor_desc *d, float x, float y, float z) {
     }
 }
 
-static treepieces_impostor_desc describe(const treepieces_card *cards, int count,
+static treepieces_impostor_desc view_cards(const treepieces_card *cards, int count,
                                          txm_image leaves) {
     treepieces_impostor_desc d;
     memset(&d, 0, sizeof d);
@@ -411,7 +376,7 @@ static void test_impostor(void **state) {
         const treepieces_species s = shaped(i / 5);
         txm_image leaves = draw_shape(i / 5, 1);
         treepieces_impostor_desc d =
-            describe(cards, treepieces_cloud(&s, (uint32_t)i, cards), leaves);
+            view_cards(cards, treepieces_cloud(&s, (uint32_t)i, cards), leaves);
         set_view(&d, views[i % 5][0], views[i % 5][1], views[i % 5][2]);
         memset(color.pixels, 0x33, image_bytes(&color));
         memset(depth.pixels, 0x33, image_bytes(&depth));
@@ -439,7 +404,7 @@ static void test_impostor_behind(void **state) {
     (void)state;
     treepieces_card cards[MOST_CARDS];
     txm_image color[2], depth[2], leaves = draw_shape(TREEPIECES_LEAF_LOBED, 1);
-    treepieces_impostor_desc d = describe(cards, treepieces_cloud(&oak, 7, cards), leaves);
+    treepieces_impostor_desc d = view_cards(cards, treepieces_cloud(&oak, 7, cards), leaves);
     for (int side = 0; side < 2; side++) {
         color[side] = make_image(VIEW, VIEW, 4, TXM_U8);
         depth[side] = make_image(VIEW, VIEW, 1, TXM_F32);
@@ -477,7 +442,7 @@ static void test_impostor_card(void **state) {
     leaves.pixels = texels;
     leaves.width = leaves.height = 2;
     leaves.channels = 4;
-    treepieces_impostor_desc d = describe(pair, 2, leaves);
+    treepieces_impostor_desc d = view_cards(pair, 2, leaves);
     assert_int_equal(treepieces_impostor(&d, NULL, color, depth), TXM_OK);
     for (int y = 0; y < 8; y++)
         for (int x = 0; x < 16; x++) { /* it covers 0.25..0.75 by 0..0.5 of -1..1 */
@@ -506,7 +471,7 @@ static void test_impostor_refusals(void **state) {
     treepieces_card cards[MOST_CARDS];
     txm_image leaves = draw_shape(0, 1), color = make_image(8, 8, 4, TXM_U8);
     txm_image depth = make_image(8, 8, 1, TXM_F32);
-    const treepieces_impostor_desc good = describe(cards, treepieces_cloud(&oak, 0, cards), leaves);
+    const treepieces_impostor_desc good = view_cards(cards, treepieces_cloud(&oak, 0, cards), leaves);
     for (int kind = 0; kind < 13; kind++) {
         treepieces_impostor_desc d = good;
         txm_image c = color, z = depth;
@@ -540,32 +505,10 @@ static void test_impostor_refusals(void **state) {
 
 /* ---- baked cards ------------------------------------------------------------------------- */
 
-typedef struct grown {
-    treepieces_forest *forest;
-    float *bones;
-} grown;
-
-static grown grow(const treepieces_species *species) {
-    grown g;
-    treepieces_forest_desc d;
-    const treepieces_pose pose = {4, 0.1f, NULL};
-    txm_env env = tk_env(NULL, NULL);
-    memset(&d, 0, sizeof d);
-    d.kit = kit;
+static grown grow_three(const treepieces_species *species) {
+    treepieces_forest_desc d = describe(3, 200);
     d.species = species;
-    d.species_count = 1;
-    d.tree_count = 3;
-    d.max_pieces = 200;
-    d.seed = 5;
-    if (treepieces_forest_make(&d, &env, &g.forest) != TXM_OK) fail_msg("%s", env.message);
-    g.bones = (float *)room(g.forest->node_count, TREEPIECES_BONE * sizeof(float));
-    assert_int_equal(treepieces_bones(g.forest, &pose, NULL, g.bones), TXM_OK);
-    return g;
-}
-
-static void free_grown(grown *g) {
-    treepieces_forest_free(g->forest);
-    free(g->bones);
+    return grow_posed(&d, 0.1f, 4);
 }
 
 /* Card `card` of the cluster, as vertices 4 i.. of the mesh. */
@@ -601,7 +544,7 @@ static void test_bake_leaves(void **state) {
     (void)state;
     static const int looks[] = {1, 5, 64};
     treepieces_card cards[MOST_CARDS];
-    grown g = grow(&oak);
+    grown g = grow_three(&oak);
     for (int tree = 0; tree < 3; tree++) {
         const treepieces_tree *t = &g.forest->trees[tree];
         treepieces_mesh *m;
@@ -623,7 +566,7 @@ static void test_bake_leaves(void **state) {
     treepieces_species bare = oak;
     treepieces_mesh *m;
     bare.leaf_count = 0;
-    g = grow(&bare);
+    g = grow_three(&bare);
     assert_int_equal(treepieces_bake_leaves(g.forest, 1, g.bones, 4, NULL, &m), TXM_OK);
     assert_int_equal(m->triangle_count, 0);
     assert_int_equal(m->vertex_count, 0);
@@ -631,30 +574,20 @@ static void test_bake_leaves(void **state) {
     free_grown(&g);
 }
 
+static txm_status bake_leaves(void *context, txm_env *env) {
+    const grown *g = (const grown *)context;
+    treepieces_mesh *m = (treepieces_mesh *)env;
+    const txm_status status = treepieces_bake_leaves(g->forest, 0, g->bones, 8, env, &m);
+    if (status != TXM_OK) assert_null(m);
+    treepieces_mesh_free(m);
+    return status;
+}
+
 static void test_bake_leaves_faults(void **state) {
     (void)state;
-    grown g = grow(&oak);
-    for (int onward = 0; onward < 2; onward++) {
-        for (long k = 1;; k++) {
-            tk_memory memory;
-            treepieces_mesh *m = (treepieces_mesh *)1;
-            memset(&memory, 0, sizeof memory);
-            memory.fail_at = k;
-            memory.fail_onward = onward;
-            txm_env env = tk_env(&memory, NULL);
-            const txm_status status = treepieces_bake_leaves(g.forest, 0, g.bones, 8, &env, &m);
-            if (memory.calls < k) {
-                assert_int_equal(status, TXM_OK);
-                treepieces_mesh_free(m);
-                assert_int_equal(tk_leaks(&memory), 0);
-                assert_true(k > 2);
-                break;
-            }
-            assert_int_equal(status, TXM_OUT_OF_MEMORY);
-            assert_null(m);
-            assert_int_equal(tk_leaks(&memory), 0);
-        }
-    }
+    grown g = grow_three(&oak);
+    assert_true(tk_sweep(bake_leaves, &g, TK_ALLOCATION) > 7);
+    assert_true(tk_sweep(bake_leaves, &g, TK_ONWARD) > 7);
     for (int kind = 0; kind < 7; kind++) {
         treepieces_mesh *m = (treepieces_mesh *)1;
         txm_env env = tk_env(NULL, NULL);

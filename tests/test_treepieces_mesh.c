@@ -1,66 +1,21 @@
 /* test_treepieces_mesh.c - trees: levels of detail, the tessellator, baked meshes and their bark
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
-
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
-#include "testkit.h"
+
+#include "growkit.h"
 
 enum { MOST_POINTS = 4 * 64 + 63 * 63, MOST_TRIANGLES = 2 * 64 * 64 + 4 * 64, SHEET = 512 };
 
-static treepieces_kit *kit;
-
-static int set_up(void **state) {
-    (void)state;
-    return treepieces_kit_make(NULL, 0, NULL, &kit) != TXM_OK;
-}
-static int tear_down(void **state) {
-    (void)state;
-    treepieces_kit_free(kit);
-    return 0;
-}
-
-static void *room(size_t count, size_t size) {
-    void *p = calloc(count + 1, size);
-    assert_non_null(p);
-    return p;
-}
-
 /* A tree of a preset, with its bones. */
-typedef struct grown {
+static grown grow_preset(int preset, int pieces, float pose_amount, uint64_t seed) {
     treepieces_species species;
-    treepieces_forest *forest;
-    float *bones;
-} grown;
-
-static grown grow(int preset, int pieces, float pose_amount, uint64_t seed) {
-    grown g;
-    treepieces_forest_desc d;
-    treepieces_pose pose;
+    treepieces_forest_desc d = describe(1, pieces);
     const char *text = treepieces_preset_text(preset);
-    memset(&d, 0, sizeof d);
-    memset(&pose, 0, sizeof pose);
-    assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &g.species), TXM_OK);
-    d.kit = kit;
-    d.species = &g.species;
-    d.species_count = 1;
-    d.tree_count = 1;
-    d.max_pieces = pieces;
+    assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &species), TXM_OK);
+    d.species = &species;
     d.seed = seed;
-    pose.amount = pose_amount;
-    assert_int_equal(treepieces_forest_make(&d, NULL, &g.forest), TXM_OK);
-    g.bones = (float *)room(g.forest->node_count, TREEPIECES_BONE * sizeof(float));
-    assert_int_equal(treepieces_bones(g.forest, &pose, NULL, g.bones), TXM_OK);
-    return g;
-}
-
-static void free_grown(grown *g) {
-    treepieces_forest_free(g->forest);
-    free(g->bones);
+    return grow_posed(&d, pose_amount, 0);
 }
 
 static int compare_keys(const void *a, const void *b) {
@@ -177,7 +132,11 @@ static void test_shared_edges(void **state) {
                 n[q][i] = 2 * txm_rng_float(&rng) - 1;
             }
         for (int q = 0; q < 2; q++)
-            for (int c = 0; c < 4; c++) tpc_unit(n[q] + 3 * c);
+            for (int c = 0; c < 4; c++) {
+                float *normal = n[q] + 3 * c;
+                const float length = sqrtf(dot(normal, normal));
+                for (int k = 0; k < 3; k++) normal[k] /= length;
+            }
         for (int e = 0; e < 2; e++) { /* the second meets the edge the other way round */
             const int from = 3 * ((side[0] + e) % 4), to = 3 * ((side[1] + 1 - e) % 4);
             memcpy(p[1] + to, p[0] + from, 12);
@@ -244,7 +203,7 @@ static void test_phong(void **state) {
         treepieces_patch_point(p, n, -1, (float)i / 20, 0.3f, flat, NULL);
         assert_true(fabsf(at[0] * at[0] + at[2] * at[2] - 1) < 0.03f);
         assert_true(flat[0] * flat[0] + flat[2] * flat[2] <= 1.000001f);
-        assert_true(fabsf(tpc_dot(up, up) - 1) < 1e-5f);
+        assert_true(fabsf(dot(up, up) - 1) < 1e-5f);
         assert_true(fabsf(at[1] - 0.7f) < 1e-6f);
     }
 }
@@ -282,7 +241,7 @@ static void audit(const treepieces_mesh *m, uint32_t nodes, size_t borders) {
             sum += w;
         }
         assert_true(fabsf(sum - 1) < 1e-4f);
-        assert_true(fabsf(tpc_dot(m->normals + 3 * i, m->normals + 3 * i) - 1) < 1e-3f);
+        assert_true(fabsf(dot(m->normals + 3 * i, m->normals + 3 * i) - 1) < 1e-3f);
     }
     free(root);
     free(sides);
@@ -293,7 +252,7 @@ static void test_species_meshes(void **state) {
     (void)state;
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
         for (int kind = 0; kind < 3; kind++) {
-            grown g = grow(preset, kind ? 60 : 500, kind ? 0.1f : 0, (uint64_t)preset + 40);
+            grown g = grow_preset(preset, kind ? 60 : 500, kind ? 0.1f : 0, (uint64_t)preset + 40);
             const treepieces_lod lod = {{0.8f, 1, 0.5f}, 10, 1.2f, 0};
             treepieces_bake_desc d;
             treepieces_mesh *m;
@@ -344,7 +303,7 @@ static void face_direction(const treepieces_mesh *m, size_t t, double out[3]) {
 /* The foot is closed by faces that look down, whatever the levels and the shape of the rim. */
 static void test_cap(void **state) {
     (void)state;
-    grown g = grow(0, 20, 0.1f, 5);
+    grown g = grow_preset(0, 20, 0.1f, 5);
     static const float shapes[4] = {-1, 0.1f, 0, 1};
     for (int kind = 0; kind < 9; kind++) {
         const treepieces_lod lod = {
@@ -411,7 +370,7 @@ static void check_quad(const treepieces_mesh *m, size_t t, const treepieces_quad
    on one joint, that of the piece above it. Triangles come piece after piece, quad after quad. */
 static void test_mesh_is_skin(void **state) {
     (void)state;
-    grown g = grow(5, 80, 0.1f, 3);
+    grown g = grow_preset(5, 80, 0.1f, 3);
     treepieces_bake_desc d;
     treepieces_mesh *m;
     memset(&d, 0, sizeof d);
@@ -476,28 +435,20 @@ static void test_company(void **state) {
         places[i].seed = 77 + (uint64_t)i;
     }
     for (int alone = 0; alone < 2; alone++) {
-        treepieces_forest_desc d;
+        treepieces_forest_desc d = describe(alone ? 1 : 3, 90);
         treepieces_bake_desc b;
-        treepieces_forest *forest;
-        memset(&d, 0, sizeof d);
         memset(&b, 0, sizeof b);
-        d.kit = kit;
         d.species = species;
         d.species_count = 2;
         d.places = places + alone;
-        d.tree_count = alone ? 1 : 3;
-        d.max_pieces = 90;
-        assert_int_equal(treepieces_forest_make(&d, NULL, &forest), TXM_OK);
-        float *bones = (float *)room(forest->node_count, TREEPIECES_BONE * sizeof(float));
-        assert_int_equal(treepieces_bones(forest, NULL, NULL, bones), TXM_OK);
-        b.forest = forest;
+        grown g = grow_posed(&d, 0, 0);
+        b.forest = g.forest;
         b.tree = alone ? 0 : 1;
-        b.bones = bones;
+        b.bones = g.bones;
         b.lod = &lod;
         b.capped = 1;
         assert_int_equal(treepieces_bake(&b, NULL, &mesh[alone]), TXM_OK);
-        treepieces_forest_free(forest);
-        free(bones);
+        free_grown(&g);
     }
     const size_t n = mesh[0]->vertex_count, t = mesh[0]->triangle_count;
     assert_int_equal(n, mesh[1]->vertex_count);
@@ -562,11 +513,21 @@ static double measure_texels(const treepieces_mesh *m, size_t t, double *density
 }
 
 /* Bark is about as fine everywhere and not drawn out. Faces look as their corners' normals do. */
+/* Does a triangle face away from where the normals of its corners point? */
+static int faces_away(const treepieces_mesh *m, size_t t) {
+    double face[3], sum = 0;
+    face_direction(m, t, face);
+    for (size_t k = 0; k < 3; k++)
+        for (size_t c = 0; c < 3; c++)
+            sum += face[c] * (double)m->normals[3 * (size_t)m->indices[3 * t + k] + c];
+    return sum < 0;
+}
+
 static void test_bark_on_species(void **state) {
     (void)state;
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
         for (int pieces = 165; pieces <= 1320; pieces *= 2) {
-            grown g = grow(preset, pieces, 0, 9);
+            grown g = grow_preset(preset, pieces, 0, 9);
             treepieces_bake_desc d;
             treepieces_mesh *m;
             size_t away = 0;
@@ -579,22 +540,14 @@ static void test_bark_on_species(void **state) {
             for (size_t t = 0; t < m->triangle_count; t++) {
                 density[t].area = ratio[t].area =
                     measure_texels(m, t, &density[t].value, &ratio[t].value);
-                const float *p[3];
-                float sum[12];
-                for (int k = 0; k < 3; k++) {
-                    const size_t v = m->indices[3 * t + (size_t)k];
-                    p[k] = m->positions + 3 * v;
-                    memcpy(sum + 3 * k, m->normals + 3 * v, 12);
-                }
-                memset(sum + 9, 0, 12);
-                away += tpc_facing(p[0], p[1], p[2], sum) < 0;
+                away += faces_away(m, t);
             }
             const double spread = quantile(density, m->triangle_count, 0.99) /
                                   quantile(density, m->triangle_count, 0.01);
             const double drawn = quantile(ratio, m->triangle_count, 0.99);
             if (spread > 6 || drawn > 6 || away * 1000 > m->triangle_count)
                 fail_msg("%s, %d pieces: density p99/p1 %.2f, anisotropy p99 %.2f, %d of %d faces "
-                         "away", g.species.name, pieces, spread, drawn, (int)away,
+                         "away", g.forest->species->name, pieces, spread, drawn, (int)away,
                          (int)m->triangle_count);
             free(density);
             free(ratio);
@@ -604,41 +557,27 @@ static void test_bark_on_species(void **state) {
     }
 }
 
-/* Every allocation in turn fails, every report cancels. */
+/* Under failing allocations and cancelled reports nothing leaks and nothing is made. */
+static txm_status bake(void *context, txm_env *env) {
+    treepieces_mesh *m = (treepieces_mesh *)env;
+    const txm_status status = treepieces_bake((const treepieces_bake_desc *)context, env, &m);
+    if (status != TXM_OK) assert_null(m);
+    treepieces_mesh_free(m);
+    return status;
+}
+
 static void test_faults(void **state) {
     (void)state;
-    grown g = grow(0, 200, 0, 1);
+    grown g = grow_preset(0, 200, 0, 1);
     const treepieces_lod lod = {{0, 1, 0}, 3, 2, 0};
     treepieces_bake_desc d;
     memset(&d, 0, sizeof d);
     d.forest = g.forest;
     d.bones = g.bones;
     d.lod = &lod;
-    for (int kind = 0; kind < 3; kind++) {
-        for (long k = 1;; k++) {
-            tk_memory memory;
-            tk_progress progress;
-            memset(&memory, 0, sizeof memory);
-            memset(&progress, 0, sizeof progress);
-            if (kind < 2) memory.fail_at = k;
-            memory.fail_onward = kind;
-            if (kind == 2) progress.cancel_at = k;
-            txm_env env = tk_env(&memory, &progress);
-            treepieces_mesh *m = (treepieces_mesh *)1;
-            const txm_status status = treepieces_bake(&d, &env, &m);
-            assert_int_equal(progress.errors, 0);
-            if (kind < 2 ? memory.calls < k : progress.calls < k) {
-                assert_int_equal(status, TXM_OK);
-                treepieces_mesh_free(m);
-                assert_int_equal(tk_leaks(&memory), 0);
-                break;
-            }
-            assert_int_equal(status, kind < 2 ? TXM_OUT_OF_MEMORY : TXM_CANCELLED);
-            assert_null(m);
-            assert_int_equal(progress.late, 0);
-            assert_int_equal(tk_leaks(&memory), 0);
-        }
-    }
+    assert_true(tk_sweep(bake, &d, TK_ALLOCATION) > 7);
+    assert_true(tk_sweep(bake, &d, TK_ONWARD) > 7);
+    assert_true(tk_sweep(bake, &d, TK_CANCEL) > 7);
     for (int i = 0; i < 8; i++) {
         treepieces_bake_desc bad = d;
         treepieces_lod far = lod;
@@ -666,7 +605,7 @@ static void test_refusals(void **state) {
     (void)state;
     static const float bad[4] = {(float)NAN, (float)INFINITY, -3e38f, 0};
     for (int kind = 0; kind < 8; kind++) {
-        grown g = grow(1, 60, 0, 2);
+        grown g = grow_preset(1, 60, 0, 2);
         const treepieces_lod lod = {{0, 1, 0}, 4, 2, 0};
         tk_memory memory;
         treepieces_bake_desc d;
@@ -686,7 +625,7 @@ static void test_refusals(void **state) {
         assert_int_equal(tk_leaks(&memory), 0);
         free_grown(&g);
     }
-    grown g = grow(0, 12000, 0, 2);
+    grown g = grow_preset(0, 12000, 0, 2);
     const treepieces_lod fine = {{0, 0, 0}, 64, 1e30f, 0};
     tk_memory memory;
     treepieces_bake_desc d;
