@@ -1,12 +1,12 @@
-/* floor.c - a photograph in, an endless floor seen in perspective out
+/* floor.c - a photograph in, a picture of an endless floor out
    SPDX-License-Identifier: MIT OR Unlicense
 
    floor PHOTO OUT.png
 
-   What a game or a renderer does with textiles.h: a set of Wang tiles is cut out of the photograph
-   and laid out as one small texture with mip-maps; which tile lies where on the floor is computed
-   at each lookup, so that nothing repeats however far one sees. A graphics card does the lookups by
-   shaders/textiles.glsl; here the processor does, to run anywhere.                               */
+   How a game or a renderer uses textiles.h: a set of Wang tiles is cut out of the photograph and laid
+   out as one small texture with mipmaps. Each lookup computes which tile lies at that place of the
+   floor, so the floor never repeats. On a graphics card shaders/textiles.glsl does the lookups; here
+   the CPU does, so that the example runs anywhere.                                               */
 #define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
@@ -17,9 +17,9 @@
 enum {
     WIDTH = 960, /* pixels of the picture                                              */
     HEIGHT = 540,
-    TILE = 128, /* pixels a side: a power of two, so that mip-maps halve it evenly     */
+    TILE = 128, /* pixels a side: a power of two, so that mipmaps halve it evenly      */
     LEVELS = 8, /* from tiles of 128 pixels to tiles of one                            */
-    SAMPLES = 8 /* lookups per pixel, one above the other: floors are seen aslant      */
+    SAMPLES = 8 /* lookups per pixel, one above the other: the floor is foreshortened  */
 };
 
 typedef struct floor_texture {
@@ -28,7 +28,7 @@ typedef struct floor_texture {
     txm_image level[LEVELS]; /* linear floats, RGB */
 } floor_texture;
 
-/* One mip-map level at (x, y) of its pixels, bilinear; the torus goes on at its borders. */
+/* One mipmap level at (x, y), in its pixels; bilinear, wrapping around at the borders. */
 static txm_vec3 sample_level(const txm_image *im, double x, double y) {
     const double fx = x - floor(x), fy = y - floor(y);
     txm_vec3 sum = txm_v3(0, 0, 0);
@@ -42,8 +42,7 @@ static txm_vec3 sample_level(const txm_image *im, double x, double y) {
     return sum;
 }
 
-/* The floor at (x, y), in pixels of the tiles, seen by a pixel of the picture that is `extent` of them
-   wide. */
+/* The floor at (x, y), in texels, as a pixel of the picture sees it that covers `extent` texels. */
 static txm_vec3 sample_floor(const floor_texture *t, double x, double y, double extent) {
     const int column = (int)floor(x / TILE), row = (int)floor(y / TILE);
     int px, py;
@@ -58,9 +57,9 @@ static txm_vec3 sample_floor(const floor_texture *t, double x, double y, double 
                      (float)(lod - fine));
 }
 
-/* The atlas of a set, made linear, and halved again and again. NULL, or what went wrong. */
+/* The atlas of a set in linear light, and its mipmaps. Returns NULL, or what went wrong. */
 static const char *make_texture(const textiles_set *set, txm_env *env, floor_texture *t) {
-    /* the torus layout: all tiles have fitting neighbours, so filters need no gutters */
+    /* in the torus layout neighbouring tiles match, so filters need no gutters */
     if (textiles_plane_make(set, 1, env, &t->plane) != TXM_OK ||
         textiles_layout_make(set, TEXTILES_TORUS, 0, env, &t->layout) != TXM_OK)
         return env->message;
@@ -85,7 +84,7 @@ static const char *make_texture(const textiles_set *set, txm_env *env, floor_tex
     return failed;
 }
 
-/* One row of the picture: the eye is `eye` above the floor and looks a little downwards. */
+/* One row of the picture: the camera is `eye` above the floor and looks slightly downwards. */
 static void render_row(const floor_texture *t, int row, unsigned char *out) {
     const double eye = 3.5 * TILE, focus = 0.8 * WIDTH, horizon = 0.12 * HEIGHT;
     for (int x = 0; x < WIDTH; x++) {
@@ -96,7 +95,7 @@ static void render_row(const floor_texture *t, int row, unsigned char *out) {
             txm_vec3 color = sky;
             if (below > 0.5) {
                 const double far = eye * focus / below, right = (x - 0.5 * WIDTH) * far / focus;
-                /* how much of the floor the pixel sees */
+                /* the footprint of the pixel on the floor */
                 const double across = far / focus, along = across * far / eye / SAMPLES;
                 color = sample_floor(t, 0.8 * right + 0.6 * far, 0.6 * right - 0.8 * far,
                                      along > across ? along : across);
@@ -127,7 +126,7 @@ int main(int argc, char **argv) {
     photo.pixels = stbi_load(argv[1], &photo.width, &photo.height, NULL, 3);
     if (!photo.pixels) failed = stbi_failure_reason();
 
-    /* 2 colours: 16 tiles, each in two variants that differ inside; zeros mean the defaults */
+    /* two edge colours: 16 tiles, each in two variants with different insides; zeros are the defaults */
     const textiles_exemplar exemplar = {&photo, 1};
     textiles_desc desc = {0};
     desc.exemplars = &exemplar;

@@ -3,8 +3,8 @@
 
    synthesise PHOTO MODEL.txs OUT.png
 
-   The whole of what a program does that embeds texsyn.h. Images are loaded and written by
-   stb_image and stb_image_write, linked from tools/files/stb.c; any other library does as well. */
+   All that a program needs to embed texsyn.h. Images are read and written by stb_image and
+   stb_image_write, linked from tools/files/stb.c; any other library will do.                    */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
@@ -14,7 +14,7 @@
 
 enum { SIZE = 512 }; /* pixels a side of the result */
 
-/* The library reports here now and then; returning non-zero would stop it. */
+/* The library calls this from time to time; a result other than 0 cancels it. */
 static int show_progress(void *user, float fraction, const char *stage) {
     (void)user;
     fprintf(stderr, "\r%s %3.0f %%  ", stage, 100.0 * (double)fraction);
@@ -26,7 +26,7 @@ int main(int argc, char **argv) {
         fprintf(stderr, "usage: synthesise PHOTO MODEL.txs OUT.png\n");
         return 2;
     }
-    txm_env env = {0}; /* malloc and one thread ... */
+    txm_env env = {0}; /* malloc, one thread */
     env.progress = show_progress;
     texsyn_model *model = NULL;
     unsigned char *bytes = NULL, *pixels = NULL;
@@ -51,7 +51,7 @@ int main(int argc, char **argv) {
         if (file && fclose(file) != 0) failed = "cannot write the model";
     }
 
-    /* synthesise: another seed would make another picture */
+    /* synthesise: another seed makes another picture */
     texsyn_synth_desc synth = {model, SIZE, SIZE, 1, 0, 1}; /* tileable, default quality, seed 1 */
     txm_image out = {NULL, SIZE, SIZE, 3, TXM_U8, 0};
     if (!failed && !(out.pixels = pixels = malloc(SIZE * SIZE * 3))) failed = "no memory";

@@ -1,17 +1,17 @@
 /* check_brush.c - what examples/brush painted: check_brush PLAIN.png PAINTED.png SCRIPT LAYERS
 
-   PLAIN is the window without the strokes of SCRIPT, PAINTED with them, LAYERS what the program has
-   said about the gray layers. They must differ near the strokes only, and within them PAINTED must
-   have the gray of their layers, which PLAIN has not. */
+   PLAIN is the window without the strokes of SCRIPT, PAINTED with them, LAYERS what the program
+   printed about the gray layers. They must differ near the strokes only, and within them PAINTED must
+   have the gray of their layers, which PLAIN does not have. */
 #include "files/image_io.h"
 
 #include <stdio.h>
 
 enum {
     MAX_POINTS = 256,
-    REACH = 4 + 8 + 23, /* pixels outside of a stroke that may change: its unrest, the guide's
-                           own border, and the diagonal of the brush's MARGIN */
-    INSIDE = 5          /* pixels from the edge that are certainly within, unrest included */
+    REACH = 4 + 8 + 23, /* pixels outside of a stroke that may change: its roughness, the border
+                           of the guide, and the diagonal of the brush's MARGIN */
+    INSIDE = 5          /* pixels from the edge that are certainly within, roughness included */
 };
 
 typedef struct stroke {

@@ -1,6 +1,6 @@
 #!/bin/sh
-# examples/brush.c in a window of a virtual screen: the strokes of a script become texture of their
-# layers, and what lies away from them stays as it was. tests/check_brush.c explains the figures.
+# examples/brush in a window of a virtual screen: the strokes of a script become texture of their
+# layers, and the texture away from them does not change. check_brush.c explains the numbers.
 . tests/tap.sh
 
 brush=$(pwd)/build/examples/brush
@@ -10,12 +10,12 @@ check "check_brush builds" $CC -std=gnu99 -O2 -Wall -Wextra -I. -Itools tests/ch
 build/draw clouds "$tmp/clouds.png" 192
 cd "$tmp" || exit 1
 
-# paint NAME: play NAME.txt on a screen of its own into NAME.png, what the program says into NAME.log
+# paint NAME: play NAME.txt on a screen of its own; the picture is NAME.png, the output NAME.log
 paint() {
     timeout 60 xvfb-run -a -s "-screen 0 640x640x24" "$brush" clouds.png --script "$1.txt" \
         --screenshot "$1.png" >"$1.log" 2>&1 || { cat "$1.log"; return 1; }
 }
-# refuses STATUS TEXT ARGUMENTS...: it ends so, says so, and makes no picture
+# refuses STATUS TEXT ARGUMENTS...: it exits with STATUS, prints TEXT, and writes no picture
 refuses() {
     status=$1 text=$2
     shift 2
@@ -36,16 +36,16 @@ cp strokes.txt again.txt
 
 check "a window without strokes" paint plain
 check "a window with strokes" paint strokes
-check "each is told" test "$(grep -c '^stroke [1-3]: .* ms$' strokes.log)" = 3
+check "each is reported" test "$(grep -c '^stroke [1-3]: .* ms$' strokes.log)" = 3
 sed -n 's/^stroke/# stroke/p' strokes.log
-check "they have changed their surroundings, to their layers' gray" \
+check "they have changed their surroundings, to the gray of their layers" \
     ./check_brush plain.png strokes.png strokes.txt strokes.log
-check "no strokes, no change: this is noticed" \
+check "check_brush fails if nothing has changed" \
     fails ./check_brush plain.png plain.png strokes.txt strokes.log
 sed 's/^stroke 3/stroke 0/' strokes.txt >other.txt
-check "so is another layer" fails ./check_brush plain.png strokes.png other.txt strokes.log
+check "and for a stroke of another layer" fails ./check_brush plain.png strokes.png other.txt strokes.log
 sed 2d strokes.txt >other.txt
-check "so is a change far away" fails ./check_brush plain.png strokes.png other.txt strokes.log
+check "and for a change far from all strokes" fails ./check_brush plain.png strokes.png other.txt strokes.log
 check "the same strokes again" paint again
 check "the same picture" cmp strokes.png again.png
 

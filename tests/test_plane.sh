@@ -65,7 +65,7 @@ for bad in "--size 0x4" "--size 7x" "--tile x" "--jobs -1" "--share 3/3" "--frob
     check "refuses $bad" refuses "plane.sh: " sh "$plane" cells.png no $bad
 done
 check "refuses a missing exemplar" refuses "cannot read" sh "$plane" no.png no
-check "join refuses tiles of different kinds" refuses "its size or kind" \
+check "join refuses tiles of different kinds" refuses "its size or format" \
     "$JOIN" no.ppm 2 small/tile-0000-0000.png small/tile-0001-0000.png
 check "join refuses an alpha channel in a PNM" refuses "no alpha" sh -c "
     '$root/build/draw' cells rgba.png 32 4 && '$JOIN' no.ppm 1 rgba.png"

@@ -1,4 +1,4 @@
-/* brush.h - what the files of brush share: one struct, and what each file does with it
+/* brush.h - the struct that all files share, and the functions of each file
    SPDX-License-Identifier: MIT OR Unlicense  */
 #ifndef BRUSH_H
 #define BRUSH_H
@@ -11,8 +11,8 @@
 
 enum {
     SIDE = 512,    /* pixels of the window and of the texture                                   */
-    FRAME = 16,    /* milliseconds of work between two looks at the mouse                       */
-    MARGIN = 16,   /* pixels around what a guide changes that are made anew with it             */
+    FRAME = 16,    /* milliseconds of work between two frames                                   */
+    MARGIN = 16,   /* pixels around a change of the guide that are made again with it           */
     SPACING = 3,   /* pixels that the mouse moves before a stroke gets another point            */
     LEVELS = 4,    /* gray layers                                                               */
     MAX_STROKES = 256,
@@ -21,19 +21,20 @@ enum {
 };
 
 typedef struct brush {
-    /* the texture and what it is made of */
+    /* the texture and what it is made of: texture.c */
     txm_image photo, layers;    /* the exemplar, and the layer of each of its pixels            */
     texpatch_exemplar exemplar; /* the two together                                             */
-    texedges_set *edges;      /* the boundaries between layers                                */
+    texedges_set *edges;        /* the boundaries between layers                                */
     texpatch_job *job;
-    txm_env env; /* malloc, silent, one thread: more of them would go in here                   */
+    txm_env env; /* malloc, silent, one thread; a thread pool would be set here                 */
     uint64_t seed;
     int more;     /* the job has steps left                                                     */
-    SDL_Rect box; /* the part of the picture that they change                                   */
+    SDL_Rect box; /* the part of the picture that those steps change                            */
     uint8_t picture[3 * SIDE * SIDE];
-    uint8_t guide[SIDE * SIDE], mask[SIDE * SIDE]; /* what the job follows at present            */
+    uint8_t guide[SIDE * SIDE], mask[SIDE * SIDE]; /* of the job, as it is now                   */
 
-    /* what is drawn: strokes lie one behind the other in points, that under way behind the last */
+    /* the strokes, whose points lie one after the other in points; the last one may be unfinished:
+       strokes.c */
     texedges_stroke strokes[MAX_STROKES + 1];
     txm_vec2 points[MAX_POINTS];
     int stroke_count, point_count, is_drawing;
@@ -41,30 +42,30 @@ typedef struct brush {
     Uint64 released;             /* when the last stroke ended; 0: its texture is finished       */
     double shown;                /* milliseconds from then to the first picture of it; 0: none   */
 
-    /* the window */
+    /* the window: window.c */
     SDL_Window *window;
     SDL_Renderer *renderer;
     SDL_Texture *texture;
     const char *screenshot;
     int shot_is_due, is_over;
-    const char *failed; /* what went wrong; NULL: nothing so far                                 */
+    const char *failed; /* the message of an error; NULL: none                                   */
 } brush;
 
 /* ---- texture.c ---- */
-void begin(brush *b);
+void begin_texture(brush *b);
 void follow_strokes(brush *b, int everywhere);
-void work(brush *b);
+void advance_texture(brush *b);
 
 /* ---- strokes.c ---- */
 void add_point(brush *b, int x, int y);
 void begin_stroke(brush *b, int x, int y);
 void end_stroke(brush *b);
-void undo(brush *b);
+void undo_stroke(brush *b);
 
 /* ---- window.c ---- */
 void open_window(brush *b);
-void show(brush *b);
-void handle(brush *b, const SDL_Event *e);
+void show_frame(brush *b);
+void handle_event(brush *b, const SDL_Event *e);
 
 /* ---- script.c ---- */
 int play_stroke(brush *b, FILE *script);

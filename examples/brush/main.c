@@ -3,20 +3,23 @@
 
    brush EXEMPLAR [--script FILE] [--screenshot OUT.png]
 
-   What an editor does with texpatch.h and texedges.h. A job is stepped between the frames, so the
-   window stays alive and shows the texture as it develops. A stroke takes on the roughness of the
+   What an editor does with texpatch.h and texedges.h. A job advances in steps between frames, so
+   the window keeps responding and shows the texture as it develops. A stroke takes on the roughness of the
    exemplar's own edges and becomes a guide of gray layers; only what the guide changes is made again.
 
      left button  draw a stroke           [ ]  narrower, wider        s    save a screenshot
-     wheel, 0-9   layer, from dark        c    strokes are closed     r    another seed
-                  to light                u    take the last back     Esc  quit
+     wheel, 0-9   layer, from dark        c    open or closed         r    another seed
+                  to light                u    undo the last one      Esc  quit
 
    Each line "stroke LAYER WIDTH open|closed X Y X Y ..." of a script is played as if drawn by hand;
    then the screenshot is saved and the program ends.
 
-   window.c     what is shown; keys and mouse          script.c   strokes from a file
-   strokes.c    what the mouse has drawn
-   texture.c    strokes to a guide, a guide to texture: calls texpatch.h, texedges.h             */
+   The files of the program; each calls only those below it:
+
+     main.c                 arguments, main loop
+     window.c  script.c     display, keys and mouse; strokes from a file
+     strokes.c              the strokes that the mouse draws
+     texture.c              from strokes to a guide to texture: calls texedges.h and texpatch.h  */
 #include "brush.h"
 
 #include <stb/stb_image.h>
@@ -30,11 +33,11 @@ static void run(brush *b, FILE *script) {
             b->is_over = 1;
             b->shot_is_due = !b->failed && b->screenshot;
         }
-        /* with nothing to do the program sleeps until something happens */
+        /* with no steps left the program sleeps until there is an event */
         int is_event = b->more || b->is_over ? SDL_PollEvent(&e) : SDL_WaitEvent(&e);
-        for (; is_event && !b->failed; is_event = SDL_PollEvent(&e)) handle(b, &e);
-        if (b->more && !b->failed) work(b);
-        if (!b->failed) show(b);
+        for (; is_event && !b->failed; is_event = SDL_PollEvent(&e)) handle_event(b, &e);
+        if (b->more && !b->failed) advance_texture(b);
+        if (!b->failed) show_frame(b);
     }
 }
 
@@ -60,7 +63,7 @@ int main(int argc, char **argv) {
     b.photo.pixels = stbi_load(argv[1], &b.photo.width, &b.photo.height, NULL, 3);
     b.photo.channels = 3;
     if (!b.photo.pixels) b.failed = stbi_failure_reason();
-    if (!b.failed) begin(&b);
+    if (!b.failed) begin_texture(&b);
     if (!b.failed) open_window(&b);
     run(&b, script);
 

@@ -18,7 +18,7 @@ static void push_event(Uint32 type, int x, int y) {
     SDL_PushEvent(&e);
 }
 
-/* Put a stroke of the script into the queue of events, as the mouse would; 0: there are no more. */
+/* Queue the mouse events of the next stroke of the script; 0: there are no more strokes. */
 int play_stroke(brush *b, FILE *script) {
     static char line[MAX_LINE];
     char how[8];
@@ -29,7 +29,7 @@ int play_stroke(brush *b, FILE *script) {
     if (sscanf(line, "stroke %d %d %7s%n", &b->layer, &b->width, how, &length) != 3 ||
         b->layer < 0 || b->layer >= LEVELS || b->width < 2 || b->width > 256 ||
         (strcmp(how, "open") != 0 && strcmp(how, "closed") != 0)) {
-        b->failed = "the script has a line that is no 'stroke LAYER WIDTH open|closed X Y ...'";
+        b->failed = "the script has a line that is not 'stroke LAYER WIDTH open|closed X Y ...'";
         return 0;
     }
     b->is_closed = how[0] == 'c';

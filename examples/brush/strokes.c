@@ -1,4 +1,4 @@
-/* strokes.c - what the mouse draws
+/* strokes.c - the strokes that the mouse draws
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "brush.h"
 
@@ -36,7 +36,7 @@ void end_stroke(brush *b) {
     follow_strokes(b, 0);
 }
 
-void undo(brush *b) {
+void undo_stroke(brush *b) {
     if (b->stroke_count == 0 || b->is_drawing) return;
     b->point_count -= b->strokes[--b->stroke_count].count;
     follow_strokes(b, 0);

@@ -1,4 +1,4 @@
-/* texture.c - the exemplar, and the job that makes texture between the frames
+/* texture.c - the exemplar, and the job that makes the texture between frames
    SPDX-License-Identifier: MIT OR Unlicense  */
 #define TEXPATCH_IMPLEMENTATION
 #include "texpatch.h"
@@ -21,8 +21,8 @@ static txm_image square(uint8_t *pixels, int channels) {
     return image;
 }
 
-/* Layers of the exemplar, and a job that follows a guide that says nothing yet. */
-void begin(brush *b) {
+/* The layers of the exemplar, and a job whose guide is still empty. */
+void begin_texture(brush *b) {
     texedges_desc find = {0};
     find.image = b->photo;
     find.levels = LEVELS;
@@ -55,29 +55,28 @@ void begin(brush *b) {
     b->more = 1;
 }
 
-/* The strokes or the seed have changed: a guide of all strokes, and the texture anew, everywhere or
-   where the guide says something else than before. MARGIN pixels around that are included, so that
-   joints find a good way. */
-void follow_strokes(brush *b, int everywhere) {
-    static uint8_t guide[SIDE * SIDE], mask[SIDE * SIDE], again[SIDE * SIDE];
-    const txm_image guide_image = square(guide, 1), mask_image = square(mask, 1);
-    const txm_image where = square(again, 1);
+/* The guide of all strokes, and the mask of where it counts. */
+static int make_guide(brush *b, const txm_image *guide, const txm_image *mask) {
     texedges_set *disturbed;
     texedges_control control = {0};
     control.edges = b->edges;
     control.strokes = b->strokes;
     control.stroke_count = b->stroke_count;
-    control.background = -1; /* away from the strokes the texture is as it likes to be */
+    control.background = -1; /* away from the strokes the texture is free */
     control.seed = b->seed;
-    if (!check(b, texedges_disturb(&control, SIDE, SIDE, &b->env, &disturbed))) return;
-    const int is_made = check(b, texedges_guide(&control, disturbed, &b->env, &guide_image,
-                                                &mask_image));
+    if (!check(b, texedges_disturb(&control, SIDE, SIDE, &b->env, &disturbed))) return 0;
+    const int is_made = check(b, texedges_guide(&control, disturbed, &b->env, guide, mask));
     texedges_set_free(disturbed);
-    if (!is_made) return;
+    return is_made;
+}
 
+/* Set `again` where the guide differs from the present one (or everywhere), and MARGIN pixels around,
+   so that there is room for good cuts. Returns the bounding box. */
+static SDL_Rect mark_changes(const brush *b, const uint8_t *guide, const uint8_t *mask, int everywhere,
+                             uint8_t *again) {
     const SDL_Rect all = {0, 0, SIDE, SIDE};
     SDL_Rect box = {0, 0, 0, 0};
-    memset(again, 0, sizeof again);
+    memset(again, 0, SIDE * SIDE);
     for (int y = 0; y < SIDE; y++) {
         for (int x = 0, end; x < SIDE; x = end) { /* x..end-1 change */
             for (end = x; end < SIDE; end++) {
@@ -93,9 +92,19 @@ void follow_strokes(brush *b, int everywhere) {
             SDL_UnionRect(&around, &box, &box); /* an empty one does not count */
         }
     }
+    return box;
+}
+
+/* The strokes or the seed have changed: make the texture again where the guide changes, or everywhere. */
+void follow_strokes(brush *b, int everywhere) {
+    static uint8_t guide[SIDE * SIDE], mask[SIDE * SIDE], again[SIDE * SIDE];
+    const txm_image guide_image = square(guide, 1), mask_image = square(mask, 1);
+    const txm_image where = square(again, 1);
+    if (!make_guide(b, &guide_image, &mask_image)) return;
+    SDL_Rect box = mark_changes(b, guide, mask, everywhere, again);
     memcpy(b->guide, guide, sizeof guide);
     memcpy(b->mask, mask, sizeof mask);
-    /* steps that are left of an earlier stroke are done now, and shown together with the new ones */
+    /* this does the remaining steps of an earlier stroke; they are shown together with the new ones */
     if (box.w > 0 && !check(b, texpatch_again(b->job, &where, &guide_image, &mask_image, b->seed,
                                               &b->env)))
         return;
@@ -104,8 +113,8 @@ void follow_strokes(brush *b, int everywhere) {
     b->more |= box.w > 0;
 }
 
-/* As many steps as a frame has time for; whatever they have reached is a picture to show. */
-void work(brush *b) {
+/* Do as many steps as a frame has time for. After each of them there is a picture to show. */
+void advance_texture(brush *b) {
     const Uint32 start = SDL_GetTicks();
     while (b->more && SDL_GetTicks() - start < FRAME)
         if (!check(b, texpatch_step(b->job, &b->env, &b->more))) return;

@@ -1,4 +1,4 @@
-/* window.c - what is shown, keys and mouse
+/* window.c - display, keys and mouse
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "brush.h"
 
@@ -13,7 +13,7 @@ static void show_settings(const brush *b) {
 }
 
 void open_window(brush *b) {
-    /* drawn by the processor: a picture of this size needs no graphics card */
+    /* rendered by the CPU, which is enough for a picture of this size */
     if (SDL_Init(SDL_INIT_VIDEO) != 0 ||
         !(b->window = SDL_CreateWindow("brush", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
                                        SIDE, SIDE, 0)) ||
@@ -24,8 +24,8 @@ void open_window(brush *b) {
     else show_settings(b);
 }
 
-/* The texture, and the stroke under way over it; all of it into a file if that is asked for. */
-void show(brush *b) {
+/* Draw the texture and, over it, the unfinished stroke; save a screenshot if one is due. */
+void show_frame(brush *b) {
     const texedges_stroke *s = &b->strokes[b->stroke_count];
     SDL_RenderCopy(b->renderer, b->texture, NULL, NULL);
     SDL_SetRenderDrawColor(b->renderer, 255, 160, 0, 255);
@@ -46,18 +46,18 @@ void show(brush *b) {
                        (double)SDL_GetPerformanceFrequency();
     if (b->shown <= 0) b->shown = now;
     if (b->more) return;
-    printf("stroke %d: %d x %d pixels anew, shown after %.1f ms, finished after %.1f ms\n",
+    printf("stroke %d: %d x %d pixels made again, shown after %.1f ms, finished after %.1f ms\n",
            b->stroke_count, b->box.w, b->box.h, b->shown, now);
     fflush(stdout);
     b->released = 0;
 }
 
-static void press(brush *b, SDL_Keycode key) {
+static void press_key(brush *b, SDL_Keycode key) {
     if (key >= SDLK_0 && key < SDLK_0 + LEVELS) b->layer = key - SDLK_0;
     if (key == SDLK_LEFTBRACKET) b->width = SDL_max(b->width - 2, 2);
     if (key == SDLK_RIGHTBRACKET) b->width = SDL_min(b->width + 2, 256);
     if (key == SDLK_c) b->is_closed = !b->is_closed;
-    if (key == SDLK_u) undo(b);
+    if (key == SDLK_u) undo_stroke(b);
     if (key == SDLK_s) b->shot_is_due = 1;
     if (key == SDLK_r) {
         b->seed++;
@@ -67,11 +67,11 @@ static void press(brush *b, SDL_Keycode key) {
     show_settings(b);
 }
 
-void handle(brush *b, const SDL_Event *e) {
+void handle_event(brush *b, const SDL_Event *e) {
     if (e->type == SDL_QUIT) {
         b->is_over = 1;
     } else if (e->type == SDL_KEYDOWN) {
-        press(b, e->key.keysym.sym);
+        press_key(b, e->key.keysym.sym);
     } else if (e->type == SDL_MOUSEWHEEL) {
         b->layer = txm_clampi(b->layer + (e->wheel.y > 0) - (e->wheel.y < 0), 0, LEVELS - 1);
         show_settings(b);

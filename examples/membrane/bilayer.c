@@ -1,12 +1,12 @@
-/* bilayer.c - both leaflets of a membrane: what trimesh_relax.h does
+/* bilayer.c - both leaflets of a membrane: calls trimesh_relax.h
    SPDX-License-Identifier: MIT OR Unlicense  */
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 
 #include "membrane.h"
 
-/* One leaflet, appended. Lipids have a size: `unit` 1 keeps heights and shapes in Angstrom, and
-   density thins the patches until there is one for every 50 square Angstrom where the tails begin. */
+/* Append one leaflet. Lipids have a fixed size: with `unit` 1 heights and scales are in Angstrom, and
+   `density` thins the patches to one lipid per 50 square Angstrom at the height where the tails begin. */
 static txm_status add_leaflet(const trimesh_mesh *mesh, const trimesh_patch *patches, int patch_count,
                               int inside, txm_env *env, membrane *m) {
     trimesh_scatter_desc d = {0};
@@ -54,7 +54,7 @@ txm_status make_membrane(double (*f)(const double[3]), txm_env *env, membrane *m
     desc.vertices = (size_t)(area_of(&desc.surface) / (2 * 877)) + 2;
     txm_status status = trimesh_retile(&desc, env, NULL, &mesh);
     if (status != TXM_OK) return status;
-    /* Enough places for the largest triangle of either leaflet: the call says when there are not. */
+    /* There must be points enough for the largest triangle of either leaflet; else TXM_TOO_SMALL. */
     for (int wanted = 24;; wanted = wanted * 5 / 4) {
         for (int p = 0; p < PATCHES && status == TXM_OK; p++) {
             const trimesh_patch_desc pd = {wanted, 0, 0, (uint64_t)p};

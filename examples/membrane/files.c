@@ -37,7 +37,7 @@ static const char *write_bytes(const char *path, const unsigned char *bytes, siz
     return fclose(file) != 0 || failed ? "cannot write the file" : NULL;
 }
 
-/* The lipids of each kind as one mesh with many places; a GLB, or a picture of it. */
+/* Each kind of lipid as one mesh with many instances: a GLB, or a picture. */
 const char *write_scene(const membrane *m, const char *extension, const char *path) {
     mesh_data meshes[KINDS];
     mesh_instances groups[KINDS];
@@ -65,7 +65,7 @@ const char *write_scene(const membrane *m, const char *extension, const char *pa
     scene.instances = groups;
     scene.instance_count = KINDS;
     if (!why && is_picture) {
-        /* into the opening if there is one, past the near rim */
+        /* so that one looks into the opening, if there is one */
         const render_desc view = {.width = 1200, .height = 900, .azimuth = 18, .elevation = 14,
                                   .colors = 1, .field = 30};
         txm_image picture;

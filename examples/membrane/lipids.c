@@ -1,4 +1,4 @@
-/* lipids.c - lipids of a few beads each; z = 0 where the tails begin, upwards to the water
+/* lipids.c - lipids of a few beads each; the tails begin at z = 0, the heads are above
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "membrane.h"
 
@@ -30,7 +30,7 @@ const lipid lipids[KINDS] = {{choline, sizeof choline / sizeof *choline, 5},
                              {serine, sizeof serine / sizeof *serine, 1},
                              {cholesterol, sizeof cholesterol / sizeof *cholesterol, 3}};
 
-/* A lipid as one mesh: a ball of 8 steps^2 triangles for each bead. */
+/* A lipid as one mesh: a sphere of 8 steps^2 triangles for each bead. */
 int make_lipid(int kind, int steps, mesh_data *out, const char **why) {
     mesh_data balls[MOST_BEADS];
     mesh_instances beads[MOST_BEADS];

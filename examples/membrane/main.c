@@ -3,13 +3,13 @@
 
    membrane sphere|capsule OUT.glb|OUT.xyz|OUT.png [cut]
 
-   What trimesh_relax.h was made for: a surface is retiled into nearly equilateral triangles, a patch
-   of places for lipids is put on every triangle, once for each leaflet, and what comes out is a
-   list of instances. The GLB has each kind of lipid once and draws it many times
-   (EXT_mesh_gpu_instancing); the XYZ lists all beads, for viewers of molecules; the PNG is a picture.
-   cut leaves out an eighth, to look inside. All lengths are in Angstrom.
+   A surface is retiled into nearly equilateral triangles, and a patch of points is put on every
+   triangle, once for each leaflet: these are the places of the lipids, a list of instances. The GLB
+   stores each kind of lipid once and draws it many times (EXT_mesh_gpu_instancing); the XYZ lists all
+   beads, for molecular viewers; the PNG is a picture. `cut` leaves out an eighth, to show the inside.
+   All lengths are in Angstrom.
 
-   surface.c    the sphere and the capsule, as triangles of any shape
+   surface.c    the sphere and the capsule, in triangles of any shape
    lipids.c     four kinds of lipids, made of beads
    bilayer.c    retile the surface, scatter lipids: calls trimesh_relax.h
    files.c      GLB, XYZ, PNG                                                                     */

@@ -1,4 +1,4 @@
-/* membrane.h - what the files of membrane share
+/* membrane.h - the types and functions of each file
    SPDX-License-Identifier: MIT OR Unlicense  */
 #ifndef MEMBRANE_H
 #define MEMBRANE_H
@@ -7,7 +7,7 @@
 
 #include "files/mesh_io.h"
 
-/* ---- surface.c: where f = 0 on the rays from the origin ---- */
+/* ---- surface.c: closed surfaces f(p) = 0 that each ray from the origin meets once ---- */
 enum {
     GRID = 40, /* squares along the side of a cube's face */
     SURFACE_VERTICES = 6 * (GRID + 1) * (GRID + 1),
@@ -18,7 +18,7 @@ double capsule(const double p[3]);
 void make_surface(double (*f)(const double[3]), float *positions, uint32_t *indices);
 double area_of(const trimesh_view *m);
 
-/* ---- lipids.c: a few beads each; z = 0 where the tails begin, upwards to the water ---- */
+/* ---- lipids.c: a few beads each; the tails begin at z = 0, the heads are above ---- */
 typedef struct bead {
     const char *element;
     float x, y, z, radius;
@@ -34,7 +34,7 @@ typedef struct lipid {
 extern const lipid lipids[KINDS];
 int make_lipid(int kind, int steps, mesh_data *out, const char **why);
 
-/* ---- bilayer.c ---- */
+/* ---- bilayer.c: retile, scatter ---- */
 typedef struct membrane {
     trimesh_instance *lipids;
     size_t count;

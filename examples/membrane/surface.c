@@ -1,4 +1,4 @@
-/* surface.c - closed surfaces: where f = 0 on the rays from the origin
+/* surface.c - closed surfaces f(p) = 0 that each ray from the origin meets once
    SPDX-License-Identifier: MIT OR Unlicense  */
 #include "membrane.h"
 
@@ -9,7 +9,7 @@ double sphere(const double p[3]) {
     return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 140;
 }
 
-/* a capsule along x, and a smaller sphere that melts into it: the smooth minimum of two distances */
+/* a capsule along x, blended with a smaller sphere: the smooth minimum of two distances */
 double capsule(const double p[3]) {
     const double along = p[0] < -90 ? p[0] + 90 : p[0] > 90 ? p[0] - 90 : 0;
     const double body = sqrt(along * along + p[1] * p[1] + p[2] * p[2]) - 80;
@@ -29,7 +29,8 @@ static void find_surface(double (*f)(const double[3]), const double d[3], float 
     for (int k = 0; k < 3; k++) out[k] = (float)(near * d[k]);
 }
 
-/* The six faces of a cube, blown up, each a grid of its own: trimesh_retile welds them. */
+/* The six faces of a cube, projected onto the surface, each a grid of its own: trimesh_retile welds
+   them. */
 void make_surface(double (*f)(const double[3]), float *positions, uint32_t *indices) {
     for (uint32_t side = 0; side < 6; side++) {
         const uint32_t first = side * (GRID + 1) * (GRID + 1);
@@ -44,7 +45,7 @@ void make_surface(double (*f)(const double[3]), float *positions, uint32_t *indi
         }
         for (uint32_t j = 0; j < GRID; j++) {
             for (uint32_t i = 0; i < GRID; i++, indices += 6) {
-                /* counter-clockwise from outside: on the last three faces the axes change places */
+                /* counter-clockwise from outside: the last three faces swap the axes */
                 const uint32_t a = first + j * (GRID + 1) + i, up = a + GRID + 1;
                 const uint32_t b = side < 3 ? a + 1 : up, c = side < 3 ? up : a + 1;
                 const uint32_t two[6] = {a, b, c, c, b, up + 1};
