@@ -44,10 +44,8 @@
      wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
 
    CONVENTIONS
-     Vectors are columns; a matrix is stored column by column, as OpenGL and glTF have it:
-     m[3 * column + row]; the product a b applies b first. Right-handed space. Angles are in
-     radians. A quaternion (x, y, z, w) has its scalar last. Image rows go from top to bottom, x to
-     the right.
+     Right-handed space. Angles are in radians. A quaternion (x, y, z, w) has its scalar last, as in
+     glTF. Image rows go from top to bottom, x to the right.
 
    MEMORY
      Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
@@ -788,44 +786,26 @@ static inline txm_dvec3 txm_d3_area2(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
     return txm_d3_cross(txm_d3_sub(b, a), txm_d3_sub(c, a));
 }
 
-/* ---- matrices --------------------------------------------------------------------------- */
-
-/* Stored column by column: row r of column c is m[3 * c + r]. */
-typedef struct txm_mat3 {
-    float m[9];
-} txm_mat3;
-
 /* ---- quaternions ------------------------------------------------------------------------ */
 
-/* A rotation: x, y, z = axis * sin(angle / 2), w = cos(angle / 2); length 1. q and -q are the same
-   rotation. No rotation is {0, 0, 0, 1}. */
+/* A rotation: x, y, z = axis * sin(angle / 2), w = cos(angle / 2), of length 1. q and -q are the
+   same rotation. No rotation is {0, 0, 0, 1}. */
 typedef struct txm_quat {
-    float x, y, z, w;
+    double x, y, z, w;
 } txm_quat;
 
 /* length 1; no rotation for the zero quaternion */
-static inline txm_quat txm_quat_normalize(txm_quat q) {
-    const double n =
-        sqrt((double)q.x * q.x + (double)q.y * q.y + (double)q.z * q.z + (double)q.w * q.w);
-    const txm_quat none = {0, 0, 0, 1}, unit = {txm_float(q.x / n), txm_float(q.y / n),
-                                                txm_float(q.z / n), txm_float(q.w / n)};
+static inline txm_quat txm_quat_unit(txm_quat q) {
+    const double n = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+    const txm_quat none = {0, 0, 0, 1}, unit = {q.x / n, q.y / n, q.z / n, q.w / n};
     return n > 0 ? unit : none;
-}
-/* counter-clockwise about axis (of any length above 0) seen from its tip */
-static inline txm_quat txm_quat_axis_angle(txm_vec3 axis, float angle) {
-    const txm_vec3 a = txm_vec3_normalize(axis);
-    const double s = sin(0.5 * angle);
-    const txm_quat q = {txm_float(s * a.x), txm_float(s * a.y), txm_float(s * a.z),
-                        txm_float(cos(0.5 * angle))};
-    return txm_quat_normalize(q);
 }
 /* a after b */
 static inline txm_quat txm_quat_mul(txm_quat a, txm_quat b) {
-    const double ax = a.x, ay = a.y, az = a.z, aw = a.w;
-    const txm_quat q = {txm_float(aw * b.x + ax * b.w + ay * b.z - az * b.y),
-                        txm_float(aw * b.y - ax * b.z + ay * b.w + az * b.x),
-                        txm_float(aw * b.z + ax * b.y - ay * b.x + az * b.w),
-                        txm_float(aw * b.w - ax * b.x - ay * b.y - az * b.z)};
+    const txm_quat q = {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+                        a.w * b.y + a.y * b.w + a.z * b.x - a.x * b.z,
+                        a.w * b.z + a.z * b.w + a.x * b.y - a.y * b.x,
+                        a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
     return q;
 }
 /* the opposite rotation */
@@ -833,66 +813,29 @@ static inline txm_quat txm_quat_conjugate(txm_quat q) {
     const txm_quat c = {-q.x, -q.y, -q.z, q.w};
     return c;
 }
-/* the matrix of a unit quaternion */
-static inline txm_mat3 txm_quat_mat3(txm_quat q) {
-    const double x = q.x, y = q.y, z = q.z, w = q.w;
-    const txm_mat3 m = {{txm_float(1 - 2 * (y * y + z * z)), txm_float(2 * (x * y + w * z)),
-                         txm_float(2 * (x * z - w * y)), txm_float(2 * (x * y - w * z)),
-                         txm_float(1 - 2 * (x * x + z * z)), txm_float(2 * (y * z + w * x)),
-                         txm_float(2 * (x * z + w * y)), txm_float(2 * (y * z - w * x)),
-                         txm_float(1 - 2 * (x * x + y * y))}};
-    return m;
+/* v turned by q: v + 2 w (u x v) + 2 u x (u x v), u = (x, y, z) */
+static inline txm_dvec3 txm_quat_rotate(txm_quat q, txm_dvec3 v) {
+    const double tx = 2 * (q.y * v.z - q.z * v.y), ty = 2 * (q.z * v.x - q.x * v.z);
+    const double tz = 2 * (q.x * v.y - q.y * v.x);
+    return txm_d3(v.x + q.w * tx + (q.y * tz - q.z * ty), v.y + q.w * ty + (q.z * tx - q.x * tz),
+                  v.z + q.w * tz + (q.x * ty - q.y * tx));
 }
-/* v turned by the unit quaternion q: v + 2 w (u x v) + 2 u x (u x v), u = (x, y, z) */
-static inline txm_vec3 txm_quat_rotate(txm_quat q, txm_vec3 v) {
-    const double x = q.x, y = q.y, z = q.z, w = q.w;
-    const double tx = 2 * (y * v.z - z * v.y), ty = 2 * (z * v.x - x * v.z),
-                 tz = 2 * (x * v.y - y * v.x);
-    return txm_v3(txm_float(v.x + w * tx + (y * tz - z * ty)),
-                  txm_float(v.y + w * ty + (z * tx - x * tz)),
-                  txm_float(v.z + w * tz + (x * ty - y * tx)));
-}
-/* The quaternion of a rotation matrix, w >= 0. Of the four ways to it, [7] takes the one whose
-   component is largest: that one never divides by something small. */
-static inline txm_quat txm_quat_from_mat3(txm_mat3 m) {
-    const double xx = m.m[0], yy = m.m[4], zz = m.m[8];
-    const double c[4] = {1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz};
-    const double yz = (double)m.m[5] + m.m[7], wx = (double)m.m[5] - m.m[7];
-    const double xz = (double)m.m[6] + m.m[2], wy = (double)m.m[6] - m.m[2];
-    const double xy = (double)m.m[1] + m.m[3], wz = (double)m.m[1] - m.m[3];
-    const double all[4][4] = {
-        {c[0], xy, xz, wx}, {xy, c[1], yz, wy}, {xz, yz, c[2], wz}, {wx, wy, wz, c[3]}};
+/* The rotation that takes the axes to x, y, z, unit vectors at right angles. Not of length 1: its
+   length is 4 times its largest component. [7]: of the four ways to compute it, the one that never
+   divides by something small. */
+static inline txm_quat txm_quat_from_axes(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z) {
+    const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
+                         1 + x.x + y.y + z.z};
+    txm_quat q;
     int k = 3;
     for (int i = 0; i < 3; i++) {
         if (c[i] > c[k]) k = i;
     }
-    /* the row is 4 q_k (x, y, z, w); its length is 4 |q_k| */
-    const double *q = all[k];
-    const double n =
-        sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) * (q[3] < 0 ? -1 : 1);
-    const txm_quat none = {0, 0, 0, 1}, unit = {txm_float(q[0] / n), txm_float(q[1] / n),
-                                                txm_float(q[2] / n), txm_float(q[3] / n)};
-    return n < 0 || n > 0 ? unit : none;
-}
-/* a * s + b * t, the shorter way round, to length 1; the helper of the two below */
-static inline txm_quat txm_quat_blend(txm_quat a, txm_quat b, double s, double t) {
-    const txm_quat q = {txm_float(s * a.x + t * b.x), txm_float(s * a.y + t * b.y),
-                        txm_float(s * a.z + t * b.z), txm_float(s * a.w + t * b.w)};
-    return txm_quat_normalize(q);
-}
-static inline double txm_quat_dot(txm_quat a, txm_quat b) {
-    return (double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z + (double)a.w * b.w;
-}
-/* From a (t = 0) to b (t = 1) the shorter way round; fast, at nearly constant angular speed. */
-static inline txm_quat txm_quat_nlerp(txm_quat a, txm_quat b, float t) {
-    return txm_quat_blend(a, b, 1.0 - t, txm_quat_dot(a, b) < 0 ? -(double)t : t);
-}
-/* The same at constant angular speed. */
-static inline txm_quat txm_quat_slerp(txm_quat a, txm_quat b, float t) {
-    const double d = txm_quat_dot(a, b), cosine = fabs(d);
-    if (cosine > 0.9995) return txm_quat_nlerp(a, b, t); /* the sine would be too small */
-    const double angle = acos(cosine), s = sin((1.0 - t) * angle), u = sin(t * angle);
-    return txm_quat_blend(a, b, s, d < 0 ? -u : u); /* blend divides by sin(angle) */
+    q.x = k == 0 ? c[0] : k == 1 ? y.x + x.y : k == 2 ? z.x + x.z : y.z - z.y;
+    q.y = k == 0 ? y.x + x.y : k == 1 ? c[1] : k == 2 ? z.y + y.z : z.x - x.z;
+    q.z = k == 0 ? z.x + x.z : k == 1 ? z.y + y.z : k == 2 ? c[2] : x.y - y.x;
+    q.w = k == 0 ? y.z - z.y : k == 1 ? z.x - x.z : k == 2 ? x.y - y.x : c[3];
+    return q;
 }
 
 /* ---- kernel: symmetric 3x3 eigensystem -------------------------------------------------- */

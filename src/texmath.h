@@ -44,10 +44,8 @@
      wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
 
    CONVENTIONS
-     Vectors are columns; a matrix is stored column by column, as OpenGL and glTF have it:
-     m[3 * column + row]; the product a b applies b first. Right-handed space. Angles are in
-     radians. A quaternion (x, y, z, w) has its scalar last. Image rows go from top to bottom, x to
-     the right.
+     Right-handed space. Angles are in radians. A quaternion (x, y, z, w) has its scalar last, as in
+     glTF. Image rows go from top to bottom, x to the right.
 
    MEMORY
      Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
@@ -98,7 +96,7 @@ extern "C" {
 #include "texmath/image.h"
 #include "texmath/random.h"
 #include "texmath/vector.h"
-#include "texmath/matrix.h"
+#include "texmath/eigen.h"
 #include "texmath/cut.h"
 #include "texmath/poisson.h"
 #include "texmath/mesh.h"

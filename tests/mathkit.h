@@ -27,15 +27,16 @@ static inline txm_vec3 random_vec3(txm_rng *rng, float size) {
     return txm_v3(x, y, random_float(rng, -size, size));
 }
 
+/* a rotation whose parts are floats: of length 1 to their precision */
 static inline txm_quat random_quat(txm_rng *rng) {
-    txm_quat q;
+    double q[4], length;
     do {
-        q.x = random_float(rng, -1, 1);
-        q.y = random_float(rng, -1, 1);
-        q.z = random_float(rng, -1, 1);
-        q.w = random_float(rng, -1, 1);
-    } while (txm_quat_dot(q, q) < 0.01);
-    return txm_quat_normalize(q);
+        for (int k = 0; k < 4; k++) q[k] = (double)random_float(rng, -1, 1);
+        length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    } while (length < 0.1);
+    const txm_quat unit = {txm_float(q[0] / length), txm_float(q[1] / length),
+                           txm_float(q[2] / length), txm_float(q[3] / length)};
+    return unit;
 }
 
 static inline void assert_vec3(txm_vec3 a, txm_vec3 b, double tolerance) {

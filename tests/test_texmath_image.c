@@ -542,20 +542,21 @@ static void test_same_bytes(void **state) {
     for (int i = 0; i < 1000; i++) {
         const txm_vec3 a = random_vec3(&rng, 3), b = random_vec3(&rng, 3);
         const txm_quat q = random_quat(&rng);
-        const txm_mat3 m = txm_quat_mat3(q);
-        const txm_vec3 v[3] = {txm_vec3_cross(a, b), txm_vec3_normalize(a), txm_quat_rotate(q, a)};
+        const txm_dvec3 turned = txm_quat_rotate(q, txm_d3(a.x, a.y, a.z));
+        const txm_vec3 v[3] = {
+            txm_vec3_cross(a, b), txm_vec3_normalize(a),
+            txm_v3(txm_float(turned.x), txm_float(turned.y), txm_float(turned.z))};
         const double s[6] = {a.x, a.y, a.z, b.x, b.y, b.z};
         double values[3], vectors[3][3];
         txm_eigen3(s, values, vectors);
         hash = tk_hash(hash, v, sizeof v);
-        hash = tk_hash(hash, &m, sizeof m);
         hash = tk_hash(hash, values, sizeof values);
         hash = tk_hash(hash, vectors, sizeof vectors);
     }
     poisson_setup(&p, 1, 4);
     assert_int_equal(txm_poisson(&p.desc, NULL), TXM_OK);
     hash = tk_hash(hash, p.pixels, sizeof p.pixels);
-    if (hash != 0xe84d1de8544bab52u) fail_msg("hash is 0x%016llxu", (unsigned long long)hash);
+    if (hash != 0x430b5669bed5f7cdu) fail_msg("hash is 0x%016llxu", (unsigned long long)hash);
 }
 
 int main(void) {

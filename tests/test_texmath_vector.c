@@ -69,66 +69,70 @@ static void test_double_vectors(void **state) {
 
 /* ---- quaternions ------------------------------------------------------------------------ */
 
-/* out = a b, by the definition of a matrix stored column by column */
-static void multiply(const txm_mat3 *a, const txm_mat3 *b, float out[9]) {
-    for (int i = 0; i < 9; i++) {
-        out[i] = 0;
-        for (int k = 0; k < 3; k++) out[i] += a->m[3 * k + i % 3] * b->m[3 * (i / 3) + k];
-    }
+static double quat_dot(txm_quat a, txm_quat b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w;
 }
 
-static txm_vec3 apply(const txm_mat3 *m, txm_vec3 v) {
-    const float *a = m->m;
-    return txm_v3(a[0] * v.x + a[3] * v.y + a[6] * v.z, a[1] * v.x + a[4] * v.y + a[7] * v.z,
-                  a[2] * v.x + a[5] * v.y + a[8] * v.z);
+/* counter-clockwise about a unit axis, seen from its tip */
+static txm_quat about(txm_dvec3 axis, double angle) {
+    const double s = sin(angle / 2);
+    const txm_quat q = {s * axis.x, s * axis.y, s * axis.z, cos(angle / 2)};
+    return q;
+}
+
+static void assert_dvec3(txm_dvec3 a, txm_dvec3 b, double tolerance) {
+    assert_near(a.x, b.x, tolerance);
+    assert_near(a.y, b.y, tolerance);
+    assert_near(a.z, b.z, tolerance);
+}
+
+/* the images of the three axes, and the rotation they give */
+static txm_quat there_and_back(txm_quat q) {
+    return txm_quat_from_axes(txm_quat_rotate(q, txm_d3(1, 0, 0)),
+                              txm_quat_rotate(q, txm_d3(0, 1, 0)),
+                              txm_quat_rotate(q, txm_d3(0, 0, 1)));
 }
 
 static void test_quaternions(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(12, 0);
-    const txm_quat quarter = txm_quat_axis_angle(txm_v3(0, 0, 5), (float)(TXM_PI / 2));
-    assert_vec3(txm_quat_rotate(quarter, txm_v3(1, 0, 0)), txm_v3(0, 1, 0), 1e-6);
-    const txm_mat3 about_x =
-        txm_quat_mat3(txm_quat_axis_angle(txm_v3(1, 0, 0), (float)(TXM_PI / 2)));
-    assert_vec3(apply(&about_x, txm_v3(0, 1, 0)), txm_v3(0, 0, 1), 1e-6);
-    assert_true(txm_quat_axis_angle(txm_v3(0, 0, 0), 0).w == 1);
+    const txm_quat quarter = about(txm_d3(0, 0, 1), TXM_PI / 2), zero = {0, 0, 0, 0};
+    assert_dvec3(txm_quat_rotate(quarter, txm_d3(1, 0, 0)), txm_d3(0, 1, 0), 1e-15);
+    assert_dvec3(txm_quat_rotate(quarter, txm_d3(0, 1, 0)), txm_d3(-1, 0, 0), 1e-15);
+    assert_true(txm_quat_unit(zero).w == 1 && txm_quat_unit(zero).x == 0);
     for (int i = 0; i < 3000; i++) {
-        const txm_quat a = random_quat(&rng), b = random_quat(&rng);
-        const txm_vec3 v = random_vec3(&rng, 2), axis = random_vec3(&rng, 1);
-        const txm_mat3 ma = txm_quat_mat3(a), mb = txm_quat_mat3(b);
-        float both[9];
-        multiply(&ma, &mb, both);
-        assert_vec3(txm_quat_rotate(a, v), apply(&ma, v), 2e-6);
-        assert_floats(txm_quat_mat3(txm_quat_mul(a, b)).m, both, 9, 2e-6);
-        assert_vec3(txm_quat_rotate(txm_quat_conjugate(a), txm_quat_rotate(a, v)), v, 2e-6);
-        const txm_quat back = txm_quat_from_mat3(ma);
-        assert_true(back.w >= 0);
-        assert_near(fabs(txm_quat_dot(a, back)), 1, 1e-6);
+        const txm_quat a = txm_quat_unit(random_quat(&rng)), b = txm_quat_unit(random_quat(&rng));
+        const txm_vec3 f = random_vec3(&rng, 2), g = random_vec3(&rng, 1);
+        const txm_dvec3 v = txm_d3(f.x, f.y, f.z), axis = txm_d3_unit(txm_d3(g.x, g.y, g.z));
+        assert_near(quat_dot(a, a), 1, 1e-15);
+        assert_near(quat_dot(txm_quat_mul(a, b), txm_quat_mul(a, b)), 1, 1e-14);
+        assert_near(txm_d3_len(txm_quat_rotate(a, v)), txm_d3_len(v), 1e-14);
+        assert_dvec3(txm_quat_rotate(txm_quat_mul(a, b), v),
+                     txm_quat_rotate(a, txm_quat_rotate(b, v)), 1e-14);
+        assert_dvec3(txm_quat_rotate(txm_quat_conjugate(a), txm_quat_rotate(a, v)), v, 1e-14);
+        /* by the axes that it makes; the length is 4 times the largest component */
+        const txm_quat back = there_and_back(a);
+        const double size = sqrt(quat_dot(back, back)), part[4] = {a.x, a.y, a.z, a.w};
+        double largest = 0;
+        for (int k = 0; k < 4; k++) largest = fmax(largest, fabs(part[k]));
+        assert_near(size, 4 * largest, 1e-13);
+        assert_near(fabs(quat_dot(a, txm_quat_unit(back))), 1, 1e-14);
 
-        /* the axis stays where it is; half way is half the angle, from either sign */
-        const float angle = random_float(&rng, -3, 3), t = txm_rng_float(&rng);
-        const txm_quat turn = txm_quat_axis_angle(axis, angle);
-        assert_vec3(txm_quat_rotate(turn, axis), axis, 2e-6);
-        const txm_quat part = txm_quat_axis_angle(axis, t * angle), none = {0, 0, 0, 1};
-        txm_quat minus = {-turn.x, -turn.y, -turn.z, -turn.w};
-        assert_near(fabs(txm_quat_dot(txm_quat_slerp(none, turn, t), part)), 1, 1e-6);
-        assert_near(fabs(txm_quat_dot(txm_quat_slerp(none, minus, t), part)), 1, 1e-6);
-        assert_near(fabs(txm_quat_dot(txm_quat_nlerp(none, turn, t), part)), 1, 0.01);
-        for (int k = 0; k < 2; k++) {
-            assert_near(fabs(txm_quat_dot(txm_quat_slerp(a, b, (float)k), k ? b : a)), 1, 1e-6);
-            assert_near(fabs(txm_quat_dot(txm_quat_nlerp(a, b, (float)k), k ? b : a)), 1, 1e-6);
-        }
-        assert_near(txm_quat_dot(txm_quat_slerp(a, b, t), txm_quat_slerp(a, b, t)), 1, 1e-6);
+        /* the axis stays where it is; a vector across it turns by the angle, to the left */
+        const double angle = random_float(&rng, -3, 3);
+        const txm_quat turn = about(axis, angle);
+        const txm_dvec3 across = txm_d3_unit(txm_d3_cross(axis, v));
+        assert_dvec3(txm_quat_rotate(turn, axis), axis, 1e-14);
+        assert_dvec3(txm_quat_rotate(turn, across),
+                     txm_d3_mad(txm_d3_scale(across, cos(angle)), txm_d3_cross(axis, across),
+                                sin(angle)), 1e-14);
     }
     /* half turns, where w = 0 and three of Shepperd's four ways divide by zero */
     for (int k = 0; k < 3; k++) {
-        const txm_vec3 axis = txm_v3(k == 0, k == 1, k == 2);
-        const txm_quat half =
-            txm_quat_from_mat3(txm_quat_mat3(txm_quat_axis_angle(axis, (float)TXM_PI)));
-        assert_near(fabs((double)half.x * axis.x + half.y * axis.y + half.z * axis.z), 1, 1e-6);
+        const txm_dvec3 axis = txm_d3(k == 0, k == 1, k == 2);
+        const txm_quat half = txm_quat_unit(there_and_back(about(axis, TXM_PI)));
+        assert_near(fabs(half.x * axis.x + half.y * axis.y + half.z * axis.z), 1, 1e-15);
     }
-    const txm_quat zero = {0, 0, 0, 0};
-    assert_true(txm_quat_normalize(zero).w == 1);
 }
 
 /* ---- eigensystem ------------------------------------------------------------------------ */

@@ -125,4 +125,56 @@ static inline txm_dvec3 txm_d3_area2(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
     return txm_d3_cross(txm_d3_sub(b, a), txm_d3_sub(c, a));
 }
 
+/* ---- quaternions ------------------------------------------------------------------------ */
+
+/* A rotation: x, y, z = axis * sin(angle / 2), w = cos(angle / 2), of length 1. q and -q are the
+   same rotation. No rotation is {0, 0, 0, 1}. */
+typedef struct txm_quat {
+    double x, y, z, w;
+} txm_quat;
+
+/* length 1; no rotation for the zero quaternion */
+static inline txm_quat txm_quat_unit(txm_quat q) {
+    const double n = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+    const txm_quat none = {0, 0, 0, 1}, unit = {q.x / n, q.y / n, q.z / n, q.w / n};
+    return n > 0 ? unit : none;
+}
+/* a after b */
+static inline txm_quat txm_quat_mul(txm_quat a, txm_quat b) {
+    const txm_quat q = {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+                        a.w * b.y + a.y * b.w + a.z * b.x - a.x * b.z,
+                        a.w * b.z + a.z * b.w + a.x * b.y - a.y * b.x,
+                        a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
+    return q;
+}
+/* the opposite rotation */
+static inline txm_quat txm_quat_conjugate(txm_quat q) {
+    const txm_quat c = {-q.x, -q.y, -q.z, q.w};
+    return c;
+}
+/* v turned by q: v + 2 w (u x v) + 2 u x (u x v), u = (x, y, z) */
+static inline txm_dvec3 txm_quat_rotate(txm_quat q, txm_dvec3 v) {
+    const double tx = 2 * (q.y * v.z - q.z * v.y), ty = 2 * (q.z * v.x - q.x * v.z);
+    const double tz = 2 * (q.x * v.y - q.y * v.x);
+    return txm_d3(v.x + q.w * tx + (q.y * tz - q.z * ty), v.y + q.w * ty + (q.z * tx - q.x * tz),
+                  v.z + q.w * tz + (q.x * ty - q.y * tx));
+}
+/* The rotation that takes the axes to x, y, z, unit vectors at right angles. Not of length 1: its
+   length is 4 times its largest component. [7]: of the four ways to compute it, the one that never
+   divides by something small. */
+static inline txm_quat txm_quat_from_axes(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z) {
+    const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
+                         1 + x.x + y.y + z.z};
+    txm_quat q;
+    int k = 3;
+    for (int i = 0; i < 3; i++) {
+        if (c[i] > c[k]) k = i;
+    }
+    q.x = k == 0 ? c[0] : k == 1 ? y.x + x.y : k == 2 ? z.x + x.z : y.z - z.y;
+    q.y = k == 0 ? y.x + x.y : k == 1 ? c[1] : k == 2 ? z.y + y.z : z.x - x.z;
+    q.z = k == 0 ? z.x + x.z : k == 1 ? z.y + y.z : k == 2 ? c[2] : x.y - y.x;
+    q.w = k == 0 ? y.z - z.y : k == 1 ? z.x - x.z : k == 2 ? x.y - y.x : c[3];
+    return q;
+}
+
 #endif /* TEXMATH_VECTOR_H */

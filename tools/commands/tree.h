@@ -77,7 +77,7 @@ typedef struct tree_rig {
 } tree_rig;
 
 /* Rotation of a bone as a unit quaternion. */
-void bone_rotation(const float *bone, double q[4]);
+txm_quat bone_rotation(const float *bone);
 
 int make_rig(tree_job *j, tree_rig *rig);
 void free_rig(tree_rig *rig);

@@ -54,11 +54,12 @@ static mesh_instances *new_copies(tree_job *j, tree_copies *copies, size_t count
     return t;
 }
 
-static void place_copy(const mesh_instances *t, size_t i, const float place[3], const double q[4],
+static void place_copy(const mesh_instances *t, size_t i, const float place[3], txm_quat q,
                        float across, float along) {
+    const double rotation[4] = {q.x, q.y, q.z, q.w};
     float *block = (float *)t->translations; /* ours, see new_copies */
     memcpy(block + 3 * i, place, 3 * sizeof(float));
-    for (size_t k = 0; k < 4; k++) block[3 * t->count + 4 * i + k] = (float)q[k];
+    for (size_t k = 0; k < 4; k++) block[3 * t->count + 4 * i + k] = (float)rotation[k];
     block[7 * t->count + 3 * i] = across;
     block[7 * t->count + 3 * i + 1] = along;
     block[7 * t->count + 3 * i + 2] = across;
@@ -184,9 +185,8 @@ static int copy_pieces(tree_job *j, int type, const unsigned char *species, cons
     for (uint32_t i = 0; i < b->count; i++) {
         const uint32_t node = b->words[(size_t)i * b->stride];
         const float *bone = bone_of(j, node), place[3] = {bone[3], bone[7], bone[11]};
-        double q[4];
-        bone_rotation(bone, q);
-        place_copy(t, i, place, q, column_length(bone, 0), column_length(bone, 1));
+        place_copy(t, i, place, bone_rotation(bone), column_length(bone, 0),
+                   column_length(bone, 1));
         if (t->colors)
             bark_factor(&j->species[species[node]], tint, copies->colors[own] + 4 * (size_t)i);
     }
@@ -229,7 +229,7 @@ static void place_cloud(const tree_job *j, const treepieces_cluster *c, const me
                                       1, 0.92387953251128676, 0.70710678118654752, 0.38268343236508977};
     const float *bone = bone_of(j, c->node);
     const int turn = (int)(c->look >> 29);
-    const double q[4] = {0, eighths[turn], 0, turn < 4 ? eighths[4 - turn] : -eighths[turn - 4]};
+    const txm_quat q = {0, eighths[turn], 0, turn < 4 ? eighths[4 - turn] : -eighths[turn - 4]};
     const float center[3] = {bone[3] + c->along * bone[1], bone[7] + c->along * bone[5],
                              bone[11] + c->along * bone[9]};
     place_copy(t, i, center, q, c->radius, c->radius);

@@ -11,62 +11,33 @@
 /* ---- rotations ----------------------------------------------------------------------------- */
 
 /* The columns X, Y, Z of a bone are at right angles; made unit vectors they are a rotation. */
-void bone_rotation(const float *bone, double q[4]) {
-    double m[3][3]; /* m[column][row] */
-    for (int c = 0; c < 3; c++) {
-        double length = 0;
-        for (int r = 0; r < 3; r++) {
-            m[c][r] = (double)bone[4 * r + c];
-            length += m[c][r] * m[c][r];
-        }
-        length = sqrt(length);
-        for (int r = 0; r < 3; r++) m[c][r] /= length;
-    }
-    /* four times the squares of x, y, z, w; the largest is safe to divide by */
-    const double squares[4] = {1 + m[0][0] - m[1][1] - m[2][2], 1 - m[0][0] + m[1][1] - m[2][2],
-                               1 - m[0][0] - m[1][1] + m[2][2], 1 + m[0][0] + m[1][1] + m[2][2]};
-    int k = 3;
-    for (int i = 0; i < 3; i++)
-        if (squares[i] > squares[k]) k = i;
-    const double two = sqrt(squares[k]);
-    if (k == 3) {
-        q[0] = (m[1][2] - m[2][1]) / two;
-        q[1] = (m[2][0] - m[0][2]) / two;
-        q[2] = (m[0][1] - m[1][0]) / two;
-        q[3] = two;
-    } else {
-        const int a = (k + 1) % 3, b = (k + 2) % 3;
-        q[k] = two;
-        q[a] = (m[k][a] + m[a][k]) / two;
-        q[b] = (m[k][b] + m[b][k]) / two;
-        q[3] = (m[a][b] - m[b][a]) / two;
-    }
-    double norm = 0;
-    for (int i = 0; i < 4; i++) norm += q[i] * q[i];
-    norm = sqrt(norm);
-    for (int i = 0; i < 4; i++) q[i] /= norm;
+txm_quat bone_rotation(const float *bone) {
+    txm_dvec3 axis[3];
+    for (int c = 0; c < 3; c++) axis[c] = txm_d3_unit(txm_d3(bone[c], bone[4 + c], bone[8 + c]));
+    return txm_quat_unit(txm_quat_from_axes(axis[0], axis[1], axis[2]));
+}
+
+static txm_dvec3 bone_place(const float *bone) {
+    return txm_d3(bone[3], bone[7], bone[11]);
 }
 
 /* conj(a) b: b as seen from a */
-static void rotation_from(const double a[4], const double b[4], double out[4]) {
-    out[0] = a[3] * b[0] - a[0] * b[3] - a[1] * b[2] + a[2] * b[1];
-    out[1] = a[3] * b[1] + a[0] * b[2] - a[1] * b[3] - a[2] * b[0];
-    out[2] = a[3] * b[2] - a[0] * b[1] + a[1] * b[0] - a[2] * b[3];
-    out[3] = a[3] * b[3] + a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+static txm_quat rotation_from(txm_quat a, txm_quat b) {
+    return txm_quat_mul(txm_quat_conjugate(a), b);
 }
 
-/* m[column][row] of a unit quaternion */
-static void rotation_matrix(const double q[4], double m[3][3]) {
-    const double x = q[0], y = q[1], z = q[2], w = q[3];
-    m[0][0] = 1 - 2 * (y * y + z * z);
-    m[0][1] = 2 * (x * y + w * z);
-    m[0][2] = 2 * (x * z - w * y);
-    m[1][0] = 2 * (x * y - w * z);
-    m[1][1] = 1 - 2 * (x * x + z * z);
-    m[1][2] = 2 * (y * z + w * x);
-    m[2][0] = 2 * (x * z + w * y);
-    m[2][1] = 2 * (y * z - w * x);
-    m[2][2] = 1 - 2 * (x * x + y * y);
+/* the same rotation for both signs */
+static void store_rotation(float to[4], txm_quat q, double sign) {
+    to[0] = (float)(sign * q.x);
+    to[1] = (float)(sign * q.y);
+    to[2] = (float)(sign * q.z);
+    to[3] = (float)(sign * q.w);
+}
+
+static void store_place(float *to, txm_dvec3 v) {
+    to[0] = (float)v.x;
+    to[1] = (float)v.y;
+    to[2] = (float)v.z;
 }
 
 /* ---- joints -------------------------------------------------------------------------------- */
@@ -122,40 +93,28 @@ static void make_joint(const tree_job *j, const tree_rig *rig, uint32_t node, me
     const treepieces_node *n = &j->forest->nodes[node];
     const float *rest = j->rest + TREEPIECES_BONE * (size_t)node;
     const float *posed = j->posed + TREEPIECES_BONE * (size_t)node;
-    double q[4], local[4], m[3][3];
+    txm_quat local = bone_rotation(posed);
     snprintf(joint->name, sizeof joint->name, "%s %lu", names[n->order < 2 ? n->order : 2],
              (unsigned long)node);
     joint->parent = -1;
-    bone_rotation(posed, local);
-    for (int r = 0; r < 3; r++) joint->translation[r] = posed[4 * r + 3];
+    store_place(joint->translation, bone_place(posed));
     if (n->parent >= 0) {
         const float *below = j->posed + TREEPIECES_BONE * (size_t)n->parent;
-        double parent[4];
+        const txm_quat parent = bone_rotation(below);
+        const txm_dvec3 way = txm_d3_sub(bone_place(posed), bone_place(below));
         joint->parent = (int)rig->joint_of[n->parent];
-        bone_rotation(posed, q);
-        bone_rotation(below, parent);
-        rotation_from(parent, q, local);
-        rotation_matrix(parent, m);
-        for (int r = 0; r < 3; r++) {
-            double sum = 0;
-            for (int k = 0; k < 3; k++)
-                sum += m[r][k] * ((double)posed[4 * k + 3] - (double)below[4 * k + 3]);
-            joint->translation[r] = (float)sum;
-        }
+        local = rotation_from(parent, local);
+        store_place(joint->translation, txm_quat_rotate(txm_quat_conjugate(parent), way));
     }
-    for (int k = 0; k < 4; k++) joint->rotation[k] = (float)local[k];
+    store_rotation(joint->rotation, local, 1);
 
     /* from the mesh, which is at rest, into the joint: turned back about its place */
-    bone_rotation(rest, q);
-    rotation_matrix(q, m);
-    for (int c = 0; c < 4; c++) {
-        for (int r = 0; r < 4; r++) joint->bind[4 * c + r] = r == 3 ? (float)(c == 3) : 0;
-        for (int r = 0; r < 3; r++) {
-            double sum = c < 3 ? m[r][c] : 0;
-            for (int k = 0; k < 3 && c == 3; k++) sum -= m[r][k] * (double)rest[4 * k + 3];
-            joint->bind[4 * c + r] = (float)sum;
-        }
-    }
+    const txm_quat back = txm_quat_conjugate(bone_rotation(rest));
+    memset(joint->bind, 0, sizeof joint->bind);
+    for (int c = 0; c < 3; c++)
+        store_place(joint->bind + 4 * c, txm_quat_rotate(back, txm_d3(c == 0, c == 1, c == 2)));
+    store_place(joint->bind + 12, txm_d3_scale(txm_quat_rotate(back, bone_place(rest)), -1));
+    joint->bind[15] = 1;
 }
 
 /* ---- the wind ------------------------------------------------------------------------------ */
@@ -167,16 +126,15 @@ static void store_turns(const tree_job *j, const tree_rig *rig, const float *bon
     for (uint32_t i = 0; i < j->forest->node_count; i++) {
         const int32_t parent = j->forest->nodes[i].parent;
         const size_t joint = rig->joint_of[i];
-        double q[4], below[4] = {0, 0, 0, 1}, local[4], dot = 0;
         if (!is_joint(j, rig, i)) continue;
-        bone_rotation(bones + TREEPIECES_BONE * (size_t)i, q);
-        if (parent >= 0) bone_rotation(bones + TREEPIECES_BONE * (size_t)parent, below);
-        rotation_from(below, q, local);
+        txm_quat local = bone_rotation(bones + TREEPIECES_BONE * (size_t)i);
+        if (parent >= 0)
+            local = rotation_from(bone_rotation(bones + TREEPIECES_BONE * (size_t)parent), local);
         const float *last = rig->joints[joint].rotation;
         if (before) last = before + 4 * joint * before_stride;
-        for (int k = 0; k < 4; k++) dot += local[k] * (double)last[k];
-        float *to = turns + 4 * (joint * stride + key);
-        for (int k = 0; k < 4; k++) to[k] = (float)(dot < 0 ? -local[k] : local[k]);
+        const double dot = local.x * (double)last[0] + local.y * (double)last[1] +
+                           local.z * (double)last[2] + local.w * (double)last[3];
+        store_rotation(turns + 4 * (joint * stride + key), local, dot < 0 ? -1 : 1);
     }
 }
 

@@ -139,10 +139,15 @@ static int bake_allocate(const mesh_instances *t, int count, mesh_data *mesh) {
            (!triangles || (mesh->indices && (!uvs || mesh->uvs)));
 }
 
+static txm_vec3 turned(txm_quat q, txm_vec3 v) {
+    const txm_dvec3 r = txm_quat_rotate(q, txm_d3(v.x, v.y, v.z));
+    return txm_v3(txm_float(r.x), txm_float(r.y), txm_float(r.z));
+}
+
 static txm_vec3 bake_normal(txm_quat q, const float *scale, const float *n) {
     txm_vec3 v = txm_v3(n[0], n[1], n[2]);
     if (scale) v = txm_v3(v.x / scale[0], v.y / scale[1], v.z / scale[2]);
-    return txm_vec3_normalize(txm_quat_rotate(q, v));
+    return txm_vec3_normalize(turned(q, v));
 }
 
 int mesh_bake(const mesh_instances *t, int count, mesh_data *mesh, const char **why) {
@@ -171,7 +176,7 @@ int mesh_bake(const mesh_instances *t, int count, mesh_data *mesh, const char **
                 const float *p = m->positions + 3 * k;
                 txm_vec3 v = txm_v3(p[0], p[1], p[2]);
                 if (scale) v = txm_v3(v.x * scale[0], v.y * scale[1], v.z * scale[2]);
-                v = txm_vec3_add(txm_quat_rotate(q, v), txm_v3(move[0], move[1], move[2]));
+                v = txm_vec3_add(turned(q, v), txm_v3(move[0], move[1], move[2]));
                 store(mesh->positions + 3 * vertex, v);
                 if (mesh->normals)
                     store(mesh->normals + 3 * vertex, bake_normal(q, scale, m->normals + 3 * k));
