@@ -1,6 +1,6 @@
 #!/bin/sh
-# demo.sh - learn and synthesise every sample of build/samples/, lay pieces of some anew, cut tiles out
-# of some, retile meshes and cover them, grow trees, show all in out/index.html
+# demo.sh - what texkit does with the samples of build/samples/: textures, tiles, meshes, trees; the
+# results and a page that shows them, index.html, are written to out/
 set -eu
 
 build=${BUILD:-build}
@@ -8,7 +8,7 @@ out=out
 tab=$(printf '\t')
 mkdir -p "$out"
 
-# figure NAME FILE: a number, or a list of them, out of a --stats file
+# figure NAME FILE: a number, or a list of numbers, from a --stats file
 figure() { sed -n "s/^ *\"$1\": \[*\([-0-9., ]*[0-9]\).*/\1/p" "$2"; }
 seconds() { printf %.1f "$(figure "$1" "$2")"; }
 
@@ -47,7 +47,7 @@ pair() {
 PAIR
 }
 
-# laid SAMPLE TITLE SOURCE LICENCE NOTE: new texture out of pieces of a sample, appended to the page
+# laid SAMPLE TITLE SOURCE LICENCE NOTE: texture from pieces of a sample, appended to the page
 laid() {
     name=${1##*/} stats=$out/${1##*/}.patch.json
     cp "$build/samples/$1.png" "$out/$name.png"
@@ -60,7 +60,7 @@ laid() {
         lattice=$(for k in ax ay bx by; do figure lattice_$k "$stats"; done | awk '
             { v[NR] = sprintf("%.0f", $1); if (v[NR] == "-0") v[NR] = 0 }
             END { print "(" v[1] ", " v[2] ") and (" v[3] ", " v[4] ") pixels" }')
-    printf 'demo: %-8s laid anew in %4s s, lattice %s\n' "$name" "$total" "$lattice"
+    printf 'demo: %-8s patched in %4s s, lattice %s\n' "$name" "$total" "$lattice"
     cat >>"$out/index.part" <<LAID
 <section class="pair">
 <div>
@@ -68,18 +68,18 @@ laid() {
 <h3>$2</h3>
 <dl>
 <dt>lattice</dt><dd>$lattice</dd>
-<dt>as in the exemplar</dt><dd>$whole % <small>of all pairs of neighbours</small></dd>
+<dt>unbroken</dt><dd>$whole % <small>of neighbouring pixels are neighbours in the exemplar</small></dd>
 <dt>made in</dt><dd>$total s</dd>
 </dl>
 <p>${5:-}</p>
 <p class="source">Exemplar: $3; licence $4.</p>
 </div>
-<img src="$name-laid.png" width="512" height="512" alt="$2, laid anew">
+<img src="$name-laid.png" width="512" height="512" alt="texture from pieces of: $2">
 </section>
 LAID
 }
 
-# tile_set NAME KIND COLORS NOTE: cut tiles out of a sample, append them to the page
+# tile_set NAME KIND COLORS NOTE: a set of tiles cut from a sample, appended to the page
 tile_set() {
     folder=$1-tiles-$2 stats=$out/$1-tiles-$2.json
     "$build/texkit" tiles "$out/$1.png" -o "$out/$folder" --kind "$2" --colors "$3" --size 64 \
@@ -89,7 +89,7 @@ tile_set() {
     joint=$(printf %.2f "$(figure joint_mean "$stats")")
     worst=$(printf %.2f "$(figure joint_worst "$stats")")
     total=$(seconds total "$stats")
-    printf 'demo: %-8s %s tiles of kind %s in %4s s, steps at joints %s of those inside\n' \
+    printf 'demo: %-8s %s tiles of kind %s in %4s s, steps across joints %s times those inside\n' \
         "$1" "$tiles" "$2" "$total" "$joint"
     cat >>"$out/index.part" <<SET
 <section class="pair">
@@ -108,7 +108,7 @@ tile_set() {
 SET
 }
 
-# retiled SHAPE VERTICES: a mesh beside its retiled form, appended to the page
+# retiled SHAPE VERTICES: a mesh before and after retiling, appended to the page
 retiled() {
     "$build/shape" "$1" "$out/$1.obj"
     "$build/texkit" retile "$out/$1.obj" -o "$out/$1-retiled.obj" --vertices "$2" \
@@ -138,7 +138,7 @@ equilateral</small></dd>
 RETILED
 }
 
-# covered SHAPE TILES VERTICES SIZE OPTIONS...: a shape under a set of tiles
+# covered SHAPE TILES VERTICES SIZE OPTIONS...: a shape covered with a set of tiles, appended
 covered() {
     shape=$1 tiles=$2 vertices=$3 size=$4
     shift 4
@@ -151,22 +151,22 @@ covered() {
         -o "$out/$shape-covered.png" --size "$size" --crease 180 "$@"
     cat >>"$out/index.part" <<COVERED
 <img class="wide" src="$shape-covered.png" alt="a $shape covered with tiles">
-<p class="source">$vertices vertices; as <a href="$shape-covered.glb">GLB</a>, for any viewer of glTF, and
+<p class="source">$vertices vertices; as <a href="$shape-covered.glb">GLB</a>, for glTF viewers, and
 as <a href="$shape-covered.obj">OBJ</a>.</p>
 COVERED
 }
 
-# bilayer SHAPE: the membrane of examples/membrane.c
+# bilayer SHAPE: a membrane, by examples/membrane
 bilayer() {
     "$build/examples/membrane" "$1" "$out/membrane-$1.glb" | sed 's/^/demo: /'
     "$build/examples/membrane" "$1" "$out/membrane-$1.png" cut >/dev/null
     cat >>"$out/index.part" <<BILAYER
 <img class="wide" src="membrane-$1.png" width="1200" height="900" alt="a bilayer of lipids on a $1, cut open">
-<p class="source">Whole, as <a href="membrane-$1.glb">GLB</a> with EXT_mesh_gpu_instancing.</p>
+<p class="source">The whole membrane as <a href="membrane-$1.glb">GLB</a> with EXT_mesh_gpu_instancing.</p>
 BILAYER
 }
 
-# drawn OUT OPTIONS...: a picture by examples/forest_gl, no window
+# drawn OUT OPTIONS...: a picture by examples/forest_gl, without a window
 drawn() {
     picture=$1
     shift
@@ -224,9 +224,9 @@ a { color: #15558a; }
 </head>
 <body>
 <h1>From a photograph to new texture</h1>
-<p>On the left the exemplar, 256 &times; 256 pixels. On the right 512 &times; 512 pixels of new
-texture, made from the model alone: statistics of the exemplar, no pixel of it. All pictures are
-shown at full size. The clique types are those of the pyramid levels, the finest first.</p>
+<p>Left: the exemplar, 256 &times; 256 pixels. Right: 512 &times; 512 pixels of new texture, made from
+the model alone, which holds statistics of the exemplar and none of its pixels. All pictures are shown at
+full size. The clique types are listed by pyramid level, the finest first.</p>
 HEAD
 
 count=0 limits=0 first=
@@ -240,7 +240,7 @@ done <"$build/samples/list.txt"
 
 "$build/texkit" synth "$out/$first.txs" -o "$out/$first-tile.png" --size 384x384 --tileable --quiet
 cat >>"$out/index.part" <<TILE
-<h2>Without a seam</h2>
+<h2>Seamless</h2>
 <p>One tile of 384 &times; 384 pixels, synthesised with <code>--tileable</code> from the model of
 $first and repeated 2 &times; 2.</p>
 <div class="repeated" role="img" aria-label="a tile of $first, repeated"
@@ -252,42 +252,42 @@ while IFS=$tab read -r role sample title source licence; do
     if [ $limits = 0 ]; then
         cat >>"$out/index.part" <<'LIMITS'
 <h2>What it cannot do</h2>
-<p>Statistics of pixels and their neighbours know nothing of long thin lines, closed contours and
-exact layouts. The next section has a way to keep them.</p>
+<p>Statistics of pixels and their neighbours do not capture long thin lines, closed contours or exact
+layouts. The next section shows a method that keeps them.</p>
 LIMITS
     fi
     limits=$((limits + 1))
     case $sample in
-    */grass) note="The tones and the grain are right, the long blades are lost." ;;
+    */grass) note="Tones and grain are right, but the long blades are lost." ;;
     */brick) note="The courses of the wall are lost." ;;
     *) note= ;;
     esac
     pair "$sample" "$title" "$source" "$licence" "$note"
 done <"$build/samples/list.txt"
 
-# those of the photographs that are here, else the first samples
+# pick NAME NUMBER: the sample NAME if there is one, else the good sample of that number
 good=$(awk -F "$tab" '$1 == "good" { print $2 }' "$build/samples/list.txt")
-pick() { # NAME NUMBER
+pick() {
     echo "$good" | grep -x "$1" || echo "$good" | sed -n "$2p"
 }
 
 stones=$(pick pebbles 2) marked=$(pick frost 1) wall=
 cat >>"$out/index.part" <<'LAYOUT'
-<h2>With its layout</h2>
-<p>Here pieces of the exemplar are laid anew, and moved, cut and bent until they go on into each other.
-Away from the seams the pixels are those of the exemplar. What repeats on a lattice stays on it, and long
-things stay whole.</p>
+<h2>Layout preserved</h2>
+<p>Here the texture is put together from pieces of the exemplar, which are shifted, cut and slightly warped
+so that they continue each other. Away from the seams the pixels are those of the exemplar. Patterns on a
+lattice stay on it, and long features stay whole.</p>
 LAYOUT
 for wanted in layout good limit; do
     while IFS=$tab read -r role sample title source licence; do
         case $wanted:$role:$sample in
         layout:layout:*) note= ;;
-        good:good:pebbles) note="As sharp as the photograph. What stands out there, such as the few dark
-stones, is met again." ;;
+        good:good:pebbles) note="As sharp as the photograph. Striking features, such as the few dark stones,
+recur." ;;
         good:good:$stones) note= ;;
         limit:limit:*/grass) note="The blades keep their length." ;;
-        limit:limit:*/brick) note="Seen at an angle, so that no two bricks of the photograph are equally
-wide. Where pieces of different width meet, joints end." ;;
+        limit:limit:*/brick) note="The wall is seen at an angle, so no two bricks of the photograph are equally
+wide. Where bricks of different width meet, mortar joints end." ;;
         *) continue ;;
         esac
         laid "$sample" "$title" "$source" "$licence" "$note"
@@ -308,10 +308,10 @@ STROKES
 "$build/texkit" edges "$out/$marked.png" -o "$out/$marked-edges.png" --smooth 1.5 --least 40 --quiet
 "$build/texkit" patch "$out/$marked.png" -o "$out/$marked-strokes.png" --size 512x512 \
     --control "$out/strokes.json" --quiet
-echo "demo: $wall tileable, $marked with its edges and along strokes"
+echo "demo: $wall tileable, $marked along strokes"
 cat >>"$out/index.part" <<LAYOUT
-<h3>Without a seam</h3>
-<p>384 &times; 384 pixels of $wall, laid with <code>--tileable</code> and repeated 2 &times; 2.</p>
+<h3>Seamless</h3>
+<p>384 &times; 384 pixels of $wall, made with <code>--tileable</code> and repeated 2 &times; 2.</p>
 <div class="repeated" role="img" aria-label="a tile of $wall, repeated"
   style="background: url($wall-laid-tile.png) repeat"></div>
 <h3>Along strokes</h3>
@@ -319,33 +319,33 @@ cat >>"$out/index.part" <<LAYOUT
 <div>
 <img src="$marked.png" alt="exemplar: $marked">
 <img src="$marked-edges.png" alt="the edges of its gray layers">
-<p>The exemplar, and the edges of its gray layers as <code>texkit edges</code> finds them. To the right
+<p>Left: the exemplar, and the edges of its gray layers as found by <code>texkit edges</code>. Right:
 <a href="strokes.json">two strokes</a>, an open one of the darkest layer and a closed one of the
-lightest, have become edges of the texture, as restless as those of the exemplar.</p>
+lightest, have become edges of the texture, as rough as those of the exemplar.</p>
 </div>
-<img src="$marked-strokes.png" width="512" height="512" alt="$marked, laid along two strokes">
+<img src="$marked-strokes.png" width="512" height="512" alt="$marked, with edges along two strokes">
 </section>
 LAYOUT
 
 cat >>"$out/index.part" <<'TILES'
 <h2>Tiles that join</h2>
-<p>Here the photograph itself is cut, into sets of tiles that join wherever their colours match: an
-endless plane out of a small atlas. Above an atlas some of the plane, laid tile by tile. The figure
-for the joints is the mean step from pixel to pixel across them, over that inside the tiles; at 1
-they are like any other place.</p>
+<p>Here the photograph is cut into sets of tiles that join wherever their edge colours match: an endless
+plane from a small atlas. Each atlas is shown below a part of the plane. The number for the joints is the
+mean difference of neighbouring pixels across joints, divided by that inside tiles; at 1 joints cannot be
+told from other places.</p>
 TILES
-tile_set "$(pick pebbles 1)" wang 3 "Squares with colours on their edges. Between the tiles of the
-atlas lie gutters, for filtering."
-tile_set "$(pick lawn 2)" corner 2 "Squares with colours on their corners: neighbours match across
-the corner too, and no pixel is in all of them."
-tile_set "$(pick gravel 3)" triangle 2 "Equilateral triangles, two to a cell of the atlas, stored with
-a right angle. They are turned as they are laid, and cover meshes too."
+tile_set "$(pick pebbles 1)" wang 3 "Squares with colours on their edges. The gutters between the
+tiles of the atlas are for texture filtering."
+tile_set "$(pick lawn 2)" corner 2 "Squares with colours on their corners: neighbours also match
+diagonally, and no pixel is common to all tiles."
+tile_set "$(pick gravel 3)" triangle 2 "Equilateral triangles, stored as right triangles, two in each
+cell of the atlas. They are rotated to fit, and cover meshes as well."
 
 cat >>"$out/index.part" <<'RETILE'
 <h2>Any surface as near-equilateral triangles</h2>
-<p>On the left meshes as they came: crowded here, stretched there. On the right the same surfaces
-retiled. Red vertices have seven triangles, blue ones five, all others six. On a surface of the kind of
-a ball, fives outnumber sevens by twelve, so some there must be.</p>
+<p>Left: the input meshes, with small triangles in some places and long ones in others. Right: the same
+surfaces retiled. Red vertices have seven triangles, blue ones five, all others six. On a surface of
+genus 0 there are always twelve more fives than sevens.</p>
 RETILE
 retiled blob 3000
 retiled knot 3000
@@ -357,27 +357,27 @@ stones=$(pick pebbles 1) leaves=$(pick lichen 3)
     --size 64 --quiet
 cat >>"$out/index.part" <<COVER
 <h3>Tiles on meshes</h3>
-<p>Each triangle of a retiled mesh shows a tile whose edges match its neighbours': no seams, no
-stretching, no texture coordinates of the input needed. The tiles are cut from the photographs
-$stones and $leaves, as above.</p>
+<p>Each triangle of a retiled mesh shows a tile whose edges match those of its neighbours: no seams, no
+stretching, and the input needs no texture coordinates. The tiles are cut from $stones and $leaves, as
+above.</p>
 COVER
 covered sphere "$stones-tiles-mesh" 600 800x800
 covered knot "$leaves-tiles-mesh" 1600 800x600 --elevation 40
 printf 'demo: sphere and knot covered with tiles of %s and %s\n' "$stones" "$leaves"
 
-# where the examples are not, as in an unpacked source of the tool alone, there is no membrane
+# without examples/, as in a copy of the sources of the tool alone, there is no membrane
 if [ -x "$build/examples/membrane" ]; then
     cat >>"$out/index.part" <<'MEMBRANE'
-<h3>Things on triangles</h3>
-<p>A bilayer of lipids, a dozen beads each, on a sphere and on a capsule with a bump
-(<code>examples/membrane.c</code>): a patch of places on every triangle, once for each leaflet, thinned to
-the same density inside and outside. An eighth is cut away.</p>
+<h3>Instances on triangles</h3>
+<p>A bilayer of lipids, of about a dozen beads each, on a sphere and on a capsule with a bump
+(<code>examples/membrane</code>): a patch of points on every triangle for each leaflet, thinned to the same
+density inside and outside. An eighth is cut away.</p>
 MEMBRANE
     bilayer sphere
     bilayer capsule
 fi
 
-# trees: as files by the tool; as pictures by the example, where there is OpenGL
+# trees: files written by the tool, and where there is OpenGL pictures drawn by examples/forest_gl
 bark=$(pick lichen 3)
 "$build/texkit" tiles "$out/$bark.png" -o "$out/$bark-tiles-bark" --kind frame --colors 1 --variants 8 \
     --size 64 --quiet
@@ -391,17 +391,17 @@ printf 'demo: an oak of %s pieces in %s s, a forest of %s trees in %s s\n' \
     "$(figure trees "$out/forest.json")" "$(seconds total "$out/forest.json")"
 cat >>"$out/index.part" <<TREES
 <h2>Trees from pieces</h2>
-<p>Seven kinds of pieces - tube, forks, side branches, tip, root flare - meet in hexagonal rims; a small grammar
-puts them together, on one skeleton. As files: <a href="oak.glb">an oak</a> of
-$(figure pieces "$out/oak.json") pieces with a clip of wind, <a href="willow-barked.glb">a willow</a> whose bark
-is cut from the photograph $bark, and <a href="forest.glb">a forest</a> of $(figure trees "$out/forest.json")
-different trees as copies of the pieces.</p>
+<p>Seven kinds of pieces - tube, forks, side branches, tip, root flare - meet in hexagonal rims; a small
+grammar puts them together on one skeleton. As files: <a href="oak.glb">an oak</a> of
+$(figure pieces "$out/oak.json") pieces with an animation of wind, <a href="willow-barked.glb">a willow</a>
+whose bark is cut from $bark, and <a href="forest.glb">a forest</a> of $(figure trees "$out/forest.json")
+different trees, as instances of the pieces.</p>
 TREES
 if [ -x "$build/examples/forest_gl" ] &&
     drawn forest.png --count 1 --pieces 8 --size 64x64 2>"$out/forest.txt"; then
     cat >>"$out/index.part" <<'SPECIES'
-<p>Each species bare and in leaf, as <code>examples/forest_gl</code> draws them: tessellated where the eye is
-near, leaves as impostors with depth. Bark and leaves are drawn by the library.</p>
+<p>Each species bare and in leaf, as <code>examples/forest_gl</code> draws them: tessellated near the
+camera, leaves as impostors with depth. The textures of bark and leaves are generated by the library.</p>
 <div class="trees">
 SPECIES
     for name in oak beech maple birch poplar willow almond pine spruce dead; do species $name; done
@@ -416,10 +416,10 @@ SPECIES
     cat >>"$out/index.part" <<'FOREST'
 </div>
 <h3>A forest</h3>
-<p>160 trees, no two alike, in $DRAWS draw calls, which is what ten thousand take.</p>
+<p>160 trees, no two alike, in $DRAWS draw calls; ten thousand trees take as many.</p>
 <img class="wide" src="forest.png" width="1200" height="600" alt="a forest of six species">
-<p>Levels of detail by distance, green for the coarsest to red for the finest: quads have more
-triangles near the eye, and edges that two quads share always agree.</p>
+<p>Levels of detail by distance, from green for the coarsest to red for the finest: quads near the camera
+have more triangles, and quads that share an edge always agree on its level, so there are no cracks.</p>
 <img class="wide" src="levels.png" width="1200" height="500" alt="trees coloured by level of tessellation">
 <p>A birch in the wind, at intervals of 0.6 seconds.</p>
 <div class="frames">
@@ -440,13 +440,13 @@ fi
 cat >>"$out/index.part" <<TAIL
 <footer>Made by <code>make demo</code> with $("$build/texkit" --version) on $threads threads. Each
 pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
-<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Each one laid anew:
+<code>texkit synth NAME.txs -o NAME-512.png --size 512x512</code>. Textures with their layout:
 <code>texkit patch NAME.png -o NAME-laid.png --size 512x512</code>; edges and strokes:
 <code>texkit edges NAME.png -o NAME-edges.png --smooth 1.5 --least 40</code> and
 <code>texkit patch NAME.png -o NAME-strokes.png --size 512x512 --control strokes.json</code>. Each set of tiles:
 <code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Each retiled
 mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>; trees:
-<code>texkit tree -o oak.glb --species oak --wind 9 --seed 2</code>. Seconds are of this run.</footer>
+<code>texkit tree -o oak.glb --species oak --wind 9 --seed 2</code>. The times are those of this run.</footer>
 </body>
 </html>
 TAIL

@@ -30,14 +30,14 @@ case $profile in test | ci)
     need has_header cmocka.h libcmocka-dev
     need has_cxx_header OpenImageIO/imagebuf.h libopenimageio-dev
     need has_python jsonschema python3-jsonschema
-    # a screen that nobody sees, for examples/brush.c; jobs of examples/plane.sh
+    # a screen that nobody sees, for examples/brush; jobs of examples/plane.sh
     need has_command xvfb-run xvfb
     need has_command xauth xauth
     need has_command parallel parallel
     need has_command assimp assimp-utils # reads what texkit tree writes
 esac
 case $profile in test | lint | ci)
-    need has_command sdl2-config libsdl2-dev # of examples/brush.c
+    need has_command sdl2-config libsdl2-dev # of examples/brush
 esac
 # of examples/forest_gl and of tests of shaders: OpenGL without a window, nor a graphics card
 case $profile in demo | test | lint | ci)
