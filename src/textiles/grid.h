@@ -55,7 +55,7 @@ static txm_status txt_choice_check(const textiles_set *s, const txt_choice *choi
             if (!(south >> n & 1) || !(east >> w & 1)) continue;
             const int key = txt_choice_key(s, height > 1 ? n : s->colors, 0, width > 1 ? w : s->colors);
             if (choice->first[key] < choice->first[key + 1]) continue;
-            return txt_fail_numbers(env, TXM_BAD_ARGUMENT,
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "a dead end: no tile has north color # and west color #; add "
                                     "such a class, or use textiles_solve",
                                     (uint64_t)n, (uint64_t)w);
@@ -386,13 +386,9 @@ static int txt_enter_wishes(txt_solver *s) {
     return 1;
 }
 
-static txm_status txt_cancelled(txm_env *env) {
-    return txm_fail(env, TXM_CANCELLED, "cancelled");
-}
-
 static txm_status txt_contradiction(txt_solver *s) {
     if (s->cancelled) return txt_cancelled(s->env);
-    return txt_fail_numbers(s->env, TXM_BAD_ARGUMENT,
+    return txm_fail_numbers(s->env, TXM_BAD_ARGUMENT,
                             "tiles: the wishes near column #, row # contradict each other",
                             s->failed_at % (uint32_t)s->width, s->failed_at / (uint32_t)s->width);
 }
@@ -550,7 +546,7 @@ TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int h
     const uint32_t w = (uint32_t)width, h = (uint32_t)height;
     for (uint32_t i = 0; i < w * h; i++) {
         if (tiles[i] < -1 || tiles[i] >= set->count)
-            return txt_fail_numbers(env, TXM_BAD_ARGUMENT,
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "tiles: the one at column #, row # is neither -1 nor a tile's "
                                     "number",
                                     i % w, i / w);

@@ -25,27 +25,6 @@ static int txt_below(uint32_t hash, int n) {
     return (int)((hash >> 8) * (uint32_t)n >> 24);
 }
 
-/* ---- messages with numbers -------------------------------------------------------------- */
-
-/* Fail with a message in which each # stands for a number, the first for a, the next for b. */
-static txm_status txt_fail_numbers(txm_env *env, txm_status status, const char *text, uint64_t a,
-                                   uint64_t b) {
-    char line[160], digits[20];
-    size_t n = 0;
-    for (; *text && n + 1 < sizeof line; text++) {
-        if (*text != '#') {
-            line[n++] = *text;
-            continue;
-        }
-        int count = 0;
-        for (; a || !count; a /= 10) digits[count++] = (char)('0' + a % 10);
-        while (count && n + 1 < sizeof line) line[n++] = digits[--count];
-        a = b;
-    }
-    line[n] = 0;
-    return txm_fail(env, status, line);
-}
-
 /* ---- the plane: which tile lies where --------------------------------------------------- */
 
 /* Everything is read off txt_hash(seed, what, x, y). Its inner half depends on the column only, so

@@ -67,6 +67,10 @@ static double txt_stored(txm_sample sample, const void *row, size_t i) {
     return ((const uint8_t *)row)[i];
 }
 
+static txm_status txt_cancelled(txm_env *env) {
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
 /* ---- which tiles a set has ---------------------------------------------------------------- */
 
 /* What is the same for made and imported sets: refuse a description that makes no sense. */
