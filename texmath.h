@@ -1539,7 +1539,7 @@ static inline txm_status txm_mesh_check(const txm_mesh *mesh, const char *name, 
         return txm_fail_numbers_at(env, TXM_TOO_LARGE, name, "more than # vertices or faces", most,
                                    0);
     if (mesh->face_count > (TXM_NO_SIDE - 1) / n || mesh->face_count > SIZE_MAX / 64 ||
-        mesh->vertex_count > SIZE_MAX / 64)
+        (positions && mesh->vertex_count > SIZE_MAX / 64))
         return txm_fail_at(env, TXM_TOO_LARGE, name,
                            "more faces or vertices than 32 bits can number the sides of");
     if (mesh->face_count && !mesh->indices)
