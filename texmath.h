@@ -1505,6 +1505,13 @@ typedef struct txm_mesh {
     int corners; /* of a face: 3 or 4; 0 = 3 */
 } txm_mesh;
 
+/* A place on a mesh of triangles: (1 - u - v) a + u b + v c of the corners a, b, c of a triangle, in
+   the order of its indices. */
+typedef struct txm_mesh_place {
+    uint32_t triangle;
+    float u, v; /* each 0..1, u + v at most 1 */
+} txm_mesh_place;
+
 /* no side, as sides are numbered in 32 bits */
 #define TXM_NO_SIDE 0xffffffffu
 

@@ -23,7 +23,7 @@
          desc.surface.positions = positions;
          desc.surface.indices = indices;
          desc.surface.vertex_count = 4;
-         desc.surface.triangle_count = 4;
+         desc.surface.face_count = 4;
          desc.vertices = 500;
          if (trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) {
              fprintf(stderr, "retile: %s\n", env.message);
@@ -111,20 +111,6 @@ extern "C" {
 
 /* ---- meshes ----------------------------------------------------------------------------- */
 
-/* A triangle mesh that the caller owns. */
-typedef struct trimesh_view {
-    const float *positions;   /* 3 per vertex, finite                                         */
-    const uint32_t *indices;  /* 3 per triangle, counter-clockwise seen from outside          */
-    size_t vertex_count, triangle_count;
-} trimesh_view;
-
-/* Where a vertex lies on the input: in which of the caller's triangles, and where in it:
-   (1 - u - v) a + u b + v c of its corners a, b, c in the order of the indices. */
-typedef struct trimesh_source {
-    uint32_t triangle;
-    float u, v; /* each 0..1, u + v at most 1 */
-} trimesh_source;
-
 /* What keeps a vertex from moving freely. */
 typedef enum trimesh_kind {
     TRIMESH_FREE = 0,   /* anywhere on the surface           */
@@ -140,7 +126,7 @@ typedef struct trimesh_mesh {
     float *positions;        /* 3 per vertex                                               */
     float *normals;          /* 3 per vertex, unit: of the input surface, smooth           */
     uint32_t *indices;       /* 3 per triangle                                             */
-    trimesh_source *sources; /* 1 per vertex                                               */
+    txm_mesh_place *sources; /* 1 per vertex: where it lies on the input                    */
     uint8_t *kinds;          /* 1 per vertex: a trimesh_kind                               */
     double edge_length;      /* that was aimed at, in units of the input                   */
     txm_arena memory;        /* where all this lies                                        */
@@ -173,7 +159,7 @@ typedef enum trimesh_method {
 } trimesh_method;
 
 typedef struct trimesh_desc {
-    trimesh_view surface;  /* not modified, need not outlive the call (a job's must)            */
+    txm_mesh surface; /* triangles; not modified, need not outlive the call (a job's must)    */
     size_t vertices;       /* how many the result has, 4 or more                                */
     trimesh_method method; /* 0 = lattice                                                       */
     const float *scale;    /* 1 per input vertex: wanted edge length relative to the others,
@@ -294,7 +280,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 
 /* ---- using a mesh: what goes for all functions below --------------------------------------- */
 
-/* They take any triangle mesh as a trimesh_view, a result of trimesh_retile or your own: borders,
+/* They take any triangle mesh as a txm_mesh, a result of trimesh_retile or your own: borders,
    several pieces, edges with more than two triangles and unequal winding are allowed, holes in the
    numbering too; two triangles are neighbours if they share two vertex numbers. Outputs are arrays
    of the caller's, of the size stated, untouched after an error unless said otherwise. Every call
@@ -304,12 +290,12 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
    allowed and gives nothing. Same arguments, same bytes, whatever the threads. */
 
 /* A result as a view. */
-TRIMESH_API trimesh_view trimesh_as_view(const trimesh_mesh *mesh);
+TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
 
 /* Smooth unit normals of a mesh that has none, 3 floats per vertex; 0 0 0 at a vertex without
    triangles of an area above 0. Each triangle counts by sin(angle at the vertex) / (product of the
    two edges' lengths), which is exact on spheres [Max 1999]. O(triangles), 24 bytes per vertex. */
-TRIMESH_API txm_status trimesh_normals(const trimesh_view *mesh, txm_env *env, float *normals);
+TRIMESH_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals);
 
 /* ---- attributes: values of the input at the vertices of the result ------------------------- */
 
@@ -332,8 +318,8 @@ typedef struct trimesh_values {
    sources  count of them, a result's: mesh->sources and mesh->vertex_count
    out      channels floats per source
    cost     O(count)                                                                           */
-TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh_values *values,
-                                        const trimesh_source *sources, size_t count, txm_env *env,
+TRIMESH_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
+                                        const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out);
 
 /* Values with seams (charts of texture coordinates) at the corners of a result's triangles, so that
@@ -359,11 +345,9 @@ TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh
    out      channels floats per corner, 3 corners per triangle, in the order of mesh->indices
    cost     O(input) for the neighbours, then for each triangle of mesh as many steps as input
             triangles lie on its paths; 75 bytes per triangle of the input, 20 per vertex       */
-TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
-                                                const trimesh_values *values,
-                                                const trimesh_view *mesh,
-                                                const trimesh_source *sources, txm_env *env,
-                                                float *out);
+TRIMESH_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
+                                                const txm_mesh *mesh, const txm_mesh_place *sources,
+                                                txm_env *env, float *out);
 
 /* From values at corners to the vertex arrays of a renderer: a vertex whose corners differ is
    doubled, one copy for each different value (bits are compared, -0 equals 0). New vertices are in
@@ -377,7 +361,7 @@ TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
                 a copy of vertex mesh->indices[c] with the value at values + channels * c.
    count        receives the number of new vertices
    cost         O(triangles), 60 bytes each                                                     */
-TRIMESH_API txm_status trimesh_split_corners(const trimesh_view *mesh, const float *values,
+TRIMESH_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
                                              int channels, txm_env *env, uint32_t *new_indices,
                                              uint32_t *corners, size_t *count);
 
@@ -423,7 +407,7 @@ typedef struct trimesh_choose_desc {
    rotations  receives 1 per triangle: r = 0..2, corner k shows corner (k + r) mod 3 of the patch;
               may be NULL
    cost       O(triangles), 60 bytes each; with repeat: none                                     */
-TRIMESH_API txm_status trimesh_choose(const trimesh_view *mesh, const trimesh_choose_desc *desc,
+TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
                                       txm_env *env, int *patches, int *rotations);
 
 /* Texture coordinates of all corners from the tile and rotation of each triangle.
@@ -447,7 +431,7 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
    edge_colors  receives 3 per triangle: 0..colors - 1, equal on both sides of an edge
    directions   receives 3 per triangle: +1 if the side runs along the edge's direction, -1 against
                 it; may be NULL. The three of a triangle never run one way round.               */
-TRIMESH_API txm_status trimesh_edge_colors(const trimesh_view *mesh, int colors, uint64_t seed,
+TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
                                            txm_env *env, int *edge_colors, int *directions);
 
 /* A random colour 0..count - 1 for every vertex, as in [1] (with 3). count 1..65536; 0 = 3. */
@@ -461,7 +445,7 @@ TRIMESH_API txm_status trimesh_random_colors(size_t vertex_count, int count, uin
    colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
    count   receives how many colours were used; may be NULL
    cost    O(triangles), 60 bytes each and 16 per vertex                                        */
-TRIMESH_API txm_status trimesh_proper_colors(const trimesh_view *mesh, txm_env *env, int *colors,
+TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count);
 
 /* ---- geometry on triangles ----------------------------------------------------------------- */
@@ -500,7 +484,7 @@ typedef struct trimesh_instance {
 } trimesh_instance;
 
 typedef struct trimesh_scatter_desc {
-    trimesh_view mesh;
+    txm_mesh mesh;
     const float *normals;         /* 3 per vertex, unit: a result's; NULL = trimesh_normals       */
     const trimesh_patch *patches; /* patch_count of them                                          */
     int patch_count;              /* 1..65536                                                     */
@@ -715,14 +699,6 @@ static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
     return txm_fail(m->env, TXM_CANCELLED, "cancelled while mending the surface");
 }
 
-/* Refuse with the number of what is wrong. */
-static txm_status tmr_mend_fail(txm_env *env, txm_status status, const char *what, size_t number,
-                                const char *why) {
-    char line[160];
-    snprintf(line, sizeof line, "%s %lu (from 0) %s", what, (unsigned long)number, why);
-    return txm_fail(env, status, line);
-}
-
 static txm_status tmr_mend_fail_edge(tmr_mend *m, int32_t corner, int count) {
     const int32_t a = m->vertex[tmr_next(corner)], b = m->vertex[tmr_prev(corner)];
     char line[160];
@@ -747,8 +723,8 @@ static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
     for (size_t i = 0; i < count; i++) {
         const double s = desc->scale[i];
         if (!txm_is_finite(s) || !(s > 0))
-            return tmr_mend_fail(env, TXM_BAD_ARGUMENT, "scale of vertex", i,
-                                 "must be finite and above 0");
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "scale: of vertex # it must be finite and above 0", i, 0);
         if (i == 0 || s < least) least = s;
         if (i == 0 || s > most) most = s;
     }
@@ -761,26 +737,13 @@ static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
 /* All that can be wrong with the numbers themselves. */
 static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
-    const trimesh_view *in = &desc->surface;
     const size_t limit = TRIMESH_MAX_VERTICES < TMR_MOST ? TRIMESH_MAX_VERTICES : TMR_MOST;
-    if (in->vertex_count == 0 || in->triangle_count == 0)
-        return txm_fail(env, TXM_TOO_SMALL, "the surface has no vertices or no triangles");
-    if (!in->positions || !in->indices)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "surface: positions or indices is NULL");
-    if (in->vertex_count > limit || in->triangle_count > limit)
-        return txm_fail(env, TXM_TOO_LARGE,
-                        "the surface has more than TRIMESH_MAX_VERTICES vertices or triangles");
+    const txm_status status = txm_mesh_check(&desc->surface, "surface", 3, 1, limit, env);
+    if (status != TXM_OK) return status;
+    if (desc->surface.vertex_count == 0 || desc->surface.face_count == 0)
+        return txm_fail(env, TXM_TOO_SMALL, "surface: no vertices or no triangles");
     if (!(desc->weld >= 0 && desc->weld <= 0.01f))
         return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01");
-    for (size_t i = 0; i < 3 * in->vertex_count; i++) {
-        if (!txm_is_finite(in->positions[i]))
-            return tmr_mend_fail(env, TXM_BAD_DATA, "vertex", i / 3, "has a position not finite");
-    }
-    for (size_t i = 0; i < 3 * in->triangle_count; i++) {
-        if (in->indices[i] >= in->vertex_count)
-            return tmr_mend_fail(env, TXM_BAD_DATA, "triangle", i / 3,
-                                 "has a vertex index out of range");
-    }
     return desc->scale ? tmr_check_scale(desc, env) : TXM_OK;
 }
 
@@ -812,10 +775,10 @@ static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scrat
 
 /* Scale the used vertices; afterwards rename is -1 for the others. */
 static txm_status tmr_mend_scale(tmr_mend *m) {
-    const trimesh_view *in = &m->desc->surface;
+    const txm_mesh *in = &m->desc->surface;
     double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, largest = 0;
     for (int32_t i = 0; i < m->vertex_count; i++) m->rename[i] = -1;
-    for (size_t i = 0; i < 3 * in->triangle_count; i++)
+    for (size_t i = 0; i < 3 * in->face_count; i++)
         m->rename[in->indices[i]] = (int32_t)in->indices[i];
     for (int k = 0; k < 3; k++)
         low[k] = high[k] = in->positions[3 * (size_t)in->indices[0] + (size_t)k];
@@ -1719,7 +1682,7 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
     txm_status status = tmr_check_surface(m->desc, m->env);
     if (status != TXM_OK) return status;
     m->vertex_count = (int32_t)m->desc->surface.vertex_count;
-    m->face_count = (int32_t)m->desc->surface.triangle_count;
+    m->face_count = (int32_t)m->desc->surface.face_count;
     m->point = (txm_dvec3 *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(txm_dvec3));
     if (!m->point) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     if ((status = tmr_mend_alloc(m, arena, scratch)) != TXM_OK) return status;
@@ -2802,9 +2765,9 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
 
 /* The place in the caller's triangle. Where mending turned an edge, a face is none of the caller's:
    then the nearest point of the triangle that it came from. */
-static trimesh_source tmr_surface_source(const tmr_surface *s, const trimesh_desc *desc,
+static txm_mesh_place tmr_surface_source(const tmr_surface *s, const trimesh_desc *desc,
                                          const tmr_place *at) {
-    trimesh_source source;
+    txm_mesh_place source;
     double weight[3] = {0, 0, 0};
     const double own[3] = {1 - at->u - at->v, at->u, at->v};
     const int turn = s->turn[at->face];
@@ -5502,7 +5465,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
 /* ---- public ------------------------------------------------------------------------------- */
 
 /* where vertex v lies in the caller's triangles */
-static trimesh_source tmr_source_of(const tmr_work *w, int32_t v) {
+static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     const tmr_surface *s = w->s;
     const int32_t face = tmr_face_of(w, v);
     const tmr_place at = tmr_on_face(s, face, w->m.p[v]);
@@ -5524,7 +5487,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         const size_t n = (size_t)m->live;
         mesh->positions = (float *)txm_arena_alloc(&arena, n, 3 * sizeof(float));
         mesh->normals = (float *)txm_arena_alloc(&arena, n, 3 * sizeof(float));
-        mesh->sources = (trimesh_source *)txm_arena_alloc(&arena, n, sizeof(trimesh_source));
+        mesh->sources = (txm_mesh_place *)txm_arena_alloc(&arena, n, sizeof(txm_mesh_place));
         mesh->kinds = (uint8_t *)txm_arena_alloc(&arena, n, 1);
         mesh->indices = (uint32_t *)txm_arena_alloc(&arena, faces, 3 * sizeof(uint32_t));
     }
@@ -6776,25 +6739,6 @@ enum {
 #define TMR_TX_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
 #define TMR_TX_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
 
-/* The message may have two #, which stand for a and b. */
-static txm_status tmr_tx_fail(txm_env *env, txm_status status, const char *text, uint64_t a,
-                              uint64_t b) {
-    char line[160], digits[20];
-    size_t n = 0;
-    for (; *text && n + 1 < sizeof line; text++) {
-        if (*text != '#') {
-            line[n++] = *text;
-            continue;
-        }
-        int count = 0;
-        for (; a || !count; a /= 10) digits[count++] = (char)('0' + a % 10);
-        while (count && n + 1 < sizeof line) line[n++] = digits[--count];
-        a = b;
-    }
-    line[n] = 0;
-    return txm_fail(env, status, line);
-}
-
 static txm_status tmr_tx_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the work on the mesh");
 }
@@ -6809,38 +6753,6 @@ static int tmr_tx_are_finite(const float *values, size_t count) {
         if (!txm_is_finite(values[i])) return 0;
     }
     return 1;
-}
-
-/* Refuse a mesh whose numbers cannot be trusted. positions: are they needed? */
-static txm_status tmr_tx_check(const trimesh_view *mesh, int positions, txm_env *env) {
-    if (!mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "the mesh is NULL");
-    if (mesh->vertex_count > TRIMESH_MAX_VERTICES || mesh->triangle_count > TRIMESH_MAX_VERTICES)
-        return txm_fail(env, TXM_TOO_LARGE, "more than TRIMESH_MAX_VERTICES vertices or triangles");
-    if (mesh->triangle_count && !mesh->indices)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "indices of the mesh is NULL");
-    if (positions && mesh->vertex_count && !mesh->positions)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "positions of the mesh is NULL");
-    for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-        if (mesh->indices[i] >= mesh->vertex_count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "triangle # names vertex #, which is not below vertex_count", i / 3,
-                               mesh->indices[i]);
-    }
-    for (size_t i = 0; positions && i < mesh->vertex_count; i++) {
-        if (!tmr_tx_are_finite(mesh->positions + 3 * i, 3))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "the position of vertex # is not finite", i,
-                               0);
-    }
-    return TXM_OK;
-}
-
-static txm_dvec3 tmr_tx_vec(const float *p) {
-    return txm_d3(p[0], p[1], p[2]);
-}
-
-static void tmr_tx_corners(const trimesh_view *mesh, size_t triangle, txm_dvec3 p[3]) {
-    for (size_t k = 0; k < 3; k++)
-        p[k] = tmr_tx_vec(mesh->positions + 3 * (size_t)mesh->indices[3 * triangle + k]);
 }
 
 /* A loop over count things, of which each block writes its own: what a thread is given. */
@@ -6878,20 +6790,21 @@ static txm_status tmr_tx_spread(void (*body)(const void *, size_t, size_t), cons
     return TXM_OK;
 }
 
-TRIMESH_API trimesh_view trimesh_as_view(const trimesh_mesh *mesh) {
-    trimesh_view view;
+TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh) {
+    txm_mesh view;
+    view.corners = 3;
     view.positions = mesh->positions;
     view.indices = mesh->indices;
     view.vertex_count = mesh->vertex_count;
-    view.triangle_count = mesh->triangle_count;
+    view.face_count = mesh->triangle_count;
     return view;
 }
 
 /* The sum of the weighted normals at each vertex; sum holds 3 zeros for each. */
-static void tmr_tx_sum_normals(const trimesh_view *mesh, double *sum) {
-    for (size_t t = 0; t < mesh->triangle_count; t++) {
+static void tmr_tx_sum_normals(const txm_mesh *mesh, double *sum) {
+    for (size_t t = 0; t < mesh->face_count; t++) {
         txm_dvec3 p[3];
-        tmr_tx_corners(mesh, t, p);
+        txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 n = txm_d3_area2(p[0], p[1], p[2]);
         const double d[3] = {txm_d3_dist2(p[0], p[1]), txm_d3_dist2(p[1], p[2]),
                              txm_d3_dist2(p[2], p[0])};
@@ -6906,9 +6819,9 @@ static void tmr_tx_sum_normals(const trimesh_view *mesh, double *sum) {
     }
 }
 
-TRIMESH_API txm_status trimesh_normals(const trimesh_view *mesh, txm_env *env, float *normals) {
+TRIMESH_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals) {
     txm_arena arena;
-    txm_status status = tmr_tx_check(mesh, 1, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (mesh->vertex_count == 0) return TXM_OK;
     if (!normals) return txm_fail(env, TXM_BAD_ARGUMENT, "normals is NULL");
@@ -6932,59 +6845,23 @@ TRIMESH_API txm_status trimesh_normals(const trimesh_view *mesh, txm_env *env, f
 
 /* ---- using a mesh: which sides share an edge ----------------------------------------------- */
 
-/* Side i of a mesh is that from corner i to the next corner of its triangle. */
-static size_t tmr_tx_end(size_t side) {
-    return side % 3 == 2 ? side - 2 : side + 1;
-}
-static uint32_t tmr_tx_low(const uint32_t *vertex, size_t side) {
-    const uint32_t a = vertex[side], b = vertex[tmr_tx_end(side)];
-    return a < b ? a : b;
-}
-static uint32_t tmr_tx_high(const uint32_t *vertex, size_t side) {
-    const uint32_t a = vertex[side], b = vertex[tmr_tx_end(side)];
-    return a < b ? b : a;
+/* The sides of a mesh in the order of their edges. NULL without memory; they lie in the arena, and as
+   much scratch. */
+static uint32_t *tmr_tx_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
+    uint32_t *sorted =
+        (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
+    if (sorted) txm_mesh_sort_sides(mesh, sorted);
+    return sorted;
 }
 
-/* The sides in the order of their edges, those of one edge by number. NULL without memory; pairs lies
-   in the arena, and as much scratch. */
-static txm_pair *tmr_tx_sort_sides(const uint32_t *vertex, size_t sides, txm_arena *arena) {
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, sides, 2 * sizeof(txm_pair));
-    if (!pairs) return NULL;
-    for (size_t i = 0; i < sides; i++) {
-        pairs[i].key = tmr_tx_high(vertex, i);
-        pairs[i].value = (uint32_t)i;
-    }
-    txm_sort_pairs(pairs, pairs + sides, sides);
-    for (size_t i = 0; i < sides; i++) pairs[i].key = tmr_tx_low(vertex, pairs[i].value);
-    txm_sort_pairs(pairs, pairs + sides, sides);
-    return pairs;
-}
-
-/* The end of the run of sides that share the edge of pairs[i]. */
-static size_t tmr_tx_run_end(const uint32_t *vertex, const txm_pair *pairs, size_t i, size_t sides) {
-    const uint32_t low = pairs[i].key, high = tmr_tx_high(vertex, pairs[i].value);
-    do i++;
-    while (i < sides && pairs[i].key == low && tmr_tx_high(vertex, pairs[i].value) == high);
-    return i;
-}
-
-/* Link the sides of each edge into a ring, lowest first: a side without another has itself as next.
-   Sides from a vertex to itself stay alone. 0 without memory. */
-static int tmr_tx_link(const uint32_t *vertex, size_t sides, uint32_t *next, const txm_env *env) {
+/* The ring of the sides of each edge, as txm_mesh_link has it. 0 without memory. */
+static int tmr_tx_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const txm_pair *pairs = tmr_tx_sort_sides(vertex, sides, &scratch);
-    for (size_t i = 0; pairs && i < sides;) {
-        const size_t end = tmr_tx_run_end(vertex, pairs, i, sides);
-        const int alone = vertex[pairs[i].value] == vertex[tmr_tx_end(pairs[i].value)];
-        for (size_t k = i; k < end; k++) {
-            const size_t other = k + 1 < end ? k + 1 : i;
-            next[pairs[k].value] = pairs[alone ? k : other].value;
-        }
-        i = end;
-    }
+    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    if (sorted) txm_mesh_link(mesh, sorted, 0, next);
     txm_arena_free(&scratch);
-    return pairs != NULL;
+    return sorted != NULL;
 }
 
 /* ---- attributes ------------------------------------------------------------------------------ */
@@ -6995,7 +6872,7 @@ typedef struct tmr_tx_values {
     size_t channels;
 } tmr_tx_values;
 
-static txm_status tmr_tx_check_values(const trimesh_view *input, const trimesh_values *values,
+static txm_status tmr_tx_check_values(const txm_mesh *input, const trimesh_values *values,
                                       txm_env *env, tmr_tx_values *out) {
     if (!values) return txm_fail(env, TXM_BAD_ARGUMENT, "values is NULL");
     if (values->channels < 1 || values->channels > TRIMESH_MAX_CHANNELS)
@@ -7010,32 +6887,33 @@ static txm_status tmr_tx_check_values(const trimesh_view *input, const trimesh_v
     out->entry = values->indices ? values->indices : input->indices;
     out->values = values->values;
     out->channels = (size_t)values->channels;
-    for (size_t i = 0; values->indices && i < 3 * input->triangle_count; i++) {
+    for (size_t i = 0; values->indices && i < 3 * input->face_count; i++) {
         if (values->indices[i] >= values->count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "values: triangle # names entry #, which is not below count", i / 3,
-                               values->indices[i]);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "values: triangle # names entry #, which is not below count",
+                                    i / 3, values->indices[i]);
     }
     for (size_t i = 0; i < values->count; i++) {
         if (!tmr_tx_are_finite(values->values + out->channels * i, out->channels))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "values: entry # is not finite", i, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "values: entry # is not finite", i, 0);
     }
     return TXM_OK;
 }
 
-static txm_status tmr_tx_check_sources(const trimesh_view *input, const trimesh_source *sources,
+static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_place *sources,
                                        size_t count, txm_env *env) {
     if (count > (size_t)INT32_MAX) return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 sources");
     if (count && !sources) return txm_fail(env, TXM_BAD_ARGUMENT, "sources is NULL");
     for (size_t i = 0; i < count; i++) {
-        const trimesh_source *s = &sources[i];
-        if (s->triangle >= input->triangle_count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "source # names triangle #, which the input does not have", i,
-                               s->triangle);
+        const txm_mesh_place *s = &sources[i];
+        if (s->triangle >= input->face_count)
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "source # names triangle #, which the input does not have", i,
+                                    s->triangle);
         if (!(s->u >= 0 && s->v >= 0 && (double)s->u + s->v <= 1 + TMR_TX_SNAP))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "u and v of source # must be 0 or more, their sum at most 1", i, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "u and v of source # must be 0 or more, their sum at most 1", i,
+                                    0);
     }
     return TXM_OK;
 }
@@ -7052,23 +6930,23 @@ static void tmr_tx_interpolate(const tmr_tx_values *x, size_t triangle, double u
 
 typedef struct tmr_tx_transfer {
     tmr_tx_values values;
-    const trimesh_source *sources;
+    const txm_mesh_place *sources;
     float *out;
 } tmr_tx_transfer;
 
 static void tmr_tx_transfer_block(const void *job, size_t first, size_t end) {
     const tmr_tx_transfer *j = (const tmr_tx_transfer *)job;
     for (size_t i = first; i < end; i++) {
-        const trimesh_source *s = &j->sources[i];
+        const txm_mesh_place *s = &j->sources[i];
         tmr_tx_interpolate(&j->values, s->triangle, s->u, s->v, j->out + j->values.channels * i);
     }
 }
 
-TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh_values *values,
-                                        const trimesh_source *sources, size_t count, txm_env *env,
+TRIMESH_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
+                                        const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out) {
     tmr_tx_transfer j;
-    txm_status status = tmr_tx_check(input, 0, env);
+    txm_status status = txm_mesh_check(input, "input", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &j.values);
     if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, count, env);
     if (status != TXM_OK || count == 0) return status;
@@ -7082,13 +6960,13 @@ TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh
 
 /* The input as paths see it. */
 typedef struct tmr_tx_paths {
-    trimesh_view input;
+    txm_mesh input;
     tmr_tx_values values;
-    const trimesh_view *mesh;
-    const trimesh_source *sources;
+    const txm_mesh *mesh;
+    const txm_mesh_place *sources;
     uint32_t *welded; /* 1 per vertex: the first vertex in the same place                  */
     uint32_t *vertex; /* 1 per corner: its welded vertex                                   */
-    uint32_t *next;   /* 1 per side, see tmr_tx_link                                       */
+    uint32_t *next;   /* 1 per side, see txm_mesh_link                                     */
     uint8_t *seam;    /* 1 per side: 0 = none, 1 = seam, 2 = none or several on the other side */
     float *out;
 } tmr_tx_paths;
@@ -7099,14 +6977,14 @@ typedef struct tmr_tx_place {
     double u, v;
 } tmr_tx_place;
 
-static txm_dvec3 tmr_tx_point(const trimesh_view *input, tmr_tx_place at) {
+static txm_dvec3 tmr_tx_point(const txm_mesh *input, tmr_tx_place at) {
     txm_dvec3 p[3];
-    tmr_tx_corners(input, at.triangle, p);
+    txm_mesh_triangle(input, at.triangle, p);
     return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
 /* Number vertices in equal places alike. pairs: room for 2 per vertex. */
-static void tmr_tx_weld(const trimesh_view *input, txm_pair *pairs, uint32_t *welded) {
+static void tmr_tx_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
     const size_t n = input->vertex_count;
     for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
     for (size_t axis = 3; axis-- > 0;) {
@@ -7135,17 +7013,17 @@ static int tmr_tx_equal_values(const tmr_tx_values *x, size_t corner, size_t oth
 static uint8_t tmr_tx_seam(const tmr_tx_paths *p, size_t side) {
     const size_t other = p->next[side];
     if (other == side || p->next[other] != side) return 2;
-    size_t a = other, b = tmr_tx_end(other); /* the same ends, whichever way round */
+    size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, whichever way round */
     if (p->vertex[a] != p->vertex[side]) {
         a = b;
         b = other;
     }
     return !(tmr_tx_equal_values(&p->values, side, a) &&
-             tmr_tx_equal_values(&p->values, tmr_tx_end(side), b));
+             tmr_tx_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
 }
 
 static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env *env) {
-    const size_t n = p->input.vertex_count, sides = 3 * p->input.triangle_count;
+    const size_t n = p->input.vertex_count, sides = 3 * p->input.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     p->welded = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
@@ -7159,7 +7037,9 @@ static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env 
     txm_arena_free(&scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->vertex[i] = p->welded[p->input.indices[i]];
-    if (!tmr_tx_link(p->vertex, sides, p->next, env)) return tmr_tx_no_memory(env);
+    txm_mesh whole = p->input;
+    whole.indices = p->vertex;
+    if (!tmr_tx_link(&whole, p->next, env)) return tmr_tx_no_memory(env);
     for (size_t i = 0; i < sides; i++) p->seam[i] = tmr_tx_seam(p, i);
     return TXM_OK;
 }
@@ -7222,7 +7102,7 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
     for (int step = 0; step < 1 << 16; step++) {
         txm_dvec3 c[3];
         if (triangle == w->goal) return 1;
-        tmr_tx_corners(&p->input, triangle, c);
+        txm_mesh_triangle(&p->input, triangle, c);
         const size_t k = tmr_tx_exit(w, c, from);
         if (k == 3) return 0;
         const double s = tmr_tx_cut(w, c, k);
@@ -7275,7 +7155,7 @@ static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
     tmr_tx_place from[3];
     txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
-        const trimesh_source *s = &p->sources[p->mesh->indices[3 * t + k]];
+        const txm_mesh_place *s = &p->sources[p->mesh->indices[3 * t + k]];
         from[k].triangle = s->triangle;
         from[k].u = s->u;
         from[k].v = s->v;
@@ -7299,19 +7179,17 @@ static void tmr_tx_transfer_faces(const void *job, size_t first, size_t end) {
     for (size_t t = first; t < end; t++) tmr_tx_transfer_face((const tmr_tx_paths *)job, t);
 }
 
-TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
-                                                const trimesh_values *values,
-                                                const trimesh_view *mesh,
-                                                const trimesh_source *sources, txm_env *env,
-                                                float *out) {
+TRIMESH_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
+                                                const txm_mesh *mesh, const txm_mesh_place *sources,
+                                                txm_env *env, float *out) {
     tmr_tx_paths p;
     txm_arena arena;
     memset(&p, 0, sizeof p);
-    txm_status status = tmr_tx_check(input, 1, env);
+    txm_status status = txm_mesh_check(input, "input", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &p.values);
-    if (status == TXM_OK) status = tmr_tx_check(mesh, 0, env);
+    if (status == TXM_OK) status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, mesh->vertex_count, env);
-    if (status != TXM_OK || mesh->triangle_count == 0) return status;
+    if (status != TXM_OK || mesh->face_count == 0) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     if (tmr_tx_report(env, 0, "seams") != TXM_OK) return TXM_CANCELLED;
     p.input = *input;
@@ -7321,8 +7199,7 @@ TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
     txm_arena_init(&arena, env);
     status = tmr_tx_paths_build(&p, &arena, env);
     if (status == TXM_OK)
-        status = tmr_tx_spread(tmr_tx_transfer_faces, &p, mesh->triangle_count, 0.3, 1, "values",
-                               env);
+        status = tmr_tx_spread(tmr_tx_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -7344,9 +7221,9 @@ static int tmr_tx_equal_bits(const float *a, const float *b, size_t count) {
 }
 
 /* Sort the corners by vertex, and those of one vertex by a hash of their values. */
-static void tmr_tx_sort_corners(const trimesh_view *mesh, const float *values, size_t channels,
+static void tmr_tx_sort_corners(const txm_mesh *mesh, const float *values, size_t channels,
                                 txm_pair *pairs) {
-    const size_t n = 3 * mesh->triangle_count;
+    const size_t n = 3 * mesh->face_count;
     for (size_t c = 0; c < n; c++) {
         uint64_t hash = 0;
         for (size_t i = 0; i < channels; i++)
@@ -7359,17 +7236,17 @@ static void tmr_tx_sort_corners(const trimesh_view *mesh, const float *values, s
     txm_sort_pairs(pairs, pairs + n, n);
 }
 
-TRIMESH_API txm_status trimesh_split_corners(const trimesh_view *mesh, const float *values,
+TRIMESH_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
                                              int channels, txm_env *env, uint32_t *new_indices,
                                              uint32_t *corners, size_t *count) {
     txm_arena arena;
-    txm_status status = tmr_tx_check(mesh, 0, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (channels < 1 || channels > TRIMESH_MAX_CHANNELS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "channels must be 1 to TRIMESH_MAX_CHANNELS");
-    if (!count || (mesh->triangle_count && !values))
+    if (!count || (mesh->face_count && !values))
         return txm_fail(env, TXM_BAD_ARGUMENT, "values or count is NULL");
-    const size_t n = 3 * mesh->triangle_count, width = (size_t)channels;
+    const size_t n = 3 * mesh->face_count, width = (size_t)channels;
     if (tmr_tx_report(env, 0, "corners") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&arena, n, 2 * sizeof(txm_pair));
@@ -7489,19 +7366,19 @@ static void tmr_tx_put_choice(int choice, int patches, size_t t, int *out, int *
     if (rotations) rotations[t] = choice / patches;
 }
 
-TRIMESH_API txm_status trimesh_choose(const trimesh_view *mesh, const trimesh_choose_desc *desc,
+TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
                                       txm_env *env, int *patches, int *rotations) {
     trimesh_choose_desc none;
     txm_arena arena;
     memset(&none, 0, sizeof none);
     if (!desc) desc = &none;
     const int n = desc->patches ? desc->patches : 4, turns = desc->rotations ? desc->rotations : 3;
-    txm_status status = tmr_tx_check(mesh, 0, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (n < 1 || n > 65536) return txm_fail(env, TXM_BAD_ARGUMENT, "patches must be 1 to 65536");
     if (turns != 1 && turns != 3)
         return txm_fail(env, TXM_BAD_ARGUMENT, "rotations must be 1 or 3");
-    const size_t count = mesh->triangle_count;
+    const size_t count = mesh->face_count;
     if (count == 0) return TXM_OK;
     if (!patches || (turns == 3 && !rotations))
         return txm_fail(env, TXM_BAD_ARGUMENT, "patches or rotations is NULL");
@@ -7516,7 +7393,7 @@ TRIMESH_API txm_status trimesh_choose(const trimesh_view *mesh, const trimesh_ch
     uint32_t *order = (uint32_t *)txm_arena_alloc(&arena, count, sizeof(uint32_t));
     int *choice = (int *)txm_arena_alloc(&arena, count, sizeof(int));
     uint8_t *seen = (uint8_t *)txm_arena_zero(&arena, count, 1);
-    if (!next || !order || !choice || !seen || !tmr_tx_link(mesh->indices, 3 * count, next, env)) {
+    if (!next || !order || !choice || !seen || !tmr_tx_link(mesh, next, env)) {
         status = tmr_tx_no_memory(env);
     } else {
         status = tmr_tx_report(env, 0.5, "patches");
@@ -7540,10 +7417,11 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
         return txm_fail(env, TXM_BAD_ARGUMENT, "tiles, tile_uv or uv is NULL");
     for (size_t t = 0; t < triangle_count; t++) {
         if (tiles[t] < 0 || (size_t)tiles[t] >= tile_count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "the tile of triangle # is not 0..tile_count - 1", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "the tile of triangle # is not 0..tile_count - 1", t, 0);
         if (rotations && (rotations[t] < 0 || rotations[t] > 2))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2",
+                                    t, 0);
     }
     for (size_t t = 0; t < triangle_count; t++) {
         const size_t turn = rotations ? (size_t)rotations[t] : 0;
@@ -7556,17 +7434,17 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
     return TXM_OK;
 }
 
-TRIMESH_API txm_status trimesh_edge_colors(const trimesh_view *mesh, int colors, uint64_t seed,
+TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
                                            txm_env *env, int *edge_colors, int *directions) {
-    const txm_status status = tmr_tx_check(mesh, 0, env);
+    const txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (colors < 1 || colors > 65536)
         return txm_fail(env, TXM_BAD_ARGUMENT, "colors must be 1 to 65536");
-    if (mesh->triangle_count && !edge_colors)
+    if (mesh->face_count && !edge_colors)
         return txm_fail(env, TXM_BAD_ARGUMENT, "edge_colors is NULL");
     const uint64_t base = txm_hash(seed ^ 0x7465787475726573u);
-    for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-        const uint32_t low = tmr_tx_low(mesh->indices, i), high = tmr_tx_high(mesh->indices, i);
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        const uint32_t low = txm_mesh_low(mesh, i), high = txm_mesh_high(mesh, i);
         const uint64_t h = txm_hash(base + ((uint64_t)high << 32 | low)) >> 32;
         edge_colors[i] = (int)(h * (uint64_t)colors >> 32);
         /* from a vertex to itself: by the corners' numbers, so that not all three go one way */
@@ -7602,20 +7480,19 @@ typedef struct tmr_tx_graph {
     uint32_t *bucket; /* where the vertices of each degree begin                          */
 } tmr_tx_graph;
 
-static int tmr_tx_graph_build(tmr_tx_graph *g, const trimesh_view *mesh, txm_arena *arena,
+static int tmr_tx_graph_build(tmr_tx_graph *g, const txm_mesh *mesh, txm_arena *arena,
                               const txm_env *env) {
-    const size_t n = mesh->vertex_count, sides = 3 * mesh->triangle_count;
-    const uint32_t *vertex = mesh->indices;
+    const size_t n = mesh->vertex_count, sides = 3 * mesh->face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     g->count = n;
     g->first = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
     g->ends = (uint32_t *)txm_arena_alloc(arena, sides, 2 * sizeof(uint32_t));
-    const txm_pair *pairs = tmr_tx_sort_sides(vertex, sides, &scratch);
-    const int good = g->first && g->ends && pairs;
+    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const int good = g->first && g->ends && sorted;
     for (int pass = 0; pass < 2 && good; pass++) {
-        for (size_t i = 0; i < sides; i = tmr_tx_run_end(vertex, pairs, i, sides)) {
-            const uint32_t low = pairs[i].key, high = tmr_tx_high(vertex, pairs[i].value);
+        for (size_t i = 0; i < sides; i = txm_mesh_edge_end(mesh, sorted, i)) {
+            const uint32_t low = txm_mesh_low(mesh, sorted[i]), high = txm_mesh_high(mesh, sorted[i]);
             if (low == high) continue;
             if (pass) {
                 g->ends[g->first[low + 1]] = high;
@@ -7683,16 +7560,16 @@ static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors
     return most;
 }
 
-TRIMESH_API txm_status trimesh_proper_colors(const trimesh_view *mesh, txm_env *env, int *colors,
+TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count) {
     tmr_tx_graph g;
     txm_arena arena;
     memset(&g, 0, sizeof g);
-    txm_status status = tmr_tx_check(mesh, 0, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     const size_t n = mesh->vertex_count;
     if (n && !colors) return txm_fail(env, TXM_BAD_ARGUMENT, "colors is NULL");
-    if (mesh->triangle_count == 0) {
+    if (mesh->face_count == 0) {
         for (size_t v = 0; v < n; v++) colors[v] = 0;
         if (count) *count = n > 0;
         return TXM_OK;
@@ -7760,7 +7637,7 @@ static txm_status tmr_tx_check_point(const trimesh_point *p, size_t patch, size_
     else if (!(p->scale >= 0 && p->scale <= 1000))
         why = "patch #, point #: scale must be 0 to 1000";
     else if (!txm_is_finite(turn)) why = "patch #, point #: rotation is not finite";
-    return why ? tmr_tx_fail(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
+    return why ? txm_fail_numbers(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
 }
 
 static void tmr_tx_ready_point(const trimesh_point *p, tmr_tx_item *item) {
@@ -7800,8 +7677,8 @@ static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *aren
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         const trimesh_patch *patch = &desc->patches[p];
         if (patch->count > TMR_TX_MOST_POINTS || (patch->count && !patch->points))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "patch # has more than 2^20 points, or points is NULL", p, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "patch # has more than 2^20 points, or points is NULL", p, 0);
         for (size_t i = 0; i < patch->count; i++) {
             const txm_status status = tmr_tx_check_point(&patch->points[i], p, i, env);
             if (status != TXM_OK) return status;
@@ -7834,16 +7711,16 @@ static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *aren
 }
 
 /* Give every side and every corner to the first triangle that has it. */
-static int tmr_tx_own(const trimesh_view *mesh, const txm_env *env, uint8_t *owned) {
-    const size_t sides = 3 * mesh->triangle_count;
+static int tmr_tx_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
+    const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const txm_pair *pairs = tmr_tx_sort_sides(vertex, sides, &scratch);
+    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
     uint8_t *given = (uint8_t *)txm_arena_zero(&scratch, mesh->vertex_count, 1);
-    const int good = pairs && given;
-    for (size_t i = 0; i < sides && good; i = tmr_tx_run_end(vertex, pairs, i, sides))
-        owned[pairs[i].value / 3] |= (uint8_t)(1 << pairs[i].value % 3);
+    const int good = sorted && given;
+    for (size_t i = 0; i < sides && good; i = txm_mesh_edge_end(mesh, sorted, i))
+        owned[sorted[i] / 3] |= (uint8_t)(1 << sorted[i] % 3);
     for (size_t i = 0; i < sides && good; i++) {
         if (!given[vertex[i]]) owned[i / 3] |= (uint8_t)(8 << i % 3);
         given[vertex[i]] = 1;
@@ -7878,16 +7755,16 @@ static double tmr_tx_unit(const tmr_tx_scatter *s, txm_dvec3 area2) {
 
 static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
     const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
-    const trimesh_view *mesh = &s->desc->mesh;
+    const txm_mesh *mesh = &s->desc->mesh;
     const double height = s->desc->inside ? -s->desc->height : s->desc->height;
     for (size_t t = first; t < end; t++) {
         txm_dvec3 p[3];
-        tmr_tx_corners(mesh, t, p);
+        txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 flat = txm_d3_area2(p[0], p[1], p[2]);
         const double up = height * tmr_tx_unit(s, flat);
         for (size_t k = 0; k < 3; k++) {
             const float *n = s->normals + 3 * (size_t)mesh->indices[3 * t + k];
-            p[k] = txm_d3_mad(p[k], tmr_tx_vec(n), up);
+            p[k] = txm_d3_mad(p[k], txm_d3_load(n), up);
         }
         const txm_dvec3 there = txm_d3_area2(p[0], p[1], p[2]);
         /* beyond the centre of a bend the triangle is turned over: no room there */
@@ -7904,16 +7781,16 @@ static uint32_t tmr_tx_third_bits(uint32_t x) {
 }
 
 /* The triangles along a Morton curve through their middles. pairs: room for 2 per triangle. */
-static void tmr_tx_morton(const trimesh_view *mesh, txm_pair *pairs) {
+static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
     double low[3] = {0, 0, 0}, size = 0;
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         if (i < 3 || mesh->positions[i] < low[i % 3]) low[i % 3] = mesh->positions[i];
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         if (mesh->positions[i] - low[i % 3] > size) size = mesh->positions[i] - low[i % 3];
-    for (size_t t = 0; t < mesh->triangle_count; t++) {
+    for (size_t t = 0; t < mesh->face_count; t++) {
         uint32_t key = 0;
         txm_dvec3 p[3];
-        tmr_tx_corners(mesh, t, p);
+        txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 sum = txm_d3_add(txm_d3_add(p[0], p[1]), p[2]);
         const double at[3] = {sum.x / 3 - low[0], sum.y / 3 - low[1], sum.z / 3 - low[2]};
         for (int k = 0; k < 3; k++) {
@@ -7923,7 +7800,7 @@ static void tmr_tx_morton(const trimesh_view *mesh, txm_pair *pairs) {
         pairs[t].key = key;
         pairs[t].value = (uint32_t)t;
     }
-    txm_sort_pairs(pairs, pairs + mesh->triangle_count, mesh->triangle_count);
+    txm_sort_pairs(pairs, pairs + mesh->face_count, mesh->face_count);
 }
 
 /* How long a beginning of a patch comes nearest to so many sixths of a thing. */
@@ -7942,7 +7819,7 @@ static uint32_t tmr_tx_beginning(const tmr_tx_kit *kit, double sixths) {
 
 /* Fill s->take so that the things on any stretch of the curve are as many as its area wants. */
 static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, txm_env *env) {
-    const size_t triangles = s->desc->mesh.triangle_count;
+    const size_t triangles = s->desc->mesh.face_count;
     double carry = 0, most = 0;
     int short_of = 0;
     for (size_t i = 0; i < triangles; i++) {
@@ -7962,10 +7839,11 @@ static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, tx
     }
     if (!short_of) return TXM_OK;
     most = ceil(most / TMR_TX_WHOLE);
-    return tmr_tx_fail(env, TXM_TOO_SMALL,
-                       "the patches have too few points for this density; the largest triangle "
-                       "needs #, points on sides counted half, on corners a sixth",
-                       most < 1e15 ? (uint64_t)most : (uint64_t)1000000000000000u, 0);
+    return txm_fail_numbers(
+        env, TXM_TOO_SMALL,
+        "the patches have too few points for this density; the largest triangle "
+        "needs #, points on sides counted half, on corners a sixth",
+        most < 1e15 ? (uint64_t)most : (uint64_t)1000000000000000u, 0);
 }
 
 /* s->offset[t] = instances of triangle t */
@@ -8025,11 +7903,11 @@ typedef struct tmr_tx_base {
 } tmr_tx_base;
 
 static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation, tmr_tx_base *b) {
-    const trimesh_view *mesh = &s->desc->mesh;
+    const txm_mesh *mesh = &s->desc->mesh;
     for (size_t k = 0; k < 3; k++) {
         const size_t v = mesh->indices[3 * t + k], to = (k + rotation) % 3;
-        b->p[to] = tmr_tx_vec(mesh->positions + 3 * v);
-        b->n[to] = tmr_tx_vec(s->normals + 3 * v);
+        b->p[to] = txm_d3_load(mesh->positions + 3 * v);
+        b->n[to] = txm_d3_load(s->normals + 3 * v);
     }
     b->up = txm_d3_area2(b->p[0], b->p[1], b->p[2]);
     b->ex = txm_d3_sub(b->p[1], b->p[0]);
@@ -8132,12 +8010,13 @@ static void tmr_tx_fill_block(const void *job, size_t first, size_t end) {
 /* ---- geometry on triangles: public ----------------------------------------------------------- */
 
 static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *env) {
-    for (size_t t = 0; t < d->mesh.triangle_count; t++) {
+    for (size_t t = 0; t < d->mesh.face_count; t++) {
         if (d->choices && (d->choices[t] < 0 || d->choices[t] >= d->patch_count))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "the choice of triangle # is not 0..patch_count - 1", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "the choice of triangle # is not 0..patch_count - 1", t, 0);
         if (d->rotations && (d->rotations[t] < 0 || d->rotations[t] > 2))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2",
+                                    t, 0);
     }
     return TXM_OK;
 }
@@ -8145,7 +8024,7 @@ static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *e
 static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *env) {
     double sum = 0;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_scatter_desc");
-    const txm_status status = tmr_tx_check(&d->mesh, 1, env);
+    const txm_status status = txm_mesh_check(&d->mesh, "mesh", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (d->normals && !tmr_tx_are_finite(d->normals, 3 * d->mesh.vertex_count))
         return txm_fail(env, TXM_BAD_ARGUMENT, "normals must be finite");
@@ -8172,7 +8051,7 @@ static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *e
 
 /* Areas, and from them how much of each patch is used. */
 static txm_status tmr_tx_plan_density(tmr_tx_scatter *s, txm_arena *arena, txm_env *env) {
-    const size_t triangles = s->desc->mesh.triangle_count;
+    const size_t triangles = s->desc->mesh.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     s->take = (uint32_t *)txm_arena_alloc(arena, triangles, sizeof(uint32_t));
@@ -8192,7 +8071,7 @@ static txm_status tmr_tx_plan_density(tmr_tx_scatter *s, txm_arena *arena, txm_e
 /* All that goes before placing: normals, patches, who owns the sides, counts, offsets. */
 static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
     const trimesh_scatter_desc *d = s->desc;
-    const size_t triangles = d->mesh.triangle_count;
+    const size_t triangles = d->mesh.face_count;
     int rims = 0;
     txm_status status = tmr_tx_ready(d, arena, env, s, &rims);
     if (status == TXM_OK) status = tmr_tx_report(env, 0, "patches");
@@ -8242,7 +8121,7 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
     txm_status status = tmr_tx_check_scatter(desc, env);
     if (status != TXM_OK) return status;
     if (!count) return txm_fail(env, TXM_BAD_ARGUMENT, "count is NULL");
-    if (desc->mesh.triangle_count == 0) {
+    if (desc->mesh.face_count == 0) {
         *count = 0;
         return TXM_OK;
     }
@@ -8253,11 +8132,11 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
     txm_arena_init(&arena, env);
     status = tmr_tx_plan(&s, &arena, env, count);
     if (status == TXM_OK && out && *count > capacity)
-        status = tmr_tx_fail(env, TXM_TOO_LARGE, "# instances, but out has room for # only", *count,
-                             capacity);
+        status = txm_fail_numbers(env, TXM_TOO_LARGE, "# instances, but out has room for # only",
+                                  *count, capacity);
     if (status == TXM_OK && out)
-        status = tmr_tx_spread(tmr_tx_fill_block, &s, desc->mesh.triangle_count, 0.3, 1, "placing",
-                               env);
+        status =
+            tmr_tx_spread(tmr_tx_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -8265,7 +8144,7 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
 TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
                                         float out[3]) {
     const double x = instance->rotation[0], y = instance->rotation[1], z = instance->rotation[2];
-    const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(tmr_tx_vec(point), instance->scale);
+    const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(txm_d3_load(point), instance->scale);
     const txm_dvec3 t = txm_d3_scale(txm_d3_cross(axis, p), 2);
     const txm_dvec3 turned =
         txm_d3_add(txm_d3_mad(p, t, instance->rotation[3]), txm_d3_cross(axis, t));
@@ -8467,8 +8346,8 @@ TRIMESH_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, t
     *count = (size_t)s.count;
     if (!points) return TXM_OK;
     if (capacity < *count)
-        return tmr_tx_fail(env, TXM_TOO_LARGE, "# points, but there is room for # only", *count,
-                           capacity);
+        return txm_fail_numbers(env, TXM_TOO_LARGE, "# points, but there is room for # only",
+                                *count, capacity);
     s.radius = TMR_TX_RADIUS / steps;
     s.margin = 0.25 / steps;
     /* a cell spans at least 2 radius / sqrt(3) of u and of v */

@@ -21,17 +21,18 @@ typedef struct surface {
     const char *name;
     float *positions;
     uint32_t *indices;
-    trimesh_view view;
+    txm_mesh view;
 } surface;
 
 static void make_room(surface *s, size_t vertices, size_t triangles) {
     s->positions = (float *)malloc(3 * vertices * sizeof(float));
     s->indices = (uint32_t *)malloc(3 * triangles * sizeof(uint32_t));
     if (!s->positions || !s->indices) give_up(s->name, "out of memory");
+    memset(&s->view, 0, sizeof s->view);
     s->view.positions = s->positions;
     s->view.indices = s->indices;
     s->view.vertex_count = vertices;
-    s->view.triangle_count = triangles;
+    s->view.face_count = triangles;
 }
 
 static void put_triangle(uint32_t **to, size_t a, size_t b, size_t c) {
@@ -162,7 +163,7 @@ static void retiling(int full) {
                 trimesh_free(retile(&surfaces[s], (trimesh_method)method, n, threads, &all));
                 trimesh_mesh *m = retile(&surfaces[s], (trimesh_method)method, n, 1, &one);
                 printf("%-10s %9lu %-7s %9lu %8.2f %9.2f %7.2f %7.1f %8.1f %12.0f %7.4f\n",
-                       surfaces[s].name, (unsigned long)surfaces[s].view.triangle_count,
+                       surfaces[s].name, (unsigned long)surfaces[s].view.face_count,
                        method == TRIMESH_LATTICE ? "lattice" : "repel", (unsigned long)n,
                        one.seconds, all.seconds, one.seconds / all.seconds,
                        1e6 * one.seconds / (double)n, (double)one.peak / 1048576,

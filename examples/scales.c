@@ -115,7 +115,7 @@ int main(int argc, char **argv) {
     desc.surface.positions = in.positions;
     desc.surface.indices = in.indices;
     desc.surface.vertex_count = in.vertex_count;
-    desc.surface.triangle_count = in.triangle_count;
+    desc.surface.face_count = in.triangle_count;
     desc.vertices = argc > 3 ? strtoul(argv[3], NULL, 10) : 1000;
     if (!failed && trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) failed = env.message;
 

@@ -23,7 +23,7 @@
          desc.surface.positions = positions;
          desc.surface.indices = indices;
          desc.surface.vertex_count = 4;
-         desc.surface.triangle_count = 4;
+         desc.surface.face_count = 4;
          desc.vertices = 500;
          if (trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) {
              fprintf(stderr, "retile: %s\n", env.message);
@@ -111,20 +111,6 @@ extern "C" {
 
 /* ---- meshes ----------------------------------------------------------------------------- */
 
-/* A triangle mesh that the caller owns. */
-typedef struct trimesh_view {
-    const float *positions;   /* 3 per vertex, finite                                         */
-    const uint32_t *indices;  /* 3 per triangle, counter-clockwise seen from outside          */
-    size_t vertex_count, triangle_count;
-} trimesh_view;
-
-/* Where a vertex lies on the input: in which of the caller's triangles, and where in it:
-   (1 - u - v) a + u b + v c of its corners a, b, c in the order of the indices. */
-typedef struct trimesh_source {
-    uint32_t triangle;
-    float u, v; /* each 0..1, u + v at most 1 */
-} trimesh_source;
-
 /* What keeps a vertex from moving freely. */
 typedef enum trimesh_kind {
     TRIMESH_FREE = 0,   /* anywhere on the surface           */
@@ -140,7 +126,7 @@ typedef struct trimesh_mesh {
     float *positions;        /* 3 per vertex                                               */
     float *normals;          /* 3 per vertex, unit: of the input surface, smooth           */
     uint32_t *indices;       /* 3 per triangle                                             */
-    trimesh_source *sources; /* 1 per vertex                                               */
+    txm_mesh_place *sources; /* 1 per vertex: where it lies on the input                    */
     uint8_t *kinds;          /* 1 per vertex: a trimesh_kind                               */
     double edge_length;      /* that was aimed at, in units of the input                   */
     txm_arena memory;        /* where all this lies                                        */
@@ -173,7 +159,7 @@ typedef enum trimesh_method {
 } trimesh_method;
 
 typedef struct trimesh_desc {
-    trimesh_view surface;  /* not modified, need not outlive the call (a job's must)            */
+    txm_mesh surface; /* triangles; not modified, need not outlive the call (a job's must)    */
     size_t vertices;       /* how many the result has, 4 or more                                */
     trimesh_method method; /* 0 = lattice                                                       */
     const float *scale;    /* 1 per input vertex: wanted edge length relative to the others,
@@ -294,7 +280,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 
 /* ---- using a mesh: what goes for all functions below --------------------------------------- */
 
-/* They take any triangle mesh as a trimesh_view, a result of trimesh_retile or your own: borders,
+/* They take any triangle mesh as a txm_mesh, a result of trimesh_retile or your own: borders,
    several pieces, edges with more than two triangles and unequal winding are allowed, holes in the
    numbering too; two triangles are neighbours if they share two vertex numbers. Outputs are arrays
    of the caller's, of the size stated, untouched after an error unless said otherwise. Every call
@@ -304,12 +290,12 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
    allowed and gives nothing. Same arguments, same bytes, whatever the threads. */
 
 /* A result as a view. */
-TRIMESH_API trimesh_view trimesh_as_view(const trimesh_mesh *mesh);
+TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
 
 /* Smooth unit normals of a mesh that has none, 3 floats per vertex; 0 0 0 at a vertex without
    triangles of an area above 0. Each triangle counts by sin(angle at the vertex) / (product of the
    two edges' lengths), which is exact on spheres [Max 1999]. O(triangles), 24 bytes per vertex. */
-TRIMESH_API txm_status trimesh_normals(const trimesh_view *mesh, txm_env *env, float *normals);
+TRIMESH_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals);
 
 /* ---- attributes: values of the input at the vertices of the result ------------------------- */
 
@@ -332,8 +318,8 @@ typedef struct trimesh_values {
    sources  count of them, a result's: mesh->sources and mesh->vertex_count
    out      channels floats per source
    cost     O(count)                                                                           */
-TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh_values *values,
-                                        const trimesh_source *sources, size_t count, txm_env *env,
+TRIMESH_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
+                                        const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out);
 
 /* Values with seams (charts of texture coordinates) at the corners of a result's triangles, so that
@@ -359,11 +345,9 @@ TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh
    out      channels floats per corner, 3 corners per triangle, in the order of mesh->indices
    cost     O(input) for the neighbours, then for each triangle of mesh as many steps as input
             triangles lie on its paths; 75 bytes per triangle of the input, 20 per vertex       */
-TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
-                                                const trimesh_values *values,
-                                                const trimesh_view *mesh,
-                                                const trimesh_source *sources, txm_env *env,
-                                                float *out);
+TRIMESH_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
+                                                const txm_mesh *mesh, const txm_mesh_place *sources,
+                                                txm_env *env, float *out);
 
 /* From values at corners to the vertex arrays of a renderer: a vertex whose corners differ is
    doubled, one copy for each different value (bits are compared, -0 equals 0). New vertices are in
@@ -377,7 +361,7 @@ TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
                 a copy of vertex mesh->indices[c] with the value at values + channels * c.
    count        receives the number of new vertices
    cost         O(triangles), 60 bytes each                                                     */
-TRIMESH_API txm_status trimesh_split_corners(const trimesh_view *mesh, const float *values,
+TRIMESH_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
                                              int channels, txm_env *env, uint32_t *new_indices,
                                              uint32_t *corners, size_t *count);
 
@@ -423,7 +407,7 @@ typedef struct trimesh_choose_desc {
    rotations  receives 1 per triangle: r = 0..2, corner k shows corner (k + r) mod 3 of the patch;
               may be NULL
    cost       O(triangles), 60 bytes each; with repeat: none                                     */
-TRIMESH_API txm_status trimesh_choose(const trimesh_view *mesh, const trimesh_choose_desc *desc,
+TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
                                       txm_env *env, int *patches, int *rotations);
 
 /* Texture coordinates of all corners from the tile and rotation of each triangle.
@@ -447,7 +431,7 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
    edge_colors  receives 3 per triangle: 0..colors - 1, equal on both sides of an edge
    directions   receives 3 per triangle: +1 if the side runs along the edge's direction, -1 against
                 it; may be NULL. The three of a triangle never run one way round.               */
-TRIMESH_API txm_status trimesh_edge_colors(const trimesh_view *mesh, int colors, uint64_t seed,
+TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
                                            txm_env *env, int *edge_colors, int *directions);
 
 /* A random colour 0..count - 1 for every vertex, as in [1] (with 3). count 1..65536; 0 = 3. */
@@ -461,7 +445,7 @@ TRIMESH_API txm_status trimesh_random_colors(size_t vertex_count, int count, uin
    colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
    count   receives how many colours were used; may be NULL
    cost    O(triangles), 60 bytes each and 16 per vertex                                        */
-TRIMESH_API txm_status trimesh_proper_colors(const trimesh_view *mesh, txm_env *env, int *colors,
+TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count);
 
 /* ---- geometry on triangles ----------------------------------------------------------------- */
@@ -500,7 +484,7 @@ typedef struct trimesh_instance {
 } trimesh_instance;
 
 typedef struct trimesh_scatter_desc {
-    trimesh_view mesh;
+    txm_mesh mesh;
     const float *normals;         /* 3 per vertex, unit: a result's; NULL = trimesh_normals       */
     const trimesh_patch *patches; /* patch_count of them                                          */
     int patch_count;              /* 1..65536                                                     */

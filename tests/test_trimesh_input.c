@@ -62,7 +62,7 @@ static trimesh_desc describe(void) {
     desc.surface.positions = in.at;
     desc.surface.indices = in.t;
     desc.surface.vertex_count = in.vertices;
-    desc.surface.triangle_count = in.triangles;
+    desc.surface.face_count = in.triangles;
     return desc;
 }
 
@@ -434,7 +434,7 @@ static void test_refused(void **state) {
     desc.surface.indices = NULL;
     assert_int_equal(build_desc(&desc), TXM_BAD_ARGUMENT);
     desc = describe();
-    desc.surface.triangle_count = SIZE_MAX;
+    desc.surface.face_count = SIZE_MAX;
     assert_int_equal(build_desc(&desc), TXM_TOO_LARGE);
     bad[0] = (float)NAN;
     bad[1] = (float)INFINITY;
@@ -442,14 +442,14 @@ static void test_refused(void **state) {
         clear();
         cube(0, 0, 0);
         in.at[16] = bad[k];
-        assert_int_equal(build(0), TXM_BAD_DATA);
+        assert_int_equal(build(0), TXM_BAD_ARGUMENT);
         assert_non_null(strstr(env.message, "vertex 5 "));
     }
     clear();
     cube(0, 0, 0);
     in.t[20] = 8;
-    assert_int_equal(build(0), TXM_BAD_DATA);
-    assert_non_null(strstr(env.message, "triangle 6 "));
+    assert_int_equal(build(0), TXM_BAD_ARGUMENT);
+    assert_non_null(strstr(env.message, "face 6 "));
 }
 
 static void test_scale(void **state) {

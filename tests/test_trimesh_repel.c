@@ -239,7 +239,7 @@ static trimesh_desc describe(const shape *s, size_t vertices) {
     d.surface.positions = s->p;
     d.surface.indices = s->f;
     d.surface.vertex_count = s->nv;
-    d.surface.triangle_count = s->nf;
+    d.surface.face_count = s->nf;
     d.vertices = vertices;
     d.method = TRIMESH_REPEL;
     return d;

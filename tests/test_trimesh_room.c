@@ -20,7 +20,7 @@ static trimesh_desc describe(size_t vertices, trimesh_method method) {
     d.surface.positions = in.at;
     d.surface.vertex_count = in.vertices;
     d.surface.indices = in.t;
-    d.surface.triangle_count = in.triangles;
+    d.surface.face_count = in.triangles;
     d.vertices = vertices;
     d.method = method;
     return d;

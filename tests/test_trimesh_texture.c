@@ -20,7 +20,7 @@ typedef struct shape {
     float *positions;
     uint32_t *indices;
     size_t vertices, triangles;
-    trimesh_view view;
+    txm_mesh view;
 } shape;
 
 static void shape_alloc(shape *s, size_t vertices, size_t triangles) {
@@ -29,10 +29,11 @@ static void shape_alloc(shape *s, size_t vertices, size_t triangles) {
     s->positions = (float *)calloc(vertices, 3 * sizeof(float));
     s->indices = (uint32_t *)calloc(triangles, 3 * sizeof(uint32_t));
     assert_true(s->positions && s->indices);
+    memset(&s->view, 0, sizeof s->view);
     s->view.positions = s->positions;
     s->view.indices = s->indices;
     s->view.vertex_count = vertices;
-    s->view.triangle_count = triangles;
+    s->view.face_count = triangles;
 }
 
 static void shape_free(shape *s) {
@@ -176,8 +177,8 @@ static void test_normals(void **state) {
 }
 
 /* random sources on the input, as many as `count` */
-static trimesh_source *strew(const shape *s, size_t count) {
-    trimesh_source *sources = (trimesh_source *)malloc(count * sizeof *sources);
+static txm_mesh_place *strew(const shape *s, size_t count) {
+    txm_mesh_place *sources = (txm_mesh_place *)malloc(count * sizeof *sources);
     txm_rng rng = txm_rng_make(5, 5);
     assert_non_null(sources);
     for (size_t i = 0; i < count; i++) {
@@ -198,7 +199,7 @@ static void test_transfer(void **state) {
     shape s;
     (void)state;
     make_plane(&s, 20, 10);
-    trimesh_source *sources = strew(&s, COUNT);
+    txm_mesh_place *sources = strew(&s, COUNT);
     /* a linear function of the place, once per vertex and once per corner */
     float *value = (float *)malloc(2 * s.vertices * sizeof(float));
     float *out = (float *)malloc(4 * COUNT * sizeof(float));
@@ -245,10 +246,10 @@ static void test_transfer(void **state) {
 }
 
 /* A coarse plane over a fine one: its triangles, and the sources of its vertices. */
-static trimesh_source *lay_over(const shape *fine, size_t columns, shape *coarse) {
-    trimesh_source *sources;
+static txm_mesh_place *lay_over(const shape *fine, size_t columns, shape *coarse) {
+    txm_mesh_place *sources;
     make_plane(coarse, 6, 6);
-    sources = (trimesh_source *)malloc(coarse->vertices * sizeof *sources);
+    sources = (txm_mesh_place *)malloc(coarse->vertices * sizeof *sources);
     for (size_t v = 0; v < coarse->vertices; v++) {
         /* lattice coordinates on the fine plane, on odd places */
         const double y = 1.31 + 2.9 * (double)(v / 7), x = 1.77 + 2.9 * (double)(v % 7);
@@ -270,7 +271,7 @@ static void test_transfer_corners(void **state) {
     shape fine, coarse;
     (void)state;
     make_plane(&fine, COLUMNS, COLUMNS);
-    trimesh_source *sources = lay_over(&fine, COLUMNS, &coarse);
+    txm_mesh_place *sources = lay_over(&fine, COLUMNS, &coarse);
     const size_t corners = 3 * coarse.triangles;
     float *out = (float *)malloc(2 * corners * sizeof(float));
     float *value = (float *)malloc(4 * fine.vertices * sizeof(float));
@@ -349,10 +350,10 @@ static void test_transfer_identity(void **state) {
     shape s;
     (void)state;
     make_sphere(&s, 6);
-    trimesh_source *sources = (trimesh_source *)malloc(s.vertices * sizeof *sources);
+    txm_mesh_place *sources = (txm_mesh_place *)malloc(s.vertices * sizeof *sources);
     float *out = (float *)malloc(9 * s.triangles * sizeof(float));
     for (size_t i = 0; i < 3 * s.triangles; i++) {
-        trimesh_source *o = &sources[s.indices[i]];
+        txm_mesh_place *o = &sources[s.indices[i]];
         o->triangle = (uint32_t)(i / 3);
         o->u = i % 3 == 1;
         o->v = i % 3 == 2;
@@ -445,7 +446,7 @@ static void test_atlas(void **state) {
 /* pairs of triangles at an edge with equal patch, and with equal patch and rotation */
 static void count_equal(const shape *s, const int *patch, const int *rotation, int equal[2]) {
     uint32_t *next = (uint32_t *)malloc(3 * s->triangles * sizeof *next);
-    assert_true(tmr_tx_link(s->indices, 3 * s->triangles, next, NULL));
+    assert_true(tmr_tx_link(&s->view, next, NULL));
     equal[0] = equal[1] = 0;
     for (size_t i = 0; i < 3 * s->triangles; i++) {
         if (next[i] <= i) continue;
@@ -580,7 +581,7 @@ static void test_tiles(void **state) {
     }
     /* the same edges on both sides: colours equal, directions opposite */
     uint32_t *next = (uint32_t *)malloc(3 * n * sizeof *next);
-    assert_true(tmr_tx_link(s.indices, 3 * n, next, NULL));
+    assert_true(tmr_tx_link(&s.view, next, NULL));
     for (size_t i = 0; i < 3 * n; i++) {
         assert_int_equal(color[i], color[next[i]]);
         assert_int_equal(way[i], -way[next[i]]);
@@ -713,7 +714,7 @@ static void test_placing(void **state) {
     patch.points = &point;
     patch.count = 1;
     d.mesh = s.view;
-    d.mesh.triangle_count = 1;
+    d.mesh.face_count = 1;
     d.patches = &patch;
     d.patch_count = 1;
     d.rotations = &rotation;
@@ -954,7 +955,7 @@ static void test_density(void **state) {
 /* ---- same bytes, failures, bad arguments ---- */
 
 /* Everything on one mesh; a number that stands for all results. */
-static txm_status run_all(const shape *s, const shape *input, const trimesh_source *sources,
+static txm_status run_all(const shape *s, const shape *input, const txm_mesh_place *sources,
                           txm_env *env, uint64_t *hash) {
     const size_t n = s->triangles, v = s->vertices;
     float *out = (float *)malloc(9 * n * sizeof(float));
@@ -1014,7 +1015,7 @@ static void test_same_bytes_and_failures(void **state) {
     shape s, input;
     (void)state;
     make_plane(&input, 24, 24);
-    trimesh_source *sources = lay_over(&input, 24, &s);
+    txm_mesh_place *sources = lay_over(&input, 24, &s);
     uint64_t first, hash;
     assert_int_equal(run_all(&s, &input, sources, NULL, &first), TXM_OK);
     print_message("# hash %016llx\n", (unsigned long long)first);
@@ -1183,7 +1184,7 @@ static void test_degenerate(void **state) {
         }
         free(out);
     }
-    trimesh_source *sources = strew(&s, s.vertices);
+    txm_mesh_place *sources = strew(&s, s.vertices);
     const trimesh_values values = {s.positions, s.vertices, NULL, 3};
     float *out = (float *)malloc(9 * s.triangles * sizeof(float));
     assert_int_equal(trimesh_transfer_corners(&s.view, &values, &s.view, sources, NULL, out), TXM_OK);

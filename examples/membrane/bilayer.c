@@ -48,7 +48,7 @@ txm_status make_membrane(double (*f)(const double[3]), txm_env *env, membrane *m
     desc.surface.positions = positions;
     desc.surface.indices = indices;
     desc.surface.vertex_count = SURFACE_VERTICES;
-    desc.surface.triangle_count = SURFACE_TRIANGLES;
+    desc.surface.face_count = SURFACE_TRIANGLES;
     desc.crease_angle = 180;
     /* triangles of 45 Angstrom: 877 square Angstrom, two for each vertex */
     desc.vertices = (size_t)(area_of(&desc.surface) / (2 * 877)) + 2;

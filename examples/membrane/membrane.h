@@ -16,7 +16,7 @@ enum {
 double sphere(const double p[3]);
 double capsule(const double p[3]);
 void make_surface(double (*f)(const double[3]), float *positions, uint32_t *indices);
-double area_of(const trimesh_view *m);
+double area_of(const txm_mesh *m);
 
 /* ---- lipids.c: a few beads each; the tails begin at z = 0, the heads are above ---- */
 typedef struct bead {

@@ -55,9 +55,9 @@ void make_surface(double (*f)(const double[3]), float *positions, uint32_t *indi
     }
 }
 
-double area_of(const trimesh_view *m) {
+double area_of(const txm_mesh *m) {
     double area = 0;
-    for (size_t t = 0; t < m->triangle_count; t++) {
+    for (size_t t = 0; t < m->face_count; t++) {
         txm_vec3 p[3];
         for (size_t k = 0; k < 3; k++) {
             const float *v = m->positions + 3 * (size_t)m->indices[3 * t + k];

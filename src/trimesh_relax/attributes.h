@@ -11,7 +11,7 @@ typedef struct tmr_tx_values {
     size_t channels;
 } tmr_tx_values;
 
-static txm_status tmr_tx_check_values(const trimesh_view *input, const trimesh_values *values,
+static txm_status tmr_tx_check_values(const txm_mesh *input, const trimesh_values *values,
                                       txm_env *env, tmr_tx_values *out) {
     if (!values) return txm_fail(env, TXM_BAD_ARGUMENT, "values is NULL");
     if (values->channels < 1 || values->channels > TRIMESH_MAX_CHANNELS)
@@ -26,32 +26,33 @@ static txm_status tmr_tx_check_values(const trimesh_view *input, const trimesh_v
     out->entry = values->indices ? values->indices : input->indices;
     out->values = values->values;
     out->channels = (size_t)values->channels;
-    for (size_t i = 0; values->indices && i < 3 * input->triangle_count; i++) {
+    for (size_t i = 0; values->indices && i < 3 * input->face_count; i++) {
         if (values->indices[i] >= values->count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "values: triangle # names entry #, which is not below count", i / 3,
-                               values->indices[i]);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "values: triangle # names entry #, which is not below count",
+                                    i / 3, values->indices[i]);
     }
     for (size_t i = 0; i < values->count; i++) {
         if (!tmr_tx_are_finite(values->values + out->channels * i, out->channels))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "values: entry # is not finite", i, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "values: entry # is not finite", i, 0);
     }
     return TXM_OK;
 }
 
-static txm_status tmr_tx_check_sources(const trimesh_view *input, const trimesh_source *sources,
+static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_place *sources,
                                        size_t count, txm_env *env) {
     if (count > (size_t)INT32_MAX) return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 sources");
     if (count && !sources) return txm_fail(env, TXM_BAD_ARGUMENT, "sources is NULL");
     for (size_t i = 0; i < count; i++) {
-        const trimesh_source *s = &sources[i];
-        if (s->triangle >= input->triangle_count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "source # names triangle #, which the input does not have", i,
-                               s->triangle);
+        const txm_mesh_place *s = &sources[i];
+        if (s->triangle >= input->face_count)
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "source # names triangle #, which the input does not have", i,
+                                    s->triangle);
         if (!(s->u >= 0 && s->v >= 0 && (double)s->u + s->v <= 1 + TMR_TX_SNAP))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "u and v of source # must be 0 or more, their sum at most 1", i, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "u and v of source # must be 0 or more, their sum at most 1", i,
+                                    0);
     }
     return TXM_OK;
 }
@@ -68,23 +69,23 @@ static void tmr_tx_interpolate(const tmr_tx_values *x, size_t triangle, double u
 
 typedef struct tmr_tx_transfer {
     tmr_tx_values values;
-    const trimesh_source *sources;
+    const txm_mesh_place *sources;
     float *out;
 } tmr_tx_transfer;
 
 static void tmr_tx_transfer_block(const void *job, size_t first, size_t end) {
     const tmr_tx_transfer *j = (const tmr_tx_transfer *)job;
     for (size_t i = first; i < end; i++) {
-        const trimesh_source *s = &j->sources[i];
+        const txm_mesh_place *s = &j->sources[i];
         tmr_tx_interpolate(&j->values, s->triangle, s->u, s->v, j->out + j->values.channels * i);
     }
 }
 
-TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh_values *values,
-                                        const trimesh_source *sources, size_t count, txm_env *env,
+TRIMESH_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
+                                        const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out) {
     tmr_tx_transfer j;
-    txm_status status = tmr_tx_check(input, 0, env);
+    txm_status status = txm_mesh_check(input, "input", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &j.values);
     if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, count, env);
     if (status != TXM_OK || count == 0) return status;
@@ -98,13 +99,13 @@ TRIMESH_API txm_status trimesh_transfer(const trimesh_view *input, const trimesh
 
 /* The input as paths see it. */
 typedef struct tmr_tx_paths {
-    trimesh_view input;
+    txm_mesh input;
     tmr_tx_values values;
-    const trimesh_view *mesh;
-    const trimesh_source *sources;
+    const txm_mesh *mesh;
+    const txm_mesh_place *sources;
     uint32_t *welded; /* 1 per vertex: the first vertex in the same place                  */
     uint32_t *vertex; /* 1 per corner: its welded vertex                                   */
-    uint32_t *next;   /* 1 per side, see tmr_tx_link                                       */
+    uint32_t *next;   /* 1 per side, see txm_mesh_link                                     */
     uint8_t *seam;    /* 1 per side: 0 = none, 1 = seam, 2 = none or several on the other side */
     float *out;
 } tmr_tx_paths;
@@ -115,14 +116,14 @@ typedef struct tmr_tx_place {
     double u, v;
 } tmr_tx_place;
 
-static txm_dvec3 tmr_tx_point(const trimesh_view *input, tmr_tx_place at) {
+static txm_dvec3 tmr_tx_point(const txm_mesh *input, tmr_tx_place at) {
     txm_dvec3 p[3];
-    tmr_tx_corners(input, at.triangle, p);
+    txm_mesh_triangle(input, at.triangle, p);
     return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
 /* Number vertices in equal places alike. pairs: room for 2 per vertex. */
-static void tmr_tx_weld(const trimesh_view *input, txm_pair *pairs, uint32_t *welded) {
+static void tmr_tx_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
     const size_t n = input->vertex_count;
     for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
     for (size_t axis = 3; axis-- > 0;) {
@@ -151,17 +152,17 @@ static int tmr_tx_equal_values(const tmr_tx_values *x, size_t corner, size_t oth
 static uint8_t tmr_tx_seam(const tmr_tx_paths *p, size_t side) {
     const size_t other = p->next[side];
     if (other == side || p->next[other] != side) return 2;
-    size_t a = other, b = tmr_tx_end(other); /* the same ends, whichever way round */
+    size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, whichever way round */
     if (p->vertex[a] != p->vertex[side]) {
         a = b;
         b = other;
     }
     return !(tmr_tx_equal_values(&p->values, side, a) &&
-             tmr_tx_equal_values(&p->values, tmr_tx_end(side), b));
+             tmr_tx_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
 }
 
 static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env *env) {
-    const size_t n = p->input.vertex_count, sides = 3 * p->input.triangle_count;
+    const size_t n = p->input.vertex_count, sides = 3 * p->input.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     p->welded = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
@@ -175,7 +176,9 @@ static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env 
     txm_arena_free(&scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->vertex[i] = p->welded[p->input.indices[i]];
-    if (!tmr_tx_link(p->vertex, sides, p->next, env)) return tmr_tx_no_memory(env);
+    txm_mesh whole = p->input;
+    whole.indices = p->vertex;
+    if (!tmr_tx_link(&whole, p->next, env)) return tmr_tx_no_memory(env);
     for (size_t i = 0; i < sides; i++) p->seam[i] = tmr_tx_seam(p, i);
     return TXM_OK;
 }
@@ -238,7 +241,7 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
     for (int step = 0; step < 1 << 16; step++) {
         txm_dvec3 c[3];
         if (triangle == w->goal) return 1;
-        tmr_tx_corners(&p->input, triangle, c);
+        txm_mesh_triangle(&p->input, triangle, c);
         const size_t k = tmr_tx_exit(w, c, from);
         if (k == 3) return 0;
         const double s = tmr_tx_cut(w, c, k);
@@ -291,7 +294,7 @@ static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
     tmr_tx_place from[3];
     txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
-        const trimesh_source *s = &p->sources[p->mesh->indices[3 * t + k]];
+        const txm_mesh_place *s = &p->sources[p->mesh->indices[3 * t + k]];
         from[k].triangle = s->triangle;
         from[k].u = s->u;
         from[k].v = s->v;
@@ -315,19 +318,17 @@ static void tmr_tx_transfer_faces(const void *job, size_t first, size_t end) {
     for (size_t t = first; t < end; t++) tmr_tx_transfer_face((const tmr_tx_paths *)job, t);
 }
 
-TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
-                                                const trimesh_values *values,
-                                                const trimesh_view *mesh,
-                                                const trimesh_source *sources, txm_env *env,
-                                                float *out) {
+TRIMESH_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
+                                                const txm_mesh *mesh, const txm_mesh_place *sources,
+                                                txm_env *env, float *out) {
     tmr_tx_paths p;
     txm_arena arena;
     memset(&p, 0, sizeof p);
-    txm_status status = tmr_tx_check(input, 1, env);
+    txm_status status = txm_mesh_check(input, "input", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &p.values);
-    if (status == TXM_OK) status = tmr_tx_check(mesh, 0, env);
+    if (status == TXM_OK) status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, mesh->vertex_count, env);
-    if (status != TXM_OK || mesh->triangle_count == 0) return status;
+    if (status != TXM_OK || mesh->face_count == 0) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     if (tmr_tx_report(env, 0, "seams") != TXM_OK) return TXM_CANCELLED;
     p.input = *input;
@@ -337,8 +338,7 @@ TRIMESH_API txm_status trimesh_transfer_corners(const trimesh_view *input,
     txm_arena_init(&arena, env);
     status = tmr_tx_paths_build(&p, &arena, env);
     if (status == TXM_OK)
-        status = tmr_tx_spread(tmr_tx_transfer_faces, &p, mesh->triangle_count, 0.3, 1, "values",
-                               env);
+        status = tmr_tx_spread(tmr_tx_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -360,9 +360,9 @@ static int tmr_tx_equal_bits(const float *a, const float *b, size_t count) {
 }
 
 /* Sort the corners by vertex, and those of one vertex by a hash of their values. */
-static void tmr_tx_sort_corners(const trimesh_view *mesh, const float *values, size_t channels,
+static void tmr_tx_sort_corners(const txm_mesh *mesh, const float *values, size_t channels,
                                 txm_pair *pairs) {
-    const size_t n = 3 * mesh->triangle_count;
+    const size_t n = 3 * mesh->face_count;
     for (size_t c = 0; c < n; c++) {
         uint64_t hash = 0;
         for (size_t i = 0; i < channels; i++)
@@ -375,17 +375,17 @@ static void tmr_tx_sort_corners(const trimesh_view *mesh, const float *values, s
     txm_sort_pairs(pairs, pairs + n, n);
 }
 
-TRIMESH_API txm_status trimesh_split_corners(const trimesh_view *mesh, const float *values,
+TRIMESH_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
                                              int channels, txm_env *env, uint32_t *new_indices,
                                              uint32_t *corners, size_t *count) {
     txm_arena arena;
-    txm_status status = tmr_tx_check(mesh, 0, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (channels < 1 || channels > TRIMESH_MAX_CHANNELS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "channels must be 1 to TRIMESH_MAX_CHANNELS");
-    if (!count || (mesh->triangle_count && !values))
+    if (!count || (mesh->face_count && !values))
         return txm_fail(env, TXM_BAD_ARGUMENT, "values or count is NULL");
-    const size_t n = 3 * mesh->triangle_count, width = (size_t)channels;
+    const size_t n = 3 * mesh->face_count, width = (size_t)channels;
     if (tmr_tx_report(env, 0, "corners") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&arena, n, 2 * sizeof(txm_pair));

@@ -48,14 +48,6 @@ static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
     return txm_fail(m->env, TXM_CANCELLED, "cancelled while mending the surface");
 }
 
-/* Refuse with the number of what is wrong. */
-static txm_status tmr_mend_fail(txm_env *env, txm_status status, const char *what, size_t number,
-                                const char *why) {
-    char line[160];
-    snprintf(line, sizeof line, "%s %lu (from 0) %s", what, (unsigned long)number, why);
-    return txm_fail(env, status, line);
-}
-
 static txm_status tmr_mend_fail_edge(tmr_mend *m, int32_t corner, int count) {
     const int32_t a = m->vertex[tmr_next(corner)], b = m->vertex[tmr_prev(corner)];
     char line[160];
@@ -80,8 +72,8 @@ static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
     for (size_t i = 0; i < count; i++) {
         const double s = desc->scale[i];
         if (!txm_is_finite(s) || !(s > 0))
-            return tmr_mend_fail(env, TXM_BAD_ARGUMENT, "scale of vertex", i,
-                                 "must be finite and above 0");
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "scale: of vertex # it must be finite and above 0", i, 0);
         if (i == 0 || s < least) least = s;
         if (i == 0 || s > most) most = s;
     }
@@ -94,26 +86,13 @@ static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
 /* All that can be wrong with the numbers themselves. */
 static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
-    const trimesh_view *in = &desc->surface;
     const size_t limit = TRIMESH_MAX_VERTICES < TMR_MOST ? TRIMESH_MAX_VERTICES : TMR_MOST;
-    if (in->vertex_count == 0 || in->triangle_count == 0)
-        return txm_fail(env, TXM_TOO_SMALL, "the surface has no vertices or no triangles");
-    if (!in->positions || !in->indices)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "surface: positions or indices is NULL");
-    if (in->vertex_count > limit || in->triangle_count > limit)
-        return txm_fail(env, TXM_TOO_LARGE,
-                        "the surface has more than TRIMESH_MAX_VERTICES vertices or triangles");
+    const txm_status status = txm_mesh_check(&desc->surface, "surface", 3, 1, limit, env);
+    if (status != TXM_OK) return status;
+    if (desc->surface.vertex_count == 0 || desc->surface.face_count == 0)
+        return txm_fail(env, TXM_TOO_SMALL, "surface: no vertices or no triangles");
     if (!(desc->weld >= 0 && desc->weld <= 0.01f))
         return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01");
-    for (size_t i = 0; i < 3 * in->vertex_count; i++) {
-        if (!txm_is_finite(in->positions[i]))
-            return tmr_mend_fail(env, TXM_BAD_DATA, "vertex", i / 3, "has a position not finite");
-    }
-    for (size_t i = 0; i < 3 * in->triangle_count; i++) {
-        if (in->indices[i] >= in->vertex_count)
-            return tmr_mend_fail(env, TXM_BAD_DATA, "triangle", i / 3,
-                                 "has a vertex index out of range");
-    }
     return desc->scale ? tmr_check_scale(desc, env) : TXM_OK;
 }
 
@@ -145,10 +124,10 @@ static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scrat
 
 /* Scale the used vertices; afterwards rename is -1 for the others. */
 static txm_status tmr_mend_scale(tmr_mend *m) {
-    const trimesh_view *in = &m->desc->surface;
+    const txm_mesh *in = &m->desc->surface;
     double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, largest = 0;
     for (int32_t i = 0; i < m->vertex_count; i++) m->rename[i] = -1;
-    for (size_t i = 0; i < 3 * in->triangle_count; i++)
+    for (size_t i = 0; i < 3 * in->face_count; i++)
         m->rename[in->indices[i]] = (int32_t)in->indices[i];
     for (int k = 0; k < 3; k++)
         low[k] = high[k] = in->positions[3 * (size_t)in->indices[0] + (size_t)k];

@@ -152,7 +152,7 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
     txm_status status = tmr_check_surface(m->desc, m->env);
     if (status != TXM_OK) return status;
     m->vertex_count = (int32_t)m->desc->surface.vertex_count;
-    m->face_count = (int32_t)m->desc->surface.triangle_count;
+    m->face_count = (int32_t)m->desc->surface.face_count;
     m->point = (txm_dvec3 *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(txm_dvec3));
     if (!m->point) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     if ((status = tmr_mend_alloc(m, arena, scratch)) != TXM_OK) return status;

@@ -196,8 +196,8 @@ TRIMESH_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, t
     *count = (size_t)s.count;
     if (!points) return TXM_OK;
     if (capacity < *count)
-        return tmr_tx_fail(env, TXM_TOO_LARGE, "# points, but there is room for # only", *count,
-                           capacity);
+        return txm_fail_numbers(env, TXM_TOO_LARGE, "# points, but there is room for # only",
+                                *count, capacity);
     s.radius = TMR_TX_RADIUS / steps;
     s.margin = 0.25 / steps;
     /* a cell spans at least 2 radius / sqrt(3) of u and of v */

@@ -101,7 +101,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
 /* ---- public ------------------------------------------------------------------------------- */
 
 /* where vertex v lies in the caller's triangles */
-static trimesh_source tmr_source_of(const tmr_work *w, int32_t v) {
+static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     const tmr_surface *s = w->s;
     const int32_t face = tmr_face_of(w, v);
     const tmr_place at = tmr_on_face(s, face, w->m.p[v]);
@@ -123,7 +123,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         const size_t n = (size_t)m->live;
         mesh->positions = (float *)txm_arena_alloc(&arena, n, 3 * sizeof(float));
         mesh->normals = (float *)txm_arena_alloc(&arena, n, 3 * sizeof(float));
-        mesh->sources = (trimesh_source *)txm_arena_alloc(&arena, n, sizeof(trimesh_source));
+        mesh->sources = (txm_mesh_place *)txm_arena_alloc(&arena, n, sizeof(txm_mesh_place));
         mesh->kinds = (uint8_t *)txm_arena_alloc(&arena, n, 1);
         mesh->indices = (uint32_t *)txm_arena_alloc(&arena, faces, 3 * sizeof(uint32_t));
     }

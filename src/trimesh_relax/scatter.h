@@ -52,7 +52,7 @@ static txm_status tmr_tx_check_point(const trimesh_point *p, size_t patch, size_
     else if (!(p->scale >= 0 && p->scale <= 1000))
         why = "patch #, point #: scale must be 0 to 1000";
     else if (!txm_is_finite(turn)) why = "patch #, point #: rotation is not finite";
-    return why ? tmr_tx_fail(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
+    return why ? txm_fail_numbers(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
 }
 
 static void tmr_tx_ready_point(const trimesh_point *p, tmr_tx_item *item) {
@@ -92,8 +92,8 @@ static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *aren
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         const trimesh_patch *patch = &desc->patches[p];
         if (patch->count > TMR_TX_MOST_POINTS || (patch->count && !patch->points))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "patch # has more than 2^20 points, or points is NULL", p, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "patch # has more than 2^20 points, or points is NULL", p, 0);
         for (size_t i = 0; i < patch->count; i++) {
             const txm_status status = tmr_tx_check_point(&patch->points[i], p, i, env);
             if (status != TXM_OK) return status;
@@ -126,16 +126,16 @@ static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *aren
 }
 
 /* Give every side and every corner to the first triangle that has it. */
-static int tmr_tx_own(const trimesh_view *mesh, const txm_env *env, uint8_t *owned) {
-    const size_t sides = 3 * mesh->triangle_count;
+static int tmr_tx_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
+    const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const txm_pair *pairs = tmr_tx_sort_sides(vertex, sides, &scratch);
+    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
     uint8_t *given = (uint8_t *)txm_arena_zero(&scratch, mesh->vertex_count, 1);
-    const int good = pairs && given;
-    for (size_t i = 0; i < sides && good; i = tmr_tx_run_end(vertex, pairs, i, sides))
-        owned[pairs[i].value / 3] |= (uint8_t)(1 << pairs[i].value % 3);
+    const int good = sorted && given;
+    for (size_t i = 0; i < sides && good; i = txm_mesh_edge_end(mesh, sorted, i))
+        owned[sorted[i] / 3] |= (uint8_t)(1 << sorted[i] % 3);
     for (size_t i = 0; i < sides && good; i++) {
         if (!given[vertex[i]]) owned[i / 3] |= (uint8_t)(8 << i % 3);
         given[vertex[i]] = 1;
@@ -170,16 +170,16 @@ static double tmr_tx_unit(const tmr_tx_scatter *s, txm_dvec3 area2) {
 
 static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
     const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
-    const trimesh_view *mesh = &s->desc->mesh;
+    const txm_mesh *mesh = &s->desc->mesh;
     const double height = s->desc->inside ? -s->desc->height : s->desc->height;
     for (size_t t = first; t < end; t++) {
         txm_dvec3 p[3];
-        tmr_tx_corners(mesh, t, p);
+        txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 flat = txm_d3_area2(p[0], p[1], p[2]);
         const double up = height * tmr_tx_unit(s, flat);
         for (size_t k = 0; k < 3; k++) {
             const float *n = s->normals + 3 * (size_t)mesh->indices[3 * t + k];
-            p[k] = txm_d3_mad(p[k], tmr_tx_vec(n), up);
+            p[k] = txm_d3_mad(p[k], txm_d3_load(n), up);
         }
         const txm_dvec3 there = txm_d3_area2(p[0], p[1], p[2]);
         /* beyond the centre of a bend the triangle is turned over: no room there */
@@ -196,16 +196,16 @@ static uint32_t tmr_tx_third_bits(uint32_t x) {
 }
 
 /* The triangles along a Morton curve through their middles. pairs: room for 2 per triangle. */
-static void tmr_tx_morton(const trimesh_view *mesh, txm_pair *pairs) {
+static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
     double low[3] = {0, 0, 0}, size = 0;
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         if (i < 3 || mesh->positions[i] < low[i % 3]) low[i % 3] = mesh->positions[i];
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         if (mesh->positions[i] - low[i % 3] > size) size = mesh->positions[i] - low[i % 3];
-    for (size_t t = 0; t < mesh->triangle_count; t++) {
+    for (size_t t = 0; t < mesh->face_count; t++) {
         uint32_t key = 0;
         txm_dvec3 p[3];
-        tmr_tx_corners(mesh, t, p);
+        txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 sum = txm_d3_add(txm_d3_add(p[0], p[1]), p[2]);
         const double at[3] = {sum.x / 3 - low[0], sum.y / 3 - low[1], sum.z / 3 - low[2]};
         for (int k = 0; k < 3; k++) {
@@ -215,7 +215,7 @@ static void tmr_tx_morton(const trimesh_view *mesh, txm_pair *pairs) {
         pairs[t].key = key;
         pairs[t].value = (uint32_t)t;
     }
-    txm_sort_pairs(pairs, pairs + mesh->triangle_count, mesh->triangle_count);
+    txm_sort_pairs(pairs, pairs + mesh->face_count, mesh->face_count);
 }
 
 /* How long a beginning of a patch comes nearest to so many sixths of a thing. */
@@ -234,7 +234,7 @@ static uint32_t tmr_tx_beginning(const tmr_tx_kit *kit, double sixths) {
 
 /* Fill s->take so that the things on any stretch of the curve are as many as its area wants. */
 static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, txm_env *env) {
-    const size_t triangles = s->desc->mesh.triangle_count;
+    const size_t triangles = s->desc->mesh.face_count;
     double carry = 0, most = 0;
     int short_of = 0;
     for (size_t i = 0; i < triangles; i++) {
@@ -254,10 +254,11 @@ static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, tx
     }
     if (!short_of) return TXM_OK;
     most = ceil(most / TMR_TX_WHOLE);
-    return tmr_tx_fail(env, TXM_TOO_SMALL,
-                       "the patches have too few points for this density; the largest triangle "
-                       "needs #, points on sides counted half, on corners a sixth",
-                       most < 1e15 ? (uint64_t)most : (uint64_t)1000000000000000u, 0);
+    return txm_fail_numbers(
+        env, TXM_TOO_SMALL,
+        "the patches have too few points for this density; the largest triangle "
+        "needs #, points on sides counted half, on corners a sixth",
+        most < 1e15 ? (uint64_t)most : (uint64_t)1000000000000000u, 0);
 }
 
 /* s->offset[t] = instances of triangle t */
@@ -317,11 +318,11 @@ typedef struct tmr_tx_base {
 } tmr_tx_base;
 
 static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation, tmr_tx_base *b) {
-    const trimesh_view *mesh = &s->desc->mesh;
+    const txm_mesh *mesh = &s->desc->mesh;
     for (size_t k = 0; k < 3; k++) {
         const size_t v = mesh->indices[3 * t + k], to = (k + rotation) % 3;
-        b->p[to] = tmr_tx_vec(mesh->positions + 3 * v);
-        b->n[to] = tmr_tx_vec(s->normals + 3 * v);
+        b->p[to] = txm_d3_load(mesh->positions + 3 * v);
+        b->n[to] = txm_d3_load(s->normals + 3 * v);
     }
     b->up = txm_d3_area2(b->p[0], b->p[1], b->p[2]);
     b->ex = txm_d3_sub(b->p[1], b->p[0]);
@@ -424,12 +425,13 @@ static void tmr_tx_fill_block(const void *job, size_t first, size_t end) {
 /* ---- geometry on triangles: public ----------------------------------------------------------- */
 
 static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *env) {
-    for (size_t t = 0; t < d->mesh.triangle_count; t++) {
+    for (size_t t = 0; t < d->mesh.face_count; t++) {
         if (d->choices && (d->choices[t] < 0 || d->choices[t] >= d->patch_count))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "the choice of triangle # is not 0..patch_count - 1", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "the choice of triangle # is not 0..patch_count - 1", t, 0);
         if (d->rotations && (d->rotations[t] < 0 || d->rotations[t] > 2))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2",
+                                    t, 0);
     }
     return TXM_OK;
 }
@@ -437,7 +439,7 @@ static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *e
 static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *env) {
     double sum = 0;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_scatter_desc");
-    const txm_status status = tmr_tx_check(&d->mesh, 1, env);
+    const txm_status status = txm_mesh_check(&d->mesh, "mesh", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (d->normals && !tmr_tx_are_finite(d->normals, 3 * d->mesh.vertex_count))
         return txm_fail(env, TXM_BAD_ARGUMENT, "normals must be finite");
@@ -464,7 +466,7 @@ static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *e
 
 /* Areas, and from them how much of each patch is used. */
 static txm_status tmr_tx_plan_density(tmr_tx_scatter *s, txm_arena *arena, txm_env *env) {
-    const size_t triangles = s->desc->mesh.triangle_count;
+    const size_t triangles = s->desc->mesh.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     s->take = (uint32_t *)txm_arena_alloc(arena, triangles, sizeof(uint32_t));
@@ -484,7 +486,7 @@ static txm_status tmr_tx_plan_density(tmr_tx_scatter *s, txm_arena *arena, txm_e
 /* All that goes before placing: normals, patches, who owns the sides, counts, offsets. */
 static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
     const trimesh_scatter_desc *d = s->desc;
-    const size_t triangles = d->mesh.triangle_count;
+    const size_t triangles = d->mesh.face_count;
     int rims = 0;
     txm_status status = tmr_tx_ready(d, arena, env, s, &rims);
     if (status == TXM_OK) status = tmr_tx_report(env, 0, "patches");
@@ -534,7 +536,7 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
     txm_status status = tmr_tx_check_scatter(desc, env);
     if (status != TXM_OK) return status;
     if (!count) return txm_fail(env, TXM_BAD_ARGUMENT, "count is NULL");
-    if (desc->mesh.triangle_count == 0) {
+    if (desc->mesh.face_count == 0) {
         *count = 0;
         return TXM_OK;
     }
@@ -545,11 +547,11 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
     txm_arena_init(&arena, env);
     status = tmr_tx_plan(&s, &arena, env, count);
     if (status == TXM_OK && out && *count > capacity)
-        status = tmr_tx_fail(env, TXM_TOO_LARGE, "# instances, but out has room for # only", *count,
-                             capacity);
+        status = txm_fail_numbers(env, TXM_TOO_LARGE, "# instances, but out has room for # only",
+                                  *count, capacity);
     if (status == TXM_OK && out)
-        status = tmr_tx_spread(tmr_tx_fill_block, &s, desc->mesh.triangle_count, 0.3, 1, "placing",
-                               env);
+        status =
+            tmr_tx_spread(tmr_tx_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -557,7 +559,7 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
 TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
                                         float out[3]) {
     const double x = instance->rotation[0], y = instance->rotation[1], z = instance->rotation[2];
-    const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(tmr_tx_vec(point), instance->scale);
+    const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(txm_d3_load(point), instance->scale);
     const txm_dvec3 t = txm_d3_scale(txm_d3_cross(axis, p), 2);
     const txm_dvec3 turned =
         txm_d3_add(txm_d3_mad(p, t, instance->rotation[3]), txm_d3_cross(axis, t));

@@ -97,19 +97,19 @@ static void tmr_tx_put_choice(int choice, int patches, size_t t, int *out, int *
     if (rotations) rotations[t] = choice / patches;
 }
 
-TRIMESH_API txm_status trimesh_choose(const trimesh_view *mesh, const trimesh_choose_desc *desc,
+TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
                                       txm_env *env, int *patches, int *rotations) {
     trimesh_choose_desc none;
     txm_arena arena;
     memset(&none, 0, sizeof none);
     if (!desc) desc = &none;
     const int n = desc->patches ? desc->patches : 4, turns = desc->rotations ? desc->rotations : 3;
-    txm_status status = tmr_tx_check(mesh, 0, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (n < 1 || n > 65536) return txm_fail(env, TXM_BAD_ARGUMENT, "patches must be 1 to 65536");
     if (turns != 1 && turns != 3)
         return txm_fail(env, TXM_BAD_ARGUMENT, "rotations must be 1 or 3");
-    const size_t count = mesh->triangle_count;
+    const size_t count = mesh->face_count;
     if (count == 0) return TXM_OK;
     if (!patches || (turns == 3 && !rotations))
         return txm_fail(env, TXM_BAD_ARGUMENT, "patches or rotations is NULL");
@@ -124,7 +124,7 @@ TRIMESH_API txm_status trimesh_choose(const trimesh_view *mesh, const trimesh_ch
     uint32_t *order = (uint32_t *)txm_arena_alloc(&arena, count, sizeof(uint32_t));
     int *choice = (int *)txm_arena_alloc(&arena, count, sizeof(int));
     uint8_t *seen = (uint8_t *)txm_arena_zero(&arena, count, 1);
-    if (!next || !order || !choice || !seen || !tmr_tx_link(mesh->indices, 3 * count, next, env)) {
+    if (!next || !order || !choice || !seen || !tmr_tx_link(mesh, next, env)) {
         status = tmr_tx_no_memory(env);
     } else {
         status = tmr_tx_report(env, 0.5, "patches");
@@ -148,10 +148,11 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
         return txm_fail(env, TXM_BAD_ARGUMENT, "tiles, tile_uv or uv is NULL");
     for (size_t t = 0; t < triangle_count; t++) {
         if (tiles[t] < 0 || (size_t)tiles[t] >= tile_count)
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT,
-                               "the tile of triangle # is not 0..tile_count - 1", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                    "the tile of triangle # is not 0..tile_count - 1", t, 0);
         if (rotations && (rotations[t] < 0 || rotations[t] > 2))
-            return tmr_tx_fail(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2", t, 0);
+            return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "the rotation of triangle # is not 0..2",
+                                    t, 0);
     }
     for (size_t t = 0; t < triangle_count; t++) {
         const size_t turn = rotations ? (size_t)rotations[t] : 0;
@@ -164,17 +165,17 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
     return TXM_OK;
 }
 
-TRIMESH_API txm_status trimesh_edge_colors(const trimesh_view *mesh, int colors, uint64_t seed,
+TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
                                            txm_env *env, int *edge_colors, int *directions) {
-    const txm_status status = tmr_tx_check(mesh, 0, env);
+    const txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     if (colors < 1 || colors > 65536)
         return txm_fail(env, TXM_BAD_ARGUMENT, "colors must be 1 to 65536");
-    if (mesh->triangle_count && !edge_colors)
+    if (mesh->face_count && !edge_colors)
         return txm_fail(env, TXM_BAD_ARGUMENT, "edge_colors is NULL");
     const uint64_t base = txm_hash(seed ^ 0x7465787475726573u);
-    for (size_t i = 0; i < 3 * mesh->triangle_count; i++) {
-        const uint32_t low = tmr_tx_low(mesh->indices, i), high = tmr_tx_high(mesh->indices, i);
+    for (size_t i = 0; i < 3 * mesh->face_count; i++) {
+        const uint32_t low = txm_mesh_low(mesh, i), high = txm_mesh_high(mesh, i);
         const uint64_t h = txm_hash(base + ((uint64_t)high << 32 | low)) >> 32;
         edge_colors[i] = (int)(h * (uint64_t)colors >> 32);
         /* from a vertex to itself: by the corners' numbers, so that not all three go one way */
@@ -210,20 +211,19 @@ typedef struct tmr_tx_graph {
     uint32_t *bucket; /* where the vertices of each degree begin                          */
 } tmr_tx_graph;
 
-static int tmr_tx_graph_build(tmr_tx_graph *g, const trimesh_view *mesh, txm_arena *arena,
+static int tmr_tx_graph_build(tmr_tx_graph *g, const txm_mesh *mesh, txm_arena *arena,
                               const txm_env *env) {
-    const size_t n = mesh->vertex_count, sides = 3 * mesh->triangle_count;
-    const uint32_t *vertex = mesh->indices;
+    const size_t n = mesh->vertex_count, sides = 3 * mesh->face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     g->count = n;
     g->first = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
     g->ends = (uint32_t *)txm_arena_alloc(arena, sides, 2 * sizeof(uint32_t));
-    const txm_pair *pairs = tmr_tx_sort_sides(vertex, sides, &scratch);
-    const int good = g->first && g->ends && pairs;
+    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const int good = g->first && g->ends && sorted;
     for (int pass = 0; pass < 2 && good; pass++) {
-        for (size_t i = 0; i < sides; i = tmr_tx_run_end(vertex, pairs, i, sides)) {
-            const uint32_t low = pairs[i].key, high = tmr_tx_high(vertex, pairs[i].value);
+        for (size_t i = 0; i < sides; i = txm_mesh_edge_end(mesh, sorted, i)) {
+            const uint32_t low = txm_mesh_low(mesh, sorted[i]), high = txm_mesh_high(mesh, sorted[i]);
             if (low == high) continue;
             if (pass) {
                 g->ends[g->first[low + 1]] = high;
@@ -291,16 +291,16 @@ static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors
     return most;
 }
 
-TRIMESH_API txm_status trimesh_proper_colors(const trimesh_view *mesh, txm_env *env, int *colors,
+TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count) {
     tmr_tx_graph g;
     txm_arena arena;
     memset(&g, 0, sizeof g);
-    txm_status status = tmr_tx_check(mesh, 0, env);
+    txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
     const size_t n = mesh->vertex_count;
     if (n && !colors) return txm_fail(env, TXM_BAD_ARGUMENT, "colors is NULL");
-    if (mesh->triangle_count == 0) {
+    if (mesh->face_count == 0) {
         for (size_t v = 0; v < n; v++) colors[v] = 0;
         if (count) *count = n > 0;
         return TXM_OK;

@@ -219,9 +219,9 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
 
 /* The place in the caller's triangle. Where mending turned an edge, a face is none of the caller's:
    then the nearest point of the triangle that it came from. */
-static trimesh_source tmr_surface_source(const tmr_surface *s, const trimesh_desc *desc,
+static txm_mesh_place tmr_surface_source(const tmr_surface *s, const trimesh_desc *desc,
                                          const tmr_place *at) {
-    trimesh_source source;
+    txm_mesh_place source;
     double weight[3] = {0, 0, 0};
     const double own[3] = {1 - at->u - at->v, at->u, at->v};
     const int turn = s->turn[at->face];

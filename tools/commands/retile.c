@@ -175,18 +175,18 @@ static int read_density(job *j, float **scale) {
 
 /* ---- what the input has on it --------------------------------------------------------------- */
 
-static trimesh_view view_of(const mesh_data *m) {
-    trimesh_view view;
+static txm_mesh view_of(const mesh_data *m) {
+    txm_mesh view = {0};
     view.positions = m->positions;
     view.indices = m->indices;
     view.vertex_count = m->vertex_count;
-    view.triangle_count = m->triangle_count;
+    view.face_count = m->triangle_count;
     return view;
 }
 
 static int carry_colors(job *j) {
     const size_t from = 4 * j->input.vertex_count, count = j->result->vertex_count;
-    const trimesh_view input = view_of(&j->input);
+    const txm_mesh input = view_of(&j->input);
     float *values = (float *)new_array(from, sizeof(float));
     float *carried = (float *)new_array(4 * count, sizeof(float));
     trimesh_values v = {0};
@@ -211,7 +211,7 @@ static int carry_colors(job *j) {
 
 static int carry_uvs(job *j) {
     const size_t corners = 3 * j->input.triangle_count;
-    const trimesh_view input = view_of(&j->input), mesh = trimesh_as_view(j->result);
+    const txm_mesh input = view_of(&j->input), mesh = trimesh_as_view(j->result);
     uint32_t *own = (uint32_t *)new_array(corners, sizeof(uint32_t)); /* each corner has its own */
     trimesh_values v = {0};
     int status = CLI_DONE;
@@ -403,22 +403,23 @@ static int find_layout(job *j, const txm_image *picture, trimesh_atlas *atlas) {
 }
 
 static int dress_with_patches(job *j) {
-    const trimesh_view mesh = trimesh_as_view(j->result);
+    const txm_mesh mesh = trimesh_as_view(j->result);
     trimesh_choose_desc choose = {0};
     trimesh_atlas atlas;
     txm_image picture = {0};
-    int *patches = (int *)new_array(2 * mesh.triangle_count, sizeof(int));
+    int *patches = (int *)new_array(2 * mesh.face_count, sizeof(int));
     float *uv = (float *)new_array((size_t)j->patch_count, 6 * sizeof(float));
     choose.patches = j->patch_count;
     choose.seed = j->run.seed;
     int status = patches && uv ? read_png(j, j->patches, &picture) : fail_memory(j);
     if (!status) status = find_layout(j, &picture, &atlas);
     if (!status)
-        status = check_result(j, trimesh_choose(&mesh, &choose, &j->run.env, patches,
-                                                patches + mesh.triangle_count), j->run.inputs[0]);
+        status = check_result(
+            j, trimesh_choose(&mesh, &choose, &j->run.env, patches, patches + mesh.face_count),
+            j->run.inputs[0]);
     if (!status) {
         trimesh_atlas_uv(&atlas, -1, uv);
-        status = place_tiles(j, patches, patches + mesh.triangle_count, uv, j->patch_count);
+        status = place_tiles(j, patches, patches + mesh.face_count, uv, j->patch_count);
     }
     image_free(&picture);
     free(patches);

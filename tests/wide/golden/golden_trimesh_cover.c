@@ -13,13 +13,13 @@ static golden_surface surface;
 static float values[6 * CORNERS];
 static int numbers[CORNERS], more_numbers[CORNERS];
 
-static trimesh_view view(void) {
-    trimesh_view v;
+static txm_mesh view(void) {
+    txm_mesh v;
     memset(&v, 0, sizeof v);
     v.positions = surface.positions;
     v.indices = surface.indices;
     v.vertex_count = surface.vertex_count;
-    v.triangle_count = surface.triangle_count;
+    v.face_count = surface.triangle_count;
     return v;
 }
 
@@ -27,7 +27,7 @@ static uint64_t normals(txm_env *env) {
     uint64_t hash = 0;
     for (int open = 0; open < 2; open++) {
         golden_ring(&surface, open);
-        const trimesh_view v = view();
+        const txm_mesh v = view();
         golden_need(trimesh_normals(&v, env, values), "normals", env);
         hash = tk_hash(hash, values, 3 * v.vertex_count * sizeof(float));
     }
@@ -35,7 +35,7 @@ static uint64_t normals(txm_env *env) {
 }
 
 /* Points spread over a surface: one in each triangle. */
-static size_t strew(trimesh_source *sources) {
+static size_t strew(txm_mesh_place *sources) {
     txm_rng rng = txm_rng_make(21, 4);
     for (size_t t = 0; t < surface.triangle_count; t++) {
         sources[t].triangle = (uint32_t)t;
@@ -46,14 +46,14 @@ static size_t strew(trimesh_source *sources) {
 }
 
 static uint64_t transfer(txm_env *env) {
-    static trimesh_source sources[GOLDEN_TRIANGLES];
+    static txm_mesh_place sources[GOLDEN_TRIANGLES];
     static float in[4 * GOLDEN_VERTICES];
     trimesh_values v;
     golden_ring(&surface, 0);
     txm_rng rng = txm_rng_make(2, 2);
     for (size_t i = 0; i < 4 * surface.vertex_count; i++) in[i] = txm_rng_float(&rng);
     const size_t count = strew(sources);
-    const trimesh_view input = view();
+    const txm_mesh input = view();
     memset(&v, 0, sizeof v);
     v.values = in;
     v.count = surface.vertex_count;
@@ -67,12 +67,12 @@ static uint64_t transfer_corners(txm_env *env) {
     enum { N = 20, M = 10 };
     static float uvs[2 * (N + 1) * (M + 1)];
     static uint32_t entries[CORNERS], new_indices[CORNERS], corners[CORNERS];
-    static trimesh_source sources[GOLDEN_VERTICES];
+    static txm_mesh_place sources[GOLDEN_VERTICES];
     static uint32_t coarse[CORNERS];
     trimesh_values v;
     size_t count = 0;
     golden_ring(&surface, 0);
-    const trimesh_view input = view();
+    const txm_mesh input = view();
     for (int i = 0; i < (N + 1) * (M + 1); i++) {
         uvs[2 * i] = (float)(i / (M + 1)) / N;
         uvs[2 * i + 1] = (float)(i % (M + 1)) / M;
@@ -100,9 +100,9 @@ static uint64_t transfer_corners(txm_env *env) {
         sources[i].triangle = (uint32_t)(2 * i); /* whose corner 0 the vertex is */
         sources[i].u = sources[i].v = 0.05f;
     }
-    trimesh_view mesh = input;
+    txm_mesh mesh = input;
     mesh.indices = coarse;
-    mesh.triangle_count = triangles;
+    mesh.face_count = triangles;
     golden_need(trimesh_transfer_corners(&input, &v, &mesh, sources, env, values), "corners", env);
     uint64_t hash = tk_hash(0, values, 6 * triangles * sizeof(float));
     golden_need(trimesh_split_corners(&mesh, values, 2, env, new_indices, corners, &count), "split",
@@ -118,7 +118,7 @@ static uint64_t textured(txm_env *env) {
     trimesh_atlas atlas;
     uint64_t hash = 0;
     golden_ring(&surface, 0);
-    const trimesh_view v = view();
+    const txm_mesh v = view();
     golden_need(trimesh_atlas_make(5, 100, -1, env, &atlas), "atlas", env);
     hash = tk_hash(hash, &atlas, sizeof atlas);
     trimesh_atlas_uv(&atlas, -1, atlas_uv);
@@ -128,12 +128,12 @@ static uint64_t textured(txm_env *env) {
         choose.repeat = repeat;
         choose.seed = 12;
         golden_need(trimesh_choose(&v, &choose, env, numbers, more_numbers), "choose", env);
-        hash = tk_hash(hash, numbers, v.triangle_count * sizeof *numbers);
-        hash = tk_hash(hash, more_numbers, v.triangle_count * sizeof *more_numbers);
-        golden_need(trimesh_place_tiles(v.triangle_count, numbers, more_numbers, atlas_uv, 5, env,
-                                        values),
-                    "place", env);
-        hash = tk_hash(hash, values, 6 * v.triangle_count * sizeof *values);
+        hash = tk_hash(hash, numbers, v.face_count * sizeof *numbers);
+        hash = tk_hash(hash, more_numbers, v.face_count * sizeof *more_numbers);
+        golden_need(
+            trimesh_place_tiles(v.face_count, numbers, more_numbers, atlas_uv, 5, env, values),
+            "place", env);
+        hash = tk_hash(hash, values, 6 * v.face_count * sizeof *values);
     }
     return hash;
 }
@@ -142,10 +142,10 @@ static uint64_t colors(txm_env *env) {
     uint64_t hash = 0;
     int count = 0;
     golden_ring(&surface, 0);
-    const trimesh_view v = view();
+    const txm_mesh v = view();
     golden_need(trimesh_edge_colors(&v, 3, 8, env, numbers, more_numbers), "edge colours", env);
-    hash = tk_hash(hash, numbers, 3 * v.triangle_count * sizeof *numbers);
-    hash = tk_hash(hash, more_numbers, 3 * v.triangle_count * sizeof *more_numbers);
+    hash = tk_hash(hash, numbers, 3 * v.face_count * sizeof *numbers);
+    hash = tk_hash(hash, more_numbers, 3 * v.face_count * sizeof *more_numbers);
     golden_need(trimesh_random_colors(v.vertex_count, 0, 8, env, numbers), "random colours", env);
     hash = tk_hash(hash, numbers, v.vertex_count * sizeof *numbers);
     golden_need(trimesh_proper_colors(&v, env, numbers, &count), "proper colours", env);

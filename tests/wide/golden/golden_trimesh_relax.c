@@ -14,7 +14,7 @@ static trimesh_desc describe(size_t vertices, trimesh_method method) {
     desc.surface.positions = surface.positions;
     desc.surface.indices = surface.indices;
     desc.surface.vertex_count = surface.vertex_count;
-    desc.surface.triangle_count = surface.triangle_count;
+    desc.surface.face_count = surface.triangle_count;
     desc.vertices = vertices;
     desc.method = method;
     return desc;
@@ -24,7 +24,7 @@ static uint64_t mesh_hash(const trimesh_mesh *mesh, uint64_t hash) {
     hash = tk_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float));
     hash = tk_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float));
     hash = tk_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t));
-    hash = tk_hash(hash, mesh->sources, mesh->vertex_count * sizeof(trimesh_source));
+    hash = tk_hash(hash, mesh->sources, mesh->vertex_count * sizeof(txm_mesh_place));
     return tk_hash(hash, mesh->kinds, mesh->vertex_count);
 }
 
