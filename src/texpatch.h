@@ -290,6 +290,7 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 #include "texpatch/canvas.h"
 #include "texpatch/lattice.h"
 #include "texpatch/sheets.h"
+#include "texpatch/check.h"
 #include "texpatch/quilt.h"
 #include "texpatch/refine.h"
 #include "texpatch/finish.h"

@@ -3,7 +3,7 @@
 
 #include "draw.h"
 
-/* ---- public: a part anew ------------------------------------------------------------------ */
+/* ---- a part made again ------------------------------------------------------------------ */
 
 /* Does the output's pixel under canvas pixel (x, y) belong to the part? */
 static inline int txp_is_again(const texpatch_job *job, const txm_image *again, int x, int y) {
@@ -154,28 +154,6 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
 no_memory:
     txm_arena_free(&memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a part");
-}
-
-/* An environment for a piece of a call: its progress is that of the whole, which rises piece by
-   piece. */
-typedef struct txp_quiet {
-    txm_env *env;
-    float done, total; /* pieces */
-} txp_quiet;
-
-static int txp_quiet_progress(void *user, float fraction, const char *stage) {
-    const txp_quiet *q = (const txp_quiet *)user;
-    (void)fraction;
-    return txm_progress(q->env, q->done / q->total, stage);
-}
-
-static txm_env txp_quiet_env(txp_quiet *q) {
-    txm_env env;
-    memset(&env, 0, sizeof env);
-    if (q->env) env = *q->env;
-    env.progress = txp_quiet_progress;
-    env.progress_user = q;
-    return env;
 }
 
 #endif /* TEXPATCH_AGAIN_H */

@@ -3,7 +3,7 @@
 
 #include "begin.h"
 
-/* ---- public: what a pixel shows ----------------------------------------------------------- */
+/* ---- what a pixel shows ----------------------------------------------------------------- */
 
 /* A pixel of the output: from sheet `sheet` (-1: it is a kept one), place (x, y) of it; bent: not
    where its neighbours' places say. */

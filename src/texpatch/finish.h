@@ -3,7 +3,7 @@
 
 #include "canvas.h"
 
-/* ---- finish: pieces bent until lines meet, steps of colour spread ------------------------- */
+/* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
 
 enum {
     TXP_REACH = 4,

@@ -3,7 +3,7 @@
 
 #include "config.h"
 
-/* ---- public: levels of detail ------------------------------------------------------------- */
+/* ---- levels of detail ------------------------------------------------------------------- */
 
 typedef struct txp_halving {
     const txm_image *image, *half;

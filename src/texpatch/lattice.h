@@ -22,7 +22,7 @@ static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
     return dx * dx + dy * dy;
 }
 
-/* ---- lattice: does the exemplar repeat itself? ------------------------------------------- */
+/* ---- finding the lattice of an exemplar ------------------------------------------------- */
 
 enum { TXP_PEAKS = 40 };
 

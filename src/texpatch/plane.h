@@ -1,9 +1,31 @@
 #ifndef TEXPATCH_PLANE_H
 #define TEXPATCH_PLANE_H
 
-#include "again.h"
+#include "draw.h"
 
-/* ---- public: the unbounded plane ---------------------------------------------------------- */
+/* ---- the unbounded plane ---------------------------------------------------------------- */
+
+/* An environment for a piece of a call: its progress is that of the whole, which rises piece by
+   piece. */
+typedef struct txp_quiet {
+    txm_env *env;
+    float done, total; /* pieces */
+} txp_quiet;
+
+static int txp_quiet_progress(void *user, float fraction, const char *stage) {
+    const txp_quiet *q = (const txp_quiet *)user;
+    (void)fraction;
+    return txm_progress(q->env, q->done / q->total, stage);
+}
+
+static txm_env txp_quiet_env(txp_quiet *q) {
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    if (q->env) env = *q->env;
+    env.progress = txp_quiet_progress;
+    env.progress_user = q;
+    return env;
+}
 
 struct texpatch_plane {
     txm_arena memory; /* of the plane, which lies in it */

@@ -439,7 +439,7 @@ static void txp_count_use(const txp_canvas *c, txp_use *u) {
     txp_use_sum(u);
 }
 
-/* ---- coherence: single pixels at seams --------------------------------------------------- */
+/* ---- single pixels at seams ------------------------------------------------------------- */
 
 typedef struct txp_polish {
     const txp_source *source;

@@ -372,4 +372,78 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
     return TXM_OK;
 }
 
+/* The lattice of a torus whose sides are multiples of it: the steps nearest to `lattice` of which
+   whole numbers lead along the sides that wrap. 0: none is within a quarter. */
+static int txp_lattice_close(const double lattice[4], int tileable, double width, double height,
+                             double out[4]) {
+    const double *a = lattice, *b = lattice + 2;
+    const double det = txp_det(a, b), sides[2] = {width, height};
+    double count[2][2], target[2][2];
+    for (int d = 0; d < 2; d++) {
+        /* steps to the end of this axis, rounded */
+        const double x = d ? 0 : sides[0], y = d ? sides[1] : 0;
+        const double u = (x * b[1] - y * b[0]) / det, v = (a[0] * y - a[1] * x) / det;
+        count[d][0] = floor(u + 0.5);
+        count[d][1] = floor(v + 0.5);
+        target[d][0] = x;
+        target[d][1] = y;
+        if (!(tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) { /* free: where it is now */
+            target[d][0] = count[d][0] * a[0] + count[d][1] * b[0];
+            target[d][1] = count[d][0] * a[1] + count[d][1] * b[1];
+        }
+    }
+    const double m = count[0][0] * count[1][1] - count[0][1] * count[1][0];
+    if (!(fabs(m) > 0.5)) return 0;
+    for (int c = 0; c < 2; c++) { /* solve count (out a, out b) = target */
+        out[c] = (count[1][1] * target[0][c] - count[0][1] * target[1][c]) / m;
+        out[2 + c] = (count[0][0] * target[1][c] - count[1][0] * target[0][c]) / m;
+    }
+    for (int k = 0; k < 4; k += 2) {
+        const double dx = out[k] - lattice[k], dy = out[k + 1] - lattice[k + 1];
+        if (dx * dx + dy * dy >
+            0.0625 * (lattice[k] * lattice[k] + lattice[k + 1] * lattice[k + 1]))
+            return 0;
+    }
+    return fabs(txp_det(out, out + 2)) > 0.5 * fabs(det);
+}
+
+/* Sheets, stacks and lattice; a torus of a texture with a lattice gets a sheet that is stretched
+   until the sides are multiples of the steps. The arenas hold what is kept. */
+static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *memory,
+                                  txm_env *env) {
+    int least = INT_MAX;
+    if (u->tileable & TEXPATCH_TILE_X) least = u->width;
+    if (u->tileable & TEXPATCH_TILE_Y && u->height < least) least = u->height;
+    txm_arena first;
+    double closed[4], stretch[4], det;
+    const double *v = s->stack[0].lattice;
+    txm_arena_init(&first, env);
+    txp_sheets(u, s, NULL);
+    txp_source_sizes(s, least);
+    txm_status status = txp_stacks(u, s, &first, env);
+    if (status == TXM_OK) status = txp_lattice_search(u, s, env);
+    if (status != TXM_OK || !s->has_lattice || !u->tileable || s->sheets > 1) goto done;
+    if (!txp_lattice_close(v, u->tileable, u->width, u->height, closed)) {
+        s->has_lattice = 0; /* too small a torus for it */
+        goto done;
+    }
+    /* the exemplar at stretch p is what the sheet shows at p: it takes closed to v */
+    det = txp_det(closed, closed + 2);
+    stretch[0] = (v[0] * closed[3] - v[2] * closed[1]) / det;
+    stretch[1] = (v[1] * closed[3] - v[3] * closed[1]) / det;
+    stretch[2] = (v[2] * closed[0] - v[0] * closed[2]) / det;
+    stretch[3] = (v[3] * closed[0] - v[1] * closed[2]) / det;
+    txm_arena_free(&first);
+    txp_sheets(u, s, stretch);
+    txp_source_sizes(s, least);
+    status = txp_stacks(u, s, &first, env);
+    for (int l = 0; l < s->levels && status == TXM_OK; l++)
+        txp_lattice_set(&s->stack[l], closed, 1.0 / (1 << l));
+done:
+    if (status == TXM_OK) txp_find_contrast(s);
+    if (status == TXM_OK) *memory = first;
+    else txm_arena_free(&first);
+    return status;
+}
+
 #endif /* TEXPATCH_SHEETS_H */

@@ -1,0 +1,206 @@
+#ifndef TEXPATCH_CHECK_H
+#define TEXPATCH_CHECK_H
+
+#include "sheets.h"
+
+/* ---- checks of what the caller gives ---------------------------------------------------- */
+
+static int txp_is_in(float x, float low, float high) {
+    return x >= low && x <= high;
+}
+
+/* The smallest and largest sample of a map over all exemplars; 8- and 16-bit samples span 0..1. */
+static void txp_range(const txm_image *im, float *low, float *high) {
+    if (im->sample != TXM_F32) {
+        *low = txm_minf(*low, 0);
+        *high = txm_maxf(*high, 1);
+        return;
+    }
+    for (int y = 0; y < im->height; y++) {
+        const float *row = (const float *)txm_image_row_const(im, y);
+        for (size_t i = 0; i < (size_t)im->width * (size_t)im->channels; i++) {
+            *low = txm_minf(*low, row[i]);
+            *high = txm_maxf(*high, row[i]);
+        }
+    }
+}
+
+static txm_status txp_check_picture(const txm_image *im, const char *name, txm_env *env) {
+    const txm_status status = txm_image_check(im, name, TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (!txm_image_is_finite(im))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite");
+    return TXM_OK;
+}
+
+static txm_status txp_check_mask(const txm_image *im, const char *name, int width, int height,
+                                 txm_env *env) {
+    const txm_status status = txm_image_check(im, name, TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (im->sample != TXM_U8 || im->channels > 1 || im->width != width || im->height != height)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "must be TXM_U8 with 1 channel and the size of its picture");
+    return TXM_OK;
+}
+
+/* The exemplars and how they are treated; the output's side is checked by the caller. */
+static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
+                                      txm_env *env) {
+    txm_status status = TXM_OK;
+    int bytes = 0, rows = 0;
+    if (!d->exemplars || d->exemplar_count < 1 || d->exemplar_count > TEXPATCH_MAX_EXEMPLARS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "exemplar_count must be 1 to 8, exemplars not NULL");
+    if (d->map_count < 1 || d->map_count > TEXPATCH_MAX_MAPS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "map_count must be 1 to 16");
+    if (d->turns != 0 && d->turns != 1 && d->turns != 2 && d->turns != 4)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "turns must be 1, 2 or 4 (0 means 1)");
+    if (d->patch < 0 || d->patch > TEXPATCH_MAX_SIDE)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 8192 pixels");
+    if (d->passes < -1 || d->passes > 16)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "passes must be 1 to 16, 0 for 3, or -1 for none");
+    if (!txp_is_in(d->novelty, 0, 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "novelty must be 0 to 1");
+    if (!txp_is_in(d->guide_weight, 0, 16))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "guide_weight must be 0 to 16");
+    if (d->lattice < -1 || d->lattice > 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "lattice must be -1, 0 or 1");
+    u->exemplar_count = d->exemplar_count;
+    u->map_count = d->map_count;
+    u->turns = d->turns ? d->turns : 1;
+    u->mirror = d->mirror != 0;
+    u->patch = d->patch;
+    u->passes = d->passes < 0 ? 0 : d->passes ? d->passes : 3;
+    u->is_default = d->passes == 0;
+    u->novelty = d->novelty;
+    u->guide_weight = d->guide_weight > 0 ? d->guide_weight : 2;
+    u->lattice = d->lattice;
+    u->seed = d->seed;
+    for (int i = 0; i < 4 && d->lattice == 1; i++) {
+        if (!txm_is_finite((double)d->lattice_vectors[i]))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be finite");
+        if (fabs((double)d->lattice_vectors[i]) > (double)TEXPATCH_MAX_SIDE)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 8192 pixels at most");
+        u->lattice_vectors[i] = (double)d->lattice_vectors[i];
+    }
+    if (d->lattice == 1 && !(fabs(txp_det(u->lattice_vectors, u->lattice_vectors + 2)) >= 16))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "lattice_vectors must span 16 pixels or more; use lattice 0 to find them");
+    for (int m = 0; m < d->map_count; m++) {
+        if (d->maps) u->kinds[m] = d->maps[m];
+        else u->kinds[m].weight = m ? 0.0f : 1.0f;
+        if (!txp_is_in(u->kinds[m].weight, 0, 16))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "the weight of a map must be 0 to 16");
+        u->low[m] = 0;
+        u->high[m] = 0;
+    }
+    for (int e = 0; e < d->exemplar_count && status == TXM_OK; e++) {
+        const texpatch_exemplar *x = &d->exemplars[e];
+        if (!x->maps) return txm_fail(env, TXM_BAD_ARGUMENT, "the maps of an exemplar are NULL");
+        for (int m = 0; m < d->map_count && status == TXM_OK; m++) {
+            status = txp_check_picture(&x->maps[m], "exemplar", env);
+            if (status != TXM_OK) return status;
+            u->maps[e][m] = txm_image_resolve(x->maps[m]);
+            const txm_image *im = &u->maps[e][m], *first = &u->maps[0][m];
+            if (im->width != u->maps[e][0].width || im->height != u->maps[e][0].height ||
+                im->channels != first->channels || im->sample != first->sample)
+                return txm_fail(env, TXM_BAD_ARGUMENT,
+                                "maps of an exemplar must have one size, and "
+                                "all exemplars the same channels and samples");
+            if (u->kinds[m].is_normal && im->channels < 3)
+                return txm_fail(env, TXM_BAD_ARGUMENT, "a normal map has 3 or 4 channels");
+            txp_range(im, &u->low[m], &u->high[m]);
+            if (e == 0 && u->kinds[m].weight > 0) bytes += im->channels;
+        }
+        const int w = u->maps[e][0].width, h = u->maps[e][0].height;
+        if (w < TEXPATCH_MIN_SIDE || h < TEXPATCH_MIN_SIDE)
+            return txm_fail(env, TXM_TOO_SMALL, "an exemplar must be 32 x 32 pixels or more");
+        if (w > TEXPATCH_MAX_SIDE || h > TEXPATCH_MAX_SIDE)
+            return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 8192 x 8192 pixels at most");
+        rows += (u->turns > 2 ? (w > h ? w : h) : h) * u->turns * (u->mirror ? 2 : 1);
+        if ((x->guide.pixels != NULL) != (d->exemplars[0].guide.pixels != NULL))
+            return txm_fail(env, TXM_BAD_ARGUMENT, "give all exemplars a guide, or none");
+        if (x->guide.pixels) {
+            status = txp_check_picture(&x->guide, "guide", env);
+            if (status != TXM_OK) return status;
+            u->guides[e] = txm_image_resolve(x->guide);
+            if (u->guides[e].width != w || u->guides[e].height != h ||
+                u->guides[e].channels != u->guides[0].channels ||
+                u->guides[e].sample != u->guides[0].sample)
+                return txm_fail(env, TXM_BAD_ARGUMENT,
+                                "a guide has the size of its exemplar, and "
+                                "all have the same channels and samples");
+            txp_range(&u->guides[e], &u->guide_low, &u->guide_high);
+        }
+        if (x->mask.pixels) {
+            status = txp_check_mask(&x->mask, "mask", w, h, env);
+            u->masks[e] = x->mask;
+        }
+    }
+    if (status != TXM_OK) return status;
+    if (!bytes) return txm_fail(env, TXM_BAD_ARGUMENT, "one map at least must have a weight");
+    s->guide_bytes = u->guides[0].pixels ? u->guides[0].channels : 0;
+    if (bytes + s->guide_bytes > TEXPATCH_MAX_CHANNELS)
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "maps with a weight and the guide may have 16 channels "
+                        "together; give some maps weight 0");
+    if (rows > INT16_MAX)
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "the exemplars are too high together (32767 rows, each "
+                        "turned form counted)");
+    u->most_weight = s->guide_bytes ? u->guide_weight : 0;
+    for (int m = 0; m < u->map_count; m++)
+        u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
+    s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
+    s->guide_at = s->guide_bytes ? bytes : s->bytes;
+    return TXM_OK;
+}
+
+/* The output's side of a description. */
+static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const txp_source *s,
+                                   txm_env *env) {
+    txm_status status = TXM_OK;
+    if (d->width < 1 || d->height < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
+    if (d->height > TEXPATCH_MAX_PIXELS / d->width)
+        return txm_fail(env, TXM_TOO_LARGE, "more than TEXPATCH_MAX_PIXELS pixels; use windows");
+    if (d->tileable < 0 || d->tileable > 3)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "tileable must be a sum of TEXPATCH_TILE_X and _Y");
+    if ((d->tileable & TEXPATCH_TILE_X && d->width < TXP_PAD) ||
+        (d->tileable & TEXPATCH_TILE_Y && d->height < TXP_PAD))
+        return txm_fail(env, TXM_TOO_SMALL, "a tileable side must be 32 pixels or more");
+    u->width = d->width;
+    u->height = d->height;
+    u->tileable = d->tileable;
+    if ((d->guide.pixels != NULL) != (s->guide_bytes > 0))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "a guide is given of the exemplars and of the output, "
+                        "or of neither");
+    if (d->guide.pixels) {
+        status = txp_check_picture(&d->guide, "guide", env);
+        if (status != TXM_OK) return status;
+        const txm_image guide = txm_image_resolve(d->guide);
+        if (guide.width != d->width || guide.height != d->height ||
+            guide.channels != u->guides[0].channels || guide.sample != u->guides[0].sample)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
+                               "must have the size of the output and "
+                               "the format of the exemplars' guides");
+        if (d->guide_mask.pixels)
+            status = txp_check_mask(&d->guide_mask, "guide_mask", d->width, d->height, env);
+    }
+    if (status != TXM_OK || !d->kept) return status;
+    if (!d->keep.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "kept needs the mask keep");
+    status = txp_check_mask(&d->keep, "keep", d->width, d->height, env);
+    for (int m = 0; m < d->map_count && status == TXM_OK; m++) {
+        status = txp_check_picture(&d->kept[m], "kept", env);
+        if (status != TXM_OK) return status;
+        u->kept[m] = txm_image_resolve(d->kept[m]);
+        if (u->kept[m].width != d->width || u->kept[m].height != d->height ||
+            u->kept[m].channels != u->maps[0][m].channels ||
+            u->kept[m].sample != u->maps[0][m].sample)
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, "kept",
+                               "must have the size of the output and the format of its map");
+    }
+    return status;
+}
+
+#endif /* TEXPATCH_CHECK_H */
