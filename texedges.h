@@ -720,7 +720,7 @@ static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
     const double smooth = desc->smooth;
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
-    if (!gray || (smooth > 0 && !scratch)) return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
     const int good = txe_gray(&desc->image, gray, bar);
     if (good < 0)
@@ -893,7 +893,7 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
             e->lines =
                 (texedges_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
             e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
-            if (!e->lines || !e->points) return txe_no_memory(env);
+            if (e->memory.failed) return txe_no_memory(env);
         }
         for (int y = 0; y < m->height; y++) {
             for (int x = 0; x < m->width; x++) {
@@ -1155,11 +1155,10 @@ typedef struct txe_bench {
     txe_point *a, *b, *c;
 } txe_bench;
 
-static int txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
+static void txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
     bench->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
     bench->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
     bench->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
-    return bench->a && bench->b && bench->c;
 }
 
 /* The factor that makes a vector of this length no longer than TXE_STRAY: 1 up to TXE_LINEAR,
@@ -1324,8 +1323,8 @@ static txm_status txe_listen_layer(txe_unrest *u, const texedges_set *e, int lay
     if (most == 0) return TXM_OK;
     u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
-    if (!u->samples || !u->starts || !txe_bench_make(&bench, arena, longest + room))
-        return txe_no_memory(env);
+    txe_bench_make(&bench, arena, longest + room);
+    if (arena->failed) return txe_no_memory(env);
     for (size_t i = 0; i < e->line_count; i++) {
         const texedges_polyline *line = &e->lines[i];
         if (line->layer != layer || line->count < TXE_SHORT) continue;
@@ -1621,7 +1620,7 @@ static txm_status txe_shake(const txe_unrest *u, double stray, txm_rng *rng,
     txe_point *even = (txe_point *)txm_arena_alloc(arena, n, 2 * sizeof *even);
     txe_sample *row = (txe_sample *)txm_arena_alloc(arena, m, sizeof *row);
     txm_vec2 *line = (txm_vec2 *)txm_arena_alloc(arena, m + 1, 2 * sizeof *line);
-    if (!even || !row || !line) return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
     const txe_point *soft = even + n;
     const size_t corner = n < 8 * TXE_CORNER ? n / 8 : (size_t)TXE_CORNER;
     if (!txe_resample(o->points, o->count, 1, length, even, n, bar) ||
@@ -1690,7 +1689,7 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
     const size_t n = (size_t)c->stroke_count;
     txm_vec2 **points = (txm_vec2 **)txm_arena_alloc(lines, n, sizeof(txm_vec2 *));
     e->lines = (texedges_polyline *)txm_arena_zero(&e->memory, n, sizeof *e->lines);
-    if (n && (!points || !e->lines)) return txe_no_memory(env);
+    if (lines->failed || e->memory.failed) return txe_no_memory(env);
     for (int layer = 0; layer < e->levels; layer++) {
         txm_arena held;
         txe_unrest u;
@@ -1828,7 +1827,7 @@ static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int 
     const size_t rows = (size_t)(bottom - top);
     size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
     txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
-    if (!next || !list) return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
     for (int pass = 0; pass < 2; pass++) {
         for (size_t i = 0; i < n; i++) {
             const txe_slope s = txe_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);

@@ -874,7 +874,7 @@ static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *a
     if (has_mask)
         k->bad = (uint32_t *)txm_arena_zero(arena, (size_t)(k->width + 1) * (size_t)(k->height + 1),
                                             sizeof *k->bad);
-    if (!k->pixels || !k->sheet || (has_mask && !k->bad))
+    if (arena->failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
     for (int n = 0; n < s->sheets; n++) memset(k->sheet + k->first[n], n, (size_t)k->high[n]);
     return TXM_OK;
@@ -1080,7 +1080,7 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
             (int16_t *)txm_arena_alloc(&scratch, (size_t)k.width * (size_t)k.height, sizeof *gray);
         k.at = (float *)txm_arena_alloc(
             &scratch, (size_t)(2 * k.reach_x + 1) * (size_t)(k.reach_y + 1), sizeof *k.at);
-        if (!gray || !k.at) {
+        if (scratch.failed) {
             txm_arena_free(&scratch);
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
         }
@@ -1141,9 +1141,11 @@ static int txp_lattice_close(const double lattice[4], int tileable, double width
 }
 
 /* Sheets, stacks and lattice; a torus of a texture with a lattice gets a sheet that is stretched
-   until the sides are multiples of the steps. The arenas hold what is kept. */
-static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *memory,
-                                  txm_env *env) {
+   until the sides are multiples of the steps.
+   s       as the checks leave it; scratch
+   out     receives the source, which lies in memory, an arena that is made here             */
+static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source **out,
+                                  txm_arena *memory, txm_env *env) {
     int least = INT_MAX;
     if (u->tileable & TEXPATCH_TILE_X) least = u->width;
     if (u->tileable & TEXPATCH_TILE_Y && u->height < least) least = u->height;
@@ -1173,7 +1175,12 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *
     for (int l = 0; l < s->levels && status == TXM_OK; l++)
         txp_lattice_set(&s->stack[l], closed, 1.0 / (1 << l));
 done:
-    if (status == TXM_OK) txp_find_contrast(s);
+    if (status == TXM_OK) {
+        txp_find_contrast(s);
+        *out = (txp_source *)txm_arena_alloc(&first, 1, sizeof **out);
+        if (*out) **out = *s;
+        else status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
+    }
     if (status == TXM_OK) *memory = first;
     else txm_arena_free(&first);
     return status;
@@ -2386,9 +2393,10 @@ static void txp_measure_band(void *context, int lane) {
     }
 }
 
-/* Room for a field; its values are all 0, in memory of their own. */
-static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
-                          txm_arena *memory, txm_arena *scratch) {
+/* Room for a field; its values are all 0, in memory of their own. If there is none, the arenas'
+   failed tells. */
+static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
+                           txm_arena *memory, txm_arena *scratch) {
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     f->width = c->width;
     f->height = c->height;
@@ -2402,7 +2410,6 @@ static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double s
     f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
     f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
     f->busy = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
-    return f->busy && f->value && f->given && f->pull[0] && f->pull[1];
 }
 
 /* ---- jobs --------------------------------------------------------------------------------- */
@@ -2534,17 +2541,14 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     c->next = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->next);
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
-    if (!c->pixels || !c->at || !c->next || (job->given.fixed && !c->fixed) ||
-        (job->given.free_guide && !c->free_guide))
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
     for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
         txp_band *b = &c->bands[i];
         const size_t band = (size_t)c->width * TXP_BAND;
         if (i * TXP_BAND >= c->height) break; /* there are fewer bands */
         b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
         b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
-        if (!b->sums || !b->mean)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
         b->total = b->sums + band * n;
         b->nearest = b->total + band;
     }
@@ -2595,14 +2599,14 @@ static double txp_use_weight(const texpatch_job *job) {
     return fmin(0.5 * job->source->contrast, job->setup.tileable ? 16 : 32);
 }
 
-static int txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
+/* no use of any cell yet */
+static void txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
     u->columns = (k->width + TXP_CELL - 1) / TXP_CELL;
     u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
     u->count =
         (uint32_t *)txm_arena_zero(arena, (size_t)u->columns * (size_t)u->rows, sizeof *u->count);
     u->sums = (uint32_t *)txm_arena_zero(arena, (size_t)(u->columns + 1) * (size_t)(u->rows + 1),
                                          sizeof *u->sums);
-    return u->count && u->sums;
 }
 
 static void txp_quilt_one(void *context, int index) {
@@ -2667,9 +2671,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
             (double *)txm_arena_alloc(&scratch, (size_t)(t->block * t->overlap), sizeof(double));
         t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(txp_place));
         t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(float));
-        if (!txp_use_make(k, &t->use, &scratch) || !t->canvas.pixels || !t->canvas.at ||
-            !t->known || !t->done || !t->error || !t->scratch || !t->near_places ||
-            !t->near_costs) {
+        txp_use_make(k, &t->use, &scratch);
+        if (scratch.failed) {
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the first pass");
             goto done;
         }
@@ -2748,11 +2751,11 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Room for a pass over c, the bands apart. */
-static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
+/* Room for a pass over c, the bands apart; scratch->failed tells if there is none. */
+static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
-    if (!p->xs || !p->ys) return 0;
+    if (scratch->failed) return;
     p->columns = txp_grid(c->width, p->size, p->step, c->wrap & TEXPATCH_TILE_X, p->xs);
     p->rows = txp_grid(c->height, p->size, p->step, c->wrap & TEXPATCH_TILE_Y, p->ys);
     const size_t windows = (size_t)p->columns * (size_t)p->rows;
@@ -2760,8 +2763,7 @@ static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->sad = (uint32_t *)txm_arena_alloc(scratch, windows, sizeof *p->sad);
     p->weight = (int32_t *)txm_arena_alloc(scratch, windows, sizeof *p->weight);
     p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
-    if (!p->match || !p->sad || !p->weight || !p->grain) return 0;
-    return 1;
+    txp_use_make(p->stack, &p->use, scratch);
 }
 
 /* One pass of the optimisation over c; the places it chooses go into c->next. */
@@ -2794,7 +2796,8 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     }
     p.seed = txm_hash(job->seed + (uint64_t)(job->next_step + 1) * 7919);
     txp_bell(p.size, p.bell);
-    if (!txp_pass_make(&p, c, &scratch) || !txp_use_make(p.stack, &p.use, &scratch)) {
+    txp_pass_make(&p, c, &scratch);
+    if (scratch.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
         goto done;
     }
@@ -2862,9 +2865,10 @@ static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, 
     return job;
 }
 
-/* Room for what is given of a canvas; what is 0 here is not wanted. */
-static int txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
-                          int free_guide, int places, txm_arena *memory) {
+/* Room for what is given of a canvas; what is 0 here is not wanted. If there is none, memory->failed
+   tells. */
+static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
+                           int free_guide, int places, txm_arena *memory) {
     g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);
     if (fixed) g->fixed = (uint8_t *)txm_arena_zero(memory, pixels, 1);
     if (free_guide) g->free_guide = (uint8_t *)txm_arena_zero(memory, pixels, 1);
@@ -2873,8 +2877,6 @@ static int txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int 
         g->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
         g->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
     }
-    return g->pixels && (!fixed || g->fixed) && (!free_guide || g->free_guide) &&
-           (!places || (g->at && g->bend && g->tone));
 }
 
 /* The guide and its mask, on the canvas; the margin has what the border has. */
@@ -2910,7 +2912,7 @@ TEXPATCH_API void texpatch_free(texpatch_job *job) {
 TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
                                        texpatch_job **out) {
     txp_setup setup;
-    txp_source source;
+    txp_source source, *s;
     txm_arena memory, source_memory;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
@@ -2920,28 +2922,25 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     txm_status status = txp_check_exemplars(desc, &setup, &source, env);
     if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
     if (status != TXM_OK) return status;
-    status = txp_source_make(&setup, &source, &source_memory, env);
+    status = txp_source_make(&setup, &source, &s, &source_memory, env);
     if (status != TXM_OK) return status;
 
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
-    const int room = 2 * TXP_WINDOW << (source.levels - 1); /* a canvas must hold some patches */
+    const int room = 2 * TXP_WINDOW << (s->levels - 1); /* a canvas must hold some patches */
     int width = desc->width + (wx ? 0 : 2 * TXP_MARGIN);
     int height = desc->height + (wy ? 0 : 2 * TXP_MARGIN);
     if (!wx && width < room) width = room;
     if (!wy && height < room) height = room;
     const size_t pixels = (size_t)width * (size_t)height;
     txm_arena_init(&memory, env);
-    txp_source *s = (txp_source *)txm_arena_alloc(&memory, 1, sizeof *s);
-    if (s) *s = source;
-    texpatch_job *job = s ? txp_job_make(&setup, s, width, height, desc->seed, &memory, env) : NULL;
+    texpatch_job *job = txp_job_make(&setup, s, width, height, desc->seed, &memory, env);
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
     job->margin_y = wy ? 0 : TXP_MARGIN;
     txp_first_shift(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
-        if (!txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0,
-                            &memory))
-            goto no_memory;
+        txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0, &memory);
+        if (memory.failed) goto no_memory;
         for (int y = 0; y < desc->height && desc->kept; y++) {
             const uint8_t *keep = (const uint8_t *)txm_image_row_const(&desc->keep, y);
             for (int x = 0; x < desc->width; x++) {
@@ -2983,8 +2982,9 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     memset(&bend, 0, sizeof bend);
     memset(&tone, 0, sizeof tone);
     txm_arena_init(&scratch, env);
-    if (!txp_field_make(&bend, c, 2, 0.02, memory, &scratch) ||
-        !txp_field_make(&tone, c, lanes, 0.004, memory, &scratch)) {
+    txp_field_make(&bend, c, 2, 0.02, memory, &scratch);
+    txp_field_make(&tone, c, lanes, 0.004, memory, &scratch);
+    if (memory->failed || scratch.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
         goto done;
     }
@@ -3438,8 +3438,9 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     memset(&no_mask, 0, sizeof no_mask);
     txm_arena_init(&memory, env);
     texpatch_job *part = NULL;
-    if (guide && !txp_given_make(&new_guide, s, all, 0, 1, 0, &memory)) goto no_memory;
     if (guide) {
+        txp_given_make(&new_guide, s, all, 0, 1, 0, &memory);
+        if (memory.failed) goto no_memory;
         const txm_image to = txm_image_resolve(*guide);
         txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
     }
@@ -3453,8 +3454,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                         &high);
         part =
             txp_job_make(u, job->source, wide, high, txm_hash(seed ^ (job->seed + 1)), &own, env);
-        if (!part || !txp_given_make(&part->given, s, (size_t)wide * (size_t)high, 1,
-                                     s->guide_bytes > 0, 1, &own)) {
+        if (part)
+            txp_given_make(&part->given, s, (size_t)wide * (size_t)high, 1, s->guide_bytes > 0, 1,
+                           &own);
+        if (own.failed) {
             txm_arena_free(&own);
             goto no_memory;
         }
@@ -3562,7 +3565,8 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     txm_arena_init(&memory, env);
     texpatch_job *job =
         txp_job_make(&plane->setup, plane->source, width, height, seed, &memory, env);
-    if (!job || !txp_given_make(&job->given, s, (size_t)width * (size_t)height, 1, 0, 1, &memory)) {
+    if (job) txp_given_make(&job->given, s, (size_t)width * (size_t)height, 1, 0, 1, &memory);
+    if (memory.failed) {
         txm_arena_free(&memory);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
@@ -3612,7 +3616,7 @@ static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int
         p->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *p->at);
         p->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
         p->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
-        if (!p->at || !p->bend || !p->tone)
+        if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
     for (int v = 0; v < height && status == TXM_OK; v++) {
@@ -3739,7 +3743,7 @@ static int64_t txp_floor_div(int64_t a, int64_t b) {
 TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
                                             texpatch_plane **out) {
     txp_setup setup;
-    txp_source source;
+    txp_source source, *s;
     txm_arena memory, source_memory;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
@@ -3757,17 +3761,14 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
         plain.exemplars = exemplars;
     }
     txm_status status = txp_check_exemplars(&plain, &setup, &source, env);
-    if (status == TXM_OK) status = txp_source_make(&setup, &source, &source_memory, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
     if (status != TXM_OK) return status;
     txm_arena_init(&memory, env);
     texpatch_plane *plane = (texpatch_plane *)txm_arena_zero(&memory, 1, sizeof *plane);
-    txp_source *s = (txp_source *)txm_arena_alloc(&memory, 1, sizeof *s);
-    if (!plane || !s) {
-        txm_arena_free(&memory);
+    if (!plane) {
         txm_arena_free(&source_memory);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a plane");
     }
-    *s = source;
     plane->setup = setup;
     plane->source = s;
     plane->half = TXP_WINDOW / 2 << (s->levels - 1);

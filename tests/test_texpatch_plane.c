@@ -163,6 +163,25 @@ static void test_plane_looks(void **state) {
 
 /* ---- misfortune -------------------------------------------------------------------------- */
 
+typedef struct window {
+    const texpatch_desc *desc;
+    const texpatch_plane *plane;
+    txm_image out;
+} window;
+
+static txm_status make_plane(void *context, txm_env *env) {
+    const window *w = (const window *)context;
+    texpatch_plane *plane;
+    const txm_status status = texpatch_plane_make(w->desc, env, &plane);
+    texpatch_plane_free(plane);
+    return status;
+}
+
+static txm_status draw_window(void *context, txm_env *env) {
+    const window *w = (const window *)context;
+    return texpatch_plane_draw(w->plane, 30, 40, env, &w->out, NULL);
+}
+
 static void test_plane_misfortune(void **state) {
     (void)state;
     const txm_image noise = draw_noise(32, 32, 1, 0, 1, 128);
@@ -171,37 +190,18 @@ static void test_plane_misfortune(void **state) {
     d.passes = -1;
     tk_memory memory = {0};
     txm_env env = tk_env(&memory, NULL);
-    texpatch_plane *plane = NULL;
-    for (long k = 1; !plane; k++) {
-        memory.fail_at = memory.calls + k;
-        const txm_status status = texpatch_plane_make(&d, &env, &plane);
-        assert_int_equal(status, plane ? TXM_OK : TXM_OUT_OF_MEMORY);
-        if (!plane) assert_int_equal(tk_leaks(&memory), 0);
-    }
-    memory.fail_at = 0;
-    const txm_image wanted = new_image(20, 20, 1, TXM_U8), out = new_image(20, 20, 1, TXM_U8);
+    texpatch_plane *plane;
+    assert_int_equal(texpatch_plane_make(&d, &env, &plane), TXM_OK);
+    window w = {&d, plane, new_image(20, 20, 1, TXM_U8)};
+    const txm_image wanted = new_image(20, 20, 1, TXM_U8);
     assert_int_equal(texpatch_plane_draw(plane, 30, 40, NULL, &wanted, NULL), TXM_OK);
-    for (int failing = 0; failing < 2; failing++) {
-        /* many alike: the first ones, then some of them */
-        for (long k = 1;; k += k < 4 ? 1 : failing ? 23 : 19) {
-            const long blocks = memory.blocks, calls = memory.calls;
-            tk_progress progress = {0};
-            if (!failing) progress.cancel_at = k;
-            else memory.fail_at = calls + k;
-            env = tk_env(&memory, &progress);
-            const txm_status status = texpatch_plane_draw(plane, 30, 40, &env, &out, NULL);
-            memory.fail_at = 0;
-            assert_int_equal(memory.blocks, blocks);
-            assert_true(progress.errors == 0 && progress.late == 0 && memory.errors == 0);
-            if (failing ? memory.calls - calls < k : progress.calls < k) {
-                assert_int_equal(status, TXM_OK);
-                break;
-            }
-            assert_int_equal(status, failing ? TXM_OUT_OF_MEMORY : TXM_CANCELLED);
-            assert_true(env.message[0] != 0);
-        }
-        assert_true(is_same(&out, &wanted));
-    }
+    const long blocks = memory.blocks;
+    assert_true(tk_sweep(make_plane, &w, TK_ALLOCATION) > 3);
+    for (int kind = 0; kind < 3; kind++)
+        assert_true(tk_sweep(draw_window, &w, (tk_kind)kind) > 20);
+    assert_int_equal(memory.blocks, blocks); /* the plane is as it was */
+    assert_int_equal(draw_window(&w, NULL), TXM_OK);
+    assert_true(is_same(&w.out, &wanted));
     texpatch_plane_free(plane);
     assert_int_equal(tk_leaks(&memory), 0);
 }

@@ -68,7 +68,7 @@ static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int 
     const size_t rows = (size_t)(bottom - top);
     size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
     txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
-    if (!next || !list) return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
     for (int pass = 0; pass < 2; pass++) {
         for (size_t i = 0; i < n; i++) {
             const txe_slope s = txe_slope_of(p[i], p[i + 1 < n ? i + 1 : 0], g->height);

@@ -242,7 +242,7 @@ static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
     const double smooth = desc->smooth;
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
-    if (!gray || (smooth > 0 && !scratch)) return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
     const int good = txe_gray(&desc->image, gray, bar);
     if (good < 0)

@@ -98,7 +98,7 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
             e->lines =
                 (texedges_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
             e->points = (txm_vec2 *)txm_arena_alloc(&e->memory, cracks, sizeof *e->points);
-            if (!e->lines || !e->points) return txe_no_memory(env);
+            if (e->memory.failed) return txe_no_memory(env);
         }
         for (int y = 0; y < m->height; y++) {
             for (int x = 0; x < m->width; x++) {

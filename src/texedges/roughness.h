@@ -112,11 +112,10 @@ typedef struct txe_bench {
     txe_point *a, *b, *c;
 } txe_bench;
 
-static int txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
+static void txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
     bench->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
     bench->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
     bench->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
-    return bench->a && bench->b && bench->c;
 }
 
 /* The factor that makes a vector of this length no longer than TXE_STRAY: 1 up to TXE_LINEAR,
@@ -281,8 +280,8 @@ static txm_status txe_listen_layer(txe_unrest *u, const texedges_set *e, int lay
     if (most == 0) return TXM_OK;
     u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
-    if (!u->samples || !u->starts || !txe_bench_make(&bench, arena, longest + room))
-        return txe_no_memory(env);
+    txe_bench_make(&bench, arena, longest + room);
+    if (arena->failed) return txe_no_memory(env);
     for (size_t i = 0; i < e->line_count; i++) {
         const texedges_polyline *line = &e->lines[i];
         if (line->layer != layer || line->count < TXE_SHORT) continue;

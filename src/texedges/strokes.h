@@ -179,7 +179,7 @@ static txm_status txe_shake(const txe_unrest *u, double stray, txm_rng *rng,
     txe_point *even = (txe_point *)txm_arena_alloc(arena, n, 2 * sizeof *even);
     txe_sample *row = (txe_sample *)txm_arena_alloc(arena, m, sizeof *row);
     txm_vec2 *line = (txm_vec2 *)txm_arena_alloc(arena, m + 1, 2 * sizeof *line);
-    if (!even || !row || !line) return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
     const txe_point *soft = even + n;
     const size_t corner = n < 8 * TXE_CORNER ? n / 8 : (size_t)TXE_CORNER;
     if (!txe_resample(o->points, o->count, 1, length, even, n, bar) ||
@@ -248,7 +248,7 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
     const size_t n = (size_t)c->stroke_count;
     txm_vec2 **points = (txm_vec2 **)txm_arena_alloc(lines, n, sizeof(txm_vec2 *));
     e->lines = (texedges_polyline *)txm_arena_zero(&e->memory, n, sizeof *e->lines);
-    if (n && (!points || !e->lines)) return txe_no_memory(env);
+    if (lines->failed || e->memory.failed) return txe_no_memory(env);
     for (int layer = 0; layer < e->levels; layer++) {
         txm_arena held;
         txe_unrest u;

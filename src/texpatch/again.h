@@ -89,8 +89,9 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     memset(&no_mask, 0, sizeof no_mask);
     txm_arena_init(&memory, env);
     texpatch_job *part = NULL;
-    if (guide && !txp_given_make(&new_guide, s, all, 0, 1, 0, &memory)) goto no_memory;
     if (guide) {
+        txp_given_make(&new_guide, s, all, 0, 1, 0, &memory);
+        if (memory.failed) goto no_memory;
         const txm_image to = txm_image_resolve(*guide);
         txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
     }
@@ -104,8 +105,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                         &high);
         part =
             txp_job_make(u, job->source, wide, high, txm_hash(seed ^ (job->seed + 1)), &own, env);
-        if (!part || !txp_given_make(&part->given, s, (size_t)wide * (size_t)high, 1,
-                                     s->guide_bytes > 0, 1, &own)) {
+        if (part)
+            txp_given_make(&part->given, s, (size_t)wide * (size_t)high, 1, s->guide_bytes > 0, 1,
+                           &own);
+        if (own.failed) {
             txm_arena_free(&own);
             goto no_memory;
         }

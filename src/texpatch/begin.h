@@ -32,9 +32,10 @@ static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, 
     return job;
 }
 
-/* Room for what is given of a canvas; what is 0 here is not wanted. */
-static int txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
-                          int free_guide, int places, txm_arena *memory) {
+/* Room for what is given of a canvas; what is 0 here is not wanted. If there is none, memory->failed
+   tells. */
+static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
+                           int free_guide, int places, txm_arena *memory) {
     g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);
     if (fixed) g->fixed = (uint8_t *)txm_arena_zero(memory, pixels, 1);
     if (free_guide) g->free_guide = (uint8_t *)txm_arena_zero(memory, pixels, 1);
@@ -43,8 +44,6 @@ static int txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int 
         g->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
         g->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
     }
-    return g->pixels && (!fixed || g->fixed) && (!free_guide || g->free_guide) &&
-           (!places || (g->at && g->bend && g->tone));
 }
 
 /* The guide and its mask, on the canvas; the margin has what the border has. */
@@ -80,7 +79,7 @@ TEXPATCH_API void texpatch_free(texpatch_job *job) {
 TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
                                        texpatch_job **out) {
     txp_setup setup;
-    txp_source source;
+    txp_source source, *s;
     txm_arena memory, source_memory;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
@@ -90,28 +89,25 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     txm_status status = txp_check_exemplars(desc, &setup, &source, env);
     if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
     if (status != TXM_OK) return status;
-    status = txp_source_make(&setup, &source, &source_memory, env);
+    status = txp_source_make(&setup, &source, &s, &source_memory, env);
     if (status != TXM_OK) return status;
 
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
-    const int room = 2 * TXP_WINDOW << (source.levels - 1); /* a canvas must hold some patches */
+    const int room = 2 * TXP_WINDOW << (s->levels - 1); /* a canvas must hold some patches */
     int width = desc->width + (wx ? 0 : 2 * TXP_MARGIN);
     int height = desc->height + (wy ? 0 : 2 * TXP_MARGIN);
     if (!wx && width < room) width = room;
     if (!wy && height < room) height = room;
     const size_t pixels = (size_t)width * (size_t)height;
     txm_arena_init(&memory, env);
-    txp_source *s = (txp_source *)txm_arena_alloc(&memory, 1, sizeof *s);
-    if (s) *s = source;
-    texpatch_job *job = s ? txp_job_make(&setup, s, width, height, desc->seed, &memory, env) : NULL;
+    texpatch_job *job = txp_job_make(&setup, s, width, height, desc->seed, &memory, env);
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
     job->margin_y = wy ? 0 : TXP_MARGIN;
     txp_first_shift(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
-        if (!txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0,
-                            &memory))
-            goto no_memory;
+        txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0, &memory);
+        if (memory.failed) goto no_memory;
         for (int y = 0; y < desc->height && desc->kept; y++) {
             const uint8_t *keep = (const uint8_t *)txm_image_row_const(&desc->keep, y);
             for (int x = 0; x < desc->width; x++) {
@@ -153,8 +149,9 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     memset(&bend, 0, sizeof bend);
     memset(&tone, 0, sizeof tone);
     txm_arena_init(&scratch, env);
-    if (!txp_field_make(&bend, c, 2, 0.02, memory, &scratch) ||
-        !txp_field_make(&tone, c, lanes, 0.004, memory, &scratch)) {
+    txp_field_make(&bend, c, 2, 0.02, memory, &scratch);
+    txp_field_make(&tone, c, lanes, 0.004, memory, &scratch);
+    if (memory->failed || scratch.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
         goto done;
     }

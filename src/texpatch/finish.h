@@ -249,9 +249,10 @@ static void txp_measure_band(void *context, int lane) {
     }
 }
 
-/* Room for a field; its values are all 0, in memory of their own. */
-static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
-                          txm_arena *memory, txm_arena *scratch) {
+/* Room for a field; its values are all 0, in memory of their own. If there is none, the arenas'
+   failed tells. */
+static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
+                           txm_arena *memory, txm_arena *scratch) {
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     f->width = c->width;
     f->height = c->height;
@@ -265,7 +266,6 @@ static int txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double s
     f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
     f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
     f->busy = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
-    return f->busy && f->value && f->given && f->pull[0] && f->pull[1];
 }
 
 #endif /* TEXPATCH_FINISH_H */

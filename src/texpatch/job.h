@@ -133,17 +133,14 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     c->next = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->next);
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
-    if (!c->pixels || !c->at || !c->next || (job->given.fixed && !c->fixed) ||
-        (job->given.free_guide && !c->free_guide))
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
     for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
         txp_band *b = &c->bands[i];
         const size_t band = (size_t)c->width * TXP_BAND;
         if (i * TXP_BAND >= c->height) break; /* there are fewer bands */
         b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
         b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
-        if (!b->sums || !b->mean)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
         b->total = b->sums + band * n;
         b->nearest = b->total + band;
     }
@@ -194,14 +191,14 @@ static double txp_use_weight(const texpatch_job *job) {
     return fmin(0.5 * job->source->contrast, job->setup.tileable ? 16 : 32);
 }
 
-static int txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
+/* no use of any cell yet */
+static void txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
     u->columns = (k->width + TXP_CELL - 1) / TXP_CELL;
     u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
     u->count =
         (uint32_t *)txm_arena_zero(arena, (size_t)u->columns * (size_t)u->rows, sizeof *u->count);
     u->sums = (uint32_t *)txm_arena_zero(arena, (size_t)(u->columns + 1) * (size_t)(u->rows + 1),
                                          sizeof *u->sums);
-    return u->count && u->sums;
 }
 
 static void txp_quilt_one(void *context, int index) {
@@ -266,9 +263,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
             (double *)txm_arena_alloc(&scratch, (size_t)(t->block * t->overlap), sizeof(double));
         t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(txp_place));
         t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(float));
-        if (!txp_use_make(k, &t->use, &scratch) || !t->canvas.pixels || !t->canvas.at ||
-            !t->known || !t->done || !t->error || !t->scratch || !t->near_places ||
-            !t->near_costs) {
+        txp_use_make(k, &t->use, &scratch);
+        if (scratch.failed) {
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the first pass");
             goto done;
         }
@@ -347,11 +343,11 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Room for a pass over c, the bands apart. */
-static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
+/* Room for a pass over c, the bands apart; scratch->failed tells if there is none. */
+static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
-    if (!p->xs || !p->ys) return 0;
+    if (scratch->failed) return;
     p->columns = txp_grid(c->width, p->size, p->step, c->wrap & TEXPATCH_TILE_X, p->xs);
     p->rows = txp_grid(c->height, p->size, p->step, c->wrap & TEXPATCH_TILE_Y, p->ys);
     const size_t windows = (size_t)p->columns * (size_t)p->rows;
@@ -359,8 +355,7 @@ static int txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->sad = (uint32_t *)txm_arena_alloc(scratch, windows, sizeof *p->sad);
     p->weight = (int32_t *)txm_arena_alloc(scratch, windows, sizeof *p->weight);
     p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
-    if (!p->match || !p->sad || !p->weight || !p->grain) return 0;
-    return 1;
+    txp_use_make(p->stack, &p->use, scratch);
 }
 
 /* One pass of the optimisation over c; the places it chooses go into c->next. */
@@ -393,7 +388,8 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
     }
     p.seed = txm_hash(job->seed + (uint64_t)(job->next_step + 1) * 7919);
     txp_bell(p.size, p.bell);
-    if (!txp_pass_make(&p, c, &scratch) || !txp_use_make(p.stack, &p.use, &scratch)) {
+    txp_pass_make(&p, c, &scratch);
+    if (scratch.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
         goto done;
     }

@@ -60,7 +60,8 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     txm_arena_init(&memory, env);
     texpatch_job *job =
         txp_job_make(&plane->setup, plane->source, width, height, seed, &memory, env);
-    if (!job || !txp_given_make(&job->given, s, (size_t)width * (size_t)height, 1, 0, 1, &memory)) {
+    if (job) txp_given_make(&job->given, s, (size_t)width * (size_t)height, 1, 0, 1, &memory);
+    if (memory.failed) {
         txm_arena_free(&memory);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
@@ -110,7 +111,7 @@ static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int
         p->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *p->at);
         p->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
         p->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
-        if (!p->at || !p->bend || !p->tone)
+        if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
     for (int v = 0; v < height && status == TXM_OK; v++) {
@@ -237,7 +238,7 @@ static int64_t txp_floor_div(int64_t a, int64_t b) {
 TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
                                             texpatch_plane **out) {
     txp_setup setup;
-    txp_source source;
+    txp_source source, *s;
     txm_arena memory, source_memory;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
@@ -255,17 +256,14 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
         plain.exemplars = exemplars;
     }
     txm_status status = txp_check_exemplars(&plain, &setup, &source, env);
-    if (status == TXM_OK) status = txp_source_make(&setup, &source, &source_memory, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
     if (status != TXM_OK) return status;
     txm_arena_init(&memory, env);
     texpatch_plane *plane = (texpatch_plane *)txm_arena_zero(&memory, 1, sizeof *plane);
-    txp_source *s = (txp_source *)txm_arena_alloc(&memory, 1, sizeof *s);
-    if (!plane || !s) {
-        txm_arena_free(&memory);
+    if (!plane) {
         txm_arena_free(&source_memory);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a plane");
     }
-    *s = source;
     plane->setup = setup;
     plane->source = s;
     plane->half = TXP_WINDOW / 2 << (s->levels - 1);

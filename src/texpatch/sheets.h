@@ -141,7 +141,7 @@ static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *a
     if (has_mask)
         k->bad = (uint32_t *)txm_arena_zero(arena, (size_t)(k->width + 1) * (size_t)(k->height + 1),
                                             sizeof *k->bad);
-    if (!k->pixels || !k->sheet || (has_mask && !k->bad))
+    if (arena->failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
     for (int n = 0; n < s->sheets; n++) memset(k->sheet + k->first[n], n, (size_t)k->high[n]);
     return TXM_OK;
@@ -347,7 +347,7 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
             (int16_t *)txm_arena_alloc(&scratch, (size_t)k.width * (size_t)k.height, sizeof *gray);
         k.at = (float *)txm_arena_alloc(
             &scratch, (size_t)(2 * k.reach_x + 1) * (size_t)(k.reach_y + 1), sizeof *k.at);
-        if (!gray || !k.at) {
+        if (scratch.failed) {
             txm_arena_free(&scratch);
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
         }
@@ -408,9 +408,11 @@ static int txp_lattice_close(const double lattice[4], int tileable, double width
 }
 
 /* Sheets, stacks and lattice; a torus of a texture with a lattice gets a sheet that is stretched
-   until the sides are multiples of the steps. The arenas hold what is kept. */
-static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *memory,
-                                  txm_env *env) {
+   until the sides are multiples of the steps.
+   s       as the checks leave it; scratch
+   out     receives the source, which lies in memory, an arena that is made here             */
+static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source **out,
+                                  txm_arena *memory, txm_env *env) {
     int least = INT_MAX;
     if (u->tileable & TEXPATCH_TILE_X) least = u->width;
     if (u->tileable & TEXPATCH_TILE_Y && u->height < least) least = u->height;
@@ -440,7 +442,12 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txm_arena *
     for (int l = 0; l < s->levels && status == TXM_OK; l++)
         txp_lattice_set(&s->stack[l], closed, 1.0 / (1 << l));
 done:
-    if (status == TXM_OK) txp_find_contrast(s);
+    if (status == TXM_OK) {
+        txp_find_contrast(s);
+        *out = (txp_source *)txm_arena_alloc(&first, 1, sizeof **out);
+        if (*out) **out = *s;
+        else status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
+    }
     if (status == TXM_OK) *memory = first;
     else txm_arena_free(&first);
     return status;
