@@ -686,11 +686,11 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #if defined(TREEPIECES_IMPLEMENTATION) && !defined(TREEPIECES_IMPLEMENTED)
 #define TREEPIECES_IMPLEMENTED
 
-/* ---- numbers ----------------------------------------------------------------------------- */
+/* ---- vectors and rotations --------------------------------------------------------------- */
 
-/* All that decides is sums, products, quotients and square roots, so that it is the same everywhere;
-   libm's sine and exponential are not, those of texmath.h are. In float and not rounded from double as
-   texmath.h's own vectors are: a forest takes millions of these. */
+/* Everything that shapes a tree is computed by sums, products, quotients and square roots, so that
+   it is the same everywhere. In float, not rounded from double as vectors of texmath.h are: a
+   forest takes millions of these operations. */
 
 /* q v q* for a unit quaternion q = x y z w; out may be v */
 static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
@@ -704,9 +704,9 @@ static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
     out[2] = z;
 }
 
-/* out = a b: b first, then a; out may be one of them. All terms are added, some with the other sign:
-   gcc 12 makes one instruction that rounds once of neighbouring a - b c and a + b c, contraction off or
-   not. */
+/* out = a b: b first, then a; out may be one of them. Leave the order of the terms, and every term
+   added, some with the sign inverted: from neighbouring a - b c and a + b c gcc 12 makes one
+   instruction that rounds only once, even with contraction off. */
 static void tpc_multiply(const float a[4], const float b[4], float out[4]) {
     const float back[3] = {-a[0], -a[1], -a[2]};
     const float x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] + back[2] * b[1];
@@ -756,8 +756,8 @@ static const float tpc_cos6[TREEPIECES_RIM] = {1.0f, 0.5f, -0.5f, -1.0f, -0.5f, 
 static const float tpc_sin6[TREEPIECES_RIM] = {0.0f,  0.86602540378f,  0.86602540378f,
                                                0.0f, -0.86602540378f, -0.86602540378f};
 
-static const float tpc_cone_out = 0.99503719021f; /* 10 / sqrt(101): of the normal at a rim */
-static const float tpc_cone_up = 0.09950371902f;  /* 1 / sqrt(101)                          */
+static const float tpc_cone_out = 0.99503719021f; /* normals at a rim: 10 / sqrt(101) outwards, */
+static const float tpc_cone_up = 0.09950371902f;  /* 1 / sqrt(101) upwards                      */
 
 static void tpc_rim_vertex(int place, float position[3], float normal[3]) {
     position[0] = tpc_cos6[place];
@@ -768,7 +768,7 @@ static void tpc_rim_vertex(int place, float position[3], float normal[3]) {
     normal[2] = -tpc_cone_out * tpc_sin6[place];
 }
 
-/* v turned about y by 60 k degrees, which takes place j of a rim to place j + k */
+/* v rotated about y by 60 k degrees, which moves vertex j of a rim to vertex j + k */
 static void tpc_turn(int k, const float v[3], float out[3]) {
     const float c = tpc_cos6[k], s = tpc_sin6[k], x = v[0], z = v[2];
     out[0] = c * x + s * z;
@@ -781,7 +781,7 @@ static void tpc_building_point(const treepieces_similarity *b, const float p[3],
     for (int i = 0; i < 3; i++) out[i] = b->translation[i] + b->scale * out[i];
 }
 
-/* Place j of a leaf rim in the piece's model space. */
+/* Vertex `place` of a leaf rim in model space of the piece. */
 static void tpc_leaf_vertex(const treepieces_similarity *b, int place, float position[3],
                             float normal[3]) {
     tpc_rim_vertex(place, position, normal);
@@ -789,21 +789,22 @@ static void tpc_leaf_vertex(const treepieces_similarity *b, int place, float pos
     tpc_rotate(b->rotation, normal, normal);
 }
 
-/* The vertex numbers of leaf rim k, of the root rim for k = -1. */
+/* The vertex numbers of leaf rim k; of the root rim for k = -1. */
 static const int *tpc_rim_of(const treepieces_piece *p, int k) {
     return k < 0 ? p->root_rim : p->leaf_rims[k];
 }
 
 /* ---- the built-in pieces ----------------------------------------------------------------- */
 
-/* A piece while it is put together. */
+/* A piece under construction. */
 typedef struct tpc_shape {
     treepieces_piece piece;
     treepieces_vertex vertices[64];
     treepieces_quad quads[64];
 } tpc_shape;
 
-/* A vertex bound to the own bone and evenly to the leaf rims of a mask, by own : 1 - own. */
+/* A vertex with weight `own` for the piece's own bone; the rest is shared evenly by the leaf rims
+   of the bit mask `leaves`. */
 static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, int leaves) {
     treepieces_vertex *v = &s->vertices[s->piece.vertex_count];
     const int count = (leaves & 1) + (leaves >> 1 & 1) + (leaves >> 2 & 1);
@@ -817,7 +818,7 @@ static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, in
     return s->piece.vertex_count++;
 }
 
-/* Six vertices about the axis, of radius even at places 0, 2, 4 and odd at the others. */
+/* Six vertices about the axis; radius `even` for vertices 0, 2, 4, `odd` for the others. */
 static void tpc_add_ring(tpc_shape *s, float y, float even, float odd, float own, int leaves,
                          int ring[TREEPIECES_RIM]) {
     for (int k = 0; k < TREEPIECES_RIM; k++) {
@@ -832,7 +833,7 @@ static void tpc_begin(tpc_shape *s, const char *name) {
     tpc_add_ring(s, 0, 1, 1, 1, 0, s->piece.root_rim);
 }
 
-/* The vertices of the leaf rim behind the last one, whose building transform is there. */
+/* Add the vertices of the next leaf rim, whose building transform is set already; return them. */
 static const int *tpc_add_rim(tpc_shape *s) {
     treepieces_piece *p = &s->piece;
     const int k = p->leaf_count++;
@@ -844,9 +845,9 @@ static const int *tpc_add_rim(tpc_shape *s) {
     return p->leaf_rims[k];
 }
 
-/* A leaf rim at (x, y, z), its axis leaning by `lean` degrees towards azimuth `turn` (degrees about y from
-   +x to -z) and its place 0 on that azimuth. */
-static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double turn, double lean,
+/* A leaf rim at (x, y, z), its axis inclined by `lean` degrees towards azimuth `turn` (degrees
+   about y from +x to -z), its vertex 0 at that azimuth. */
+static const int *tpc_add_leaf_rim(tpc_shape *s, float x, float y, float z, double turn, double lean,
                                float scale) {
     treepieces_similarity *b = &s->piece.building[s->piece.leaf_count];
     const double degree = TXM_PI / 180;
@@ -856,7 +857,7 @@ static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double t
     b->translation[0] = x;
     b->translation[1] = y;
     b->translation[2] = z;
-    b->rotation[0] = txm_float(-st * sl); /* about y by turn, after about z by -lean */
+    b->rotation[0] = txm_float(-st * sl); /* -lean about z, then turn about y */
     b->rotation[1] = txm_float(st * cl);
     b->rotation[2] = txm_float(-ct * sl);
     b->rotation[3] = txm_float(ct * cl);
@@ -875,7 +876,7 @@ static void tpc_add_quad(tpc_shape *s, int nw, int sw, int se, int ne, treepiece
     q->band = (uint8_t)band;
 }
 
-/* The quads between two loops, from place `first` on, `count` of them. */
+/* `count` quads between two loops of six vertices, from vertex `first` on. */
 static void tpc_add_row(tpc_shape *s, const int *below, const int *above, int first, int count,
                         treepieces_class c, int band) {
     for (int i = first; i < first + count; i++) {
@@ -888,28 +889,28 @@ static void tpc_make_i(tpc_shape *s) {
     int middle[TREEPIECES_RIM];
     tpc_begin(s, "I");
     tpc_add_ring(s, 0.5f, 0.95f, 0.95f, 0.5f, 1, middle);
-    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.9f);
+    const int *top = tpc_add_leaf_rim(s, 0, 1, 0, 0, 0, 0.9f);
     tpc_add_row(s, s->piece.root_rim, middle, 0, 6, TREEPIECES_BARK, 0);
     tpc_add_row(s, middle, top, 0, 6, TREEPIECES_BARK, 1);
 }
 
-/* The crotch runs from place 0 over m1 and m2 to place 3; arm 0 leans to -z, arm 1 to +z:
+/* The crotch runs from vertex 0 over m1 and m2 to vertex 3; arm 0 leans to -z, arm 1 to +z:
 
-        2 - 1          each arm's loop: half the ring and the crotch
+        2 - 1          the loop of an arm is half of the ring, and the crotch
        /     \
       3-m2-m1-0  --> x                                                                       */
 static void tpc_make_y(tpc_shape *s) {
     int a[TREEPIECES_RIM];
     tpc_begin(s, "Y");
     for (int k = 0; k < TREEPIECES_RIM; k++) {
-        const int side = k % 3 == 0; /* where the crotch begins and ends */
+        const int side = k % 3 == 0; /* an end of the crotch */
         const int leaves = side ? 3 : k < 3 ? 1 : 2;
         a[k] = tpc_add_vertex(s, (side ? 0.97f : 0.98f) * tpc_cos6[k], side ? 0.66f : 0.5f,
                               -1.08f * tpc_sin6[k], 0.6f, leaves);
     }
     const int m1 = tpc_add_vertex(s, 0.4f, 0.94f, 0, 0.5f, 3);
     const int m2 = tpc_add_vertex(s, -0.4f, 0.94f, 0, 0.5f, 3);
-    /* leaning about x keeps place 0 at +x: a turn by 90, the lean, and back by 90 */
+    /* inclined about x, which keeps vertex 0 at +x */
     for (int arm = 0; arm < 2; arm++) {
         const float to = arm ? 1.0f : -1.0f;
         double sine, cosine;
@@ -931,15 +932,15 @@ static void tpc_make_y(tpc_shape *s) {
     tpc_add_row(s, loop1, s->piece.leaf_rims[1], 0, 3, TREEPIECES_FOLD, 2);
 }
 
-/* A tube of three rows; a branch takes the place of two quads of the middle row, those left and right
-   of place v = 0 (and 3). The hole's loop, as the branch sees it: bottom, bottom right, top right, top,
-   top left, bottom left. */
+/* A tube of three rows of quads; each branch replaces two quads of the middle row, left and right
+   of vertex v = 0 (and 3). The loop around the hole, seen from the branch: bottom, bottom right,
+   top right, top, top left, bottom left. */
 static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
     int b[TREEPIECES_RIM], c[TREEPIECES_RIM];
     tpc_begin(s, name);
     tpc_add_ring(s, 0.28f, 0.99f, 0.99f, 0.8f, 1, b);
     tpc_add_ring(s, 0.74f, 0.96f, 0.96f, 0.4f, 1, c);
-    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.93f);
+    const int *top = tpc_add_leaf_rim(s, 0, 1, 0, 0, 0, 0.93f);
     tpc_add_row(s, s->piece.root_rim, b, 0, 6, TREEPIECES_BARK, 0);
     for (int k = 0; k < TREEPIECES_RIM; k++) {
         const int at_first = k == 5 || k == 0, at_second = branches > 1 && (k == 2 || k == 3);
@@ -951,7 +952,7 @@ static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
         const int v = 3 * i, left = (v + 5) % 6, right = v + 1;
         const float side = i ? -1.0f : 1.0f;
         const int loop[TREEPIECES_RIM] = {b[v], b[right], c[right], c[v], c[left], b[left]};
-        const int *rim = tpc_add_leaf(s, 1.4f * side, 0.55f, 0, 180 * i, 60, 0.45f);
+        const int *rim = tpc_add_leaf_rim(s, 1.4f * side, 0.55f, 0, 180 * i, 60, 0.45f);
         tpc_add_row(s, loop, rim, 0, 1, TREEPIECES_BARK, 2 + i);
         tpc_add_row(s, loop, rim, 1, 1, TREEPIECES_TURN_RIGHT, 2 + i);
         tpc_add_row(s, loop, rim, 2, 2, TREEPIECES_FOLD, 2 + i);
@@ -960,12 +961,12 @@ static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
     }
 }
 
-/* Three crotches meet in the middle; arm k leans to place 1 + 2 k. */
+/* Three crotches meet in the middle; arm k leans towards vertex 1 + 2 k. */
 static void tpc_make_spatial(tpc_shape *s) {
     int a[TREEPIECES_RIM], p[TREEPIECES_RIM];
     tpc_begin(s, "spatial trifurcation");
     for (int k = 0; k < TREEPIECES_RIM; k++) {
-        const int arm = k / 2, before = (arm + 2) % 3; /* even places lie between two arms */
+        const int arm = k / 2, before = (arm + 2) % 3; /* even ones lie between two arms */
         const int leaves = k & 1 ? 1 << arm : 1 << arm | 1 << before;
         const float r = k & 1 ? 1.06f : 0.97f;
         a[k] = tpc_add_vertex(s, r * tpc_cos6[k], k & 1 ? 0.5f : 0.64f, -r * tpc_sin6[k], 0.6f,
@@ -979,7 +980,7 @@ static void tpc_make_spatial(tpc_shape *s) {
     for (int arm = 0; arm < 3; arm++) {
         const int to = 1 + 2 * arm, next = (to + 1) % 6, before = to - 1;
         const int loop[TREEPIECES_RIM] = {a[to], a[next], p[next], middle, p[before], a[before]};
-        const int *rim = tpc_add_leaf(s, 0.78f * tpc_cos6[to], 1.3f, -0.78f * tpc_sin6[to],
+        const int *rim = tpc_add_leaf_rim(s, 0.78f * tpc_cos6[to], 1.3f, -0.78f * tpc_sin6[to],
                                       60 * to, 32, 0.62f);
         tpc_add_row(s, loop, rim, 5, 2, TREEPIECES_BARK, 1 + arm);
         tpc_add_row(s, loop, rim, 1, 4, TREEPIECES_FOLD, 1 + arm);
@@ -1001,14 +1002,14 @@ static void tpc_make_flare(tpc_shape *s) {
     tpc_begin(s, "root flare");
     tpc_add_ring(s, 0.2f, 0.92f, 0.7f, 1, 0, low);
     tpc_add_ring(s, 0.55f, 0.74f, 0.64f, 0.6f, 1, high);
-    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.62f);
+    const int *top = tpc_add_leaf_rim(s, 0, 1, 0, 0, 0, 0.62f);
     tpc_add_row(s, s->piece.root_rim, low, 0, 6, TREEPIECES_BARK, 0);
     tpc_add_row(s, low, high, 0, 6, TREEPIECES_BARK, 0);
     tpc_add_row(s, high, top, 0, 6, TREEPIECES_BARK, 1);
 }
 
-/* Normals of all vertices: the mean of the quads about them, as large as they are. Those of rims are
-   replaced when the piece is taken in. */
+/* Normals of all vertices: the mean of the adjacent quads, weighted by area. Those of rims are
+   replaced when the piece is added to the kit. */
 static void tpc_smooth(tpc_shape *s) {
     float sums[64][3];
     memset(sums, 0, sizeof sums);
@@ -1048,18 +1049,19 @@ static void tpc_make_builtin(int type, tpc_shape *s) {
 
 /* ---- the kit ----------------------------------------------------------------------------- */
 
-/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
-typedef struct tpc_seen {
+/* A vertex of a piece in the frame of one of its leaf rims. */
+typedef struct tpc_rim_frame {
     float position[3], normal[3];
-} tpc_seen;
+} tpc_rim_frame;
 
-/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
+/* Average height of the quads of a band: along y in lengths, outwards in radii. */
 typedef struct tpc_band {
     float rise, spread;
 } tpc_band;
 
-/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
-   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
+/* Four quads whose tiles share one word of a record, one byte each. The byte is 255 in bands[b] if
+   the quad belongs to band b, in bottom if it lies at the bottom of its layer, in own if its class
+   is one of the caller's. first, last: range of the bands that occur. */
 typedef struct tpc_cells {
     uint32_t bands[TREEPIECES_BANDS], bottom, own;
     int first, last;
@@ -1069,16 +1071,16 @@ struct treepieces_kit {
     txm_arena arena; /* holds the kit itself and all it points to */
     int count;
     treepieces_piece pieces[TREEPIECES_MAX_TYPES];
-    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
+    tpc_rim_frame *in_rims[TREEPIECES_MAX_TYPES]; /* vertex_count for each leaf rim */
     tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
     int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
     float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
     tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
 };
 
-/* ---- what a piece must be ---------------------------------------------------------------- */
+/* ---- checking a piece -------------------------------------------------------------------- */
 
-/* Refuse a piece; number < 0: the fault is not that of one vertex. */
+/* Fail because of a piece; number < 0: the fault is not that of one vertex or quad. */
 static txm_status tpc_refuse(txm_env *env, const treepieces_piece *p, int index, const char *what,
                              int number, const char *fault) {
     char line[160];
@@ -1096,7 +1098,7 @@ static int tpc_is_near(const float *a, const float *b, int n, float tolerance) {
     return 1;
 }
 
-/* Counts and numbers, so that the rest can index. */
+/* Counts and indices, so that the other checks can index. */
 static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_env *env) {
     if (!p->vertices || p->vertex_count < 7 || p->vertex_count > TREEPIECES_MAX_VERTICES)
         return tpc_refuse(env, p, index, "", -1, "needs 7 to 255 vertices");
@@ -1108,7 +1110,7 @@ static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_en
         const treepieces_quad *q = &p->quads[i];
         for (int k = 0; k < 4; k++) {
             if (q->corners[k] >= p->vertex_count)
-                return tpc_refuse(env, p, index, "quad", i, "a corner is no vertex");
+                return tpc_refuse(env, p, index, "quad", i, "a corner is not a vertex");
             for (int j = 0; j < k; j++)
                 if (q->corners[j] == q->corners[k])
                     return tpc_refuse(env, p, index, "quad", i, "two corners are one vertex");
@@ -1122,7 +1124,7 @@ static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_en
         const int *rim = tpc_rim_of(p, k);
         for (int j = 0; j < TREEPIECES_RIM; j++)
             if (rim[j] < 0 || rim[j] >= p->vertex_count)
-                return tpc_refuse(env, p, index, "place", j, "of a rim is no vertex");
+                return tpc_refuse(env, p, index, "place", j, "of a rim is not a vertex");
     }
     return TXM_OK;
 }
@@ -1140,16 +1142,16 @@ static txm_status tpc_check_vertices(const treepieces_piece *p, int index, txm_e
         for (int k = 0; k < 4; k++) {
             if (!(v->weights[k] >= 0) || (k > p->leaf_count && v->weights[k] != 0))
                 return tpc_refuse(env, p, index, "vertex", i,
-                                  "a weight is negative, or of a joint that is not there");
+                                  "a weight is negative, or of a joint that does not exist");
             sum += v->weights[k];
         }
         if (!(fabsf(sum - 1) <= 1e-4f))
-            return tpc_refuse(env, p, index, "vertex", i, "the weights' sum is not 1");
+            return tpc_refuse(env, p, index, "vertex", i, "the sum of the weights is not 1");
     }
     return TXM_OK;
 }
 
-/* Rim k (-1: the root rim) is the canonical one, bound to its joint alone. */
+/* Rim k (-1: the root rim) is the canonical hexagon, bound to its joint alone. */
 static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm_env *env) {
     const treepieces_similarity root = {{0, 0, 0}, {0, 0, 0, 1}, 1};
     const treepieces_similarity *b = k < 0 ? &root : &p->building[k];
@@ -1157,7 +1159,8 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
     float length = 0;
     for (int i = 0; i < 4; i++) length += b->rotation[i] * b->rotation[i];
     if (!(fabsf(length - 1) <= 1e-4f))
-        return tpc_refuse(env, p, index, "leaf rim", k, "the building rotation is no unit quaternion");
+        return tpc_refuse(env, p, index, "leaf rim", k,
+                          "the building rotation is not a unit quaternion");
     if (!(b->scale > 0) || !txm_is_finite((double)b->scale))
         return tpc_refuse(env, p, index, "leaf rim", k, "the building scale is not above 0");
     for (int j = 0; j < TREEPIECES_RIM; j++) {
@@ -1166,9 +1169,9 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
         tpc_leaf_vertex(b, j, position, normal);
         if (!tpc_is_near(v->position, position, 3, 1e-4f * b->scale))
             return tpc_refuse(env, p, index, "vertex", rim[j],
-                              k < 0 ? "is not at its place of the root rim"
-                                    : "is not at its place of a leaf rim, moved by the building "
-                                      "transform");
+                              k < 0 ? "is not at its place on the root rim"
+                                    : "is not at its place on a leaf rim, which the building "
+                                      "transform gives");
         if (!tpc_is_near(v->normal, normal, 3, 1e-3f))
             return tpc_refuse(env, p, index, "vertex", rim[j],
                               "the normal is not that of the rim's cone");
@@ -1186,12 +1189,12 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
     return TXM_OK;
 }
 
-/* side[a * n + b]: how many quads have the side from a to b */
+/* side[a * n + b]: number of quads with the side from a to b */
 static int tpc_has_side(const uint8_t *side, int n, int a, int b) {
     return side[(size_t)a * (size_t)n + (size_t)b];
 }
 
-/* The quads about every vertex are one fan: walking from one over shared sides meets them all. */
+/* The quads about each vertex form one fan: walking over shared sides reaches all of them. */
 static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *env) {
     for (int v = 0; v < p->vertex_count; v++) {
         int from[TREEPIECES_MAX_QUADS], to[TREEPIECES_MAX_QUADS], count = 0, met = 1;
@@ -1222,13 +1225,13 @@ static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *
     return TXM_OK;
 }
 
-/* Which of the vertices that hang together with this one stands for all of them. */
+/* The representative of the connected vertices to which this one belongs (union-find). */
 static int tpc_find_root(const int *root, int vertex) {
     while (root[vertex] != vertex) vertex = root[vertex];
     return vertex;
 }
 
-/* Oriented, manifold, in one piece, its borders the rims. */
+/* Oriented, manifold, connected, and the rims are its only borders. */
 static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_t *side,
                                     txm_env *env) {
     const int n = p->vertex_count;
@@ -1240,7 +1243,7 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
             const int a = p->quads[i].corners[k], b = p->quads[i].corners[(k + 1) % 4];
             if (side[(size_t)a * (size_t)n + (size_t)b]++)
                 return tpc_refuse(env, p, index, "vertex", a,
-                                  "a side from it is that of two quads that are not oriented alike");
+                                  "a side from it belongs to two quads of opposite orientation");
             root[tpc_find_root(root, a)] = tpc_find_root(root, b);
         }
     }
@@ -1251,21 +1254,21 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
             const int ahead = tpc_has_side(side, n, a, b), back = tpc_has_side(side, n, b, a);
             if (ahead != (k < 0) || back != (k >= 0))
                 return tpc_refuse(env, p, index, "vertex", a,
-                                  "the rim from it on is no border, or runs the wrong way round");
+                                  "the edge of the rim from it is no border, or runs the wrong way");
         }
     }
     for (int a = 0; a < n; a++) {
         for (int b = 0; b < n; b++) {
             if (!tpc_has_side(side, n, a, b) || tpc_has_side(side, n, b, a)) continue;
             if (++borders > TREEPIECES_RIM * (1 + p->leaf_count))
-                return tpc_refuse(env, p, index, "", -1, "has a border that is no rim");
+                return tpc_refuse(env, p, index, "", -1, "has a border that is not a rim");
         }
     }
     const txm_status status = tpc_check_fans(p, index, env);
     if (status != TXM_OK) return status;
     for (int i = 1; i < n; i++)
         if (tpc_find_root(root, i) != tpc_find_root(root, 0))
-            return tpc_refuse(env, p, index, "vertex", i, "does not hang together with vertex 0");
+            return tpc_refuse(env, p, index, "vertex", i, "is not connected to vertex 0");
     return TXM_OK;
 }
 
@@ -1312,16 +1315,16 @@ static void tpc_sort_cells(const treepieces_piece *p, tpc_cells *cells) {
     }
 }
 
-/* Copy a piece into the kit, its rims moved to where they belong to the bit. */
-static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
+/* Copy a piece into the kit; its rims are moved to their exact places. */
+static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
     const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
     const size_t name = from->name ? strlen(from->name) : 0;
     treepieces_vertex *v =
         (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
     treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
     char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
-    tpc_seen *seen = (tpc_seen *)txm_arena_alloc(
-        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *seen);
+    tpc_rim_frame *in_rims = (tpc_rim_frame *)txm_arena_alloc(
+        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *in_rims);
     tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
     if (kit->arena.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
@@ -1354,7 +1357,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
                                             b->translation[2] * b->translation[2]);
         const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
         for (size_t i = 0; i < vertices; i++) {
-            tpc_seen *at = &seen[(size_t)k * vertices + i];
+            tpc_rim_frame *at = &in_rims[(size_t)k * vertices + i];
             float moved[3];
             for (int c = 0; c < 3; c++)
                 moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
@@ -1370,7 +1373,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
     for (size_t i = 0; i < quads; i++)
         if (q[i].band >= kit->band_counts[kit->count]) kit->band_counts[kit->count] = q[i].band + 1;
     kit->cells[kit->count] = cells;
-    kit->seen[kit->count++] = seen;
+    kit->in_rims[kit->count++] = in_rims;
     return TXM_OK;
 }
 
@@ -1400,11 +1403,11 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
     } else {
         for (int i = 0; status == TXM_OK && i < TREEPIECES_BUILTIN; i++) {
             tpc_make_builtin(i, shape);
-            status = tpc_take(kit, &shape->piece, env);
+            status = tpc_add_piece(kit, &shape->piece, env);
         }
         for (int i = 0; status == TXM_OK && i < count; i++) {
             status = tpc_check_piece(&pieces[i], i, side, env);
-            if (status == TXM_OK) status = tpc_take(kit, &pieces[i], env);
+            if (status == TXM_OK) status = tpc_add_piece(kit, &pieces[i], env);
         }
     }
     txm_free(env, shape);
@@ -1440,7 +1443,7 @@ typedef struct tpc_field {
 #define TPC_ORDER(key, count, low, high) \
     { #key, offsetof(treepieces_order, key), TPC_REAL, count, low, high }
 
-/* name and orders are read apart */
+/* all but the name and the orders, which are read separately */
 static const tpc_field tpc_fields[] = {
     TPC_FIELD(order_count, TPC_WHOLE, 1, 1, TREEPIECES_MAX_ORDERS),
     TPC_FIELD(flare, TPC_REAL, 1, 1, 4),
@@ -1500,7 +1503,7 @@ static const char *const tpc_envelope_names[] = {"free", "ellipsoid", "cone", "c
 static const char *const tpc_leaf_names[] = {"oval",  "lobed",  "lance", "heart",
                                              "needle", "blossom", NULL};
 
-/* The words that a field's values are called by; NULL: they are numbers. */
+/* The names of the values of a field; NULL: they are numbers. */
 static const char *const *tpc_names_of(const tpc_field *f) {
     return f->kind == TPC_ENVELOPE ? tpc_envelope_names
            : f->kind == TPC_LEAF   ? tpc_leaf_names
@@ -1537,8 +1540,8 @@ static double tpc_scale10(double x, int e) {
     return e < 0 ? x / power : x * power;
 }
 
-/* Digits from *at on into *sum, as many as it holds exactly; returns how many there are, and in
-   *dropped how many of them went nowhere. */
+/* Read digits from *at on into *sum, as many as it holds exactly. Returns how many digits there
+   are; *dropped counts those that *sum could not hold. */
 static int tpc_read_digits(const char **at, const char *end, double *sum, int *dropped) {
     int count = 0;
     for (; *at < end && **at >= '0' && **at <= '9'; ++*at, count++) {
@@ -1548,7 +1551,7 @@ static int tpc_read_digits(const char **at, const char *end, double *sum, int *d
     return count;
 }
 
-/* A decimal number, whatever the locale says; 0 if the text is none. */
+/* Read a decimal number, independent of the locale; 0 if the text is not a number. */
 static int tpc_read_number(const char *at, const char *end, double *value) {
     const int negative = at < end && *at == '-';
     double sum = 0, exponent = 0;
@@ -1578,7 +1581,7 @@ static int tpc_read_number(const char *at, const char *end, double *value) {
     return 1;
 }
 
-/* `count` significant digits of x > 0, and the power of ten of the first. */
+/* Write `count` significant digits of x > 0; returns the power of ten of the first. */
 static int tpc_write_digits(double x, int count, char *digits) {
     int power = 0;
     while (tpc_scale10(x, -power) >= 10) power++;
@@ -1593,7 +1596,7 @@ static int tpc_write_digits(double x, int count, char *digits) {
     return power;
 }
 
-/* x to `count` significant digits: 0.05, 12, 1.5e-7 */
+/* Write x to `count` significant digits: 0.05, 12, 1.5e-7. */
 static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
     char digits[16], *to = text;
     const int power = tpc_write_digits(fabs((double)x), count, digits);
@@ -1613,7 +1616,7 @@ static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
     if (!plain) snprintf(to, (size_t)(text + TPC_NUMBER - to), "e%d", power);
 }
 
-/* The shortest text that reads back as x. */
+/* Write the shortest text that reads back as x. */
 static void tpc_write_number(float x, char text[TPC_NUMBER]) {
     if (!txm_is_finite((double)x) || x == 0) {
         snprintf(text, TPC_NUMBER, "%s", x == 0 ? "0" : x > 0 ? "inf" : x < 0 ? "-inf" : "nan");
@@ -1629,8 +1632,8 @@ static void tpc_write_number(float x, char text[TPC_NUMBER]) {
 
 /* ---- species: checking ------------------------------------------------------------------- */
 
-/* What a field's value must be, for a message. */
-static void tpc_tell_range(const tpc_field *f, char *text, size_t capacity) {
+/* Write what the value of a field must be, for a message. */
+static void tpc_write_range(const tpc_field *f, char *text, size_t capacity) {
     const char *const *names = tpc_names_of(f);
     char low[TPC_NUMBER], high[TPC_NUMBER];
     if (!names) {
@@ -1645,7 +1648,7 @@ static void tpc_tell_range(const tpc_field *f, char *text, size_t capacity) {
         n += snprintf(text + n, capacity - (size_t)n, " %s", *names);
 }
 
-/* NULL, or the first of the fields that is not within its range */
+/* the first field that is out of its range, or NULL */
 static const tpc_field *tpc_find_fault(const tpc_field *fields, int count, const void *base) {
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < fields[i].count; k++) {
@@ -1656,7 +1659,7 @@ static const tpc_field *tpc_find_fault(const tpc_field *fields, int count, const
     return NULL;
 }
 
-/* A name can be written on a line: printable, no comment, no blanks about it. */
+/* Can this name be written on a line? No control characters, no #, no blanks at its ends. */
 static int tpc_is_name(const char name[TREEPIECES_MAX_NAME]) {
     int n = 0;
     while (n < TREEPIECES_MAX_NAME && name[n]) {
@@ -1670,18 +1673,19 @@ static txm_status tpc_species_check(const treepieces_species *s, txm_env *env) {
     char line[200], range[120];
     if (!tpc_is_name(s->name))
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "a species' name is too long, begins or ends blank, or holds # or controls");
+                        "a species name is too long, begins or ends with a blank, or contains # or a "
+                        "control character");
     const char *name = s->name[0] ? s->name : "without a name";
     const tpc_field *fault = tpc_find_fault(tpc_fields, TPC_FIELDS, s);
     if (fault) {
-        tpc_tell_range(fault, range, sizeof range);
+        tpc_write_range(fault, range, sizeof range);
         snprintf(line, sizeof line, "species %s: %s", name, range);
         return txm_fail(env, TXM_BAD_ARGUMENT, line);
     }
     for (int k = 0; k < s->order_count; k++) {
         fault = tpc_find_fault(tpc_order_fields, TPC_ORDER_FIELDS, &s->orders[k]);
         if (!fault) continue;
-        tpc_tell_range(fault, range, sizeof range);
+        tpc_write_range(fault, range, sizeof range);
         snprintf(line, sizeof line, "species %s, order %d: %s", name, k, range);
         return txm_fail(env, TXM_BAD_ARGUMENT, line);
     }
@@ -1694,7 +1698,7 @@ static txm_status tpc_species_check(const treepieces_species *s, txm_env *env) {
 
 /* ---- species: presets -------------------------------------------------------------------- */
 
-/* What a species has that is not in its text: a small round tree. */
+/* The default of every key: a small round tree. */
 static const char tpc_fresh[] =
     "flare 1.6\n"
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
@@ -1928,10 +1932,10 @@ TREEPIECES_API const char *treepieces_preset_text(int index) {
 /* ---- species: reading -------------------------------------------------------------------- */
 
 typedef struct tpc_reader {
-    const char *at, *end; /* what is left of the line */
-    int line, order;      /* order -1: none begun     */
-    int keys, crown_line; /* keys so far; line of the last one of the crown */
-    const char *like;     /* NULL, or the text to read behind this line     */
+    const char *at, *end; /* rest of the line          */
+    int line, order;      /* order -1: none begun      */
+    int keys, crown_line; /* keys so far; line of the last crown_ key */
+    const char *like;     /* NULL, or the text to read after this line */
     treepieces_species species;
     txm_env *env;
 } tpc_reader;
@@ -1949,7 +1953,7 @@ static int tpc_is_word(const tpc_word *w, const char *text) {
     return (size_t)(w->end - w->at) == n && !memcmp(w->at, text, n);
 }
 
-/* The next word of the line, 0 if there is none. */
+/* Read the next word of the line; 0 if there is none. */
 static int tpc_next_word(tpc_reader *r, tpc_word *w) {
     while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
     w->at = r->at;
@@ -1958,8 +1962,8 @@ static int tpc_next_word(tpc_reader *r, tpc_word *w) {
     return w->at < w->end;
 }
 
-/* "line 7: WORD: fault"; the word may hold anything, and be NULL. */
-static txm_status tpc_misread(const tpc_reader *r, const tpc_word *w, const char *fault) {
+/* Fail with "line 7: WORD: fault"; the word may contain anything, or be NULL. */
+static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const char *fault) {
     char line[220], shown[28];
     size_t n = 0;
     for (const char *p = w ? w->at : NULL; p && p < w->end; p++) {
@@ -1975,22 +1979,22 @@ static txm_status tpc_misread(const tpc_reader *r, const tpc_word *w, const char
     return txm_fail(r->env, TXM_BAD_DATA, line);
 }
 
-/* One value of a field; the key is for messages. */
+/* Read value i of a field; the key is for messages. */
 static txm_status tpc_read_value(tpc_reader *r, const tpc_word *key, const tpc_field *f, void *base,
                                  int i) {
     char range[120];
     tpc_word w;
     double x = -1;
     const char *const *names = tpc_names_of(f);
-    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
+    if (!tpc_next_word(r, &w)) return tpc_fail_line(r, key, "a value is missing");
     for (int k = 0; names && names[k]; k++)
         if (tpc_is_word(&w, names[k])) x = k;
-    if (!names && !tpc_read_number(w.at, w.end, &x)) return tpc_misread(r, &w, "is no number");
+    if (!names && !tpc_read_number(w.at, w.end, &x)) return tpc_fail_line(r, &w, "is not a number");
     const float value = x > -1e9 && x < 1e9 ? txm_float(x) : x < 0 ? -1e9f : 1e9f;
     if (!(value >= f->low && value <= f->high) ||
         (f->kind != TPC_REAL && value != (float)(int)value)) {
-        tpc_tell_range(f, range, sizeof range);
-        return tpc_misread(r, &w, range);
+        tpc_write_range(f, range, sizeof range);
+        return tpc_fail_line(r, &w, range);
     }
     tpc_set(f, base, i, value == 0 ? 0 : value); /* no -0 */
     return TXM_OK;
@@ -2001,18 +2005,18 @@ static txm_status tpc_read_name(tpc_reader *r, const tpc_word *key) {
     while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
     while (r->at < r->end && tpc_is_blank(r->end[-1])) r->end--;
     const size_t size = (size_t)(r->end - r->at);
-    if (!size) return tpc_misread(r, key, "a value is missing");
+    if (!size) return tpc_fail_line(r, key, "a value is missing");
     if (size >= TREEPIECES_MAX_NAME)
-        return tpc_misread(r, key, "longer than 31 characters");
+        return tpc_fail_line(r, key, "longer than 31 characters");
     memset(name, 0, TREEPIECES_MAX_NAME);
     memcpy(name, r->at, size);
     if (strlen(name) != size || !tpc_is_name(name))
-        return tpc_misread(r, key, "holds a control character");
+        return tpc_fail_line(r, key, "contains a control character");
     r->at = r->end;
     return TXM_OK;
 }
 
-/* "order N" begins an order; there are at least as many then. */
+/* "order N" begins an order; order_count becomes at least N + 1. */
 static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
     static const tpc_field field = {"order", 0, TPC_WHOLE, 1, 0, TREEPIECES_MAX_ORDERS - 1};
     const txm_status status = tpc_read_value(r, key, &field, &r->order, 0);
@@ -2021,18 +2025,17 @@ static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
     return TXM_OK;
 }
 
-/* "like NAME": its text is read behind this line. The orders beyond those of that species keep what a
-   fresh one has. */
+/* "like NAME": its text is read after this line. Orders that it does not have keep their defaults. */
 static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
     tpc_word w;
-    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
-    if (r->keys) return tpc_misread(r, key, "must come before all other keys");
+    if (!tpc_next_word(r, &w)) return tpc_fail_line(r, key, "a value is missing");
+    if (r->keys) return tpc_fail_line(r, key, "must come before all other keys");
     for (int i = 0; i < treepieces_preset_count(); i++) {
         if (!tpc_is_word(&w, tpc_presets[i].name)) continue;
         r->like = tpc_presets[i].text;
         return TXM_OK;
     }
-    return tpc_misread(r, &w, "is none of the built-in species");
+    return tpc_fail_line(r, &w, "is not a built-in species");
 }
 
 static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
@@ -2045,11 +2048,11 @@ static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
         if (tpc_is_word(key, tpc_fields[i].key)) field = &tpc_fields[i];
     for (int i = 0; i < TPC_ORDER_FIELDS && !field; i++) {
         if (!tpc_is_word(key, tpc_order_fields[i].key)) continue;
-        if (r->order < 0) return tpc_misread(r, key, "needs a line \"order N\" before it");
+        if (r->order < 0) return tpc_fail_line(r, key, "needs a line \"order N\" before it");
         field = &tpc_order_fields[i];
         base = &r->species.orders[r->order];
     }
-    if (!field) return tpc_misread(r, key, "is no key");
+    if (!field) return tpc_fail_line(r, key, "is not a key");
     if (!strncmp(field->key, "crown_", 6)) r->crown_line = r->line;
     for (int i = 0; i < field->count; i++) {
         const txm_status status = tpc_read_value(r, key, field, base, i);
@@ -2058,7 +2061,7 @@ static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
     return TXM_OK;
 }
 
-/* The line from r->at on: a key and its values, a comment, or nothing. */
+/* Read the line from r->at on: a key and its values, a comment, or nothing. */
 static txm_status tpc_read_line(tpc_reader *r) {
     tpc_word key, rest;
     const char *comment = (const char *)memchr(r->at, '#', (size_t)(r->end - r->at));
@@ -2066,12 +2069,12 @@ static txm_status tpc_read_line(tpc_reader *r) {
     if (!tpc_next_word(r, &key)) return TXM_OK;
     const txm_status status = tpc_read_key(r, &key);
     if (status != TXM_OK) return status;
-    if (tpc_next_word(r, &rest)) return tpc_misread(r, &key, "has too many values");
+    if (tpc_next_word(r, &rest)) return tpc_fail_line(r, &key, "has too many values");
     r->keys++;
     return TXM_OK;
 }
 
-/* Read on top of what *species is. */
+/* Read a text whose missing keys keep the values of *species. */
 static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
                                 treepieces_species *species) {
     const char *at = text, *end = text + size;
@@ -2095,7 +2098,7 @@ static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
     }
     if (!(r.species.crown_base < r.species.crown_top)) {
         r.line = r.crown_line;
-        return tpc_misread(&r, NULL, "crown_top must be above crown_base");
+        return tpc_fail_line(&r, NULL, "crown_top must be above crown_base");
     }
     *species = r.species;
     return TXM_OK;
@@ -2107,7 +2110,7 @@ TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size
     if (!species || (!text && size))
         return txm_fail(env, TXM_BAD_ARGUMENT, "text or species is NULL");
     memset(&fresh, 0, sizeof fresh);
-    fresh.crown_top = 1; /* until it is read */
+    fresh.crown_top = 1; /* above crown_base until it is read */
     txm_status status = tpc_read_text(tpc_fresh, strlen(tpc_fresh), env, &fresh);
     for (int k = 1; k < TREEPIECES_MAX_ORDERS; k++)
         if (k >= fresh.order_count) fresh.orders[k] = fresh.orders[k - 1];
@@ -2188,32 +2191,34 @@ TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
     return txm_fail(env, TXM_BAD_ARGUMENT, line);
 }
 
-/* ---- growing: what a tree is made of ------------------------------------------------------ */
+/* ---- growing: the state of a tree --------------------------------------------------------- */
 
 enum {
-    TPC_BUCKETS = 160,     /* of rims that wait, by the logarithm of their radius                 */
-    TPC_GRID = 16,         /* cells a side of the grid of shade                                   */
-    TPC_CLASSES = 16,      /* of oscillators                                                      */
-    TPC_MAX_BRANCH = 60    /* percent: radius of a side branch over that of its stem at most      */
+    TPC_BUCKETS = 160,     /* of open rims, by the logarithm of their radius                */
+    TPC_GRID = 16,         /* cells along a side of the shade grid                          */
+    TPC_CLASSES = 16,      /* of oscillators                                                */
+    TPC_MAX_BRANCH = 60    /* percent: largest radius of a side branch over that of its stem */
 };
 
-/* A rim that waits for a piece. */
+/* An open rim. */
 typedef struct tpc_bud {
-    int32_t next;      /* in its bucket */
-    int32_t parent;    /* node, or TREEPIECES_NONE */
-    uint8_t rim, order, across;       /* across: log2 of the tiles across an edge of the rim      */
-    uint8_t is_forked, is_aimed;      /* behind a fork, where start no longer counts; aim says
-                                         where the piece after this one goes                      */
+    int32_t next;                 /* in its bucket                                              */
+    int32_t parent;               /* node, or TREEPIECES_NONE                                   */
+    uint8_t rim, order, across;   /* across: log2 of the tiles across an edge of the rim        */
+    uint8_t is_forked, is_aimed;  /* after a fork, where `start` no longer applies; `aim` is the
+                                     direction of the piece after this one                      */
     uint16_t depth;
-    float position[3], rotation[4], heading[3]; /* rotation: of the rim; heading: where it grows  */
+    float position[3], rotation[4], heading[3]; /* rotation: of the rim; heading: of growth     */
     float aim[3];
-    float radius, end_radius;                   /* here and at the end of the axis                */
-    float rest; /* of its step, which a short branching piece left for a plain one */
-    float along, length, step;                  /* of the axis; step: length of a piece           */
-    float roll;     /* degrees about the axis, for the next branch, as the rim's frame counts them */
+    float radius, end_radius;     /* here, and at the end of the axis                           */
+    float rest;                   /* of its step, which a short branching piece left over for a
+                                     plain one                                                  */
+    float along, length, step;    /* of the axis; step: length of a piece                       */
+    float roll;                   /* degrees about the axis to the next branch, in the
+                                     frame of the rim                                           */
 } tpc_bud;
 
-/* One tree as it grows. */
+/* A tree while it grows. */
 typedef struct tpc_growth {
     const treepieces_forest_desc *desc;
     const treepieces_kit *kit;
@@ -2225,36 +2230,36 @@ typedef struct tpc_growth {
     int index; /* of the tree */
     treepieces_node *nodes;
     uint32_t *bands;   /* by node: word 3 of its record        */
-    uint32_t *records; /* by node: where its record is, filled last */
+    uint32_t *records; /* by node: number of its record, set at the end */
     treepieces_cluster *clusters;
     tpc_bud *buds;
     int node_count, cluster_count, bud_count, waiting, most, bucket;
     int32_t first[TPC_BUCKETS], last[TPC_BUCKETS];
     uint32_t type_counts[TREEPIECES_MAX_TYPES];
-    float scale, trunk, foot; /* metres: scale of the place, length and radius of the trunk       */
+    float scale, trunk, foot; /* scale of the place; length and base radius of the trunk, metres  */
     float height;
-    uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above it    */
+    uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above       */
 } tpc_growth;
 
 static float tpc_uniform(tpc_growth *g, float low, float high) {
     return low + (high - low) * txm_rng_float(&g->rng);
 }
 
-/* ---- growing: rims in order of their radius ------------------------------------------------ */
+/* ---- growing: open rims by radius ---------------------------------------------------------- */
 
-/* The bits of a float above 0 rise about as its logarithm, 2^23 an octave. */
-static uint32_t tpc_bits(float x) {
+/* The bits of a positive float, which grow about as its logarithm, by 2^23 per octave. */
+static uint32_t tpc_float_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits;
 }
 
-/* Eight buckets an octave, the thickest first. */
+/* Eight buckets per octave, the thickest first. */
 static int tpc_bucket(float radius) {
-    return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
+    return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_float_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
 }
 
-/* The bud behind the last one now waits. */
+/* Put the bud after the last one into its bucket. */
 static void tpc_push(tpc_growth *g) {
     const int i = g->bud_count++, b = tpc_bucket(g->buds[i].radius);
     g->buds[i].next = -1;
@@ -2262,10 +2267,10 @@ static void tpc_push(tpc_growth *g) {
     else g->buds[g->last[b]].next = i;
     g->last[b] = i;
     g->waiting++;
-    if (b < g->bucket) g->bucket = b; /* a rule may let a stem grow thicker */
+    if (b < g->bucket) g->bucket = b; /* a rule of the caller may let a stem grow thicker */
 }
 
-/* The thickest rim that waits; there must be one. */
+/* Take out the thickest open rim; there must be one. */
 static tpc_bud *tpc_pop(tpc_growth *g) {
     while (g->first[g->bucket] < 0) g->bucket++;
     tpc_bud *bud = &g->buds[g->first[g->bucket]];
@@ -2292,7 +2297,7 @@ static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     return x * x + z * z > r * r;
 }
 
-/* the cell of a place, and the side of a cell: the grid is as wide as 1.6 trunks */
+/* the shade cell of a position; returns the side of a cell. The grid is 1.6 trunk lengths wide */
 static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
     const float side = 1.6f * g->trunk / (float)TPC_GRID;
     for (int k = 0; k < 3; k++) {
@@ -2324,14 +2329,14 @@ static const treepieces_order *tpc_order(const tpc_growth *g, int order) {
     return &g->species->orders[order < g->species->order_count ? order : g->species->order_count - 1];
 }
 
-/* Which piece comes next. */
+/* Choose the type of the next piece. */
 static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
     const treepieces_order *o = tpc_order(g, bud->order);
     if (bud->depth == 0 && g->species->flare > 1) return TREEPIECES_FLARE;
     if ((1 - bud->along) * bud->length < 0.5f * bud->step || tpc_is_outside(g, bud) ||
         tpc_is_shaded(g, bud))
         return TREEPIECES_TIP;
-    /* what hangs down ends before it lies on the ground */
+    /* a hanging axis ends before it reaches the ground */
     if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < 0.04f * g->trunk)
         return TREEPIECES_TIP;
     if (g->desc->rule == TREEPIECES_ALTERNATE) return bud->depth & 1 ? TREEPIECES_Y : TREEPIECES_I;
@@ -2350,12 +2355,12 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
     return TREEPIECES_I;
 }
 
-/* Twigs do not get thinner than this, so that texels are not much smaller on them than on the trunk. */
+/* The smallest radius of twigs, so that texels are not much smaller on them than on the trunk. */
 static float tpc_thinnest(const tpc_growth *g) {
     return 0.033f * g->foot;
 }
 
-/* How long it is, so that its proportions stay those of its kind: between so many radii. */
+/* The length of the next piece, limited to a range of radii so that its type keeps its proportions. */
 static float tpc_choose_length(const tpc_bud *bud, int type) {
     static const float low[TREEPIECES_BUILTIN] = {1, 1, 2, 2, 1, 1.2f, 1};
     static const float high[TREEPIECES_BUILTIN] = {40, 2.5f, 3, 3, 2.5f, 18, 1.4f};
@@ -2363,7 +2368,7 @@ static float tpc_choose_length(const tpc_bud *bud, int type) {
     const float step = bud->rest > 0 ? bud->rest : bud->step;
     float length = step < left ? step : left;
     if (type == TREEPIECES_TIP && length < 0.7f * bud->step) length = 0.7f * bud->step;
-    /* no more than 8 tiles lie along a quad, so one with many across must not be long */
+    /* at most 8 tiles lie along a quad, so one with many across must not be long */
     const float most = txm_minf(high[type], (type == TREEPIECES_I ? 64.0f : 20.0f) / (float)(1 << bud->across));
     return txm_clampf(length, low[type] * bud->radius, txm_maxf(most, low[type]) * bud->radius);
 }
@@ -2378,7 +2383,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
     c->turn = type == TREEPIECES_I ? (int)txm_rng_below(&g->rng, TREEPIECES_RIM) : -1;
     const float left = (1 - bud->along) * bud->length;
     const float share = left > c->length ? c->length / left : 1;
-    const float on = 1 + (bud->end_radius / bud->radius - 1) * share; /* the stem's own taper */
+    const float on = 1 + (bud->end_radius / bud->radius - 1) * share; /* the taper of the stem */
     c->ratios[0] = txm_clampf(on, 0.3f, 1);
     if (type == TREEPIECES_FLARE) c->ratios[0] = 1 / g->species->flare;
     if (type == TREEPIECES_Y) {
@@ -2401,7 +2406,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
                 txm_rng_float(&g->rng) < o->leaves;
 }
 
-/* Turn the axis a little: at random, to the light, by its weight. */
+/* Turn the axis a little: wander, tropism, sag. */
 static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
     const treepieces_order *o = tpc_order(g, bud->order);
     float *h = bud->heading;
@@ -2412,7 +2417,7 @@ static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
         tpc_rotate(bud->rotation, aside, aside);
         for (int k = 0; k < 3; k++) h[k] += aside[k];
     }
-    /* the part of "up" at a right angle to the heading is the sine of the angle between them */
+    /* the component of "up" orthogonal to the heading is the sine of the angle between them */
     const float up = o->tropism, rise = h[1];
     h[0] -= up * rise * h[0];
     h[1] += up * (1 - rise * rise);
@@ -2432,33 +2437,33 @@ static const float tpc_turns[TREEPIECES_RIM][4] = {
     {0, 1, 0, 0},           {0, 0.86602540378f, 0, -0.5f}, {0, 0.5f, 0, -0.86602540378f},
 };
 
-/* out = a b where one, the building rotation, is mostly none */
-static void tpc_after(const float building[4], const float b[4], float out[4]) {
+/* out = a b, where the building rotation is skipped when it is the identity, the usual case */
+static void tpc_multiply_building(const float building[4], const float b[4], float out[4]) {
     if (building[3] < 1) tpc_multiply(building, b, out);
     else memcpy(out, b, 4 * sizeof *b);
 }
-static void tpc_before(const float a[4], const float building[4], float out[4]) {
+static void tpc_multiply_by_building(const float a[4], const float building[4], float out[4]) {
     if (building[3] < 1) tpc_multiply(a, building, out);
     else memcpy(out, a, 4 * sizeof *a);
 }
 
-/* Degrees to the nearest sixth of a turn and what is left, -30..30. */
-static int tpc_sixth(float degrees, float *rest) {
+/* The nearest multiple of 60 degrees, as 0..5, and the rest, -30..30 degrees. */
+static int tpc_nearest_sixth(float degrees, float *rest) {
     const float turns = degrees / 60;
     const int whole = (int)(turns + (turns < 0 ? -0.5f : 0.5f));
     *rest = degrees - 60 * (float)whole;
     return (whole % TREEPIECES_RIM + TREEPIECES_RIM) % TREEPIECES_RIM;
 }
 
-/* The joint that lets the stem grow along `heading` (world) from a rim's frame turned by `turn`, with a
-   twist in degrees: the shortest swing of y, after the twist. */
+/* The joint rotation that lets the stem grow along `heading` (world space) from the frame of a rim
+   turned by `turn`: a twist in degrees, then the shortest rotation of y to the heading. */
 static void tpc_joint(const float rim[4], int turn, const float heading[3], float twist,
                       float joint[4]) {
     const float back[4] = {-rim[0], -rim[1], -rim[2], rim[3]};
     float h[3];
     tpc_rotate(back, heading, h);
     tpc_turn((TREEPIECES_RIM - turn) % TREEPIECES_RIM, h, h);
-    if (h[1] < 0.5f) { /* held within 60 degrees */
+    if (h[1] < 0.5f) { /* limited to 60 degrees */
         const float level = sqrtf(h[0] * h[0] + h[2] * h[2]);
         const float shrink = level > 0 ? 0.86602540378f / level : 0;
         h[0] *= shrink;
@@ -2470,15 +2475,16 @@ static void tpc_joint(const float rim[4], int turn, const float heading[3], floa
     joint[1] = 0;
     joint[2] = -h[0] * scale;
     joint[3] = (1 + h[1]) * scale;
-    if (twist != 0) { /* the tangent of its half: 15 degrees at most */
+    if (twist != 0) { /* t: tangent of half the twist, 15 degrees at most */
         const float x = twist * 0.00872664626f, t = x * (1 + x * x * (0.33333333f + 0.13333333f * x * x));
         const float shorter = 1 / sqrtf(1 + t * t), about[4] = {0, t * shorter, 0, shorter};
         tpc_multiply(joint, about, joint);
     }
 }
 
-/* log2 of how many tiles lie along and across the quads of each band. Tiles are to be a tenth of the
-   foot's radius wide; where they would be narrower than 0.58 of that their number is halved. */
+/* Word 3 of a record: log2 of the number of tiles along and across the quads of each band. A tile
+   should be a tenth of the trunk's base radius wide; where it would be narrower than 0.58 of that,
+   the number across is halved. across: receives the log2 at each leaf rim. */
 static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
                           int across[TREEPIECES_MAX_LEAVES]) {
     static const uint8_t halvable[TREEPIECES_BUILTIN] = {3, 1, 1, 1, 1, 0, 2};
@@ -2493,7 +2499,7 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
         const float part = c->type == TREEPIECES_I && b == 0 ? 0.5f : 1;
         const float radius = bud->radius * (1 + (c->ratios[0] - 1) * part);
         int halve = 0;
-        if (b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE) { /* keeps band 0's */
+        if (b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE) { /* as band 0 */
         } else if ((may >> b & 1) && now > 0 && radius < 0.58f * tile * (float)(1 << now)) {
             halve = 1;
             now--;
@@ -2509,8 +2515,9 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
     return word;
 }
 
-/* A thick branch that keeps close to its stem would have its rim in there, and a steep one a pocket above
-   it: the first piece stands off as far as it must, the next one takes the direction that was meant. */
+/* A thick branch at a small angle to its stem would have its rim inside the stem, and a pocket
+   above it. Its first piece therefore leads away from the stem as far as necessary, and the next
+   one takes the intended direction. */
 static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3], float ratio,
                           float offset) {
     const float most = txm_minf((offset - 1.1f) / ratio, 0.68f), cosine = tpc_dot(bud->heading, stem);
@@ -2521,8 +2528,9 @@ static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3],
     for (int i = 0; i < 3; i++) bud->heading[i] = most * stem[i] + sine * out[i];
 }
 
-/* The axis that begins or goes on at leaf rim k of the piece just placed; bud is a copy of from. */
-static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+/* Set up the bud at leaf rim k of the piece just attached, where an axis continues or begins; on
+   entry bud is a copy of from. */
+static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
                         const float rotation[4], tpc_bud *bud) {
     const treepieces_similarity *b = &g->kit->pieces[c->type].building[k];
     const float offset = g->kit->offsets[c->type][k];
@@ -2535,7 +2543,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     bud->parent = g->node_count - 1;
     bud->depth = (uint16_t)(from->depth + 1);
     bud->radius = from->radius * c->ratios[k];
-    tpc_before(rotation, b->rotation, bud->rotation);
+    tpc_multiply_by_building(rotation, b->rotation, bud->rotation);
     tpc_rotate(rotation, up, stem);
     for (int i = 0; i < 3; i++) bud->position[i] = stem[i] * local[1];
     if (offset > 0) tpc_rotate(rotation, local, bud->position);
@@ -2555,12 +2563,12 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     tpc_rotate(rotation, radial, out);
     double sine, cosine;
     if (is_fork) {
-        bud->roll = tpc_uniform(g, 60, 120); /* the next fork across this one */
+        bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
         const treepieces_order *o = tpc_order(g, from->order);
         float mean = 0;
         const int arms = g->kit->pieces[c->type].leaf_count;
         for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
-        /* the thicker arm goes straighter on */
+        /* the thicker arm is straighter */
         const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
         txm_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
         const float ahead = txm_float(cosine), aside = txm_float(sine);
@@ -2607,8 +2615,8 @@ static void tpc_add_cluster(tpc_growth *g, int type) {
     c->look = txm_rng_next(&g->rng);
 }
 
-/* Put what was chosen on the rim; its own rims wait from now on. */
-static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c) {
+/* Attach the chosen piece to the rim; its leaf rims become open. */
+static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c) {
     const treepieces_piece *p = &g->kit->pieces[c->type];
     treepieces_node *node = &g->nodes[g->node_count];
     int across[TREEPIECES_MAX_LEAVES] = {0, 0, 0}, turn = c->turn;
@@ -2616,15 +2624,15 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     float joint[4];
     float after = bud->roll;
     tpc_unit_or_up(heading);
-    if (turn < 0) turn = tpc_sixth(bud->roll, &twist); /* a branch where the roll wants it */
+    if (turn < 0) turn = tpc_nearest_sixth(bud->roll, &twist);
     after -= 60 * (float)turn + twist;
     tpc_joint(bud->rotation, turn, heading, twist, joint);
     if (turn) tpc_multiply(tpc_turns[turn], joint, joint);
     tpc_multiply(bud->rotation, joint, rotation);
-    /* from the parent's frame, which the rim's is the building rotation away from */
+    /* node rotations are relative to the parent, rim frames include the building rotation */
     if (bud->parent >= 0) {
         const int type = g->nodes[bud->parent].type;
-        tpc_after(g->kit->pieces[type].building[bud->rim].rotation, joint, node->rotation);
+        tpc_multiply_building(g->kit->pieces[type].building[bud->rim].rotation, joint, node->rotation);
     } else {
         memcpy(node->rotation, rotation, sizeof rotation);
     }
@@ -2634,8 +2642,8 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     node->type = (uint8_t)c->type;
     node->joint = (uint8_t)(bud->rim * 8 + turn);
     node->order = bud->order;
-    /* the thinner, the faster: two classes an octave, give or take one */
-    const int sway = (int)(tpc_bits(g->foot) >> 22) - (int)(tpc_bits(bud->radius) >> 22) +
+    /* the thinner the faster: two classes per octave, plus one at random */
+    const int sway = (int)(tpc_float_bits(g->foot) >> 22) - (int)(tpc_float_bits(bud->radius) >> 22) +
                      (int)(txm_rng_next(&g->rng) >> 31);
     node->sway = (uint8_t)txm_clampi(sway, 0, TPC_CLASSES - 1);
     g->bands[g->node_count] = tpc_bands(g, bud, c, across);
@@ -2652,17 +2660,17 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
         *next = *bud;
         next->roll = after;
         next->across = (uint8_t)across[k];
-        tpc_grow_on(g, bud, c, k, rotation, next);
+        tpc_open_rim(g, bud, c, k, rotation, next);
         if (k == 0 && (c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR))
-            next->roll = after + tpc_order(g, bud->order + 1)->roll; /* the next branch's turn */
+            next->roll = after + tpc_order(g, bud->order + 1)->roll; /* of the next branch */
         tpc_push(g);
     }
 }
 
 /* ---- growing: one tree --------------------------------------------------------------------- */
 
-/* Ask the user, and check what he says. */
-static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
+/* Call the caller's rule and check its choice; 0 if that is invalid. */
+static int tpc_call_rule(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     treepieces_site site;
     site.depth = bud->depth;
     site.order = bud->order;
@@ -2676,8 +2684,10 @@ static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     site.length = bud->length;
     g->desc->own_rule(g->desc->own_user, &site, &g->rng, c);
     g->fault = NULL;
-    if (c->type < 0 || c->type >= g->kit->count) g->fault = "own_rule chose no type of the kit";
-    else if (c->turn < -1 || c->turn >= TREEPIECES_RIM) g->fault = "own_rule chose no turn of 0 to 5";
+    if (c->type < 0 || c->type >= g->kit->count)
+        g->fault = "own_rule chose a type that the kit does not have";
+    else if (c->turn < -1 || c->turn >= TREEPIECES_RIM)
+        g->fault = "own_rule chose a turn that is not -1 to 5";
     else if (!(c->length > 0) || !txm_is_finite((double)c->length))
         g->fault = "own_rule chose a length that is not above 0";
     else if (!txm_is_finite((double)c->direction[0] + (double)c->direction[1] + (double)c->direction[2]))
@@ -2690,7 +2700,8 @@ static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     return g->status == TXM_OK;
 }
 
-static void tpc_sprout(tpc_growth *g) {
+/* Reset a slot and open the first rim, on the ground. */
+static void tpc_begin_tree(tpc_growth *g) {
     const treepieces_order *o = &g->species->orders[0];
     tpc_bud *bud = &g->buds[0];
     memset(bud, 0, sizeof *bud);
@@ -2721,14 +2732,14 @@ static void tpc_sprout(tpc_growth *g) {
     tpc_push(g);
 }
 
-/* Every rim that waits needs a piece at least, so the last of them get tips. */
+/* Grow one tree. Every open rim needs at least one more piece, so near the limit they all get tips. */
 static void tpc_grow(tpc_growth *g) {
-    tpc_sprout(g);
+    tpc_begin_tree(g);
     while (g->waiting && g->status == TXM_OK) {
         const tpc_bud *bud = tpc_pop(g);
         treepieces_choice choice;
         tpc_choose(g, bud, &choice);
-        if (g->desc->own_rule && !tpc_ask(g, bud, &choice)) return;
+        if (g->desc->own_rule && !tpc_call_rule(g, bud, &choice)) return;
         const int leaves = g->kit->pieces[choice.type].leaf_count;
         if (leaves && g->node_count + 1 + g->waiting + leaves > g->most) {
             choice.type = TREEPIECES_TIP;
@@ -2738,8 +2749,8 @@ static void tpc_grow(tpc_growth *g) {
         }
         const int pruned = leaves && choice.type == TREEPIECES_TIP && choice.leaves;
         const float left = (1 - bud->along) * bud->length;
-        tpc_place(g, bud, &choice);
-        if (pruned) /* stands for all that would have grown */
+        tpc_attach(g, bud, &choice);
+        if (pruned) /* its cloud represents the whole pruned branch */
             g->clusters[g->cluster_count - 1].radius *=
                 txm_clampf(0.35f * left / (g->species->cloud * g->scale), 1, 1.8f);
     }
@@ -2748,18 +2759,18 @@ static void tpc_grow(tpc_growth *g) {
 /* ---- a forest ------------------------------------------------------------------------------ */
 
 enum {
-    TPC_BLOCK_TREES = 64,      /* trees that grow at once ...                           */
-    TPC_BLOCK_PIECES = 1 << 18 /* ... as long as they have no more than so many pieces  */
+    TPC_BLOCK_TREES = 64,      /* trees that grow at a time ...                  */
+    TPC_BLOCK_PIECES = 1 << 18 /* ... limited to this many pieces in total       */
 };
 
 /* A forest with its memory. */
 typedef struct tpc_forest {
-    treepieces_forest forest; /* first: the one is the other */
+    treepieces_forest forest; /* first, so that a pointer to it is one to this */
     txm_arena arena;          /* itself, species, trees and records */
     txm_arena node_arena, cluster_arena;
 } tpc_forest;
 
-/* Everything while a forest is made. */
+/* A forest under construction. */
 typedef struct tpc_planting {
     const treepieces_forest_desc *desc;
     tpc_forest *made;
@@ -2778,7 +2789,7 @@ typedef struct tpc_planting {
     size_t node_count, cluster_count, node_capacity, band_capacity, cluster_capacity;
 } tpc_planting;
 
-/* Where tree i stands if the user does not say. */
+/* Where tree i stands if the caller gives no places. */
 static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
     treepieces_place place;
     int side = 1;
@@ -2813,7 +2824,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
     count = txm_clampi(count, 4, TPC_BLOCK_TREES);
     if (count > p->desc->tree_count) count = p->desc->tree_count;
     p->slots = (tpc_growth *)txm_arena_zero(&p->scratch, (size_t)count, sizeof *p->slots);
-    if (!p->slots) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+    if (!p->slots) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     for (p->slot_count = 0; p->slot_count < count; p->slot_count++) {
         tpc_growth *g = &p->slots[p->slot_count];
         g->desc = p->desc;
@@ -2826,32 +2837,32 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
         if (p->scratch.failed)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     }
     return TXM_OK;
 }
 
-/* Make room for `more` items behind the `count` that a block holds. The first time room is made for
-   all trees if they are like those so far. Returns the block, or NULL if there is no memory. */
+/* Make room for `more` items after the first `count` of a block. What is allocated is an estimate
+   for all trees from those that are done. Returns the block, or NULL if there is no memory. */
 static void *tpc_reserve(const tpc_planting *p, int done, txm_arena *arena, void *block, size_t count,
                          size_t more, size_t size, size_t *capacity) {
     size_t wanted = count + more;
     if (block && wanted <= *capacity) return block;
     const double all = 1.05 * (double)wanted / done * p->desc->tree_count + 64;
     if (all < 4e9 && (size_t)all > wanted) wanted = (size_t)all;
-    txm_arena roomier = *arena;
-    roomier.blocks = NULL;
-    void *larger = txm_arena_alloc(&roomier, wanted, size);
+    txm_arena larger_arena = *arena;
+    larger_arena.blocks = NULL;
+    void *larger = txm_arena_alloc(&larger_arena, wanted, size);
     if (!larger) return NULL;
     if (block) memcpy(larger, block, count * size);
     txm_arena_free(arena);
-    *arena = roomier;
+    *arena = larger_arena;
     *capacity = wanted;
     return larger;
 }
 
-/* Keep what grew in the slots. */
-static txm_status tpc_keep(tpc_planting *p, int count, txm_env *env) {
+/* Append the trees that grew in the slots to the forest. */
+static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
     size_t nodes = 0, clusters = 0;
     for (int i = 0; i < count; i++) {
         if (p->slots[i].status != TXM_OK) return txm_fail(env, p->slots[i].status, p->slots[i].fault);
@@ -2900,8 +2911,9 @@ static txm_status tpc_keep(tpc_planting *p, int count, txm_env *env) {
     return TXM_OK;
 }
 
-/* A random tile for every quad, four at a time: column (r (9 - tiles across)) / 16 for r of 0..15 (0
-   for 16 tiles), the row likewise; quads that lie on the bottom of their layer have the last row. */
+/* Choose a random tile for every quad, four at a time: column r (9 - tiles across) / 16 for random
+   r of 0..15 (0 for 16 tiles), the row likewise; quads at the bottom of their layer get the last
+   row. */
 static void tpc_fill_cells(const tpc_cells *cells, int words, uint32_t bands, txm_rng *rng,
                            uint32_t *word) {
     const uint32_t low = 0x0f0f0f0fu;
@@ -2917,11 +2929,11 @@ static void tpc_fill_cells(const tpc_cells *cells, int words, uint32_t bands, tx
             const uint32_t chosen = (row & ~bottom) | (last * 0x01010101u & bottom);
             word[i] |= (column | chosen << 3) & c->bands[b];
         }
-        word[i] &= ~c->own | 0x36363636u; /* those lie on 2 x 2 cells */
+        word[i] &= ~c->own | 0x36363636u; /* the caller's classes lie on 2 x 2 cells */
     }
 }
 
-/* The records of tree p->first + i; those of its children go into the parent's as they are met. */
+/* Fill the records of tree p->first + i. A child enters itself in the record of its parent. */
 static void tpc_fill_tree(void *context, int i) {
     tpc_planting *p = (tpc_planting *)context;
     const treepieces_kit *kit = p->desc->kit;
@@ -2946,7 +2958,7 @@ static void tpc_fill_tree(void *context, int i) {
     }
 }
 
-/* The records' arrays, of the sizes that are known now. */
+/* Allocate the records, as their numbers are known now. */
 static txm_status tpc_make_arrays(tpc_planting *p, txm_env *env) {
     treepieces_forest *out = &p->made->forest;
     size_t bytes = sizeof *p->made + (size_t)out->tree_count * sizeof *p->trees +
@@ -2972,7 +2984,8 @@ static txm_status tpc_make_arrays(tpc_planting *p, txm_env *env) {
     return TXM_OK;
 }
 
-static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
+/* Grow all trees, block after block; then, as the sizes of the batches are known, fill the records. */
+static txm_status tpc_grow_trees(tpc_planting *p, txm_env *env) {
     const int trees = p->desc->tree_count;
     p->trees = (treepieces_tree *)txm_arena_zero(&p->made->arena, (size_t)trees, sizeof *p->trees);
     p->offsets = (uint32_t(*)[TREEPIECES_MAX_TYPES])txm_arena_alloc(&p->scratch, (size_t)trees,
@@ -2989,7 +3002,7 @@ static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
                              pass ? "assemble" : "grow"))
                 return txm_fail(env, TXM_CANCELLED, "cancelled");
             txm_parallel_for(env, count, pass ? tpc_fill_tree : tpc_grow_slot, p);
-            if (!pass) status = tpc_keep(p, count, env);
+            if (!pass) status = tpc_append_trees(p, count, env);
         }
     }
     return status;
@@ -2998,12 +3011,12 @@ static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
 static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env) {
     if (!d || !d->kit) return txm_fail(env, TXM_BAD_ARGUMENT, "desc or kit is NULL");
     if (!d->species || d->species_count < 1)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "species: one at least is needed");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "species: at least one is needed");
     if (d->tree_count < 1) return txm_fail(env, TXM_BAD_ARGUMENT, "tree_count must be 1 or more");
     if (d->max_pieces && (d->max_pieces < 8 || d->max_pieces > 65535))
         return txm_fail(env, TXM_BAD_ARGUMENT, "max_pieces must be 8 to 65535, or 0 for 600");
     if (d->rule < TREEPIECES_GRAMMAR || d->rule > TREEPIECES_RANDOM)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "rule is none of treepieces_rule");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "rule is not a treepieces_rule");
     if (!(d->spacing >= 0) || !txm_is_finite((double)d->spacing))
         return txm_fail(env, TXM_BAD_ARGUMENT, "spacing must be 0 or more");
     for (int i = 0; i < d->species_count; i++) {
@@ -3018,7 +3031,7 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
         if (!(fabsf(p->turn) <= 1e4f) || !(p->scale >= 0 && p->scale <= 1000))
             return txm_fail(env, TXM_BAD_ARGUMENT, "places: a turn or scale is out of range");
         if (p->species < 0 || p->species >= d->species_count)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species is none of species");
+            return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species number is out of range");
     }
     return TXM_OK;
 }
@@ -3066,7 +3079,7 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
         f->forest.tree_count = desc->tree_count;
         f->forest.type_count = desc->kit->count;
         p.made = f;
-        status = tpc_plant(&p, env);
+        status = tpc_grow_trees(&p, env);
     }
     txm_arena_free(&p.scratch);
     txm_arena_free(&p.band_arena);
@@ -3083,31 +3096,31 @@ enum {
     TPC_PHASES = 8 /* of the flutter within a class of oscillators */
 };
 
-/* A gust that travels over the land: weight sin(2 pi (along . (x, z) - rate t + phase)) */
+/* A travelling gust: weight * sin(2 pi (along . (x, z) - rate * t + phase)). */
 typedef struct tpc_wave {
     double along[2], rate, phase, weight;
 } tpc_wave;
 
-/* The wind of one moment, and the step of the oscillators that ends there. */
+/* The wind at one time, and the step of the oscillators that ends then. */
 typedef struct tpc_air {
     float direction[3], pressure, gusts;
     tpc_wave waves[TPC_WAVES];
     double time;
     struct {
-        float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from where it rests */
-        float give;           /* radians at pressure 1 for a sixteenth of the tree's height  */
+        float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from the equilibrium */
+        float give;           /* radians at pressure 1 per sixteenth of the tree's height     */
         float flutter[TPC_PHASES];
     } classes[TPC_CLASSES];
 } tpc_air;
 
-/* sine of so many turns, however many */
+/* sin(2 pi turns), for any number of turns */
 static double tpc_sine_of_turns(double turns) {
     double sine, cosine;
     txm_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
     return sine;
 }
 
-/* Waves of 90, 41, 19 and 9 m that run with the wind, a little to its sides, at about its speed. */
+/* Waves of 90, 41, 19 and 9 m that travel about in the direction and at the speed of the wind. */
 static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     static const double lengths[TPC_WAVES] = {90, 41, 19, 9};
     static const double weights[TPC_WAVES] = {0.4, 0.3, 0.2, 0.1};
@@ -3156,18 +3169,19 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
     return tpc_pressure(&air, position, time);
 }
 
-/* Class c swings 0.3 * 2^(c / 4) times a second, damped by a fifth. The step over dt is that of
+/* Class c has the frequency 0.3 * 2^(c / 4) Hz and the damping ratio d = 1/5. The step over dt is
+   the exact solution of
 
        x'' + 2 d w x' + w^2 x = 0,   x = e^(-d w t) (a cos(k t) + b sin(k t)),  k = w sqrt(1 - d^2)
 
-   so that it is right however long it is; nothing can grow. Thin branches give more, and flutter. */
+   so that it is right and stable for any dt. Thin branches bend further, and flutter. */
 static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
     const double damping = 0.2, part = sqrt(1 - damping * damping);
     for (int c = 0; c < TPC_CLASSES; c++) {
         const double frequency = 0.3 * txm_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
         const double fade = damping * omega * dt;
         double e = 0, sine = 0, cosine = 0;
-        if (fade < 60) { /* beyond that nothing of the old swing is left */
+        if (fade < 60) { /* else the old swing has died out */
             e = txm_exp2(-fade * 1.44269504088896340736);
             txm_sincos(omega * part * dt, &sine, &cosine);
         }
@@ -3193,14 +3207,14 @@ typedef struct tpc_posing {
     float *state, *bones;
 } tpc_posing;
 
-/* q = q p, with p the rotation about the level axis (x, 0, z) by about its length, in radians */
+/* q = q p, with p the rotation about the axis (x, 0, z) by about its length, in radians */
 static void tpc_bend(float q[4], float x, float z) {
     const float a = 0.5f * x, c = 0.5f * z, w = 1 / sqrtf(1 + a * a + c * c);
     const float p[4] = {w * a, 0, w * c, w};
     tpc_multiply(q, p, q);
 }
 
-/* A random bend of the pose, the same for this node at any time. */
+/* Apply the pose to a joint: its random bend, which is a hash of the node, and its own rotation. */
 static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4]) {
     if (pose->amount > 0) {
         const uint64_t h = txm_hash(pose->seed ^ ((uint64_t)node + 1) * 0x9e3779b97f4a7c15u);
@@ -3210,7 +3224,7 @@ static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4
     if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
 }
 
-/* The wind on a joint, seen in its frame (x and z across the stem), and one step of its swing. */
+/* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. */
 static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_t look,
                            const float wind[3], float yield, float *state, float q[4]) {
     const float back[4] = {-q[0], -q[1], -q[2], q[3]};
@@ -3220,7 +3234,7 @@ static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_
     const float other = air->classes[n->sway].flutter[look >> 3 & (TPC_PHASES - 1)];
     const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
     const float give = air->classes[n->sway].give * txm_clampf(yield * n->length, 0.2f, 3);
-    /* the stem leans with the wind: towards +z about +x, towards +x about -z */
+    /* equilibrium, leaning with the wind: towards +z about +x, towards +x about -z */
     const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
                            txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
     for (int k = 0; k < 2; k++) {
@@ -3231,12 +3245,12 @@ static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_
     tpc_bend(q, state[0], state[2]);
 }
 
-/* The bones of a tree, from its foot on. */
+/* The bones of a tree, parents first. */
 static void tpc_pose_tree(void *context, int index) {
     const tpc_posing *p = (const tpc_posing *)context;
     const treepieces_tree *t = &p->forest->trees[index];
     const float stiffness = p->forest->species[t->species].stiffness;
-    const float yield = 16 / (stiffness * txm_maxf(t->height, 0.1f)); /* of a metre of stem */
+    const float yield = 16 / (stiffness * txm_maxf(t->height, 0.1f)); /* of one metre of stem */
     float pressure = 0;
     if (p->air) pressure = tpc_pressure(p->air, t->position, p->air->time);
     for (uint32_t i = 0; i < t->node_count; i++) {
@@ -3342,7 +3356,7 @@ static void tpc_columns(const float *bone, float squares[3]) {
         squares[k] = (bone[k] * bone[k] + bone[4 + k] * bone[4 + k]) + bone[8 + k] * bone[8 + k];
 }
 
-/* n by the inverse transpose: columns at right angles are divided by their squares */
+/* n by the inverse transpose: as columns are orthogonal, each is divided by its square */
 static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
     float squares[3];
     tpc_columns(bone, squares);
@@ -3351,7 +3365,7 @@ static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
         out[k] = (bone[4 * k] * m[0] + bone[4 * k + 1] * m[1]) + bone[4 * k + 2] * m[2];
 }
 
-/* The bones of a record's children, less its own; 0 where there is none. */
+/* The bones of a record's children, relative to its own; 0 where there is none. */
 static void tpc_children(const uint32_t *record, uint32_t children[TREEPIECES_MAX_LEAVES]) {
     children[0] = record[1] & 0xffffu;
     children[1] = record[1] >> 16;
@@ -3394,7 +3408,7 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
             for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
             for (int k = 0; k < piece->leaf_count; k++) {
                 const float wk = v->weights[1 + k];
-                const tpc_seen *at = &forest->kit->seen[type][k * piece->vertex_count + i];
+                const tpc_rim_frame *at = &forest->kit->in_rims[type][k * piece->vertex_count + i];
                 if (!(wk > 0)) continue;
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);
@@ -3416,7 +3430,7 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
 
 /* ---- level of detail --------------------------------------------------------------------- */
 
-/* The level at a place, which is given as a sum of `count` points. */
+/* The level at the mean of `count` points, which are given as their sum. */
 static int tpc_level(const treepieces_lod *lod, const float sum[3], float count) {
     const float half = lod->half_distance > 0 ? lod->half_distance : 10;
     const float most = txm_clampf(lod->max_level, 1, 64);
@@ -3444,16 +3458,16 @@ TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float
     return tpc_level(lod, sum, 4);
 }
 
-/* Place i of 0..n along a side: multiples of 2^-16, so that place n - i is exactly 1 - place i. Steps
-   of n-ths that are rounded once, then multiplied, are what tessellation units take. */
-static float tpc_place_along(int i, int n) {
-    if (2 * i > n) return 1 - tpc_place_along(n - i, n);
+/* Position i of 0..n along a side, a multiple of 2^-16, so that position n - i is exactly 1 minus
+   that of i. The step 1 / n is rounded once, then multiplied, as tessellation units do. */
+static float tpc_fraction(int i, int n) {
+    if (2 * i > n) return 1 - tpc_fraction(n - i, n);
     if (2 * i == n) return 0.5f;
     return (float)(i * ((65536 * 2 + n) / (2 * n))) / 65536.0f;
 }
 
-/* The vertices of a pattern: the sides' first, side k from corner k up to the one before corner
-   k + 1, then the inner grid, column by column. */
+/* The vertices of a pattern: first those of the sides, side k from corner k up to the one before
+   corner k + 1, then the inner grid, column by column. */
 typedef struct tpc_pattern {
     int edges[4], first[4], inner, outer_count;
 } tpc_pattern;
@@ -3462,7 +3476,7 @@ static int tpc_side_vertex(const tpc_pattern *p, int side, int i) {
     return i < p->edges[side] ? p->first[side] + i : p->first[(side + 1) % 4];
 }
 
-/* Vertex i of 0..inner - 2 of the inner grid's border along a side, in the side's direction. */
+/* Vertex i of 0..inner - 2 on the border of the inner grid along a side, in the side's direction. */
 static int tpc_inner_vertex(const tpc_pattern *p, int side, int i) {
     const int n = p->inner - 1, far = n - 1 - i;
     const int u = side == 0 ? 0 : side == 1 ? i : side == 2 ? n - 1 : far;
@@ -3479,7 +3493,7 @@ static void tpc_add_triangle(uint16_t *indices, int *count, int a, int b, int c)
     ++*count;
 }
 
-/* The strip between a side and the inner grid: always the next step that is the less far along. */
+/* The strip between a side and the inner grid: always advance on the one that is less far along. */
 static void tpc_stitch(const tpc_pattern *p, int side, uint16_t *indices, int *count) {
     const int outer = p->edges[side], inner = p->inner - 2;
     int i = 0, j = 0;
@@ -3512,14 +3526,14 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
     }
     if (p.inner == 1 && p.outer_count > 4) p.inner = 2;
     const int n = p.inner - 1;
-    if (!coords && !indices) { /* the strips, and the grid within */
+    if (!coords && !indices) { /* the strips and the inner grid */
         count = n == 0 ? 2 : p.outer_count + 4 * (n - 1) + 2 * (n - 1) * (n - 1);
         if (triangles) *triangles = count;
         return p.outer_count + n * n;
     }
     for (int k = 0; k < 4 && coords; k++) {
         for (int i = 0; i < p.edges[k]; i++) {
-            const float t = tpc_place_along(i, p.edges[k]), back = 1 - t;
+            const float t = tpc_fraction(i, p.edges[k]), back = 1 - t;
             float *at = coords + 2 * (p.first[k] + i);
             const int u = corner_u[k], v = corner_v[k], next = (k + 1) % 4;
             at[0] = u == corner_u[next] ? (float)u : u ? back : t;
@@ -3530,8 +3544,8 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
         for (int v = 0; v < n; v++) {
             if (coords) {
                 float *at = coords + 2 * (p.outer_count + u * n + v);
-                at[0] = tpc_place_along(u + 1, p.inner);
-                at[1] = tpc_place_along(v + 1, p.inner);
+                at[0] = tpc_fraction(u + 1, p.inner);
+                at[1] = tpc_fraction(v + 1, p.inner);
             }
             if (u + 1 == n || v + 1 == n) continue;
             const int a = p.outer_count + u * n + v;
@@ -3548,16 +3562,16 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
     return p.outer_count + n * n;
 }
 
-/* How much of each corner there is at (u, v). */
-static void tpc_weigh(float u, float v, float w[4]) {
+/* The bilinear weights of the corners at (u, v). */
+static void tpc_corner_weights(float u, float v, float w[4]) {
     w[0] = (1 - u) * (1 - v);
     w[1] = (1 - u) * v;
     w[2] = u * v;
     w[3] = u * (1 - v);
 }
 
-/* A weighted sum of four numbers, the same to the bit whatever the order of the corners as long as
-   two weights at most are not 0: opposite corners are added first, and x + 0 is x. */
+/* A weighted sum of four numbers. Independent of the order of the corners to the bit while at most
+   two weights are not 0, as on a side: opposite corners are added first, and x + 0 is x. */
 static float tpc_mix(const float w[4], float a, float b, float c, float d) {
     return (w[0] * a + w[2] * c) + (w[1] * b + w[3] * d);
 }
@@ -3567,12 +3581,12 @@ TREEPIECES_API void treepieces_patch_point(const float positions[12], const floa
                                            float normal[3]) {
     const float alpha = shape < 0 ? 0 : shape > 0 ? shape : 0.6f;
     float w[4], p[3], n[3], depth[4];
-    tpc_weigh(u, v, w);
+    tpc_corner_weights(u, v, w);
     for (int k = 0; k < 3; k++) {
         p[k] = tpc_mix(w, positions[k], positions[3 + k], positions[6 + k], positions[9 + k]);
         n[k] = tpc_mix(w, normals[k], normals[3 + k], normals[6 + k], normals[9 + k]);
     }
-    for (int i = 0; i < 4; i++) { /* above the corner's tangent plane */
+    for (int i = 0; i < 4; i++) { /* height above the tangent plane of the corner */
         const float *corner = positions + 3 * i, *up = normals + 3 * i;
         depth[i] = (up[0] * (p[0] - corner[0]) + up[1] * (p[1] - corner[1])) +
                    up[2] * (p[2] - corner[2]);
@@ -3585,7 +3599,7 @@ TREEPIECES_API void treepieces_patch_point(const float positions[12], const floa
     memcpy(normal, n, sizeof n);
 }
 
-/* ---- bark: sheets out of framed tiles ------------------------------------------------------ */
+/* ---- bark: sheets of framed tiles --------------------------------------------------------- */
 
 TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc) {
     int layers = TREEPIECES_OWN;
@@ -3628,14 +3642,14 @@ static txm_status tpc_check_bark(const treepieces_bark_desc *d, const txm_image 
     return TXM_OK;
 }
 
-/* A number of a tile of that class, at random; -1: there is none. */
+/* A random tile of a class, if possible not one of the two given; -1: there is none. */
 static int tpc_pick_tile(const treepieces_bark_desc *d, int tile_class, txm_rng *rng, int unlike,
                          int unlike_too) {
     int best = -1;
     uint32_t most = 0;
     for (int i = 0; i < d->tile_count; i++) {
         if ((d->classes ? d->classes[i] : TREEPIECES_BARK) != tile_class) continue;
-        /* not like its neighbours as long as there is another */
+        /* others come before those two */
         const uint32_t preferred = i != unlike && i != unlike_too ? 1u << 31 : 1;
         const uint32_t ticket = (txm_rng_next(rng) >> 1) | preferred;
         if (ticket > most) {
@@ -3652,18 +3666,18 @@ static float tpc_fade(float x) {
     return t * t * (3 - 2 * t);
 }
 
-/* A cell of the lowest row: (x, y) of its tile blended with what its class wants at the south side.
-   lower: four tiles of half the size for HALVING. */
+/* Texel (x, y) of a cell of the lowest row: its tile, blended towards the south side with what the
+   layer requires there. lower: four tiles, shown at half size, for HALVING. */
 static float tpc_blend_texel(const txm_image *tile, const txm_image *const lower[4], int layer,
                              int x, int y, int c) {
     const int last = tile->width - 1, size = tile->width;
     const float plain = txm_image_get(tile, x, y, c);
     const float rise = (float)(last - y) / (float)size; /* from the south side, in tiles */
     float other = plain, weight = 0;
-    if (layer == TREEPIECES_FOLD) { /* as much of itself mirrored: then both sides are the same */
+    if (layer == TREEPIECES_FOLD) { /* half of its mirror image: then it is symmetric */
         weight = 0.5f * tpc_fade(4 * rise);
         other = txm_image_get(tile, last - x, y, c);
-    } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side lies at the south */
+    } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side, turned to the south */
         weight = tpc_fade(2 * rise);
         other = txm_image_get(tile, last - y, x, c);
     } else if (layer == TREEPIECES_TURN_RIGHT) { /* its east side */
@@ -3695,7 +3709,7 @@ static void tpc_draw_cell(const txm_image *out, int column, int top, const txm_i
     }
 }
 
-/* Tiles of an own class: each on 2 x 2 cells, continued by its border. */
+/* A layer of one of the caller's classes: each tile on 2 x 2 cells, extended by its border. */
 static void tpc_draw_own(const treepieces_bark_desc *d, const txm_image *out, int layer,
                          txm_rng *rng) {
     const int size = txm_image_resolve(d->tiles[0]).width, first = layer * TREEPIECES_SHEET * size;
@@ -3765,7 +3779,7 @@ TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t band
 
 /* ---- bark: drawn ---------------------------------------------------------------------------- */
 
-/* Smooth noise of 0..1 on the unit torus with columns x rows cells. */
+/* Smooth value noise, 0..1, on the unit torus with columns x rows cells. */
 static float tpc_noise(float x, float y, int columns, int rows, uint64_t seed) {
     const float u = x * (float)columns, v = y * (float)rows;
     const int i = (int)u, j = (int)v;
@@ -3779,8 +3793,8 @@ static float tpc_noise(float x, float y, int columns, int rows, uint64_t seed) {
     return txm_lerpf(txm_lerpf(corner[0], corner[1], s), txm_lerpf(corner[2], corner[3], s), t);
 }
 
-/* The noise of tile `number`: all tiles have that of number 0 at their border. The sum of two is
-   brought back to the contrast of one. */
+/* Noise for tile `number`: its own inside, one that all tiles share at the border. The blend is
+   scaled so that its contrast is that of either. */
 static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t seed, int number) {
     const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
     const float inside = 1 - tpc_fade((border - 0.03f) * 5), outside = 1 - inside;
@@ -3790,8 +3804,8 @@ static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t 
     return 0.5f + (outside * frame + inside * own) / sqrtf(inside * inside + outside * outside);
 }
 
-/* How light bark is at a place, about 1: plates between fissures along the stem. The fissures meet
-   the frame at the same places in all tiles and wander in between; so no frame shows. */
+/* Brightness of bark, about 1: plates between fissures along the stem. The fissures cross the frame
+   at the same places in all tiles and wander in between, so that the frame is not visible. */
 static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
     enum { PLATES = 3, CRACKS = 2 }; /* across and along a tile */
     const float slow = tpc_framed_noise(x, y, 4, 3, seed + 1000, number) - 0.5f;
@@ -3801,7 +3815,7 @@ static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
     const int plate = (int)across;
     const float f = across - (float)plate, edge = txm_minf(f, 1 - f);
     const float gap = 0.1f + 0.3f * tpc_framed_noise(x, y, 6, 3, seed + 4000, number);
-    /* cracks across a plate, at a height of its own */
+    /* cracks across a plate, at heights that differ from plate to plate */
     const uint64_t own = txm_hash(seed + 9000 + (uint64_t)(plate % PLATES));
     const float bend = tpc_framed_noise(x, y, 3, 4, seed + 5000, number) - 0.5f;
     const float along = (float)CRACKS * (1 + y) + (float)(own >> 60) / 16 + 0.9f * bend;
@@ -3809,12 +3823,13 @@ static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
     const float open = 2.4f * (tpc_framed_noise(x, y, 5, 4, seed + 6000, number) - 0.42f);
     const float crack = tpc_fade(txm_minf(g, 1 - g) / 0.09f) * txm_clampf(open, 0, 1);
     const float depth = txm_maxf(tpc_fade(edge / gap), 0.75f * crack);
-    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick; /* lit aslant */
+    /* a plate is lit from one side */
+    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick;
     return 0.46f + top * (1 - depth) + (0.4f - 0.2f * depth) * grain;
 }
 
-/* Smooth pale bark with dark lenticels across it, as birches have; none lie on the frame, where
-   they would be seen again and again. */
+/* Smooth pale bark with dark lenticels across it, as of birches; none lie on the frame, where their
+   repetition would be visible. */
 static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
     const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
     const float inside = 1 - tpc_fade((border - 0.03f) * 5);
@@ -3860,19 +3875,19 @@ TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species
 
 /* ---- foliage: leaf clouds ------------------------------------------------------------------ */
 
-/* -1..1 */
+/* a random number, -1..1 */
 static float tpc_signed(txm_rng *rng) {
     return 2 * txm_rng_float(rng) - 1;
 }
 
-/* Turn a card so that its picture grows along `along` and shows its face to `facing` as well as it
-   then can; outward: where the cloud's surface looks to. */
-static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
+/* Orient a card: its image grows along `along`, and its face is turned to `facing` as far as that
+   allows. outward: normal of the cloud's surface there. */
+static void tpc_orient_card(treepieces_card *card, float along[3], float facing[3],
                          const float outward[3], float half) {
     tpc_unit_or(along, 1, 0, 0);
     const float share = tpc_dot(facing, along);
     for (int k = 0; k < 3; k++) facing[k] -= share * along[k];
-    if (tpc_dot(facing, facing) < 1e-6f) { /* anything across will do */
+    if (tpc_dot(facing, facing) < 1e-6f) { /* any orthogonal direction */
         facing[0] = along[1];
         facing[1] = -along[0];
         facing[2] = 0;
@@ -3888,7 +3903,8 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
     tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }
 
-/* Impostors show no more than the sphere: draw a card's center in until its corners lie inside. */
+/* Impostors show only the unit sphere: move the centre of a card inwards until its corners are
+   inside. */
 static void tpc_keep_inside(treepieces_card *card) {
     for (int step = 0; step < 64; step++) {
         float most = 0;
@@ -3904,8 +3920,8 @@ static void tpc_keep_inside(treepieces_card *card) {
     }
 }
 
-/* Direction `index` of `count` spread evenly over the sphere, each a little off its place. */
-static void tpc_spread(int index, int count, float phase, txm_rng *rng, float direction[3]) {
+/* Direction `index` of `count` distributed evenly over the sphere, with some jitter. */
+static void tpc_sphere_direction(int index, int count, float phase, txm_rng *rng, float direction[3]) {
     double sine, cosine;
     const float jitter = 0.6f * tpc_signed(rng), off = 0.3f * tpc_signed(rng);
     const float y = txm_clampf(1 - (2 * (float)index + 1 + jitter) / (float)count, -1, 1);
@@ -3916,8 +3932,8 @@ static void tpc_spread(int index, int count, float phase, txm_rng *rng, float di
     direction[2] = ring * (float)sine;
 }
 
-/* A place in the unit ball far from those that are taken: of some tries the best. So there are
-   neither heaps nor holes, and most places lie towards the surface. */
+/* A position in the unit ball far from the cards so far: the best of some random candidates. This
+   avoids clusters and gaps, and puts most cards near the surface. */
 static void tpc_far_place(const treepieces_card *cards, int taken, const float size[3],
                           txm_rng *rng, float place[3]) {
     enum { TRIES = 6 };
@@ -3938,7 +3954,7 @@ static void tpc_far_place(const treepieces_card *cards, int taken, const float s
     }
 }
 
-/* Sprays of leaves, spread out and hanging as their kind does. */
+/* Broad leaves: cards distributed in the cloud, drooping as the leaf shape asks for. */
 static void tpc_leafy_card(const treepieces_species *species, treepieces_card *cards, int index,
                            const float scale[3], float half, txm_rng *rng) {
     const int is_lance = species->leaf_shape == TREEPIECES_LEAF_LANCE;
@@ -3957,21 +3973,21 @@ static void tpc_leafy_card(const treepieces_species *species, treepieces_card *c
         along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
         facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
     }
-    tpc_aim_card(&cards[index], along, facing, outward, half);
+    tpc_orient_card(&cards[index], along, facing, outward, half);
 }
 
-/* Needles: cards one behind the other along twigs that radiate, crossed about them. */
+/* Needles: rows of cards along twigs that radiate from the centre, turned alternately about them. */
 static void tpc_needle_card(int index, int count, float phase, const float scale[3], float half,
                             txm_rng *rng, treepieces_card *card) {
     const float reach = txm_maxf(1 - half, 0);
-    const float fit = 0.7f * reach / txm_maxf(half, 0.01f) + 0.95f; /* half overlapping */
+    const float fit = 0.7f * reach / txm_maxf(half, 0.01f) + 0.95f; /* overlapping by half */
     const int most = txm_clampi((int)txm_minf(fit, 4), 1, 4);
     const int twigs = (count + most - 1) / most, steps = (count + twigs - 1) / twigs;
     const int step = index / twigs;
     const float place = ((float)step + 0.5f + 0.5f * txm_rng_float(rng)) / (float)steps;
     const float roll = (float)((index % twigs + step) % 3 - 1);
     float along[3], facing[3], outward[3];
-    tpc_spread(index % twigs, twigs, phase, rng, along);
+    tpc_sphere_direction(index % twigs, twigs, phase, rng, along);
     const float at = reach * (0.3f + 0.7f * place);
     for (int k = 0; k < 3; k++) along[k] *= scale[k];
     tpc_unit_or(along, 1, 0, 0);
@@ -3981,11 +3997,11 @@ static void tpc_needle_card(int index, int count, float phase, const float scale
     }
     tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(rng);
-    /* across the twig, level */
+    /* across the twig, horizontal */
     facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(rng);
     facing[1] = 1;
     facing[2] = 1.2f * roll * along[0] + 0.2f * tpc_signed(rng);
-    tpc_aim_card(card, along, facing, outward, half);
+    tpc_orient_card(card, along, facing, outward, half);
 }
 
 TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t look,
@@ -4008,24 +4024,24 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
 
 /* ---- foliage: drawn leaves ----------------------------------------------------------------- */
 
-/* A spray is a list of marks, later ones over earlier ones. A sample of the picture asks them from
-   the last to the first who has it; so edges are smoothed without seams, and rows do not wait for
-   each other. Lengths are in sides of the picture, y goes down. */
+/* A spray is a list of marks, painted in order. A sample takes the colour of the last mark that
+   covers it, so that edges are antialiased without seams and rows are independent of each other.
+   Lengths are in sides of the image, y points down. */
 enum {
-    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* a tapering stroke; else treepieces_leaf_shape */
+    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* shape of a mark: a tapering stroke */
     TPC_MARKS = 1024,
-    TPC_SAMPLES = 4 /* across and down a pixel */
+    TPC_SAMPLES = 4 /* per pixel, across and down */
 };
 
 typedef struct tpc_mark {
-    int shape;
-    float from[2], along[2]; /* its foot, and from there to its tip */
+    int shape;               /* treepieces_leaf_shape, or TPC_TWIG */
+    float from[2], along[2]; /* its base, and the vector from there to its tip */
     float width;             /* half of it over the length */
-    float taper;             /* of a twig: width at its tip over that at its foot */
+    float taper;             /* of a twig: width at its tip over that at its base */
     float bend;              /* of the midrib, over the length */
-    float fold;              /* how much one half is lighter than the other */
-    float low[2], high[2];   /* the box around it */
-    float color[3], tip[3];
+    float fold;              /* how much lighter one half is than the other */
+    float low[2], high[2];   /* bounding box */
+    float color[3], tip[3];  /* at the base and at the tip */
 } tpc_mark;
 
 typedef struct tpc_spray {
@@ -4037,26 +4053,26 @@ typedef struct tpc_spray {
     int first_row;
 } tpc_spray;
 
-/* What a leaf shape's spray is like. */
+/* The growth habit of a spray, by leaf shape. */
 typedef struct tpc_habit {
     int leaves, twigs, twig_leaves; /* on the stem; side twigs; leaves on each */
     float length, width;            /* of a leaf; half the width over the length */
     float petiole, angle, bend;     /* angle: degrees between leaf and stem */
 } tpc_habit;
 
-/* by treepieces_leaf_shape */
 static const tpc_habit tpc_habits[] = {
     {9, 6, 6, 0.23f, 0.31f, 0.02f, 58, 0.10f},   {7, 5, 4, 0.31f, 0.34f, 0.01f, 55, 0.06f},
     {15, 6, 9, 0.32f, 0.085f, 0.02f, 38, 0.14f}, {8, 6, 6, 0.20f, 0.44f, 0.05f, 62, 0.06f},
     {0, 9, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.105f, 0.42f, 0.06f, 75, 0},
 };
 
-/* Half the width of a leaf at u of its length over the most it has; side: 0..1 how far across. */
+/* Half the width of a leaf at u of its length, over its maximum; side: 0..1 how far from the
+   midrib. */
 static float tpc_outline(int shape, float u, float side) {
     const float arc = 4 * u * (1 - u);
     float v, phase;
     switch (shape) {
-    case TREEPIECES_LEAF_LOBED: /* lobes point forwards */
+    case TREEPIECES_LEAF_LOBED: /* lobes point to the tip */
         phase = 4.3f * (u - 0.14f * side) + 0.1f;
         v = 2 * (phase - floorf(phase)) - 1;
         return arc * (0.52f + 0.75f * u) * (0.4f + 0.64f * sqrtf(txm_maxf(0, 1 - v * v)));
@@ -4076,12 +4092,12 @@ static float tpc_outline(int shape, float u, float side) {
     }
 }
 
-/* The color of a leaf at u of its length and x across it, half the width being `half`. */
+/* The color of a leaf at u of its length and x across; half: half its width there. */
 static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, float color[3]) {
     static const float veins[] = {9, 6, 11, 7}; /* by shape */
     const float across = x < 0 ? -x : x, edge = half > 0 ? across / half : 0;
     float shade = (x < 0 ? 1 - m->fold : 1 + m->fold) * (0.86f + 0.1f * u + 0.1f * edge), light = 0;
-    if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the blade bulging between them */
+    if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the bulges between them */
         const float phase = (u - 0.7f * across) * veins[m->shape] + 100;
         const float between = phase - floorf(phase), off = between < 0.5f ? between : 1 - between;
         shade *= 0.96f + 0.1f * between;
@@ -4099,7 +4115,7 @@ static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, floa
     }
 }
 
-/* Does the mark have that place? Its color there then. color may be NULL. */
+/* Does the mark cover (x, y)? If so, color (may be NULL) receives its color there. */
 static int tpc_mark_at(const tpc_mark *m, float x, float y, float color[3]) {
     if (x < m->low[0] || y < m->low[1] || x > m->high[0] || y > m->high[1]) return 0;
     const float dx = x - m->from[0], dy = y - m->from[1];
@@ -4122,8 +4138,8 @@ static int tpc_mark_at(const tpc_mark *m, float x, float y, float color[3]) {
     return 1;
 }
 
-/* Color of the picture at a place, in the shadow of marks that lie higher; 0: it is transparent
-   there. Of the marks, those listed can be there. */
+/* Color of the spray at (x, y), shadows of higher marks included; 0 if it is transparent there.
+   Only the listed marks are tested. */
 static int tpc_spray_at(const tpc_spray *s, const uint16_t *listed, int count, float x, float y,
                         float color[3]) {
     int is_shaded = 0;
@@ -4138,7 +4154,7 @@ static int tpc_spray_at(const tpc_spray *s, const uint16_t *listed, int count, f
     return 0;
 }
 
-/* Those of the marks in `from` that reach low..high along an axis, with the shadows they throw. */
+/* List the marks in `from` that, with their shadows, overlap low..high along an axis. */
 static int tpc_list_marks(const tpc_spray *s, const uint16_t *from, int count, int axis, float low,
                           float high, uint16_t *listed) {
     int kept = 0;
@@ -4173,15 +4189,15 @@ static void tpc_draw_row(void *context, int index) {
             for (int c = 0; c < 3; c++) sum[c] += color[c];
             covered++;
         }
-        for (int c = 0; c < 3; c++) /* what is transparent too: filtering leaves no dark fringe */
+        /* transparent pixels have a color too, so that filtering shows no dark fringe */
+        for (int c = 0; c < 3; c++)
             txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered
                                                     : 0.85f * s->species->leaf_color[c]);
         txm_image_set(&s->out, x, y, 3, (float)covered / (TPC_SAMPLES * TPC_SAMPLES));
     }
 }
 
-/* A mark from a to b, `half` a width to either side; NULL: there are too many, or it has no
-   length. */
+/* Add a mark from a to b of half width `half`; NULL if there are too many, or if it has no length. */
 static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const float b[2],
                               float half, float bend, const float color[3]) {
     const float dx = b[0] - a[0], dy = b[1] - a[1], length = sqrtf(dx * dx + dy * dy);
@@ -4203,9 +4219,9 @@ static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const f
     return m;
 }
 
-/* A place `length` from a, turned by so many degrees from `heading` (a unit vector), kept off the
-   border by `margin`. */
-static void tpc_go(const float a[2], const float heading[2], float degrees, float length,
+/* b = the point at distance `length` from a in the direction of `heading` (unit length) rotated by
+   `degrees`, kept away from the border by `margin`. */
+static void tpc_advance(const float a[2], const float heading[2], float degrees, float length,
                    float margin, float b[2]) {
     double sine, cosine;
     txm_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
@@ -4215,7 +4231,7 @@ static void tpc_go(const float a[2], const float heading[2], float degrees, floa
     b[1] = txm_clampf(a[1] + length * y, margin, 1 - margin);
 }
 
-/* The leaf color, a bit lighter or darker, yellower or bluer. */
+/* The base color made a little lighter or darker, yellower or bluer, at random. */
 static void tpc_vary_color(tpc_spray *s, const float base[3], float color[3]) {
     const float light = 1 + 0.13f * tpc_signed(&s->rng), warm = 0.09f * tpc_signed(&s->rng);
     color[0] = base[0] * light * (1 + warm);
@@ -4228,6 +4244,7 @@ typedef struct tpc_stem {
     float from[2], to[2], bend;
 } tpc_stem;
 
+/* The point and the direction at s of the length of a stem. */
 static void tpc_stem_at(const tpc_stem *t, float s, float at[2], float heading[2]) {
     const float dx = t->to[0] - t->from[0], dy = t->to[1] - t->from[1];
     const float arc = t->bend * 4 * s * (1 - s), slope = t->bend * 4 * (1 - 2 * s);
@@ -4240,6 +4257,7 @@ static void tpc_stem_at(const tpc_stem *t, float s, float at[2], float heading[2
     heading[1] /= length;
 }
 
+/* Add a stem as a chain of twig marks. */
 static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float half_at_end) {
     const int parts = 8, is_blossom = s->shape == TREEPIECES_LEAF_BLOSSOM;
     float color[3], green[3];
@@ -4265,8 +4283,8 @@ static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float h
     }
 }
 
-/* A leaf on its stalk, seen more or less from above. */
-static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
+/* Add a leaf with its petiole, seen roughly from above. */
+static void tpc_add_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
                          float degrees, float size, const float base[3]) {
     const tpc_habit *habit = &tpc_habits[shape];
     float foot[2], tip[2], color[3];
@@ -4274,8 +4292,8 @@ static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float
     const float half = length * habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
     const float bend = habit->bend * tpc_signed(&s->rng), margin = 0.015f + 0.75f * half;
     tpc_vary_color(s, base, color);
-    tpc_go(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
-    tpc_go(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
+    tpc_advance(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
+    tpc_advance(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
     tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.004f, 0, color);
     if (stalk) stalk->taper = 0.7f;
     tpc_mark *leaf = tpc_add_mark(s, shape, foot, tip, half, bend, color);
@@ -4284,7 +4302,7 @@ static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float
     for (int k = 0; k < 3; k++) leaf->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
 }
 
-/* Five petals about a middle with stamens, seen askew. */
+/* Add a flower: five petals and the stamens, seen obliquely. */
 static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
     static const float white[3] = {1, 0.97f, 0.975f}, anther[3] = {0.85f, 0.62f, 0.25f};
     static const float up[2] = {0, -1};
@@ -4299,8 +4317,8 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
         txm_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
         const float length = radius * (1 - squash * (float)(cosine * cosine));
         const float half = 0.46f * radius * (1 - squash * (float)(sine * sine));
-        tpc_go(at, up, angle, 0.08f * radius, 0.01f, foot);
-        tpc_go(at, up, angle, length, 0.01f, tip);
+        tpc_advance(at, up, angle, 0.08f * radius, 0.01f, foot);
+        tpc_advance(at, up, angle, length, 0.01f, tip);
         tpc_mark *petal = tpc_add_mark(s, TREEPIECES_LEAF_BLOSSOM, foot, tip, half, 0, deep);
         if (!petal) return;
         const float paler = 0.45f + 0.35f * txm_rng_float(&s->rng);
@@ -4313,15 +4331,16 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
     for (int i = 0; i < 9; i++) {
         const float angle = 40 * (float)i + 15 * tpc_signed(&s->rng);
         float tip[2], top[2];
-        tpc_go(at, up, angle, radius * (0.2f + 0.2f * txm_rng_float(&s->rng)), 0.01f, tip);
-        tpc_go(tip, up, angle, 0.07f * radius, 0.01f, top);
+        tpc_advance(at, up, angle, radius * (0.2f + 0.2f * txm_rng_float(&s->rng)), 0.01f, tip);
+        tpc_advance(tip, up, angle, 0.07f * radius, 0.01f, top);
         tpc_add_mark(s, TPC_TWIG, at, tip, 0.014f * radius, 0, deep);
         tpc_add_mark(s, TPC_TWIG, tip, top, 0.04f * radius, 0, anther);
     }
 }
 
-/* What grows on a twig: leaves to both sides in turn and one at the end. */
-static void tpc_dress(tpc_spray *s, const tpc_stem *stem, int count, float first, float size) {
+/* Add the leaves or flowers of a twig: on alternate sides, and one at the end. */
+static void tpc_add_foliage(tpc_spray *s, const tpc_stem *stem, int count, float first,
+                            float size) {
     static const float young[3] = {0.42f, 0.55f, 0.2f};
     const tpc_habit *habit = &tpc_habits[s->shape];
     float side = txm_rng_float(&s->rng) < 0.5f ? -1.0f : 1.0f;
@@ -4333,18 +4352,18 @@ static void tpc_dress(tpc_spray *s, const tpc_stem *stem, int count, float first
         float at[2], heading[2], middle[2];
         tpc_stem_at(stem, along, at, heading);
         if (s->shape != TREEPIECES_LEAF_BLOSSOM) {
-            tpc_put_leaf(s, s->shape, at, heading, angle, size * (1.05f - 0.3f * along * along),
+            tpc_add_leaf(s, s->shape, at, heading, angle, size * (1.05f - 0.3f * along * along),
                          s->species->leaf_color);
             continue;
         }
         if (is_last || txm_rng_float(&s->rng) < 0.35f)
-            tpc_put_leaf(s, TREEPIECES_LEAF_LANCE, at, heading, -0.6f * angle, 0.4f, young);
-        tpc_go(at, heading, angle, habit->petiole, 0.13f, middle);
+            tpc_add_leaf(s, TREEPIECES_LEAF_LANCE, at, heading, -0.6f * angle, 0.4f, young);
+        tpc_advance(at, heading, angle, habit->petiole, 0.13f, middle);
         tpc_add_flower(s, middle, habit->length * (0.85f + 0.25f * txm_rng_float(&s->rng)));
     }
 }
 
-/* Needles on both sides of a twig and towards the eye. */
+/* Add needles on both sides of a twig and towards the viewer. */
 static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
     const tpc_habit *habit = &tpc_habits[TREEPIECES_LEAF_NEEDLE];
     const float dx = stem->to[0] - stem->from[0], dy = stem->to[1] - stem->from[1];
@@ -4357,7 +4376,7 @@ static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
         float at[2], heading[2], tip[2], color[3];
         tpc_stem_at(stem, along, at, heading);
         tpc_vary_color(s, s->species->leaf_color, color);
-        tpc_go(at, heading, angle + 12 * tpc_signed(&s->rng), length, 0.01f, tip);
+        tpc_advance(at, heading, angle + 12 * tpc_signed(&s->rng), length, 0.01f, tip);
         tpc_mark *m = tpc_add_mark(s, TREEPIECES_LEAF_NEEDLE, at, tip, habit->width * habit->length,
                                    habit->bend * tpc_signed(&s->rng), color);
         for (int k = 0; m && k < 3; k++) {
@@ -4367,8 +4386,9 @@ static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
     }
 }
 
-/* The whole spray: a stem from the middle of the lower side upwards, twigs to both sides. */
-static void tpc_compose(tpc_spray *s) {
+/* Add all marks of the spray: a stem upwards from the middle of the lower side, twigs on both
+   sides. */
+static void tpc_make_spray(tpc_spray *s) {
     const tpc_habit *habit = &tpc_habits[s->shape];
     const int is_needle = s->shape == TREEPIECES_LEAF_NEEDLE;
     const float top = is_needle ? 0.12f : 0.97f * habit->length + 0.03f;
@@ -4384,19 +4404,19 @@ static void tpc_compose(tpc_spray *s) {
         tpc_stem twig;
         float heading[2];
         tpc_stem_at(&stem, along, twig.from, heading);
-        tpc_go(twig.from, heading, angle, length, 0.12f, twig.to);
+        tpc_advance(twig.from, heading, angle, length, 0.12f, twig.to);
         twig.bend = -0.08f * side;
         tpc_add_stem(s, &twig, 0.007f, 0.003f);
         if (is_needle) tpc_add_needles(s, &twig, 0.08f);
-        else tpc_dress(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
+        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
     }
     if (is_needle) tpc_add_needles(s, &stem, 0.03f);
-    else tpc_dress(s, &stem, habit->leaves, 0.14f, 1);
+    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 1);
 }
 
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out) {
-    enum { ROWS = 64 }; /* between two reports */
+    enum { ROWS = 64 }; /* between two progress reports */
     tpc_spray spray;
     if (!species) return txm_fail(env, TXM_BAD_ARGUMENT, "species is NULL");
     txm_status status = txm_image_check(&out, "out", 0, env);
@@ -4410,7 +4430,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
     spray.rng = txm_rng_make(seed, 0x59a7);
     spray.out = txm_image_resolve(out);
-    tpc_compose(&spray);
+    tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
         if (txm_progress(env, (float)y / (float)out.height, "leaves"))
@@ -4427,23 +4447,24 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
 
        (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.65 + 0.35 min(1, p.p))
 
-   with the card's normal n, l towards the light and f the view's forward: light that wraps around,
-   light that shines through when the sun stands behind, and shade in the cloud's middle. Texels are
-   the nearest, numbers sRGB as they are: a shader does the same in three lines. Cards whose plane
-   is seen at a sine below 0.1 are left out: they would be rows of dots. */
+   with the normal n of the card, l towards the light and the forward axis f of the view: wrap
+   lighting, light transmitted by leaves when the sun is behind them, and shade in the middle of the
+   cloud. The nearest texel is taken, sRGB values are used as they are: a shader does the same in
+   three lines. Cards seen at an angle with a sine below 0.1 are skipped: they would be rows of
+   dots. */
 static float tpc_card_light(const treepieces_impostor_desc *d, const treepieces_card *card) {
     const float direct = txm_clampf(0.35f + 0.65f * tpc_dot(card->normal, d->light), 0, 1);
     return 0.7f + 0.6f * direct + 0.2f * txm_maxf(0, tpc_dot(d->forward, d->light));
 }
 
-/* First and last pixel, of count, whose middles lie in low..high of -1..1. */
+/* First and last of `count` pixels whose centres lie in low..high, where -1..1 is the image. */
 static void tpc_pixels(float low, float high, int count, int *first, int *last) {
     const float n = (float)count;
     *first = (int)txm_clampf((low + 1) * 0.5f * n - 0.5f, 0, n);
     *last = (int)txm_clampf((high + 1) * 0.5f * n + 0.5f, -1, n - 1);
 }
 
-/* The texel at s, t of a card, -1..1 to the right and up. */
+/* The texel at (s, t) of a card, each -1..1, to the right and up. */
 static const uint8_t *tpc_texel(const txm_image *leaves, float s, float t) {
     const int x = (int)((s + 1) * 0.5f * (float)leaves->width);
     const int y = (int)((1 - t) * 0.5f * (float)leaves->height);
@@ -4464,7 +4485,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     const float area = tpc_dot(card->right, card->right) * tpc_dot(card->up, card->up);
     int left, right, top, bottom;
     if (!(det * det > 0.01f * area)) return; /* seen edge on */
-    if (!(fabsf(c[0]) + fabsf(c[1]) + wide + high < 1e6f)) return; /* not of this world */
+    if (!(fabsf(c[0]) + fabsf(c[1]) + wide + high < 1e6f)) return; /* too large or not finite */
     tpc_pixels(c[0] - wide, c[0] + wide, color->width, &left, &right);
     tpc_pixels(-c[1] - high, high - c[1], color->height, &top, &bottom);
     for (int row = top; row <= bottom; row++) {
@@ -4491,7 +4512,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     }
 }
 
-/* Unit vectors at right angles? */
+/* Are the axes orthogonal unit vectors, and is light of unit length? */
 static int tpc_is_view(const treepieces_impostor_desc *d) {
     const float *v[4] = {d->right, d->up, d->forward, d->light};
     for (int i = 0; i < 4; i++) {
@@ -4517,8 +4538,8 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
         return txm_fail(env, TXM_BAD_ARGUMENT, "depth must be float, 1 channel, of color's size");
     if (!tpc_is_view(desc))
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "right, up, forward and light must be unit vectors, the first three at "
-                        "right angles");
+                        "right, up, forward and light must be unit vectors, the first three "
+                        "orthogonal");
     for (int y = 0; y < c.height; y++) {
         float *depths = (float *)txm_image_row(&d, y);
         memset(txm_image_row(&c, y), 0, 4 * (size_t)c.width);
@@ -4539,11 +4560,11 @@ enum {
 
 /* A mesh with its memory. */
 typedef struct tpc_mesh {
-    treepieces_mesh mesh; /* first: the one is the other */
+    treepieces_mesh mesh; /* first, so that a pointer to it is one to this */
     txm_arena arena;
 } tpc_mesh;
 
-/* An empty mesh in an arena of its own; NULL: no memory. */
+/* An empty mesh in its own arena; NULL: no memory. */
 static tpc_mesh *tpc_make_mesh(const txm_env *env) {
     txm_arena arena;
     txm_arena_init(&arena, env);
@@ -4552,7 +4573,7 @@ static tpc_mesh *tpc_make_mesh(const txm_env *env) {
     return made;
 }
 
-/* Room for so many vertices and triangles; 0: no memory. */
+/* Allocate the arrays for this many vertices and triangles; 0: no memory. */
 static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
     treepieces_mesh *m = &made->mesh;
     m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
@@ -4570,14 +4591,14 @@ TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
     txm_arena_free(&arena);
 }
 
-/* The mesh if it was made, else NULL, and nothing stays allocated. */
-static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
+/* The mesh if all went well; else it is released, and NULL. */
+static treepieces_mesh *tpc_finish_mesh(tpc_mesh *made, txm_status status) {
     if (status == TXM_OK) return &made->mesh;
     if (made) treepieces_mesh_free(&made->mesh);
     return NULL;
 }
 
-/* A mesh while it is baked. */
+/* A mesh under construction. */
 typedef struct tpc_baking {
     const treepieces_bake_desc *desc;
     const treepieces_forest *forest;
@@ -4585,14 +4606,14 @@ typedef struct tpc_baking {
     treepieces_lod lod;
     int sheet_size, layers;
     treepieces_mesh *out;
-    int is_broken; /* met a position that is no number */
+    int is_broken; /* a position was not finite */
     uint32_t *table; /* vertex + 1 by hash of its position; 0 = free */
     size_t table_mask;
-    /* the quad at work */
+    /* the current quad */
     float coords[2 * TPC_PATTERN_VERTICES];
     uint16_t indices[3 * TPC_PATTERN_TRIANGLES];
     uint32_t numbers[TPC_PATTERN_VERTICES]; /* in the mesh */
-    /* the piece at work */
+    /* the current piece */
     float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
     uint32_t joints[4];
 } tpc_baking;
@@ -4601,7 +4622,7 @@ static int tpc_is_tessellated(const tpc_baking *b) {
     return b->lod.max_level > 1;
 }
 
-/* Levels of a quad whose corners are given. */
+/* The tessellation levels of a quad: returns the inner one. */
 static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int edges[4]) {
     for (int k = 0; k < 4; k++) edges[k] = 1;
     if (!tpc_is_tessellated(b)) return 1;
@@ -4610,8 +4631,8 @@ static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int e
     return treepieces_inner_level(&b->lod, positions);
 }
 
-/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out:
-   its bits are nobody's promise, so there might come more vertices than were counted. */
+/* The vertex at exactly this position; a new one if there is none. A NaN is refused: its bits are
+   not reproducible, so that there could be more vertices than were counted. */
 static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
                          const float weights[4]) {
     treepieces_mesh *m = b->out;
@@ -4640,7 +4661,7 @@ static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float nor
     return (uint32_t)i;
 }
 
-/* How well a triangle faces where its corners' normals point; below 0: away from there. */
+/* How well a triangle faces the direction of the normals; below 0: it faces away. */
 static float tpc_facing(const float *a, const float *b, const float *c, const float normals[12]) {
     float u[3], v[3], n[3], cross[3];
     for (int k = 0; k < 3; k++) {
@@ -4653,7 +4674,7 @@ static float tpc_facing(const float *a, const float *b, const float *c, const fl
     return length > 0 ? tpc_dot(cross, n) / length : 0;
 }
 
-/* Split a quad of level 1 along the diagonal that leaves the worse of its triangles the better. */
+/* Split a quad of level 1 along the diagonal whose worse triangle is better. */
 static void tpc_choose_diagonal(const float p[12], const float n[12], uint16_t indices[6]) {
     static const uint16_t other[6] = {1, 2, 3, 1, 3, 0};
     const float kept = txm_minf(tpc_facing(p, p + 3, p + 6, n), tpc_facing(p, p + 6, p + 9, n));
@@ -4679,7 +4700,7 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
     for (int i = 0; i < vertices; i++) {
         const float u = b->coords[2 * i], v = b->coords[2 * i + 1];
         float w[4], position[3], normal[3], weights[4], sum = 0;
-        tpc_weigh(u, v, w);
+        tpc_corner_weights(u, v, w);
         treepieces_patch_point(positions, normals, b->lod.shape, u, v, position, normal);
         for (int k = 0; k < 4; k++) {
             const treepieces_vertex *c = piece->vertices;
@@ -4694,7 +4715,7 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
         const size_t at = 3 * b->out->triangle_count + (size_t)i;
         const float u = b->coords[2 * b->indices[i]], v = b->coords[2 * b->indices[i] + 1];
         float w[4];
-        tpc_weigh(u, v, w);
+        tpc_corner_weights(u, v, w);
         b->out->indices[at] = b->numbers[b->indices[i]];
         b->out->uvs[2 * at] = tpc_mix(w, uv[0][0], uv[1][0], uv[2][0], uv[3][0]);
         b->out->uvs[2 * at + 1] =
@@ -4703,11 +4724,11 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
     b->out->triangle_count += (size_t)triangles;
 }
 
-/* The records of a tree lie together, of each type; *count receives how many. */
+/* The first record of a tree in a batch, where its records are contiguous; *count: how many. */
 static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces_tree *tree,
                                  uint32_t *count) {
     uint32_t ends[2];
-    for (int e = 0; e < 2; e++) { /* the first with a bone of at least ... */
+    for (int e = 0; e < 2; e++) { /* the first record whose bone is not lower */
         const uint32_t bone = tree->first_node + (e ? tree->node_count : 0);
         uint32_t low = 0, high = batch->count;
         while (low < high) {
@@ -4721,7 +4742,7 @@ static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces
     return ends[0];
 }
 
-/* Visit all quads: count what they need (out NULL), or bake them. */
+/* Visit all quads: count vertices and triangles (out NULL), or bake them. */
 static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, size_t *triangles) {
     uint32_t done = 0;
     for (int t = 0; t < b->forest->type_count; t++) {
@@ -4762,18 +4783,18 @@ static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, s
                 *triangles += (size_t)more;
             }
             if (b->is_broken)
-                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are infinite, flat or no numbers");
+                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are not finite, or flat");
         }
     }
     return TXM_OK;
 }
 
-/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and
-   where they lie in the circle about the rim. */
+/* The vertices along the root rim and at its centre: their numbers in the mesh, and their positions
+   in the plane of the rim. */
 typedef struct tpc_cap {
     uint32_t numbers[TREEPIECES_RIM * 64 + 1];
     float places[TREEPIECES_RIM * 64 + 1][2];
-    int count; /* without the middle */
+    int count; /* without the centre */
 } tpc_cap;
 
 static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *cap) {
@@ -4790,7 +4811,7 @@ static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *
         tpc_rim_vertex((j + 1) % TREEPIECES_RIM, to, normal);
         const int level = tpc_is_tessellated(b) ? treepieces_edge_level(&b->lod, p, p + 3) : 1;
         for (int i = 0; i < level; i++, cap->count++) {
-            const float t = tpc_place_along(i, level);
+            const float t = tpc_fraction(i, level);
             treepieces_patch_point(p, normals, b->lod.shape, 0, t, at, normal);
             cap->numbers[cap->count] = tpc_weld(b, at, normal, own);
             cap->places[cap->count][0] = (1 - t) * from[0] + t * to[0];
@@ -4799,8 +4820,8 @@ static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *
     }
 }
 
-/* Close the foot: a hexagon by a fan of four; a finer rim, which need be neither convex nor bent at
-   all, by one about its middle. */
+/* Close the base: a hexagon by a fan of four triangles, a finer rim, which need not be convex, by a
+   fan about its centre. */
 static void tpc_bake_cap(tpc_baking *b) {
     const float own[4] = {1, 0, 0, 0}, middle[3] = {0, 0, 0}, down[3] = {0, -1, 0};
     const int type = b->forest->nodes[b->tree->first_node].type;
@@ -4825,7 +4846,7 @@ static void tpc_bake_cap(tpc_baking *b) {
         const int corners[3] = {hub, (i + 1) % cap.count, i}; /* seen from below */
         for (int k = 0; k < 3; k++) {
             const size_t at = 3 * m->triangle_count + (size_t)k;
-            const float *place = cap.places[corners[k]]; /* on all of layer 0 */
+            const float *place = cap.places[corners[k]]; /* covers layer 0 */
             m->indices[at] = cap.numbers[corners[k]];
             m->uvs[2 * at] = 0.5f + 0.49f * place[0];
             m->uvs[2 * at + 1] = (0.5f - 0.49f * place[1]) / (float)b->layers;
@@ -4888,13 +4909,13 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
         txm_free(env, b->table);
     }
     txm_free(env, b);
-    *out = tpc_hand_over(made, status);
+    *out = tpc_finish_mesh(made, status);
     return status;
 }
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */
 
-/* Card number `index` of the mesh, of a cloud about `center`. */
+/* Write card number `index` of the mesh, of a cloud about `center`. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
                           const float center[3], float radius, uint32_t joint) {
     static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
@@ -4957,7 +4978,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
                           c->node - t->first_node);
     }
     txm_arena_free(&scratch);
-    *out = tpc_hand_over(made, status);
+    *out = tpc_finish_mesh(made, status);
     return status;
 }
 

@@ -102,7 +102,7 @@ rm -f ./*.obj ./*.ply
 check "the species as text" run 0 tree -o mine.txt --species birch
 check "is refused with the line where it is wrong" sh -c "
     sed 's/^leaf_count .*/leaf_count many/' mine.txt >wrong.txt"
-refuses 1 "is no number" tree -o n.glb --species wrong.txt
+refuses 1 "is not a number" tree -o n.glb --species wrong.txt
 printf 'like oak\nname mine\nleaf_count 0\n' >mine.txt
 check "a species like another" run 0 tree -o mine.glb --species mine.txt --pieces 60
 check "is without its leaves" $check_tree skin mine.glb materials=1

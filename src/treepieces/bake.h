@@ -16,11 +16,11 @@ enum {
 
 /* A mesh with its memory. */
 typedef struct tpc_mesh {
-    treepieces_mesh mesh; /* first: the one is the other */
+    treepieces_mesh mesh; /* first, so that a pointer to it is one to this */
     txm_arena arena;
 } tpc_mesh;
 
-/* An empty mesh in an arena of its own; NULL: no memory. */
+/* An empty mesh in its own arena; NULL: no memory. */
 static tpc_mesh *tpc_make_mesh(const txm_env *env) {
     txm_arena arena;
     txm_arena_init(&arena, env);
@@ -29,7 +29,7 @@ static tpc_mesh *tpc_make_mesh(const txm_env *env) {
     return made;
 }
 
-/* Room for so many vertices and triangles; 0: no memory. */
+/* Allocate the arrays for this many vertices and triangles; 0: no memory. */
 static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
     treepieces_mesh *m = &made->mesh;
     m->positions = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
@@ -47,14 +47,14 @@ TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh) {
     txm_arena_free(&arena);
 }
 
-/* The mesh if it was made, else NULL, and nothing stays allocated. */
-static treepieces_mesh *tpc_hand_over(tpc_mesh *made, txm_status status) {
+/* The mesh if all went well; else it is released, and NULL. */
+static treepieces_mesh *tpc_finish_mesh(tpc_mesh *made, txm_status status) {
     if (status == TXM_OK) return &made->mesh;
     if (made) treepieces_mesh_free(&made->mesh);
     return NULL;
 }
 
-/* A mesh while it is baked. */
+/* A mesh under construction. */
 typedef struct tpc_baking {
     const treepieces_bake_desc *desc;
     const treepieces_forest *forest;
@@ -62,14 +62,14 @@ typedef struct tpc_baking {
     treepieces_lod lod;
     int sheet_size, layers;
     treepieces_mesh *out;
-    int is_broken; /* met a position that is no number */
+    int is_broken; /* a position was not finite */
     uint32_t *table; /* vertex + 1 by hash of its position; 0 = free */
     size_t table_mask;
-    /* the quad at work */
+    /* the current quad */
     float coords[2 * TPC_PATTERN_VERTICES];
     uint16_t indices[3 * TPC_PATTERN_TRIANGLES];
     uint32_t numbers[TPC_PATTERN_VERTICES]; /* in the mesh */
-    /* the piece at work */
+    /* the current piece */
     float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
     uint32_t joints[4];
 } tpc_baking;
@@ -78,7 +78,7 @@ static int tpc_is_tessellated(const tpc_baking *b) {
     return b->lod.max_level > 1;
 }
 
-/* Levels of a quad whose corners are given. */
+/* The tessellation levels of a quad: returns the inner one. */
 static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int edges[4]) {
     for (int k = 0; k < 4; k++) edges[k] = 1;
     if (!tpc_is_tessellated(b)) return 1;
@@ -87,8 +87,8 @@ static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int e
     return treepieces_inner_level(&b->lod, positions);
 }
 
-/* The vertex at this place to the bit, a new one if there is none. What is no number is kept out:
-   its bits are nobody's promise, so there might come more vertices than were counted. */
+/* The vertex at exactly this position; a new one if there is none. A NaN is refused: its bits are
+   not reproducible, so that there could be more vertices than were counted. */
 static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
                          const float weights[4]) {
     treepieces_mesh *m = b->out;
@@ -117,7 +117,7 @@ static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float nor
     return (uint32_t)i;
 }
 
-/* How well a triangle faces where its corners' normals point; below 0: away from there. */
+/* How well a triangle faces the direction of the normals; below 0: it faces away. */
 static float tpc_facing(const float *a, const float *b, const float *c, const float normals[12]) {
     float u[3], v[3], n[3], cross[3];
     for (int k = 0; k < 3; k++) {
@@ -130,7 +130,7 @@ static float tpc_facing(const float *a, const float *b, const float *c, const fl
     return length > 0 ? tpc_dot(cross, n) / length : 0;
 }
 
-/* Split a quad of level 1 along the diagonal that leaves the worse of its triangles the better. */
+/* Split a quad of level 1 along the diagonal whose worse triangle is better. */
 static void tpc_choose_diagonal(const float p[12], const float n[12], uint16_t indices[6]) {
     static const uint16_t other[6] = {1, 2, 3, 1, 3, 0};
     const float kept = txm_minf(tpc_facing(p, p + 3, p + 6, n), tpc_facing(p, p + 6, p + 9, n));
@@ -156,7 +156,7 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
     for (int i = 0; i < vertices; i++) {
         const float u = b->coords[2 * i], v = b->coords[2 * i + 1];
         float w[4], position[3], normal[3], weights[4], sum = 0;
-        tpc_weigh(u, v, w);
+        tpc_corner_weights(u, v, w);
         treepieces_patch_point(positions, normals, b->lod.shape, u, v, position, normal);
         for (int k = 0; k < 4; k++) {
             const treepieces_vertex *c = piece->vertices;
@@ -171,7 +171,7 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
         const size_t at = 3 * b->out->triangle_count + (size_t)i;
         const float u = b->coords[2 * b->indices[i]], v = b->coords[2 * b->indices[i] + 1];
         float w[4];
-        tpc_weigh(u, v, w);
+        tpc_corner_weights(u, v, w);
         b->out->indices[at] = b->numbers[b->indices[i]];
         b->out->uvs[2 * at] = tpc_mix(w, uv[0][0], uv[1][0], uv[2][0], uv[3][0]);
         b->out->uvs[2 * at + 1] =
@@ -180,11 +180,11 @@ static void tpc_bake_quad(tpc_baking *b, const treepieces_piece *piece, const ui
     b->out->triangle_count += (size_t)triangles;
 }
 
-/* The records of a tree lie together, of each type; *count receives how many. */
+/* The first record of a tree in a batch, where its records are contiguous; *count: how many. */
 static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces_tree *tree,
                                  uint32_t *count) {
     uint32_t ends[2];
-    for (int e = 0; e < 2; e++) { /* the first with a bone of at least ... */
+    for (int e = 0; e < 2; e++) { /* the first record whose bone is not lower */
         const uint32_t bone = tree->first_node + (e ? tree->node_count : 0);
         uint32_t low = 0, high = batch->count;
         while (low < high) {
@@ -198,7 +198,7 @@ static uint32_t tpc_first_record(const treepieces_batch *batch, const treepieces
     return ends[0];
 }
 
-/* Visit all quads: count what they need (out NULL), or bake them. */
+/* Visit all quads: count vertices and triangles (out NULL), or bake them. */
 static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, size_t *triangles) {
     uint32_t done = 0;
     for (int t = 0; t < b->forest->type_count; t++) {
@@ -239,18 +239,18 @@ static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, s
                 *triangles += (size_t)more;
             }
             if (b->is_broken)
-                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are infinite, flat or no numbers");
+                return txm_fail(env, TXM_BAD_ARGUMENT, "bones are not finite, or flat");
         }
     }
     return TXM_OK;
 }
 
-/* The points of the root rim, place after place, and its middle: their numbers in the mesh, and
-   where they lie in the circle about the rim. */
+/* The vertices along the root rim and at its centre: their numbers in the mesh, and their positions
+   in the plane of the rim. */
 typedef struct tpc_cap {
     uint32_t numbers[TREEPIECES_RIM * 64 + 1];
     float places[TREEPIECES_RIM * 64 + 1][2];
-    int count; /* without the middle */
+    int count; /* without the centre */
 } tpc_cap;
 
 static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *cap) {
@@ -267,7 +267,7 @@ static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *
         tpc_rim_vertex((j + 1) % TREEPIECES_RIM, to, normal);
         const int level = tpc_is_tessellated(b) ? treepieces_edge_level(&b->lod, p, p + 3) : 1;
         for (int i = 0; i < level; i++, cap->count++) {
-            const float t = tpc_place_along(i, level);
+            const float t = tpc_fraction(i, level);
             treepieces_patch_point(p, normals, b->lod.shape, 0, t, at, normal);
             cap->numbers[cap->count] = tpc_weld(b, at, normal, own);
             cap->places[cap->count][0] = (1 - t) * from[0] + t * to[0];
@@ -276,8 +276,8 @@ static void tpc_find_cap(tpc_baking *b, const treepieces_piece *piece, tpc_cap *
     }
 }
 
-/* Close the foot: a hexagon by a fan of four; a finer rim, which need be neither convex nor bent at
-   all, by one about its middle. */
+/* Close the base: a hexagon by a fan of four triangles, a finer rim, which need not be convex, by a
+   fan about its centre. */
 static void tpc_bake_cap(tpc_baking *b) {
     const float own[4] = {1, 0, 0, 0}, middle[3] = {0, 0, 0}, down[3] = {0, -1, 0};
     const int type = b->forest->nodes[b->tree->first_node].type;
@@ -302,7 +302,7 @@ static void tpc_bake_cap(tpc_baking *b) {
         const int corners[3] = {hub, (i + 1) % cap.count, i}; /* seen from below */
         for (int k = 0; k < 3; k++) {
             const size_t at = 3 * m->triangle_count + (size_t)k;
-            const float *place = cap.places[corners[k]]; /* on all of layer 0 */
+            const float *place = cap.places[corners[k]]; /* covers layer 0 */
             m->indices[at] = cap.numbers[corners[k]];
             m->uvs[2 * at] = 0.5f + 0.49f * place[0];
             m->uvs[2 * at + 1] = (0.5f - 0.49f * place[1]) / (float)b->layers;
@@ -365,13 +365,13 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
         txm_free(env, b->table);
     }
     txm_free(env, b);
-    *out = tpc_hand_over(made, status);
+    *out = tpc_finish_mesh(made, status);
     return status;
 }
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */
 
-/* Card number `index` of the mesh, of a cloud about `center`. */
+/* Write card number `index` of the mesh, of a cloud about `center`. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
                           const float center[3], float radius, uint32_t joint) {
     static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
@@ -434,7 +434,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
                           c->node - t->first_node);
     }
     txm_arena_free(&scratch);
-    *out = tpc_hand_over(made, status);
+    *out = tpc_finish_mesh(made, status);
     return status;
 }
 

@@ -3,7 +3,7 @@
 
 #include "../treepieces.h"
 
-/* ---- bark: sheets out of framed tiles ------------------------------------------------------ */
+/* ---- bark: sheets of framed tiles --------------------------------------------------------- */
 
 TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc) {
     int layers = TREEPIECES_OWN;
@@ -46,14 +46,14 @@ static txm_status tpc_check_bark(const treepieces_bark_desc *d, const txm_image 
     return TXM_OK;
 }
 
-/* A number of a tile of that class, at random; -1: there is none. */
+/* A random tile of a class, if possible not one of the two given; -1: there is none. */
 static int tpc_pick_tile(const treepieces_bark_desc *d, int tile_class, txm_rng *rng, int unlike,
                          int unlike_too) {
     int best = -1;
     uint32_t most = 0;
     for (int i = 0; i < d->tile_count; i++) {
         if ((d->classes ? d->classes[i] : TREEPIECES_BARK) != tile_class) continue;
-        /* not like its neighbours as long as there is another */
+        /* others come before those two */
         const uint32_t preferred = i != unlike && i != unlike_too ? 1u << 31 : 1;
         const uint32_t ticket = (txm_rng_next(rng) >> 1) | preferred;
         if (ticket > most) {
@@ -70,18 +70,18 @@ static float tpc_fade(float x) {
     return t * t * (3 - 2 * t);
 }
 
-/* A cell of the lowest row: (x, y) of its tile blended with what its class wants at the south side.
-   lower: four tiles of half the size for HALVING. */
+/* Texel (x, y) of a cell of the lowest row: its tile, blended towards the south side with what the
+   layer requires there. lower: four tiles, shown at half size, for HALVING. */
 static float tpc_blend_texel(const txm_image *tile, const txm_image *const lower[4], int layer,
                              int x, int y, int c) {
     const int last = tile->width - 1, size = tile->width;
     const float plain = txm_image_get(tile, x, y, c);
     const float rise = (float)(last - y) / (float)size; /* from the south side, in tiles */
     float other = plain, weight = 0;
-    if (layer == TREEPIECES_FOLD) { /* as much of itself mirrored: then both sides are the same */
+    if (layer == TREEPIECES_FOLD) { /* half of its mirror image: then it is symmetric */
         weight = 0.5f * tpc_fade(4 * rise);
         other = txm_image_get(tile, last - x, y, c);
-    } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side lies at the south */
+    } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side, turned to the south */
         weight = tpc_fade(2 * rise);
         other = txm_image_get(tile, last - y, x, c);
     } else if (layer == TREEPIECES_TURN_RIGHT) { /* its east side */
@@ -113,7 +113,7 @@ static void tpc_draw_cell(const txm_image *out, int column, int top, const txm_i
     }
 }
 
-/* Tiles of an own class: each on 2 x 2 cells, continued by its border. */
+/* A layer of one of the caller's classes: each tile on 2 x 2 cells, extended by its border. */
 static void tpc_draw_own(const treepieces_bark_desc *d, const txm_image *out, int layer,
                          txm_rng *rng) {
     const int size = txm_image_resolve(d->tiles[0]).width, first = layer * TREEPIECES_SHEET * size;
@@ -183,7 +183,7 @@ TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t band
 
 /* ---- bark: drawn ---------------------------------------------------------------------------- */
 
-/* Smooth noise of 0..1 on the unit torus with columns x rows cells. */
+/* Smooth value noise, 0..1, on the unit torus with columns x rows cells. */
 static float tpc_noise(float x, float y, int columns, int rows, uint64_t seed) {
     const float u = x * (float)columns, v = y * (float)rows;
     const int i = (int)u, j = (int)v;
@@ -197,8 +197,8 @@ static float tpc_noise(float x, float y, int columns, int rows, uint64_t seed) {
     return txm_lerpf(txm_lerpf(corner[0], corner[1], s), txm_lerpf(corner[2], corner[3], s), t);
 }
 
-/* The noise of tile `number`: all tiles have that of number 0 at their border. The sum of two is
-   brought back to the contrast of one. */
+/* Noise for tile `number`: its own inside, one that all tiles share at the border. The blend is
+   scaled so that its contrast is that of either. */
 static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t seed, int number) {
     const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
     const float inside = 1 - tpc_fade((border - 0.03f) * 5), outside = 1 - inside;
@@ -208,8 +208,8 @@ static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t 
     return 0.5f + (outside * frame + inside * own) / sqrtf(inside * inside + outside * outside);
 }
 
-/* How light bark is at a place, about 1: plates between fissures along the stem. The fissures meet
-   the frame at the same places in all tiles and wander in between; so no frame shows. */
+/* Brightness of bark, about 1: plates between fissures along the stem. The fissures cross the frame
+   at the same places in all tiles and wander in between, so that the frame is not visible. */
 static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
     enum { PLATES = 3, CRACKS = 2 }; /* across and along a tile */
     const float slow = tpc_framed_noise(x, y, 4, 3, seed + 1000, number) - 0.5f;
@@ -219,7 +219,7 @@ static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
     const int plate = (int)across;
     const float f = across - (float)plate, edge = txm_minf(f, 1 - f);
     const float gap = 0.1f + 0.3f * tpc_framed_noise(x, y, 6, 3, seed + 4000, number);
-    /* cracks across a plate, at a height of its own */
+    /* cracks across a plate, at heights that differ from plate to plate */
     const uint64_t own = txm_hash(seed + 9000 + (uint64_t)(plate % PLATES));
     const float bend = tpc_framed_noise(x, y, 3, 4, seed + 5000, number) - 0.5f;
     const float along = (float)CRACKS * (1 + y) + (float)(own >> 60) / 16 + 0.9f * bend;
@@ -227,12 +227,13 @@ static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
     const float open = 2.4f * (tpc_framed_noise(x, y, 5, 4, seed + 6000, number) - 0.42f);
     const float crack = tpc_fade(txm_minf(g, 1 - g) / 0.09f) * txm_clampf(open, 0, 1);
     const float depth = txm_maxf(tpc_fade(edge / gap), 0.75f * crack);
-    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick; /* lit aslant */
+    /* a plate is lit from one side */
+    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick;
     return 0.46f + top * (1 - depth) + (0.4f - 0.2f * depth) * grain;
 }
 
-/* Smooth pale bark with dark lenticels across it, as birches have; none lie on the frame, where
-   they would be seen again and again. */
+/* Smooth pale bark with dark lenticels across it, as of birches; none lie on the frame, where their
+   repetition would be visible. */
 static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
     const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
     const float inside = 1 - tpc_fade((border - 0.03f) * 5);

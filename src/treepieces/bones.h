@@ -12,14 +12,14 @@ typedef struct tpc_posing {
     float *state, *bones;
 } tpc_posing;
 
-/* q = q p, with p the rotation about the level axis (x, 0, z) by about its length, in radians */
+/* q = q p, with p the rotation about the axis (x, 0, z) by about its length, in radians */
 static void tpc_bend(float q[4], float x, float z) {
     const float a = 0.5f * x, c = 0.5f * z, w = 1 / sqrtf(1 + a * a + c * c);
     const float p[4] = {w * a, 0, w * c, w};
     tpc_multiply(q, p, q);
 }
 
-/* A random bend of the pose, the same for this node at any time. */
+/* Apply the pose to a joint: its random bend, which is a hash of the node, and its own rotation. */
 static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4]) {
     if (pose->amount > 0) {
         const uint64_t h = txm_hash(pose->seed ^ ((uint64_t)node + 1) * 0x9e3779b97f4a7c15u);
@@ -29,7 +29,7 @@ static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4
     if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
 }
 
-/* The wind on a joint, seen in its frame (x and z across the stem), and one step of its swing. */
+/* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. */
 static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_t look,
                            const float wind[3], float yield, float *state, float q[4]) {
     const float back[4] = {-q[0], -q[1], -q[2], q[3]};
@@ -39,7 +39,7 @@ static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_
     const float other = air->classes[n->sway].flutter[look >> 3 & (TPC_PHASES - 1)];
     const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
     const float give = air->classes[n->sway].give * txm_clampf(yield * n->length, 0.2f, 3);
-    /* the stem leans with the wind: towards +z about +x, towards +x about -z */
+    /* equilibrium, leaning with the wind: towards +z about +x, towards +x about -z */
     const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
                            txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
     for (int k = 0; k < 2; k++) {
@@ -50,12 +50,12 @@ static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_
     tpc_bend(q, state[0], state[2]);
 }
 
-/* The bones of a tree, from its foot on. */
+/* The bones of a tree, parents first. */
 static void tpc_pose_tree(void *context, int index) {
     const tpc_posing *p = (const tpc_posing *)context;
     const treepieces_tree *t = &p->forest->trees[index];
     const float stiffness = p->forest->species[t->species].stiffness;
-    const float yield = 16 / (stiffness * txm_maxf(t->height, 0.1f)); /* of a metre of stem */
+    const float yield = 16 / (stiffness * txm_maxf(t->height, 0.1f)); /* of one metre of stem */
     float pressure = 0;
     if (p->air) pressure = tpc_pressure(p->air, t->position, p->air->time);
     for (uint32_t i = 0; i < t->node_count; i++) {
@@ -161,7 +161,7 @@ static void tpc_columns(const float *bone, float squares[3]) {
         squares[k] = (bone[k] * bone[k] + bone[4 + k] * bone[4 + k]) + bone[8 + k] * bone[8 + k];
 }
 
-/* n by the inverse transpose: columns at right angles are divided by their squares */
+/* n by the inverse transpose: as columns are orthogonal, each is divided by its square */
 static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
     float squares[3];
     tpc_columns(bone, squares);
@@ -170,7 +170,7 @@ static void tpc_move_normal(const float *bone, const float n[3], float out[3]) {
         out[k] = (bone[4 * k] * m[0] + bone[4 * k + 1] * m[1]) + bone[4 * k + 2] * m[2];
 }
 
-/* The bones of a record's children, less its own; 0 where there is none. */
+/* The bones of a record's children, relative to its own; 0 where there is none. */
 static void tpc_children(const uint32_t *record, uint32_t children[TREEPIECES_MAX_LEAVES]) {
     children[0] = record[1] & 0xffffu;
     children[1] = record[1] >> 16;
@@ -213,7 +213,7 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
             for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
             for (int k = 0; k < piece->leaf_count; k++) {
                 const float wk = v->weights[1 + k];
-                const tpc_seen *at = &forest->kit->seen[type][k * piece->vertex_count + i];
+                const tpc_rim_frame *at = &forest->kit->in_rims[type][k * piece->vertex_count + i];
                 if (!(wk > 0)) continue;
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);

@@ -5,14 +5,15 @@
 
 /* ---- the built-in pieces ----------------------------------------------------------------- */
 
-/* A piece while it is put together. */
+/* A piece under construction. */
 typedef struct tpc_shape {
     treepieces_piece piece;
     treepieces_vertex vertices[64];
     treepieces_quad quads[64];
 } tpc_shape;
 
-/* A vertex bound to the own bone and evenly to the leaf rims of a mask, by own : 1 - own. */
+/* A vertex with weight `own` for the piece's own bone; the rest is shared evenly by the leaf rims
+   of the bit mask `leaves`. */
 static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, int leaves) {
     treepieces_vertex *v = &s->vertices[s->piece.vertex_count];
     const int count = (leaves & 1) + (leaves >> 1 & 1) + (leaves >> 2 & 1);
@@ -26,7 +27,7 @@ static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, in
     return s->piece.vertex_count++;
 }
 
-/* Six vertices about the axis, of radius even at places 0, 2, 4 and odd at the others. */
+/* Six vertices about the axis; radius `even` for vertices 0, 2, 4, `odd` for the others. */
 static void tpc_add_ring(tpc_shape *s, float y, float even, float odd, float own, int leaves,
                          int ring[TREEPIECES_RIM]) {
     for (int k = 0; k < TREEPIECES_RIM; k++) {
@@ -41,7 +42,7 @@ static void tpc_begin(tpc_shape *s, const char *name) {
     tpc_add_ring(s, 0, 1, 1, 1, 0, s->piece.root_rim);
 }
 
-/* The vertices of the leaf rim behind the last one, whose building transform is there. */
+/* Add the vertices of the next leaf rim, whose building transform is set already; return them. */
 static const int *tpc_add_rim(tpc_shape *s) {
     treepieces_piece *p = &s->piece;
     const int k = p->leaf_count++;
@@ -53,9 +54,9 @@ static const int *tpc_add_rim(tpc_shape *s) {
     return p->leaf_rims[k];
 }
 
-/* A leaf rim at (x, y, z), its axis leaning by `lean` degrees towards azimuth `turn` (degrees about y from
-   +x to -z) and its place 0 on that azimuth. */
-static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double turn, double lean,
+/* A leaf rim at (x, y, z), its axis inclined by `lean` degrees towards azimuth `turn` (degrees
+   about y from +x to -z), its vertex 0 at that azimuth. */
+static const int *tpc_add_leaf_rim(tpc_shape *s, float x, float y, float z, double turn, double lean,
                                float scale) {
     treepieces_similarity *b = &s->piece.building[s->piece.leaf_count];
     const double degree = TXM_PI / 180;
@@ -65,7 +66,7 @@ static const int *tpc_add_leaf(tpc_shape *s, float x, float y, float z, double t
     b->translation[0] = x;
     b->translation[1] = y;
     b->translation[2] = z;
-    b->rotation[0] = txm_float(-st * sl); /* about y by turn, after about z by -lean */
+    b->rotation[0] = txm_float(-st * sl); /* -lean about z, then turn about y */
     b->rotation[1] = txm_float(st * cl);
     b->rotation[2] = txm_float(-ct * sl);
     b->rotation[3] = txm_float(ct * cl);
@@ -84,7 +85,7 @@ static void tpc_add_quad(tpc_shape *s, int nw, int sw, int se, int ne, treepiece
     q->band = (uint8_t)band;
 }
 
-/* The quads between two loops, from place `first` on, `count` of them. */
+/* `count` quads between two loops of six vertices, from vertex `first` on. */
 static void tpc_add_row(tpc_shape *s, const int *below, const int *above, int first, int count,
                         treepieces_class c, int band) {
     for (int i = first; i < first + count; i++) {
@@ -97,28 +98,28 @@ static void tpc_make_i(tpc_shape *s) {
     int middle[TREEPIECES_RIM];
     tpc_begin(s, "I");
     tpc_add_ring(s, 0.5f, 0.95f, 0.95f, 0.5f, 1, middle);
-    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.9f);
+    const int *top = tpc_add_leaf_rim(s, 0, 1, 0, 0, 0, 0.9f);
     tpc_add_row(s, s->piece.root_rim, middle, 0, 6, TREEPIECES_BARK, 0);
     tpc_add_row(s, middle, top, 0, 6, TREEPIECES_BARK, 1);
 }
 
-/* The crotch runs from place 0 over m1 and m2 to place 3; arm 0 leans to -z, arm 1 to +z:
+/* The crotch runs from vertex 0 over m1 and m2 to vertex 3; arm 0 leans to -z, arm 1 to +z:
 
-        2 - 1          each arm's loop: half the ring and the crotch
+        2 - 1          the loop of an arm is half of the ring, and the crotch
        /     \
       3-m2-m1-0  --> x                                                                       */
 static void tpc_make_y(tpc_shape *s) {
     int a[TREEPIECES_RIM];
     tpc_begin(s, "Y");
     for (int k = 0; k < TREEPIECES_RIM; k++) {
-        const int side = k % 3 == 0; /* where the crotch begins and ends */
+        const int side = k % 3 == 0; /* an end of the crotch */
         const int leaves = side ? 3 : k < 3 ? 1 : 2;
         a[k] = tpc_add_vertex(s, (side ? 0.97f : 0.98f) * tpc_cos6[k], side ? 0.66f : 0.5f,
                               -1.08f * tpc_sin6[k], 0.6f, leaves);
     }
     const int m1 = tpc_add_vertex(s, 0.4f, 0.94f, 0, 0.5f, 3);
     const int m2 = tpc_add_vertex(s, -0.4f, 0.94f, 0, 0.5f, 3);
-    /* leaning about x keeps place 0 at +x: a turn by 90, the lean, and back by 90 */
+    /* inclined about x, which keeps vertex 0 at +x */
     for (int arm = 0; arm < 2; arm++) {
         const float to = arm ? 1.0f : -1.0f;
         double sine, cosine;
@@ -140,15 +141,15 @@ static void tpc_make_y(tpc_shape *s) {
     tpc_add_row(s, loop1, s->piece.leaf_rims[1], 0, 3, TREEPIECES_FOLD, 2);
 }
 
-/* A tube of three rows; a branch takes the place of two quads of the middle row, those left and right
-   of place v = 0 (and 3). The hole's loop, as the branch sees it: bottom, bottom right, top right, top,
-   top left, bottom left. */
+/* A tube of three rows of quads; each branch replaces two quads of the middle row, left and right
+   of vertex v = 0 (and 3). The loop around the hole, seen from the branch: bottom, bottom right,
+   top right, top, top left, bottom left. */
 static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
     int b[TREEPIECES_RIM], c[TREEPIECES_RIM];
     tpc_begin(s, name);
     tpc_add_ring(s, 0.28f, 0.99f, 0.99f, 0.8f, 1, b);
     tpc_add_ring(s, 0.74f, 0.96f, 0.96f, 0.4f, 1, c);
-    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.93f);
+    const int *top = tpc_add_leaf_rim(s, 0, 1, 0, 0, 0, 0.93f);
     tpc_add_row(s, s->piece.root_rim, b, 0, 6, TREEPIECES_BARK, 0);
     for (int k = 0; k < TREEPIECES_RIM; k++) {
         const int at_first = k == 5 || k == 0, at_second = branches > 1 && (k == 2 || k == 3);
@@ -160,7 +161,7 @@ static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
         const int v = 3 * i, left = (v + 5) % 6, right = v + 1;
         const float side = i ? -1.0f : 1.0f;
         const int loop[TREEPIECES_RIM] = {b[v], b[right], c[right], c[v], c[left], b[left]};
-        const int *rim = tpc_add_leaf(s, 1.4f * side, 0.55f, 0, 180 * i, 60, 0.45f);
+        const int *rim = tpc_add_leaf_rim(s, 1.4f * side, 0.55f, 0, 180 * i, 60, 0.45f);
         tpc_add_row(s, loop, rim, 0, 1, TREEPIECES_BARK, 2 + i);
         tpc_add_row(s, loop, rim, 1, 1, TREEPIECES_TURN_RIGHT, 2 + i);
         tpc_add_row(s, loop, rim, 2, 2, TREEPIECES_FOLD, 2 + i);
@@ -169,12 +170,12 @@ static void tpc_make_branched(tpc_shape *s, const char *name, int branches) {
     }
 }
 
-/* Three crotches meet in the middle; arm k leans to place 1 + 2 k. */
+/* Three crotches meet in the middle; arm k leans towards vertex 1 + 2 k. */
 static void tpc_make_spatial(tpc_shape *s) {
     int a[TREEPIECES_RIM], p[TREEPIECES_RIM];
     tpc_begin(s, "spatial trifurcation");
     for (int k = 0; k < TREEPIECES_RIM; k++) {
-        const int arm = k / 2, before = (arm + 2) % 3; /* even places lie between two arms */
+        const int arm = k / 2, before = (arm + 2) % 3; /* even ones lie between two arms */
         const int leaves = k & 1 ? 1 << arm : 1 << arm | 1 << before;
         const float r = k & 1 ? 1.06f : 0.97f;
         a[k] = tpc_add_vertex(s, r * tpc_cos6[k], k & 1 ? 0.5f : 0.64f, -r * tpc_sin6[k], 0.6f,
@@ -188,7 +189,7 @@ static void tpc_make_spatial(tpc_shape *s) {
     for (int arm = 0; arm < 3; arm++) {
         const int to = 1 + 2 * arm, next = (to + 1) % 6, before = to - 1;
         const int loop[TREEPIECES_RIM] = {a[to], a[next], p[next], middle, p[before], a[before]};
-        const int *rim = tpc_add_leaf(s, 0.78f * tpc_cos6[to], 1.3f, -0.78f * tpc_sin6[to],
+        const int *rim = tpc_add_leaf_rim(s, 0.78f * tpc_cos6[to], 1.3f, -0.78f * tpc_sin6[to],
                                       60 * to, 32, 0.62f);
         tpc_add_row(s, loop, rim, 5, 2, TREEPIECES_BARK, 1 + arm);
         tpc_add_row(s, loop, rim, 1, 4, TREEPIECES_FOLD, 1 + arm);
@@ -210,14 +211,14 @@ static void tpc_make_flare(tpc_shape *s) {
     tpc_begin(s, "root flare");
     tpc_add_ring(s, 0.2f, 0.92f, 0.7f, 1, 0, low);
     tpc_add_ring(s, 0.55f, 0.74f, 0.64f, 0.6f, 1, high);
-    const int *top = tpc_add_leaf(s, 0, 1, 0, 0, 0, 0.62f);
+    const int *top = tpc_add_leaf_rim(s, 0, 1, 0, 0, 0, 0.62f);
     tpc_add_row(s, s->piece.root_rim, low, 0, 6, TREEPIECES_BARK, 0);
     tpc_add_row(s, low, high, 0, 6, TREEPIECES_BARK, 0);
     tpc_add_row(s, high, top, 0, 6, TREEPIECES_BARK, 1);
 }
 
-/* Normals of all vertices: the mean of the quads about them, as large as they are. Those of rims are
-   replaced when the piece is taken in. */
+/* Normals of all vertices: the mean of the adjacent quads, weighted by area. Those of rims are
+   replaced when the piece is added to the kit. */
 static void tpc_smooth(tpc_shape *s) {
     float sums[64][3];
     memset(sums, 0, sizeof sums);

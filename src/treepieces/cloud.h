@@ -5,19 +5,19 @@
 
 /* ---- foliage: leaf clouds ------------------------------------------------------------------ */
 
-/* -1..1 */
+/* a random number, -1..1 */
 static float tpc_signed(txm_rng *rng) {
     return 2 * txm_rng_float(rng) - 1;
 }
 
-/* Turn a card so that its picture grows along `along` and shows its face to `facing` as well as it
-   then can; outward: where the cloud's surface looks to. */
-static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
+/* Orient a card: its image grows along `along`, and its face is turned to `facing` as far as that
+   allows. outward: normal of the cloud's surface there. */
+static void tpc_orient_card(treepieces_card *card, float along[3], float facing[3],
                          const float outward[3], float half) {
     tpc_unit_or(along, 1, 0, 0);
     const float share = tpc_dot(facing, along);
     for (int k = 0; k < 3; k++) facing[k] -= share * along[k];
-    if (tpc_dot(facing, facing) < 1e-6f) { /* anything across will do */
+    if (tpc_dot(facing, facing) < 1e-6f) { /* any orthogonal direction */
         facing[0] = along[1];
         facing[1] = -along[0];
         facing[2] = 0;
@@ -33,7 +33,8 @@ static void tpc_aim_card(treepieces_card *card, float along[3], float facing[3],
     tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }
 
-/* Impostors show no more than the sphere: draw a card's center in until its corners lie inside. */
+/* Impostors show only the unit sphere: move the centre of a card inwards until its corners are
+   inside. */
 static void tpc_keep_inside(treepieces_card *card) {
     for (int step = 0; step < 64; step++) {
         float most = 0;
@@ -49,8 +50,8 @@ static void tpc_keep_inside(treepieces_card *card) {
     }
 }
 
-/* Direction `index` of `count` spread evenly over the sphere, each a little off its place. */
-static void tpc_spread(int index, int count, float phase, txm_rng *rng, float direction[3]) {
+/* Direction `index` of `count` distributed evenly over the sphere, with some jitter. */
+static void tpc_sphere_direction(int index, int count, float phase, txm_rng *rng, float direction[3]) {
     double sine, cosine;
     const float jitter = 0.6f * tpc_signed(rng), off = 0.3f * tpc_signed(rng);
     const float y = txm_clampf(1 - (2 * (float)index + 1 + jitter) / (float)count, -1, 1);
@@ -61,8 +62,8 @@ static void tpc_spread(int index, int count, float phase, txm_rng *rng, float di
     direction[2] = ring * (float)sine;
 }
 
-/* A place in the unit ball far from those that are taken: of some tries the best. So there are
-   neither heaps nor holes, and most places lie towards the surface. */
+/* A position in the unit ball far from the cards so far: the best of some random candidates. This
+   avoids clusters and gaps, and puts most cards near the surface. */
 static void tpc_far_place(const treepieces_card *cards, int taken, const float size[3],
                           txm_rng *rng, float place[3]) {
     enum { TRIES = 6 };
@@ -83,7 +84,7 @@ static void tpc_far_place(const treepieces_card *cards, int taken, const float s
     }
 }
 
-/* Sprays of leaves, spread out and hanging as their kind does. */
+/* Broad leaves: cards distributed in the cloud, drooping as the leaf shape asks for. */
 static void tpc_leafy_card(const treepieces_species *species, treepieces_card *cards, int index,
                            const float scale[3], float half, txm_rng *rng) {
     const int is_lance = species->leaf_shape == TREEPIECES_LEAF_LANCE;
@@ -102,21 +103,21 @@ static void tpc_leafy_card(const treepieces_species *species, treepieces_card *c
         along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
         facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
     }
-    tpc_aim_card(&cards[index], along, facing, outward, half);
+    tpc_orient_card(&cards[index], along, facing, outward, half);
 }
 
-/* Needles: cards one behind the other along twigs that radiate, crossed about them. */
+/* Needles: rows of cards along twigs that radiate from the centre, turned alternately about them. */
 static void tpc_needle_card(int index, int count, float phase, const float scale[3], float half,
                             txm_rng *rng, treepieces_card *card) {
     const float reach = txm_maxf(1 - half, 0);
-    const float fit = 0.7f * reach / txm_maxf(half, 0.01f) + 0.95f; /* half overlapping */
+    const float fit = 0.7f * reach / txm_maxf(half, 0.01f) + 0.95f; /* overlapping by half */
     const int most = txm_clampi((int)txm_minf(fit, 4), 1, 4);
     const int twigs = (count + most - 1) / most, steps = (count + twigs - 1) / twigs;
     const int step = index / twigs;
     const float place = ((float)step + 0.5f + 0.5f * txm_rng_float(rng)) / (float)steps;
     const float roll = (float)((index % twigs + step) % 3 - 1);
     float along[3], facing[3], outward[3];
-    tpc_spread(index % twigs, twigs, phase, rng, along);
+    tpc_sphere_direction(index % twigs, twigs, phase, rng, along);
     const float at = reach * (0.3f + 0.7f * place);
     for (int k = 0; k < 3; k++) along[k] *= scale[k];
     tpc_unit_or(along, 1, 0, 0);
@@ -126,11 +127,11 @@ static void tpc_needle_card(int index, int count, float phase, const float scale
     }
     tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(rng);
-    /* across the twig, level */
+    /* across the twig, horizontal */
     facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(rng);
     facing[1] = 1;
     facing[2] = 1.2f * roll * along[0] + 0.2f * tpc_signed(rng);
-    tpc_aim_card(card, along, facing, outward, half);
+    tpc_orient_card(card, along, facing, outward, half);
 }
 
 TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t look,

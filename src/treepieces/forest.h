@@ -7,18 +7,18 @@
 /* ---- a forest ------------------------------------------------------------------------------ */
 
 enum {
-    TPC_BLOCK_TREES = 64,      /* trees that grow at once ...                           */
-    TPC_BLOCK_PIECES = 1 << 18 /* ... as long as they have no more than so many pieces  */
+    TPC_BLOCK_TREES = 64,      /* trees that grow at a time ...                  */
+    TPC_BLOCK_PIECES = 1 << 18 /* ... limited to this many pieces in total       */
 };
 
 /* A forest with its memory. */
 typedef struct tpc_forest {
-    treepieces_forest forest; /* first: the one is the other */
+    treepieces_forest forest; /* first, so that a pointer to it is one to this */
     txm_arena arena;          /* itself, species, trees and records */
     txm_arena node_arena, cluster_arena;
 } tpc_forest;
 
-/* Everything while a forest is made. */
+/* A forest under construction. */
 typedef struct tpc_planting {
     const treepieces_forest_desc *desc;
     tpc_forest *made;
@@ -37,7 +37,7 @@ typedef struct tpc_planting {
     size_t node_count, cluster_count, node_capacity, band_capacity, cluster_capacity;
 } tpc_planting;
 
-/* Where tree i stands if the user does not say. */
+/* Where tree i stands if the caller gives no places. */
 static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
     treepieces_place place;
     int side = 1;
@@ -72,7 +72,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
     count = txm_clampi(count, 4, TPC_BLOCK_TREES);
     if (count > p->desc->tree_count) count = p->desc->tree_count;
     p->slots = (tpc_growth *)txm_arena_zero(&p->scratch, (size_t)count, sizeof *p->slots);
-    if (!p->slots) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+    if (!p->slots) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     for (p->slot_count = 0; p->slot_count < count; p->slot_count++) {
         tpc_growth *g = &p->slots[p->slot_count];
         g->desc = p->desc;
@@ -85,32 +85,32 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
         if (p->scratch.failed)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees in");
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     }
     return TXM_OK;
 }
 
-/* Make room for `more` items behind the `count` that a block holds. The first time room is made for
-   all trees if they are like those so far. Returns the block, or NULL if there is no memory. */
+/* Make room for `more` items after the first `count` of a block. What is allocated is an estimate
+   for all trees from those that are done. Returns the block, or NULL if there is no memory. */
 static void *tpc_reserve(const tpc_planting *p, int done, txm_arena *arena, void *block, size_t count,
                          size_t more, size_t size, size_t *capacity) {
     size_t wanted = count + more;
     if (block && wanted <= *capacity) return block;
     const double all = 1.05 * (double)wanted / done * p->desc->tree_count + 64;
     if (all < 4e9 && (size_t)all > wanted) wanted = (size_t)all;
-    txm_arena roomier = *arena;
-    roomier.blocks = NULL;
-    void *larger = txm_arena_alloc(&roomier, wanted, size);
+    txm_arena larger_arena = *arena;
+    larger_arena.blocks = NULL;
+    void *larger = txm_arena_alloc(&larger_arena, wanted, size);
     if (!larger) return NULL;
     if (block) memcpy(larger, block, count * size);
     txm_arena_free(arena);
-    *arena = roomier;
+    *arena = larger_arena;
     *capacity = wanted;
     return larger;
 }
 
-/* Keep what grew in the slots. */
-static txm_status tpc_keep(tpc_planting *p, int count, txm_env *env) {
+/* Append the trees that grew in the slots to the forest. */
+static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
     size_t nodes = 0, clusters = 0;
     for (int i = 0; i < count; i++) {
         if (p->slots[i].status != TXM_OK) return txm_fail(env, p->slots[i].status, p->slots[i].fault);
@@ -159,8 +159,9 @@ static txm_status tpc_keep(tpc_planting *p, int count, txm_env *env) {
     return TXM_OK;
 }
 
-/* A random tile for every quad, four at a time: column (r (9 - tiles across)) / 16 for r of 0..15 (0
-   for 16 tiles), the row likewise; quads that lie on the bottom of their layer have the last row. */
+/* Choose a random tile for every quad, four at a time: column r (9 - tiles across) / 16 for random
+   r of 0..15 (0 for 16 tiles), the row likewise; quads at the bottom of their layer get the last
+   row. */
 static void tpc_fill_cells(const tpc_cells *cells, int words, uint32_t bands, txm_rng *rng,
                            uint32_t *word) {
     const uint32_t low = 0x0f0f0f0fu;
@@ -176,11 +177,11 @@ static void tpc_fill_cells(const tpc_cells *cells, int words, uint32_t bands, tx
             const uint32_t chosen = (row & ~bottom) | (last * 0x01010101u & bottom);
             word[i] |= (column | chosen << 3) & c->bands[b];
         }
-        word[i] &= ~c->own | 0x36363636u; /* those lie on 2 x 2 cells */
+        word[i] &= ~c->own | 0x36363636u; /* the caller's classes lie on 2 x 2 cells */
     }
 }
 
-/* The records of tree p->first + i; those of its children go into the parent's as they are met. */
+/* Fill the records of tree p->first + i. A child enters itself in the record of its parent. */
 static void tpc_fill_tree(void *context, int i) {
     tpc_planting *p = (tpc_planting *)context;
     const treepieces_kit *kit = p->desc->kit;
@@ -205,7 +206,7 @@ static void tpc_fill_tree(void *context, int i) {
     }
 }
 
-/* The records' arrays, of the sizes that are known now. */
+/* Allocate the records, as their numbers are known now. */
 static txm_status tpc_make_arrays(tpc_planting *p, txm_env *env) {
     treepieces_forest *out = &p->made->forest;
     size_t bytes = sizeof *p->made + (size_t)out->tree_count * sizeof *p->trees +
@@ -231,7 +232,8 @@ static txm_status tpc_make_arrays(tpc_planting *p, txm_env *env) {
     return TXM_OK;
 }
 
-static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
+/* Grow all trees, block after block; then, as the sizes of the batches are known, fill the records. */
+static txm_status tpc_grow_trees(tpc_planting *p, txm_env *env) {
     const int trees = p->desc->tree_count;
     p->trees = (treepieces_tree *)txm_arena_zero(&p->made->arena, (size_t)trees, sizeof *p->trees);
     p->offsets = (uint32_t(*)[TREEPIECES_MAX_TYPES])txm_arena_alloc(&p->scratch, (size_t)trees,
@@ -248,7 +250,7 @@ static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
                              pass ? "assemble" : "grow"))
                 return txm_fail(env, TXM_CANCELLED, "cancelled");
             txm_parallel_for(env, count, pass ? tpc_fill_tree : tpc_grow_slot, p);
-            if (!pass) status = tpc_keep(p, count, env);
+            if (!pass) status = tpc_append_trees(p, count, env);
         }
     }
     return status;
@@ -257,12 +259,12 @@ static txm_status tpc_plant(tpc_planting *p, txm_env *env) {
 static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env) {
     if (!d || !d->kit) return txm_fail(env, TXM_BAD_ARGUMENT, "desc or kit is NULL");
     if (!d->species || d->species_count < 1)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "species: one at least is needed");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "species: at least one is needed");
     if (d->tree_count < 1) return txm_fail(env, TXM_BAD_ARGUMENT, "tree_count must be 1 or more");
     if (d->max_pieces && (d->max_pieces < 8 || d->max_pieces > 65535))
         return txm_fail(env, TXM_BAD_ARGUMENT, "max_pieces must be 8 to 65535, or 0 for 600");
     if (d->rule < TREEPIECES_GRAMMAR || d->rule > TREEPIECES_RANDOM)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "rule is none of treepieces_rule");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "rule is not a treepieces_rule");
     if (!(d->spacing >= 0) || !txm_is_finite((double)d->spacing))
         return txm_fail(env, TXM_BAD_ARGUMENT, "spacing must be 0 or more");
     for (int i = 0; i < d->species_count; i++) {
@@ -277,7 +279,7 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
         if (!(fabsf(p->turn) <= 1e4f) || !(p->scale >= 0 && p->scale <= 1000))
             return txm_fail(env, TXM_BAD_ARGUMENT, "places: a turn or scale is out of range");
         if (p->species < 0 || p->species >= d->species_count)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species is none of species");
+            return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species number is out of range");
     }
     return TXM_OK;
 }
@@ -325,7 +327,7 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
         f->forest.tree_count = desc->tree_count;
         f->forest.type_count = desc->kit->count;
         p.made = f;
-        status = tpc_plant(&p, env);
+        status = tpc_grow_trees(&p, env);
     }
     txm_arena_free(&p.scratch);
     txm_arena_free(&p.band_arena);

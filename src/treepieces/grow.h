@@ -3,32 +3,34 @@
 
 #include "kit.h"
 
-/* ---- growing: what a tree is made of ------------------------------------------------------ */
+/* ---- growing: the state of a tree --------------------------------------------------------- */
 
 enum {
-    TPC_BUCKETS = 160,     /* of rims that wait, by the logarithm of their radius                 */
-    TPC_GRID = 16,         /* cells a side of the grid of shade                                   */
-    TPC_CLASSES = 16,      /* of oscillators                                                      */
-    TPC_MAX_BRANCH = 60    /* percent: radius of a side branch over that of its stem at most      */
+    TPC_BUCKETS = 160,     /* of open rims, by the logarithm of their radius                */
+    TPC_GRID = 16,         /* cells along a side of the shade grid                          */
+    TPC_CLASSES = 16,      /* of oscillators                                                */
+    TPC_MAX_BRANCH = 60    /* percent: largest radius of a side branch over that of its stem */
 };
 
-/* A rim that waits for a piece. */
+/* An open rim. */
 typedef struct tpc_bud {
-    int32_t next;      /* in its bucket */
-    int32_t parent;    /* node, or TREEPIECES_NONE */
-    uint8_t rim, order, across;       /* across: log2 of the tiles across an edge of the rim      */
-    uint8_t is_forked, is_aimed;      /* behind a fork, where start no longer counts; aim says
-                                         where the piece after this one goes                      */
+    int32_t next;                 /* in its bucket                                              */
+    int32_t parent;               /* node, or TREEPIECES_NONE                                   */
+    uint8_t rim, order, across;   /* across: log2 of the tiles across an edge of the rim        */
+    uint8_t is_forked, is_aimed;  /* after a fork, where `start` no longer applies; `aim` is the
+                                     direction of the piece after this one                      */
     uint16_t depth;
-    float position[3], rotation[4], heading[3]; /* rotation: of the rim; heading: where it grows  */
+    float position[3], rotation[4], heading[3]; /* rotation: of the rim; heading: of growth     */
     float aim[3];
-    float radius, end_radius;                   /* here and at the end of the axis                */
-    float rest; /* of its step, which a short branching piece left for a plain one */
-    float along, length, step;                  /* of the axis; step: length of a piece           */
-    float roll;     /* degrees about the axis, for the next branch, as the rim's frame counts them */
+    float radius, end_radius;     /* here, and at the end of the axis                           */
+    float rest;                   /* of its step, which a short branching piece left over for a
+                                     plain one                                                  */
+    float along, length, step;    /* of the axis; step: length of a piece                       */
+    float roll;                   /* degrees about the axis to the next branch, in the
+                                     frame of the rim                                           */
 } tpc_bud;
 
-/* One tree as it grows. */
+/* A tree while it grows. */
 typedef struct tpc_growth {
     const treepieces_forest_desc *desc;
     const treepieces_kit *kit;
@@ -40,36 +42,36 @@ typedef struct tpc_growth {
     int index; /* of the tree */
     treepieces_node *nodes;
     uint32_t *bands;   /* by node: word 3 of its record        */
-    uint32_t *records; /* by node: where its record is, filled last */
+    uint32_t *records; /* by node: number of its record, set at the end */
     treepieces_cluster *clusters;
     tpc_bud *buds;
     int node_count, cluster_count, bud_count, waiting, most, bucket;
     int32_t first[TPC_BUCKETS], last[TPC_BUCKETS];
     uint32_t type_counts[TREEPIECES_MAX_TYPES];
-    float scale, trunk, foot; /* metres: scale of the place, length and radius of the trunk       */
+    float scale, trunk, foot; /* scale of the place; length and base radius of the trunk, metres  */
     float height;
-    uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above it    */
+    uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above       */
 } tpc_growth;
 
 static float tpc_uniform(tpc_growth *g, float low, float high) {
     return low + (high - low) * txm_rng_float(&g->rng);
 }
 
-/* ---- growing: rims in order of their radius ------------------------------------------------ */
+/* ---- growing: open rims by radius ---------------------------------------------------------- */
 
-/* The bits of a float above 0 rise about as its logarithm, 2^23 an octave. */
-static uint32_t tpc_bits(float x) {
+/* The bits of a positive float, which grow about as its logarithm, by 2^23 per octave. */
+static uint32_t tpc_float_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits;
 }
 
-/* Eight buckets an octave, the thickest first. */
+/* Eight buckets per octave, the thickest first. */
 static int tpc_bucket(float radius) {
-    return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
+    return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_float_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
 }
 
-/* The bud behind the last one now waits. */
+/* Put the bud after the last one into its bucket. */
 static void tpc_push(tpc_growth *g) {
     const int i = g->bud_count++, b = tpc_bucket(g->buds[i].radius);
     g->buds[i].next = -1;
@@ -77,10 +79,10 @@ static void tpc_push(tpc_growth *g) {
     else g->buds[g->last[b]].next = i;
     g->last[b] = i;
     g->waiting++;
-    if (b < g->bucket) g->bucket = b; /* a rule may let a stem grow thicker */
+    if (b < g->bucket) g->bucket = b; /* a rule of the caller may let a stem grow thicker */
 }
 
-/* The thickest rim that waits; there must be one. */
+/* Take out the thickest open rim; there must be one. */
 static tpc_bud *tpc_pop(tpc_growth *g) {
     while (g->first[g->bucket] < 0) g->bucket++;
     tpc_bud *bud = &g->buds[g->first[g->bucket]];
@@ -107,7 +109,7 @@ static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     return x * x + z * z > r * r;
 }
 
-/* the cell of a place, and the side of a cell: the grid is as wide as 1.6 trunks */
+/* the shade cell of a position; returns the side of a cell. The grid is 1.6 trunk lengths wide */
 static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
     const float side = 1.6f * g->trunk / (float)TPC_GRID;
     for (int k = 0; k < 3; k++) {
@@ -139,14 +141,14 @@ static const treepieces_order *tpc_order(const tpc_growth *g, int order) {
     return &g->species->orders[order < g->species->order_count ? order : g->species->order_count - 1];
 }
 
-/* Which piece comes next. */
+/* Choose the type of the next piece. */
 static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
     const treepieces_order *o = tpc_order(g, bud->order);
     if (bud->depth == 0 && g->species->flare > 1) return TREEPIECES_FLARE;
     if ((1 - bud->along) * bud->length < 0.5f * bud->step || tpc_is_outside(g, bud) ||
         tpc_is_shaded(g, bud))
         return TREEPIECES_TIP;
-    /* what hangs down ends before it lies on the ground */
+    /* a hanging axis ends before it reaches the ground */
     if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < 0.04f * g->trunk)
         return TREEPIECES_TIP;
     if (g->desc->rule == TREEPIECES_ALTERNATE) return bud->depth & 1 ? TREEPIECES_Y : TREEPIECES_I;
@@ -165,12 +167,12 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
     return TREEPIECES_I;
 }
 
-/* Twigs do not get thinner than this, so that texels are not much smaller on them than on the trunk. */
+/* The smallest radius of twigs, so that texels are not much smaller on them than on the trunk. */
 static float tpc_thinnest(const tpc_growth *g) {
     return 0.033f * g->foot;
 }
 
-/* How long it is, so that its proportions stay those of its kind: between so many radii. */
+/* The length of the next piece, limited to a range of radii so that its type keeps its proportions. */
 static float tpc_choose_length(const tpc_bud *bud, int type) {
     static const float low[TREEPIECES_BUILTIN] = {1, 1, 2, 2, 1, 1.2f, 1};
     static const float high[TREEPIECES_BUILTIN] = {40, 2.5f, 3, 3, 2.5f, 18, 1.4f};
@@ -178,7 +180,7 @@ static float tpc_choose_length(const tpc_bud *bud, int type) {
     const float step = bud->rest > 0 ? bud->rest : bud->step;
     float length = step < left ? step : left;
     if (type == TREEPIECES_TIP && length < 0.7f * bud->step) length = 0.7f * bud->step;
-    /* no more than 8 tiles lie along a quad, so one with many across must not be long */
+    /* at most 8 tiles lie along a quad, so one with many across must not be long */
     const float most = txm_minf(high[type], (type == TREEPIECES_I ? 64.0f : 20.0f) / (float)(1 << bud->across));
     return txm_clampf(length, low[type] * bud->radius, txm_maxf(most, low[type]) * bud->radius);
 }
@@ -193,7 +195,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
     c->turn = type == TREEPIECES_I ? (int)txm_rng_below(&g->rng, TREEPIECES_RIM) : -1;
     const float left = (1 - bud->along) * bud->length;
     const float share = left > c->length ? c->length / left : 1;
-    const float on = 1 + (bud->end_radius / bud->radius - 1) * share; /* the stem's own taper */
+    const float on = 1 + (bud->end_radius / bud->radius - 1) * share; /* the taper of the stem */
     c->ratios[0] = txm_clampf(on, 0.3f, 1);
     if (type == TREEPIECES_FLARE) c->ratios[0] = 1 / g->species->flare;
     if (type == TREEPIECES_Y) {
@@ -216,7 +218,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
                 txm_rng_float(&g->rng) < o->leaves;
 }
 
-/* Turn the axis a little: at random, to the light, by its weight. */
+/* Turn the axis a little: wander, tropism, sag. */
 static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
     const treepieces_order *o = tpc_order(g, bud->order);
     float *h = bud->heading;
@@ -227,7 +229,7 @@ static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
         tpc_rotate(bud->rotation, aside, aside);
         for (int k = 0; k < 3; k++) h[k] += aside[k];
     }
-    /* the part of "up" at a right angle to the heading is the sine of the angle between them */
+    /* the component of "up" orthogonal to the heading is the sine of the angle between them */
     const float up = o->tropism, rise = h[1];
     h[0] -= up * rise * h[0];
     h[1] += up * (1 - rise * rise);
@@ -247,33 +249,33 @@ static const float tpc_turns[TREEPIECES_RIM][4] = {
     {0, 1, 0, 0},           {0, 0.86602540378f, 0, -0.5f}, {0, 0.5f, 0, -0.86602540378f},
 };
 
-/* out = a b where one, the building rotation, is mostly none */
-static void tpc_after(const float building[4], const float b[4], float out[4]) {
+/* out = a b, where the building rotation is skipped when it is the identity, the usual case */
+static void tpc_multiply_building(const float building[4], const float b[4], float out[4]) {
     if (building[3] < 1) tpc_multiply(building, b, out);
     else memcpy(out, b, 4 * sizeof *b);
 }
-static void tpc_before(const float a[4], const float building[4], float out[4]) {
+static void tpc_multiply_by_building(const float a[4], const float building[4], float out[4]) {
     if (building[3] < 1) tpc_multiply(a, building, out);
     else memcpy(out, a, 4 * sizeof *a);
 }
 
-/* Degrees to the nearest sixth of a turn and what is left, -30..30. */
-static int tpc_sixth(float degrees, float *rest) {
+/* The nearest multiple of 60 degrees, as 0..5, and the rest, -30..30 degrees. */
+static int tpc_nearest_sixth(float degrees, float *rest) {
     const float turns = degrees / 60;
     const int whole = (int)(turns + (turns < 0 ? -0.5f : 0.5f));
     *rest = degrees - 60 * (float)whole;
     return (whole % TREEPIECES_RIM + TREEPIECES_RIM) % TREEPIECES_RIM;
 }
 
-/* The joint that lets the stem grow along `heading` (world) from a rim's frame turned by `turn`, with a
-   twist in degrees: the shortest swing of y, after the twist. */
+/* The joint rotation that lets the stem grow along `heading` (world space) from the frame of a rim
+   turned by `turn`: a twist in degrees, then the shortest rotation of y to the heading. */
 static void tpc_joint(const float rim[4], int turn, const float heading[3], float twist,
                       float joint[4]) {
     const float back[4] = {-rim[0], -rim[1], -rim[2], rim[3]};
     float h[3];
     tpc_rotate(back, heading, h);
     tpc_turn((TREEPIECES_RIM - turn) % TREEPIECES_RIM, h, h);
-    if (h[1] < 0.5f) { /* held within 60 degrees */
+    if (h[1] < 0.5f) { /* limited to 60 degrees */
         const float level = sqrtf(h[0] * h[0] + h[2] * h[2]);
         const float shrink = level > 0 ? 0.86602540378f / level : 0;
         h[0] *= shrink;
@@ -285,15 +287,16 @@ static void tpc_joint(const float rim[4], int turn, const float heading[3], floa
     joint[1] = 0;
     joint[2] = -h[0] * scale;
     joint[3] = (1 + h[1]) * scale;
-    if (twist != 0) { /* the tangent of its half: 15 degrees at most */
+    if (twist != 0) { /* t: tangent of half the twist, 15 degrees at most */
         const float x = twist * 0.00872664626f, t = x * (1 + x * x * (0.33333333f + 0.13333333f * x * x));
         const float shorter = 1 / sqrtf(1 + t * t), about[4] = {0, t * shorter, 0, shorter};
         tpc_multiply(joint, about, joint);
     }
 }
 
-/* log2 of how many tiles lie along and across the quads of each band. Tiles are to be a tenth of the
-   foot's radius wide; where they would be narrower than 0.58 of that their number is halved. */
+/* Word 3 of a record: log2 of the number of tiles along and across the quads of each band. A tile
+   should be a tenth of the trunk's base radius wide; where it would be narrower than 0.58 of that,
+   the number across is halved. across: receives the log2 at each leaf rim. */
 static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
                           int across[TREEPIECES_MAX_LEAVES]) {
     static const uint8_t halvable[TREEPIECES_BUILTIN] = {3, 1, 1, 1, 1, 0, 2};
@@ -308,7 +311,7 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
         const float part = c->type == TREEPIECES_I && b == 0 ? 0.5f : 1;
         const float radius = bud->radius * (1 + (c->ratios[0] - 1) * part);
         int halve = 0;
-        if (b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE) { /* keeps band 0's */
+        if (b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE) { /* as band 0 */
         } else if ((may >> b & 1) && now > 0 && radius < 0.58f * tile * (float)(1 << now)) {
             halve = 1;
             now--;
@@ -324,8 +327,9 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
     return word;
 }
 
-/* A thick branch that keeps close to its stem would have its rim in there, and a steep one a pocket above
-   it: the first piece stands off as far as it must, the next one takes the direction that was meant. */
+/* A thick branch at a small angle to its stem would have its rim inside the stem, and a pocket
+   above it. Its first piece therefore leads away from the stem as far as necessary, and the next
+   one takes the intended direction. */
 static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3], float ratio,
                           float offset) {
     const float most = txm_minf((offset - 1.1f) / ratio, 0.68f), cosine = tpc_dot(bud->heading, stem);
@@ -336,8 +340,9 @@ static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3],
     for (int i = 0; i < 3; i++) bud->heading[i] = most * stem[i] + sine * out[i];
 }
 
-/* The axis that begins or goes on at leaf rim k of the piece just placed; bud is a copy of from. */
-static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+/* Set up the bud at leaf rim k of the piece just attached, where an axis continues or begins; on
+   entry bud is a copy of from. */
+static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
                         const float rotation[4], tpc_bud *bud) {
     const treepieces_similarity *b = &g->kit->pieces[c->type].building[k];
     const float offset = g->kit->offsets[c->type][k];
@@ -350,7 +355,7 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     bud->parent = g->node_count - 1;
     bud->depth = (uint16_t)(from->depth + 1);
     bud->radius = from->radius * c->ratios[k];
-    tpc_before(rotation, b->rotation, bud->rotation);
+    tpc_multiply_by_building(rotation, b->rotation, bud->rotation);
     tpc_rotate(rotation, up, stem);
     for (int i = 0; i < 3; i++) bud->position[i] = stem[i] * local[1];
     if (offset > 0) tpc_rotate(rotation, local, bud->position);
@@ -370,12 +375,12 @@ static void tpc_grow_on(tpc_growth *g, const tpc_bud *from, const treepieces_cho
     tpc_rotate(rotation, radial, out);
     double sine, cosine;
     if (is_fork) {
-        bud->roll = tpc_uniform(g, 60, 120); /* the next fork across this one */
+        bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
         const treepieces_order *o = tpc_order(g, from->order);
         float mean = 0;
         const int arms = g->kit->pieces[c->type].leaf_count;
         for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
-        /* the thicker arm goes straighter on */
+        /* the thicker arm is straighter */
         const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
         txm_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
         const float ahead = txm_float(cosine), aside = txm_float(sine);
@@ -422,8 +427,8 @@ static void tpc_add_cluster(tpc_growth *g, int type) {
     c->look = txm_rng_next(&g->rng);
 }
 
-/* Put what was chosen on the rim; its own rims wait from now on. */
-static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c) {
+/* Attach the chosen piece to the rim; its leaf rims become open. */
+static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c) {
     const treepieces_piece *p = &g->kit->pieces[c->type];
     treepieces_node *node = &g->nodes[g->node_count];
     int across[TREEPIECES_MAX_LEAVES] = {0, 0, 0}, turn = c->turn;
@@ -431,15 +436,15 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     float joint[4];
     float after = bud->roll;
     tpc_unit_or_up(heading);
-    if (turn < 0) turn = tpc_sixth(bud->roll, &twist); /* a branch where the roll wants it */
+    if (turn < 0) turn = tpc_nearest_sixth(bud->roll, &twist);
     after -= 60 * (float)turn + twist;
     tpc_joint(bud->rotation, turn, heading, twist, joint);
     if (turn) tpc_multiply(tpc_turns[turn], joint, joint);
     tpc_multiply(bud->rotation, joint, rotation);
-    /* from the parent's frame, which the rim's is the building rotation away from */
+    /* node rotations are relative to the parent, rim frames include the building rotation */
     if (bud->parent >= 0) {
         const int type = g->nodes[bud->parent].type;
-        tpc_after(g->kit->pieces[type].building[bud->rim].rotation, joint, node->rotation);
+        tpc_multiply_building(g->kit->pieces[type].building[bud->rim].rotation, joint, node->rotation);
     } else {
         memcpy(node->rotation, rotation, sizeof rotation);
     }
@@ -449,8 +454,8 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
     node->type = (uint8_t)c->type;
     node->joint = (uint8_t)(bud->rim * 8 + turn);
     node->order = bud->order;
-    /* the thinner, the faster: two classes an octave, give or take one */
-    const int sway = (int)(tpc_bits(g->foot) >> 22) - (int)(tpc_bits(bud->radius) >> 22) +
+    /* the thinner the faster: two classes per octave, plus one at random */
+    const int sway = (int)(tpc_float_bits(g->foot) >> 22) - (int)(tpc_float_bits(bud->radius) >> 22) +
                      (int)(txm_rng_next(&g->rng) >> 31);
     node->sway = (uint8_t)txm_clampi(sway, 0, TPC_CLASSES - 1);
     g->bands[g->node_count] = tpc_bands(g, bud, c, across);
@@ -467,17 +472,17 @@ static void tpc_place(tpc_growth *g, const tpc_bud *bud, const treepieces_choice
         *next = *bud;
         next->roll = after;
         next->across = (uint8_t)across[k];
-        tpc_grow_on(g, bud, c, k, rotation, next);
+        tpc_open_rim(g, bud, c, k, rotation, next);
         if (k == 0 && (c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR))
-            next->roll = after + tpc_order(g, bud->order + 1)->roll; /* the next branch's turn */
+            next->roll = after + tpc_order(g, bud->order + 1)->roll; /* of the next branch */
         tpc_push(g);
     }
 }
 
 /* ---- growing: one tree --------------------------------------------------------------------- */
 
-/* Ask the user, and check what he says. */
-static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
+/* Call the caller's rule and check its choice; 0 if that is invalid. */
+static int tpc_call_rule(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     treepieces_site site;
     site.depth = bud->depth;
     site.order = bud->order;
@@ -491,8 +496,10 @@ static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     site.length = bud->length;
     g->desc->own_rule(g->desc->own_user, &site, &g->rng, c);
     g->fault = NULL;
-    if (c->type < 0 || c->type >= g->kit->count) g->fault = "own_rule chose no type of the kit";
-    else if (c->turn < -1 || c->turn >= TREEPIECES_RIM) g->fault = "own_rule chose no turn of 0 to 5";
+    if (c->type < 0 || c->type >= g->kit->count)
+        g->fault = "own_rule chose a type that the kit does not have";
+    else if (c->turn < -1 || c->turn >= TREEPIECES_RIM)
+        g->fault = "own_rule chose a turn that is not -1 to 5";
     else if (!(c->length > 0) || !txm_is_finite((double)c->length))
         g->fault = "own_rule chose a length that is not above 0";
     else if (!txm_is_finite((double)c->direction[0] + (double)c->direction[1] + (double)c->direction[2]))
@@ -505,7 +512,8 @@ static int tpc_ask(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     return g->status == TXM_OK;
 }
 
-static void tpc_sprout(tpc_growth *g) {
+/* Reset a slot and open the first rim, on the ground. */
+static void tpc_begin_tree(tpc_growth *g) {
     const treepieces_order *o = &g->species->orders[0];
     tpc_bud *bud = &g->buds[0];
     memset(bud, 0, sizeof *bud);
@@ -536,14 +544,14 @@ static void tpc_sprout(tpc_growth *g) {
     tpc_push(g);
 }
 
-/* Every rim that waits needs a piece at least, so the last of them get tips. */
+/* Grow one tree. Every open rim needs at least one more piece, so near the limit they all get tips. */
 static void tpc_grow(tpc_growth *g) {
-    tpc_sprout(g);
+    tpc_begin_tree(g);
     while (g->waiting && g->status == TXM_OK) {
         const tpc_bud *bud = tpc_pop(g);
         treepieces_choice choice;
         tpc_choose(g, bud, &choice);
-        if (g->desc->own_rule && !tpc_ask(g, bud, &choice)) return;
+        if (g->desc->own_rule && !tpc_call_rule(g, bud, &choice)) return;
         const int leaves = g->kit->pieces[choice.type].leaf_count;
         if (leaves && g->node_count + 1 + g->waiting + leaves > g->most) {
             choice.type = TREEPIECES_TIP;
@@ -553,8 +561,8 @@ static void tpc_grow(tpc_growth *g) {
         }
         const int pruned = leaves && choice.type == TREEPIECES_TIP && choice.leaves;
         const float left = (1 - bud->along) * bud->length;
-        tpc_place(g, bud, &choice);
-        if (pruned) /* stands for all that would have grown */
+        tpc_attach(g, bud, &choice);
+        if (pruned) /* its cloud represents the whole pruned branch */
             g->clusters[g->cluster_count - 1].radius *=
                 txm_clampf(0.35f * left / (g->species->cloud * g->scale), 1, 1.8f);
     }

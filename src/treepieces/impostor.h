@@ -9,23 +9,24 @@
 
        (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.65 + 0.35 min(1, p.p))
 
-   with the card's normal n, l towards the light and f the view's forward: light that wraps around,
-   light that shines through when the sun stands behind, and shade in the cloud's middle. Texels are
-   the nearest, numbers sRGB as they are: a shader does the same in three lines. Cards whose plane
-   is seen at a sine below 0.1 are left out: they would be rows of dots. */
+   with the normal n of the card, l towards the light and the forward axis f of the view: wrap
+   lighting, light transmitted by leaves when the sun is behind them, and shade in the middle of the
+   cloud. The nearest texel is taken, sRGB values are used as they are: a shader does the same in
+   three lines. Cards seen at an angle with a sine below 0.1 are skipped: they would be rows of
+   dots. */
 static float tpc_card_light(const treepieces_impostor_desc *d, const treepieces_card *card) {
     const float direct = txm_clampf(0.35f + 0.65f * tpc_dot(card->normal, d->light), 0, 1);
     return 0.7f + 0.6f * direct + 0.2f * txm_maxf(0, tpc_dot(d->forward, d->light));
 }
 
-/* First and last pixel, of count, whose middles lie in low..high of -1..1. */
+/* First and last of `count` pixels whose centres lie in low..high, where -1..1 is the image. */
 static void tpc_pixels(float low, float high, int count, int *first, int *last) {
     const float n = (float)count;
     *first = (int)txm_clampf((low + 1) * 0.5f * n - 0.5f, 0, n);
     *last = (int)txm_clampf((high + 1) * 0.5f * n + 0.5f, -1, n - 1);
 }
 
-/* The texel at s, t of a card, -1..1 to the right and up. */
+/* The texel at (s, t) of a card, each -1..1, to the right and up. */
 static const uint8_t *tpc_texel(const txm_image *leaves, float s, float t) {
     const int x = (int)((s + 1) * 0.5f * (float)leaves->width);
     const int y = (int)((1 - t) * 0.5f * (float)leaves->height);
@@ -46,7 +47,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     const float area = tpc_dot(card->right, card->right) * tpc_dot(card->up, card->up);
     int left, right, top, bottom;
     if (!(det * det > 0.01f * area)) return; /* seen edge on */
-    if (!(fabsf(c[0]) + fabsf(c[1]) + wide + high < 1e6f)) return; /* not of this world */
+    if (!(fabsf(c[0]) + fabsf(c[1]) + wide + high < 1e6f)) return; /* too large or not finite */
     tpc_pixels(c[0] - wide, c[0] + wide, color->width, &left, &right);
     tpc_pixels(-c[1] - high, high - c[1], color->height, &top, &bottom);
     for (int row = top; row <= bottom; row++) {
@@ -73,7 +74,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     }
 }
 
-/* Unit vectors at right angles? */
+/* Are the axes orthogonal unit vectors, and is light of unit length? */
 static int tpc_is_view(const treepieces_impostor_desc *d) {
     const float *v[4] = {d->right, d->up, d->forward, d->light};
     for (int i = 0; i < 4; i++) {
@@ -99,8 +100,8 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
         return txm_fail(env, TXM_BAD_ARGUMENT, "depth must be float, 1 channel, of color's size");
     if (!tpc_is_view(desc))
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "right, up, forward and light must be unit vectors, the first three at "
-                        "right angles");
+                        "right, up, forward and light must be unit vectors, the first three "
+                        "orthogonal");
     for (int y = 0; y < c.height; y++) {
         float *depths = (float *)txm_image_row(&d, y);
         memset(txm_image_row(&c, y), 0, 4 * (size_t)c.width);

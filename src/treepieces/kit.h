@@ -5,18 +5,19 @@
 
 /* ---- the kit ----------------------------------------------------------------------------- */
 
-/* A vertex as terminal joint k sees it: in the frame of that leaf rim. */
-typedef struct tpc_seen {
+/* A vertex of a piece in the frame of one of its leaf rims. */
+typedef struct tpc_rim_frame {
     float position[3], normal[3];
-} tpc_seen;
+} tpc_rim_frame;
 
-/* How high the quads of a band are: along y in lengths, outwards in radii, on average. */
+/* Average height of the quads of a band: along y in lengths, outwards in radii. */
 typedef struct tpc_band {
     float rise, spread;
 } tpc_band;
 
-/* Which of the four quads whose tiles share a word of a record belong to which band, lie on the bottom
-   of their layer, or are of an own class: 255 in their byte. Bands first to last occur. */
+/* Four quads whose tiles share one word of a record, one byte each. The byte is 255 in bands[b] if
+   the quad belongs to band b, in bottom if it lies at the bottom of its layer, in own if its class
+   is one of the caller's. first, last: range of the bands that occur. */
 typedef struct tpc_cells {
     uint32_t bands[TREEPIECES_BANDS], bottom, own;
     int first, last;
@@ -26,16 +27,16 @@ struct treepieces_kit {
     txm_arena arena; /* holds the kit itself and all it points to */
     int count;
     treepieces_piece pieces[TREEPIECES_MAX_TYPES];
-    tpc_seen *seen[TREEPIECES_MAX_TYPES]; /* leaf by leaf, vertex_count each */
+    tpc_rim_frame *in_rims[TREEPIECES_MAX_TYPES]; /* vertex_count for each leaf rim */
     tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
     int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
     float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
     tpc_cells *cells[TREEPIECES_MAX_TYPES]; /* (quad_count + 3) / 4 each */
 };
 
-/* ---- what a piece must be ---------------------------------------------------------------- */
+/* ---- checking a piece -------------------------------------------------------------------- */
 
-/* Refuse a piece; number < 0: the fault is not that of one vertex. */
+/* Fail because of a piece; number < 0: the fault is not that of one vertex or quad. */
 static txm_status tpc_refuse(txm_env *env, const treepieces_piece *p, int index, const char *what,
                              int number, const char *fault) {
     char line[160];
@@ -53,7 +54,7 @@ static int tpc_is_near(const float *a, const float *b, int n, float tolerance) {
     return 1;
 }
 
-/* Counts and numbers, so that the rest can index. */
+/* Counts and indices, so that the other checks can index. */
 static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_env *env) {
     if (!p->vertices || p->vertex_count < 7 || p->vertex_count > TREEPIECES_MAX_VERTICES)
         return tpc_refuse(env, p, index, "", -1, "needs 7 to 255 vertices");
@@ -65,7 +66,7 @@ static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_en
         const treepieces_quad *q = &p->quads[i];
         for (int k = 0; k < 4; k++) {
             if (q->corners[k] >= p->vertex_count)
-                return tpc_refuse(env, p, index, "quad", i, "a corner is no vertex");
+                return tpc_refuse(env, p, index, "quad", i, "a corner is not a vertex");
             for (int j = 0; j < k; j++)
                 if (q->corners[j] == q->corners[k])
                     return tpc_refuse(env, p, index, "quad", i, "two corners are one vertex");
@@ -79,7 +80,7 @@ static txm_status tpc_check_numbers(const treepieces_piece *p, int index, txm_en
         const int *rim = tpc_rim_of(p, k);
         for (int j = 0; j < TREEPIECES_RIM; j++)
             if (rim[j] < 0 || rim[j] >= p->vertex_count)
-                return tpc_refuse(env, p, index, "place", j, "of a rim is no vertex");
+                return tpc_refuse(env, p, index, "place", j, "of a rim is not a vertex");
     }
     return TXM_OK;
 }
@@ -97,16 +98,16 @@ static txm_status tpc_check_vertices(const treepieces_piece *p, int index, txm_e
         for (int k = 0; k < 4; k++) {
             if (!(v->weights[k] >= 0) || (k > p->leaf_count && v->weights[k] != 0))
                 return tpc_refuse(env, p, index, "vertex", i,
-                                  "a weight is negative, or of a joint that is not there");
+                                  "a weight is negative, or of a joint that does not exist");
             sum += v->weights[k];
         }
         if (!(fabsf(sum - 1) <= 1e-4f))
-            return tpc_refuse(env, p, index, "vertex", i, "the weights' sum is not 1");
+            return tpc_refuse(env, p, index, "vertex", i, "the sum of the weights is not 1");
     }
     return TXM_OK;
 }
 
-/* Rim k (-1: the root rim) is the canonical one, bound to its joint alone. */
+/* Rim k (-1: the root rim) is the canonical hexagon, bound to its joint alone. */
 static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm_env *env) {
     const treepieces_similarity root = {{0, 0, 0}, {0, 0, 0, 1}, 1};
     const treepieces_similarity *b = k < 0 ? &root : &p->building[k];
@@ -114,7 +115,8 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
     float length = 0;
     for (int i = 0; i < 4; i++) length += b->rotation[i] * b->rotation[i];
     if (!(fabsf(length - 1) <= 1e-4f))
-        return tpc_refuse(env, p, index, "leaf rim", k, "the building rotation is no unit quaternion");
+        return tpc_refuse(env, p, index, "leaf rim", k,
+                          "the building rotation is not a unit quaternion");
     if (!(b->scale > 0) || !txm_is_finite((double)b->scale))
         return tpc_refuse(env, p, index, "leaf rim", k, "the building scale is not above 0");
     for (int j = 0; j < TREEPIECES_RIM; j++) {
@@ -123,9 +125,9 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
         tpc_leaf_vertex(b, j, position, normal);
         if (!tpc_is_near(v->position, position, 3, 1e-4f * b->scale))
             return tpc_refuse(env, p, index, "vertex", rim[j],
-                              k < 0 ? "is not at its place of the root rim"
-                                    : "is not at its place of a leaf rim, moved by the building "
-                                      "transform");
+                              k < 0 ? "is not at its place on the root rim"
+                                    : "is not at its place on a leaf rim, which the building "
+                                      "transform gives");
         if (!tpc_is_near(v->normal, normal, 3, 1e-3f))
             return tpc_refuse(env, p, index, "vertex", rim[j],
                               "the normal is not that of the rim's cone");
@@ -143,12 +145,12 @@ static txm_status tpc_check_rim(const treepieces_piece *p, int index, int k, txm
     return TXM_OK;
 }
 
-/* side[a * n + b]: how many quads have the side from a to b */
+/* side[a * n + b]: number of quads with the side from a to b */
 static int tpc_has_side(const uint8_t *side, int n, int a, int b) {
     return side[(size_t)a * (size_t)n + (size_t)b];
 }
 
-/* The quads about every vertex are one fan: walking from one over shared sides meets them all. */
+/* The quads about each vertex form one fan: walking over shared sides reaches all of them. */
 static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *env) {
     for (int v = 0; v < p->vertex_count; v++) {
         int from[TREEPIECES_MAX_QUADS], to[TREEPIECES_MAX_QUADS], count = 0, met = 1;
@@ -179,13 +181,13 @@ static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *
     return TXM_OK;
 }
 
-/* Which of the vertices that hang together with this one stands for all of them. */
+/* The representative of the connected vertices to which this one belongs (union-find). */
 static int tpc_find_root(const int *root, int vertex) {
     while (root[vertex] != vertex) vertex = root[vertex];
     return vertex;
 }
 
-/* Oriented, manifold, in one piece, its borders the rims. */
+/* Oriented, manifold, connected, and the rims are its only borders. */
 static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_t *side,
                                     txm_env *env) {
     const int n = p->vertex_count;
@@ -197,7 +199,7 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
             const int a = p->quads[i].corners[k], b = p->quads[i].corners[(k + 1) % 4];
             if (side[(size_t)a * (size_t)n + (size_t)b]++)
                 return tpc_refuse(env, p, index, "vertex", a,
-                                  "a side from it is that of two quads that are not oriented alike");
+                                  "a side from it belongs to two quads of opposite orientation");
             root[tpc_find_root(root, a)] = tpc_find_root(root, b);
         }
     }
@@ -208,21 +210,21 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
             const int ahead = tpc_has_side(side, n, a, b), back = tpc_has_side(side, n, b, a);
             if (ahead != (k < 0) || back != (k >= 0))
                 return tpc_refuse(env, p, index, "vertex", a,
-                                  "the rim from it on is no border, or runs the wrong way round");
+                                  "the edge of the rim from it is no border, or runs the wrong way");
         }
     }
     for (int a = 0; a < n; a++) {
         for (int b = 0; b < n; b++) {
             if (!tpc_has_side(side, n, a, b) || tpc_has_side(side, n, b, a)) continue;
             if (++borders > TREEPIECES_RIM * (1 + p->leaf_count))
-                return tpc_refuse(env, p, index, "", -1, "has a border that is no rim");
+                return tpc_refuse(env, p, index, "", -1, "has a border that is not a rim");
         }
     }
     const txm_status status = tpc_check_fans(p, index, env);
     if (status != TXM_OK) return status;
     for (int i = 1; i < n; i++)
         if (tpc_find_root(root, i) != tpc_find_root(root, 0))
-            return tpc_refuse(env, p, index, "vertex", i, "does not hang together with vertex 0");
+            return tpc_refuse(env, p, index, "vertex", i, "is not connected to vertex 0");
     return TXM_OK;
 }
 
@@ -269,16 +271,16 @@ static void tpc_sort_cells(const treepieces_piece *p, tpc_cells *cells) {
     }
 }
 
-/* Copy a piece into the kit, its rims moved to where they belong to the bit. */
-static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
+/* Copy a piece into the kit; its rims are moved to their exact places. */
+static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
     const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
     const size_t name = from->name ? strlen(from->name) : 0;
     treepieces_vertex *v =
         (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
     treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
     char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
-    tpc_seen *seen = (tpc_seen *)txm_arena_alloc(
-        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *seen);
+    tpc_rim_frame *in_rims = (tpc_rim_frame *)txm_arena_alloc(
+        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *in_rims);
     tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
     if (kit->arena.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
@@ -311,7 +313,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
                                             b->translation[2] * b->translation[2]);
         const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
         for (size_t i = 0; i < vertices; i++) {
-            tpc_seen *at = &seen[(size_t)k * vertices + i];
+            tpc_rim_frame *at = &in_rims[(size_t)k * vertices + i];
             float moved[3];
             for (int c = 0; c < 3; c++)
                 moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
@@ -327,7 +329,7 @@ static txm_status tpc_take(treepieces_kit *kit, const treepieces_piece *from, tx
     for (size_t i = 0; i < quads; i++)
         if (q[i].band >= kit->band_counts[kit->count]) kit->band_counts[kit->count] = q[i].band + 1;
     kit->cells[kit->count] = cells;
-    kit->seen[kit->count++] = seen;
+    kit->in_rims[kit->count++] = in_rims;
     return TXM_OK;
 }
 
@@ -357,11 +359,11 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
     } else {
         for (int i = 0; status == TXM_OK && i < TREEPIECES_BUILTIN; i++) {
             tpc_make_builtin(i, shape);
-            status = tpc_take(kit, &shape->piece, env);
+            status = tpc_add_piece(kit, &shape->piece, env);
         }
         for (int i = 0; status == TXM_OK && i < count; i++) {
             status = tpc_check_piece(&pieces[i], i, side, env);
-            if (status == TXM_OK) status = tpc_take(kit, &pieces[i], env);
+            if (status == TXM_OK) status = tpc_add_piece(kit, &pieces[i], env);
         }
     }
     txm_free(env, shape);

@@ -5,7 +5,7 @@
 
 /* ---- species: presets -------------------------------------------------------------------- */
 
-/* What a species has that is not in its text: a small round tree. */
+/* The default of every key: a small round tree. */
 static const char tpc_fresh[] =
     "flare 1.6\n"
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"

@@ -3,11 +3,11 @@
 
 #include "../treepieces.h"
 
-/* ---- numbers ----------------------------------------------------------------------------- */
+/* ---- vectors and rotations --------------------------------------------------------------- */
 
-/* All that decides is sums, products, quotients and square roots, so that it is the same everywhere;
-   libm's sine and exponential are not, those of texmath.h are. In float and not rounded from double as
-   texmath.h's own vectors are: a forest takes millions of these. */
+/* Everything that shapes a tree is computed by sums, products, quotients and square roots, so that
+   it is the same everywhere. In float, not rounded from double as vectors of texmath.h are: a
+   forest takes millions of these operations. */
 
 /* q v q* for a unit quaternion q = x y z w; out may be v */
 static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
@@ -21,9 +21,9 @@ static void tpc_rotate(const float q[4], const float v[3], float out[3]) {
     out[2] = z;
 }
 
-/* out = a b: b first, then a; out may be one of them. All terms are added, some with the other sign:
-   gcc 12 makes one instruction that rounds once of neighbouring a - b c and a + b c, contraction off or
-   not. */
+/* out = a b: b first, then a; out may be one of them. Leave the order of the terms, and every term
+   added, some with the sign inverted: from neighbouring a - b c and a + b c gcc 12 makes one
+   instruction that rounds only once, even with contraction off. */
 static void tpc_multiply(const float a[4], const float b[4], float out[4]) {
     const float back[3] = {-a[0], -a[1], -a[2]};
     const float x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] + back[2] * b[1];
@@ -73,8 +73,8 @@ static const float tpc_cos6[TREEPIECES_RIM] = {1.0f, 0.5f, -0.5f, -1.0f, -0.5f, 
 static const float tpc_sin6[TREEPIECES_RIM] = {0.0f,  0.86602540378f,  0.86602540378f,
                                                0.0f, -0.86602540378f, -0.86602540378f};
 
-static const float tpc_cone_out = 0.99503719021f; /* 10 / sqrt(101): of the normal at a rim */
-static const float tpc_cone_up = 0.09950371902f;  /* 1 / sqrt(101)                          */
+static const float tpc_cone_out = 0.99503719021f; /* normals at a rim: 10 / sqrt(101) outwards, */
+static const float tpc_cone_up = 0.09950371902f;  /* 1 / sqrt(101) upwards                      */
 
 static void tpc_rim_vertex(int place, float position[3], float normal[3]) {
     position[0] = tpc_cos6[place];
@@ -85,7 +85,7 @@ static void tpc_rim_vertex(int place, float position[3], float normal[3]) {
     normal[2] = -tpc_cone_out * tpc_sin6[place];
 }
 
-/* v turned about y by 60 k degrees, which takes place j of a rim to place j + k */
+/* v rotated about y by 60 k degrees, which moves vertex j of a rim to vertex j + k */
 static void tpc_turn(int k, const float v[3], float out[3]) {
     const float c = tpc_cos6[k], s = tpc_sin6[k], x = v[0], z = v[2];
     out[0] = c * x + s * z;
@@ -98,7 +98,7 @@ static void tpc_building_point(const treepieces_similarity *b, const float p[3],
     for (int i = 0; i < 3; i++) out[i] = b->translation[i] + b->scale * out[i];
 }
 
-/* Place j of a leaf rim in the piece's model space. */
+/* Vertex `place` of a leaf rim in model space of the piece. */
 static void tpc_leaf_vertex(const treepieces_similarity *b, int place, float position[3],
                             float normal[3]) {
     tpc_rim_vertex(place, position, normal);
@@ -106,7 +106,7 @@ static void tpc_leaf_vertex(const treepieces_similarity *b, int place, float pos
     tpc_rotate(b->rotation, normal, normal);
 }
 
-/* The vertex numbers of leaf rim k, of the root rim for k = -1. */
+/* The vertex numbers of leaf rim k; of the root rim for k = -1. */
 static const int *tpc_rim_of(const treepieces_piece *p, int k) {
     return k < 0 ? p->root_rim : p->leaf_rims[k];
 }

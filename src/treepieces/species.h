@@ -21,7 +21,7 @@ typedef struct tpc_field {
 #define TPC_ORDER(key, count, low, high) \
     { #key, offsetof(treepieces_order, key), TPC_REAL, count, low, high }
 
-/* name and orders are read apart */
+/* all but the name and the orders, which are read separately */
 static const tpc_field tpc_fields[] = {
     TPC_FIELD(order_count, TPC_WHOLE, 1, 1, TREEPIECES_MAX_ORDERS),
     TPC_FIELD(flare, TPC_REAL, 1, 1, 4),
@@ -81,7 +81,7 @@ static const char *const tpc_envelope_names[] = {"free", "ellipsoid", "cone", "c
 static const char *const tpc_leaf_names[] = {"oval",  "lobed",  "lance", "heart",
                                              "needle", "blossom", NULL};
 
-/* The words that a field's values are called by; NULL: they are numbers. */
+/* The names of the values of a field; NULL: they are numbers. */
 static const char *const *tpc_names_of(const tpc_field *f) {
     return f->kind == TPC_ENVELOPE ? tpc_envelope_names
            : f->kind == TPC_LEAF   ? tpc_leaf_names
@@ -118,8 +118,8 @@ static double tpc_scale10(double x, int e) {
     return e < 0 ? x / power : x * power;
 }
 
-/* Digits from *at on into *sum, as many as it holds exactly; returns how many there are, and in
-   *dropped how many of them went nowhere. */
+/* Read digits from *at on into *sum, as many as it holds exactly. Returns how many digits there
+   are; *dropped counts those that *sum could not hold. */
 static int tpc_read_digits(const char **at, const char *end, double *sum, int *dropped) {
     int count = 0;
     for (; *at < end && **at >= '0' && **at <= '9'; ++*at, count++) {
@@ -129,7 +129,7 @@ static int tpc_read_digits(const char **at, const char *end, double *sum, int *d
     return count;
 }
 
-/* A decimal number, whatever the locale says; 0 if the text is none. */
+/* Read a decimal number, independent of the locale; 0 if the text is not a number. */
 static int tpc_read_number(const char *at, const char *end, double *value) {
     const int negative = at < end && *at == '-';
     double sum = 0, exponent = 0;
@@ -159,7 +159,7 @@ static int tpc_read_number(const char *at, const char *end, double *value) {
     return 1;
 }
 
-/* `count` significant digits of x > 0, and the power of ten of the first. */
+/* Write `count` significant digits of x > 0; returns the power of ten of the first. */
 static int tpc_write_digits(double x, int count, char *digits) {
     int power = 0;
     while (tpc_scale10(x, -power) >= 10) power++;
@@ -174,7 +174,7 @@ static int tpc_write_digits(double x, int count, char *digits) {
     return power;
 }
 
-/* x to `count` significant digits: 0.05, 12, 1.5e-7 */
+/* Write x to `count` significant digits: 0.05, 12, 1.5e-7. */
 static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
     char digits[16], *to = text;
     const int power = tpc_write_digits(fabs((double)x), count, digits);
@@ -194,7 +194,7 @@ static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
     if (!plain) snprintf(to, (size_t)(text + TPC_NUMBER - to), "e%d", power);
 }
 
-/* The shortest text that reads back as x. */
+/* Write the shortest text that reads back as x. */
 static void tpc_write_number(float x, char text[TPC_NUMBER]) {
     if (!txm_is_finite((double)x) || x == 0) {
         snprintf(text, TPC_NUMBER, "%s", x == 0 ? "0" : x > 0 ? "inf" : x < 0 ? "-inf" : "nan");
@@ -210,8 +210,8 @@ static void tpc_write_number(float x, char text[TPC_NUMBER]) {
 
 /* ---- species: checking ------------------------------------------------------------------- */
 
-/* What a field's value must be, for a message. */
-static void tpc_tell_range(const tpc_field *f, char *text, size_t capacity) {
+/* Write what the value of a field must be, for a message. */
+static void tpc_write_range(const tpc_field *f, char *text, size_t capacity) {
     const char *const *names = tpc_names_of(f);
     char low[TPC_NUMBER], high[TPC_NUMBER];
     if (!names) {
@@ -226,7 +226,7 @@ static void tpc_tell_range(const tpc_field *f, char *text, size_t capacity) {
         n += snprintf(text + n, capacity - (size_t)n, " %s", *names);
 }
 
-/* NULL, or the first of the fields that is not within its range */
+/* the first field that is out of its range, or NULL */
 static const tpc_field *tpc_find_fault(const tpc_field *fields, int count, const void *base) {
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < fields[i].count; k++) {
@@ -237,7 +237,7 @@ static const tpc_field *tpc_find_fault(const tpc_field *fields, int count, const
     return NULL;
 }
 
-/* A name can be written on a line: printable, no comment, no blanks about it. */
+/* Can this name be written on a line? No control characters, no #, no blanks at its ends. */
 static int tpc_is_name(const char name[TREEPIECES_MAX_NAME]) {
     int n = 0;
     while (n < TREEPIECES_MAX_NAME && name[n]) {
@@ -251,18 +251,19 @@ static txm_status tpc_species_check(const treepieces_species *s, txm_env *env) {
     char line[200], range[120];
     if (!tpc_is_name(s->name))
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "a species' name is too long, begins or ends blank, or holds # or controls");
+                        "a species name is too long, begins or ends with a blank, or contains # or a "
+                        "control character");
     const char *name = s->name[0] ? s->name : "without a name";
     const tpc_field *fault = tpc_find_fault(tpc_fields, TPC_FIELDS, s);
     if (fault) {
-        tpc_tell_range(fault, range, sizeof range);
+        tpc_write_range(fault, range, sizeof range);
         snprintf(line, sizeof line, "species %s: %s", name, range);
         return txm_fail(env, TXM_BAD_ARGUMENT, line);
     }
     for (int k = 0; k < s->order_count; k++) {
         fault = tpc_find_fault(tpc_order_fields, TPC_ORDER_FIELDS, &s->orders[k]);
         if (!fault) continue;
-        tpc_tell_range(fault, range, sizeof range);
+        tpc_write_range(fault, range, sizeof range);
         snprintf(line, sizeof line, "species %s, order %d: %s", name, k, range);
         return txm_fail(env, TXM_BAD_ARGUMENT, line);
     }

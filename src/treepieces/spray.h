@@ -6,24 +6,24 @@
 
 /* ---- foliage: drawn leaves ----------------------------------------------------------------- */
 
-/* A spray is a list of marks, later ones over earlier ones. A sample of the picture asks them from
-   the last to the first who has it; so edges are smoothed without seams, and rows do not wait for
-   each other. Lengths are in sides of the picture, y goes down. */
+/* A spray is a list of marks, painted in order. A sample takes the colour of the last mark that
+   covers it, so that edges are antialiased without seams and rows are independent of each other.
+   Lengths are in sides of the image, y points down. */
 enum {
-    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* a tapering stroke; else treepieces_leaf_shape */
+    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* shape of a mark: a tapering stroke */
     TPC_MARKS = 1024,
-    TPC_SAMPLES = 4 /* across and down a pixel */
+    TPC_SAMPLES = 4 /* per pixel, across and down */
 };
 
 typedef struct tpc_mark {
-    int shape;
-    float from[2], along[2]; /* its foot, and from there to its tip */
+    int shape;               /* treepieces_leaf_shape, or TPC_TWIG */
+    float from[2], along[2]; /* its base, and the vector from there to its tip */
     float width;             /* half of it over the length */
-    float taper;             /* of a twig: width at its tip over that at its foot */
+    float taper;             /* of a twig: width at its tip over that at its base */
     float bend;              /* of the midrib, over the length */
-    float fold;              /* how much one half is lighter than the other */
-    float low[2], high[2];   /* the box around it */
-    float color[3], tip[3];
+    float fold;              /* how much lighter one half is than the other */
+    float low[2], high[2];   /* bounding box */
+    float color[3], tip[3];  /* at the base and at the tip */
 } tpc_mark;
 
 typedef struct tpc_spray {
@@ -35,26 +35,26 @@ typedef struct tpc_spray {
     int first_row;
 } tpc_spray;
 
-/* What a leaf shape's spray is like. */
+/* The growth habit of a spray, by leaf shape. */
 typedef struct tpc_habit {
     int leaves, twigs, twig_leaves; /* on the stem; side twigs; leaves on each */
     float length, width;            /* of a leaf; half the width over the length */
     float petiole, angle, bend;     /* angle: degrees between leaf and stem */
 } tpc_habit;
 
-/* by treepieces_leaf_shape */
 static const tpc_habit tpc_habits[] = {
     {9, 6, 6, 0.23f, 0.31f, 0.02f, 58, 0.10f},   {7, 5, 4, 0.31f, 0.34f, 0.01f, 55, 0.06f},
     {15, 6, 9, 0.32f, 0.085f, 0.02f, 38, 0.14f}, {8, 6, 6, 0.20f, 0.44f, 0.05f, 62, 0.06f},
     {0, 9, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.105f, 0.42f, 0.06f, 75, 0},
 };
 
-/* Half the width of a leaf at u of its length over the most it has; side: 0..1 how far across. */
+/* Half the width of a leaf at u of its length, over its maximum; side: 0..1 how far from the
+   midrib. */
 static float tpc_outline(int shape, float u, float side) {
     const float arc = 4 * u * (1 - u);
     float v, phase;
     switch (shape) {
-    case TREEPIECES_LEAF_LOBED: /* lobes point forwards */
+    case TREEPIECES_LEAF_LOBED: /* lobes point to the tip */
         phase = 4.3f * (u - 0.14f * side) + 0.1f;
         v = 2 * (phase - floorf(phase)) - 1;
         return arc * (0.52f + 0.75f * u) * (0.4f + 0.64f * sqrtf(txm_maxf(0, 1 - v * v)));
@@ -74,12 +74,12 @@ static float tpc_outline(int shape, float u, float side) {
     }
 }
 
-/* The color of a leaf at u of its length and x across it, half the width being `half`. */
+/* The color of a leaf at u of its length and x across; half: half its width there. */
 static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, float color[3]) {
     static const float veins[] = {9, 6, 11, 7}; /* by shape */
     const float across = x < 0 ? -x : x, edge = half > 0 ? across / half : 0;
     float shade = (x < 0 ? 1 - m->fold : 1 + m->fold) * (0.86f + 0.1f * u + 0.1f * edge), light = 0;
-    if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the blade bulging between them */
+    if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the bulges between them */
         const float phase = (u - 0.7f * across) * veins[m->shape] + 100;
         const float between = phase - floorf(phase), off = between < 0.5f ? between : 1 - between;
         shade *= 0.96f + 0.1f * between;
@@ -97,7 +97,7 @@ static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, floa
     }
 }
 
-/* Does the mark have that place? Its color there then. color may be NULL. */
+/* Does the mark cover (x, y)? If so, color (may be NULL) receives its color there. */
 static int tpc_mark_at(const tpc_mark *m, float x, float y, float color[3]) {
     if (x < m->low[0] || y < m->low[1] || x > m->high[0] || y > m->high[1]) return 0;
     const float dx = x - m->from[0], dy = y - m->from[1];
@@ -120,8 +120,8 @@ static int tpc_mark_at(const tpc_mark *m, float x, float y, float color[3]) {
     return 1;
 }
 
-/* Color of the picture at a place, in the shadow of marks that lie higher; 0: it is transparent
-   there. Of the marks, those listed can be there. */
+/* Color of the spray at (x, y), shadows of higher marks included; 0 if it is transparent there.
+   Only the listed marks are tested. */
 static int tpc_spray_at(const tpc_spray *s, const uint16_t *listed, int count, float x, float y,
                         float color[3]) {
     int is_shaded = 0;
@@ -136,7 +136,7 @@ static int tpc_spray_at(const tpc_spray *s, const uint16_t *listed, int count, f
     return 0;
 }
 
-/* Those of the marks in `from` that reach low..high along an axis, with the shadows they throw. */
+/* List the marks in `from` that, with their shadows, overlap low..high along an axis. */
 static int tpc_list_marks(const tpc_spray *s, const uint16_t *from, int count, int axis, float low,
                           float high, uint16_t *listed) {
     int kept = 0;
@@ -171,15 +171,15 @@ static void tpc_draw_row(void *context, int index) {
             for (int c = 0; c < 3; c++) sum[c] += color[c];
             covered++;
         }
-        for (int c = 0; c < 3; c++) /* what is transparent too: filtering leaves no dark fringe */
+        /* transparent pixels have a color too, so that filtering shows no dark fringe */
+        for (int c = 0; c < 3; c++)
             txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered
                                                     : 0.85f * s->species->leaf_color[c]);
         txm_image_set(&s->out, x, y, 3, (float)covered / (TPC_SAMPLES * TPC_SAMPLES));
     }
 }
 
-/* A mark from a to b, `half` a width to either side; NULL: there are too many, or it has no
-   length. */
+/* Add a mark from a to b of half width `half`; NULL if there are too many, or if it has no length. */
 static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const float b[2],
                               float half, float bend, const float color[3]) {
     const float dx = b[0] - a[0], dy = b[1] - a[1], length = sqrtf(dx * dx + dy * dy);
@@ -201,9 +201,9 @@ static tpc_mark *tpc_add_mark(tpc_spray *s, int shape, const float a[2], const f
     return m;
 }
 
-/* A place `length` from a, turned by so many degrees from `heading` (a unit vector), kept off the
-   border by `margin`. */
-static void tpc_go(const float a[2], const float heading[2], float degrees, float length,
+/* b = the point at distance `length` from a in the direction of `heading` (unit length) rotated by
+   `degrees`, kept away from the border by `margin`. */
+static void tpc_advance(const float a[2], const float heading[2], float degrees, float length,
                    float margin, float b[2]) {
     double sine, cosine;
     txm_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
@@ -213,7 +213,7 @@ static void tpc_go(const float a[2], const float heading[2], float degrees, floa
     b[1] = txm_clampf(a[1] + length * y, margin, 1 - margin);
 }
 
-/* The leaf color, a bit lighter or darker, yellower or bluer. */
+/* The base color made a little lighter or darker, yellower or bluer, at random. */
 static void tpc_vary_color(tpc_spray *s, const float base[3], float color[3]) {
     const float light = 1 + 0.13f * tpc_signed(&s->rng), warm = 0.09f * tpc_signed(&s->rng);
     color[0] = base[0] * light * (1 + warm);
@@ -226,6 +226,7 @@ typedef struct tpc_stem {
     float from[2], to[2], bend;
 } tpc_stem;
 
+/* The point and the direction at s of the length of a stem. */
 static void tpc_stem_at(const tpc_stem *t, float s, float at[2], float heading[2]) {
     const float dx = t->to[0] - t->from[0], dy = t->to[1] - t->from[1];
     const float arc = t->bend * 4 * s * (1 - s), slope = t->bend * 4 * (1 - 2 * s);
@@ -238,6 +239,7 @@ static void tpc_stem_at(const tpc_stem *t, float s, float at[2], float heading[2
     heading[1] /= length;
 }
 
+/* Add a stem as a chain of twig marks. */
 static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float half_at_end) {
     const int parts = 8, is_blossom = s->shape == TREEPIECES_LEAF_BLOSSOM;
     float color[3], green[3];
@@ -263,8 +265,8 @@ static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float h
     }
 }
 
-/* A leaf on its stalk, seen more or less from above. */
-static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
+/* Add a leaf with its petiole, seen roughly from above. */
+static void tpc_add_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
                          float degrees, float size, const float base[3]) {
     const tpc_habit *habit = &tpc_habits[shape];
     float foot[2], tip[2], color[3];
@@ -272,8 +274,8 @@ static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float
     const float half = length * habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
     const float bend = habit->bend * tpc_signed(&s->rng), margin = 0.015f + 0.75f * half;
     tpc_vary_color(s, base, color);
-    tpc_go(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
-    tpc_go(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
+    tpc_advance(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
+    tpc_advance(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
     tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.004f, 0, color);
     if (stalk) stalk->taper = 0.7f;
     tpc_mark *leaf = tpc_add_mark(s, shape, foot, tip, half, bend, color);
@@ -282,7 +284,7 @@ static void tpc_put_leaf(tpc_spray *s, int shape, const float at[2], const float
     for (int k = 0; k < 3; k++) leaf->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
 }
 
-/* Five petals about a middle with stamens, seen askew. */
+/* Add a flower: five petals and the stamens, seen obliquely. */
 static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
     static const float white[3] = {1, 0.97f, 0.975f}, anther[3] = {0.85f, 0.62f, 0.25f};
     static const float up[2] = {0, -1};
@@ -297,8 +299,8 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
         txm_sincos((double)(angle - lean) * (TXM_PI / 180), &sine, &cosine);
         const float length = radius * (1 - squash * (float)(cosine * cosine));
         const float half = 0.46f * radius * (1 - squash * (float)(sine * sine));
-        tpc_go(at, up, angle, 0.08f * radius, 0.01f, foot);
-        tpc_go(at, up, angle, length, 0.01f, tip);
+        tpc_advance(at, up, angle, 0.08f * radius, 0.01f, foot);
+        tpc_advance(at, up, angle, length, 0.01f, tip);
         tpc_mark *petal = tpc_add_mark(s, TREEPIECES_LEAF_BLOSSOM, foot, tip, half, 0, deep);
         if (!petal) return;
         const float paler = 0.45f + 0.35f * txm_rng_float(&s->rng);
@@ -311,15 +313,16 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
     for (int i = 0; i < 9; i++) {
         const float angle = 40 * (float)i + 15 * tpc_signed(&s->rng);
         float tip[2], top[2];
-        tpc_go(at, up, angle, radius * (0.2f + 0.2f * txm_rng_float(&s->rng)), 0.01f, tip);
-        tpc_go(tip, up, angle, 0.07f * radius, 0.01f, top);
+        tpc_advance(at, up, angle, radius * (0.2f + 0.2f * txm_rng_float(&s->rng)), 0.01f, tip);
+        tpc_advance(tip, up, angle, 0.07f * radius, 0.01f, top);
         tpc_add_mark(s, TPC_TWIG, at, tip, 0.014f * radius, 0, deep);
         tpc_add_mark(s, TPC_TWIG, tip, top, 0.04f * radius, 0, anther);
     }
 }
 
-/* What grows on a twig: leaves to both sides in turn and one at the end. */
-static void tpc_dress(tpc_spray *s, const tpc_stem *stem, int count, float first, float size) {
+/* Add the leaves or flowers of a twig: on alternate sides, and one at the end. */
+static void tpc_add_foliage(tpc_spray *s, const tpc_stem *stem, int count, float first,
+                            float size) {
     static const float young[3] = {0.42f, 0.55f, 0.2f};
     const tpc_habit *habit = &tpc_habits[s->shape];
     float side = txm_rng_float(&s->rng) < 0.5f ? -1.0f : 1.0f;
@@ -331,18 +334,18 @@ static void tpc_dress(tpc_spray *s, const tpc_stem *stem, int count, float first
         float at[2], heading[2], middle[2];
         tpc_stem_at(stem, along, at, heading);
         if (s->shape != TREEPIECES_LEAF_BLOSSOM) {
-            tpc_put_leaf(s, s->shape, at, heading, angle, size * (1.05f - 0.3f * along * along),
+            tpc_add_leaf(s, s->shape, at, heading, angle, size * (1.05f - 0.3f * along * along),
                          s->species->leaf_color);
             continue;
         }
         if (is_last || txm_rng_float(&s->rng) < 0.35f)
-            tpc_put_leaf(s, TREEPIECES_LEAF_LANCE, at, heading, -0.6f * angle, 0.4f, young);
-        tpc_go(at, heading, angle, habit->petiole, 0.13f, middle);
+            tpc_add_leaf(s, TREEPIECES_LEAF_LANCE, at, heading, -0.6f * angle, 0.4f, young);
+        tpc_advance(at, heading, angle, habit->petiole, 0.13f, middle);
         tpc_add_flower(s, middle, habit->length * (0.85f + 0.25f * txm_rng_float(&s->rng)));
     }
 }
 
-/* Needles on both sides of a twig and towards the eye. */
+/* Add needles on both sides of a twig and towards the viewer. */
 static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
     const tpc_habit *habit = &tpc_habits[TREEPIECES_LEAF_NEEDLE];
     const float dx = stem->to[0] - stem->from[0], dy = stem->to[1] - stem->from[1];
@@ -355,7 +358,7 @@ static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
         float at[2], heading[2], tip[2], color[3];
         tpc_stem_at(stem, along, at, heading);
         tpc_vary_color(s, s->species->leaf_color, color);
-        tpc_go(at, heading, angle + 12 * tpc_signed(&s->rng), length, 0.01f, tip);
+        tpc_advance(at, heading, angle + 12 * tpc_signed(&s->rng), length, 0.01f, tip);
         tpc_mark *m = tpc_add_mark(s, TREEPIECES_LEAF_NEEDLE, at, tip, habit->width * habit->length,
                                    habit->bend * tpc_signed(&s->rng), color);
         for (int k = 0; m && k < 3; k++) {
@@ -365,8 +368,9 @@ static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
     }
 }
 
-/* The whole spray: a stem from the middle of the lower side upwards, twigs to both sides. */
-static void tpc_compose(tpc_spray *s) {
+/* Add all marks of the spray: a stem upwards from the middle of the lower side, twigs on both
+   sides. */
+static void tpc_make_spray(tpc_spray *s) {
     const tpc_habit *habit = &tpc_habits[s->shape];
     const int is_needle = s->shape == TREEPIECES_LEAF_NEEDLE;
     const float top = is_needle ? 0.12f : 0.97f * habit->length + 0.03f;
@@ -382,19 +386,19 @@ static void tpc_compose(tpc_spray *s) {
         tpc_stem twig;
         float heading[2];
         tpc_stem_at(&stem, along, twig.from, heading);
-        tpc_go(twig.from, heading, angle, length, 0.12f, twig.to);
+        tpc_advance(twig.from, heading, angle, length, 0.12f, twig.to);
         twig.bend = -0.08f * side;
         tpc_add_stem(s, &twig, 0.007f, 0.003f);
         if (is_needle) tpc_add_needles(s, &twig, 0.08f);
-        else tpc_dress(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
+        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
     }
     if (is_needle) tpc_add_needles(s, &stem, 0.03f);
-    else tpc_dress(s, &stem, habit->leaves, 0.14f, 1);
+    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 1);
 }
 
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out) {
-    enum { ROWS = 64 }; /* between two reports */
+    enum { ROWS = 64 }; /* between two progress reports */
     tpc_spray spray;
     if (!species) return txm_fail(env, TXM_BAD_ARGUMENT, "species is NULL");
     txm_status status = txm_image_check(&out, "out", 0, env);
@@ -408,7 +412,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
     spray.rng = txm_rng_make(seed, 0x59a7);
     spray.out = txm_image_resolve(out);
-    tpc_compose(&spray);
+    tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
         if (txm_progress(env, (float)y / (float)out.height, "leaves"))

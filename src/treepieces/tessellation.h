@@ -5,7 +5,7 @@
 
 /* ---- level of detail --------------------------------------------------------------------- */
 
-/* The level at a place, which is given as a sum of `count` points. */
+/* The level at the mean of `count` points, which are given as their sum. */
 static int tpc_level(const treepieces_lod *lod, const float sum[3], float count) {
     const float half = lod->half_distance > 0 ? lod->half_distance : 10;
     const float most = txm_clampf(lod->max_level, 1, 64);
@@ -33,16 +33,16 @@ TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float
     return tpc_level(lod, sum, 4);
 }
 
-/* Place i of 0..n along a side: multiples of 2^-16, so that place n - i is exactly 1 - place i. Steps
-   of n-ths that are rounded once, then multiplied, are what tessellation units take. */
-static float tpc_place_along(int i, int n) {
-    if (2 * i > n) return 1 - tpc_place_along(n - i, n);
+/* Position i of 0..n along a side, a multiple of 2^-16, so that position n - i is exactly 1 minus
+   that of i. The step 1 / n is rounded once, then multiplied, as tessellation units do. */
+static float tpc_fraction(int i, int n) {
+    if (2 * i > n) return 1 - tpc_fraction(n - i, n);
     if (2 * i == n) return 0.5f;
     return (float)(i * ((65536 * 2 + n) / (2 * n))) / 65536.0f;
 }
 
-/* The vertices of a pattern: the sides' first, side k from corner k up to the one before corner
-   k + 1, then the inner grid, column by column. */
+/* The vertices of a pattern: first those of the sides, side k from corner k up to the one before
+   corner k + 1, then the inner grid, column by column. */
 typedef struct tpc_pattern {
     int edges[4], first[4], inner, outer_count;
 } tpc_pattern;
@@ -51,7 +51,7 @@ static int tpc_side_vertex(const tpc_pattern *p, int side, int i) {
     return i < p->edges[side] ? p->first[side] + i : p->first[(side + 1) % 4];
 }
 
-/* Vertex i of 0..inner - 2 of the inner grid's border along a side, in the side's direction. */
+/* Vertex i of 0..inner - 2 on the border of the inner grid along a side, in the side's direction. */
 static int tpc_inner_vertex(const tpc_pattern *p, int side, int i) {
     const int n = p->inner - 1, far = n - 1 - i;
     const int u = side == 0 ? 0 : side == 1 ? i : side == 2 ? n - 1 : far;
@@ -68,7 +68,7 @@ static void tpc_add_triangle(uint16_t *indices, int *count, int a, int b, int c)
     ++*count;
 }
 
-/* The strip between a side and the inner grid: always the next step that is the less far along. */
+/* The strip between a side and the inner grid: always advance on the one that is less far along. */
 static void tpc_stitch(const tpc_pattern *p, int side, uint16_t *indices, int *count) {
     const int outer = p->edges[side], inner = p->inner - 2;
     int i = 0, j = 0;
@@ -101,14 +101,14 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
     }
     if (p.inner == 1 && p.outer_count > 4) p.inner = 2;
     const int n = p.inner - 1;
-    if (!coords && !indices) { /* the strips, and the grid within */
+    if (!coords && !indices) { /* the strips and the inner grid */
         count = n == 0 ? 2 : p.outer_count + 4 * (n - 1) + 2 * (n - 1) * (n - 1);
         if (triangles) *triangles = count;
         return p.outer_count + n * n;
     }
     for (int k = 0; k < 4 && coords; k++) {
         for (int i = 0; i < p.edges[k]; i++) {
-            const float t = tpc_place_along(i, p.edges[k]), back = 1 - t;
+            const float t = tpc_fraction(i, p.edges[k]), back = 1 - t;
             float *at = coords + 2 * (p.first[k] + i);
             const int u = corner_u[k], v = corner_v[k], next = (k + 1) % 4;
             at[0] = u == corner_u[next] ? (float)u : u ? back : t;
@@ -119,8 +119,8 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
         for (int v = 0; v < n; v++) {
             if (coords) {
                 float *at = coords + 2 * (p.outer_count + u * n + v);
-                at[0] = tpc_place_along(u + 1, p.inner);
-                at[1] = tpc_place_along(v + 1, p.inner);
+                at[0] = tpc_fraction(u + 1, p.inner);
+                at[1] = tpc_fraction(v + 1, p.inner);
             }
             if (u + 1 == n || v + 1 == n) continue;
             const int a = p.outer_count + u * n + v;
@@ -137,16 +137,16 @@ TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coor
     return p.outer_count + n * n;
 }
 
-/* How much of each corner there is at (u, v). */
-static void tpc_weigh(float u, float v, float w[4]) {
+/* The bilinear weights of the corners at (u, v). */
+static void tpc_corner_weights(float u, float v, float w[4]) {
     w[0] = (1 - u) * (1 - v);
     w[1] = (1 - u) * v;
     w[2] = u * v;
     w[3] = u * (1 - v);
 }
 
-/* A weighted sum of four numbers, the same to the bit whatever the order of the corners as long as
-   two weights at most are not 0: opposite corners are added first, and x + 0 is x. */
+/* A weighted sum of four numbers. Independent of the order of the corners to the bit while at most
+   two weights are not 0, as on a side: opposite corners are added first, and x + 0 is x. */
 static float tpc_mix(const float w[4], float a, float b, float c, float d) {
     return (w[0] * a + w[2] * c) + (w[1] * b + w[3] * d);
 }
@@ -156,12 +156,12 @@ TREEPIECES_API void treepieces_patch_point(const float positions[12], const floa
                                            float normal[3]) {
     const float alpha = shape < 0 ? 0 : shape > 0 ? shape : 0.6f;
     float w[4], p[3], n[3], depth[4];
-    tpc_weigh(u, v, w);
+    tpc_corner_weights(u, v, w);
     for (int k = 0; k < 3; k++) {
         p[k] = tpc_mix(w, positions[k], positions[3 + k], positions[6 + k], positions[9 + k]);
         n[k] = tpc_mix(w, normals[k], normals[3 + k], normals[6 + k], normals[9 + k]);
     }
-    for (int i = 0; i < 4; i++) { /* above the corner's tangent plane */
+    for (int i = 0; i < 4; i++) { /* height above the tangent plane of the corner */
         const float *corner = positions + 3 * i, *up = normals + 3 * i;
         depth[i] = (up[0] * (p[0] - corner[0]) + up[1] * (p[1] - corner[1])) +
                    up[2] * (p[2] - corner[2]);

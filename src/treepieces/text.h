@@ -7,10 +7,10 @@
 /* ---- species: reading -------------------------------------------------------------------- */
 
 typedef struct tpc_reader {
-    const char *at, *end; /* what is left of the line */
-    int line, order;      /* order -1: none begun     */
-    int keys, crown_line; /* keys so far; line of the last one of the crown */
-    const char *like;     /* NULL, or the text to read behind this line     */
+    const char *at, *end; /* rest of the line          */
+    int line, order;      /* order -1: none begun      */
+    int keys, crown_line; /* keys so far; line of the last crown_ key */
+    const char *like;     /* NULL, or the text to read after this line */
     treepieces_species species;
     txm_env *env;
 } tpc_reader;
@@ -28,7 +28,7 @@ static int tpc_is_word(const tpc_word *w, const char *text) {
     return (size_t)(w->end - w->at) == n && !memcmp(w->at, text, n);
 }
 
-/* The next word of the line, 0 if there is none. */
+/* Read the next word of the line; 0 if there is none. */
 static int tpc_next_word(tpc_reader *r, tpc_word *w) {
     while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
     w->at = r->at;
@@ -37,8 +37,8 @@ static int tpc_next_word(tpc_reader *r, tpc_word *w) {
     return w->at < w->end;
 }
 
-/* "line 7: WORD: fault"; the word may hold anything, and be NULL. */
-static txm_status tpc_misread(const tpc_reader *r, const tpc_word *w, const char *fault) {
+/* Fail with "line 7: WORD: fault"; the word may contain anything, or be NULL. */
+static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const char *fault) {
     char line[220], shown[28];
     size_t n = 0;
     for (const char *p = w ? w->at : NULL; p && p < w->end; p++) {
@@ -54,22 +54,22 @@ static txm_status tpc_misread(const tpc_reader *r, const tpc_word *w, const char
     return txm_fail(r->env, TXM_BAD_DATA, line);
 }
 
-/* One value of a field; the key is for messages. */
+/* Read value i of a field; the key is for messages. */
 static txm_status tpc_read_value(tpc_reader *r, const tpc_word *key, const tpc_field *f, void *base,
                                  int i) {
     char range[120];
     tpc_word w;
     double x = -1;
     const char *const *names = tpc_names_of(f);
-    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
+    if (!tpc_next_word(r, &w)) return tpc_fail_line(r, key, "a value is missing");
     for (int k = 0; names && names[k]; k++)
         if (tpc_is_word(&w, names[k])) x = k;
-    if (!names && !tpc_read_number(w.at, w.end, &x)) return tpc_misread(r, &w, "is no number");
+    if (!names && !tpc_read_number(w.at, w.end, &x)) return tpc_fail_line(r, &w, "is not a number");
     const float value = x > -1e9 && x < 1e9 ? txm_float(x) : x < 0 ? -1e9f : 1e9f;
     if (!(value >= f->low && value <= f->high) ||
         (f->kind != TPC_REAL && value != (float)(int)value)) {
-        tpc_tell_range(f, range, sizeof range);
-        return tpc_misread(r, &w, range);
+        tpc_write_range(f, range, sizeof range);
+        return tpc_fail_line(r, &w, range);
     }
     tpc_set(f, base, i, value == 0 ? 0 : value); /* no -0 */
     return TXM_OK;
@@ -80,18 +80,18 @@ static txm_status tpc_read_name(tpc_reader *r, const tpc_word *key) {
     while (r->at < r->end && tpc_is_blank(*r->at)) r->at++;
     while (r->at < r->end && tpc_is_blank(r->end[-1])) r->end--;
     const size_t size = (size_t)(r->end - r->at);
-    if (!size) return tpc_misread(r, key, "a value is missing");
+    if (!size) return tpc_fail_line(r, key, "a value is missing");
     if (size >= TREEPIECES_MAX_NAME)
-        return tpc_misread(r, key, "longer than 31 characters");
+        return tpc_fail_line(r, key, "longer than 31 characters");
     memset(name, 0, TREEPIECES_MAX_NAME);
     memcpy(name, r->at, size);
     if (strlen(name) != size || !tpc_is_name(name))
-        return tpc_misread(r, key, "holds a control character");
+        return tpc_fail_line(r, key, "contains a control character");
     r->at = r->end;
     return TXM_OK;
 }
 
-/* "order N" begins an order; there are at least as many then. */
+/* "order N" begins an order; order_count becomes at least N + 1. */
 static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
     static const tpc_field field = {"order", 0, TPC_WHOLE, 1, 0, TREEPIECES_MAX_ORDERS - 1};
     const txm_status status = tpc_read_value(r, key, &field, &r->order, 0);
@@ -100,18 +100,17 @@ static txm_status tpc_begin_order(tpc_reader *r, const tpc_word *key) {
     return TXM_OK;
 }
 
-/* "like NAME": its text is read behind this line. The orders beyond those of that species keep what a
-   fresh one has. */
+/* "like NAME": its text is read after this line. Orders that it does not have keep their defaults. */
 static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
     tpc_word w;
-    if (!tpc_next_word(r, &w)) return tpc_misread(r, key, "a value is missing");
-    if (r->keys) return tpc_misread(r, key, "must come before all other keys");
+    if (!tpc_next_word(r, &w)) return tpc_fail_line(r, key, "a value is missing");
+    if (r->keys) return tpc_fail_line(r, key, "must come before all other keys");
     for (int i = 0; i < treepieces_preset_count(); i++) {
         if (!tpc_is_word(&w, tpc_presets[i].name)) continue;
         r->like = tpc_presets[i].text;
         return TXM_OK;
     }
-    return tpc_misread(r, &w, "is none of the built-in species");
+    return tpc_fail_line(r, &w, "is not a built-in species");
 }
 
 static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
@@ -124,11 +123,11 @@ static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
         if (tpc_is_word(key, tpc_fields[i].key)) field = &tpc_fields[i];
     for (int i = 0; i < TPC_ORDER_FIELDS && !field; i++) {
         if (!tpc_is_word(key, tpc_order_fields[i].key)) continue;
-        if (r->order < 0) return tpc_misread(r, key, "needs a line \"order N\" before it");
+        if (r->order < 0) return tpc_fail_line(r, key, "needs a line \"order N\" before it");
         field = &tpc_order_fields[i];
         base = &r->species.orders[r->order];
     }
-    if (!field) return tpc_misread(r, key, "is no key");
+    if (!field) return tpc_fail_line(r, key, "is not a key");
     if (!strncmp(field->key, "crown_", 6)) r->crown_line = r->line;
     for (int i = 0; i < field->count; i++) {
         const txm_status status = tpc_read_value(r, key, field, base, i);
@@ -137,7 +136,7 @@ static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
     return TXM_OK;
 }
 
-/* The line from r->at on: a key and its values, a comment, or nothing. */
+/* Read the line from r->at on: a key and its values, a comment, or nothing. */
 static txm_status tpc_read_line(tpc_reader *r) {
     tpc_word key, rest;
     const char *comment = (const char *)memchr(r->at, '#', (size_t)(r->end - r->at));
@@ -145,12 +144,12 @@ static txm_status tpc_read_line(tpc_reader *r) {
     if (!tpc_next_word(r, &key)) return TXM_OK;
     const txm_status status = tpc_read_key(r, &key);
     if (status != TXM_OK) return status;
-    if (tpc_next_word(r, &rest)) return tpc_misread(r, &key, "has too many values");
+    if (tpc_next_word(r, &rest)) return tpc_fail_line(r, &key, "has too many values");
     r->keys++;
     return TXM_OK;
 }
 
-/* Read on top of what *species is. */
+/* Read a text whose missing keys keep the values of *species. */
 static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
                                 treepieces_species *species) {
     const char *at = text, *end = text + size;
@@ -174,7 +173,7 @@ static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
     }
     if (!(r.species.crown_base < r.species.crown_top)) {
         r.line = r.crown_line;
-        return tpc_misread(&r, NULL, "crown_top must be above crown_base");
+        return tpc_fail_line(&r, NULL, "crown_top must be above crown_base");
     }
     *species = r.species;
     return TXM_OK;
@@ -186,7 +185,7 @@ TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size
     if (!species || (!text && size))
         return txm_fail(env, TXM_BAD_ARGUMENT, "text or species is NULL");
     memset(&fresh, 0, sizeof fresh);
-    fresh.crown_top = 1; /* until it is read */
+    fresh.crown_top = 1; /* above crown_base until it is read */
     txm_status status = tpc_read_text(tpc_fresh, strlen(tpc_fresh), env, &fresh);
     for (int k = 1; k < TREEPIECES_MAX_ORDERS; k++)
         if (k >= fresh.order_count) fresh.orders[k] = fresh.orders[k - 1];

@@ -10,31 +10,31 @@ enum {
     TPC_PHASES = 8 /* of the flutter within a class of oscillators */
 };
 
-/* A gust that travels over the land: weight sin(2 pi (along . (x, z) - rate t + phase)) */
+/* A travelling gust: weight * sin(2 pi (along . (x, z) - rate * t + phase)). */
 typedef struct tpc_wave {
     double along[2], rate, phase, weight;
 } tpc_wave;
 
-/* The wind of one moment, and the step of the oscillators that ends there. */
+/* The wind at one time, and the step of the oscillators that ends then. */
 typedef struct tpc_air {
     float direction[3], pressure, gusts;
     tpc_wave waves[TPC_WAVES];
     double time;
     struct {
-        float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from where it rests */
-        float give;           /* radians at pressure 1 for a sixteenth of the tree's height  */
+        float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from the equilibrium */
+        float give;           /* radians at pressure 1 per sixteenth of the tree's height     */
         float flutter[TPC_PHASES];
     } classes[TPC_CLASSES];
 } tpc_air;
 
-/* sine of so many turns, however many */
+/* sin(2 pi turns), for any number of turns */
 static double tpc_sine_of_turns(double turns) {
     double sine, cosine;
     txm_sincos((turns - floor(turns)) * (2 * TXM_PI), &sine, &cosine);
     return sine;
 }
 
-/* Waves of 90, 41, 19 and 9 m that run with the wind, a little to its sides, at about its speed. */
+/* Waves of 90, 41, 19 and 9 m that travel about in the direction and at the speed of the wind. */
 static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     static const double lengths[TPC_WAVES] = {90, 41, 19, 9};
     static const double weights[TPC_WAVES] = {0.4, 0.3, 0.2, 0.1};
@@ -83,18 +83,19 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
     return tpc_pressure(&air, position, time);
 }
 
-/* Class c swings 0.3 * 2^(c / 4) times a second, damped by a fifth. The step over dt is that of
+/* Class c has the frequency 0.3 * 2^(c / 4) Hz and the damping ratio d = 1/5. The step over dt is
+   the exact solution of
 
        x'' + 2 d w x' + w^2 x = 0,   x = e^(-d w t) (a cos(k t) + b sin(k t)),  k = w sqrt(1 - d^2)
 
-   so that it is right however long it is; nothing can grow. Thin branches give more, and flutter. */
+   so that it is right and stable for any dt. Thin branches bend further, and flutter. */
 static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
     const double damping = 0.2, part = sqrt(1 - damping * damping);
     for (int c = 0; c < TPC_CLASSES; c++) {
         const double frequency = 0.3 * txm_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
         const double fade = damping * omega * dt;
         double e = 0, sine = 0, cosine = 0;
-        if (fade < 60) { /* beyond that nothing of the old swing is left */
+        if (fade < 60) { /* else the old swing has died out */
             e = txm_exp2(-fade * 1.44269504088896340736);
             txm_sincos(omega * part * dt, &sine, &cosine);
         }
