@@ -5,36 +5,36 @@
    file:
 
      PIECE_VERTEX, PIECE_CONTROL, PIECE_EVALUATION, PIECE_WIRE (only with --wire), PIECE_FRAGMENT
-                       one instanced draw of each type of piece: skin, tessellate, light the bark
+                       an instanced draw call for each type of piece: skinning, tessellation, lighting
      CARD_VERTEX, CARD_GEOMETRY, CARD_FRAGMENT
-                       all leaf clouds as seen along the view, each into its layer: impostors
+                       the impostors: every leaf cloud along the view direction, each into its layer
      CLOUD_VERTEX, CLOUD_FRAGMENT
-                       one instanced draw of all clusters of leaves, with the impostors' depth
+                       one instanced draw call for all clusters of leaves, with the impostors' depth
      LAND_VERTEX, LAND_FRAGMENT
-                       ground and sky: one triangle over the picture                             */
+                       ground and sky: one triangle that covers the picture                      */
 
 layout(std140, binding = 0) uniform frame_block {
     mat4 view_projection;
     vec4 eye;
-    vec4 right;   /* and the tangent of half the angle of view across */
-    vec4 up;      /* and up */
-    vec4 forward; /* and the clouds that each species has */
-    vec4 sun;     /* towards it */
-    vec4 box_low; /* of the light's texture, and its cells' size */
-    vec4 box_scale; /* 1 / its size, and the fog in 1 / m */
-    vec4 lod;     /* greatest level, half distance, shape of Phong tessellation, pixels of the sheet */
+    vec4 right;   /* w: tangent of half the horizontal field of view */
+    vec4 up;      /* w: the same, vertical */
+    vec4 forward; /* w: number of leaf clouds of a species */
+    vec4 sun;     /* unit vector towards it */
+    vec4 box_low; /* lower corner of the texture of light; w: size of its cells */
+    vec4 box_scale; /* 1 / its size; w: density of the fog, 1 / m */
+    vec4 lod;     /* maximum level, half distance, shape of Phong tessellation, pixels of the sheet */
 } frame;
 
-/* a word for each node: species, and from bit 8 on a random number of the tree */
+/* a word per node: bits 0 to 7 the species, above a random number per tree */
 layout(std430, binding = 4) readonly buffer look_buffer { uint looks[]; };
-/* as treepieces_cluster: node, along, radius, look; floats by their bits */
+/* treepieces_cluster: node, along, radius, look; floats as their bits */
 layout(std430, binding = 5) readonly buffer cluster_buffer { uvec4 clusters[]; };
 
 layout(binding = 0) uniform sampler2DArray bark;
 layout(binding = 1) uniform sampler2DArray leaves;
 layout(binding = 2) uniform sampler2DArray impostors;
 layout(binding = 3) uniform sampler2DArray depths;
-layout(binding = 4) uniform sampler3D light; /* what comes through the crowns: from sun, from sky */
+layout(binding = 4) uniform sampler3D light; /* that reaches a place: from the sun, from the sky */
 
 uniform int kind;
 
@@ -46,7 +46,7 @@ const vec3 land_color = vec3(0.25, 0.26, 0.12);
 
 vec2 light_at(vec3 place) {
     vec2 open = texture(light, (place - frame.box_low.xyz) * frame.box_scale.xyz).rg;
-    return max(open, vec2(0.03, 0.2)); /* light that crowns hand on */
+    return max(open, vec2(0.03, 0.2)); /* indirect light */
 }
 
 vec3 sky_towards(vec3 way) {
@@ -56,7 +56,7 @@ vec3 sky_towards(vec3 way) {
     return color + vec3(1.0, 0.8, 0.5) * (0.10 * pow(glow, 6.0) + 0.25 * pow(glow, 48.0));
 }
 
-/* to the eye: fog, then the curve of film, then sRGB */
+/* from radiance to a colour of the picture: fog, a filmic tone curve, sRGB */
 vec4 seen(vec3 color, vec3 place) {
     vec3 way = place - frame.eye.xyz;
     float clear = exp(-frame.box_scale.w * length(way));
@@ -205,7 +205,7 @@ out vec4 color;
 
 void main() {
     vec3 n = normalize(normal), albedo = texture(bark, vec3(tile_at, layer)).rgb;
-    /* the bark's brightness as relief, a tenth of a tile deep: turn the normal away from where it rises */
+    /* bump mapping: the brightness of the bark as height, a tenth of a tile deep */
     float height = sqrt(dot(albedo, vec3(0.3, 0.6, 0.1)));
     vec3 across = dFdx(place), along = dFdy(place), a = cross(along, n), b = cross(n, across);
     vec2 tile_across = dFdx(tile_at), tile_along = dFdy(tile_at);
@@ -219,7 +219,7 @@ void main() {
     float facing = max(dot(n, frame.sun.xyz), 0.0), skywards = 0.5 + 0.5 * n.y;
     vec3 arriving = sun_color * facing * open.r + sky_color * mix(0.35, 1.0, skywards) * open.g +
                     land_color * (1.0 - skywards) * (0.4 + 0.6 * open.r);
-    arriving *= 0.55 + 0.45 * smoothstep(-0.1, 0.9, place.y); /* the corner with the ground */
+    arriving *= 0.55 + 0.45 * smoothstep(-0.1, 0.9, place.y); /* ambient occlusion near the ground */
 #ifdef WIRE
     float fine = (level - 1.0) / max(ceil(frame.lod.x) - 1.0, 1.0); /* green, yellow, red */
     vec3 rings = pow(clamp(vec3(2.2 * fine, 1.8 - 1.8 * fine, 0.12), 0.0, 0.85), vec3(2.2));
@@ -316,7 +316,7 @@ void main() {
     at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
     sphere = vec4(center, radius);
     layer = int((look & 255u) * clouds + c.w % clouds);
-    /* trees differ in colour, clouds a little more */
+    /* a tint per tree, and a smaller variation per cloud */
     float warm = float(look >> 8 & 255u) / 255.0 - 0.5, other = float(c.w >> 8 & 255u) / 255.0 - 0.5;
     float bright = float(look >> 16 & 255u) / 255.0 - 0.5;
     tint = vec3(1.0 + 0.20 * warm + 0.10 * other, 1.0, 1.0 - 0.25 * warm) *
@@ -344,8 +344,8 @@ void main() {
     gl_FragDepth = treepieces_impostor_depth(frame.view_projection, sphere.xyz, sphere.w, view,
                                              vec3(at, depth));
 
-    /* the impostor is shaded by the sun on its own; here: what comes through the crown, how the
-       cloud's surface faces, light through leaves from behind */
+    /* the impostor holds the shading of its cards; here: shadows of the crown, the orientation of the
+       cloud's surface, light shining through leaves from behind */
     vec3 from_middle = view * vec3(at, -depth), place = sphere.xyz + sphere.w * from_middle;
     vec3 albedo = pow(leaf.rgb / leaf.a, vec3(2.2)) * tint;
     vec2 open = light_at(place + frame.sun.xyz * frame.box_low.w);
@@ -378,7 +378,7 @@ void main() {
     vec3 way = normalize(frame.forward.xyz + at.x * frame.right.w * frame.right.xyz +
                          at.y * frame.up.w * frame.up.xyz);
     gl_FragDepth = 1.0;
-    if (way.y > -1e-4) { /* wooded hills under the sky, the farther ones paler */
+    if (way.y > -1e-4) { /* wooded hills, paler with distance */
         vec3 sky = sky_towards(way), haze = sky_towards(vec3(way.x, 0.0, way.z));
         vec2 round = way.xz / length(way.xz) * 4.0;
         for (float k = 0.0; k < 3.0; k++) {
@@ -399,7 +399,7 @@ void main() {
     vec4 clip = frame.view_projection * vec4(place, 1.0);
     gl_FragDepth = min(0.5 + 0.5 * clip.z / clip.w, 1.0);
 
-    /* meadow: octaves of noise, each left out where a pixel is larger than its waves */
+    /* meadow: octaves of noise, each faded out where a pixel is larger than its wavelength */
     float pixel = sqrt(abs(determinant(mat2(dFdx(place.xz), dFdy(place.xz)))));
     float sum = 0.0, weight = 0.30;
     for (float size = 9.0; size > 0.008; size *= 0.45, weight *= 0.97) {

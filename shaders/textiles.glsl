@@ -2,10 +2,10 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    WHAT IT DOES
-     Colours of a plane covered by a tile set, without end and without period: which tile lies where
-     is hashed from place and seed, as textiles_plane_tile and textiles_plane_triangle do it, and
-     looked up in an atlas or a texture array. In constant time: a handful of hashes, one texture
-     lookup, of triangles one texel of a table besides. GLSL 3.30 and GLSL ES 3.00, no extensions.
+     Colours of an endless plane covered by a tile set, without period. A hash of place and seed says
+     which tile lies where, as in textiles_plane_tile and textiles_plane_triangle; its colour is read
+     from an atlas or a texture array. Constant time: a few hashes and one texture lookup, for
+     triangles also one texel of a table. GLSL 3.30 and GLSL ES 3.00, no extensions.
 
    HOW TO USE IT
      Paste it into a fragment shader after #version (ES: it sets high precision) and call one of
@@ -26,8 +26,8 @@
            color = textiles_fetch(albedo, s) * shade(textiles_fetch(bumps, s));
        }
 
-     where the maps of a set share the search. Calls outside uniform control flow give the
-     derivatives of the place themselves, as here.
+     where all maps of a set use the same spot. Outside uniform control flow pass the derivatives
+     of the place yourself, as here.
 
    UNIFORMS
      The fields of textiles_plane are those of textiles_plane and textiles_layout in textiles.h:
@@ -36,23 +36,23 @@
        packing, size, gutter, columns            of the layout
        pitch   pitch_x, pitch_y
        extent  width, height
-       origin  square (or lattice point) that the place (0, 0) lies at. Floats are exact to about
-               1/500 of a pixel up to 2^14 pixels from there; move the origin along to go further
+       origin  the square (or lattice point) at place (0, 0). Floats are exact to about 1/500 of a
+               pixel up to 2^14 pixels from there; to go farther, move the origin
 
-     and the table is what textiles_plane_table returns, as a texture count x 1 of GL_R32I with
+     and the table is the one that textiles_plane_table returns, as a texture count x 1 of GL_R32I with
      GL_NEAREST filters.
 
    TEXTURES
-     Rows are uploaded from the top, as textiles_draw_atlas draws them.
-       TEXTILES_PACKED  GL_CLAMP_TO_EDGE; GL_TEXTURE_MAX_LEVEL = log2(gutter), beyond it tiles mix
-       TEXTILES_TORUS   GL_REPEAT; all levels if size is a power of two, else as many as 2 divides it
+     Upload the rows from the top, as textiles_draw_atlas draws them.
+       TEXTILES_PACKED  GL_CLAMP_TO_EDGE; GL_TEXTURE_MAX_LEVEL = log2(gutter); on higher levels tiles mix
+       TEXTILES_TORUS   GL_REPEAT; all levels if size is a power of two, else while it is even
        TEXTILES_SLICES  GL_TEXTURE_2D_ARRAY, GL_CLAMP_TO_EDGE, pitch.x x pitch.y, slice = tile;
-                        GL_TEXTURE_MAX_LEVEL = log2(gutter), beyond it joints show
-     Filter with GL_LINEAR_MIPMAP_LINEAR. A gutter of 1 is the least for bilinear filtering.
-     Mip-maps: glGenerateMipmap, or halve by boxes of 2 x 2.
+                        GL_TEXTURE_MAX_LEVEL = log2(gutter); on higher levels joints show
+     Filter with GL_LINEAR_MIPMAP_LINEAR. Bilinear filtering needs a gutter of 1 at least.
+     Mipmaps: glGenerateMipmap, or means of 2 x 2 pixels.
 
-     The lookup is given the derivatives of the place, not those of the texture coordinates, which
-     jump where one tile ends and the next begins. So no lines show along the joints.             */
+     The lookup uses the derivatives of the place, not those of the texture coordinates, which jump
+     between tiles. So no lines show along the joints.             */
 
 #ifdef GL_ES
 precision highp float;
@@ -72,7 +72,7 @@ struct textiles_plane {
     ivec2 pitch, extent, origin;
 };
 
-/* what to look up */
+/* where to read the textures */
 struct textiles_spot {
     int tile;
     vec2 uv;     /* in the atlas, or in the slice of number tile */
@@ -89,7 +89,7 @@ uint textiles_mix(uint h) {
     return h ^ (h >> 16);
 }
 
-/* the hash in two steps, since much that is asked for lies in one column */
+/* the hash in two steps, because many lookups are in one column */
 uint textiles_column(uint seed, uint x) {
     return textiles_mix(x + seed);
 }

@@ -2,29 +2,29 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    WHAT IT DOES
-     Skins pieces as treepieces_skin does, chooses levels of tessellation and places the points of a
-     patch as treepieces_edge_level and treepieces_patch_point do, finds the bark of a quad as
-     treepieces_quad_uv does, and gives leaf clouds their depth. GLSL 4.30, no extensions. A program
-     that draws forests with it is examples/forest_gl, its shaders are in forest.glsl.
+     Skins pieces as treepieces_skin does, computes levels of tessellation and points of patches as
+     treepieces_edge_level and treepieces_patch_point do, texture coordinates of bark as
+     treepieces_quad_uv does, and the depth of leaf clouds. GLSL 4.30, no extensions.
+     examples/forest_gl draws forests with it; its own shaders are in forest.glsl.
 
    HOW TO USE IT
-     Paste it after #version into the stages that need it. What it reads are buffers that hold the
-     arrays of treepieces.h as they are; another binding is chosen by defining its name before:
+     Paste it after #version into the stages that need it. It reads buffers that hold the arrays of
+     treepieces.h unchanged. To use another binding, define its name before:
 
-       TREEPIECES_BONES    0   vec4[3] a node: what treepieces_bones or treepieces_sway fills
-       TREEPIECES_RECORDS  1   the words of all batches, one behind the other
+       TREEPIECES_BONES    0   vec4[3] per node: the output of treepieces_bones or treepieces_sway
+       TREEPIECES_RECORDS  1   the words of all batches, one after the other
        TREEPIECES_KINDS    2   a treepieces_kind for each type of piece
-       TREEPIECES_QUADS    3   a word for each quad, type after type: tile_class + 256 band
+       TREEPIECES_QUADS    3   a word per quad, type after type: tile_class + 256 band
 
-     A piece is one instanced draw of GL_PATCHES with 4 vertices each: the vertices of treepieces_piece
-     as attributes, the corners of its quads as indices. gl_InstanceID is the number of the record,
-     gl_PrimitiveID in the control shader that of the quad. Vertex shader:
+     A type of piece is one instanced draw call of GL_PATCHES of 4 vertices: the vertices of treepieces_piece
+     as attributes, the corners of its quads as indices. gl_InstanceID is the number of the record
+     and, in the control shader, gl_PrimitiveID that of the quad. Vertex shader:
 
        treepieces_instance it = treepieces_find(kind, gl_InstanceID);
        treepieces_skin(kind, it, rim, position, normal, weights, world, world_normal);
 
-     Tessellation control shader, with layout(vertices = 4), in invocation 0; side k goes from corner k
-     to the next, and OpenGL counts sides in another order:
+     Tessellation control shader, with layout(vertices = 4), in invocation 0. Side k goes from corner k
+     to corner k + 1; OpenGL numbers the sides differently:
 
        gl_TessLevelOuter[0] = treepieces_edge_level(lod, corner 0, corner 1);
        gl_TessLevelOuter[3] = treepieces_edge_level(lod, corner 1, corner 2);
@@ -32,17 +32,17 @@
        gl_TessLevelOuter[1] = treepieces_edge_level(lod, corner 3, corner 0);
        gl_TessLevelInner[0] = gl_TessLevelInner[1] = treepieces_inner_level(lod, corners);
 
-     Tessellation evaluation shader, with layout(quads, equal_spacing, cw) for what is
-     counter-clockwise seen from outside, as v goes down:
+     Tessellation evaluation shader, with layout(quads, equal_spacing, cw): as v points down, this
+     gives triangles that are counter-clockwise seen from outside:
 
        treepieces_patch_point(positions, normals, shape, gl_TessCoord.xy, world, world_normal);
 
-     Fragment shader: the texture is treepieces_bark's sheet as an array, a layer 8 tiles high;
-     GL_REPEAT across, GL_CLAMP_TO_EDGE along.
+     Fragment shader: the texture is the sheet of treepieces_bark as an array texture whose layers are
+     8 tiles high; GL_REPEAT horizontally, GL_CLAMP_TO_EDGE vertically.
 
    NO CRACKS
-     A leaf rim and the root rim of the child on it, and the two patches at an edge, compute the same
-     numbers by the same instructions, all `precise`: equal to the bit.                           */
+     A leaf rim and the root rim of the child on it, and the two patches that share an edge, compute
+     the same numbers by the same instructions, all `precise`: they are equal to the bit.                           */
 
 #ifndef TREEPIECES_BONES
 #define TREEPIECES_BONES 0
@@ -82,7 +82,7 @@ layout(std430, binding = TREEPIECES_QUADS) readonly buffer treepieces_quad_buffe
 
 /* ---- skinning ---- */
 
-/* What a record says. */
+/* The contents of a record. */
 struct treepieces_instance {
     uint own;       /* bone */
     uvec3 children; /* bones at leaf rims 0, 1, 2 */
@@ -97,7 +97,7 @@ treepieces_instance treepieces_find(int kind, int instance) {
                                ivec3(far >> 16 & 15u, far >> 20 & 15u, far >> 24 & 15u));
 }
 
-/* Place 0..5 of the canonical rim; the constants are the very floats of treepieces.h. */
+/* Place 0..5 of the canonical rim; the constants are bit for bit those of treepieces.h. */
 void treepieces_rim_vertex(int place, out vec3 position, out vec3 normal) {
     const float high = uintBitsToFloat(0x3f5db3d7u); /* sin 60  */
     const float outwards = uintBitsToFloat(0x3f7ebac2u), up = uintBitsToFloat(0x3dcbc89bu);
@@ -124,7 +124,7 @@ vec3 treepieces_columns(uint bone) {
     return squares;
 }
 
-/* n by the inverse transpose: columns at right angles are divided by their squares */
+/* n by the inverse transpose; as the columns are orthogonal, they are divided by their squares */
 vec3 treepieces_move_normal(uint bone, vec3 n) {
     precise vec3 m = n / treepieces_columns(bone);
     precise vec3 moved;
@@ -146,7 +146,7 @@ vec3 treepieces_rotate(vec4 q, vec3 v) {
     return v + q.w * t + cross(q.xyz, t);
 }
 
-/* v turned about y by -60 degrees times turn */
+/* v rotated about y by -60 degrees times turn */
 vec3 treepieces_turn_back(int turn, vec3 v) {
     vec3 x, unused;
     treepieces_rim_vertex((6 - turn) % 6, x, unused);
@@ -156,7 +156,8 @@ vec3 treepieces_turn_back(int turn, vec3 v) {
 /* A vertex of a piece in the world; see treepieces_skin in treepieces.h. */
 void treepieces_skin(int kind, treepieces_instance it, int rim, vec3 position, vec3 normal,
                      vec4 weights, out vec3 world, out vec3 world_normal) {
-    /* a rim belongs to one bone; leaf rims in the frame of the child, by its own instructions */
+    /* a rim belongs to one bone; leaf rims are computed in the frame of the child, by the same
+       instructions as the child's root rim */
     uint bone = it.own;
     vec3 p = position, n = normal;
     if (rim >= 0) {
@@ -203,7 +204,7 @@ float treepieces_level(treepieces_lod lod, vec3 middle) {
     return clamp(ceil(level), 1.0, max(ceil(lod.max_level), 1.0)); /* exp2 may round up */
 }
 
-/* the same whichever end comes first */
+/* symmetric in a and b */
 float treepieces_edge_level(treepieces_lod lod, vec3 a, vec3 b) {
     precise vec3 middle = (a + b) / 2.0;
     return treepieces_level(lod, middle);
@@ -214,7 +215,7 @@ float treepieces_inner_level(treepieces_lod lod, vec3 a, vec3 b, vec3 c, vec3 d)
     return treepieces_level(lod, middle);
 }
 
-/* Is a quad outside of the picture, with room to bulge by half its size? */
+/* Is a quad outside the view frustum, even if it bulges by half its size? */
 bool treepieces_is_outside(mat4 view_projection, vec3 a, vec3 b, vec3 c, vec3 d) {
     vec3 middle = (a + b + c + d) / 4.0;
     vec3 sizes = max(max(abs(a - middle), abs(b - middle)), max(abs(c - middle), abs(d - middle)));
@@ -229,7 +230,7 @@ bool treepieces_is_outside(mat4 view_projection, vec3 a, vec3 b, vec3 c, vec3 d)
     return false;
 }
 
-/* Weights of two corners at most are not 0 along a side: the order of corners does not matter there. */
+/* Along a side at most two weights are not 0, so the result does not depend on the order of corners. */
 vec3 treepieces_mix(vec4 w, vec3 a, vec3 b, vec3 c, vec3 d) {
     precise vec3 sum = (w.x * a + w.z * c) + (w.y * b + w.w * d);
     return sum;
@@ -241,7 +242,7 @@ vec4 treepieces_corner_weights(vec2 at) {
     return w;
 }
 
-/* (n . (p - corner)) n: what takes p onto the corner's tangent plane */
+/* (n . (p - corner)) n: p minus this is its projection onto the tangent plane of the corner */
 vec3 treepieces_above(vec3 p, vec3 corner, vec3 n) {
     precise vec3 way = p - corner;
     precise vec3 above = ((n.x * way.x + n.y * way.y) + n.z * way.z) * n;
@@ -263,13 +264,13 @@ void treepieces_patch_point(vec3 p[4], vec3 n[4], float shape, vec2 at, out vec3
 
 /* ---- bark ---- */
 
-/* Where a quad's tiles lie: u v of its corner 0, then of corner 2, in a layer of the sheet. */
+/* The tiles of a quad: u v of its corner 0, then of its corner 2, in a layer of the sheet. */
 struct treepieces_tile {
     vec4 box;
     int layer;
 };
 
-/* pixels: across the sheet, of which half a one is kept away. */
+/* pixels: width of the sheet; texture coordinates keep half a pixel inside. */
 treepieces_tile treepieces_find_tile(int kind, int instance, int quad, float pixels) {
     uint at = treepieces_kinds[kind].first + uint(instance) * treepieces_kinds[kind].stride;
     uint word = treepieces_quads[treepieces_kinds[kind].quads + uint(quad)];
@@ -293,8 +294,8 @@ vec2 treepieces_tile_at(treepieces_tile tile, vec2 at) {
 
 /* ---- leaf clouds ---- */
 
-/* gl_FragDepth of a place of an impostor: center and radius of the cloud, x and y in -1..1 along right
-   and up, depth out of the picture of treepieces_impostor. */
+/* gl_FragDepth of a point of an impostor. center, radius: of the cloud; at.xy: -1..1 along right and up;
+   at.z: from the depth picture of treepieces_impostor. */
 float treepieces_impostor_depth(mat4 view_projection, vec3 center, float radius, mat3 view, vec3 at) {
     vec4 clip = view_projection * vec4(center + radius * (view * vec3(at.xy, -at.z)), 1.0);
     return 0.5 + 0.5 * clip.z / clip.w;
