@@ -1,14 +1,14 @@
 /* golden_texedges.c - hashes of layers, their boundaries and control edges; see golden.h
    SPDX-License-Identifier: MIT OR Unlicense                                                      */
-#define TEXPATCH_IMPLEMENTATION
-#include "texpatch.h"
+#define TEXEDGES_IMPLEMENTATION
+#include "texedges.h"
 
 #include "golden.h"
 
 enum { SIDE = 96, WIDTH = 160, HEIGHT = 128 };
 static uint8_t exemplar[SIDE * SIDE * 3], out[WIDTH * HEIGHT * 3];
 
-static uint64_t edges_hash(const texpatch_edges *edges, uint64_t hash) {
+static uint64_t edges_hash(const texedges_set *edges, uint64_t hash) {
     const int numbers[3] = {edges->levels, edges->width, edges->height};
     hash = tk_hash(hash, numbers, sizeof numbers);
     hash = tk_hash(hash, edges->thresholds, (size_t)(edges->levels - 1) * sizeof(float));
@@ -21,67 +21,67 @@ static uint64_t edges_hash(const texpatch_edges *edges, uint64_t hash) {
     return tk_hash(hash, edges->points, edges->point_count * sizeof *edges->points);
 }
 
-static texpatch_edges_desc describe(int channels) {
-    texpatch_edges_desc desc;
+static texedges_desc describe(int channels) {
+    texedges_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.image = golden_image(exemplar, SIDE, SIDE, channels, TXM_U8);
     return desc;
 }
 
 static uint64_t find(txm_env *env) {
-    texpatch_edges edges;
+    texedges_set *edges;
     golden_noise(exemplar, SIDE, SIDE, 1);
-    const texpatch_edges_desc desc = describe(1);
-    golden_need(texpatch_edges_find(&desc, env, &edges), "find", env);
-    const uint64_t hash = edges_hash(&edges, 0);
-    texpatch_edges_free(&edges);
+    const texedges_desc desc = describe(1);
+    golden_need(texedges_find(&desc, env, &edges), "find", env);
+    const uint64_t hash = edges_hash(edges, 0);
+    texedges_set_free(edges);
     return hash;
 }
 
 static uint64_t find_smooth(txm_env *env) {
-    texpatch_edges edges;
+    texedges_set *edges;
     golden_noise(exemplar, SIDE, SIDE, 3);
-    texpatch_edges_desc desc = describe(3);
+    texedges_desc desc = describe(3);
     desc.levels = 6;
     desc.smooth = 2.5f;
     desc.least = 24;
-    golden_need(texpatch_edges_find(&desc, env, &edges), "find", env);
-    const uint64_t hash = edges_hash(&edges, 0);
-    texpatch_edges_free(&edges);
+    golden_need(texedges_find(&desc, env, &edges), "find", env);
+    const uint64_t hash = edges_hash(edges, 0);
+    texedges_set_free(edges);
     return hash;
 }
 
 static uint64_t layers(txm_env *env) {
     static const float thresholds[2] = {0.3f, 0.62f};
-    texpatch_edges edges;
+    texedges_set *edges;
     golden_blobs(exemplar, SIDE, SIDE, 3);
-    texpatch_edges_desc desc = describe(3);
+    texedges_desc desc = describe(3);
     desc.levels = 3;
     desc.thresholds = thresholds;
     desc.least = 30;
-    golden_need(texpatch_edges_find(&desc, env, &edges), "find", env);
-    uint64_t hash = edges_hash(&edges, 0);
+    golden_need(texedges_find(&desc, env, &edges), "find", env);
+    uint64_t hash = edges_hash(edges, 0);
     const txm_image image = golden_image(out, SIDE, SIDE, 1, TXM_U8);
-    golden_need(texpatch_layers(&desc, &edges, env, &image), "layers", env);
+    golden_need(texedges_layers(&desc, edges, env, &image), "layers", env);
     hash = tk_hash(hash, out, SIDE * SIDE);
-    texpatch_edges_free(&edges);
+    texedges_set_free(edges);
     return hash;
 }
 
 static uint64_t drawn(txm_env *env) {
-    texpatch_edges edges;
+    texedges_set *edges;
     uint64_t hash = 0;
     golden_blobs(exemplar, SIDE, SIDE, 1);
-    const texpatch_edges_desc desc = describe(1);
-    golden_need(texpatch_edges_find(&desc, env, &edges), "find", env);
+    const texedges_desc desc = describe(1);
+    golden_need(texedges_find(&desc, env, &edges), "find", env);
     for (int layer = -1; layer < 2; layer++) {
         const int channels = layer < 0 ? 3 : 1;
         const txm_image image = golden_image(out, SIDE, SIDE, channels, TXM_U8);
         memset(out, 40, sizeof out);
-        golden_need(texpatch_edges_draw(&edges, layer, env, &image), "draw", env);
+        golden_need(texedges_draw(edges, layer, env, &image), "draw", env);
         hash = tk_hash(hash, out, (size_t)(SIDE * SIDE * channels));
     }
-    texpatch_edges_free(&edges);
+    texedges_set_free(edges);
     return hash;
 }
 
@@ -90,12 +90,12 @@ static uint64_t control(int background, float disturb, txm_env *env) {
     static const txm_vec2 bent[4] = {{10, 20}, {60, 50}, {110, 25}, {150, 90}};
     static const txm_vec2 ring[5] = {{40, 60}, {80, 66}, {96, 96}, {60, 118}, {30, 100}};
     static const txm_vec2 outside[3] = {{-20, 110}, {90, 120}, {200, 60}};
-    texpatch_edges edges, lines;
-    texpatch_stroke strokes[3];
-    texpatch_control c;
+    texedges_set *edges, *lines;
+    texedges_stroke strokes[3];
+    texedges_control c;
     golden_blobs(exemplar, SIDE, SIDE, 1);
-    const texpatch_edges_desc desc = describe(1);
-    golden_need(texpatch_edges_find(&desc, env, &edges), "find", env);
+    const texedges_desc desc = describe(1);
+    golden_need(texedges_find(&desc, env, &edges), "find", env);
     memset(strokes, 0, sizeof strokes);
     memset(&c, 0, sizeof c);
     strokes[0].points = bent;
@@ -109,20 +109,20 @@ static uint64_t control(int background, float disturb, txm_env *env) {
     strokes[2].points = outside;
     strokes[2].count = 3;
     strokes[2].layer = 2;
-    c.edges = &edges;
+    c.edges = edges;
     c.strokes = strokes;
     c.stroke_count = 3;
     c.background = background;
     c.disturb = disturb;
     c.seed = 4;
-    golden_need(texpatch_disturb(&c, WIDTH, HEIGHT, env, &lines), "disturb", env);
-    uint64_t hash = edges_hash(&lines, 0);
+    golden_need(texedges_disturb(&c, WIDTH, HEIGHT, env, &lines), "disturb", env);
+    uint64_t hash = edges_hash(lines, 0);
     const txm_image guide = golden_image(out, WIDTH, HEIGHT, 1, TXM_U8);
     const txm_image mask = golden_image(out + WIDTH * HEIGHT, WIDTH, HEIGHT, 1, TXM_U8);
-    golden_need(texpatch_control_guide(&c, &lines, env, &guide, &mask), "guide", env);
+    golden_need(texedges_guide(&c, lines, env, &guide, &mask), "guide", env);
     hash = tk_hash(hash, out, 2 * WIDTH * HEIGHT);
-    texpatch_edges_free(&lines);
-    texpatch_edges_free(&edges);
+    texedges_set_free(lines);
+    texedges_set_free(edges);
     return hash;
 }
 
