@@ -272,7 +272,7 @@ refuses 2 "add -o" torus.obj --vertices 100
 refuses 2 "add --vertices" torus.obj -o n.obj
 for bad in 0 3 -1 x 1.5 "" 99999999999; do refuses 2 "--vertices" torus.obj -o n.obj --vertices "$bad"; done
 for name in n.stl n.txs n n.png n.gltf; do refuses 2 "cannot write '$name'" torus.obj -o $name --vertices 100; done
-refuses 2 "lattice or repel" torus.obj -o n.obj --vertices 100 --method magic
+refuses 2 "lattice, repel" torus.obj -o n.obj --vertices 100 --method magic
 for bad in 0 181 x -5; do refuses 2 "--crease" torus.obj -o n.obj --vertices 100 --crease $bad; done
 for bad in -1 101 x; do refuses 2 "--adapt" torus.obj -o n.obj --vertices 100 --adapt $bad; done
 for bad in 24 401 0 x; do refuses 2 "--spacing" torus.obj -o n.obj --vertices 100 --spacing $bad; done

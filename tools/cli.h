@@ -56,6 +56,7 @@ typedef struct cli_manual {
     int inputs;          /* how many input files it takes                   */
     const char *input;   /* what the first is called in messages            */
     int makes_folder;    /* the output is a folder of files                 */
+    const char *smaller; /* what to do if memory runs out                   */
 } cli_manual;
 
 /* ---- one run of one command --------------------------------------------------------------- */

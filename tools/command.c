@@ -8,27 +8,52 @@
 #include <errno.h>
 #include <stdio.h>
 
-int fail_library(cli *run, txm_status status, const char *what) {
-    if (status == TXM_CANCELLED) return cli_fail(run, CLI_FAILED, "stopped; nothing was written");
-    if (status == TXM_OUT_OF_MEMORY)
-        return cli_fail(run, CLI_FAILED, "'%s': out of memory; take a smaller size", what);
+/* ---- what can fail ------------------------------------------------------------------------ */
+
+int fail_memory(cli *run) {
+    return cli_fail(run, CLI_FAILED, "out of memory; %s", run->manual->smaller);
+}
+
+int check_result(cli *run, txm_status result, const char *what) {
+    if (result == TXM_OK) return CLI_DONE;
+    if (result == TXM_OUT_OF_MEMORY) return fail_memory(run);
+    if (result == TXM_CANCELLED) return cli_fail(run, CLI_FAILED, "stopped; nothing was written");
     return cli_fail(run, CLI_FAILED, "'%s': %s", what, run->env.message);
 }
 
-int read_image(cli *run, const char *path, int channels, txm_image *image) {
+/* ---- memory and pictures ------------------------------------------------------------------ */
+
+void *new_array(size_t count, size_t size) {
+    size_t bytes;
+    return txm_mul(count, size, 1, &bytes) ? calloc(1, bytes ? bytes : 1) : NULL;
+}
+
+int new_picture(cli *run, int width, int height, int channels, txm_sample sample,
+                txm_image *image) {
+    return image_new(width, height, channels, sample, image) ? CLI_DONE : fail_memory(run);
+}
+
+int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image) {
     const char *why;
-    if (image_read(path, channels, image, &why)) return CLI_DONE;
+    if (most == TXM_U8 ? image_read(path, channels, image, &why)
+                       : image_read_deep(path, channels, image, &why))
+        return CLI_DONE;
     return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
 }
 
-int read_deep_image(cli *run, const char *path, int channels, txm_image *image) {
+int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
+                   size_t *size) {
     const char *why;
-    if (image_read_deep(path, channels, image, &why)) return CLI_DONE;
-    return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
+    char extension[8];
+    file_extension(path, extension);
+    if (image_encode(extension, image, bytes, size, &why)) return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", path, why);
 }
 
-/* One number; what strtod takes besides - blanks, 0x1p3, nan, infinity - is none. */
-static int parse_number(const char *text, char **end, double low, double high, double *value) {
+/* ---- values of options -------------------------------------------------------------------- */
+
+/* What strtod takes besides numbers - blanks, 0x1p3, nan, infinity - is none. */
+static int read_number(const char *text, char **end, double low, double high, double *value) {
     if (!isdigit((unsigned char)text[text[0] == '-'])) return 0;
     *value = strtod(text, end);
     for (const char *c = text; c < *end; c++) {
@@ -42,7 +67,7 @@ int parse_numbers(cli *run, const char *option, const char *text, int most, doub
     const char *from = text;
     for (int n = 0; n < most; n++) {
         char *end;
-        if (!parse_number(from, &end, low, high, &values[n])) break;
+        if (!read_number(from, &end, low, high, &values[n])) break;
         if (*end == 0) return n + 1;
         if (*end != ',') break;
         from = end + 1;
@@ -55,6 +80,25 @@ int parse_numbers(cli *run, const char *option, const char *text, int most, doub
     return 0;
 }
 
+int parse_number(cli *run, const char *option, const char *text, double low, double high,
+                 double *value) {
+    if (!text || parse_numbers(run, option, text, 1, low, high, value)) return CLI_DONE;
+    return CLI_USAGE;
+}
+
+int find_name(cli *run, const char *option, const char *name, const char *const *names) {
+    char all[80] = "";
+    for (int i = 0; names[i]; i++) {
+        if (!strcmp(names[i], name)) return i;
+        const size_t n = strlen(all);
+        snprintf(all + n, sizeof all - n, "%s%s", i ? ", " : "", names[i]);
+    }
+    cli_fail(run, CLI_USAGE, "%s '%s': choose one of %s", option, name, all);
+    return -1;
+}
+
+/* ---- outputs ------------------------------------------------------------------------------ */
+
 int check_picture_path(cli *run, const char *path, int width, int height, int channels) {
     const char *why;
     char extension[8];
@@ -64,16 +108,13 @@ int check_picture_path(cli *run, const char *path, int width, int height, int ch
 }
 
 int finish_with_picture(cli *run, const txm_image *image) {
-    const char *why;
-    char extension[8];
     unsigned char *bytes;
     size_t size;
     cli_stage(run, "encode");
-    file_extension(run->output, extension);
-    if (!image_encode(extension, image, &bytes, &size, &why))
-        return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
+    int status = encode_picture(run, run->output, image, &bytes, &size);
+    if (status) return status;
     cli_figure(run, "file_bytes", (double)size);
-    int status = cli_finish(run, bytes, size);
+    status = cli_finish(run, bytes, size);
     free(bytes);
     return status;
 }
@@ -93,6 +134,8 @@ const char *name_in(const char *path) {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
 }
+
+/* ---- JSON --------------------------------------------------------------------------------- */
 
 int read_tiles_json(cli *run, const char *folder, cJSON **json) {
     char path[MAX_PATH];

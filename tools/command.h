@@ -20,19 +20,44 @@ extern const command tiles_command;                /* tiles.c  */
 extern const command retile_command;               /* retile.c */
 extern const command tree_command, forest_command; /* tree.c   */
 
-/* A call into the library failed: say so in its own words. */
-int fail_library(cli *run, txm_status status, const char *what);
+/* ---- what can fail: these say what did, and return an exit status ------------------------- */
 
-/* Read a picture; channels 0 keeps what it has. An exit status. */
-int read_image(cli *run, const char *path, int channels, txm_image *image);
+int fail_memory(cli *run);
 
-/* The same keeping 16 bits a sample if it has them. */
-int read_deep_image(cli *run, const char *path, int channels, txm_image *image);
+/* A call into a library; what: the file that it was about. */
+int check_result(cli *run, txm_status result, const char *what);
+
+/* ---- memory and pictures ------------------------------------------------------------------ */
+
+/* count items, all bytes 0, for free(); NULL only without memory. */
+void *new_array(size_t count, size_t size);
+
+/* A picture of zeros; image_free releases it, as those below. An exit status. */
+int new_picture(cli *run, int width, int height, int channels, txm_sample sample, txm_image *image);
+
+/* Read a picture; channels 0 keeps what it has, TXM_U16 keeps 16 bits a sample if it has them. An
+   exit status. */
+int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image);
+
+/* The picture as a file with the extension of that path, for free(). An exit status. */
+int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
+                   size_t *size);
+
+/* ---- values of options -------------------------------------------------------------------- */
 
 /* Decimal numbers low..high with commas between them, such as "1,0.5". Returns how many, at most
    most, or 0 after a message that names the option. */
 int parse_numbers(cli *run, const char *option, const char *text, int most, double low, double high,
                   double *values);
+
+/* One such number, or none if text is NULL: then *value stays. An exit status. */
+int parse_number(cli *run, const char *option, const char *text, double low, double high,
+                 double *value);
+
+/* The index of a name in a list that ends in NULL; -1 after a message that tells the names. */
+int find_name(cli *run, const char *option, const char *name, const char *const *names);
+
+/* ---- outputs ------------------------------------------------------------------------------ */
 
 /* Refuse, before any work, an output path that cannot hold such a picture. 0: not known yet. */
 int check_picture_path(cli *run, const char *path, int width, int height, int channels);
@@ -47,6 +72,8 @@ int path_beside(cli *run, const char *ending, char path[MAX_PATH]);
 
 /* What follows the last '/'. */
 const char *name_in(const char *path);
+
+/* ---- JSON --------------------------------------------------------------------------------- */
 
 /* tiles.json of a folder of 'texkit tiles'; for cJSON_Delete. An exit status. */
 struct cJSON;

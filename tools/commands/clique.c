@@ -33,7 +33,7 @@ static const cli_manual learn_manual = {
     "model holds statistics, no pixels; 'texkit synth' makes new texture from it.\n",
     "  texkit learn gravel.jpg -o gravel.txs\n"
     "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
-    1, "exemplar", 0};
+    1, "exemplar", 0, "take a smaller exemplar"};
 
 static int run_learn(int argc, char **argv) {
     cli run;
@@ -63,8 +63,8 @@ static int run_learn(int argc, char **argv) {
                         run.output);
 
     cli_stage(&run, "read");
-    status = read_image(&run, run.inputs[0], 0, &desc.example);
-    if (!status && mask_path) status = read_image(&run, mask_path, 1, &desc.mask);
+    status = read_picture(&run, run.inputs[0], 0, TXM_U8, &desc.example);
+    if (!status && mask_path) status = read_picture(&run, mask_path, 1, TXM_U8, &desc.mask);
     if (!status && mask_path &&
         (desc.mask.width != desc.example.width || desc.mask.height != desc.example.height))
         status = cli_fail(&run, CLI_FAILED, "the mask '%s' is %d x %d; make it %d x %d as '%s'",
@@ -79,7 +79,7 @@ static int run_learn(int argc, char **argv) {
     if (result == TXM_OK && !(bytes = (unsigned char *)malloc(size))) result = TXM_OUT_OF_MEMORY;
     if (result == TXM_OK) result = texsyn_save(model, &run.env, bytes, size, &size);
     if (result != TXM_OK) {
-        status = fail_library(&run, result, run.inputs[0]);
+        status = check_result(&run, result, run.inputs[0]);
         goto done;
     }
 
@@ -108,7 +108,7 @@ static const cli_manual synth_manual = {
     "exemplar's, and more time.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
-    1, "exemplar or model", 0};
+    1, "exemplar or model", 0, "take a smaller size"};
 
 /* The input as a model: loaded if it is one, else learned from the picture. */
 static int get_model(cli *run, texsyn_model **model) {
@@ -127,7 +127,7 @@ static int get_model(cli *run, texsyn_model **model) {
     if (result == TXM_OK) {
         model_figures(run, *model, size);
     } else if (!strcmp(extension, ".txs") && !image_is_known(bytes, size)) {
-        status = fail_library(run, result, path);
+        status = check_result(run, result, path);
     } else if (!image_decode(bytes, size, 0, &learn.example, &why)) {
         status = cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
     } else if (!(status = check_picture_path(run, run->output, 0, 0, learn.example.channels))) {
@@ -136,7 +136,7 @@ static int get_model(cli *run, texsyn_model **model) {
         result = texsyn_learn(&learn, &run->env, model);
         if (result == TXM_OK) result = texsyn_save(*model, &run->env, NULL, 0, &size);
         if (result == TXM_OK) model_figures(run, *model, size);
-        else status = fail_library(run, result, path);
+        else status = check_result(run, result, path);
     }
     image_free(&learn.example);
     free(bytes);
@@ -177,7 +177,7 @@ static int run_synth(int argc, char **argv) {
     texsyn_synth_desc desc = {model, out.width, out.height, tileable, quality, run.seed};
     txm_status result = out.pixels ? texsyn_synthesize(&desc, &run.env, out) : TXM_OUT_OF_MEMORY;
     if (result != TXM_OK) {
-        status = fail_library(&run, result, run.inputs[0]);
+        status = check_result(&run, result, run.inputs[0]);
         goto done;
     }
 

@@ -25,7 +25,7 @@ static const cli_manual edges_manual = {
     "Of --stats, 'length' is that of all lines in pixels; each edge counts on both sides.\n",
     "  texkit edges bricks.jpg -o bricks-edges.png --levels 3 --smooth 1.5 --least 40\n"
     "  texkit edges bricks.jpg -o bricks.svg --layers bricks-layers.png\n",
-    1, "exemplar", 0};
+    1, "exemplar", 0, "take a smaller picture"};
 
 typedef struct options {
     const char *smooth, *thresholds, *over, *layers;
@@ -117,16 +117,10 @@ static char *lines_as_text(const texedges_set *e, int layer, int is_svg, size_t 
 
 /* ---- lines as a picture ------------------------------------------------------------------ */
 
-static int new_picture(cli *run, int width, int height, int channels, txm_image *image) {
-    return image_new(width, height, channels, TXM_U8, image)
-               ? CLI_DONE
-               : cli_fail(run, CLI_FAILED, "out of memory; make it smaller");
-}
-
 /* Lines over black, over the picture (in RGB) or over its layers (gray). */
 static int draw_lines(cli *run, const texedges_set *e, int layer, int over,
                       const txm_image *image, const txm_image *layers, txm_image *out) {
-    const int status = new_picture(run, e->width, e->height, 3, out);
+    const int status = new_picture(run, e->width, e->height, 3, TXM_U8, out);
     if (status) return status;
     const txm_image *under = over == OVER_PICTURE ? image : layers;
     for (int y = 0; y < e->height && over != OVER_BLACK; y++) {
@@ -137,7 +131,7 @@ static int draw_lines(cli *run, const texedges_set *e, int layer, int over,
         }
     }
     const txm_status result = texedges_draw(e, layer, &run->env, out);
-    return result == TXM_OK ? CLI_DONE : fail_library(run, result, run->inputs[0]);
+    return check_result(run, result, run->inputs[0]);
 }
 
 /* ---- the command ------------------------------------------------------------------------- */
@@ -149,7 +143,7 @@ static int is_text(const char *extension) {
 /* Refuse, before any work, what does not go together. */
 static int check_options(cli *run, const options *o, texedges_desc *d, int *over,
                          float thresholds[TEXEDGES_MAX_LEVELS]) {
-    static const char *const overs[] = {"black", "picture", "layers"};
+    static const char *const overs[] = {"black", "picture", "layers", NULL};
     char extension[8];
     double numbers[TEXEDGES_MAX_LEVELS];
     int status = CLI_DONE;
@@ -181,10 +175,8 @@ static int check_options(cli *run, const options *o, texedges_desc *d, int *over
     if (o->layer >= levels)
         return cli_fail(run, CLI_USAGE, "--layer %d: there are %d, 0 to %d", o->layer, levels,
                         levels - 1);
-    while (*over < 3 && strcmp(o->over, overs[*over]) != 0) (*over)++;
-    if (*over == 3)
-        return cli_fail(run, CLI_USAGE, "--over '%s': choose one of black, picture, layers",
-                        o->over);
+    *over = find_name(run, "--over", o->over, overs);
+    if (*over < 0) return CLI_USAGE;
     if (*over != OVER_BLACK && is_text(extension))
         return cli_fail(run, CLI_USAGE, "--over is for pictures; '%s' holds lines alone",
                         run->output);
@@ -217,7 +209,6 @@ static int write_outputs(cli *run, const options *o, const texedges_set *e, int 
     cli_file files[2] = {{0}, {0}};
     unsigned char *bytes[2] = {NULL, NULL};
     char extension[8];
-    const char *why = NULL;
     txm_image out = {0};
     int status = CLI_DONE;
     cli_stage(run, "encode");
@@ -227,17 +218,13 @@ static int write_outputs(cli *run, const options *o, const texedges_set *e, int 
     if (is_text(extension)) {
         bytes[0] = (unsigned char *)lines_as_text(e, o->layer, !strcmp(extension, ".svg"),
                                                   &files[0].size);
-        if (!bytes[0]) status = cli_fail(run, CLI_FAILED, "out of memory; take fewer --levels");
+        if (!bytes[0]) status = fail_memory(run);
     } else {
         status = draw_lines(run, e, o->layer, over, image, layers, &out);
-        if (!status && !image_encode(extension, &out, &bytes[0], &files[0].size, &why))
-            status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
+        if (!status) status = encode_picture(run, run->output, &out, &bytes[0], &files[0].size);
     }
-    if (!status && o->layers) {
-        file_extension(o->layers, extension);
-        if (!image_encode(extension, layers, &bytes[1], &files[1].size, &why))
-            status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", o->layers, why);
-    }
+    if (!status && o->layers)
+        status = encode_picture(run, o->layers, layers, &bytes[1], &files[1].size);
     for (int i = 0; i < 2; i++) files[i].bytes = bytes[i];
     cli_figure(run, "file_bytes", (double)(files[0].size + files[1].size));
     if (!status) status = cli_finish_files(run, files, o->layers ? 2 : 1);
@@ -275,17 +262,17 @@ static int run_edges(int argc, char **argv) {
     status = check_options(&run, &o, &desc, &over, thresholds);
     if (status) return status;
     cli_stage(&run, "read");
-    status = read_deep_image(&run, run.inputs[0], 0, &desc.image);
+    status = read_picture(&run, run.inputs[0], 0, TXM_U16, &desc.image);
     if (status) return status;
 
     cli_stage(&run, "find");
     txm_status result = texedges_find(&desc, &run.env, &edges);
     if (result == TXM_OK && (o.layers || over == OVER_LAYERS)) {
         cli_stage(&run, "layers");
-        status = new_picture(&run, desc.image.width, desc.image.height, 1, &layers);
+        status = new_picture(&run, desc.image.width, desc.image.height, 1, TXM_U8, &layers);
         if (!status) result = texedges_layers(&desc, edges, &run.env, &layers);
     }
-    if (result != TXM_OK) status = fail_library(&run, result, run.inputs[0]);
+    if (!status) status = check_result(&run, result, run.inputs[0]);
     if (!status) {
         const size_t count = set_figures(&run, edges, o.layer);
         status = write_outputs(&run, &o, edges, over, &desc.image, &layers);

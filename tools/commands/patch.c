@@ -54,7 +54,7 @@ static const cli_manual patch_manual = {
     "  texkit patch bricks.jpg -o wall.png --size 2048x1024 --tileable --lod 4\n"
     "  texkit patch bricks.png -o wall.png --size 512x512 --normal 1 --data 2 \\\n"
     "      --maps bricks-normal.png,bricks-height.png --weights 1,0,0.3\n",
-    1, "exemplar", 0};
+    1, "exemplar", 0, "take a smaller size"};
 
 /* Names out of a list; they lie in storage. */
 typedef struct names {
@@ -87,26 +87,13 @@ typedef struct job {
     texpatch_source *from; /* of all pixels; NULL: nobody asks */
 } job;
 
-static int fail_memory(job *j) {
-    return cli_fail(&j->run, CLI_FAILED, "out of memory; take a smaller size");
-}
-
-static int check_result(job *j, txm_status result, const char *what) {
-    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, what);
-}
-
-static int new_picture(job *j, int width, int height, int channels, txm_sample sample,
-                       txm_image *image) {
-    return image_new(width, height, channels, sample, image) ? CLI_DONE : fail_memory(j);
-}
-
 /* ---- lists ------------------------------------------------------------------------------- */
 
 /* Take a list apart at its separators; most names, none empty. */
 static int split(job *j, const char *option, const char *list, char separator, int most, names *n) {
     const size_t size = strlen(list) + 1;
     n->storage = (char *)malloc(size);
-    if (!n->storage) return fail_memory(j);
+    if (!n->storage) return fail_memory(&j->run);
     memcpy(n->storage, list, size);
     for (char *c = n->storage; c; n->count++) {
         if (n->count == most)
@@ -271,15 +258,6 @@ static int parse_lattice(job *j) {
     return CLI_DONE;
 }
 
-/* A single number. */
-static int parse_amount(job *j, const char *option, const char *text, double most, float *value) {
-    double number;
-    if (!text) return CLI_DONE;
-    if (!parse_numbers(&j->run, option, text, 1, 0, most, &number)) return CLI_USAGE;
-    *value = (float)number;
-    return CLI_DONE;
-}
-
 /* Refuse, before any work, what does not go together. */
 static int check_options(job *j) {
     cli *run = &j->run;
@@ -321,8 +299,11 @@ static int check_options(job *j) {
     d->width = w;
     d->height = h;
     d->seed = run->seed;
-    status = parse_amount(j, "--novelty", j->novelty, 1, &d->novelty);
-    if (!status) status = parse_amount(j, "--guide-weight", j->guide_weight, 16, &d->guide_weight);
+    double novelty = 0, weight = 0;
+    status = parse_number(run, "--novelty", j->novelty, 0, 1, &novelty);
+    if (!status) status = parse_number(run, "--guide-weight", j->guide_weight, 0, 16, &weight);
+    d->novelty = (float)novelty;
+    d->guide_weight = (float)weight;
     if (!status && j->guide_weight && d->guide_weight <= 0)
         return cli_fail(run, CLI_USAGE, "--guide-weight 0: leave out --target or --control "
                         "instead");
@@ -381,7 +362,7 @@ static int name_outputs(job *j) {
     int status = CLI_DONE;
     file_extension(j->run.output, j->extension);
     j->paths = (char(*)[MAX_PATH])calloc((size_t)count + 1, MAX_PATH);
-    if (!j->paths) return fail_memory(j);
+    if (!j->paths) return fail_memory(&j->run);
     for (int i = 0; i < count && !status; i++) {
         status = name_output(j, i / levels, i % levels, j->paths[i]);
         if (!status && i > 0) status = cli_writes(&j->run, j->paths[i]); /* the first is -o */
@@ -402,7 +383,8 @@ static int name_outputs(job *j) {
 /* 8 bits as 16. */
 static int widen(job *j, txm_image *image) {
     txm_image wide;
-    const int status = new_picture(j, image->width, image->height, image->channels, TXM_U16, &wide);
+    const int status =
+        new_picture(&j->run, image->width, image->height, image->channels, TXM_U16, &wide);
     const size_t count = (size_t)image->width * (size_t)image->height * (size_t)image->channels;
     const uint8_t *from = (const uint8_t *)image->pixels;
     for (size_t i = 0; i < count && !status; i++) {
@@ -415,9 +397,8 @@ static int widen(job *j, txm_image *image) {
 
 /* Read a picture with so many channels of that sample type. */
 static int read_as(job *j, const char *path, int channels, txm_sample sample, txm_image *image) {
-    if (sample == TXM_U8) return read_image(&j->run, path, channels, image);
-    const int status = read_deep_image(&j->run, path, channels, image);
-    return !status && image->sample == TXM_U8 ? widen(j, image) : status;
+    const int status = read_picture(&j->run, path, channels, sample, image);
+    return !status && image->sample != sample ? widen(j, image) : status;
 }
 
 static int check_extent(job *j, const char *what, const char *path, const txm_image *image,
@@ -438,7 +419,7 @@ static int read_exemplar(job *j, int e) {
         txm_image *image = &j->pictures[e][m];
         const char *name = m ? j->map_names[e].at[m - 1] : path;
         if (e) status = read_as(j, name, first->channels, first->sample, image);
-        else status = read_deep_image(&j->run, name, 0, image);
+        else status = read_picture(&j->run, name, 0, TXM_U16, image);
         if (!status && m)
             status = check_extent(j, "the map", name, image, x->maps[0].width, x->maps[0].height,
                                   path);
@@ -669,26 +650,26 @@ static int follow_strokes(job *j, strokes *s) {
     texedges_control control = s->control;
     int status = CLI_DONE;
     s->find.image = j->pictures[0][0];
-    status = check_result(j, texedges_find(&s->find, &j->run.env, &edges), j->run.inputs[0]);
+    status = check_result(&j->run, texedges_find(&s->find, &j->run.env, &edges), j->run.inputs[0]);
     for (int e = 0; e < d->exemplar_count && !status; e++) {
         const txm_image *image = &j->pictures[e][0];
         txm_image *layers = &j->exemplars[e].guide;
         s->find.image = *image;
-        status = new_picture(j, image->width, image->height, 1, TXM_U8, layers);
+        status = new_picture(&j->run, image->width, image->height, 1, TXM_U8, layers);
         if (!status)
-            status = check_result(j, texedges_layers(&s->find, edges, &j->run.env, layers),
+            status = check_result(&j->run, texedges_layers(&s->find, edges, &j->run.env, layers),
                                   j->exemplar_names.at[e]);
     }
     control.edges = edges;
     control.seed = j->run.seed;
-    if (!status) status = new_picture(j, d->width, d->height, 1, TXM_U8, &d->guide);
-    if (!status) status = new_picture(j, d->width, d->height, 1, TXM_U8, &d->guide_mask);
+    if (!status) status = new_picture(&j->run, d->width, d->height, 1, TXM_U8, &d->guide);
+    if (!status) status = new_picture(&j->run, d->width, d->height, 1, TXM_U8, &d->guide_mask);
     if (!status)
-        status = check_result(j, texedges_disturb(&control, d->width, d->height, &j->run.env,
-                                                  &disturbed), j->control);
+        status = check_result(&j->run, texedges_disturb(&control, d->width, d->height, &j->run.env,
+                                                        &disturbed), j->control);
     if (!status)
-        status = check_result(j, texedges_guide(&control, disturbed, &j->run.env,
-                                                &d->guide, &d->guide_mask), j->control);
+        status = check_result(&j->run, texedges_guide(&control, disturbed, &j->run.env,
+                                                      &d->guide, &d->guide_mask), j->control);
     texedges_set_free(edges);
     texedges_set_free(disturbed);
     return status;
@@ -715,13 +696,13 @@ static int make_room(job *j) {
     const texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
     for (int m = 0; m < d->map_count && !status; m++)
-        status = new_picture(j, d->width, d->height, j->pictures[0][m].channels,
+        status = new_picture(&j->run, d->width, d->height, j->pictures[0][m].channels,
                              j->pictures[0][m].sample, &j->out[m]);
     if (!status && (j->sources || j->run.stats)) {
         size_t bytes;
         if (txm_mul((size_t)d->width, (size_t)d->height, sizeof *j->from, &bytes))
             j->from = (texpatch_source *)malloc(bytes);
-        if (!j->from) status = fail_memory(j);
+        if (!j->from) status = fail_memory(&j->run);
     }
     return status;
 }
@@ -759,7 +740,7 @@ static int make_picture(job *j, char text[80]) {
             j->from[(size_t)y * (size_t)d->width + (size_t)x] = texpatch_source_at(made, x, y);
     }
     texpatch_free(made);
-    return check_result(j, result, j->run.inputs[0]);
+    return check_result(&j->run, result, j->run.inputs[0]);
 }
 
 static int make_window(job *j, char text[80]) {
@@ -773,7 +754,7 @@ static int make_window(job *j, char text[80]) {
         result = texpatch_plane_draw(plane, j->window_x, j->window_y, &j->run.env, j->out, j->from);
     }
     texpatch_plane_free(plane);
-    return check_result(j, result, j->run.inputs[0]);
+    return check_result(&j->run, result, j->run.inputs[0]);
 }
 
 /* ---- where pixels come from ---------------------------------------------------------------- */
@@ -834,12 +815,10 @@ static unsigned char *encode_sources(const job *j, size_t *size) {
 
 static int encode(job *j, const txm_image *image, int index, cli_file *file,
                   unsigned char **bytes) {
-    const char *why;
     file->name = j->paths[index];
-    if (!image_encode(j->extension, image, bytes, &file->size, &why))
-        return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", file->name, why);
+    const int status = encode_picture(&j->run, file->name, image, bytes, &file->size);
     file->bytes = *bytes;
-    return CLI_DONE;
+    return status;
 }
 
 /* A map and its coarser levels; the finer one is given up as soon as the next is made. */
@@ -850,10 +829,10 @@ static int encode_levels(job *j, int map, cli_file *files, unsigned char **bytes
     for (int level = 1; level <= j->lod && !status; level++) {
         const int i = first + level;
         txm_image half;
-        status = new_picture(j, (image->width + 1) / 2, (image->height + 1) / 2, image->channels,
-                             image->sample, &half);
+        status = new_picture(&j->run, (image->width + 1) / 2, (image->height + 1) / 2,
+                             image->channels, image->sample, &half);
         if (!status)
-            status = check_result(j, texpatch_half(image, &j->maps[map], &j->run.env, &half),
+            status = check_result(&j->run, texpatch_half(image, &j->maps[map], &j->run.env, &half),
                                   j->run.inputs[0]);
         free(image->pixels);
         *image = half;
@@ -867,7 +846,7 @@ static int write_outputs(job *j) {
     cli_file *files = (cli_file *)calloc(count, sizeof *files);
     unsigned char **bytes = (unsigned char **)calloc(count, sizeof *bytes);
     double sum = 0;
-    int status = files && bytes ? CLI_DONE : fail_memory(j);
+    int status = files && bytes ? CLI_DONE : fail_memory(&j->run);
     cli_stage(&j->run, "encode");
     for (int m = 0; m < j->desc.map_count && !status; m++)
         status = encode_levels(j, m, files, bytes);
@@ -875,7 +854,7 @@ static int write_outputs(job *j) {
         cli_file *last = &files[count - 1];
         last->name = j->sources;
         last->bytes = bytes[count - 1] = encode_sources(j, &last->size);
-        if (!last->bytes) status = fail_memory(j);
+        if (!last->bytes) status = fail_memory(&j->run);
     }
     for (size_t i = 0; i < count && !status; i++) sum += (double)files[i].size;
     cli_figure(&j->run, "files", (double)count);

@@ -45,7 +45,7 @@ static const cli_manual retile_manual = {
     "radius over the circumscribed one's: 1 for an equilateral triangle.\n",
     "  texkit retile bunny.obj -o bunny.glb --vertices 5000 --tiles gravel-triangles\n"
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
-    1, "mesh", 0};
+    1, "mesh", 0, "take fewer vertices"};
 
 typedef struct job {
     cli run;
@@ -76,24 +76,11 @@ typedef struct job {
     size_t placed;
 } job;
 
-static int fail_memory(job *j) {
-    return cli_fail(&j->run, CLI_FAILED, "out of memory; take fewer vertices");
-}
-
-static int check_result(job *j, txm_status result, const char *what) {
-    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, what);
-}
-
-/* count items; NULL if there are none or no memory */
-static void *new_array(size_t count, size_t size) {
-    size_t bytes;
-    return txm_mul(count, size, 1, &bytes) && bytes ? malloc(bytes) : NULL;
-}
-
 /* ---- the command line ---------------------------------------------------------------------- */
 
 /* Refuse, before any work, what does not go together. */
 static int check_options(job *j, const char *method) {
+    static const char *const methods[] = {"lattice", "repel", NULL};
     const char *why;
     cli *run = &j->run;
     file_extension(run->output, j->extension);
@@ -101,9 +88,9 @@ static int check_options(job *j, const char *method) {
         return cli_fail(run, CLI_USAGE, "cannot write '%s': %s", run->output, why);
     if (j->desc.vertices == 0)
         return cli_fail(run, CLI_USAGE, "no number of vertices given; add --vertices N");
-    if (strcmp(method, "lattice") != 0 && strcmp(method, "repel") != 0)
-        return cli_fail(run, CLI_USAGE, "--method '%s': choose lattice or repel", method);
-    j->desc.method = method[0] == 'l' ? TRIMESH_LATTICE : TRIMESH_REPEL;
+    const int repels = find_name(run, "--method", method, methods);
+    if (repels < 0) return CLI_USAGE;
+    j->desc.method = repels ? TRIMESH_REPEL : TRIMESH_LATTICE;
     if ((j->tiles != NULL) + (j->patches != NULL) + (j->texture != NULL) > 1)
         return cli_fail(run, CLI_USAGE, "choose one of --tiles, --patches and --texture");
     if (j->dot && !j->instances) return cli_fail(run, CLI_USAGE, "--dot goes with --instances");
@@ -146,8 +133,7 @@ static int read_png(job *j, const char *path, txm_image *image) {
         return CLI_DONE;
     }
     free(bytes);
-    if (image_encode(".png", image, &j->png, &j->png_size, &why)) return CLI_DONE;
-    return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->png_path, why);
+    return encode_picture(&j->run, j->png_path, image, &j->png, &j->png_size);
 }
 
 /* Wanted edge lengths from a picture on the input's texture coordinates: where it is white a
@@ -158,7 +144,7 @@ static int read_density(job *j, float **scale) {
     if (!m->uvs)
         return cli_fail(&j->run, CLI_FAILED, "--density: '%s' has no texture coordinates",
                         j->run.inputs[0]);
-    const int status = read_image(&j->run, j->density, 1, &map);
+    const int status = read_picture(&j->run, j->density, 1, TXM_U8, &map);
     if (status) return status;
     *scale = (float *)new_array(m->vertex_count, sizeof(float));
     for (size_t i = 0; i < m->vertex_count && *scale; i++) (*scale)[i] = 1;
@@ -170,7 +156,7 @@ static int read_density(job *j, float **scale) {
         (*scale)[m->indices[c]] = txm_float(pow(0.25, row[x] / 255.0));
     }
     image_free(&map);
-    return *scale ? CLI_DONE : fail_memory(j);
+    return *scale ? CLI_DONE : fail_memory(&j->run);
 }
 
 /* ---- what the input has on it --------------------------------------------------------------- */
@@ -193,14 +179,14 @@ static int carry_colors(job *j) {
     int status = CLI_DONE;
     j->output.colors = (unsigned char *)new_array(count, 4);
     if (!values || !carried || !j->output.colors) {
-        status = fail_memory(j);
+        status = fail_memory(&j->run);
     } else {
         for (size_t i = 0; i < from; i++) values[i] = (float)j->input.colors[i];
         v.values = values;
         v.count = j->input.vertex_count;
         v.channels = 4;
-        status = check_result(j, trimesh_transfer(&input, &v, j->result->sources, count,
-                                                  &j->run.env, carried), j->run.inputs[0]);
+        status = check_result(&j->run, trimesh_transfer(&input, &v, j->result->sources, count,
+                                                        &j->run.env, carried), j->run.inputs[0]);
     }
     for (size_t i = 0; i < 4 * count && !status; i++)
         j->output.colors[i] = (unsigned char)(txm_clampf(carried[i], 0, 255) + 0.5f);
@@ -217,15 +203,16 @@ static int carry_uvs(job *j) {
     int status = CLI_DONE;
     j->output.uvs = (float *)new_array(j->result->triangle_count, 6 * sizeof(float));
     if (!own || !j->output.uvs) {
-        status = fail_memory(j);
+        status = fail_memory(&j->run);
     } else {
         for (size_t c = 0; c < corners; c++) own[c] = (uint32_t)c;
         v.values = j->input.uvs;
         v.count = corners;
         v.indices = own;
         v.channels = 2;
-        status = check_result(j, trimesh_transfer_corners(&input, &v, &mesh, j->result->sources,
-                                                          &j->run.env, j->output.uvs),
+        status = check_result(&j->run,
+                              trimesh_transfer_corners(&input, &v, &mesh, j->result->sources,
+                                                       &j->run.env, j->output.uvs),
                               j->run.inputs[0]);
     }
     free(own);
@@ -340,7 +327,8 @@ static int read_tiles(job *j, tile_file *f, textiles_set **set) {
     snprintf(path, sizeof path, "%s/tiles.json", j->tiles);
     if (!ok) return cli_fail(&j->run, CLI_FAILED, "'%s': %s", path, why);
     const txm_status result = import_tiles(j, f, set);
-    if (result != TXM_OK) return fail_library(&j->run, result, path);
+    status = check_result(&j->run, result, path);
+    if (status) return status;
     if (!same_tiles(*set, f))
         return cli_fail(&j->run, CLI_FAILED, "'%s': its tiles are not in their order; make the set "
                         "again", path);
@@ -354,9 +342,9 @@ static int read_tiles(job *j, tile_file *f, textiles_set **set) {
 static int place_tiles(job *j, const int *tiles, const int *rotations, const float *uv, int count) {
     const size_t triangles = j->result->triangle_count;
     j->output.uvs = (float *)new_array(triangles, 6 * sizeof(float));
-    if (!j->output.uvs) return fail_memory(j);
-    return check_result(j, trimesh_place_tiles(triangles, tiles, rotations, uv, (size_t)count,
-                                               &j->run.env, j->output.uvs), j->run.inputs[0]);
+    if (!j->output.uvs) return fail_memory(&j->run);
+    return check_result(&j->run, trimesh_place_tiles(triangles, tiles, rotations, uv, (size_t)count,
+                                                     &j->run.env, j->output.uvs), j->run.inputs[0]);
 }
 
 static int dress_with_tiles(job *j) {
@@ -365,12 +353,13 @@ static int dress_with_tiles(job *j) {
     tile_file f;
     memset(&f, 0, sizeof f);
     int *tiles = (int *)new_array(2 * m->triangle_count, sizeof(int));
-    int status = tiles ? read_tiles(j, &f, &set) : fail_memory(j);
+    int status = tiles ? read_tiles(j, &f, &set) : fail_memory(&j->run);
     if (!status)
-        status = check_result(j, textiles_assign_triangles(set, m->indices, m->triangle_count,
-                                                           m->vertex_count, j->run.seed,
-                                                           &j->run.env, tiles,
-                                                           tiles + m->triangle_count), j->tiles);
+        status = check_result(&j->run,
+                              textiles_assign_triangles(set, m->indices, m->triangle_count,
+                                                        m->vertex_count, j->run.seed, &j->run.env,
+                                                        tiles, tiles + m->triangle_count),
+                              j->tiles);
     if (!status) status = place_tiles(j, tiles, tiles + m->triangle_count, f.uv, f.count);
     textiles_set_free(set);
     free(f.tiles);
@@ -411,12 +400,13 @@ static int dress_with_patches(job *j) {
     float *uv = (float *)new_array((size_t)j->patch_count, 6 * sizeof(float));
     choose.patches = j->patch_count;
     choose.seed = j->run.seed;
-    int status = patches && uv ? read_png(j, j->patches, &picture) : fail_memory(j);
+    int status = patches && uv ? read_png(j, j->patches, &picture) : fail_memory(&j->run);
     if (!status) status = find_layout(j, &picture, &atlas);
     if (!status)
-        status = check_result(
-            j, trimesh_choose(&mesh, &choose, &j->run.env, patches, patches + mesh.face_count),
-            j->run.inputs[0]);
+        status = check_result(&j->run,
+                              trimesh_choose(&mesh, &choose, &j->run.env, patches,
+                                             patches + mesh.face_count),
+                              j->run.inputs[0]);
     if (!status) {
         trimesh_atlas_uv(&atlas, -1, uv);
         status = place_tiles(j, patches, patches + mesh.face_count, uv, j->patch_count);
@@ -476,7 +466,7 @@ static int take_points(job *j, trimesh_point *points) {
     const double radius = j->dot ? j->dot / 100.0 : 0.5 * sqrt(0.5 / (double)m->vertex_count);
     for (size_t i = 0; i < m->vertex_count; i++) {
         const int sphere = sphere_of(j, m->colors ? m->colors + 4 * i : plain);
-        if (sphere == -2) return fail_memory(j);
+        if (sphere == -2) return fail_memory(&j->run);
         if (sphere < 0)
             return cli_fail(&j->run, CLI_FAILED, "'%s': more than %d different colors",
                             j->instances, MAX_PROTOTYPES);
@@ -507,7 +497,7 @@ static void take_mesh(job *j, trimesh_point *point) {
 static int sort_instances(job *j, const trimesh_instance *list, size_t count) {
     size_t at[MAX_PROTOTYPES + 1] = {0};
     j->placements = (float *)new_array(count, 10 * sizeof(float));
-    if (!j->placements) return fail_memory(j);
+    if (!j->placements) return fail_memory(&j->run);
     float *translations = j->placements, *rotations = translations + 3 * count;
     float *scales = rotations + 4 * count;
     for (size_t i = 0; i < count; i++) at[list[i].prototype + 1]++;
@@ -538,7 +528,7 @@ static int place_instances(job *j) {
     const int has_points = j->patch.triangle_count == 0;
     trimesh_point *points =
         (trimesh_point *)new_array(has_points ? j->patch.vertex_count : 1, sizeof *points);
-    int status = points ? CLI_DONE : fail_memory(j);
+    int status = points ? CLI_DONE : fail_memory(&j->run);
     if (points) {
         patch.points = points;
         patch.count = has_points ? j->patch.vertex_count : 1;
@@ -552,12 +542,13 @@ static int place_instances(job *j) {
     d.curve = (float)j->curved;
     d.seed = j->run.seed;
     if (!status)
-        status = check_result(j, trimesh_scatter(&d, &j->run.env, NULL, 0, &count), j->instances);
+        status = check_result(&j->run, trimesh_scatter(&d, &j->run.env, NULL, 0, &count),
+                              j->instances);
     if (!status && count) {
         list = (trimesh_instance *)new_array(count, sizeof *list);
-        if (!list) status = fail_memory(j);
+        if (!list) status = fail_memory(&j->run);
         if (!status)
-            status = check_result(j, trimesh_scatter(&d, &j->run.env, list, count, &count),
+            status = check_result(&j->run, trimesh_scatter(&d, &j->run.env, list, count, &count),
                                   j->instances);
         if (!status) status = sort_instances(j, list, count);
     }
@@ -668,7 +659,7 @@ static int measure(job *j, double *mean_quality, double *valence_6) {
     spread edges = {0, 0, 0}, areas = {0, 0, 0}, qualities = {0, 0, 0};
     double least_quality = 1, least_angle = 180;
     figures f;
-    if (!count_edges(m, &f)) return fail_memory(j);
+    if (!count_edges(m, &f)) return fail_memory(&j->run);
     for (size_t t = 0; t < m->triangle_count; t++) {
         double side[3];
         for (size_t k = 0; k < 3; k++) { /* side k is opposite to corner k */
@@ -799,7 +790,8 @@ static int retile(job *j) {
         j->desc.surface = view_of(&j->input);
         j->desc.scale = scale;
         j->desc.seed = j->run.seed;
-        status = check_result(j, trimesh_retile(&j->desc, &j->run.env, &j->report, &j->result),
+        status = check_result(&j->run,
+                              trimesh_retile(&j->desc, &j->run.env, &j->report, &j->result),
                               j->run.inputs[0]);
     }
     free(scale);
@@ -829,7 +821,7 @@ static int dress(job *j) {
     }
     const float crease = j->desc.crease_angle > 0 ? j->desc.crease_angle : CREASE;
     if (!status && j->report.crease_edges && !mesh_crease(&j->output, crease))
-        status = fail_memory(j);
+        status = fail_memory(&j->run);
     if (!status && j->instances) status = place_instances(j);
     return status;
 }

@@ -32,7 +32,7 @@ static const cli_manual tiles_manual = {
     "atlas-2.png is of the first of them, and so on.\n",
     "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
-    1, "exemplar", 1};
+    1, "exemplar", 1, "make smaller tiles"};
 
 /* ---- the files of a set ------------------------------------------------------------------ */
 
@@ -106,12 +106,6 @@ static void print_document(FILE *to, const textiles_set *set, const textiles_lay
 
 /* ---- pictures --------------------------------------------------------------------------- */
 
-static int new_picture(cli *run, txm_image *image, int width, int height, int channels) {
-    return image_new(width, height, channels, TXM_U8, image)
-               ? CLI_DONE
-               : cli_fail(run, CLI_FAILED, "out of memory; make smaller tiles");
-}
-
 /* Some of the plane that the set covers; what has no plane is laid in scan-line order. */
 static txm_status draw_preview(cli *run, const textiles_set *set, const textiles_layout *layout,
                                const txm_image *atlas, const txm_image *out) {
@@ -146,40 +140,39 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
     unsigned char *bytes[TEXTILES_MAX_MAPS + 1] = {NULL};
     char *json = NULL;
     size_t json_size = 0;
-    const char *why = NULL;
     int status = CLI_DONE, count = 0, side = PREVIEW_TILES;
     memset(atlas, 0, sizeof atlas);
 
     cli_stage(run, "draw");
     for (int m = 0; m < maps && !status; m++) {
-        status = new_picture(run, &atlas[m], layout->width, layout->height, textiles_channels(set, m));
+        status = new_picture(run, layout->width, layout->height, textiles_channels(set, m), TXM_U8,
+                             &atlas[m]);
         if (status) break;
-        const txm_status result = textiles_draw_atlas(set, layout, m, &run->env, atlas[m]);
-        if (result != TXM_OK) status = fail_library(run, result, run->inputs[0]);
+        status = check_result(run, textiles_draw_atlas(set, layout, m, &run->env, atlas[m]),
+                              run->inputs[0]);
     }
     while (side > 2 && side * layout->size > PREVIEW_PIXELS) side--;
     if (!status)
-        status = new_picture(run, &preview, side * layout->size, side * layout->size,
-                             atlas[0].channels);
-    if (!status) {
-        const txm_status result = draw_preview(run, set, layout, &atlas[0], &preview);
-        if (result != TXM_OK) status = fail_library(run, result, run->inputs[0]);
-    }
+        status = new_picture(run, side * layout->size, side * layout->size, atlas[0].channels,
+                             TXM_U8, &preview);
+    if (!status)
+        status = check_result(run, draw_preview(run, set, layout, &atlas[0], &preview),
+                              run->inputs[0]);
 
     cli_stage(run, "encode");
     for (int m = 0; m <= maps && !status; m++) { /* the preview comes last */
         size_t size;
         name_atlas(m, names[m]);
-        if (!image_encode(".png", m < maps ? &atlas[m] : &preview, &bytes[m], &size, &why))
-            status = cli_fail(run, CLI_FAILED, "cannot write into '%s': %s", run->output, why);
         files[count].name = m < maps ? names[m] : "preview.png";
+        status = encode_picture(run, files[count].name, m < maps ? &atlas[m] : &preview, &bytes[m],
+                                &size);
         files[count].bytes = bytes[m];
         files[count++].size = size;
     }
     if (!status) {
         FILE *to = open_memstream(&json, &json_size);
         if (to) print_document(to, set, layout, maps);
-        if (!to || ferror(to) | fclose(to)) status = cli_fail(run, CLI_FAILED, "out of memory");
+        if (!to || ferror(to) | fclose(to)) status = fail_memory(run);
         files[count].name = "tiles.json";
         files[count].bytes = json;
         files[count++].size = json_size;
@@ -193,18 +186,6 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
 }
 
 /* ---- the command ------------------------------------------------------------------------- */
-
-/* The index of a name in a list that ends in NULL, or -1 with the names in the message. */
-static int find_name(cli *run, const char *option, const char *name, const char *const *names) {
-    char all[80] = "";
-    for (int i = 0; names[i]; i++) {
-        if (!strcmp(names[i], name)) return i;
-        const size_t n = strlen(all);
-        snprintf(all + n, sizeof all - n, "%s%s", i ? ", " : "", names[i]);
-    }
-    cli_fail(run, CLI_USAGE, "%s '%s': choose one of %s", option, name, all);
-    return -1;
-}
 
 /* "0,0,0,0;0,1,0,0" as classes. Returns how many, or 0 if it is nothing of the kind. */
 static int parse_classes(const char *list, int classes[TEXTILES_MAX_CLASSES][4]) {
@@ -245,7 +226,7 @@ static int read_list(cli *run, const char *list, const char *option, int most, p
 static int take_map(cli *run, photos *p, const char *path) {
     textiles_exemplar *x = &p->exemplars[0];
     txm_image *image = &p->images[0][x->map_count];
-    const int status = read_image(run, path, 0, image);
+    const int status = read_picture(run, path, 0, TXM_U8, image);
     if (status) return status;
     x->map_count++;
     if (image->width == p->images[0][0].width && image->height == p->images[0][0].height)
@@ -256,7 +237,8 @@ static int take_map(cli *run, photos *p, const char *path) {
 }
 
 static int take_photo(cli *run, photos *p, const char *path) {
-    const int status = read_image(run, path, p->images[0][0].channels, &p->images[p->count][0]);
+    const int status = read_picture(run, path, p->images[0][0].channels, TXM_U8,
+                                    &p->images[p->count][0]);
     if (status) return status;
     p->exemplars[p->count].maps = p->images[p->count];
     p->exemplars[p->count].map_count = 1;
@@ -375,7 +357,7 @@ static int run_tiles(int argc, char **argv) {
     if (status) return status;
 
     cli_stage(&run, "read");
-    status = read_image(&run, run.inputs[0], 0, &p.images[0][0]);
+    status = read_picture(&run, run.inputs[0], 0, TXM_U8, &p.images[0][0]);
     if (!status) {
         p.exemplars[0].maps = p.images[0];
         p.exemplars[0].map_count = p.count = 1;
@@ -404,7 +386,7 @@ static int run_tiles(int argc, char **argv) {
         result = textiles_measure(set, 0, &run.env, &joints);
     }
     if (result != TXM_OK) {
-        status = fail_library(&run, result, run.inputs[0]);
+        status = check_result(&run, result, run.inputs[0]);
         goto done;
     }
     set_figures(&run, set, &layout, &joints);

@@ -31,7 +31,7 @@ static const cli_manual tree_manual = {
     "  texkit tree -o oak.glb --species oak --wind 8\n"
     "  texkit tree -o mine.txt --species birch\n"
     "  texkit tree -o mine.obj --species mine.txt --tiles bark-tiles --level 3\n",
-    0, NULL, 0};
+    0, NULL, 0, "take fewer --pieces"};
 
 static const cli_manual forest_manual = {
     "forest", "--count N -o OUT [options]", "grow many trees, no two alike, from the same pieces",
@@ -45,21 +45,7 @@ static const cli_manual forest_manual = {
     "copies of a piece show the same tiles of bark.\n",
     "  texkit forest --count 1000 -o forest.glb --species oak,birch,spruce\n"
     "  texkit forest --count 20 -o grove.obj --species poplar --spacing 6 --pieces 200\n",
-    0, NULL, 0};
-
-void *tree_array(size_t count, size_t size) {
-    size_t bytes;
-    return txm_mul(count, size, 1, &bytes) ? calloc(1, bytes ? bytes : 1) : NULL;
-}
-
-int tree_fail_memory(tree_job *j) {
-    return cli_fail(&j->run, CLI_FAILED, "out of memory; take fewer --pieces%s",
-                    j->is_forest ? " or trees" : "");
-}
-
-static int check_result(tree_job *j, txm_status result, const char *what) {
-    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, what);
-}
+    0, NULL, 0, "take fewer --pieces or trees"};
 
 static int is_glb(const tree_job *j) {
     return !strcmp(j->extension, ".glb");
@@ -71,7 +57,7 @@ static int is_glb(const tree_job *j) {
 static int read_species(tree_job *j, const char *name, treepieces_species *species) {
     size_t size;
     if (!strpbrk(name, "./"))
-        return check_result(j, treepieces_preset(name, &j->run.env, species), name);
+        return check_result(&j->run, treepieces_preset(name, &j->run.env, species), name);
     const int status = cli_reads(&j->run, name);
     if (status) return status;
     unsigned char *text = file_read(name, &size);
@@ -79,7 +65,7 @@ static int read_species(tree_job *j, const char *name, treepieces_species *speci
     const txm_status result =
         treepieces_species_parse((const char *)text, size, &j->run.env, species);
     free(text);
-    return check_result(j, result, name);
+    return check_result(&j->run, result, name);
 }
 
 static int read_all_species(tree_job *j) {
@@ -101,8 +87,8 @@ static int read_all_species(tree_job *j) {
 /* The species as text. */
 static int write_species(tree_job *j) {
     const size_t size = treepieces_species_print(&j->species[0], NULL, 0);
-    char *text = (char *)tree_array(size + 1, 1);
-    if (!text) return tree_fail_memory(j);
+    char *text = (char *)new_array(size + 1, 1);
+    if (!text) return fail_memory(&j->run);
     treepieces_species_print(&j->species[0], text, size + 1);
     cli_figure(&j->run, "file_bytes", (double)size);
     const int status = cli_finish(&j->run, text, size);
@@ -133,7 +119,7 @@ static int grow(tree_job *j) {
     desc.spacing = (float)j->spacing;
     desc.max_pieces = j->pieces;
     desc.seed = j->run.seed;
-    return check_result(j, treepieces_forest_make(&desc, &j->run.env, &j->forest),
+    return check_result(&j->run, treepieces_forest_make(&desc, &j->run.env, &j->forest),
                         j->species[0].name);
 }
 
@@ -145,20 +131,20 @@ static int pose(tree_job *j) {
     const treepieces_wind wind = tree_wind(j);
     const int has_rig = is_glb(j) && !j->is_forest;
     txm_status result = TXM_OK;
-    j->posed = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
-    if (has_rig) j->rest = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
-    if (!j->posed || (has_rig && !j->rest)) return tree_fail_memory(j);
+    j->posed = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
+    if (has_rig) j->rest = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
+    if (!j->posed || (has_rig && !j->rest)) return fail_memory(&j->run);
     if (has_rig) result = treepieces_bones(j->forest, NULL, &j->run.env, j->rest);
     if (result == TXM_OK) result = treepieces_bones(j->forest, &bent, &j->run.env, j->posed);
     if (result == TXM_OK && j->wind > 0 && !has_rig) {
-        float *state = (float *)tree_array(nodes, 4 * sizeof(float));
-        if (!state) return tree_fail_memory(j);
+        float *state = (float *)new_array(nodes, 4 * sizeof(float));
+        if (!state) return fail_memory(&j->run);
         for (int i = WARM_UP - 1; i >= 0 && result == TXM_OK; i--)
             result = treepieces_sway(j->forest, &wind, -0.1 * i, 0.1, &bent, &j->run.env, state,
                                      j->posed);
         free(state);
     }
-    return check_result(j, result, j->species[0].name);
+    return check_result(&j->run, result, j->species[0].name);
 }
 
 static void grown_figures(tree_job *j) {
@@ -246,7 +232,7 @@ static int extend(mesh_data *m, size_t vertices, size_t triangles, int with_uvs,
 static int append(tree_job *j, const treepieces_mesh *from, const float *color, mesh_data *to) {
     const size_t base = to->vertex_count, first = 3 * to->triangle_count;
     if (!extend(to, from->vertex_count, from->triangle_count, !color, color != NULL))
-        return tree_fail_memory(j);
+        return fail_memory(&j->run);
     memcpy(to->positions + 3 * base, from->positions, 3 * from->vertex_count * sizeof(float));
     memcpy(to->normals + 3 * base, from->normals, 3 * from->vertex_count * sizeof(float));
     for (size_t c = 0; c < 3 * from->triangle_count; c++)
@@ -281,7 +267,7 @@ static int bake_tree(tree_job *j, int tree, const float *bones, treepieces_mesh 
     txm_status result = treepieces_bake(&desc, &j->run.env, bark);
     if (result == TXM_OK && t->cluster_count && j->species[t->species].leaf_count)
         result = treepieces_bake_leaves(j->forest, tree, bones, BAKED_LOOKS, &j->run.env, leaves);
-    return check_result(j, result, j->species[t->species].name);
+    return check_result(&j->run, result, j->species[t->species].name);
 }
 
 /* ---- what is built ------------------------------------------------------------------------- */
@@ -393,7 +379,7 @@ static int make_extras(tree_job *j, built *b) {
     b->extras = cJSON_PrintUnformatted(json);
     cJSON_Delete(json);
     b->scene.extras = b->extras;
-    return b->extras ? CLI_DONE : tree_fail_memory(j);
+    return b->extras ? CLI_DONE : fail_memory(&j->run);
 }
 
 static size_t count_triangles(const built *b) {
@@ -468,7 +454,8 @@ static void print_summary(const tree_job *j, const built *b, size_t triangles) {
 static int grow_trees(tree_job *j, built *b) {
     float tint[3];
     cli_stage(&j->run, "grow");
-    int status = check_result(j, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
+    int status =
+        check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
     if (!status) status = grow(j);
     if (!status) {
         grown_figures(j);
@@ -510,13 +497,6 @@ static int name_files(tree_job *j) {
     return status;
 }
 
-/* A number option that was given as text; its target stays if it was not. */
-static int number(tree_job *j, const char *option, const char *text, double low, double high,
-                  double *value) {
-    if (!text || parse_numbers(&j->run, option, text, 1, low, high, value)) return CLI_DONE;
-    return CLI_USAGE;
-}
-
 static int check_output_kind(tree_job *j) {
     const char *why;
     file_extension(j->run.output, j->extension);
@@ -541,8 +521,8 @@ static int run_job(tree_job *j, int needs_glb) {
     if (!strcmp(j->extension, ".txt")) return write_species(j);
     status = name_files(j);
     if (status) return status;
-    b = (built *)tree_array(1, sizeof *b); /* too large for a small stack, as the job */
-    if (!b) return tree_fail_memory(j);
+    b = (built *)new_array(1, sizeof *b); /* too large for a small stack, as the job */
+    if (!b) return fail_memory(&j->run);
     status = grow_trees(j, b);
     free_built(b);
     free(b);
@@ -606,9 +586,9 @@ static int run_tree(int argc, char **argv) {
         const int needs_glb = j->bones || seconds || j->rate;
         const int needs_wind = seconds || j->rate;
         if (!j->rate) j->rate = 12;
-        status = number(j, "--wind", wind, 0, 50, &j->wind);
-        if (!status) status = number(j, "--seconds", seconds, 1, 60, &j->seconds);
-        if (!status) status = number(j, "--pose", bend, 0, 1, &j->pose);
+        status = parse_number(&j->run, "--wind", wind, 0, 50, &j->wind);
+        if (!status) status = parse_number(&j->run, "--seconds", seconds, 1, 60, &j->seconds);
+        if (!status) status = parse_number(&j->run, "--pose", bend, 0, 1, &j->pose);
         if (!status && needs_wind && j->wind <= 0)
             status = cli_fail(&j->run, CLI_USAGE, "--seconds and --rate go with --wind SPEED");
         if (!status) status = run_job(j, needs_glb);
@@ -646,9 +626,9 @@ static int run_forest(int argc, char **argv) {
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (!cli_begin(&j->run, &forest_manual, options, argc, argv, &status)) {
-        status = number(j, "--wind", wind, 0, 50, &j->wind);
-        if (!status) status = number(j, "--spacing", spacing, 0.1, 1000, &j->spacing);
-        if (!status) status = number(j, "--pose", bend, 0, 1, &j->pose);
+        status = parse_number(&j->run, "--wind", wind, 0, 50, &j->wind);
+        if (!status) status = parse_number(&j->run, "--spacing", spacing, 0.1, 1000, &j->spacing);
+        if (!status) status = parse_number(&j->run, "--pose", bend, 0, 1, &j->pose);
         if (!status && j->count == 0)
             status = cli_fail(&j->run, CLI_USAGE, "no number of trees given; add --count N");
         if (!status) status = run_job(j, 0);

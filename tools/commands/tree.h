@@ -49,11 +49,6 @@ typedef struct tree_job {
     mesh_material bark_materials[MAX_SPECIES], leaf_materials[MAX_SPECIES];
 } tree_job;
 
-/* count items, 0 bytes all; NULL without memory */
-void *tree_array(size_t count, size_t size);
-
-int tree_fail_memory(tree_job *j);
-
 /* The steady and the gusty part of --wind. */
 treepieces_wind tree_wind(const tree_job *j);
 

@@ -24,11 +24,11 @@ static float column_length(const float *bone, int c) {
 static int new_mesh(tree_job *j, size_t vertices, size_t triangles, mesh_data *m) {
     m->vertex_count = vertices;
     m->triangle_count = triangles;
-    m->positions = (float *)tree_array(vertices, 3 * sizeof(float));
-    m->normals = (float *)tree_array(vertices, 3 * sizeof(float));
-    m->indices = (uint32_t *)tree_array(triangles, 3 * sizeof(uint32_t));
-    m->uvs = (float *)tree_array(triangles, 6 * sizeof(float));
-    return m->positions && m->normals && m->indices && m->uvs ? CLI_DONE : tree_fail_memory(j);
+    m->positions = (float *)new_array(vertices, 3 * sizeof(float));
+    m->normals = (float *)new_array(vertices, 3 * sizeof(float));
+    m->indices = (uint32_t *)new_array(triangles, 3 * sizeof(uint32_t));
+    m->uvs = (float *)new_array(triangles, 6 * sizeof(float));
+    return m->positions && m->normals && m->indices && m->uvs ? CLI_DONE : fail_memory(&j->run);
 }
 
 /* The next entry, with room for so many copies. */
@@ -36,9 +36,9 @@ static mesh_instances *new_copies(tree_job *j, tree_copies *copies, size_t count
                                   const mesh_material *material, const char *name) {
     const int i = copies->count;
     mesh_instances *t = &copies->list[i];
-    float *block = (float *)tree_array(count, 10 * sizeof(float));
+    float *block = (float *)new_array(count, 10 * sizeof(float));
     if (!block) {
-        tree_fail_memory(j);
+        fail_memory(&j->run);
         return NULL;
     }
     copies->blocks[i] = block;
@@ -152,7 +152,7 @@ static int make_piece(tree_job *j, int type, mesh_data *m) {
 /* Per node of the forest the species of its tree; NULL without memory. */
 static unsigned char *list_species(const tree_job *j) {
     const treepieces_forest *f = j->forest;
-    unsigned char *species = (unsigned char *)tree_array(f->node_count, 1);
+    unsigned char *species = (unsigned char *)new_array(f->node_count, 1);
     for (int t = 0; t < f->tree_count && species; t++)
         memset(species + f->trees[t].first_node, f->trees[t].species, f->trees[t].node_count);
     return species;
@@ -178,8 +178,8 @@ static int copy_pieces(tree_job *j, int type, const unsigned char *species, cons
                                    treepieces_kit_piece(j->kit, type)->name);
     if (!t) return CLI_FAILED;
     if (j->species_count > 1 && !j->tiles) {
-        copies->colors[own] = (unsigned char *)tree_array(b->count, 4);
-        if (!copies->colors[own]) return tree_fail_memory(j);
+        copies->colors[own] = (unsigned char *)new_array(b->count, 4);
+        if (!copies->colors[own]) return fail_memory(&j->run);
         t->colors = copies->colors[own];
     }
     for (uint32_t i = 0; i < b->count; i++) {
@@ -201,8 +201,9 @@ static int make_cloud(tree_job *j, const treepieces_species *species, uint32_t l
     static const float uv[4][2] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
     static const int order[6] = {0, 1, 2, 0, 2, 3};
     const int count = treepieces_cloud(species, look, NULL);
-    treepieces_card *cards = (treepieces_card *)tree_array((size_t)count, sizeof *cards);
-    int status = cards ? new_mesh(j, 4 * (size_t)count, 2 * (size_t)count, m) : tree_fail_memory(j);
+    treepieces_card *cards = (treepieces_card *)new_array((size_t)count, sizeof *cards);
+    int status =
+        cards ? new_mesh(j, 4 * (size_t)count, 2 * (size_t)count, m) : fail_memory(&j->run);
     size_t corner = 0;
     if (!status) treepieces_cloud(species, look, cards);
     for (int i = 0; i < count && !status; i++) {
@@ -263,7 +264,7 @@ static int copy_cloud(tree_job *j, int s, uint32_t look, uint32_t looks,
 
 int make_copies(tree_job *j, const float tint[3], tree_copies *copies) {
     unsigned char *species = list_species(j);
-    int status = species ? CLI_DONE : tree_fail_memory(j);
+    int status = species ? CLI_DONE : fail_memory(&j->run);
     memset(copies, 0, sizeof *copies);
     for (int type = 0; type < j->forest->type_count && !status; type++)
         if (j->forest->batches[type].count) status = copy_pieces(j, type, species, tint, copies);

@@ -8,10 +8,6 @@
 
 enum { DRAWN_LEAVES = 256, MAX_TILES = 64 };
 
-static int new_image(tree_job *j, txm_image *image, int width, int height, int channels) {
-    return image_new(width, height, channels, TXM_U8, image) ? CLI_DONE : tree_fail_memory(j);
-}
-
 static int encode(tree_job *j, const txm_image *image, const char *kind, int s, picture *p) {
     const char *why;
     if (!image_encode(".png", image, &p->png, &p->size, &why))
@@ -25,8 +21,8 @@ static int encode(tree_job *j, const txm_image *image, const char *kind, int s, 
 /* So many square pictures in one block, for free(), or NULL. */
 static unsigned char *new_tiles(tree_job *j, txm_image *tiles, int count, int side, int channels) {
     const size_t size = (size_t)side * (size_t)side * (size_t)channels;
-    unsigned char *block = (unsigned char *)tree_array((size_t)count, size);
-    if (!block) tree_fail_memory(j);
+    unsigned char *block = (unsigned char *)new_array((size_t)count, size);
+    if (!block) fail_memory(&j->run);
     for (int i = 0; i < count && block; i++) {
         memset(&tiles[i], 0, sizeof tiles[i]);
         tiles[i].pixels = block + (size_t)i * size;
@@ -108,7 +104,7 @@ static int read_tiles(tree_job *j, int side, txm_image *tiles, int *count, unsig
     if (status) return status;
     if (snprintf(path, sizeof path, "%s/atlas.png", j->tiles) >= (int)sizeof path)
         status = cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->tiles);
-    if (!status) status = read_image(&j->run, path, 0, &atlas);
+    if (!status) status = read_picture(&j->run, path, 0, TXM_U8, &atlas);
     if (status) {
         cJSON_Delete(json);
         return status;
@@ -133,9 +129,9 @@ static int draw_tiles(tree_job *j, const treepieces_species *species, int side, 
                       unsigned char **block) {
     *block = new_tiles(j, tiles, BARK_TILES, side, 3);
     if (!*block) return CLI_FAILED;
-    const txm_status result =
-        treepieces_draw_bark(species, j->run.seed, &j->run.env, tiles, BARK_TILES);
-    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, species->name);
+    return check_result(
+        &j->run, treepieces_draw_bark(species, j->run.seed, &j->run.env, tiles, BARK_TILES),
+        species->name);
 }
 
 /* ---- the sheet ----------------------------------------------------------------------------- */
@@ -156,14 +152,12 @@ int make_bark(tree_job *j, int s, const float color[3]) {
     else status = draw_tiles(j, &species, side, tiles, &block);
     if (!status) {
         const int width = TREEPIECES_SHEET * tiles[0].width;
-        status = new_image(j, &sheet, width, width * treepieces_bark_layers(&desc),
-                           tiles[0].channels);
+        status = new_picture(&j->run, width, width * treepieces_bark_layers(&desc),
+                             tiles[0].channels, TXM_U8, &sheet);
     }
-    if (!status) {
-        const txm_status result = treepieces_bark(&desc, &j->run.env, sheet);
-        if (result != TXM_OK)
-            status = fail_library(&j->run, result, j->tiles ? j->tiles : species.name);
-    }
+    if (!status)
+        status = check_result(&j->run, treepieces_bark(&desc, &j->run.env, sheet),
+                              j->tiles ? j->tiles : species.name);
     if (!status) status = encode(j, &sheet, "bark", s, &j->bark[s]);
     free(block);
     free(sheet.pixels);
@@ -175,14 +169,13 @@ int make_leaves(tree_job *j, int s) {
     int status;
     if (j->species[s].leaf_count == 0) return CLI_DONE;
     if (j->leaf) {
-        status = read_image(&j->run, j->leaf, 4, &image);
+        status = read_picture(&j->run, j->leaf, 4, TXM_U8, &image);
     } else {
-        status = new_image(j, &image, DRAWN_LEAVES, DRAWN_LEAVES, 4);
-        if (!status) {
-            const txm_status result =
-                treepieces_draw_leaves(&j->species[s], j->run.seed, &j->run.env, image);
-            if (result != TXM_OK) status = fail_library(&j->run, result, j->species[s].name);
-        }
+        status = new_picture(&j->run, DRAWN_LEAVES, DRAWN_LEAVES, 4, TXM_U8, &image);
+        if (!status)
+            status = check_result(
+                &j->run, treepieces_draw_leaves(&j->species[s], j->run.seed, &j->run.env, image),
+                j->species[s].name);
     }
     if (!status) status = encode(j, &image, "leaves", s, &j->leaves[s]);
     free(image.pixels);

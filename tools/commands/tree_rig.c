@@ -58,13 +58,13 @@ static int compare_ranked(const void *a, const void *b) {
 static int choose_joints(tree_job *j, tree_rig *rig, uint32_t most) {
     const treepieces_node *nodes = j->forest->nodes;
     const uint32_t count = j->forest->node_count;
-    ranked *list = (ranked *)tree_array(count, sizeof *list);
-    unsigned char *kept = (unsigned char *)tree_array(count, 1);
+    ranked *list = (ranked *)new_array(count, sizeof *list);
+    unsigned char *kept = (unsigned char *)new_array(count, 1);
     uint32_t joints = 0;
     if (!list || !kept) {
         free(list);
         free(kept);
-        return tree_fail_memory(j);
+        return fail_memory(&j->run);
     }
     for (uint32_t i = 0; i < count; i++) {
         list[i].node = i;
@@ -184,7 +184,7 @@ static int record(tree_job *j, tree_rig *rig, float *state, float *bones, float 
                         i ? rig->turns + 4 * (size_t)(i - 1) : lead + 4 * place,
                         i ? (size_t)keys : lead_stride);
     }
-    return result == TXM_OK ? CLI_DONE : fail_library(&j->run, result, j->species[0].name);
+    return check_result(&j->run, result, j->species[0].name);
 }
 
 static int make_clip(tree_job *j, tree_rig *rig) {
@@ -192,16 +192,16 @@ static int make_clip(tree_job *j, tree_rig *rig) {
     const int steps = (int)(j->seconds * j->rate + 0.5) > 2 ? (int)(j->seconds * j->rate + 0.5) : 2;
     const int keys = steps + 1, blend = j->rate < steps / 2 ? j->rate : steps / 2;
     size_t all;
-    if (!txm_mul((size_t)keys, joints, 4, &all)) return tree_fail_memory(j);
-    float *state = (float *)tree_array(nodes, 4 * sizeof(float));
-    float *bones = (float *)tree_array(nodes, TREEPIECES_BONE * sizeof(float));
-    float *lead = (float *)tree_array(((size_t)blend + 1) * joints, 4 * sizeof(float));
+    if (!txm_mul((size_t)keys, joints, 4, &all)) return fail_memory(&j->run);
+    float *state = (float *)new_array(nodes, 4 * sizeof(float));
+    float *bones = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
+    float *lead = (float *)new_array(((size_t)blend + 1) * joints, 4 * sizeof(float));
     int status = CLI_DONE;
-    rig->times = (float *)tree_array((size_t)keys, sizeof(float));
-    rig->turns = (float *)tree_array(all, sizeof(float));
+    rig->times = (float *)new_array((size_t)keys, sizeof(float));
+    rig->turns = (float *)new_array(all, sizeof(float));
     rig->skeleton.key_count = keys;
     rig->skeleton.clip = "wind";
-    if (!state || !bones || !lead || !rig->times || !rig->turns) status = tree_fail_memory(j);
+    if (!state || !bones || !lead || !rig->times || !rig->turns) status = fail_memory(&j->run);
     if (!status) status = record(j, rig, state, bones, lead, blend);
     if (!status) {
         for (int i = 0; i < keys; i++) rig->times[i] = (float)((double)i / j->rate);
@@ -222,9 +222,9 @@ int make_rig(tree_job *j, tree_rig *rig) {
     const uint32_t most = j->bones > 0 ? (uint32_t)j->bones : 65535;
     const uint32_t count = nodes < most ? nodes : most;
     memset(rig, 0, sizeof *rig);
-    rig->joint_of = (uint32_t *)tree_array(nodes, sizeof(uint32_t));
-    rig->joints = (mesh_joint *)tree_array(count, sizeof(mesh_joint));
-    if (!rig->joint_of || !rig->joints) return tree_fail_memory(j);
+    rig->joint_of = (uint32_t *)new_array(nodes, sizeof(uint32_t));
+    rig->joints = (mesh_joint *)new_array(count, sizeof(mesh_joint));
+    if (!rig->joint_of || !rig->joints) return fail_memory(&j->run);
     int status = choose_joints(j, rig, count);
     if (status) return status;
     for (uint32_t i = 0; i < nodes; i++)
@@ -244,12 +244,12 @@ void free_rig(tree_rig *rig) {
 
 int bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to) {
     const size_t count = 4 * from->vertex_count;
-    uint32_t *joints = (uint32_t *)tree_array(count, sizeof(uint32_t));
-    float *weights = (float *)tree_array(count, sizeof(float));
+    uint32_t *joints = (uint32_t *)new_array(count, sizeof(uint32_t));
+    float *weights = (float *)new_array(count, sizeof(float));
     if (!joints || !weights) {
         free(joints);
         free(weights);
-        return tree_fail_memory(j);
+        return fail_memory(&j->run);
     }
     for (size_t i = 0; i < count; i += 4) {
         size_t used = 0;
