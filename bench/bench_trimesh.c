@@ -1,4 +1,4 @@
-/* bench_trimesh.c - seconds and memory of trimesh_relax.h: bench_trimesh [--full] [ANYTHING...]
+/* bench_trimesh.c - seconds and memory of retiling and scattering: bench_trimesh [--full] [ANYTHING...]
    SPDX-License-Identifier: MIT OR Unlicense
 
    The surfaces are made here, so names of pictures, which `make bench` gives to every benchmark, are
@@ -8,6 +8,8 @@
 #define _XOPEN_SOURCE 700 /* clock_gettime, setenv */
 #include <stdlib.h>
 #include <string.h>
+#define TRIMESH_COVER_IMPLEMENTATION
+#include "trimesh_cover.h"
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 

@@ -1,12 +1,11 @@
-/* trimesh_relax.h - v0.1.0 - any surface as near-equilateral triangles, and textures on them
+/* trimesh_relax.h - v0.1.0 - any surface as near-equilateral triangles
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
      Takes a triangle mesh of any shape and quality and covers the same surface with a given number
      of vertices whose triangles are as equilateral and equal as the surface allows: a closed or
      bordered manifold of the same topology, creases and borders kept. On such triangles textures
-     are easy: it lays triangular patches and edge-matching tiles, carries UVs and colours over, and
-     places things (lipids, scales, blades) on every triangle for instanced drawing.
+     are easy: see trimesh_cover.h.
 
    QUICK START                                 (tests build and run this very block)
      // Cover a tetrahedron-like pebble with 500 vertices. cc -std=c99 quick.c -lm
@@ -17,9 +16,9 @@
      int main(void) {
          static const float positions[] = {1, 1, 1, -1, -1, 1, -1, 1, -1, 1, -1, -1};
          static const uint32_t indices[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
-         trimesh_desc desc = {0};             // zero = the default, for every field
+         static trimesh_desc desc;            // static: all zero, which means the defaults
+         static txm_env env;                  // malloc, silent, serial; receives the message
          trimesh_mesh *mesh;
-         txm_env env = {0};                   // malloc, silent, serial; receives the message
          desc.surface.positions = positions;
          desc.surface.indices = indices;
          desc.surface.vertex_count = 4;
@@ -41,7 +40,7 @@
      as a copy of the surface and is a closed manifold at every moment: it is only ever split,
      collapsed (under the link condition) and flipped, so that its topology cannot go wrong.
        TRIMESH_LATTICE (default): the copy is brought to about twice the number of vertices; a
-     six-fold direction field and triangular lattice points are found on a hierarchy [4]; edges whose
+     six-fold direction field and triangular lattice points are found on a hierarchy [3]; edges whose
      ends share a lattice point collapse. From 20,000 vertices on this is done at a quarter of the
      number and each triangle cut in four.
        TRIMESH_REPEL: the method of [1] and [2]: points strewn by area repel each other along the
@@ -61,8 +60,8 @@
 
    MEMORY     About 200 bytes per input vertex and 600 per output vertex while working; the result
               takes 60 bytes per vertex. After an error nothing stays allocated, *out is NULL.
-   THREADS    No global state; calls with different env may overlap. Relaxation, projection and
-              placing run on the environment's parallel-for.
+   THREADS    No global state; calls with different env may overlap. Relaxation and projection run
+              on the environment's parallel-for.
    SAME BYTES The same result for any number of threads. Sums are taken in double in a fixed order
               and no libm function but sqrt takes part in decisions, except that normals are
               weighted by angles (atan2).
@@ -79,14 +78,9 @@
          Bachelor's thesis, TU Wien, 2016.
      [2] G. Turk. Generating textures on arbitrary surfaces using reaction-diffusion. SIGGRAPH 1991;
          Re-tiling polygonal surfaces. SIGGRAPH 1992.
-     [3] F. Neyret, M.-P. Cani. Pattern-based texturing revisited. SIGGRAPH 1999.
-     [4] W. Jakob, M. Tarini, D. Panozzo, O. Sorkine-Hornung. Instant field-aligned meshes.
+     [3] W. Jakob, M. Tarini, D. Panozzo, O. Sorkine-Hornung. Instant field-aligned meshes.
          SIGGRAPH Asia 2015.
-     [5] M. Botsch, L. Kobbelt. A remeshing approach to multiresolution modeling. SGP 2004.
-     [6] N. Max. Weights for computing vertex normals from facet normals. J. Graphics Tools 4(2), 1999.
-     [7] T. Boubekeur, M. Alexa. Phong tessellation. SIGGRAPH Asia 2008.
-     [8] D. Matula, L. Beck. Smallest-last ordering and clustering and graph coloring algorithms.
-         J. ACM 30(3), 1983.                                                                      */
+     [4] M. Botsch, L. Kobbelt. A remeshing approach to multiresolution modeling. SGP 2004.     */
 #ifndef TRIMESH_RELAX_H
 #define TRIMESH_RELAX_H
 
@@ -190,6 +184,9 @@ typedef struct trimesh_desc {
 TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
                                       trimesh_report *report, trimesh_mesh **out);
 
+/* A result as a mesh of texmath.h, which shows its arrays: for trimesh_cover.h. */
+TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
+
 /* Release a mesh; NULL is allowed. */
 TRIMESH_API void trimesh_free(trimesh_mesh *mesh);
 
@@ -277,294 +274,6 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
                                       txm_env *env, trimesh_report *report, trimesh_mesh **out,
                                       const int32_t **map);
 
-
-/* ---- using a mesh: what goes for all functions below --------------------------------------- */
-
-/* They take any triangle mesh as a txm_mesh, a result of trimesh_retile or your own: borders,
-   several pieces, edges with more than two triangles and unequal winding are allowed, holes in the
-   numbering too; two triangles are neighbours if they share two vertex numbers. Outputs are arrays
-   of the caller's, of the size stated, untouched after an error unless said otherwise. Every call
-   returns TXM_OK; TXM_BAD_ARGUMENT for a NULL, a field outside its range, an index that is not below
-   vertex_count, a position that is not finite; TXM_TOO_LARGE above TRIMESH_MAX_VERTICES vertices
-   or triangles; TXM_OUT_OF_MEMORY; TXM_CANCELLED; what else, it says. A mesh without triangles is
-   allowed and gives nothing. Same arguments, same bytes, whatever the threads. */
-
-/* A result as a view. */
-TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
-
-/* Smooth unit normals of a mesh that has none, 3 floats per vertex; 0 0 0 at a vertex without
-   triangles of an area above 0. Each triangle counts by sin(angle at the vertex) / (product of the
-   two edges' lengths), which is exact on spheres [Max 1999]. O(triangles), 24 bytes per vertex. */
-TRIMESH_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals);
-
-/* ---- attributes: values of the input at the vertices of the result ------------------------- */
-
-enum { TRIMESH_MAX_CHANNELS = 64 };
-
-/* What is known at the vertices or corners of the input: texture coordinates, colours, weights. */
-typedef struct trimesh_values {
-    const float *values;     /* channels per entry, finite                                      */
-    size_t count;            /* entries; without indices: vertex_count of the input             */
-    const uint32_t *indices; /* 3 per triangle, which entry its corners have, as OBJ files have for
-                                texture coordinates; NULL = the entry of the corner's vertex     */
-    int channels;            /* floats per entry, 1..TRIMESH_MAX_CHANNELS                        */
-} trimesh_values;
-
-/* Values at points of the input: a + u (b - a) + v (c - a) of the three corners' values a, b, c.
-   Right for what is continuous, colours and weights; for texture coordinates with seams there is
-   the next function.
-
-   input    as it was given to trimesh_retile (positions are not looked at)
-   sources  count of them, a result's: mesh->sources and mesh->vertex_count
-   out      channels floats per source
-   cost     O(count)                                                                           */
-TRIMESH_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
-                                        const txm_mesh_place *sources, size_t count, txm_env *env,
-                                        float *out);
-
-/* Values with seams (charts of texture coordinates) at the corners of a result's triangles, so that
-   no triangle spans two charts. A seam is an edge of the input whose two triangles have other
-   values there, or that has no or several triangles on its other side; vertices in equal places are
-   one, so that meshes cut along their seams (glTF) do as well.
-
-   Each triangle takes the chart of the input at its middle: from the source of its corner 0 a path
-   leads there, over seams, in the plane through both that stands upright on the triangle. From the
-   middle another such path leads to each corner, and ends where it meets a seam: a corner beyond
-   takes the value at that place. So along a seam charts end up to a triangle early or late, as the
-   triangles lie; nothing is ever interpolated across.
-
-               chart 1    s   chart 2
-               +----------s------+          m middle, in chart 1; s the seam
-                \     m - s - > /           the corner at the right gets what chart 1 has
-                 \        s    /            where the path meets s
-                  \       s   /
-
-   input    as it was given to trimesh_retile, sound enough: degenerate triangles only end paths
-   mesh     the result (its indices; positions are not looked at)
-   sources  1 per vertex of mesh
-   out      channels floats per corner, 3 corners per triangle, in the order of mesh->indices
-   cost     O(input) for the neighbours, then for each triangle of mesh as many steps as input
-            triangles lie on its paths; 75 bytes per triangle of the input, 20 per vertex       */
-TRIMESH_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
-                                                const txm_mesh *mesh, const txm_mesh_place *sources,
-                                                txm_env *env, float *out);
-
-/* From values at corners to the vertex arrays of a renderer: a vertex whose corners differ is
-   doubled, one copy for each different value (bits are compared, -0 equals 0). New vertices are in
-   the order of the old ones; old ones without triangles are left out.
-
-   mesh         indices and counts; positions are not looked at and may be NULL
-   values       channels floats per corner
-   new_indices  receives 3 per triangle, or NULL: count only
-   corners      receives for each new vertex one of its corners, or NULL; room for 3 * triangle_count
-                is always enough, *count of a first call exactly. With c = corners[i], new vertex i is
-                a copy of vertex mesh->indices[c] with the value at values + channels * c.
-   count        receives the number of new vertices
-   cost         O(triangles), 60 bytes each                                                     */
-TRIMESH_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
-                                             int channels, txm_env *env, uint32_t *new_indices,
-                                             uint32_t *corners, size_t *count);
-
-/* ---- texturing [1, section 3.4] ------------------------------------------------------------ */
-
-/* The thesis's atlas: equilateral triangles side by side in one picture, each in a cell with a gutter
-   around. With h = size sqrt(3) / 2, in pixels from the top left corner of the picture, corners
-   0, 1, 2 of patch p lie at
-
-       x = p pitch + gutter + (0, size, size / 2),   y = height - gutter - (0, 0, h)
-
-              2          pitch  = size + 2 gutter
-             / \         width  = count pitch
-            / p \        height = ceil(h) + 2 gutter
-           0 --- 1       texture coordinates: x / width, y / height, v downwards (glTF)        */
-typedef struct trimesh_atlas {
-    int count, size, gutter;  /* as asked for, defaults resolved */
-    int pitch, width, height; /* pixels */
-} trimesh_atlas;
-
-/* Lay out an atlas. count 1..256, 0 = 4; size (pixels a side) 2..16384, 0 = 256; gutter (pixels)
-   0..size, -1 = 8. */
-TRIMESH_API txm_status trimesh_atlas_make(int count, int size, int gutter, txm_env *env,
-                                          trimesh_atlas *atlas);
-
-/* Texture coordinates u v of the corners 0, 1, 2 of one patch, or, with patch -1, of all: 6 floats
-   each, what trimesh_place_tiles takes. 0 for a bad number. */
-TRIMESH_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, float *uv);
-
-typedef struct trimesh_choose_desc {
-    int patches;   /* how many there are to choose from, 1..65536; 0 = 4                          */
-    int rotations; /* 1: corner k always shows corner k; 3: also turned; 0 = 3                    */
-    int repeat;    /* 0: neighbours differ in patch where they can, else in rotation; non-zero: all
-                      at random, as in [1]                                                        */
-    uint64_t seed; /* another number, another choice                                              */
-} trimesh_choose_desc;
-
-/* Choose a patch and a rotation for every triangle, at random.
-
-   mesh       indices and counts; positions may be NULL
-   desc       NULL = all defaults
-   patches    receives 1 per triangle
-   rotations  receives 1 per triangle: r = 0..2, corner k shows corner (k + r) mod 3 of the patch;
-              may be NULL
-   cost       O(triangles), 60 bytes each; with repeat: none                                     */
-TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
-                                      txm_env *env, int *patches, int *rotations);
-
-/* Texture coordinates of all corners from the tile and rotation of each triangle.
-
-   tiles, rotations  1 per triangle, of trimesh_choose or of textiles_assign_triangles; rotations
-                     NULL = all 0
-   tile_uv           6 floats per tile, its corners 0, 1, 2: of trimesh_atlas_uv, or the first three
-                     of textiles_place; tile_count tiles
-   uv                receives 6 floats per triangle: corner k gets corner (k + rotation) mod 3 of the
-                     tile. Double vertices by trimesh_split_corners with 2 channels.           */
-TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *tiles,
-                                           const int *rotations, const float *tile_uv,
-                                           size_t tile_count, txm_env *env, float *uv);
-
-/* For edge-matching tiles of any make: a colour for every edge, by hash of its two vertices and the
-   seed, and a direction, from its lower to its higher vertex number. Side k of a triangle runs from
-   corner k to corner (k + 1) mod 3. The same hash as textiles_assign_triangles begins with (which
-   then recolours edges so that equal tiles do not meet).
-
-   colors       how many, 1..65536
-   edge_colors  receives 3 per triangle: 0..colors - 1, equal on both sides of an edge
-   directions   receives 3 per triangle: +1 if the side runs along the edge's direction, -1 against
-                it; may be NULL. The three of a triangle never run one way round.               */
-TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
-                                           txm_env *env, int *edge_colors, int *directions);
-
-/* A random colour 0..count - 1 for every vertex, as in [1] (with 3). count 1..65536; 0 = 3. */
-TRIMESH_API txm_status trimesh_random_colors(size_t vertex_count, int count, uint64_t seed,
-                                             txm_env *env, int *colors);
-
-/* A colour for every vertex so that the ends of every edge differ: greedily, the vertex that had the
-   fewest neighbours left when taken away coloured last-taken first (smallest-last order [Matula and
-   Beck 1983]). At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
-
-   colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
-   count   receives how many colours were used; may be NULL
-   cost    O(triangles), 60 bytes each and 16 per vertex                                        */
-TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
-                                             int *count);
-
-/* ---- geometry on triangles ----------------------------------------------------------------- */
-
-/* One thing on the reference triangle (0, 0), (1, 0), (1/2, sqrt(3)/2), at x = u + v / 2,
-   y = v sqrt(3) / 2; z points away from the surface. Lengths are in edges of the triangle. */
-typedef struct trimesh_point {
-    float u, v;         /* 0 or more, u + v at most 1; exactly 0 or 1 on the sides              */
-    float height;       /* over the surface, in edge lengths, -1000..1000                       */
-    float scale;        /* size, in edge lengths, 0..1000; 0 = 1                                */
-    float rotation[4];  /* quaternion x, y, z, w that turns the thing in the frame x, y, z of the
-                           reference triangle, of any length; 0 0 0 0 = as it is                */
-    uint32_t prototype; /* which thing, handed through                                          */
-} trimesh_point;
-
-/* What is put on a triangle. Where desc->density thins it, points are taken from the front of the
-   list, so put them in an order in which every beginning is spread well (trimesh_order_patch).
-
-   Points on the sides (within 10^-6 of an edge) belong to one triangle only: an edge to the first
-   (lowest) of its triangles, a vertex to the first of its. So that edges have neither gaps nor
-   doubles, have the same points on all three sides, at t and 1 - t alike, and all corners or none,
-   in all patches of a call; then every edge and vertex of the mesh shows them once, whatever patches
-   and rotations meet there. */
-typedef struct trimesh_patch {
-    const trimesh_point *points;
-    size_t count; /* 0..2^20 */
-} trimesh_patch;
-
-/* A thing in space: place it by scaling, then turning, then moving. */
-typedef struct trimesh_instance {
-    float position[3];
-    float rotation[4];  /* unit quaternion x, y, z, w: glTF's order; w >= 0                     */
-    float scale;
-    uint32_t prototype;
-    uint32_t triangle;  /* on which it stands                                                   */
-} trimesh_instance;
-
-typedef struct trimesh_scatter_desc {
-    txm_mesh mesh;
-    const float *normals;         /* 3 per vertex, unit: a result's; NULL = trimesh_normals       */
-    const trimesh_patch *patches; /* patch_count of them                                          */
-    int patch_count;              /* 1..65536                                                     */
-    const int *choices;           /* 1 per triangle: its patch; NULL = at random                  */
-    const int *rotations;         /* 1 per triangle, 0..2: corner k of the triangle is corner
-                                     (k + rotation) mod 3 of the patch; NULL = at random          */
-    float unit;   /* length of an edge, for heights and scales: above 0, in units of the mesh; 0 =
-                     each triangle's own, that of the equilateral triangle of its area            */
-    float height; /* added to the height of every point, in edge lengths, -1000..1000             */
-    int inside;   /* non-zero: the other side. Heights count against the normals, and things are
-                     turned half round about their x axis, z against the normal                   */
-    float curve;  /* 0..1: 0 = things stand on the flat triangles, 1 = on the curved surface that the
-                     normals tell of (Phong tessellation with half its weight, which is what a sphere
-                     needs); clamped to 1 edge                                                    */
-    float density; /* things per unit of area at height `height` (on side `inside`): patches are
-                     thinned for it, see below; 0 = all points of the patches on every triangle   */
-    int spin;      /* non-zero: every thing is turned by a random angle about its own z axis      */
-    const float *mix; /* shares, mix_count of them, 0 or more: prototypes 0..mix_count - 1 are drawn
-                     at random in these proportions; NULL = the points' own                       */
-    int mix_count;    /* 0..256                                                                   */
-    uint64_t seed;    /* another number, other choices                                            */
-} trimesh_scatter_desc;
-
-/* Put a patch on every triangle of a mesh, and list what stands where.
-
-   Position: the point (u, v) of the triangle (moved by curve), plus height times the unit normal
-   interpolated there. Orientation: z along that normal, x along the direction of the patch's x axis
-   on the triangle: of the affine map from the reference triangle the rotation nearest to it, made
-   perpendicular to z. So frames go on smoothly across edges, up to the turn by a multiple of
-   60 degrees. Scale: the point's times the edge length.
-
-   With density, triangle t of area A(t) (its corners moved along their normals to the height) gets
-   the beginning of its patch that comes nearest to density A(t) + e things, where e is the error
-   left by the triangle before, in the order of a space-filling (Morton) curve; a point on a side
-   counts 1/2, on a corner 1/6, as so many triangles share it. So counts are right in any region, to
-   a thing or so per side of it. The patches need enough points for the largest triangle: a third
-   more than for the mean do for meshes of trimesh_retile.
-
-   out       receives *count instances, triangle by triangle in the patch's order; NULL: count only.
-             After TXM_CANCELLED it may be filled in part
-   capacity  how many instances out has room for
-   count     receives how many there are, also after TXM_TOO_LARGE for want of room
-   return    also TXM_TOO_SMALL: the patches have too few points for this density, the message says
-             how many the largest triangle needs; TXM_TOO_LARGE: more than capacity or 2^31
-   cost      O(triangles + instances), 0.1 to 0.2 us per instance; 36 bytes per triangle, 36 per
-             vertex without normals; with points on the sides 50 more per triangle. The parallel-for
-             hook spreads the triangles                                                         */
-TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
-                                       trimesh_instance *out, size_t capacity, size_t *count);
-
-/* position + scale (point turned): where a point of the thing comes to lie. out may be point. */
-TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
-                                        float out[3]);
-
-typedef struct trimesh_patch_desc {
-    int points;      /* how many per triangle of a mesh, on average, 1..4096; 0 = 32              */
-    int hexagonal;   /* non-zero: the triangular lattice with m steps along a side, m^2 / 2 points per
-                        triangle, m = the nearest to sqrt(2 points); then rotations do not show   */
-    int iterations;  /* rounds of repulsion, 1..1000; 0 = 100                                     */
-    uint64_t seed;   /* another number, another patch; all with the same `points` go together     */
-} trimesh_patch_desc;
-
-/* Make a patch of evenly spread points, in an order for thinning. m + 1 points lie on each side, the
-   corners included, at equal steps, m as above, so that all patches of the same `points` join
-   without gaps in all rotations; those inside repel each other and these, with a force falling to
-   zero at the radius of influence [1, equation 3.1]. Heights are 0, scales 1, prototypes 0.
-
-   points    receives *count points; NULL: count only. points + 2 m + 2 is always room enough
-   capacity  how many points it has room for
-   return    also TXM_TOO_LARGE for want of room; count is right then
-   cost      O(count^2 + iterations count), 0.1 s for 1000                                       */
-TRIMESH_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
-                                               trimesh_point *points, size_t capacity,
-                                               size_t *count);
-
-/* Put the points of a patch of your own in an order for thinning: each next point the one furthest
-   from those before, neighbouring triangles taken for mirror images. O(count^2); count up to 16384.
-   8 bytes each. */
-TRIMESH_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env);
-
 #ifdef __cplusplus
 }
 #endif
@@ -593,11 +302,6 @@ TRIMESH_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, 
 #include "trimesh_relax/retile.h"
 #include "trimesh_relax/job.h"
 #include "trimesh_relax/update.h"
-#include "trimesh_relax/check.h"
-#include "trimesh_relax/attributes.h"
-#include "trimesh_relax/texture.h"
-#include "trimesh_relax/scatter.h"
-#include "trimesh_relax/patch.h"
 #endif /* TRIMESH_RELAX_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------

@@ -40,7 +40,7 @@ check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth 
     grep -q tree out.log && grep -q forest out.log"
 check "--version" run 0 --version
 check "--version names the headers" \
-    grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, texedges [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, treepieces [0-9.]*)$' out.log
+    grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, texedges [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, trimesh_cover [0-9.]*, treepieces [0-9.]*)$' out.log
 for command in learn synth patch edges tiles retile tree forest; do
     check "$command --help" run 0 $command --help
     check "$command --help has an example" grep -q "  texkit $command .*-o" out.log

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#define TRIMESH_RELAX_IMPLEMENTATION
-#include "trimesh_relax.h"
+#define TRIMESH_COVER_IMPLEMENTATION
+#include "trimesh_cover.h"
 #define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 #include "testkit.h"

@@ -12,6 +12,7 @@
 #include "texsyn.h"
 #include "textiles.h"
 #include "treepieces.h"
+#include "trimesh_cover.h"
 #include "trimesh_relax.h"
 
 #include <stdio.h>
@@ -21,7 +22,7 @@ const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
                    ", texpatch " TEXPATCH_VERSION ", texedges " TEXEDGES_VERSION
                    ", textiles " TEXTILES_VERSION ", trimesh_relax " TRIMESH_RELAX_VERSION
-                   ", treepieces " TREEPIECES_VERSION ")";
+                   ", trimesh_cover " TRIMESH_COVER_VERSION ", treepieces " TREEPIECES_VERSION ")";
 
 /* ---- the table of commands ---------------------------------------------------------------- */
 

@@ -1,5 +1,7 @@
-/* bilayer.c - both leaflets of a membrane: calls trimesh_relax.h
+/* bilayer.c - both leaflets of a membrane: calls trimesh_relax.h, trimesh_cover.h
    SPDX-License-Identifier: MIT OR Unlicense  */
+#define TRIMESH_COVER_IMPLEMENTATION
+#include "trimesh_cover.h"
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 

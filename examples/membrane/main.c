@@ -11,7 +11,7 @@
 
    surface.c    the sphere and the capsule, in triangles of any shape
    lipids.c     four kinds of lipids, made of beads
-   bilayer.c    retile the surface, scatter lipids: calls trimesh_relax.h
+   bilayer.c    retile the surface, scatter lipids: calls trimesh_relax.h, trimesh_cover.h
    files.c      GLB, XYZ, PNG                                                                     */
 #include "membrane.h"
 

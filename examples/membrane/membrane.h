@@ -3,7 +3,7 @@
 #ifndef MEMBRANE_H
 #define MEMBRANE_H
 
-#include "trimesh_relax.h"
+#include "trimesh_cover.h"
 
 #include "files/mesh_io.h"
 

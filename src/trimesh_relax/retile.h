@@ -163,6 +163,16 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
     return TXM_OK;
 }
 
+TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh) {
+    txm_mesh view;
+    view.corners = 3;
+    view.positions = mesh->positions;
+    view.indices = mesh->indices;
+    view.vertex_count = mesh->vertex_count;
+    view.face_count = mesh->triangle_count;
+    return view;
+}
+
 TRIMESH_API void trimesh_free(trimesh_mesh *mesh) {
     if (!mesh) return;
     txm_arena arena = mesh->memory; /* the mesh lies in it */

@@ -8,7 +8,9 @@
 #include "files/mesh_io.h"
 #include "textiles.h"
 
+#define TRIMESH_COVER_IMPLEMENTATION
 #define TRIMESH_RELAX_IMPLEMENTATION
+#include "trimesh_cover.h"
 #include "trimesh_relax.h"
 
 #include <cjson/cJSON.h>

@@ -3,8 +3,8 @@
 
    The meshes are the surfaces of golden.h themselves, not retiled ones, so that a change of the
    retiling shows in that module's lines alone.                                                   */
-#define TRIMESH_RELAX_IMPLEMENTATION
-#include "trimesh_relax.h"
+#define TRIMESH_COVER_IMPLEMENTATION
+#include "trimesh_cover.h"
 
 #include "golden.h"
 

@@ -1,5 +1,5 @@
-#ifndef TRIMESH_RELAX_SCATTER_H
-#define TRIMESH_RELAX_SCATTER_H
+#ifndef TRIMESH_COVER_SCATTER_H
+#define TRIMESH_COVER_SCATTER_H
 
 #include "check.h"
 
@@ -332,7 +332,7 @@ static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation,
     b->edge = sqrt(txm_d3_len(b->up) / TMR_TX_H);
 }
 
-/* Phong tessellation [Boubekeur, Alexa 2008]: the point p of the triangle moves towards its feet on
+/* Phong tessellation [4]: the point p of the triangle moves towards its feet on
    the tangent planes at the corners, here half the way, which on a sphere leads back to it:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
@@ -529,7 +529,7 @@ static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env,
     return status;
 }
 
-TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
+TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
                                        trimesh_instance *out, size_t capacity, size_t *count) {
     tmr_tx_scatter s;
     txm_arena arena;
@@ -556,7 +556,7 @@ TRIMESH_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env
     return status;
 }
 
-TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
+TRIMESH_COVER_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
                                         float out[3]) {
     const double x = instance->rotation[0], y = instance->rotation[1], z = instance->rotation[2];
     const txm_dvec3 axis = txm_d3(x, y, z), p = txm_d3_scale(txm_d3_load(point), instance->scale);
@@ -568,4 +568,4 @@ TRIMESH_API void trimesh_instance_apply(const trimesh_instance *instance, const 
     out[2] = txm_float(turned.z + instance->position[2]);
 }
 
-#endif /* TRIMESH_RELAX_SCATTER_H */
+#endif /* TRIMESH_COVER_SCATTER_H */

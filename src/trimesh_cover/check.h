@@ -1,9 +1,9 @@
-#ifndef TRIMESH_RELAX_CHECK_H
-#define TRIMESH_RELAX_CHECK_H
+#ifndef TRIMESH_COVER_CHECK_H
+#define TRIMESH_COVER_CHECK_H
 
-#include "config.h"
+#include "../trimesh_cover.h"
 
-/* ---- using a mesh: what all functions share ------------------------------------------------ */
+/* ---- what all functions share -------------------------------------------------------------- */
 
 enum {
     TMR_TX_BLOCK = 1024,  /* triangles or values that a thread takes at a time                    */
@@ -64,16 +64,6 @@ static txm_status tmr_tx_spread(void (*body)(const void *, size_t, size_t), cons
     return TXM_OK;
 }
 
-TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh) {
-    txm_mesh view;
-    view.corners = 3;
-    view.positions = mesh->positions;
-    view.indices = mesh->indices;
-    view.vertex_count = mesh->vertex_count;
-    view.face_count = mesh->triangle_count;
-    return view;
-}
-
 /* The sum of the weighted normals at each vertex; sum holds 3 zeros for each. */
 static void tmr_tx_sum_normals(const txm_mesh *mesh, double *sum) {
     for (size_t t = 0; t < mesh->face_count; t++) {
@@ -93,7 +83,7 @@ static void tmr_tx_sum_normals(const txm_mesh *mesh, double *sum) {
     }
 }
 
-TRIMESH_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals) {
+TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals) {
     txm_arena arena;
     txm_status status = txm_mesh_check(mesh, "mesh", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
@@ -117,7 +107,7 @@ TRIMESH_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float
     return status;
 }
 
-/* ---- using a mesh: which sides share an edge ----------------------------------------------- */
+/* ---- which sides share an edge -------------------------------------------------------------- */
 
 /* The sides of a mesh in the order of their edges. NULL without memory; they lie in the arena, and as
    much scratch. */
@@ -138,4 +128,4 @@ static int tmr_tx_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env)
     return sorted != NULL;
 }
 
-#endif /* TRIMESH_RELAX_CHECK_H */
+#endif /* TRIMESH_COVER_CHECK_H */

@@ -1,5 +1,5 @@
-#ifndef TRIMESH_RELAX_ATTRIBUTES_H
-#define TRIMESH_RELAX_ATTRIBUTES_H
+#ifndef TRIMESH_COVER_ATTRIBUTES_H
+#define TRIMESH_COVER_ATTRIBUTES_H
 
 #include "check.h"
 
@@ -81,7 +81,7 @@ static void tmr_tx_transfer_block(const void *job, size_t first, size_t end) {
     }
 }
 
-TRIMESH_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
+TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
                                         const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out) {
     tmr_tx_transfer j;
@@ -318,7 +318,7 @@ static void tmr_tx_transfer_faces(const void *job, size_t first, size_t end) {
     for (size_t t = first; t < end; t++) tmr_tx_transfer_face((const tmr_tx_paths *)job, t);
 }
 
-TRIMESH_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
+TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
                                                 const txm_mesh *mesh, const txm_mesh_place *sources,
                                                 txm_env *env, float *out) {
     tmr_tx_paths p;
@@ -375,7 +375,7 @@ static void tmr_tx_sort_corners(const txm_mesh *mesh, const float *values, size_
     txm_sort_pairs(pairs, pairs + n, n);
 }
 
-TRIMESH_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
+TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
                                              int channels, txm_env *env, uint32_t *new_indices,
                                              uint32_t *corners, size_t *count) {
     txm_arena arena;
@@ -411,4 +411,4 @@ done:
     return status;
 }
 
-#endif /* TRIMESH_RELAX_ATTRIBUTES_H */
+#endif /* TRIMESH_COVER_ATTRIBUTES_H */

@@ -1,5 +1,5 @@
-#ifndef TRIMESH_RELAX_PATCH_H
-#define TRIMESH_RELAX_PATCH_H
+#ifndef TRIMESH_COVER_PATCH_H
+#define TRIMESH_COVER_PATCH_H
 
 #include "scatter.h"
 
@@ -59,7 +59,7 @@ static void tmr_tx_order(trimesh_point *points, size_t count, double *gap) {
     }
 }
 
-TRIMESH_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env) {
+TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env) {
     if (count > 16384) return txm_fail(env, TXM_TOO_LARGE, "more than 16384 points to order");
     if (count == 0) return TXM_OK;
     if (!points) return txm_fail(env, TXM_BAD_ARGUMENT, "points is NULL");
@@ -171,7 +171,7 @@ static txm_status tmr_tx_swarm_run(tmr_tx_swarm *s, int rounds, txm_env *env) {
     return tmr_tx_report(env, 0.8, "order");
 }
 
-TRIMESH_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
+TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
                                                trimesh_point *points, size_t capacity,
                                                size_t *count) {
     trimesh_patch_desc none;
@@ -226,4 +226,4 @@ TRIMESH_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, t
     return status;
 }
 
-#endif /* TRIMESH_RELAX_PATCH_H */
+#endif /* TRIMESH_COVER_PATCH_H */

@@ -1,11 +1,11 @@
-#ifndef TRIMESH_RELAX_TEXTURE_H
-#define TRIMESH_RELAX_TEXTURE_H
+#ifndef TRIMESH_COVER_TEXTURE_H
+#define TRIMESH_COVER_TEXTURE_H
 
 #include "check.h"
 
 /* ---- texturing ------------------------------------------------------------------------------- */
 
-TRIMESH_API txm_status trimesh_atlas_make(int count, int size, int gutter, txm_env *env,
+TRIMESH_COVER_API txm_status trimesh_atlas_make(int count, int size, int gutter, txm_env *env,
                                           trimesh_atlas *atlas) {
     const int n = count ? count : 4, s = size ? size : 256, g = gutter == -1 ? 8 : gutter;
     if (!atlas) return txm_fail(env, TXM_BAD_ARGUMENT, "atlas is NULL");
@@ -21,7 +21,7 @@ TRIMESH_API txm_status trimesh_atlas_make(int count, int size, int gutter, txm_e
     return TXM_OK;
 }
 
-TRIMESH_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, float *uv) {
+TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, float *uv) {
     if (!atlas || !uv || patch < -1 || patch >= atlas->count) return 0;
     const int first = patch < 0 ? 0 : patch, end = patch < 0 ? atlas->count : patch + 1;
     for (int p = first; p < end; p++) {
@@ -97,7 +97,7 @@ static void tmr_tx_put_choice(int choice, int patches, size_t t, int *out, int *
     if (rotations) rotations[t] = choice / patches;
 }
 
-TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
+TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
                                       txm_env *env, int *patches, int *rotations) {
     trimesh_choose_desc none;
     txm_arena arena;
@@ -138,7 +138,7 @@ TRIMESH_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose
     return status;
 }
 
-TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *tiles,
+TRIMESH_COVER_API txm_status trimesh_place_tiles(size_t triangle_count, const int *tiles,
                                            const int *rotations, const float *tile_uv,
                                            size_t tile_count, txm_env *env, float *uv) {
     if (triangle_count > TRIMESH_MAX_VERTICES)
@@ -165,7 +165,7 @@ TRIMESH_API txm_status trimesh_place_tiles(size_t triangle_count, const int *til
     return TXM_OK;
 }
 
-TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
+TRIMESH_COVER_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
                                            txm_env *env, int *edge_colors, int *directions) {
     const txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
@@ -185,7 +185,7 @@ TRIMESH_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uin
     return TXM_OK;
 }
 
-TRIMESH_API txm_status trimesh_random_colors(size_t vertex_count, int count, uint64_t seed,
+TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int count, uint64_t seed,
                                              txm_env *env, int *colors) {
     const int n = count ? count : 3;
     if (vertex_count > TRIMESH_MAX_VERTICES)
@@ -291,7 +291,7 @@ static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors
     return most;
 }
 
-TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
+TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count) {
     tmr_tx_graph g;
     txm_arena arena;
@@ -319,4 +319,4 @@ TRIMESH_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env,
     return status;
 }
 
-#endif /* TRIMESH_RELAX_TEXTURE_H */
+#endif /* TRIMESH_COVER_TEXTURE_H */
