@@ -389,23 +389,23 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
 /* ---- what all functions share -------------------------------------------------------------- */
 
 enum {
-    TMR_TX_BLOCK = 1024,  /* triangles or values that a thread takes at a time                    */
-    TMR_TX_NONE = 0xff    /* no corner                                                            */
+    TMC_BLOCK = 1024, /* triangles or values that a thread takes at a time                    */
+    TMC_NONE = 0xff   /* no corner                                                            */
 };
-#define TMR_TX_BATCHES 16 /* rounds of a long loop, between which the caller may cancel           */
-#define TMR_TX_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
-#define TMR_TX_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
+#define TMC_BATCHES 16 /* rounds of a long loop, between which the caller may cancel           */
+#define TMC_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
+#define TMC_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
 
-static txm_status tmr_tx_no_memory(txm_env *env) {
+static txm_status tmc_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the work on the mesh");
 }
 
-static txm_status tmr_tx_report(txm_env *env, double fraction, const char *stage) {
+static txm_status tmc_report(txm_env *env, double fraction, const char *stage) {
     if (!txm_progress(env, txm_float(fraction), stage)) return TXM_OK;
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
-static int tmr_tx_are_finite(const float *values, size_t count) {
+static int tmc_are_finite(const float *values, size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (!txm_is_finite(values[i])) return 0;
     }
@@ -413,42 +413,42 @@ static int tmr_tx_are_finite(const float *values, size_t count) {
 }
 
 /* A loop over count things, of which each block writes its own: what a thread is given. */
-typedef struct tmr_tx_loop {
+typedef struct tmc_loop {
     void (*body)(const void *job, size_t first, size_t end);
     const void *job;
     size_t count, first_block;
-} tmr_tx_loop;
+} tmc_loop;
 
-static void tmr_tx_block(void *context, int index) {
-    const tmr_tx_loop *l = (const tmr_tx_loop *)context;
-    const size_t first = (l->first_block + (size_t)index) * TMR_TX_BLOCK;
-    const size_t end = first + TMR_TX_BLOCK;
+static void tmc_block(void *context, int index) {
+    const tmc_loop *l = (const tmc_loop *)context;
+    const size_t first = (l->first_block + (size_t)index) * TMC_BLOCK;
+    const size_t end = first + TMC_BLOCK;
     l->body(l->job, first, end < l->count ? end : l->count);
 }
 
 /* body(job, first, end) for all of count, spread over threads; progress goes from..to. */
-static txm_status tmr_tx_spread(void (*body)(const void *, size_t, size_t), const void *job,
-                                size_t count, double from, double to, const char *stage,
-                                txm_env *env) {
-    tmr_tx_loop l;
-    const size_t blocks = (count + TMR_TX_BLOCK - 1) / TMR_TX_BLOCK;
+static txm_status tmc_spread(void (*body)(const void *, size_t, size_t), const void *job,
+                             size_t count, double from, double to, const char *stage,
+                             txm_env *env) {
+    tmc_loop l;
+    const size_t blocks = (count + TMC_BLOCK - 1) / TMC_BLOCK;
     l.body = body;
     l.job = job;
     l.count = count;
-    for (size_t b = 0; b < TMR_TX_BATCHES; b++) {
-        const size_t end = blocks * (b + 1) / TMR_TX_BATCHES;
-        l.first_block = blocks * b / TMR_TX_BATCHES;
+    for (size_t b = 0; b < TMC_BATCHES; b++) {
+        const size_t end = blocks * (b + 1) / TMC_BATCHES;
+        l.first_block = blocks * b / TMC_BATCHES;
         if (end == l.first_block) continue;
         const txm_status status =
-            tmr_tx_report(env, from + (to - from) * (double)b / TMR_TX_BATCHES, stage);
+            tmc_report(env, from + (to - from) * (double)b / TMC_BATCHES, stage);
         if (status != TXM_OK) return status;
-        txm_parallel_for(env, (int)(end - l.first_block), tmr_tx_block, &l);
+        txm_parallel_for(env, (int)(end - l.first_block), tmc_block, &l);
     }
     return TXM_OK;
 }
 
 /* The sum of the weighted normals at each vertex; sum holds 3 zeros for each. */
-static void tmr_tx_sum_normals(const txm_mesh *mesh, double *sum) {
+static void tmc_sum_normals(const txm_mesh *mesh, double *sum) {
     for (size_t t = 0; t < mesh->face_count; t++) {
         txm_dvec3 p[3];
         txm_mesh_triangle(mesh, t, p);
@@ -472,13 +472,13 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
     if (status != TXM_OK) return status;
     if (mesh->vertex_count == 0) return TXM_OK;
     if (!normals) return txm_fail(env, TXM_BAD_ARGUMENT, "normals is NULL");
-    if (tmr_tx_report(env, 0, "normals") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "normals") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     double *sum = (double *)txm_arena_zero(&arena, mesh->vertex_count, 3 * sizeof(double));
     if (!sum) {
-        status = tmr_tx_no_memory(env);
+        status = tmc_no_memory(env);
     } else {
-        tmr_tx_sum_normals(mesh, sum);
+        tmc_sum_normals(mesh, sum);
         for (size_t v = 0; v < mesh->vertex_count; v++) {
             const txm_dvec3 n = txm_d3_unit(txm_d3(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
             normals[3 * v] = txm_float(n.x);
@@ -494,7 +494,7 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
 
 /* The sides of a mesh in the order of their edges. NULL without memory; they lie in the arena, and as
    much scratch. */
-static uint32_t *tmr_tx_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
+static uint32_t *tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
     uint32_t *sorted =
         (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
     if (sorted) txm_mesh_sort_sides(mesh, sorted);
@@ -502,10 +502,10 @@ static uint32_t *tmr_tx_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
 }
 
 /* The ring of the sides of each edge, as txm_mesh_link has it. 0 without memory. */
-static int tmr_tx_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
+static int tmc_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     if (sorted) txm_mesh_link(mesh, sorted, 0, next);
     txm_arena_free(&scratch);
     return sorted != NULL;
@@ -513,14 +513,14 @@ static int tmr_tx_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env)
 
 /* ---- attributes ------------------------------------------------------------------------------ */
 
-typedef struct tmr_tx_values {
+typedef struct tmc_values {
     const uint32_t *entry; /* which value each corner of the input has */
     const float *values;
     size_t channels;
-} tmr_tx_values;
+} tmc_values;
 
-static txm_status tmr_tx_check_values(const txm_mesh *input, const trimesh_values *values,
-                                      txm_env *env, tmr_tx_values *out) {
+static txm_status tmc_check_values(const txm_mesh *input, const trimesh_values *values,
+                                   txm_env *env, tmc_values *out) {
     if (!values) return txm_fail(env, TXM_BAD_ARGUMENT, "values is NULL");
     if (values->channels < 1 || values->channels > TRIMESH_MAX_CHANNELS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "channels must be 1 to TRIMESH_MAX_CHANNELS");
@@ -541,14 +541,14 @@ static txm_status tmr_tx_check_values(const txm_mesh *input, const trimesh_value
                                     i / 3, values->indices[i]);
     }
     for (size_t i = 0; i < values->count; i++) {
-        if (!tmr_tx_are_finite(values->values + out->channels * i, out->channels))
+        if (!tmc_are_finite(values->values + out->channels * i, out->channels))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "values: entry # is not finite", i, 0);
     }
     return TXM_OK;
 }
 
-static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_place *sources,
-                                       size_t count, txm_env *env) {
+static txm_status tmc_check_sources(const txm_mesh *input, const txm_mesh_place *sources,
+                                    size_t count, txm_env *env) {
     if (count > (size_t)INT32_MAX) return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 sources");
     if (count && !sources) return txm_fail(env, TXM_BAD_ARGUMENT, "sources is NULL");
     for (size_t i = 0; i < count; i++) {
@@ -557,7 +557,7 @@ static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_pla
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "source # names triangle #, which the input does not have", i,
                                     s->triangle);
-        if (!(s->u >= 0 && s->v >= 0 && (double)s->u + s->v <= 1 + TMR_TX_SNAP))
+        if (!(s->u >= 0 && s->v >= 0 && (double)s->u + s->v <= 1 + TMC_SNAP))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "u and v of source # must be 0 or more, their sum at most 1", i,
                                     0);
@@ -566,8 +566,7 @@ static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_pla
 }
 
 /* out = a + u (b - a) + v (c - a): exact where the three are equal */
-static void tmr_tx_interpolate(const tmr_tx_values *x, size_t triangle, double u, double v,
-                               float *out) {
+static void tmc_interpolate(const tmc_values *x, size_t triangle, double u, double v, float *out) {
     const float *a = x->values + x->channels * x->entry[3 * triangle];
     const float *b = x->values + x->channels * x->entry[3 * triangle + 1];
     const float *c = x->values + x->channels * x->entry[3 * triangle + 2];
@@ -575,40 +574,40 @@ static void tmr_tx_interpolate(const tmr_tx_values *x, size_t triangle, double u
         out[i] = txm_float(a[i] + u * ((double)b[i] - a[i]) + v * ((double)c[i] - a[i]));
 }
 
-typedef struct tmr_tx_transfer {
-    tmr_tx_values values;
+typedef struct tmc_transfer {
+    tmc_values values;
     const txm_mesh_place *sources;
     float *out;
-} tmr_tx_transfer;
+} tmc_transfer;
 
-static void tmr_tx_transfer_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_transfer *j = (const tmr_tx_transfer *)job;
+static void tmc_transfer_block(const void *job, size_t first, size_t end) {
+    const tmc_transfer *j = (const tmc_transfer *)job;
     for (size_t i = first; i < end; i++) {
         const txm_mesh_place *s = &j->sources[i];
-        tmr_tx_interpolate(&j->values, s->triangle, s->u, s->v, j->out + j->values.channels * i);
+        tmc_interpolate(&j->values, s->triangle, s->u, s->v, j->out + j->values.channels * i);
     }
 }
 
 TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
                                         const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out) {
-    tmr_tx_transfer j;
+    tmc_transfer j;
     txm_status status = txm_mesh_check(input, "input", 3, 0, TRIMESH_MAX_VERTICES, env);
-    if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &j.values);
-    if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, count, env);
+    if (status == TXM_OK) status = tmc_check_values(input, values, env, &j.values);
+    if (status == TXM_OK) status = tmc_check_sources(input, sources, count, env);
     if (status != TXM_OK || count == 0) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     j.sources = sources;
     j.out = out;
-    return tmr_tx_spread(tmr_tx_transfer_block, &j, count, 0, 1, "values", env);
+    return tmc_spread(tmc_transfer_block, &j, count, 0, 1, "values", env);
 }
 
 /* ---- attributes: paths on the input ---------------------------------------------------------- */
 
 /* The input as paths see it. */
-typedef struct tmr_tx_paths {
+typedef struct tmc_paths {
     txm_mesh input;
-    tmr_tx_values values;
+    tmc_values values;
     const txm_mesh *mesh;
     const txm_mesh_place *sources;
     uint32_t *welded; /* 1 per vertex: the first vertex in the same place                  */
@@ -616,22 +615,22 @@ typedef struct tmr_tx_paths {
     uint32_t *next;   /* 1 per side, see txm_mesh_link                                     */
     uint8_t *seam;    /* 1 per side: 0 = none, 1 = seam, 2 = none or several on the other side */
     float *out;
-} tmr_tx_paths;
+} tmc_paths;
 
 /* A place on the input: (1 - u - v) a + u b + v c of a triangle. */
-typedef struct tmr_tx_place {
+typedef struct tmc_place {
     size_t triangle;
     double u, v;
-} tmr_tx_place;
+} tmc_place;
 
-static txm_dvec3 tmr_tx_point(const txm_mesh *input, tmr_tx_place at) {
+static txm_dvec3 tmc_point(const txm_mesh *input, tmc_place at) {
     txm_dvec3 p[3];
     txm_mesh_triangle(input, at.triangle, p);
     return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
 /* Number vertices in equal places alike. pairs: room for 2 per vertex. */
-static void tmr_tx_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
+static void tmc_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
     const size_t n = input->vertex_count;
     for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
     for (size_t axis = 3; axis-- > 0;) {
@@ -648,7 +647,7 @@ static void tmr_tx_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded
     }
 }
 
-static int tmr_tx_equal_values(const tmr_tx_values *x, size_t corner, size_t other) {
+static int tmc_equal_values(const tmc_values *x, size_t corner, size_t other) {
     const float *a = x->values + x->channels * x->entry[corner];
     const float *b = x->values + x->channels * x->entry[other];
     for (size_t i = 0; i < x->channels; i++) {
@@ -657,7 +656,7 @@ static int tmr_tx_equal_values(const tmr_tx_values *x, size_t corner, size_t oth
     return 1;
 }
 
-static uint8_t tmr_tx_seam(const tmr_tx_paths *p, size_t side) {
+static uint8_t tmc_seam(const tmc_paths *p, size_t side) {
     const size_t other = p->next[side];
     if (other == side || p->next[other] != side) return 2;
     size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, whichever way round */
@@ -665,11 +664,11 @@ static uint8_t tmr_tx_seam(const tmr_tx_paths *p, size_t side) {
         a = b;
         b = other;
     }
-    return !(tmr_tx_equal_values(&p->values, side, a) &&
-             tmr_tx_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
+    return !(tmc_equal_values(&p->values, side, a) &&
+             tmc_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
 }
 
-static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env *env) {
+static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) {
     const size_t n = p->input.vertex_count, sides = 3 * p->input.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
@@ -679,37 +678,37 @@ static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env 
     p->seam = (uint8_t *)txm_arena_alloc(arena, sides, 1);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
     txm_status status = TXM_OK;
-    if (!p->welded || !p->vertex || !p->next || !p->seam || !pairs) status = tmr_tx_no_memory(env);
-    if (status == TXM_OK) tmr_tx_weld(&p->input, pairs, p->welded);
+    if (!p->welded || !p->vertex || !p->next || !p->seam || !pairs) status = tmc_no_memory(env);
+    if (status == TXM_OK) tmc_weld(&p->input, pairs, p->welded);
     txm_arena_free(&scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->vertex[i] = p->welded[p->input.indices[i]];
     txm_mesh whole = p->input;
     whole.indices = p->vertex;
-    if (!tmr_tx_link(&whole, p->next, env)) return tmr_tx_no_memory(env);
-    for (size_t i = 0; i < sides; i++) p->seam[i] = tmr_tx_seam(p, i);
+    if (!tmc_link(&whole, p->next, env)) return tmc_no_memory(env);
+    for (size_t i = 0; i < sides; i++) p->seam[i] = tmc_seam(p, i);
     return TXM_OK;
 }
 
 /* A path: from `start` towards `end` in the plane through both along `up`. */
-typedef struct tmr_tx_path {
+typedef struct tmc_path {
     txm_dvec3 start, ahead, across; /* ahead: to the end; across: normal of the plane           */
     double reach;                 /* |ahead|^2                                                */
     size_t goal;                  /* the triangle of the end; SIZE_MAX = not known            */
     int through;                  /* cross seams                                              */
-} tmr_tx_path;
+} tmc_path;
 
 /* Where the plane meets a side, as a share of it. The values on both sides of the plane are computed
    from the vertex alone, so that all triangles there agree. */
-static double tmr_tx_cut(const tmr_tx_path *w, const txm_dvec3 c[3], size_t k) {
+static double tmc_cut(const tmc_path *w, const txm_dvec3 c[3], size_t k) {
     const double f = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across);
     const double g = txm_d3_dot(txm_d3_sub(c[(k + 1) % 3], w->start), w->across);
     return f / (f - g);
 }
 
 /* the place at share s of side k of a triangle */
-static tmr_tx_place tmr_tx_on_side(size_t triangle, size_t k, double s) {
-    tmr_tx_place at;
+static tmc_place tmc_on_side(size_t triangle, size_t k, double s) {
+    tmc_place at;
     at.triangle = triangle;
     s = s >= 0 ? s <= 1 ? s : 1 : 0;
     at.u = k == 0 ? s : k == 1 ? 1 - s : 0;
@@ -717,13 +716,13 @@ static tmr_tx_place tmr_tx_on_side(size_t triangle, size_t k, double s) {
     return at;
 }
 
-static double tmr_tx_along(const tmr_tx_path *w, txm_dvec3 x) {
+static double tmc_along(const tmc_path *w, txm_dvec3 x) {
     return txm_d3_dot(txm_d3_sub(x, w->start), w->ahead);
 }
 
 /* The side by which the path leaves a triangle: the one that the plane meets, other than the side
    `from` (0..2, or 3: at the start, then the one further ahead). 3 if there is none. */
-static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t from) {
+static size_t tmc_exit(const tmc_path *w, const txm_dvec3 c[3], size_t from) {
     int above[3];
     size_t best = 3;
     double furthest = 0;
@@ -732,8 +731,8 @@ static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t fro
     for (size_t k = 0; k < 3; k++) {
         const size_t n = (k + 1) % 3;
         if (above[k] == above[n] || k == from) continue;
-        const double s = tmr_tx_cut(w, c, k);
-        const double along = tmr_tx_along(w, txm_d3_mad(c[k], txm_d3_sub(c[n], c[k]), s));
+        const double s = tmc_cut(w, c, k);
+        const double along = tmc_along(w, txm_d3_mad(c[k], txm_d3_sub(c[n], c[k]), s));
         if (best != 3 && along <= furthest) continue;
         best = k;
         furthest = along;
@@ -743,31 +742,31 @@ static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t fro
 
 /* Follow a path. *at is its start and receives its end: where it meets a seam, or what lies at the
    end's distance. 1 if it came to the goal triangle. */
-static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place *at) {
+static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
     size_t triangle = at->triangle, from = 3;
     int reached = 0;
     for (int step = 0; step < 1 << 16; step++) {
         txm_dvec3 c[3];
         if (triangle == w->goal) return 1;
         txm_mesh_triangle(&p->input, triangle, c);
-        const size_t k = tmr_tx_exit(w, c, from);
+        const size_t k = tmc_exit(w, c, from);
         if (k == 3) return 0;
-        const double s = tmr_tx_cut(w, c, k);
+        const double s = tmc_cut(w, c, k);
         const txm_dvec3 x = txm_d3_mad(c[k], txm_d3_sub(c[(k + 1) % 3], c[k]), s);
-        const double along = tmr_tx_along(w, x), least = -0.5 * w->reach;
-        const tmr_tx_place out = tmr_tx_on_side(triangle, k, s);
+        const double along = tmc_along(w, x), least = -0.5 * w->reach;
+        const tmc_place out = tmc_on_side(triangle, k, s);
         if (!reached && along >= w->reach) {
             /* between the way in and the way out; the end may yet lie in a triangle nearby */
-            tmr_tx_place in = *at;
-            if (from < 3) in = tmr_tx_on_side(triangle, from, tmr_tx_cut(w, c, from));
-            const double before = tmr_tx_along(w, tmr_tx_point(&p->input, in));
+            tmc_place in = *at;
+            if (from < 3) in = tmc_on_side(triangle, from, tmc_cut(w, c, from));
+            const double before = tmc_along(w, tmc_point(&p->input, in));
             const double share = along > before ? (w->reach - before) / (along - before) : 1;
             const double t = share >= 0 ? share <= 1 ? share : 1 : 0;
             at->triangle = triangle;
             at->u = in.u + t * (out.u - in.u);
             at->v = in.v + t * (out.v - in.v);
             const txm_dvec3 gap =
-                txm_d3_sub(tmr_tx_point(&p->input, *at), txm_d3_add(w->start, w->ahead));
+                txm_d3_sub(tmc_point(&p->input, *at), txm_d3_add(w->start, w->ahead));
             if (w->goal == SIZE_MAX || txm_d3_len2(gap) <= 1e-12 * w->reach) return 0;
             reached = 1;
         }
@@ -783,12 +782,12 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
 
 /* A path from a place, which is first moved a little into its triangle: so the plane certainly cuts
    two sides of it, and a start in a corner needs no search of the fan. */
-static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, txm_dvec3 end,
-                                    txm_dvec3 up, size_t goal, int through) {
-    tmr_tx_path w;
+static tmc_path tmc_path_make(const tmc_paths *p, tmc_place *at, txm_dvec3 end, txm_dvec3 up,
+                              size_t goal, int through) {
+    tmc_path w;
     at->u += 1e-3 * (1.0 / 3 - at->u);
     at->v += 1e-3 * (1.0 / 3 - at->v);
-    w.start = tmr_tx_point(&p->input, *at);
+    w.start = tmc_point(&p->input, *at);
     w.ahead = txm_d3_sub(end, w.start);
     w.across = txm_d3_cross(up, w.ahead);
     w.reach = txm_d3_len2(w.ahead);
@@ -798,55 +797,55 @@ static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, txm
 }
 
 /* The values at the corners of one triangle of the mesh. */
-static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
-    tmr_tx_place from[3];
+static void tmc_transfer_face(const tmc_paths *p, size_t t) {
+    tmc_place from[3];
     txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
         const txm_mesh_place *s = &p->sources[p->mesh->indices[3 * t + k]];
         from[k].triangle = s->triangle;
         from[k].u = s->u;
         from[k].v = s->v;
-        c[k] = tmr_tx_point(&p->input, from[k]);
+        c[k] = tmc_point(&p->input, from[k]);
     }
     const txm_dvec3 up = txm_d3_unit(txm_d3_area2(c[0], c[1], c[2]));
     const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(c[0], c[1]), c[2]), 1.0 / 3);
-    tmr_tx_place centre = from[0];
-    const tmr_tx_path way = tmr_tx_path_make(p, &centre, middle, up, SIZE_MAX, 1);
-    if (way.reach > 0) tmr_tx_walk(p, &way, &centre);
+    tmc_place centre = from[0];
+    const tmc_path way = tmc_path_make(p, &centre, middle, up, SIZE_MAX, 1);
+    if (way.reach > 0) tmc_walk(p, &way, &centre);
     for (size_t k = 0; k < 3; k++) {
-        tmr_tx_place at = centre;
-        const tmr_tx_path w = tmr_tx_path_make(p, &at, c[k], up, from[k].triangle, 0);
-        if (tmr_tx_walk(p, &w, &at)) at = from[k];
-        tmr_tx_interpolate(&p->values, at.triangle, at.u, at.v,
-                           p->out + p->values.channels * (3 * t + k));
+        tmc_place at = centre;
+        const tmc_path w = tmc_path_make(p, &at, c[k], up, from[k].triangle, 0);
+        if (tmc_walk(p, &w, &at)) at = from[k];
+        tmc_interpolate(&p->values, at.triangle, at.u, at.v,
+                        p->out + p->values.channels * (3 * t + k));
     }
 }
 
-static void tmr_tx_transfer_faces(const void *job, size_t first, size_t end) {
-    for (size_t t = first; t < end; t++) tmr_tx_transfer_face((const tmr_tx_paths *)job, t);
+static void tmc_transfer_faces(const void *job, size_t first, size_t end) {
+    for (size_t t = first; t < end; t++) tmc_transfer_face((const tmc_paths *)job, t);
 }
 
 TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
                                                 const txm_mesh *mesh, const txm_mesh_place *sources,
                                                 txm_env *env, float *out) {
-    tmr_tx_paths p;
+    tmc_paths p;
     txm_arena arena;
     memset(&p, 0, sizeof p);
     txm_status status = txm_mesh_check(input, "input", 3, 1, TRIMESH_MAX_VERTICES, env);
-    if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &p.values);
+    if (status == TXM_OK) status = tmc_check_values(input, values, env, &p.values);
     if (status == TXM_OK) status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
-    if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, mesh->vertex_count, env);
+    if (status == TXM_OK) status = tmc_check_sources(input, sources, mesh->vertex_count, env);
     if (status != TXM_OK || mesh->face_count == 0) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    if (tmr_tx_report(env, 0, "seams") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "seams") != TXM_OK) return TXM_CANCELLED;
     p.input = *input;
     p.mesh = mesh;
     p.sources = sources;
     p.out = out;
     txm_arena_init(&arena, env);
-    status = tmr_tx_paths_build(&p, &arena, env);
+    status = tmc_paths_build(&p, &arena, env);
     if (status == TXM_OK)
-        status = tmr_tx_spread(tmr_tx_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
+        status = tmc_spread(tmc_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -854,27 +853,27 @@ TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, con
 /* ---- attributes: doubled vertices ------------------------------------------------------------ */
 
 /* the bits of a float, one pattern for both zeros */
-static uint32_t tmr_tx_bits(float x) {
+static uint32_t tmc_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits == 0x80000000u ? 0 : bits;
 }
 
-static int tmr_tx_equal_bits(const float *a, const float *b, size_t count) {
+static int tmc_equal_bits(const float *a, const float *b, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        if (tmr_tx_bits(a[i]) != tmr_tx_bits(b[i])) return 0;
+        if (tmc_bits(a[i]) != tmc_bits(b[i])) return 0;
     }
     return 1;
 }
 
 /* Sort the corners by vertex, and those of one vertex by a hash of their values. */
-static void tmr_tx_sort_corners(const txm_mesh *mesh, const float *values, size_t channels,
-                                txm_pair *pairs) {
+static void tmc_sort_corners(const txm_mesh *mesh, const float *values, size_t channels,
+                             txm_pair *pairs) {
     const size_t n = 3 * mesh->face_count;
     for (size_t c = 0; c < n; c++) {
         uint64_t hash = 0;
         for (size_t i = 0; i < channels; i++)
-            hash = txm_hash(hash + tmr_tx_bits(values[channels * c + i]) + 1);
+            hash = txm_hash(hash + tmc_bits(values[channels * c + i]) + 1);
         pairs[c].key = (uint32_t)(hash >> 32);
         pairs[c].value = (uint32_t)c;
     }
@@ -894,21 +893,21 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
     if (!count || (mesh->face_count && !values))
         return txm_fail(env, TXM_BAD_ARGUMENT, "values or count is NULL");
     const size_t n = 3 * mesh->face_count, width = (size_t)channels;
-    if (tmr_tx_report(env, 0, "corners") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "corners") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&arena, n, 2 * sizeof(txm_pair));
     size_t made = 0;
     if (n && !pairs) {
-        status = tmr_tx_no_memory(env);
+        status = tmc_no_memory(env);
         goto done;
     }
-    tmr_tx_sort_corners(mesh, values, width, pairs);
+    tmc_sort_corners(mesh, values, width, pairs);
     /* Equal corners now follow each other, but for the rare ones whose hashes are equal by chance: a
        new vertex more then, which does no harm. */
     for (size_t i = 0; i < n; i++) {
         const size_t c = pairs[i].value, before = pairs[i ? i - 1 : 0].value;
         const int fresh = i == 0 || mesh->indices[c] != mesh->indices[before] ||
-                          !tmr_tx_equal_bits(values + width * c, values + width * before, width);
+                          !tmc_equal_bits(values + width * c, values + width * before, width);
         if (fresh && corners) corners[made] = (uint32_t)c;
         made += (size_t)fresh;
         if (new_indices) new_indices[c] = (uint32_t)(made - 1);
@@ -933,7 +932,7 @@ TRIMESH_COVER_API txm_status trimesh_atlas_make(int count, int size, int gutter,
     atlas->gutter = g;
     atlas->pitch = s + 2 * g;
     atlas->width = n * atlas->pitch;
-    atlas->height = (int)ceil(s * TMR_TX_H) + 2 * g;
+    atlas->height = (int)ceil(s * TMC_H) + 2 * g;
     return TXM_OK;
 }
 
@@ -944,7 +943,7 @@ TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, fl
         for (int k = 0; k < 3; k++, uv += 2) {
             const double across = k == 0 ? 0 : k == 1 ? 1 : 0.5;
             const double x = (double)p * atlas->pitch + atlas->gutter + across * atlas->size;
-            const double y = atlas->height - atlas->gutter - (k == 2 ? atlas->size * TMR_TX_H : 0);
+            const double y = atlas->height - atlas->gutter - (k == 2 ? atlas->size * TMC_H : 0);
             uv[0] = txm_float(x / atlas->width);
             uv[1] = txm_float(y / atlas->height);
         }
@@ -953,8 +952,8 @@ TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, fl
 }
 
 /* All triangles, each after the one that it was reached from: breadth first. */
-static void tmr_tx_spread_order(const uint32_t *next, size_t triangles, uint8_t *seen,
-                                uint32_t *order) {
+static void tmc_spread_order(const uint32_t *next, size_t triangles, uint8_t *seen,
+                             uint32_t *order) {
     size_t end = 0;
     for (size_t first = 0, at = 0; first < triangles; first++) {
         if (seen[first]) continue;
@@ -973,8 +972,7 @@ static void tmr_tx_spread_order(const uint32_t *next, size_t triangles, uint8_t 
 }
 
 /* How badly a choice goes with the neighbours' so far: 0 = none has this patch. */
-static int tmr_tx_clashes(const uint32_t *next, const int *choice, int patches, size_t t,
-                          int chosen) {
+static int tmc_clashes(const uint32_t *next, const int *choice, int patches, size_t t, int chosen) {
     int sum = 0;
     for (size_t side = 3 * t; side < 3 * t + 3; side++) {
         int looked = 0; /* edges of very many triangles are not worth it */
@@ -989,8 +987,8 @@ static int tmr_tx_clashes(const uint32_t *next, const int *choice, int patches, 
 /* Choose backwards in that order: then every triangle but the last of its piece still has a neighbour
    without a choice, so that two neighbours at most stand in its way. choice = patch + patches *
    rotation. */
-static void tmr_tx_choose(const uint32_t *next, const uint32_t *order, size_t triangles, int patches,
-                          int total, uint64_t seed, int *choice) {
+static void tmc_choose(const uint32_t *next, const uint32_t *order, size_t triangles, int patches,
+                       int total, uint64_t seed, int *choice) {
     for (size_t t = 0; t < triangles; t++) choice[t] = -1;
     for (size_t i = triangles; i-- > 0;) {
         const size_t t = order[i];
@@ -999,7 +997,7 @@ static void tmr_tx_choose(const uint32_t *next, const uint32_t *order, size_t tr
         int best = first, least = INT_MAX;
         for (int k = 0; k < total && k < 64 && least > 0; k++) {
             const int chosen = (int)(((int64_t)first + k) % total);
-            const int clashes = tmr_tx_clashes(next, choice, patches, t, chosen);
+            const int clashes = tmc_clashes(next, choice, patches, t, chosen);
             if (clashes >= least) continue;
             least = clashes;
             best = chosen;
@@ -1008,7 +1006,7 @@ static void tmr_tx_choose(const uint32_t *next, const uint32_t *order, size_t tr
     }
 }
 
-static void tmr_tx_put_choice(int choice, int patches, size_t t, int *out, int *rotations) {
+static void tmc_put_choice(int choice, int patches, size_t t, int *out, int *rotations) {
     out[t] = choice % patches;
     if (rotations) rotations[t] = choice / patches;
 }
@@ -1029,10 +1027,10 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     if (count == 0) return TXM_OK;
     if (!patches || (turns == 3 && !rotations))
         return txm_fail(env, TXM_BAD_ARGUMENT, "patches or rotations is NULL");
-    if (tmr_tx_report(env, 0, "patches") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "patches") != TXM_OK) return TXM_CANCELLED;
     for (size_t t = 0; desc->repeat && t < count; t++) {
         txm_rng rng = txm_rng_make(desc->seed, t);
-        tmr_tx_put_choice((int)txm_rng_below(&rng, (uint32_t)(n * turns)), n, t, patches, rotations);
+        tmc_put_choice((int)txm_rng_below(&rng, (uint32_t)(n * turns)), n, t, patches, rotations);
     }
     if (desc->repeat) return TXM_OK;
     txm_arena_init(&arena, env);
@@ -1040,15 +1038,15 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     uint32_t *order = (uint32_t *)txm_arena_alloc(&arena, count, sizeof(uint32_t));
     int *choice = (int *)txm_arena_alloc(&arena, count, sizeof(int));
     uint8_t *seen = (uint8_t *)txm_arena_zero(&arena, count, 1);
-    if (!next || !order || !choice || !seen || !tmr_tx_link(mesh, next, env)) {
-        status = tmr_tx_no_memory(env);
+    if (!next || !order || !choice || !seen || !tmc_link(mesh, next, env)) {
+        status = tmc_no_memory(env);
     } else {
-        status = tmr_tx_report(env, 0.5, "patches");
+        status = tmc_report(env, 0.5, "patches");
     }
     if (status == TXM_OK) {
-        tmr_tx_spread_order(next, count, seen, order);
-        tmr_tx_choose(next, order, count, n, n * turns, desc->seed, choice);
-        for (size_t t = 0; t < count; t++) tmr_tx_put_choice(choice[t], n, t, patches, rotations);
+        tmc_spread_order(next, count, seen, order);
+        tmc_choose(next, order, count, n, n * turns, desc->seed, choice);
+        for (size_t t = 0; t < count; t++) tmc_put_choice(choice[t], n, t, patches, rotations);
     }
     txm_arena_free(&arena);
     return status;
@@ -1118,24 +1116,24 @@ TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int coun
 /* ---- texturing: proper colours --------------------------------------------------------------- */
 
 /* Which vertices share an edge: those of v are ends[first[v]] .. ends[first[v + 1] - 1]. */
-typedef struct tmr_tx_graph {
+typedef struct tmc_graph {
     size_t count;
     uint32_t *first, *ends;
     uint32_t *degree; /* neighbours left                                                  */
     uint32_t *order;  /* all vertices by degree; taken away from the front               */
     uint32_t *place;  /* where a vertex lies in order                                     */
     uint32_t *bucket; /* where the vertices of each degree begin                          */
-} tmr_tx_graph;
+} tmc_graph;
 
-static int tmr_tx_graph_build(tmr_tx_graph *g, const txm_mesh *mesh, txm_arena *arena,
-                              const txm_env *env) {
+static int tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
+                           const txm_env *env) {
     const size_t n = mesh->vertex_count, sides = 3 * mesh->face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     g->count = n;
     g->first = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
     g->ends = (uint32_t *)txm_arena_alloc(arena, sides, 2 * sizeof(uint32_t));
-    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     const int good = g->first && g->ends && sorted;
     for (int pass = 0; pass < 2 && good; pass++) {
         for (size_t i = 0; i < sides; i = txm_mesh_edge_end(mesh, sorted, i)) {
@@ -1157,7 +1155,7 @@ static int tmr_tx_graph_build(tmr_tx_graph *g, const txm_mesh *mesh, txm_arena *
 
 /* Take away the vertex with the fewest neighbours left, over and over; order receives them. Vertices
    lie sorted by degree; one that loses a neighbour changes places with the first of its degree. */
-static int tmr_tx_smallest_first(tmr_tx_graph *g, txm_arena *arena) {
+static int tmc_smallest_first(tmc_graph *g, txm_arena *arena) {
     const size_t n = g->count;
     g->degree = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->order = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
@@ -1192,7 +1190,7 @@ static int tmr_tx_smallest_first(tmr_tx_graph *g, txm_arena *arena) {
 }
 
 /* Color in the opposite order; taken[c] = v + 1: a neighbour of v has colour c. */
-static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors) {
+static int tmc_color_back(const tmc_graph *g, uint32_t *taken, int *colors) {
     int most = 0;
     for (size_t i = g->count; i-- > 0;) {
         const uint32_t v = g->order[i];
@@ -1209,7 +1207,7 @@ static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors
 
 TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count) {
-    tmr_tx_graph g;
+    tmc_graph g;
     txm_arena arena;
     memset(&g, 0, sizeof g);
     txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
@@ -1221,14 +1219,14 @@ TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env
         if (count) *count = n > 0;
         return TXM_OK;
     }
-    if (tmr_tx_report(env, 0, "edges") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "edges") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     uint32_t *taken = (uint32_t *)txm_arena_zero(&arena, n + 1, sizeof(uint32_t));
-    if (!taken || !tmr_tx_graph_build(&g, mesh, &arena, env) || !tmr_tx_smallest_first(&g, &arena))
-        status = tmr_tx_no_memory(env);
-    else status = tmr_tx_report(env, 0.7, "colors");
+    if (!taken || !tmc_graph_build(&g, mesh, &arena, env) || !tmc_smallest_first(&g, &arena))
+        status = tmc_no_memory(env);
+    else status = tmc_report(env, 0.7, "colors");
     if (status == TXM_OK) {
-        const int most = tmr_tx_color_back(&g, taken, colors);
+        const int most = tmc_color_back(&g, taken, colors);
         if (count) *count = most;
     }
     txm_arena_free(&arena);
@@ -1238,31 +1236,31 @@ TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env
 /* ---- geometry on triangles: patches made ready ----------------------------------------------- */
 
 enum {
-    TMR_TX_MOST_POINTS = 1 << 20 /* of a patch */
+    TMC_MOST_POINTS = 1 << 20 /* of a patch */
 };
-#define TMR_TX_WHOLE 6 /* sixths of a thing that a point inside counts; on a side 3, a corner 1 */
+#define TMC_WHOLE 6 /* sixths of a thing that a point inside counts; on a side 3, a corner 1 */
 
 /* A point of a patch with all that does not depend on the triangle. */
-typedef struct tmr_tx_item {
+typedef struct tmc_item {
     double w[3]; /* weights of the patch's corners                                        */
     double height, scale;
     double turn[4]; /* unit quaternion                                                    */
     uint32_t prototype;
     uint32_t before;      /* sixths of the points before this one                         */
-    uint8_t side, corner; /* on which it lies; TMR_TX_NONE = inside. Of a corner both     */
-} tmr_tx_item;
+    uint8_t side, corner; /* on which it lies; TMC_NONE = inside. Of a corner both     */
+} tmc_item;
 
-typedef struct tmr_tx_kit {
-    const tmr_tx_item *items;
+typedef struct tmc_kit {
+    const tmc_item *items;
     const uint32_t *rim; /* numbers of the items on sides and corners, rising             */
     uint32_t count, rim_count;
     uint32_t sixths; /* of all points                                                     */
-} tmr_tx_kit;
+} tmc_kit;
 
-typedef struct tmr_tx_scatter {
+typedef struct tmc_scatter {
     const trimesh_scatter_desc *desc;
     const float *normals;
-    const tmr_tx_kit *kits;
+    const tmc_kit *kits;
     const uint8_t *owned; /* 1 per triangle: bit k = its side k, bit 3 + k = its corner k; NULL =
                              no patch has points there                                    */
     double *area;         /* 1 per triangle, at the height                                */
@@ -1271,13 +1269,13 @@ typedef struct tmr_tx_scatter {
     const double *mix;    /* sums of the shares                                           */
     uint64_t key;         /* of the seed                                                  */
     trimesh_instance *out;
-} tmr_tx_scatter;
+} tmc_scatter;
 
-static txm_status tmr_tx_check_point(const trimesh_point *p, size_t patch, size_t i, txm_env *env) {
+static txm_status tmc_check_point(const trimesh_point *p, size_t patch, size_t i, txm_env *env) {
     const char *why = NULL;
     double turn = 0;
     for (int k = 0; k < 4; k++) turn += (double)p->rotation[k] * p->rotation[k];
-    if (!(p->u >= 0 && p->v >= 0 && (double)p->u + p->v <= 1 + TMR_TX_SNAP))
+    if (!(p->u >= 0 && p->v >= 0 && (double)p->u + p->v <= 1 + TMC_SNAP))
         why = "patch #, point #: u and v must be 0 or more, their sum at most 1";
     else if (!(p->height >= -1000 && p->height <= 1000))
         why = "patch #, point #: height must be -1000 to 1000";
@@ -1287,15 +1285,15 @@ static txm_status tmr_tx_check_point(const trimesh_point *p, size_t patch, size_
     return why ? txm_fail_numbers(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
 }
 
-static void tmr_tx_ready_point(const trimesh_point *p, tmr_tx_item *item) {
+static void tmc_ready_point(const trimesh_point *p, tmc_item *item) {
     double turn = 0, sum = 0;
     int zeros = 0;
     item->w[0] = 1.0 - p->u - p->v;
     item->w[1] = p->u;
     item->w[2] = p->v;
-    item->side = item->corner = TMR_TX_NONE;
+    item->side = item->corner = TMC_NONE;
     for (int k = 0; k < 3; k++) { /* side k lies opposite corner k + 2 */
-        if (item->w[k] > TMR_TX_SNAP) continue;
+        if (item->w[k] > TMC_SNAP) continue;
         item->w[k] = 0;
         item->side = (uint8_t)((k + 1) % 3);
         zeros++;
@@ -1313,42 +1311,41 @@ static void tmr_tx_ready_point(const trimesh_point *p, tmr_tx_item *item) {
     item->prototype = p->prototype;
 }
 
-static uint32_t tmr_tx_sixths(const tmr_tx_item *item) {
-    return item->corner != TMR_TX_NONE ? 1 : item->side != TMR_TX_NONE ? 3 : TMR_TX_WHOLE;
+static uint32_t tmc_sixths(const tmc_item *item) {
+    return item->corner != TMC_NONE ? 1 : item->side != TMC_NONE ? 3 : TMC_WHOLE;
 }
 
 /* Check all patches and make them ready; *rims: has one points on its sides? */
-static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
-                               tmr_tx_scatter *s, int *rims) {
+static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
+                            tmc_scatter *s, int *rims) {
     size_t total = 0;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         const trimesh_patch *patch = &desc->patches[p];
-        if (patch->count > TMR_TX_MOST_POINTS || (patch->count && !patch->points))
+        if (patch->count > TMC_MOST_POINTS || (patch->count && !patch->points))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "patch # has more than 2^20 points, or points is NULL", p, 0);
         for (size_t i = 0; i < patch->count; i++) {
-            const txm_status status = tmr_tx_check_point(&patch->points[i], p, i, env);
+            const txm_status status = tmc_check_point(&patch->points[i], p, i, env);
             if (status != TXM_OK) return status;
         }
         total += patch->count;
     }
-    tmr_tx_item *items = (tmr_tx_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
+    tmc_item *items = (tmc_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
     uint32_t *rim = (uint32_t *)txm_arena_alloc(arena, total + 1, sizeof *rim);
-    tmr_tx_kit *kits =
-        (tmr_tx_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
-    if (!items || !rim || !kits) return tmr_tx_no_memory(env);
+    tmc_kit *kits = (tmc_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
+    if (!items || !rim || !kits) return tmc_no_memory(env);
     s->kits = kits;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
-        tmr_tx_kit *kit = &kits[p];
+        tmc_kit *kit = &kits[p];
         kit->items = items;
         kit->rim = rim;
         kit->count = (uint32_t)desc->patches[p].count;
         kit->rim_count = kit->sixths = 0;
         for (uint32_t i = 0; i < kit->count; i++) {
-            tmr_tx_ready_point(&desc->patches[p].points[i], &items[i]);
+            tmc_ready_point(&desc->patches[p].points[i], &items[i]);
             items[i].before = kit->sixths;
-            kit->sixths += tmr_tx_sixths(&items[i]);
-            if (items[i].side != TMR_TX_NONE) rim[kit->rim_count++] = i;
+            kit->sixths += tmc_sixths(&items[i]);
+            if (items[i].side != TMC_NONE) rim[kit->rim_count++] = i;
         }
         items += kit->count;
         rim += kit->rim_count;
@@ -1358,12 +1355,12 @@ static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *aren
 }
 
 /* Give every side and every corner to the first triangle that has it. */
-static int tmr_tx_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
+static int tmc_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
     const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     uint8_t *given = (uint8_t *)txm_arena_zero(&scratch, mesh->vertex_count, 1);
     const int good = sorted && given;
     for (size_t i = 0; i < sides && good; i = txm_mesh_edge_end(mesh, sorted, i))
@@ -1377,7 +1374,7 @@ static int tmr_tx_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) 
 }
 
 /* The patch of a triangle and how it is turned. */
-static const tmr_tx_kit *tmr_tx_choice(const tmr_tx_scatter *s, size_t t, size_t *rotation) {
+static const tmc_kit *tmc_choice(const tmc_scatter *s, size_t t, size_t *rotation) {
     const trimesh_scatter_desc *d = s->desc;
     const uint64_t h = txm_hash(s->key + t);
     const size_t random = (size_t)((h >> 32) * (uint64_t)d->patch_count >> 32);
@@ -1386,9 +1383,9 @@ static const tmr_tx_kit *tmr_tx_choice(const tmr_tx_scatter *s, size_t t, size_t
 }
 
 /* May this triangle show the item, turned so? */
-static int tmr_tx_owns(const tmr_tx_scatter *s, size_t t, size_t rotation, const tmr_tx_item *item) {
-    if (item->side == TMR_TX_NONE) return 1;
-    const int corner = item->corner != TMR_TX_NONE;
+static int tmc_owns(const tmc_scatter *s, size_t t, size_t rotation, const tmc_item *item) {
+    if (item->side == TMC_NONE) return 1;
+    const int corner = item->corner != TMC_NONE;
     const size_t there = corner ? item->corner : item->side, here = (there + 3 - rotation) % 3;
     return s->owned[t] >> (here + (corner ? 3 : 0)) & 1;
 }
@@ -1396,19 +1393,19 @@ static int tmr_tx_owns(const tmr_tx_scatter *s, size_t t, size_t rotation, const
 /* ---- geometry on triangles: how many where --------------------------------------------------- */
 
 /* The edge length of the triangle, as heights and scales take it. */
-static double tmr_tx_unit(const tmr_tx_scatter *s, txm_dvec3 area2) {
-    return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMR_TX_H);
+static double tmc_unit(const tmc_scatter *s, txm_dvec3 area2) {
+    return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMC_H);
 }
 
-static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
+static void tmc_area_block(const void *job, size_t first, size_t end) {
+    const tmc_scatter *s = (const tmc_scatter *)job;
     const txm_mesh *mesh = &s->desc->mesh;
     const double height = s->desc->inside ? -s->desc->height : s->desc->height;
     for (size_t t = first; t < end; t++) {
         txm_dvec3 p[3];
         txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 flat = txm_d3_area2(p[0], p[1], p[2]);
-        const double up = height * tmr_tx_unit(s, flat);
+        const double up = height * tmc_unit(s, flat);
         for (size_t k = 0; k < 3; k++) {
             const float *n = s->normals + 3 * (size_t)mesh->indices[3 * t + k];
             p[k] = txm_d3_mad(p[k], txm_d3_load(n), up);
@@ -1420,7 +1417,7 @@ static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
 }
 
 /* every third bit of 30 from the 10 of x */
-static uint32_t tmr_tx_third_bits(uint32_t x) {
+static uint32_t tmc_third_bits(uint32_t x) {
     x = (x | x << 16) & 0x030000ffu;
     x = (x | x << 8) & 0x0300f00fu;
     x = (x | x << 4) & 0x030c30c3u;
@@ -1428,7 +1425,7 @@ static uint32_t tmr_tx_third_bits(uint32_t x) {
 }
 
 /* The triangles along a Morton curve through their middles. pairs: room for 2 per triangle. */
-static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
+static void tmc_morton(const txm_mesh *mesh, txm_pair *pairs) {
     double low[3] = {0, 0, 0}, size = 0;
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         if (i < 3 || mesh->positions[i] < low[i % 3]) low[i % 3] = mesh->positions[i];
@@ -1442,7 +1439,7 @@ static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
         const double at[3] = {sum.x / 3 - low[0], sum.y / 3 - low[1], sum.z / 3 - low[2]};
         for (int k = 0; k < 3; k++) {
             const int cell = size > 0 ? (int)(at[k] / size * 1023.5) : 0;
-            key |= tmr_tx_third_bits((uint32_t)txm_clampi(cell, 0, 1023)) << k;
+            key |= tmc_third_bits((uint32_t)txm_clampi(cell, 0, 1023)) << k;
         }
         pairs[t].key = key;
         pairs[t].value = (uint32_t)t;
@@ -1451,7 +1448,7 @@ static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
 }
 
 /* How long a beginning of a patch comes nearest to so many sixths of a thing. */
-static uint32_t tmr_tx_beginning(const tmr_tx_kit *kit, double sixths) {
+static uint32_t tmc_beginning(const tmc_kit *kit, double sixths) {
     uint32_t low = 0, high = kit->count; /* low points are not too many, high + 1 are */
     while (low < high) {
         const uint32_t middle = (low + high + 1) / 2;
@@ -1460,24 +1457,24 @@ static uint32_t tmr_tx_beginning(const tmr_tx_kit *kit, double sixths) {
         else high = middle - 1;
     }
     if (low == kit->count) return low;
-    const tmr_tx_item *next = &kit->items[low];
-    return sixths - next->before > 0.5 * tmr_tx_sixths(next) ? low + 1 : low;
+    const tmc_item *next = &kit->items[low];
+    return sixths - next->before > 0.5 * tmc_sixths(next) ? low + 1 : low;
 }
 
 /* Fill s->take so that the things on any stretch of the curve are as many as its area wants. */
-static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, txm_env *env) {
+static txm_status tmc_thin(const tmc_scatter *s, const txm_pair *order, txm_env *env) {
     const size_t triangles = s->desc->mesh.face_count;
     double carry = 0, most = 0;
     int short_of = 0;
     for (size_t i = 0; i < triangles; i++) {
         const size_t t = order[i].value;
-        const double wanted = TMR_TX_WHOLE * (double)s->desc->density * s->area[t];
+        const double wanted = TMC_WHOLE * (double)s->desc->density * s->area[t];
         size_t rotation;
-        const tmr_tx_kit *kit = tmr_tx_choice(s, t, &rotation);
-        const uint32_t n = tmr_tx_beginning(kit, wanted + carry);
+        const tmc_kit *kit = tmc_choice(s, t, &rotation);
+        const uint32_t n = tmc_beginning(kit, wanted + carry);
         carry += wanted - (n < kit->count ? kit->items[n].before : kit->sixths);
         /* what one triangle lacks the next few have, but no more than an eighth of it */
-        if (carry > fmax(TMR_TX_WHOLE, wanted / 8)) {
+        if (carry > fmax(TMC_WHOLE, wanted / 8)) {
             short_of = 1;
             carry = 0;
         }
@@ -1485,7 +1482,7 @@ static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, tx
         s->take[t] = n;
     }
     if (!short_of) return TXM_OK;
-    most = ceil(most / TMR_TX_WHOLE);
+    most = ceil(most / TMC_WHOLE);
     return txm_fail_numbers(
         env, TXM_TOO_SMALL,
         "the patches have too few points for this density; the largest triangle "
@@ -1494,15 +1491,15 @@ static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, tx
 }
 
 /* s->offset[t] = instances of triangle t */
-static void tmr_tx_count_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
+static void tmc_count_block(const void *job, size_t first, size_t end) {
+    const tmc_scatter *s = (const tmc_scatter *)job;
     for (size_t t = first; t < end; t++) {
         size_t rotation;
-        const tmr_tx_kit *kit = tmr_tx_choice(s, t, &rotation);
+        const tmc_kit *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         size_t count = take;
         for (uint32_t i = 0; i < kit->rim_count && kit->rim[i] < take; i++)
-            count -= !tmr_tx_owns(s, t, rotation, &kit->items[kit->rim[i]]);
+            count -= !tmc_owns(s, t, rotation, &kit->items[kit->rim[i]]);
         s->offset[t] = count;
     }
 }
@@ -1510,7 +1507,7 @@ static void tmr_tx_count_block(const void *job, size_t first, size_t end) {
 /* ---- geometry on triangles: frames ----------------------------------------------------------- */
 
 /* a after b */
-static void tmr_tx_quat_mul(const double a[4], const double b[4], double out[4]) {
+static void tmc_quat_mul(const double a[4], const double b[4], double out[4]) {
     out[0] = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1];
     out[1] = a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2];
     out[2] = a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0];
@@ -1518,7 +1515,7 @@ static void tmr_tx_quat_mul(const double a[4], const double b[4], double out[4])
 }
 
 /* The quaternion of the frame x, y, z, by its largest component [Shepperd 1978]; not of length 1. */
-static void tmr_tx_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
+static void tmc_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
     const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
                          1 + x.x + y.y + z.z};
     int k = 3;
@@ -1532,7 +1529,7 @@ static void tmr_tx_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]
 }
 
 /* A unit vector at a right angle to the unit vector n, near x if there is one. */
-static txm_dvec3 tmr_tx_tangent(txm_dvec3 x, txm_dvec3 n) {
+static txm_dvec3 tmc_tangent(txm_dvec3 x, txm_dvec3 n) {
     x = txm_d3_mad(x, n, -txm_d3_dot(x, n));
     if (txm_d3_len2(x) > 0) return txm_d3_unit(x);
     const txm_vec3 p = txm_vec3_perpendicular(
@@ -1542,14 +1539,14 @@ static txm_dvec3 tmr_tx_tangent(txm_dvec3 x, txm_dvec3 n) {
 }
 
 /* A triangle that a patch lies on. */
-typedef struct tmr_tx_base {
+typedef struct tmc_base {
     txm_dvec3 p[3], n[3]; /* by the corner of the patch                     */
     txm_dvec3 ex, ey;     /* images of the patch's axes                     */
     txm_dvec3 up;         /* twice the area times the normal                */
     double unit, edge;  /* for heights and scales; the triangle's own     */
-} tmr_tx_base;
+} tmc_base;
 
-static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation, tmr_tx_base *b) {
+static void tmc_base_make(const tmc_scatter *s, size_t t, size_t rotation, tmc_base *b) {
     const txm_mesh *mesh = &s->desc->mesh;
     for (size_t k = 0; k < 3; k++) {
         const size_t v = mesh->indices[3 * t + k], to = (k + rotation) % 3;
@@ -1559,16 +1556,16 @@ static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation,
     b->up = txm_d3_area2(b->p[0], b->p[1], b->p[2]);
     b->ex = txm_d3_sub(b->p[1], b->p[0]);
     b->ey = txm_d3_scale(txm_d3_sub(b->p[2], txm_d3_scale(txm_d3_add(b->p[0], b->p[1]), 0.5)),
-                         1 / TMR_TX_H);
-    b->unit = tmr_tx_unit(s, b->up);
-    b->edge = sqrt(txm_d3_len(b->up) / TMR_TX_H);
+                         1 / TMC_H);
+    b->unit = tmc_unit(s, b->up);
+    b->edge = sqrt(txm_d3_len(b->up) / TMC_H);
 }
 
 /* Phong tessellation [4]: the point p of the triangle moves towards its feet on
    the tangent planes at the corners, here half the way, which on a sphere leads back to it:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
-static txm_dvec3 tmr_tx_bulge(const tmr_tx_base *b, const double w[3], txm_dvec3 p, double curve) {
+static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, double curve) {
     txm_dvec3 sum = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++)
         sum = txm_d3_mad(sum, b->n[k], w[k] * txm_d3_dot(txm_d3_sub(b->p[k], p), b->n[k]));
@@ -1578,7 +1575,7 @@ static txm_dvec3 tmr_tx_bulge(const tmr_tx_base *b, const double w[3], txm_dvec3
 }
 
 /* A random turn about z: half the angle is that of a random point of the disc. */
-static void tmr_tx_spin(uint64_t h, double q[4]) {
+static void tmc_spin(uint64_t h, double q[4]) {
     double x, y, r;
     do {
         h = txm_hash(h + 1);
@@ -1591,7 +1588,7 @@ static void tmr_tx_spin(uint64_t h, double q[4]) {
     q[3] = y / sqrt(r);
 }
 
-static uint32_t tmr_tx_mix(const tmr_tx_scatter *s, uint64_t h) {
+static uint32_t tmc_mix(const tmc_scatter *s, uint64_t h) {
     const int count = s->desc->mix_count;
     const double x = (double)(h >> 11) / 9007199254740992.0 * s->mix[count - 1];
     int k = 0;
@@ -1599,8 +1596,8 @@ static uint32_t tmr_tx_mix(const tmr_tx_scatter *s, uint64_t h) {
     return (uint32_t)k;
 }
 
-static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, const tmr_tx_item *item,
-                              uint64_t h, trimesh_instance *out) {
+static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_item *item,
+                           uint64_t h, trimesh_instance *out) {
     const trimesh_scatter_desc *d = s->desc;
     const double *w = item->w, side = d->inside ? -1 : 1;
     txm_dvec3 p = txm_d3_scale(b->p[0], w[0]), n = txm_d3_scale(b->n[0], w[0]);
@@ -1610,19 +1607,19 @@ static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, con
     }
     n = txm_d3_unit(txm_d3_len2(n) > 0 ? n : b->up);
     if (!(txm_d3_len2(n) > 0)) n = txm_d3(0, 0, 1);
-    if (d->curve > 0) p = txm_d3_add(p, tmr_tx_bulge(b, w, p, d->curve));
+    if (d->curve > 0) p = txm_d3_add(p, tmc_bulge(b, w, p, d->curve));
     p = txm_d3_mad(p, n, side * (item->height + d->height) * b->unit);
     /* In the plane of the triangle the nearest rotation takes x to ex + ey turned back by 90 degrees;
        seen from below, where the winding is the other one, turned forth. */
     const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
-    const txm_dvec3 x = tmr_tx_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
+    const txm_dvec3 x = tmc_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
     const txm_dvec3 z = txm_d3_scale(n, side);
     double q[4], r[4], spin[4];
-    tmr_tx_quat_frame(x, txm_d3_cross(z, x), z, q);
-    tmr_tx_quat_mul(q, item->turn, r);
+    tmc_quat_frame(x, txm_d3_cross(z, x), z, q);
+    tmc_quat_mul(q, item->turn, r);
     if (d->spin) {
-        tmr_tx_spin(h, spin);
-        tmr_tx_quat_mul(r, spin, q);
+        tmc_spin(h, spin);
+        tmc_quat_mul(r, spin, q);
         memcpy(r, q, sizeof r);
     }
     const double length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]);
@@ -1632,22 +1629,22 @@ static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, con
     out->position[2] = txm_float(p.z);
     for (int k = 0; k < 4; k++) out->rotation[k] = txm_float(r[k] * scale);
     out->scale = txm_float(item->scale * b->unit);
-    out->prototype = s->mix ? tmr_tx_mix(s, txm_hash(h)) : item->prototype;
+    out->prototype = s->mix ? tmc_mix(s, txm_hash(h)) : item->prototype;
 }
 
-static void tmr_tx_fill_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
+static void tmc_fill_block(const void *job, size_t first, size_t end) {
+    const tmc_scatter *s = (const tmc_scatter *)job;
     for (size_t t = first; t < end; t++) {
-        tmr_tx_base base;
+        tmc_base base;
         size_t rotation;
-        const tmr_tx_kit *kit = tmr_tx_choice(s, t, &rotation);
+        const tmc_kit *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         trimesh_instance *out = s->out + s->offset[t];
-        tmr_tx_base_make(s, t, rotation, &base);
+        tmc_base_make(s, t, rotation, &base);
         for (uint32_t i = 0; i < take; i++) {
-            const tmr_tx_item *item = &kit->items[i];
-            if (!tmr_tx_owns(s, t, rotation, item)) continue;
-            tmr_tx_place_item(s, &base, item, txm_hash(s->key + ((uint64_t)t << 20 | i) + 1), out);
+            const tmc_item *item = &kit->items[i];
+            if (!tmc_owns(s, t, rotation, item)) continue;
+            tmc_place_item(s, &base, item, txm_hash(s->key + ((uint64_t)t << 20 | i) + 1), out);
             out->triangle = (uint32_t)t;
             out++;
         }
@@ -1656,7 +1653,7 @@ static void tmr_tx_fill_block(const void *job, size_t first, size_t end) {
 
 /* ---- geometry on triangles: public ----------------------------------------------------------- */
 
-static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *env) {
+static txm_status tmc_check_choices(const trimesh_scatter_desc *d, txm_env *env) {
     for (size_t t = 0; t < d->mesh.face_count; t++) {
         if (d->choices && (d->choices[t] < 0 || d->choices[t] >= d->patch_count))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
@@ -1668,12 +1665,12 @@ static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *e
     return TXM_OK;
 }
 
-static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *env) {
+static txm_status tmc_check_scatter(const trimesh_scatter_desc *d, txm_env *env) {
     double sum = 0;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_scatter_desc");
     const txm_status status = txm_mesh_check(&d->mesh, "mesh", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
-    if (d->normals && !tmr_tx_are_finite(d->normals, 3 * d->mesh.vertex_count))
+    if (d->normals && !tmc_are_finite(d->normals, 3 * d->mesh.vertex_count))
         return txm_fail(env, TXM_BAD_ARGUMENT, "normals must be finite");
     if (!d->patches || d->patch_count < 1 || d->patch_count > 65536)
         return txm_fail(env, TXM_BAD_ARGUMENT, "patch_count must be 1 to 65536, patches not NULL");
@@ -1693,35 +1690,34 @@ static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *e
         sum += d->mix[i];
     }
     if (d->mix && !(sum > 0)) return txm_fail(env, TXM_BAD_ARGUMENT, "mix must not be all 0");
-    return tmr_tx_check_choices(d, env);
+    return tmc_check_choices(d, env);
 }
 
 /* Areas, and from them how much of each patch is used. */
-static txm_status tmr_tx_plan_density(tmr_tx_scatter *s, txm_arena *arena, txm_env *env) {
+static txm_status tmc_plan_density(tmc_scatter *s, txm_arena *arena, txm_env *env) {
     const size_t triangles = s->desc->mesh.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     s->take = (uint32_t *)txm_arena_alloc(arena, triangles, sizeof(uint32_t));
     s->area = (double *)txm_arena_alloc(&scratch, triangles, sizeof(double));
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, triangles, 2 * sizeof(txm_pair));
-    txm_status status = s->take && s->area && pairs ? TXM_OK : tmr_tx_no_memory(env);
-    if (status == TXM_OK)
-        status = tmr_tx_spread(tmr_tx_area_block, s, triangles, 0.1, 0.2, "areas", env);
+    txm_status status = s->take && s->area && pairs ? TXM_OK : tmc_no_memory(env);
+    if (status == TXM_OK) status = tmc_spread(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
     if (status == TXM_OK) {
-        tmr_tx_morton(&s->desc->mesh, pairs);
-        status = tmr_tx_thin(s, pairs, env);
+        tmc_morton(&s->desc->mesh, pairs);
+        status = tmc_thin(s, pairs, env);
     }
     txm_arena_free(&scratch);
     return status;
 }
 
 /* All that goes before placing: normals, patches, who owns the sides, counts, offsets. */
-static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
+static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
     const trimesh_scatter_desc *d = s->desc;
     const size_t triangles = d->mesh.face_count;
     int rims = 0;
-    txm_status status = tmr_tx_ready(d, arena, env, s, &rims);
-    if (status == TXM_OK) status = tmr_tx_report(env, 0, "patches");
+    txm_status status = tmc_ready(d, arena, env, s, &rims);
+    if (status == TXM_OK) status = tmc_report(env, 0, "patches");
     if (status != TXM_OK) return status;
     s->normals = d->normals;
     if (!s->normals) {
@@ -1730,25 +1726,25 @@ static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env,
         memset(&quiet, 0, sizeof quiet);
         if (env) quiet = *env;
         quiet.progress = NULL; /* its bar is not the call's */
-        if (!n || trimesh_normals(&d->mesh, &quiet, n) != TXM_OK) return tmr_tx_no_memory(env);
+        if (!n || trimesh_normals(&d->mesh, &quiet, n) != TXM_OK) return tmc_no_memory(env);
         s->normals = n;
     }
     if (d->mix) {
         double *mix = (double *)txm_arena_alloc(arena, (size_t)d->mix_count, sizeof(double));
-        if (!mix) return tmr_tx_no_memory(env);
+        if (!mix) return tmc_no_memory(env);
         for (int i = 0; i < d->mix_count; i++) mix[i] = d->mix[i] + (i ? mix[i - 1] : 0);
         s->mix = mix;
     }
     if (rims) {
         uint8_t *owned = (uint8_t *)txm_arena_zero(arena, triangles, 1);
-        if (!owned || !tmr_tx_own(&d->mesh, env, owned)) return tmr_tx_no_memory(env);
+        if (!owned || !tmc_own(&d->mesh, env, owned)) return tmc_no_memory(env);
         s->owned = owned;
     }
-    if (d->density > 0) status = tmr_tx_plan_density(s, arena, env);
+    if (d->density > 0) status = tmc_plan_density(s, arena, env);
     if (status != TXM_OK) return status;
     s->offset = (size_t *)txm_arena_alloc(arena, triangles, sizeof(size_t));
-    if (!s->offset) return tmr_tx_no_memory(env);
-    status = tmr_tx_spread(tmr_tx_count_block, s, triangles, 0.2, 0.3, "counting", env);
+    if (!s->offset) return tmc_no_memory(env);
+    status = tmc_spread(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
     uint64_t sum = 0;
     for (size_t t = 0; t < triangles && status == TXM_OK; t++) {
         const size_t here = s->offset[t];
@@ -1763,9 +1759,9 @@ static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env,
 
 TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
                                        trimesh_instance *out, size_t capacity, size_t *count) {
-    tmr_tx_scatter s;
+    tmc_scatter s;
     txm_arena arena;
-    txm_status status = tmr_tx_check_scatter(desc, env);
+    txm_status status = tmc_check_scatter(desc, env);
     if (status != TXM_OK) return status;
     if (!count) return txm_fail(env, TXM_BAD_ARGUMENT, "count is NULL");
     if (desc->mesh.face_count == 0) {
@@ -1777,13 +1773,12 @@ TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, t
     s.key = txm_hash(desc->seed + 0x9e3779b97f4a7c15u) << 1;
     s.out = out;
     txm_arena_init(&arena, env);
-    status = tmr_tx_plan(&s, &arena, env, count);
+    status = tmc_plan(&s, &arena, env, count);
     if (status == TXM_OK && out && *count > capacity)
         status = txm_fail_numbers(env, TXM_TOO_LARGE, "# instances, but out has room for # only",
                                   *count, capacity);
     if (status == TXM_OK && out)
-        status =
-            tmr_tx_spread(tmr_tx_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
+        status = tmc_spread(tmc_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -1802,37 +1797,37 @@ TRIMESH_COVER_API void trimesh_instance_apply(const trimesh_instance *instance, 
 
 /* ---- geometry on triangles: making patches --------------------------------------------------- */
 
-#define TMR_TX_RADIUS 1.9 /* of influence, in steps; the best of 1.5, 1.7, 1.9, 2.5 */
-#define TMR_TX_FORCE 0.2  /* constant f; of 0.1, 0.2, 0.3, 0.5 */
+#define TMC_RADIUS 1.9 /* of influence, in steps; the best of 1.5, 1.7, 1.9, 2.5 */
+#define TMC_FORCE 0.2  /* constant f; of 0.1, 0.2, 0.3, 0.5 */
 
 /* Points as u, v; the triangles across the sides are taken for mirror images. */
-typedef struct tmr_tx_uv {
+typedef struct tmc_uv {
     double u, v;
-} tmr_tx_uv;
+} tmc_uv;
 
 /* its image in side k, where the weight of the corner opposite changes its sign */
-static tmr_tx_uv tmr_tx_mirror(tmr_tx_uv p, int k) {
+static tmc_uv tmc_mirror(tmc_uv p, int k) {
     const double w = 1 - p.u - p.v, s = k == 0 ? p.v : k == 1 ? w : p.u;
-    tmr_tx_uv q;
+    tmc_uv q;
     q.u = k == 2 ? -s : p.u + s;
     q.v = k == 0 ? -s : p.v + s;
     return q;
 }
 
-static double tmr_tx_uv_dist2(tmr_tx_uv a, tmr_tx_uv b) {
+static double tmc_uv_dist2(tmc_uv a, tmc_uv b) {
     const double u = a.u - b.u, v = a.v - b.v;
     return u * u + u * v + v * v;
 }
 
 /* Every next point is the one furthest from those before and their images. gap: 1 per point. */
-static void tmr_tx_order(trimesh_point *points, size_t count, double *gap) {
-    tmr_tx_uv at;
+static void tmc_order(trimesh_point *points, size_t count, double *gap) {
+    tmc_uv at;
     at.u = at.v = 1.0 / 3;
     for (size_t i = 0; i < count; i++) { /* the first: nearest to the middle */
-        tmr_tx_uv p;
+        tmc_uv p;
         p.u = points[i].u;
         p.v = points[i].v;
-        gap[i] = 100 - tmr_tx_uv_dist2(at, p);
+        gap[i] = 100 - tmc_uv_dist2(at, p);
     }
     for (size_t i = 0; i < count; i++) {
         size_t best = i;
@@ -1845,13 +1840,12 @@ static void tmr_tx_order(trimesh_point *points, size_t count, double *gap) {
         points[i] = chosen;
         at.u = chosen.u;
         at.v = chosen.v;
-        const tmr_tx_uv copies[4] = {at, tmr_tx_mirror(at, 0), tmr_tx_mirror(at, 1),
-                                     tmr_tx_mirror(at, 2)};
+        const tmc_uv copies[4] = {at, tmc_mirror(at, 0), tmc_mirror(at, 1), tmc_mirror(at, 2)};
         for (size_t k = i + 1; k < count; k++) {
-            tmr_tx_uv p;
+            tmc_uv p;
             p.u = points[k].u;
             p.v = points[k].v;
-            for (int c = 0; c < 4; c++) gap[k] = fmin(gap[k], tmr_tx_uv_dist2(copies[c], p));
+            for (int c = 0; c < 4; c++) gap[k] = fmin(gap[k], tmc_uv_dist2(copies[c], p));
         }
     }
 }
@@ -1861,43 +1855,42 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
     if (count == 0) return TXM_OK;
     if (!points) return txm_fail(env, TXM_BAD_ARGUMENT, "points is NULL");
     for (size_t i = 0; i < count; i++) {
-        const txm_status status = tmr_tx_check_point(&points[i], 0, i, env);
+        const txm_status status = tmc_check_point(&points[i], 0, i, env);
         if (status != TXM_OK) return status;
     }
-    if (tmr_tx_report(env, 0, "order") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "order") != TXM_OK) return TXM_CANCELLED;
     double *gap = (double *)txm_alloc(env, count * sizeof(double));
-    if (!gap) return tmr_tx_no_memory(env);
-    tmr_tx_order(points, count, gap);
+    if (!gap) return tmc_no_memory(env);
+    tmc_order(points, count, gap);
     txm_free(env, gap);
     return TXM_OK;
 }
 
 /* Repulsion inside a triangle: `fixed` points on its sides, the others move. */
-typedef struct tmr_tx_swarm {
+typedef struct tmc_swarm {
     int fixed, count;       /* points                                                     */
     int all;                /* with the images near the sides                             */
     double radius, margin;  /* of influence; least weight of a corner for those that move */
-    tmr_tx_uv *at, *to;     /* room for 4 per point                                       */
+    tmc_uv *at, *to;        /* room for 4 per point                                       */
     int *head, *next;       /* which points lie in a cell: a list each                    */
     int cells;              /* a side; cell (0, 0) begins at (-1/2, -1/2)                 */
-} tmr_tx_swarm;
+} tmc_swarm;
 
-static int tmr_tx_cell(const tmr_tx_swarm *s, double x) {
+static int tmc_cell(const tmc_swarm *s, double x) {
     return txm_clampi((int)((x + 0.5) * 0.5 * s->cells), 0, s->cells - 1);
 }
 
-static void tmr_tx_fill_cells(tmr_tx_swarm *s) {
+static void tmc_fill_cells(tmc_swarm *s) {
     s->all = s->count;
     for (int i = s->fixed; i < s->count; i++) {
         for (int k = 0; k < 3; k++) {
-            const tmr_tx_uv image = tmr_tx_mirror(s->at[i], k);
-            if (tmr_tx_uv_dist2(image, s->at[i]) < 4 * s->radius * s->radius)
-                s->at[s->all++] = image;
+            const tmc_uv image = tmc_mirror(s->at[i], k);
+            if (tmc_uv_dist2(image, s->at[i]) < 4 * s->radius * s->radius) s->at[s->all++] = image;
         }
     }
     for (int c = 0; c < s->cells * s->cells; c++) s->head[c] = -1;
     for (int i = 0; i < s->all; i++) {
-        int *head = &s->head[s->cells * tmr_tx_cell(s, s->at[i].v) + tmr_tx_cell(s, s->at[i].u)];
+        int *head = &s->head[s->cells * tmc_cell(s, s->at[i].v) + tmc_cell(s, s->at[i].u)];
         s->next[i] = *head;
         *head = i;
     }
@@ -1906,18 +1899,18 @@ static void tmr_tx_fill_cells(tmr_tx_swarm *s) {
 /* pos_new = pos + sum over the others (r - d) f direction [1, equation 3.1]. The thesis has f = 1/2;
    with all moving at once that swings to and fro, and pairs stay in one place: least distances of
    0.02 to 0.17 steps against 0.7 to 0.8 with these two. */
-static tmr_tx_uv tmr_tx_push(const tmr_tx_swarm *s, int i) {
-    const tmr_tx_uv p = s->at[i];
-    const int column = tmr_tx_cell(s, p.u), row = tmr_tx_cell(s, p.v);
-    tmr_tx_uv to = p;
+static tmc_uv tmc_push(const tmc_swarm *s, int i) {
+    const tmc_uv p = s->at[i];
+    const int column = tmc_cell(s, p.u), row = tmc_cell(s, p.v);
+    tmc_uv to = p;
     for (int c = 0; c < 9; c++) {
         const int x = column + c % 3 - 1, y = row + c / 3 - 1;
         if (x < 0 || y < 0 || x >= s->cells || y >= s->cells) continue;
         for (int j = s->head[s->cells * y + x]; j >= 0; j = s->next[j]) {
-            const double d = sqrt(tmr_tx_uv_dist2(p, s->at[j]));
+            const double d = sqrt(tmc_uv_dist2(p, s->at[j]));
             if (d >= s->radius || !(d > 0)) continue;
-            to.u += TMR_TX_FORCE * (s->radius - d) * (p.u - s->at[j].u) / d;
-            to.v += TMR_TX_FORCE * (s->radius - d) * (p.v - s->at[j].v) / d;
+            to.u += TMC_FORCE * (s->radius - d) * (p.u - s->at[j].u) / d;
+            to.v += TMC_FORCE * (s->radius - d) * (p.v - s->at[j].v) / d;
         }
     }
     const double least = fmin(fmin(to.u, to.v), 1 - to.u - to.v), third = 1.0 / 3;
@@ -1929,7 +1922,7 @@ static tmr_tx_uv tmr_tx_push(const tmr_tx_swarm *s, int i) {
     return to;
 }
 
-static void tmr_tx_swarm_start(tmr_tx_swarm *s, int steps, int hexagonal, uint64_t seed) {
+static void tmc_swarm_start(tmc_swarm *s, int steps, int hexagonal, uint64_t seed) {
     txm_rng rng = txm_rng_make(seed, 0x7061746368u);
     int n = 0;
     for (int k = 0; k < 3; k++) {
@@ -1957,15 +1950,15 @@ static void tmr_tx_swarm_start(tmr_tx_swarm *s, int steps, int hexagonal, uint64
     }
 }
 
-static txm_status tmr_tx_swarm_run(tmr_tx_swarm *s, int rounds, txm_env *env) {
+static txm_status tmc_swarm_run(tmc_swarm *s, int rounds, txm_env *env) {
     for (int r = 0; r < rounds; r++) {
-        const txm_status status = tmr_tx_report(env, 0.8 * r / rounds, "repulsion");
+        const txm_status status = tmc_report(env, 0.8 * r / rounds, "repulsion");
         if (status != TXM_OK) return status;
-        tmr_tx_fill_cells(s);
-        for (int i = s->fixed; i < s->count; i++) s->to[i] = tmr_tx_push(s, i);
+        tmc_fill_cells(s);
+        for (int i = s->fixed; i < s->count; i++) s->to[i] = tmc_push(s, i);
         for (int i = s->fixed; i < s->count; i++) s->at[i] = s->to[i];
     }
-    return tmr_tx_report(env, 0.8, "order");
+    return tmc_report(env, 0.8, "order");
 }
 
 TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
@@ -1973,7 +1966,7 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
                                                size_t *count) {
     trimesh_patch_desc none;
     txm_arena arena;
-    tmr_tx_swarm s;
+    tmc_swarm s;
     memset(&none, 0, sizeof none);
     if (!desc) desc = &none;
     const int wanted = desc->points ? desc->points : 32;
@@ -1995,21 +1988,21 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
     if (capacity < *count)
         return txm_fail_numbers(env, TXM_TOO_LARGE, "# points, but there is room for # only",
                                 *count, capacity);
-    s.radius = TMR_TX_RADIUS / steps;
+    s.radius = TMC_RADIUS / steps;
     s.margin = 0.25 / steps;
     /* a cell spans at least 2 radius / sqrt(3) of u and of v */
-    s.cells = txm_clampi((int)(2 * TMR_TX_H / s.radius), 1, 1024);
+    s.cells = txm_clampi((int)(2 * TMC_H / s.radius), 1, 1024);
     txm_arena_init(&arena, env);
-    s.at = (tmr_tx_uv *)txm_arena_alloc(&arena, *count, 4 * sizeof(tmr_tx_uv));
-    s.to = (tmr_tx_uv *)txm_arena_alloc(&arena, *count, sizeof(tmr_tx_uv));
+    s.at = (tmc_uv *)txm_arena_alloc(&arena, *count, 4 * sizeof(tmc_uv));
+    s.to = (tmc_uv *)txm_arena_alloc(&arena, *count, sizeof(tmc_uv));
     s.next = (int *)txm_arena_alloc(&arena, *count, 4 * sizeof(int));
     s.head = (int *)txm_arena_alloc(&arena, (size_t)s.cells * (size_t)s.cells, sizeof(int));
     double *gap = (double *)txm_arena_alloc(&arena, *count, sizeof(double));
     txm_status status = TXM_OK;
-    if (!s.at || !s.to || !s.next || !s.head || !gap) status = tmr_tx_no_memory(env);
+    if (!s.at || !s.to || !s.next || !s.head || !gap) status = tmc_no_memory(env);
     if (status == TXM_OK) {
-        tmr_tx_swarm_start(&s, steps, desc->hexagonal, desc->seed);
-        status = tmr_tx_swarm_run(&s, desc->hexagonal ? 0 : rounds, env);
+        tmc_swarm_start(&s, steps, desc->hexagonal, desc->seed);
+        status = tmc_swarm_run(&s, desc->hexagonal ? 0 : rounds, env);
     }
     if (status == TXM_OK) {
         memset(points, 0, *count * sizeof *points);
@@ -2017,7 +2010,7 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
             points[i].u = txm_float(s.at[i].u);
             points[i].v = txm_float(s.at[i].v);
         }
-        tmr_tx_order(points, *count, gap);
+        tmc_order(points, *count, gap);
     }
     txm_arena_free(&arena);
     return status;

@@ -5,14 +5,14 @@
 
 /* ---- attributes ------------------------------------------------------------------------------ */
 
-typedef struct tmr_tx_values {
+typedef struct tmc_values {
     const uint32_t *entry; /* which value each corner of the input has */
     const float *values;
     size_t channels;
-} tmr_tx_values;
+} tmc_values;
 
-static txm_status tmr_tx_check_values(const txm_mesh *input, const trimesh_values *values,
-                                      txm_env *env, tmr_tx_values *out) {
+static txm_status tmc_check_values(const txm_mesh *input, const trimesh_values *values,
+                                   txm_env *env, tmc_values *out) {
     if (!values) return txm_fail(env, TXM_BAD_ARGUMENT, "values is NULL");
     if (values->channels < 1 || values->channels > TRIMESH_MAX_CHANNELS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "channels must be 1 to TRIMESH_MAX_CHANNELS");
@@ -33,14 +33,14 @@ static txm_status tmr_tx_check_values(const txm_mesh *input, const trimesh_value
                                     i / 3, values->indices[i]);
     }
     for (size_t i = 0; i < values->count; i++) {
-        if (!tmr_tx_are_finite(values->values + out->channels * i, out->channels))
+        if (!tmc_are_finite(values->values + out->channels * i, out->channels))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "values: entry # is not finite", i, 0);
     }
     return TXM_OK;
 }
 
-static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_place *sources,
-                                       size_t count, txm_env *env) {
+static txm_status tmc_check_sources(const txm_mesh *input, const txm_mesh_place *sources,
+                                    size_t count, txm_env *env) {
     if (count > (size_t)INT32_MAX) return txm_fail(env, TXM_TOO_LARGE, "more than 2^31 sources");
     if (count && !sources) return txm_fail(env, TXM_BAD_ARGUMENT, "sources is NULL");
     for (size_t i = 0; i < count; i++) {
@@ -49,7 +49,7 @@ static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_pla
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "source # names triangle #, which the input does not have", i,
                                     s->triangle);
-        if (!(s->u >= 0 && s->v >= 0 && (double)s->u + s->v <= 1 + TMR_TX_SNAP))
+        if (!(s->u >= 0 && s->v >= 0 && (double)s->u + s->v <= 1 + TMC_SNAP))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "u and v of source # must be 0 or more, their sum at most 1", i,
                                     0);
@@ -58,8 +58,7 @@ static txm_status tmr_tx_check_sources(const txm_mesh *input, const txm_mesh_pla
 }
 
 /* out = a + u (b - a) + v (c - a): exact where the three are equal */
-static void tmr_tx_interpolate(const tmr_tx_values *x, size_t triangle, double u, double v,
-                               float *out) {
+static void tmc_interpolate(const tmc_values *x, size_t triangle, double u, double v, float *out) {
     const float *a = x->values + x->channels * x->entry[3 * triangle];
     const float *b = x->values + x->channels * x->entry[3 * triangle + 1];
     const float *c = x->values + x->channels * x->entry[3 * triangle + 2];
@@ -67,40 +66,40 @@ static void tmr_tx_interpolate(const tmr_tx_values *x, size_t triangle, double u
         out[i] = txm_float(a[i] + u * ((double)b[i] - a[i]) + v * ((double)c[i] - a[i]));
 }
 
-typedef struct tmr_tx_transfer {
-    tmr_tx_values values;
+typedef struct tmc_transfer {
+    tmc_values values;
     const txm_mesh_place *sources;
     float *out;
-} tmr_tx_transfer;
+} tmc_transfer;
 
-static void tmr_tx_transfer_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_transfer *j = (const tmr_tx_transfer *)job;
+static void tmc_transfer_block(const void *job, size_t first, size_t end) {
+    const tmc_transfer *j = (const tmc_transfer *)job;
     for (size_t i = first; i < end; i++) {
         const txm_mesh_place *s = &j->sources[i];
-        tmr_tx_interpolate(&j->values, s->triangle, s->u, s->v, j->out + j->values.channels * i);
+        tmc_interpolate(&j->values, s->triangle, s->u, s->v, j->out + j->values.channels * i);
     }
 }
 
 TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
                                         const txm_mesh_place *sources, size_t count, txm_env *env,
                                         float *out) {
-    tmr_tx_transfer j;
+    tmc_transfer j;
     txm_status status = txm_mesh_check(input, "input", 3, 0, TRIMESH_MAX_VERTICES, env);
-    if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &j.values);
-    if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, count, env);
+    if (status == TXM_OK) status = tmc_check_values(input, values, env, &j.values);
+    if (status == TXM_OK) status = tmc_check_sources(input, sources, count, env);
     if (status != TXM_OK || count == 0) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     j.sources = sources;
     j.out = out;
-    return tmr_tx_spread(tmr_tx_transfer_block, &j, count, 0, 1, "values", env);
+    return tmc_spread(tmc_transfer_block, &j, count, 0, 1, "values", env);
 }
 
 /* ---- attributes: paths on the input ---------------------------------------------------------- */
 
 /* The input as paths see it. */
-typedef struct tmr_tx_paths {
+typedef struct tmc_paths {
     txm_mesh input;
-    tmr_tx_values values;
+    tmc_values values;
     const txm_mesh *mesh;
     const txm_mesh_place *sources;
     uint32_t *welded; /* 1 per vertex: the first vertex in the same place                  */
@@ -108,22 +107,22 @@ typedef struct tmr_tx_paths {
     uint32_t *next;   /* 1 per side, see txm_mesh_link                                     */
     uint8_t *seam;    /* 1 per side: 0 = none, 1 = seam, 2 = none or several on the other side */
     float *out;
-} tmr_tx_paths;
+} tmc_paths;
 
 /* A place on the input: (1 - u - v) a + u b + v c of a triangle. */
-typedef struct tmr_tx_place {
+typedef struct tmc_place {
     size_t triangle;
     double u, v;
-} tmr_tx_place;
+} tmc_place;
 
-static txm_dvec3 tmr_tx_point(const txm_mesh *input, tmr_tx_place at) {
+static txm_dvec3 tmc_point(const txm_mesh *input, tmc_place at) {
     txm_dvec3 p[3];
     txm_mesh_triangle(input, at.triangle, p);
     return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
 /* Number vertices in equal places alike. pairs: room for 2 per vertex. */
-static void tmr_tx_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
+static void tmc_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
     const size_t n = input->vertex_count;
     for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
     for (size_t axis = 3; axis-- > 0;) {
@@ -140,7 +139,7 @@ static void tmr_tx_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded
     }
 }
 
-static int tmr_tx_equal_values(const tmr_tx_values *x, size_t corner, size_t other) {
+static int tmc_equal_values(const tmc_values *x, size_t corner, size_t other) {
     const float *a = x->values + x->channels * x->entry[corner];
     const float *b = x->values + x->channels * x->entry[other];
     for (size_t i = 0; i < x->channels; i++) {
@@ -149,7 +148,7 @@ static int tmr_tx_equal_values(const tmr_tx_values *x, size_t corner, size_t oth
     return 1;
 }
 
-static uint8_t tmr_tx_seam(const tmr_tx_paths *p, size_t side) {
+static uint8_t tmc_seam(const tmc_paths *p, size_t side) {
     const size_t other = p->next[side];
     if (other == side || p->next[other] != side) return 2;
     size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, whichever way round */
@@ -157,11 +156,11 @@ static uint8_t tmr_tx_seam(const tmr_tx_paths *p, size_t side) {
         a = b;
         b = other;
     }
-    return !(tmr_tx_equal_values(&p->values, side, a) &&
-             tmr_tx_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
+    return !(tmc_equal_values(&p->values, side, a) &&
+             tmc_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
 }
 
-static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env *env) {
+static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) {
     const size_t n = p->input.vertex_count, sides = 3 * p->input.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
@@ -171,37 +170,37 @@ static txm_status tmr_tx_paths_build(tmr_tx_paths *p, txm_arena *arena, txm_env 
     p->seam = (uint8_t *)txm_arena_alloc(arena, sides, 1);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
     txm_status status = TXM_OK;
-    if (!p->welded || !p->vertex || !p->next || !p->seam || !pairs) status = tmr_tx_no_memory(env);
-    if (status == TXM_OK) tmr_tx_weld(&p->input, pairs, p->welded);
+    if (!p->welded || !p->vertex || !p->next || !p->seam || !pairs) status = tmc_no_memory(env);
+    if (status == TXM_OK) tmc_weld(&p->input, pairs, p->welded);
     txm_arena_free(&scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->vertex[i] = p->welded[p->input.indices[i]];
     txm_mesh whole = p->input;
     whole.indices = p->vertex;
-    if (!tmr_tx_link(&whole, p->next, env)) return tmr_tx_no_memory(env);
-    for (size_t i = 0; i < sides; i++) p->seam[i] = tmr_tx_seam(p, i);
+    if (!tmc_link(&whole, p->next, env)) return tmc_no_memory(env);
+    for (size_t i = 0; i < sides; i++) p->seam[i] = tmc_seam(p, i);
     return TXM_OK;
 }
 
 /* A path: from `start` towards `end` in the plane through both along `up`. */
-typedef struct tmr_tx_path {
+typedef struct tmc_path {
     txm_dvec3 start, ahead, across; /* ahead: to the end; across: normal of the plane           */
     double reach;                 /* |ahead|^2                                                */
     size_t goal;                  /* the triangle of the end; SIZE_MAX = not known            */
     int through;                  /* cross seams                                              */
-} tmr_tx_path;
+} tmc_path;
 
 /* Where the plane meets a side, as a share of it. The values on both sides of the plane are computed
    from the vertex alone, so that all triangles there agree. */
-static double tmr_tx_cut(const tmr_tx_path *w, const txm_dvec3 c[3], size_t k) {
+static double tmc_cut(const tmc_path *w, const txm_dvec3 c[3], size_t k) {
     const double f = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across);
     const double g = txm_d3_dot(txm_d3_sub(c[(k + 1) % 3], w->start), w->across);
     return f / (f - g);
 }
 
 /* the place at share s of side k of a triangle */
-static tmr_tx_place tmr_tx_on_side(size_t triangle, size_t k, double s) {
-    tmr_tx_place at;
+static tmc_place tmc_on_side(size_t triangle, size_t k, double s) {
+    tmc_place at;
     at.triangle = triangle;
     s = s >= 0 ? s <= 1 ? s : 1 : 0;
     at.u = k == 0 ? s : k == 1 ? 1 - s : 0;
@@ -209,13 +208,13 @@ static tmr_tx_place tmr_tx_on_side(size_t triangle, size_t k, double s) {
     return at;
 }
 
-static double tmr_tx_along(const tmr_tx_path *w, txm_dvec3 x) {
+static double tmc_along(const tmc_path *w, txm_dvec3 x) {
     return txm_d3_dot(txm_d3_sub(x, w->start), w->ahead);
 }
 
 /* The side by which the path leaves a triangle: the one that the plane meets, other than the side
    `from` (0..2, or 3: at the start, then the one further ahead). 3 if there is none. */
-static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t from) {
+static size_t tmc_exit(const tmc_path *w, const txm_dvec3 c[3], size_t from) {
     int above[3];
     size_t best = 3;
     double furthest = 0;
@@ -224,8 +223,8 @@ static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t fro
     for (size_t k = 0; k < 3; k++) {
         const size_t n = (k + 1) % 3;
         if (above[k] == above[n] || k == from) continue;
-        const double s = tmr_tx_cut(w, c, k);
-        const double along = tmr_tx_along(w, txm_d3_mad(c[k], txm_d3_sub(c[n], c[k]), s));
+        const double s = tmc_cut(w, c, k);
+        const double along = tmc_along(w, txm_d3_mad(c[k], txm_d3_sub(c[n], c[k]), s));
         if (best != 3 && along <= furthest) continue;
         best = k;
         furthest = along;
@@ -235,31 +234,31 @@ static size_t tmr_tx_exit(const tmr_tx_path *w, const txm_dvec3 c[3], size_t fro
 
 /* Follow a path. *at is its start and receives its end: where it meets a seam, or what lies at the
    end's distance. 1 if it came to the goal triangle. */
-static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place *at) {
+static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
     size_t triangle = at->triangle, from = 3;
     int reached = 0;
     for (int step = 0; step < 1 << 16; step++) {
         txm_dvec3 c[3];
         if (triangle == w->goal) return 1;
         txm_mesh_triangle(&p->input, triangle, c);
-        const size_t k = tmr_tx_exit(w, c, from);
+        const size_t k = tmc_exit(w, c, from);
         if (k == 3) return 0;
-        const double s = tmr_tx_cut(w, c, k);
+        const double s = tmc_cut(w, c, k);
         const txm_dvec3 x = txm_d3_mad(c[k], txm_d3_sub(c[(k + 1) % 3], c[k]), s);
-        const double along = tmr_tx_along(w, x), least = -0.5 * w->reach;
-        const tmr_tx_place out = tmr_tx_on_side(triangle, k, s);
+        const double along = tmc_along(w, x), least = -0.5 * w->reach;
+        const tmc_place out = tmc_on_side(triangle, k, s);
         if (!reached && along >= w->reach) {
             /* between the way in and the way out; the end may yet lie in a triangle nearby */
-            tmr_tx_place in = *at;
-            if (from < 3) in = tmr_tx_on_side(triangle, from, tmr_tx_cut(w, c, from));
-            const double before = tmr_tx_along(w, tmr_tx_point(&p->input, in));
+            tmc_place in = *at;
+            if (from < 3) in = tmc_on_side(triangle, from, tmc_cut(w, c, from));
+            const double before = tmc_along(w, tmc_point(&p->input, in));
             const double share = along > before ? (w->reach - before) / (along - before) : 1;
             const double t = share >= 0 ? share <= 1 ? share : 1 : 0;
             at->triangle = triangle;
             at->u = in.u + t * (out.u - in.u);
             at->v = in.v + t * (out.v - in.v);
             const txm_dvec3 gap =
-                txm_d3_sub(tmr_tx_point(&p->input, *at), txm_d3_add(w->start, w->ahead));
+                txm_d3_sub(tmc_point(&p->input, *at), txm_d3_add(w->start, w->ahead));
             if (w->goal == SIZE_MAX || txm_d3_len2(gap) <= 1e-12 * w->reach) return 0;
             reached = 1;
         }
@@ -275,12 +274,12 @@ static int tmr_tx_walk(const tmr_tx_paths *p, const tmr_tx_path *w, tmr_tx_place
 
 /* A path from a place, which is first moved a little into its triangle: so the plane certainly cuts
    two sides of it, and a start in a corner needs no search of the fan. */
-static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, txm_dvec3 end,
-                                    txm_dvec3 up, size_t goal, int through) {
-    tmr_tx_path w;
+static tmc_path tmc_path_make(const tmc_paths *p, tmc_place *at, txm_dvec3 end, txm_dvec3 up,
+                              size_t goal, int through) {
+    tmc_path w;
     at->u += 1e-3 * (1.0 / 3 - at->u);
     at->v += 1e-3 * (1.0 / 3 - at->v);
-    w.start = tmr_tx_point(&p->input, *at);
+    w.start = tmc_point(&p->input, *at);
     w.ahead = txm_d3_sub(end, w.start);
     w.across = txm_d3_cross(up, w.ahead);
     w.reach = txm_d3_len2(w.ahead);
@@ -290,55 +289,55 @@ static tmr_tx_path tmr_tx_path_make(const tmr_tx_paths *p, tmr_tx_place *at, txm
 }
 
 /* The values at the corners of one triangle of the mesh. */
-static void tmr_tx_transfer_face(const tmr_tx_paths *p, size_t t) {
-    tmr_tx_place from[3];
+static void tmc_transfer_face(const tmc_paths *p, size_t t) {
+    tmc_place from[3];
     txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
         const txm_mesh_place *s = &p->sources[p->mesh->indices[3 * t + k]];
         from[k].triangle = s->triangle;
         from[k].u = s->u;
         from[k].v = s->v;
-        c[k] = tmr_tx_point(&p->input, from[k]);
+        c[k] = tmc_point(&p->input, from[k]);
     }
     const txm_dvec3 up = txm_d3_unit(txm_d3_area2(c[0], c[1], c[2]));
     const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(c[0], c[1]), c[2]), 1.0 / 3);
-    tmr_tx_place centre = from[0];
-    const tmr_tx_path way = tmr_tx_path_make(p, &centre, middle, up, SIZE_MAX, 1);
-    if (way.reach > 0) tmr_tx_walk(p, &way, &centre);
+    tmc_place centre = from[0];
+    const tmc_path way = tmc_path_make(p, &centre, middle, up, SIZE_MAX, 1);
+    if (way.reach > 0) tmc_walk(p, &way, &centre);
     for (size_t k = 0; k < 3; k++) {
-        tmr_tx_place at = centre;
-        const tmr_tx_path w = tmr_tx_path_make(p, &at, c[k], up, from[k].triangle, 0);
-        if (tmr_tx_walk(p, &w, &at)) at = from[k];
-        tmr_tx_interpolate(&p->values, at.triangle, at.u, at.v,
-                           p->out + p->values.channels * (3 * t + k));
+        tmc_place at = centre;
+        const tmc_path w = tmc_path_make(p, &at, c[k], up, from[k].triangle, 0);
+        if (tmc_walk(p, &w, &at)) at = from[k];
+        tmc_interpolate(&p->values, at.triangle, at.u, at.v,
+                        p->out + p->values.channels * (3 * t + k));
     }
 }
 
-static void tmr_tx_transfer_faces(const void *job, size_t first, size_t end) {
-    for (size_t t = first; t < end; t++) tmr_tx_transfer_face((const tmr_tx_paths *)job, t);
+static void tmc_transfer_faces(const void *job, size_t first, size_t end) {
+    for (size_t t = first; t < end; t++) tmc_transfer_face((const tmc_paths *)job, t);
 }
 
 TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
                                                 const txm_mesh *mesh, const txm_mesh_place *sources,
                                                 txm_env *env, float *out) {
-    tmr_tx_paths p;
+    tmc_paths p;
     txm_arena arena;
     memset(&p, 0, sizeof p);
     txm_status status = txm_mesh_check(input, "input", 3, 1, TRIMESH_MAX_VERTICES, env);
-    if (status == TXM_OK) status = tmr_tx_check_values(input, values, env, &p.values);
+    if (status == TXM_OK) status = tmc_check_values(input, values, env, &p.values);
     if (status == TXM_OK) status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
-    if (status == TXM_OK) status = tmr_tx_check_sources(input, sources, mesh->vertex_count, env);
+    if (status == TXM_OK) status = tmc_check_sources(input, sources, mesh->vertex_count, env);
     if (status != TXM_OK || mesh->face_count == 0) return status;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    if (tmr_tx_report(env, 0, "seams") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "seams") != TXM_OK) return TXM_CANCELLED;
     p.input = *input;
     p.mesh = mesh;
     p.sources = sources;
     p.out = out;
     txm_arena_init(&arena, env);
-    status = tmr_tx_paths_build(&p, &arena, env);
+    status = tmc_paths_build(&p, &arena, env);
     if (status == TXM_OK)
-        status = tmr_tx_spread(tmr_tx_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
+        status = tmc_spread(tmc_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -346,27 +345,27 @@ TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, con
 /* ---- attributes: doubled vertices ------------------------------------------------------------ */
 
 /* the bits of a float, one pattern for both zeros */
-static uint32_t tmr_tx_bits(float x) {
+static uint32_t tmc_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits == 0x80000000u ? 0 : bits;
 }
 
-static int tmr_tx_equal_bits(const float *a, const float *b, size_t count) {
+static int tmc_equal_bits(const float *a, const float *b, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        if (tmr_tx_bits(a[i]) != tmr_tx_bits(b[i])) return 0;
+        if (tmc_bits(a[i]) != tmc_bits(b[i])) return 0;
     }
     return 1;
 }
 
 /* Sort the corners by vertex, and those of one vertex by a hash of their values. */
-static void tmr_tx_sort_corners(const txm_mesh *mesh, const float *values, size_t channels,
-                                txm_pair *pairs) {
+static void tmc_sort_corners(const txm_mesh *mesh, const float *values, size_t channels,
+                             txm_pair *pairs) {
     const size_t n = 3 * mesh->face_count;
     for (size_t c = 0; c < n; c++) {
         uint64_t hash = 0;
         for (size_t i = 0; i < channels; i++)
-            hash = txm_hash(hash + tmr_tx_bits(values[channels * c + i]) + 1);
+            hash = txm_hash(hash + tmc_bits(values[channels * c + i]) + 1);
         pairs[c].key = (uint32_t)(hash >> 32);
         pairs[c].value = (uint32_t)c;
     }
@@ -386,21 +385,21 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
     if (!count || (mesh->face_count && !values))
         return txm_fail(env, TXM_BAD_ARGUMENT, "values or count is NULL");
     const size_t n = 3 * mesh->face_count, width = (size_t)channels;
-    if (tmr_tx_report(env, 0, "corners") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "corners") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&arena, n, 2 * sizeof(txm_pair));
     size_t made = 0;
     if (n && !pairs) {
-        status = tmr_tx_no_memory(env);
+        status = tmc_no_memory(env);
         goto done;
     }
-    tmr_tx_sort_corners(mesh, values, width, pairs);
+    tmc_sort_corners(mesh, values, width, pairs);
     /* Equal corners now follow each other, but for the rare ones whose hashes are equal by chance: a
        new vertex more then, which does no harm. */
     for (size_t i = 0; i < n; i++) {
         const size_t c = pairs[i].value, before = pairs[i ? i - 1 : 0].value;
         const int fresh = i == 0 || mesh->indices[c] != mesh->indices[before] ||
-                          !tmr_tx_equal_bits(values + width * c, values + width * before, width);
+                          !tmc_equal_bits(values + width * c, values + width * before, width);
         if (fresh && corners) corners[made] = (uint32_t)c;
         made += (size_t)fresh;
         if (new_indices) new_indices[c] = (uint32_t)(made - 1);

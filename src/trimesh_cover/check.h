@@ -6,23 +6,23 @@
 /* ---- what all functions share -------------------------------------------------------------- */
 
 enum {
-    TMR_TX_BLOCK = 1024,  /* triangles or values that a thread takes at a time                    */
-    TMR_TX_NONE = 0xff    /* no corner                                                            */
+    TMC_BLOCK = 1024, /* triangles or values that a thread takes at a time                    */
+    TMC_NONE = 0xff   /* no corner                                                            */
 };
-#define TMR_TX_BATCHES 16 /* rounds of a long loop, between which the caller may cancel           */
-#define TMR_TX_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
-#define TMR_TX_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
+#define TMC_BATCHES 16 /* rounds of a long loop, between which the caller may cancel           */
+#define TMC_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
+#define TMC_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
 
-static txm_status tmr_tx_no_memory(txm_env *env) {
+static txm_status tmc_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the work on the mesh");
 }
 
-static txm_status tmr_tx_report(txm_env *env, double fraction, const char *stage) {
+static txm_status tmc_report(txm_env *env, double fraction, const char *stage) {
     if (!txm_progress(env, txm_float(fraction), stage)) return TXM_OK;
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
-static int tmr_tx_are_finite(const float *values, size_t count) {
+static int tmc_are_finite(const float *values, size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (!txm_is_finite(values[i])) return 0;
     }
@@ -30,42 +30,42 @@ static int tmr_tx_are_finite(const float *values, size_t count) {
 }
 
 /* A loop over count things, of which each block writes its own: what a thread is given. */
-typedef struct tmr_tx_loop {
+typedef struct tmc_loop {
     void (*body)(const void *job, size_t first, size_t end);
     const void *job;
     size_t count, first_block;
-} tmr_tx_loop;
+} tmc_loop;
 
-static void tmr_tx_block(void *context, int index) {
-    const tmr_tx_loop *l = (const tmr_tx_loop *)context;
-    const size_t first = (l->first_block + (size_t)index) * TMR_TX_BLOCK;
-    const size_t end = first + TMR_TX_BLOCK;
+static void tmc_block(void *context, int index) {
+    const tmc_loop *l = (const tmc_loop *)context;
+    const size_t first = (l->first_block + (size_t)index) * TMC_BLOCK;
+    const size_t end = first + TMC_BLOCK;
     l->body(l->job, first, end < l->count ? end : l->count);
 }
 
 /* body(job, first, end) for all of count, spread over threads; progress goes from..to. */
-static txm_status tmr_tx_spread(void (*body)(const void *, size_t, size_t), const void *job,
-                                size_t count, double from, double to, const char *stage,
-                                txm_env *env) {
-    tmr_tx_loop l;
-    const size_t blocks = (count + TMR_TX_BLOCK - 1) / TMR_TX_BLOCK;
+static txm_status tmc_spread(void (*body)(const void *, size_t, size_t), const void *job,
+                             size_t count, double from, double to, const char *stage,
+                             txm_env *env) {
+    tmc_loop l;
+    const size_t blocks = (count + TMC_BLOCK - 1) / TMC_BLOCK;
     l.body = body;
     l.job = job;
     l.count = count;
-    for (size_t b = 0; b < TMR_TX_BATCHES; b++) {
-        const size_t end = blocks * (b + 1) / TMR_TX_BATCHES;
-        l.first_block = blocks * b / TMR_TX_BATCHES;
+    for (size_t b = 0; b < TMC_BATCHES; b++) {
+        const size_t end = blocks * (b + 1) / TMC_BATCHES;
+        l.first_block = blocks * b / TMC_BATCHES;
         if (end == l.first_block) continue;
         const txm_status status =
-            tmr_tx_report(env, from + (to - from) * (double)b / TMR_TX_BATCHES, stage);
+            tmc_report(env, from + (to - from) * (double)b / TMC_BATCHES, stage);
         if (status != TXM_OK) return status;
-        txm_parallel_for(env, (int)(end - l.first_block), tmr_tx_block, &l);
+        txm_parallel_for(env, (int)(end - l.first_block), tmc_block, &l);
     }
     return TXM_OK;
 }
 
 /* The sum of the weighted normals at each vertex; sum holds 3 zeros for each. */
-static void tmr_tx_sum_normals(const txm_mesh *mesh, double *sum) {
+static void tmc_sum_normals(const txm_mesh *mesh, double *sum) {
     for (size_t t = 0; t < mesh->face_count; t++) {
         txm_dvec3 p[3];
         txm_mesh_triangle(mesh, t, p);
@@ -89,13 +89,13 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
     if (status != TXM_OK) return status;
     if (mesh->vertex_count == 0) return TXM_OK;
     if (!normals) return txm_fail(env, TXM_BAD_ARGUMENT, "normals is NULL");
-    if (tmr_tx_report(env, 0, "normals") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "normals") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     double *sum = (double *)txm_arena_zero(&arena, mesh->vertex_count, 3 * sizeof(double));
     if (!sum) {
-        status = tmr_tx_no_memory(env);
+        status = tmc_no_memory(env);
     } else {
-        tmr_tx_sum_normals(mesh, sum);
+        tmc_sum_normals(mesh, sum);
         for (size_t v = 0; v < mesh->vertex_count; v++) {
             const txm_dvec3 n = txm_d3_unit(txm_d3(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
             normals[3 * v] = txm_float(n.x);
@@ -111,7 +111,7 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
 
 /* The sides of a mesh in the order of their edges. NULL without memory; they lie in the arena, and as
    much scratch. */
-static uint32_t *tmr_tx_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
+static uint32_t *tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
     uint32_t *sorted =
         (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
     if (sorted) txm_mesh_sort_sides(mesh, sorted);
@@ -119,10 +119,10 @@ static uint32_t *tmr_tx_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
 }
 
 /* The ring of the sides of each edge, as txm_mesh_link has it. 0 without memory. */
-static int tmr_tx_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
+static int tmc_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     if (sorted) txm_mesh_link(mesh, sorted, 0, next);
     txm_arena_free(&scratch);
     return sorted != NULL;

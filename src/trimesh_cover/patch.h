@@ -5,37 +5,37 @@
 
 /* ---- geometry on triangles: making patches --------------------------------------------------- */
 
-#define TMR_TX_RADIUS 1.9 /* of influence, in steps; the best of 1.5, 1.7, 1.9, 2.5 */
-#define TMR_TX_FORCE 0.2  /* constant f; of 0.1, 0.2, 0.3, 0.5 */
+#define TMC_RADIUS 1.9 /* of influence, in steps; the best of 1.5, 1.7, 1.9, 2.5 */
+#define TMC_FORCE 0.2  /* constant f; of 0.1, 0.2, 0.3, 0.5 */
 
 /* Points as u, v; the triangles across the sides are taken for mirror images. */
-typedef struct tmr_tx_uv {
+typedef struct tmc_uv {
     double u, v;
-} tmr_tx_uv;
+} tmc_uv;
 
 /* its image in side k, where the weight of the corner opposite changes its sign */
-static tmr_tx_uv tmr_tx_mirror(tmr_tx_uv p, int k) {
+static tmc_uv tmc_mirror(tmc_uv p, int k) {
     const double w = 1 - p.u - p.v, s = k == 0 ? p.v : k == 1 ? w : p.u;
-    tmr_tx_uv q;
+    tmc_uv q;
     q.u = k == 2 ? -s : p.u + s;
     q.v = k == 0 ? -s : p.v + s;
     return q;
 }
 
-static double tmr_tx_uv_dist2(tmr_tx_uv a, tmr_tx_uv b) {
+static double tmc_uv_dist2(tmc_uv a, tmc_uv b) {
     const double u = a.u - b.u, v = a.v - b.v;
     return u * u + u * v + v * v;
 }
 
 /* Every next point is the one furthest from those before and their images. gap: 1 per point. */
-static void tmr_tx_order(trimesh_point *points, size_t count, double *gap) {
-    tmr_tx_uv at;
+static void tmc_order(trimesh_point *points, size_t count, double *gap) {
+    tmc_uv at;
     at.u = at.v = 1.0 / 3;
     for (size_t i = 0; i < count; i++) { /* the first: nearest to the middle */
-        tmr_tx_uv p;
+        tmc_uv p;
         p.u = points[i].u;
         p.v = points[i].v;
-        gap[i] = 100 - tmr_tx_uv_dist2(at, p);
+        gap[i] = 100 - tmc_uv_dist2(at, p);
     }
     for (size_t i = 0; i < count; i++) {
         size_t best = i;
@@ -48,13 +48,12 @@ static void tmr_tx_order(trimesh_point *points, size_t count, double *gap) {
         points[i] = chosen;
         at.u = chosen.u;
         at.v = chosen.v;
-        const tmr_tx_uv copies[4] = {at, tmr_tx_mirror(at, 0), tmr_tx_mirror(at, 1),
-                                     tmr_tx_mirror(at, 2)};
+        const tmc_uv copies[4] = {at, tmc_mirror(at, 0), tmc_mirror(at, 1), tmc_mirror(at, 2)};
         for (size_t k = i + 1; k < count; k++) {
-            tmr_tx_uv p;
+            tmc_uv p;
             p.u = points[k].u;
             p.v = points[k].v;
-            for (int c = 0; c < 4; c++) gap[k] = fmin(gap[k], tmr_tx_uv_dist2(copies[c], p));
+            for (int c = 0; c < 4; c++) gap[k] = fmin(gap[k], tmc_uv_dist2(copies[c], p));
         }
     }
 }
@@ -64,43 +63,42 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
     if (count == 0) return TXM_OK;
     if (!points) return txm_fail(env, TXM_BAD_ARGUMENT, "points is NULL");
     for (size_t i = 0; i < count; i++) {
-        const txm_status status = tmr_tx_check_point(&points[i], 0, i, env);
+        const txm_status status = tmc_check_point(&points[i], 0, i, env);
         if (status != TXM_OK) return status;
     }
-    if (tmr_tx_report(env, 0, "order") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "order") != TXM_OK) return TXM_CANCELLED;
     double *gap = (double *)txm_alloc(env, count * sizeof(double));
-    if (!gap) return tmr_tx_no_memory(env);
-    tmr_tx_order(points, count, gap);
+    if (!gap) return tmc_no_memory(env);
+    tmc_order(points, count, gap);
     txm_free(env, gap);
     return TXM_OK;
 }
 
 /* Repulsion inside a triangle: `fixed` points on its sides, the others move. */
-typedef struct tmr_tx_swarm {
+typedef struct tmc_swarm {
     int fixed, count;       /* points                                                     */
     int all;                /* with the images near the sides                             */
     double radius, margin;  /* of influence; least weight of a corner for those that move */
-    tmr_tx_uv *at, *to;     /* room for 4 per point                                       */
+    tmc_uv *at, *to;        /* room for 4 per point                                       */
     int *head, *next;       /* which points lie in a cell: a list each                    */
     int cells;              /* a side; cell (0, 0) begins at (-1/2, -1/2)                 */
-} tmr_tx_swarm;
+} tmc_swarm;
 
-static int tmr_tx_cell(const tmr_tx_swarm *s, double x) {
+static int tmc_cell(const tmc_swarm *s, double x) {
     return txm_clampi((int)((x + 0.5) * 0.5 * s->cells), 0, s->cells - 1);
 }
 
-static void tmr_tx_fill_cells(tmr_tx_swarm *s) {
+static void tmc_fill_cells(tmc_swarm *s) {
     s->all = s->count;
     for (int i = s->fixed; i < s->count; i++) {
         for (int k = 0; k < 3; k++) {
-            const tmr_tx_uv image = tmr_tx_mirror(s->at[i], k);
-            if (tmr_tx_uv_dist2(image, s->at[i]) < 4 * s->radius * s->radius)
-                s->at[s->all++] = image;
+            const tmc_uv image = tmc_mirror(s->at[i], k);
+            if (tmc_uv_dist2(image, s->at[i]) < 4 * s->radius * s->radius) s->at[s->all++] = image;
         }
     }
     for (int c = 0; c < s->cells * s->cells; c++) s->head[c] = -1;
     for (int i = 0; i < s->all; i++) {
-        int *head = &s->head[s->cells * tmr_tx_cell(s, s->at[i].v) + tmr_tx_cell(s, s->at[i].u)];
+        int *head = &s->head[s->cells * tmc_cell(s, s->at[i].v) + tmc_cell(s, s->at[i].u)];
         s->next[i] = *head;
         *head = i;
     }
@@ -109,18 +107,18 @@ static void tmr_tx_fill_cells(tmr_tx_swarm *s) {
 /* pos_new = pos + sum over the others (r - d) f direction [1, equation 3.1]. The thesis has f = 1/2;
    with all moving at once that swings to and fro, and pairs stay in one place: least distances of
    0.02 to 0.17 steps against 0.7 to 0.8 with these two. */
-static tmr_tx_uv tmr_tx_push(const tmr_tx_swarm *s, int i) {
-    const tmr_tx_uv p = s->at[i];
-    const int column = tmr_tx_cell(s, p.u), row = tmr_tx_cell(s, p.v);
-    tmr_tx_uv to = p;
+static tmc_uv tmc_push(const tmc_swarm *s, int i) {
+    const tmc_uv p = s->at[i];
+    const int column = tmc_cell(s, p.u), row = tmc_cell(s, p.v);
+    tmc_uv to = p;
     for (int c = 0; c < 9; c++) {
         const int x = column + c % 3 - 1, y = row + c / 3 - 1;
         if (x < 0 || y < 0 || x >= s->cells || y >= s->cells) continue;
         for (int j = s->head[s->cells * y + x]; j >= 0; j = s->next[j]) {
-            const double d = sqrt(tmr_tx_uv_dist2(p, s->at[j]));
+            const double d = sqrt(tmc_uv_dist2(p, s->at[j]));
             if (d >= s->radius || !(d > 0)) continue;
-            to.u += TMR_TX_FORCE * (s->radius - d) * (p.u - s->at[j].u) / d;
-            to.v += TMR_TX_FORCE * (s->radius - d) * (p.v - s->at[j].v) / d;
+            to.u += TMC_FORCE * (s->radius - d) * (p.u - s->at[j].u) / d;
+            to.v += TMC_FORCE * (s->radius - d) * (p.v - s->at[j].v) / d;
         }
     }
     const double least = fmin(fmin(to.u, to.v), 1 - to.u - to.v), third = 1.0 / 3;
@@ -132,7 +130,7 @@ static tmr_tx_uv tmr_tx_push(const tmr_tx_swarm *s, int i) {
     return to;
 }
 
-static void tmr_tx_swarm_start(tmr_tx_swarm *s, int steps, int hexagonal, uint64_t seed) {
+static void tmc_swarm_start(tmc_swarm *s, int steps, int hexagonal, uint64_t seed) {
     txm_rng rng = txm_rng_make(seed, 0x7061746368u);
     int n = 0;
     for (int k = 0; k < 3; k++) {
@@ -160,15 +158,15 @@ static void tmr_tx_swarm_start(tmr_tx_swarm *s, int steps, int hexagonal, uint64
     }
 }
 
-static txm_status tmr_tx_swarm_run(tmr_tx_swarm *s, int rounds, txm_env *env) {
+static txm_status tmc_swarm_run(tmc_swarm *s, int rounds, txm_env *env) {
     for (int r = 0; r < rounds; r++) {
-        const txm_status status = tmr_tx_report(env, 0.8 * r / rounds, "repulsion");
+        const txm_status status = tmc_report(env, 0.8 * r / rounds, "repulsion");
         if (status != TXM_OK) return status;
-        tmr_tx_fill_cells(s);
-        for (int i = s->fixed; i < s->count; i++) s->to[i] = tmr_tx_push(s, i);
+        tmc_fill_cells(s);
+        for (int i = s->fixed; i < s->count; i++) s->to[i] = tmc_push(s, i);
         for (int i = s->fixed; i < s->count; i++) s->at[i] = s->to[i];
     }
-    return tmr_tx_report(env, 0.8, "order");
+    return tmc_report(env, 0.8, "order");
 }
 
 TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
@@ -176,7 +174,7 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
                                                size_t *count) {
     trimesh_patch_desc none;
     txm_arena arena;
-    tmr_tx_swarm s;
+    tmc_swarm s;
     memset(&none, 0, sizeof none);
     if (!desc) desc = &none;
     const int wanted = desc->points ? desc->points : 32;
@@ -198,21 +196,21 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
     if (capacity < *count)
         return txm_fail_numbers(env, TXM_TOO_LARGE, "# points, but there is room for # only",
                                 *count, capacity);
-    s.radius = TMR_TX_RADIUS / steps;
+    s.radius = TMC_RADIUS / steps;
     s.margin = 0.25 / steps;
     /* a cell spans at least 2 radius / sqrt(3) of u and of v */
-    s.cells = txm_clampi((int)(2 * TMR_TX_H / s.radius), 1, 1024);
+    s.cells = txm_clampi((int)(2 * TMC_H / s.radius), 1, 1024);
     txm_arena_init(&arena, env);
-    s.at = (tmr_tx_uv *)txm_arena_alloc(&arena, *count, 4 * sizeof(tmr_tx_uv));
-    s.to = (tmr_tx_uv *)txm_arena_alloc(&arena, *count, sizeof(tmr_tx_uv));
+    s.at = (tmc_uv *)txm_arena_alloc(&arena, *count, 4 * sizeof(tmc_uv));
+    s.to = (tmc_uv *)txm_arena_alloc(&arena, *count, sizeof(tmc_uv));
     s.next = (int *)txm_arena_alloc(&arena, *count, 4 * sizeof(int));
     s.head = (int *)txm_arena_alloc(&arena, (size_t)s.cells * (size_t)s.cells, sizeof(int));
     double *gap = (double *)txm_arena_alloc(&arena, *count, sizeof(double));
     txm_status status = TXM_OK;
-    if (!s.at || !s.to || !s.next || !s.head || !gap) status = tmr_tx_no_memory(env);
+    if (!s.at || !s.to || !s.next || !s.head || !gap) status = tmc_no_memory(env);
     if (status == TXM_OK) {
-        tmr_tx_swarm_start(&s, steps, desc->hexagonal, desc->seed);
-        status = tmr_tx_swarm_run(&s, desc->hexagonal ? 0 : rounds, env);
+        tmc_swarm_start(&s, steps, desc->hexagonal, desc->seed);
+        status = tmc_swarm_run(&s, desc->hexagonal ? 0 : rounds, env);
     }
     if (status == TXM_OK) {
         memset(points, 0, *count * sizeof *points);
@@ -220,7 +218,7 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
             points[i].u = txm_float(s.at[i].u);
             points[i].v = txm_float(s.at[i].v);
         }
-        tmr_tx_order(points, *count, gap);
+        tmc_order(points, *count, gap);
     }
     txm_arena_free(&arena);
     return status;

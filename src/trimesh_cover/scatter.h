@@ -6,31 +6,31 @@
 /* ---- geometry on triangles: patches made ready ----------------------------------------------- */
 
 enum {
-    TMR_TX_MOST_POINTS = 1 << 20 /* of a patch */
+    TMC_MOST_POINTS = 1 << 20 /* of a patch */
 };
-#define TMR_TX_WHOLE 6 /* sixths of a thing that a point inside counts; on a side 3, a corner 1 */
+#define TMC_WHOLE 6 /* sixths of a thing that a point inside counts; on a side 3, a corner 1 */
 
 /* A point of a patch with all that does not depend on the triangle. */
-typedef struct tmr_tx_item {
+typedef struct tmc_item {
     double w[3]; /* weights of the patch's corners                                        */
     double height, scale;
     double turn[4]; /* unit quaternion                                                    */
     uint32_t prototype;
     uint32_t before;      /* sixths of the points before this one                         */
-    uint8_t side, corner; /* on which it lies; TMR_TX_NONE = inside. Of a corner both     */
-} tmr_tx_item;
+    uint8_t side, corner; /* on which it lies; TMC_NONE = inside. Of a corner both     */
+} tmc_item;
 
-typedef struct tmr_tx_kit {
-    const tmr_tx_item *items;
+typedef struct tmc_kit {
+    const tmc_item *items;
     const uint32_t *rim; /* numbers of the items on sides and corners, rising             */
     uint32_t count, rim_count;
     uint32_t sixths; /* of all points                                                     */
-} tmr_tx_kit;
+} tmc_kit;
 
-typedef struct tmr_tx_scatter {
+typedef struct tmc_scatter {
     const trimesh_scatter_desc *desc;
     const float *normals;
-    const tmr_tx_kit *kits;
+    const tmc_kit *kits;
     const uint8_t *owned; /* 1 per triangle: bit k = its side k, bit 3 + k = its corner k; NULL =
                              no patch has points there                                    */
     double *area;         /* 1 per triangle, at the height                                */
@@ -39,13 +39,13 @@ typedef struct tmr_tx_scatter {
     const double *mix;    /* sums of the shares                                           */
     uint64_t key;         /* of the seed                                                  */
     trimesh_instance *out;
-} tmr_tx_scatter;
+} tmc_scatter;
 
-static txm_status tmr_tx_check_point(const trimesh_point *p, size_t patch, size_t i, txm_env *env) {
+static txm_status tmc_check_point(const trimesh_point *p, size_t patch, size_t i, txm_env *env) {
     const char *why = NULL;
     double turn = 0;
     for (int k = 0; k < 4; k++) turn += (double)p->rotation[k] * p->rotation[k];
-    if (!(p->u >= 0 && p->v >= 0 && (double)p->u + p->v <= 1 + TMR_TX_SNAP))
+    if (!(p->u >= 0 && p->v >= 0 && (double)p->u + p->v <= 1 + TMC_SNAP))
         why = "patch #, point #: u and v must be 0 or more, their sum at most 1";
     else if (!(p->height >= -1000 && p->height <= 1000))
         why = "patch #, point #: height must be -1000 to 1000";
@@ -55,15 +55,15 @@ static txm_status tmr_tx_check_point(const trimesh_point *p, size_t patch, size_
     return why ? txm_fail_numbers(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
 }
 
-static void tmr_tx_ready_point(const trimesh_point *p, tmr_tx_item *item) {
+static void tmc_ready_point(const trimesh_point *p, tmc_item *item) {
     double turn = 0, sum = 0;
     int zeros = 0;
     item->w[0] = 1.0 - p->u - p->v;
     item->w[1] = p->u;
     item->w[2] = p->v;
-    item->side = item->corner = TMR_TX_NONE;
+    item->side = item->corner = TMC_NONE;
     for (int k = 0; k < 3; k++) { /* side k lies opposite corner k + 2 */
-        if (item->w[k] > TMR_TX_SNAP) continue;
+        if (item->w[k] > TMC_SNAP) continue;
         item->w[k] = 0;
         item->side = (uint8_t)((k + 1) % 3);
         zeros++;
@@ -81,42 +81,41 @@ static void tmr_tx_ready_point(const trimesh_point *p, tmr_tx_item *item) {
     item->prototype = p->prototype;
 }
 
-static uint32_t tmr_tx_sixths(const tmr_tx_item *item) {
-    return item->corner != TMR_TX_NONE ? 1 : item->side != TMR_TX_NONE ? 3 : TMR_TX_WHOLE;
+static uint32_t tmc_sixths(const tmc_item *item) {
+    return item->corner != TMC_NONE ? 1 : item->side != TMC_NONE ? 3 : TMC_WHOLE;
 }
 
 /* Check all patches and make them ready; *rims: has one points on its sides? */
-static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
-                               tmr_tx_scatter *s, int *rims) {
+static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
+                            tmc_scatter *s, int *rims) {
     size_t total = 0;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         const trimesh_patch *patch = &desc->patches[p];
-        if (patch->count > TMR_TX_MOST_POINTS || (patch->count && !patch->points))
+        if (patch->count > TMC_MOST_POINTS || (patch->count && !patch->points))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
                                     "patch # has more than 2^20 points, or points is NULL", p, 0);
         for (size_t i = 0; i < patch->count; i++) {
-            const txm_status status = tmr_tx_check_point(&patch->points[i], p, i, env);
+            const txm_status status = tmc_check_point(&patch->points[i], p, i, env);
             if (status != TXM_OK) return status;
         }
         total += patch->count;
     }
-    tmr_tx_item *items = (tmr_tx_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
+    tmc_item *items = (tmc_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
     uint32_t *rim = (uint32_t *)txm_arena_alloc(arena, total + 1, sizeof *rim);
-    tmr_tx_kit *kits =
-        (tmr_tx_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
-    if (!items || !rim || !kits) return tmr_tx_no_memory(env);
+    tmc_kit *kits = (tmc_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
+    if (!items || !rim || !kits) return tmc_no_memory(env);
     s->kits = kits;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
-        tmr_tx_kit *kit = &kits[p];
+        tmc_kit *kit = &kits[p];
         kit->items = items;
         kit->rim = rim;
         kit->count = (uint32_t)desc->patches[p].count;
         kit->rim_count = kit->sixths = 0;
         for (uint32_t i = 0; i < kit->count; i++) {
-            tmr_tx_ready_point(&desc->patches[p].points[i], &items[i]);
+            tmc_ready_point(&desc->patches[p].points[i], &items[i]);
             items[i].before = kit->sixths;
-            kit->sixths += tmr_tx_sixths(&items[i]);
-            if (items[i].side != TMR_TX_NONE) rim[kit->rim_count++] = i;
+            kit->sixths += tmc_sixths(&items[i]);
+            if (items[i].side != TMC_NONE) rim[kit->rim_count++] = i;
         }
         items += kit->count;
         rim += kit->rim_count;
@@ -126,12 +125,12 @@ static txm_status tmr_tx_ready(const trimesh_scatter_desc *desc, txm_arena *aren
 }
 
 /* Give every side and every corner to the first triangle that has it. */
-static int tmr_tx_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
+static int tmc_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
     const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     uint8_t *given = (uint8_t *)txm_arena_zero(&scratch, mesh->vertex_count, 1);
     const int good = sorted && given;
     for (size_t i = 0; i < sides && good; i = txm_mesh_edge_end(mesh, sorted, i))
@@ -145,7 +144,7 @@ static int tmr_tx_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) 
 }
 
 /* The patch of a triangle and how it is turned. */
-static const tmr_tx_kit *tmr_tx_choice(const tmr_tx_scatter *s, size_t t, size_t *rotation) {
+static const tmc_kit *tmc_choice(const tmc_scatter *s, size_t t, size_t *rotation) {
     const trimesh_scatter_desc *d = s->desc;
     const uint64_t h = txm_hash(s->key + t);
     const size_t random = (size_t)((h >> 32) * (uint64_t)d->patch_count >> 32);
@@ -154,9 +153,9 @@ static const tmr_tx_kit *tmr_tx_choice(const tmr_tx_scatter *s, size_t t, size_t
 }
 
 /* May this triangle show the item, turned so? */
-static int tmr_tx_owns(const tmr_tx_scatter *s, size_t t, size_t rotation, const tmr_tx_item *item) {
-    if (item->side == TMR_TX_NONE) return 1;
-    const int corner = item->corner != TMR_TX_NONE;
+static int tmc_owns(const tmc_scatter *s, size_t t, size_t rotation, const tmc_item *item) {
+    if (item->side == TMC_NONE) return 1;
+    const int corner = item->corner != TMC_NONE;
     const size_t there = corner ? item->corner : item->side, here = (there + 3 - rotation) % 3;
     return s->owned[t] >> (here + (corner ? 3 : 0)) & 1;
 }
@@ -164,19 +163,19 @@ static int tmr_tx_owns(const tmr_tx_scatter *s, size_t t, size_t rotation, const
 /* ---- geometry on triangles: how many where --------------------------------------------------- */
 
 /* The edge length of the triangle, as heights and scales take it. */
-static double tmr_tx_unit(const tmr_tx_scatter *s, txm_dvec3 area2) {
-    return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMR_TX_H);
+static double tmc_unit(const tmc_scatter *s, txm_dvec3 area2) {
+    return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMC_H);
 }
 
-static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
+static void tmc_area_block(const void *job, size_t first, size_t end) {
+    const tmc_scatter *s = (const tmc_scatter *)job;
     const txm_mesh *mesh = &s->desc->mesh;
     const double height = s->desc->inside ? -s->desc->height : s->desc->height;
     for (size_t t = first; t < end; t++) {
         txm_dvec3 p[3];
         txm_mesh_triangle(mesh, t, p);
         const txm_dvec3 flat = txm_d3_area2(p[0], p[1], p[2]);
-        const double up = height * tmr_tx_unit(s, flat);
+        const double up = height * tmc_unit(s, flat);
         for (size_t k = 0; k < 3; k++) {
             const float *n = s->normals + 3 * (size_t)mesh->indices[3 * t + k];
             p[k] = txm_d3_mad(p[k], txm_d3_load(n), up);
@@ -188,7 +187,7 @@ static void tmr_tx_area_block(const void *job, size_t first, size_t end) {
 }
 
 /* every third bit of 30 from the 10 of x */
-static uint32_t tmr_tx_third_bits(uint32_t x) {
+static uint32_t tmc_third_bits(uint32_t x) {
     x = (x | x << 16) & 0x030000ffu;
     x = (x | x << 8) & 0x0300f00fu;
     x = (x | x << 4) & 0x030c30c3u;
@@ -196,7 +195,7 @@ static uint32_t tmr_tx_third_bits(uint32_t x) {
 }
 
 /* The triangles along a Morton curve through their middles. pairs: room for 2 per triangle. */
-static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
+static void tmc_morton(const txm_mesh *mesh, txm_pair *pairs) {
     double low[3] = {0, 0, 0}, size = 0;
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         if (i < 3 || mesh->positions[i] < low[i % 3]) low[i % 3] = mesh->positions[i];
@@ -210,7 +209,7 @@ static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
         const double at[3] = {sum.x / 3 - low[0], sum.y / 3 - low[1], sum.z / 3 - low[2]};
         for (int k = 0; k < 3; k++) {
             const int cell = size > 0 ? (int)(at[k] / size * 1023.5) : 0;
-            key |= tmr_tx_third_bits((uint32_t)txm_clampi(cell, 0, 1023)) << k;
+            key |= tmc_third_bits((uint32_t)txm_clampi(cell, 0, 1023)) << k;
         }
         pairs[t].key = key;
         pairs[t].value = (uint32_t)t;
@@ -219,7 +218,7 @@ static void tmr_tx_morton(const txm_mesh *mesh, txm_pair *pairs) {
 }
 
 /* How long a beginning of a patch comes nearest to so many sixths of a thing. */
-static uint32_t tmr_tx_beginning(const tmr_tx_kit *kit, double sixths) {
+static uint32_t tmc_beginning(const tmc_kit *kit, double sixths) {
     uint32_t low = 0, high = kit->count; /* low points are not too many, high + 1 are */
     while (low < high) {
         const uint32_t middle = (low + high + 1) / 2;
@@ -228,24 +227,24 @@ static uint32_t tmr_tx_beginning(const tmr_tx_kit *kit, double sixths) {
         else high = middle - 1;
     }
     if (low == kit->count) return low;
-    const tmr_tx_item *next = &kit->items[low];
-    return sixths - next->before > 0.5 * tmr_tx_sixths(next) ? low + 1 : low;
+    const tmc_item *next = &kit->items[low];
+    return sixths - next->before > 0.5 * tmc_sixths(next) ? low + 1 : low;
 }
 
 /* Fill s->take so that the things on any stretch of the curve are as many as its area wants. */
-static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, txm_env *env) {
+static txm_status tmc_thin(const tmc_scatter *s, const txm_pair *order, txm_env *env) {
     const size_t triangles = s->desc->mesh.face_count;
     double carry = 0, most = 0;
     int short_of = 0;
     for (size_t i = 0; i < triangles; i++) {
         const size_t t = order[i].value;
-        const double wanted = TMR_TX_WHOLE * (double)s->desc->density * s->area[t];
+        const double wanted = TMC_WHOLE * (double)s->desc->density * s->area[t];
         size_t rotation;
-        const tmr_tx_kit *kit = tmr_tx_choice(s, t, &rotation);
-        const uint32_t n = tmr_tx_beginning(kit, wanted + carry);
+        const tmc_kit *kit = tmc_choice(s, t, &rotation);
+        const uint32_t n = tmc_beginning(kit, wanted + carry);
         carry += wanted - (n < kit->count ? kit->items[n].before : kit->sixths);
         /* what one triangle lacks the next few have, but no more than an eighth of it */
-        if (carry > fmax(TMR_TX_WHOLE, wanted / 8)) {
+        if (carry > fmax(TMC_WHOLE, wanted / 8)) {
             short_of = 1;
             carry = 0;
         }
@@ -253,7 +252,7 @@ static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, tx
         s->take[t] = n;
     }
     if (!short_of) return TXM_OK;
-    most = ceil(most / TMR_TX_WHOLE);
+    most = ceil(most / TMC_WHOLE);
     return txm_fail_numbers(
         env, TXM_TOO_SMALL,
         "the patches have too few points for this density; the largest triangle "
@@ -262,15 +261,15 @@ static txm_status tmr_tx_thin(const tmr_tx_scatter *s, const txm_pair *order, tx
 }
 
 /* s->offset[t] = instances of triangle t */
-static void tmr_tx_count_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
+static void tmc_count_block(const void *job, size_t first, size_t end) {
+    const tmc_scatter *s = (const tmc_scatter *)job;
     for (size_t t = first; t < end; t++) {
         size_t rotation;
-        const tmr_tx_kit *kit = tmr_tx_choice(s, t, &rotation);
+        const tmc_kit *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         size_t count = take;
         for (uint32_t i = 0; i < kit->rim_count && kit->rim[i] < take; i++)
-            count -= !tmr_tx_owns(s, t, rotation, &kit->items[kit->rim[i]]);
+            count -= !tmc_owns(s, t, rotation, &kit->items[kit->rim[i]]);
         s->offset[t] = count;
     }
 }
@@ -278,7 +277,7 @@ static void tmr_tx_count_block(const void *job, size_t first, size_t end) {
 /* ---- geometry on triangles: frames ----------------------------------------------------------- */
 
 /* a after b */
-static void tmr_tx_quat_mul(const double a[4], const double b[4], double out[4]) {
+static void tmc_quat_mul(const double a[4], const double b[4], double out[4]) {
     out[0] = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1];
     out[1] = a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2];
     out[2] = a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0];
@@ -286,7 +285,7 @@ static void tmr_tx_quat_mul(const double a[4], const double b[4], double out[4])
 }
 
 /* The quaternion of the frame x, y, z, by its largest component [Shepperd 1978]; not of length 1. */
-static void tmr_tx_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
+static void tmc_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
     const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
                          1 + x.x + y.y + z.z};
     int k = 3;
@@ -300,7 +299,7 @@ static void tmr_tx_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]
 }
 
 /* A unit vector at a right angle to the unit vector n, near x if there is one. */
-static txm_dvec3 tmr_tx_tangent(txm_dvec3 x, txm_dvec3 n) {
+static txm_dvec3 tmc_tangent(txm_dvec3 x, txm_dvec3 n) {
     x = txm_d3_mad(x, n, -txm_d3_dot(x, n));
     if (txm_d3_len2(x) > 0) return txm_d3_unit(x);
     const txm_vec3 p = txm_vec3_perpendicular(
@@ -310,14 +309,14 @@ static txm_dvec3 tmr_tx_tangent(txm_dvec3 x, txm_dvec3 n) {
 }
 
 /* A triangle that a patch lies on. */
-typedef struct tmr_tx_base {
+typedef struct tmc_base {
     txm_dvec3 p[3], n[3]; /* by the corner of the patch                     */
     txm_dvec3 ex, ey;     /* images of the patch's axes                     */
     txm_dvec3 up;         /* twice the area times the normal                */
     double unit, edge;  /* for heights and scales; the triangle's own     */
-} tmr_tx_base;
+} tmc_base;
 
-static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation, tmr_tx_base *b) {
+static void tmc_base_make(const tmc_scatter *s, size_t t, size_t rotation, tmc_base *b) {
     const txm_mesh *mesh = &s->desc->mesh;
     for (size_t k = 0; k < 3; k++) {
         const size_t v = mesh->indices[3 * t + k], to = (k + rotation) % 3;
@@ -327,16 +326,16 @@ static void tmr_tx_base_make(const tmr_tx_scatter *s, size_t t, size_t rotation,
     b->up = txm_d3_area2(b->p[0], b->p[1], b->p[2]);
     b->ex = txm_d3_sub(b->p[1], b->p[0]);
     b->ey = txm_d3_scale(txm_d3_sub(b->p[2], txm_d3_scale(txm_d3_add(b->p[0], b->p[1]), 0.5)),
-                         1 / TMR_TX_H);
-    b->unit = tmr_tx_unit(s, b->up);
-    b->edge = sqrt(txm_d3_len(b->up) / TMR_TX_H);
+                         1 / TMC_H);
+    b->unit = tmc_unit(s, b->up);
+    b->edge = sqrt(txm_d3_len(b->up) / TMC_H);
 }
 
 /* Phong tessellation [4]: the point p of the triangle moves towards its feet on
    the tangent planes at the corners, here half the way, which on a sphere leads back to it:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
-static txm_dvec3 tmr_tx_bulge(const tmr_tx_base *b, const double w[3], txm_dvec3 p, double curve) {
+static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, double curve) {
     txm_dvec3 sum = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++)
         sum = txm_d3_mad(sum, b->n[k], w[k] * txm_d3_dot(txm_d3_sub(b->p[k], p), b->n[k]));
@@ -346,7 +345,7 @@ static txm_dvec3 tmr_tx_bulge(const tmr_tx_base *b, const double w[3], txm_dvec3
 }
 
 /* A random turn about z: half the angle is that of a random point of the disc. */
-static void tmr_tx_spin(uint64_t h, double q[4]) {
+static void tmc_spin(uint64_t h, double q[4]) {
     double x, y, r;
     do {
         h = txm_hash(h + 1);
@@ -359,7 +358,7 @@ static void tmr_tx_spin(uint64_t h, double q[4]) {
     q[3] = y / sqrt(r);
 }
 
-static uint32_t tmr_tx_mix(const tmr_tx_scatter *s, uint64_t h) {
+static uint32_t tmc_mix(const tmc_scatter *s, uint64_t h) {
     const int count = s->desc->mix_count;
     const double x = (double)(h >> 11) / 9007199254740992.0 * s->mix[count - 1];
     int k = 0;
@@ -367,8 +366,8 @@ static uint32_t tmr_tx_mix(const tmr_tx_scatter *s, uint64_t h) {
     return (uint32_t)k;
 }
 
-static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, const tmr_tx_item *item,
-                              uint64_t h, trimesh_instance *out) {
+static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_item *item,
+                           uint64_t h, trimesh_instance *out) {
     const trimesh_scatter_desc *d = s->desc;
     const double *w = item->w, side = d->inside ? -1 : 1;
     txm_dvec3 p = txm_d3_scale(b->p[0], w[0]), n = txm_d3_scale(b->n[0], w[0]);
@@ -378,19 +377,19 @@ static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, con
     }
     n = txm_d3_unit(txm_d3_len2(n) > 0 ? n : b->up);
     if (!(txm_d3_len2(n) > 0)) n = txm_d3(0, 0, 1);
-    if (d->curve > 0) p = txm_d3_add(p, tmr_tx_bulge(b, w, p, d->curve));
+    if (d->curve > 0) p = txm_d3_add(p, tmc_bulge(b, w, p, d->curve));
     p = txm_d3_mad(p, n, side * (item->height + d->height) * b->unit);
     /* In the plane of the triangle the nearest rotation takes x to ex + ey turned back by 90 degrees;
        seen from below, where the winding is the other one, turned forth. */
     const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
-    const txm_dvec3 x = tmr_tx_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
+    const txm_dvec3 x = tmc_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
     const txm_dvec3 z = txm_d3_scale(n, side);
     double q[4], r[4], spin[4];
-    tmr_tx_quat_frame(x, txm_d3_cross(z, x), z, q);
-    tmr_tx_quat_mul(q, item->turn, r);
+    tmc_quat_frame(x, txm_d3_cross(z, x), z, q);
+    tmc_quat_mul(q, item->turn, r);
     if (d->spin) {
-        tmr_tx_spin(h, spin);
-        tmr_tx_quat_mul(r, spin, q);
+        tmc_spin(h, spin);
+        tmc_quat_mul(r, spin, q);
         memcpy(r, q, sizeof r);
     }
     const double length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]);
@@ -400,22 +399,22 @@ static void tmr_tx_place_item(const tmr_tx_scatter *s, const tmr_tx_base *b, con
     out->position[2] = txm_float(p.z);
     for (int k = 0; k < 4; k++) out->rotation[k] = txm_float(r[k] * scale);
     out->scale = txm_float(item->scale * b->unit);
-    out->prototype = s->mix ? tmr_tx_mix(s, txm_hash(h)) : item->prototype;
+    out->prototype = s->mix ? tmc_mix(s, txm_hash(h)) : item->prototype;
 }
 
-static void tmr_tx_fill_block(const void *job, size_t first, size_t end) {
-    const tmr_tx_scatter *s = (const tmr_tx_scatter *)job;
+static void tmc_fill_block(const void *job, size_t first, size_t end) {
+    const tmc_scatter *s = (const tmc_scatter *)job;
     for (size_t t = first; t < end; t++) {
-        tmr_tx_base base;
+        tmc_base base;
         size_t rotation;
-        const tmr_tx_kit *kit = tmr_tx_choice(s, t, &rotation);
+        const tmc_kit *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         trimesh_instance *out = s->out + s->offset[t];
-        tmr_tx_base_make(s, t, rotation, &base);
+        tmc_base_make(s, t, rotation, &base);
         for (uint32_t i = 0; i < take; i++) {
-            const tmr_tx_item *item = &kit->items[i];
-            if (!tmr_tx_owns(s, t, rotation, item)) continue;
-            tmr_tx_place_item(s, &base, item, txm_hash(s->key + ((uint64_t)t << 20 | i) + 1), out);
+            const tmc_item *item = &kit->items[i];
+            if (!tmc_owns(s, t, rotation, item)) continue;
+            tmc_place_item(s, &base, item, txm_hash(s->key + ((uint64_t)t << 20 | i) + 1), out);
             out->triangle = (uint32_t)t;
             out++;
         }
@@ -424,7 +423,7 @@ static void tmr_tx_fill_block(const void *job, size_t first, size_t end) {
 
 /* ---- geometry on triangles: public ----------------------------------------------------------- */
 
-static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *env) {
+static txm_status tmc_check_choices(const trimesh_scatter_desc *d, txm_env *env) {
     for (size_t t = 0; t < d->mesh.face_count; t++) {
         if (d->choices && (d->choices[t] < 0 || d->choices[t] >= d->patch_count))
             return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
@@ -436,12 +435,12 @@ static txm_status tmr_tx_check_choices(const trimesh_scatter_desc *d, txm_env *e
     return TXM_OK;
 }
 
-static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *env) {
+static txm_status tmc_check_scatter(const trimesh_scatter_desc *d, txm_env *env) {
     double sum = 0;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_scatter_desc");
     const txm_status status = txm_mesh_check(&d->mesh, "mesh", 3, 1, TRIMESH_MAX_VERTICES, env);
     if (status != TXM_OK) return status;
-    if (d->normals && !tmr_tx_are_finite(d->normals, 3 * d->mesh.vertex_count))
+    if (d->normals && !tmc_are_finite(d->normals, 3 * d->mesh.vertex_count))
         return txm_fail(env, TXM_BAD_ARGUMENT, "normals must be finite");
     if (!d->patches || d->patch_count < 1 || d->patch_count > 65536)
         return txm_fail(env, TXM_BAD_ARGUMENT, "patch_count must be 1 to 65536, patches not NULL");
@@ -461,35 +460,34 @@ static txm_status tmr_tx_check_scatter(const trimesh_scatter_desc *d, txm_env *e
         sum += d->mix[i];
     }
     if (d->mix && !(sum > 0)) return txm_fail(env, TXM_BAD_ARGUMENT, "mix must not be all 0");
-    return tmr_tx_check_choices(d, env);
+    return tmc_check_choices(d, env);
 }
 
 /* Areas, and from them how much of each patch is used. */
-static txm_status tmr_tx_plan_density(tmr_tx_scatter *s, txm_arena *arena, txm_env *env) {
+static txm_status tmc_plan_density(tmc_scatter *s, txm_arena *arena, txm_env *env) {
     const size_t triangles = s->desc->mesh.face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     s->take = (uint32_t *)txm_arena_alloc(arena, triangles, sizeof(uint32_t));
     s->area = (double *)txm_arena_alloc(&scratch, triangles, sizeof(double));
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, triangles, 2 * sizeof(txm_pair));
-    txm_status status = s->take && s->area && pairs ? TXM_OK : tmr_tx_no_memory(env);
-    if (status == TXM_OK)
-        status = tmr_tx_spread(tmr_tx_area_block, s, triangles, 0.1, 0.2, "areas", env);
+    txm_status status = s->take && s->area && pairs ? TXM_OK : tmc_no_memory(env);
+    if (status == TXM_OK) status = tmc_spread(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
     if (status == TXM_OK) {
-        tmr_tx_morton(&s->desc->mesh, pairs);
-        status = tmr_tx_thin(s, pairs, env);
+        tmc_morton(&s->desc->mesh, pairs);
+        status = tmc_thin(s, pairs, env);
     }
     txm_arena_free(&scratch);
     return status;
 }
 
 /* All that goes before placing: normals, patches, who owns the sides, counts, offsets. */
-static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
+static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
     const trimesh_scatter_desc *d = s->desc;
     const size_t triangles = d->mesh.face_count;
     int rims = 0;
-    txm_status status = tmr_tx_ready(d, arena, env, s, &rims);
-    if (status == TXM_OK) status = tmr_tx_report(env, 0, "patches");
+    txm_status status = tmc_ready(d, arena, env, s, &rims);
+    if (status == TXM_OK) status = tmc_report(env, 0, "patches");
     if (status != TXM_OK) return status;
     s->normals = d->normals;
     if (!s->normals) {
@@ -498,25 +496,25 @@ static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env,
         memset(&quiet, 0, sizeof quiet);
         if (env) quiet = *env;
         quiet.progress = NULL; /* its bar is not the call's */
-        if (!n || trimesh_normals(&d->mesh, &quiet, n) != TXM_OK) return tmr_tx_no_memory(env);
+        if (!n || trimesh_normals(&d->mesh, &quiet, n) != TXM_OK) return tmc_no_memory(env);
         s->normals = n;
     }
     if (d->mix) {
         double *mix = (double *)txm_arena_alloc(arena, (size_t)d->mix_count, sizeof(double));
-        if (!mix) return tmr_tx_no_memory(env);
+        if (!mix) return tmc_no_memory(env);
         for (int i = 0; i < d->mix_count; i++) mix[i] = d->mix[i] + (i ? mix[i - 1] : 0);
         s->mix = mix;
     }
     if (rims) {
         uint8_t *owned = (uint8_t *)txm_arena_zero(arena, triangles, 1);
-        if (!owned || !tmr_tx_own(&d->mesh, env, owned)) return tmr_tx_no_memory(env);
+        if (!owned || !tmc_own(&d->mesh, env, owned)) return tmc_no_memory(env);
         s->owned = owned;
     }
-    if (d->density > 0) status = tmr_tx_plan_density(s, arena, env);
+    if (d->density > 0) status = tmc_plan_density(s, arena, env);
     if (status != TXM_OK) return status;
     s->offset = (size_t *)txm_arena_alloc(arena, triangles, sizeof(size_t));
-    if (!s->offset) return tmr_tx_no_memory(env);
-    status = tmr_tx_spread(tmr_tx_count_block, s, triangles, 0.2, 0.3, "counting", env);
+    if (!s->offset) return tmc_no_memory(env);
+    status = tmc_spread(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
     uint64_t sum = 0;
     for (size_t t = 0; t < triangles && status == TXM_OK; t++) {
         const size_t here = s->offset[t];
@@ -531,9 +529,9 @@ static txm_status tmr_tx_plan(tmr_tx_scatter *s, txm_arena *arena, txm_env *env,
 
 TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
                                        trimesh_instance *out, size_t capacity, size_t *count) {
-    tmr_tx_scatter s;
+    tmc_scatter s;
     txm_arena arena;
-    txm_status status = tmr_tx_check_scatter(desc, env);
+    txm_status status = tmc_check_scatter(desc, env);
     if (status != TXM_OK) return status;
     if (!count) return txm_fail(env, TXM_BAD_ARGUMENT, "count is NULL");
     if (desc->mesh.face_count == 0) {
@@ -545,13 +543,12 @@ TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, t
     s.key = txm_hash(desc->seed + 0x9e3779b97f4a7c15u) << 1;
     s.out = out;
     txm_arena_init(&arena, env);
-    status = tmr_tx_plan(&s, &arena, env, count);
+    status = tmc_plan(&s, &arena, env, count);
     if (status == TXM_OK && out && *count > capacity)
         status = txm_fail_numbers(env, TXM_TOO_LARGE, "# instances, but out has room for # only",
                                   *count, capacity);
     if (status == TXM_OK && out)
-        status =
-            tmr_tx_spread(tmr_tx_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
+        status = tmc_spread(tmc_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
     txm_arena_free(&arena);
     return status;
 }

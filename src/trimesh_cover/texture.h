@@ -17,7 +17,7 @@ TRIMESH_COVER_API txm_status trimesh_atlas_make(int count, int size, int gutter,
     atlas->gutter = g;
     atlas->pitch = s + 2 * g;
     atlas->width = n * atlas->pitch;
-    atlas->height = (int)ceil(s * TMR_TX_H) + 2 * g;
+    atlas->height = (int)ceil(s * TMC_H) + 2 * g;
     return TXM_OK;
 }
 
@@ -28,7 +28,7 @@ TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, fl
         for (int k = 0; k < 3; k++, uv += 2) {
             const double across = k == 0 ? 0 : k == 1 ? 1 : 0.5;
             const double x = (double)p * atlas->pitch + atlas->gutter + across * atlas->size;
-            const double y = atlas->height - atlas->gutter - (k == 2 ? atlas->size * TMR_TX_H : 0);
+            const double y = atlas->height - atlas->gutter - (k == 2 ? atlas->size * TMC_H : 0);
             uv[0] = txm_float(x / atlas->width);
             uv[1] = txm_float(y / atlas->height);
         }
@@ -37,8 +37,8 @@ TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, fl
 }
 
 /* All triangles, each after the one that it was reached from: breadth first. */
-static void tmr_tx_spread_order(const uint32_t *next, size_t triangles, uint8_t *seen,
-                                uint32_t *order) {
+static void tmc_spread_order(const uint32_t *next, size_t triangles, uint8_t *seen,
+                             uint32_t *order) {
     size_t end = 0;
     for (size_t first = 0, at = 0; first < triangles; first++) {
         if (seen[first]) continue;
@@ -57,8 +57,7 @@ static void tmr_tx_spread_order(const uint32_t *next, size_t triangles, uint8_t 
 }
 
 /* How badly a choice goes with the neighbours' so far: 0 = none has this patch. */
-static int tmr_tx_clashes(const uint32_t *next, const int *choice, int patches, size_t t,
-                          int chosen) {
+static int tmc_clashes(const uint32_t *next, const int *choice, int patches, size_t t, int chosen) {
     int sum = 0;
     for (size_t side = 3 * t; side < 3 * t + 3; side++) {
         int looked = 0; /* edges of very many triangles are not worth it */
@@ -73,8 +72,8 @@ static int tmr_tx_clashes(const uint32_t *next, const int *choice, int patches, 
 /* Choose backwards in that order: then every triangle but the last of its piece still has a neighbour
    without a choice, so that two neighbours at most stand in its way. choice = patch + patches *
    rotation. */
-static void tmr_tx_choose(const uint32_t *next, const uint32_t *order, size_t triangles, int patches,
-                          int total, uint64_t seed, int *choice) {
+static void tmc_choose(const uint32_t *next, const uint32_t *order, size_t triangles, int patches,
+                       int total, uint64_t seed, int *choice) {
     for (size_t t = 0; t < triangles; t++) choice[t] = -1;
     for (size_t i = triangles; i-- > 0;) {
         const size_t t = order[i];
@@ -83,7 +82,7 @@ static void tmr_tx_choose(const uint32_t *next, const uint32_t *order, size_t tr
         int best = first, least = INT_MAX;
         for (int k = 0; k < total && k < 64 && least > 0; k++) {
             const int chosen = (int)(((int64_t)first + k) % total);
-            const int clashes = tmr_tx_clashes(next, choice, patches, t, chosen);
+            const int clashes = tmc_clashes(next, choice, patches, t, chosen);
             if (clashes >= least) continue;
             least = clashes;
             best = chosen;
@@ -92,7 +91,7 @@ static void tmr_tx_choose(const uint32_t *next, const uint32_t *order, size_t tr
     }
 }
 
-static void tmr_tx_put_choice(int choice, int patches, size_t t, int *out, int *rotations) {
+static void tmc_put_choice(int choice, int patches, size_t t, int *out, int *rotations) {
     out[t] = choice % patches;
     if (rotations) rotations[t] = choice / patches;
 }
@@ -113,10 +112,10 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     if (count == 0) return TXM_OK;
     if (!patches || (turns == 3 && !rotations))
         return txm_fail(env, TXM_BAD_ARGUMENT, "patches or rotations is NULL");
-    if (tmr_tx_report(env, 0, "patches") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "patches") != TXM_OK) return TXM_CANCELLED;
     for (size_t t = 0; desc->repeat && t < count; t++) {
         txm_rng rng = txm_rng_make(desc->seed, t);
-        tmr_tx_put_choice((int)txm_rng_below(&rng, (uint32_t)(n * turns)), n, t, patches, rotations);
+        tmc_put_choice((int)txm_rng_below(&rng, (uint32_t)(n * turns)), n, t, patches, rotations);
     }
     if (desc->repeat) return TXM_OK;
     txm_arena_init(&arena, env);
@@ -124,15 +123,15 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     uint32_t *order = (uint32_t *)txm_arena_alloc(&arena, count, sizeof(uint32_t));
     int *choice = (int *)txm_arena_alloc(&arena, count, sizeof(int));
     uint8_t *seen = (uint8_t *)txm_arena_zero(&arena, count, 1);
-    if (!next || !order || !choice || !seen || !tmr_tx_link(mesh, next, env)) {
-        status = tmr_tx_no_memory(env);
+    if (!next || !order || !choice || !seen || !tmc_link(mesh, next, env)) {
+        status = tmc_no_memory(env);
     } else {
-        status = tmr_tx_report(env, 0.5, "patches");
+        status = tmc_report(env, 0.5, "patches");
     }
     if (status == TXM_OK) {
-        tmr_tx_spread_order(next, count, seen, order);
-        tmr_tx_choose(next, order, count, n, n * turns, desc->seed, choice);
-        for (size_t t = 0; t < count; t++) tmr_tx_put_choice(choice[t], n, t, patches, rotations);
+        tmc_spread_order(next, count, seen, order);
+        tmc_choose(next, order, count, n, n * turns, desc->seed, choice);
+        for (size_t t = 0; t < count; t++) tmc_put_choice(choice[t], n, t, patches, rotations);
     }
     txm_arena_free(&arena);
     return status;
@@ -202,24 +201,24 @@ TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int coun
 /* ---- texturing: proper colours --------------------------------------------------------------- */
 
 /* Which vertices share an edge: those of v are ends[first[v]] .. ends[first[v + 1] - 1]. */
-typedef struct tmr_tx_graph {
+typedef struct tmc_graph {
     size_t count;
     uint32_t *first, *ends;
     uint32_t *degree; /* neighbours left                                                  */
     uint32_t *order;  /* all vertices by degree; taken away from the front               */
     uint32_t *place;  /* where a vertex lies in order                                     */
     uint32_t *bucket; /* where the vertices of each degree begin                          */
-} tmr_tx_graph;
+} tmc_graph;
 
-static int tmr_tx_graph_build(tmr_tx_graph *g, const txm_mesh *mesh, txm_arena *arena,
-                              const txm_env *env) {
+static int tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
+                           const txm_env *env) {
     const size_t n = mesh->vertex_count, sides = 3 * mesh->face_count;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     g->count = n;
     g->first = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
     g->ends = (uint32_t *)txm_arena_alloc(arena, sides, 2 * sizeof(uint32_t));
-    const uint32_t *sorted = tmr_tx_sort_sides(mesh, &scratch);
+    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     const int good = g->first && g->ends && sorted;
     for (int pass = 0; pass < 2 && good; pass++) {
         for (size_t i = 0; i < sides; i = txm_mesh_edge_end(mesh, sorted, i)) {
@@ -241,7 +240,7 @@ static int tmr_tx_graph_build(tmr_tx_graph *g, const txm_mesh *mesh, txm_arena *
 
 /* Take away the vertex with the fewest neighbours left, over and over; order receives them. Vertices
    lie sorted by degree; one that loses a neighbour changes places with the first of its degree. */
-static int tmr_tx_smallest_first(tmr_tx_graph *g, txm_arena *arena) {
+static int tmc_smallest_first(tmc_graph *g, txm_arena *arena) {
     const size_t n = g->count;
     g->degree = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->order = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
@@ -276,7 +275,7 @@ static int tmr_tx_smallest_first(tmr_tx_graph *g, txm_arena *arena) {
 }
 
 /* Color in the opposite order; taken[c] = v + 1: a neighbour of v has colour c. */
-static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors) {
+static int tmc_color_back(const tmc_graph *g, uint32_t *taken, int *colors) {
     int most = 0;
     for (size_t i = g->count; i-- > 0;) {
         const uint32_t v = g->order[i];
@@ -293,7 +292,7 @@ static int tmr_tx_color_back(const tmr_tx_graph *g, uint32_t *taken, int *colors
 
 TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
                                              int *count) {
-    tmr_tx_graph g;
+    tmc_graph g;
     txm_arena arena;
     memset(&g, 0, sizeof g);
     txm_status status = txm_mesh_check(mesh, "mesh", 3, 0, TRIMESH_MAX_VERTICES, env);
@@ -305,14 +304,14 @@ TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env
         if (count) *count = n > 0;
         return TXM_OK;
     }
-    if (tmr_tx_report(env, 0, "edges") != TXM_OK) return TXM_CANCELLED;
+    if (tmc_report(env, 0, "edges") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     uint32_t *taken = (uint32_t *)txm_arena_zero(&arena, n + 1, sizeof(uint32_t));
-    if (!taken || !tmr_tx_graph_build(&g, mesh, &arena, env) || !tmr_tx_smallest_first(&g, &arena))
-        status = tmr_tx_no_memory(env);
-    else status = tmr_tx_report(env, 0.7, "colors");
+    if (!taken || !tmc_graph_build(&g, mesh, &arena, env) || !tmc_smallest_first(&g, &arena))
+        status = tmc_no_memory(env);
+    else status = tmc_report(env, 0.7, "colors");
     if (status == TXM_OK) {
-        const int most = tmr_tx_color_back(&g, taken, colors);
+        const int most = tmc_color_back(&g, taken, colors);
         if (count) *count = most;
     }
     txm_arena_free(&arena);
