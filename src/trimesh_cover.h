@@ -252,8 +252,9 @@ TRIMESH_COVER_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int color
 TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int count, uint64_t seed,
                                              txm_env *env, int *colors);
 
-/* A colour for every vertex so that the ends of every edge differ: greedily, the vertex that had the
-   fewest neighbours left when taken away coloured last-taken first (smallest-last order [5]). At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
+/* A colour for every vertex so that the ends of every edge differ. Greedy, in smallest-last order [5]:
+   the vertex with the fewest neighbours left is taken away, over and over, and the last one taken is
+   coloured first. At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
 
    colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
    count   receives how many colours were used; may be NULL
