@@ -474,6 +474,8 @@ typedef struct treepieces_forest {
    cost   O(pieces); about 130 bytes per piece with its bone and sway state                      */
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out);
+
+/* Release a forest; NULL is allowed. */
 TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
 
 /* ---- poses and wind ---------------------------------------------------------------------- */
@@ -593,6 +595,8 @@ typedef struct treepieces_bake_desc {
    cost    O(vertices); nothing stays allocated but the mesh                                      */
 TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
                                           treepieces_mesh **out);
+
+/* Release a mesh; NULL is allowed. */
 TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh);
 
 /* ---- bark -------------------------------------------------------------------------------- */
@@ -1050,9 +1054,9 @@ static void tpc_make_builtin(int type, tpc_shape *s) {
 /* ---- the kit ----------------------------------------------------------------------------- */
 
 /* A vertex of a piece in the frame of one of its leaf rims. */
-typedef struct tpc_rim_frame {
+typedef struct tpc_local_vertex {
     float position[3], normal[3];
-} tpc_rim_frame;
+} tpc_local_vertex;
 
 /* Average height of the quads of a band: along y in lengths, outwards in radii. */
 typedef struct tpc_band {
@@ -1071,7 +1075,7 @@ struct treepieces_kit {
     txm_arena arena; /* holds the kit itself and all it points to */
     int count;
     treepieces_piece pieces[TREEPIECES_MAX_TYPES];
-    tpc_rim_frame *in_rims[TREEPIECES_MAX_TYPES]; /* vertex_count for each leaf rim */
+    tpc_local_vertex *local[TREEPIECES_MAX_TYPES]; /* vertex_count for each leaf rim */
     tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
     int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
     float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
@@ -1272,7 +1276,8 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
     return TXM_OK;
 }
 
-static txm_status tpc_check_piece(const treepieces_piece *p, int index, uint8_t *side, txm_env *env) {
+static txm_status tpc_check_piece(const treepieces_piece *p, int index, uint8_t *side,
+                                  txm_env *env) {
     txm_status status = tpc_check_numbers(p, index, env);
     if (status == TXM_OK) status = tpc_check_vertices(p, index, env);
     for (int k = -1; status == TXM_OK && k < p->leaf_count; k++)
@@ -1315,32 +1320,15 @@ static void tpc_sort_cells(const treepieces_piece *p, tpc_cells *cells) {
     }
 }
 
-/* Copy a piece into the kit; its rims are moved to their exact places. */
-static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
-    const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
-    const size_t name = from->name ? strlen(from->name) : 0;
-    treepieces_vertex *v =
-        (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
-    treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
-    char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
-    tpc_rim_frame *in_rims = (tpc_rim_frame *)txm_arena_alloc(
-        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *in_rims);
-    tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
-    if (kit->arena.failed)
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
-    treepieces_piece *p = &kit->pieces[kit->count];
-    *p = *from;
-    memcpy(v, from->vertices, vertices * sizeof *v);
-    memcpy(q, from->quads, quads * sizeof *q);
-    if (name) memcpy(text, from->name, name);
-    text[name] = 0;
-    for (size_t i = 0; i < vertices; i++) {
+/* Move the rims to their exact places and bind them to their joints alone. */
+static void tpc_place_rims(const treepieces_piece *p, treepieces_vertex *v) {
+    const float own[4] = {1, 0, 0, 0};
+    for (int i = 0; i < p->vertex_count; i++) {
         v[i].rim = -1;
         v[i].reserved = 0;
     }
     for (int j = 0; j < TREEPIECES_RIM; j++) {
         treepieces_vertex *r = &v[p->root_rim[j]];
-        const float own[4] = {1, 0, 0, 0};
         tpc_rim_vertex(j, r->position, r->normal);
         memcpy(r->weights, own, sizeof own);
         for (int k = 0; k < p->leaf_count; k++) {
@@ -1351,19 +1339,46 @@ static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *fro
             l->rim = TREEPIECES_RIM * k + j;
         }
     }
+}
+
+/* All vertices of a piece, moved into the frame of a leaf rim. */
+static void tpc_move_into_rim(const treepieces_vertex *v, size_t count,
+                             const treepieces_similarity *b, tpc_local_vertex *local) {
+    const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
+    for (size_t i = 0; i < count; i++) {
+        float moved[3];
+        for (int c = 0; c < 3; c++)
+            moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
+        tpc_rotate(back, moved, local[i].position);
+        tpc_rotate(back, v[i].normal, local[i].normal);
+    }
+}
+
+/* Copy a piece into the kit; its rims are moved to their exact places. */
+static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
+    const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
+    const size_t name = from->name ? strlen(from->name) : 0;
+    treepieces_vertex *v =
+        (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
+    treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
+    char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
+    tpc_local_vertex *local = (tpc_local_vertex *)txm_arena_alloc(
+        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *local);
+    tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
+    if (kit->arena.failed)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
+    treepieces_piece *p = &kit->pieces[kit->count];
+    *p = *from;
+    memcpy(v, from->vertices, vertices * sizeof *v);
+    memcpy(q, from->quads, quads * sizeof *q);
+    if (name) memcpy(text, from->name, name);
+    text[name] = 0;
+    tpc_place_rims(p, v);
     for (int k = 0; k < p->leaf_count; k++) {
         const treepieces_similarity *b = &p->building[k];
         kit->offsets[kit->count][k] = sqrtf(b->translation[0] * b->translation[0] +
                                             b->translation[2] * b->translation[2]);
-        const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
-        for (size_t i = 0; i < vertices; i++) {
-            tpc_rim_frame *at = &in_rims[(size_t)k * vertices + i];
-            float moved[3];
-            for (int c = 0; c < 3; c++)
-                moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
-            tpc_rotate(back, moved, at->position);
-            tpc_rotate(back, v[i].normal, at->normal);
-        }
+        tpc_move_into_rim(v, vertices, b, local + (size_t)k * vertices);
     }
     p->vertices = v;
     p->quads = q;
@@ -1373,7 +1388,7 @@ static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *fro
     for (size_t i = 0; i < quads; i++)
         if (q[i].band >= kit->band_counts[kit->count]) kit->band_counts[kit->count] = q[i].band + 1;
     kit->cells[kit->count] = cells;
-    kit->in_rims[kit->count++] = in_rims;
+    kit->local[kit->count++] = local;
     return TXM_OK;
 }
 
@@ -2528,15 +2543,68 @@ static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3],
     for (int i = 0; i < 3; i++) bud->heading[i] = most * stem[i] + sine * out[i];
 }
 
+/* The heading at so many degrees from the stem, towards `out`. */
+static void tpc_turn_aside(tpc_bud *bud, float degrees, const float stem[3], const float out[3]) {
+    double sine, cosine;
+    txm_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
+    const float ahead = txm_float(cosine), aside = txm_float(sine);
+    for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
+}
+
+/* The bud at leaf rim k of a fork: the axis goes on as one of its arms. */
+static void tpc_open_arm(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+                         const float stem[3], const float out[3], tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, from->order);
+    const int arms = g->kit->pieces[c->type].leaf_count;
+    float mean = 0;
+    bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
+    for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
+    /* the thicker arm is straighter */
+    const float straighter = txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
+    tpc_turn_aside(bud, o->fork_angle * straighter, stem, out);
+    bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
+    bud->end_radius =
+        txm_maxf(bud->end_radius * c->ratios[k], txm_minf(bud->radius, tpc_thinnest(g)));
+    bud->is_forked = 1;
+    bud->is_aimed = 0;
+}
+
+/* The bud at leaf rim k, at this distance from the stem's axis, where a branch begins. */
+static void tpc_open_branch(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+                            float offset, const float stem[3], const float out[3], tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, from->order + 1), *parent = tpc_order(g, from->order);
+    if (from->order + 1 < g->species->order_count) bud->order++;
+    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
+                        tpc_uniform(g, -1, 1) * o->angle_spread;
+    tpc_turn_aside(bud, txm_clampf(angle, 5, 175), stem, out);
+    bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
+    tpc_unit_or_up(bud->heading);
+    tpc_stand_off(bud, stem, out, c->ratios[k], offset);
+    const float t = from->is_forked || parent->start >= 1
+                        ? from->along
+                        : txm_clampf((from->along - parent->start) / (1 - parent->start), 0, 1);
+    float longer = o->profile[0] * (1 - t) * (1 - 2 * t) + o->profile[1] * 4 * t * (1 - t) +
+                   o->profile[2] * t * (2 * t - 1);
+    longer *= 1 + o->gravimorphism * out[1];
+    bud->length = from->length * o->length * txm_clampf(longer, 0.02f, 10) *
+                  tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
+    bud->step = from->length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
+    if (bud->step < 1.5f * bud->radius) bud->step = 1.5f * bud->radius;
+    bud->end_radius = txm_maxf(bud->radius * o->taper, txm_minf(bud->radius, tpc_thinnest(g)));
+    bud->along = 0;
+    bud->is_forked = 0;
+    bud->rest = 0;
+    bud->roll = tpc_uniform(g, 0, 360);
+}
+
 /* Set up the bud at leaf rim k of the piece just attached, where an axis continues or begins; on
    entry bud is a copy of from. */
 static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
-                        const float rotation[4], tpc_bud *bud) {
+                         const float rotation[4], tpc_bud *bud) {
     const treepieces_similarity *b = &g->kit->pieces[c->type].building[k];
     const float offset = g->kit->offsets[c->type][k];
     const float local[3] = {b->translation[0] * from->radius, b->translation[1] * c->length,
                             b->translation[2] * from->radius};
-    const int is_fork = c->type == TREEPIECES_Y || c->type == TREEPIECES_SPATIAL;
     const float up[3] = {0, 1, 0};
     float stem[3], out[3];
     bud->rim = (uint8_t)k;
@@ -2561,50 +2629,9 @@ static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_ch
     }
     const float radial[3] = {b->translation[0] / offset, 0, b->translation[2] / offset};
     tpc_rotate(rotation, radial, out);
-    double sine, cosine;
-    if (is_fork) {
-        bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
-        const treepieces_order *o = tpc_order(g, from->order);
-        float mean = 0;
-        const int arms = g->kit->pieces[c->type].leaf_count;
-        for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
-        /* the thicker arm is straighter */
-        const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
-        txm_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
-        const float ahead = txm_float(cosine), aside = txm_float(sine);
-        for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
-        bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
-        bud->end_radius = txm_maxf(bud->end_radius * c->ratios[k],
-                                   txm_minf(bud->radius, tpc_thinnest(g)));
-        bud->is_forked = 1;
-        bud->is_aimed = 0;
-        return;
-    }
-    const treepieces_order *o = tpc_order(g, from->order + 1), *parent = tpc_order(g, from->order);
-    if (from->order + 1 < g->species->order_count) bud->order++;
-    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
-                        tpc_uniform(g, -1, 1) * o->angle_spread;
-    txm_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
-    const float ahead = txm_float(cosine), aside = txm_float(sine);
-    for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
-    bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
-    tpc_unit_or_up(bud->heading);
-    tpc_stand_off(bud, stem, out, c->ratios[k], offset);
-    const float t = from->is_forked || parent->start >= 1
-                        ? from->along
-                        : txm_clampf((from->along - parent->start) / (1 - parent->start), 0, 1);
-    float longer = o->profile[0] * (1 - t) * (1 - 2 * t) + o->profile[1] * 4 * t * (1 - t) +
-                   o->profile[2] * t * (2 * t - 1);
-    longer *= 1 + o->gravimorphism * out[1];
-    bud->length = from->length * o->length * txm_clampf(longer, 0.02f, 10) *
-                  tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
-    bud->step = from->length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
-    if (bud->step < 1.5f * bud->radius) bud->step = 1.5f * bud->radius;
-    bud->end_radius = txm_maxf(bud->radius * o->taper, txm_minf(bud->radius, tpc_thinnest(g)));
-    bud->along = 0;
-    bud->is_forked = 0;
-    bud->rest = 0;
-    bud->roll = tpc_uniform(g, 0, 360);
+    if (c->type == TREEPIECES_Y || c->type == TREEPIECES_SPATIAL)
+        tpc_open_arm(g, from, c, k, stem, out, bud);
+    else tpc_open_branch(g, from, c, k, offset, stem, out, bud);
 }
 
 static void tpc_add_cluster(tpc_growth *g, int type) {
@@ -3408,7 +3435,7 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
             for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
             for (int k = 0; k < piece->leaf_count; k++) {
                 const float wk = v->weights[1 + k];
-                const tpc_rim_frame *at = &forest->kit->in_rims[type][k * piece->vertex_count + i];
+                const tpc_local_vertex *at = &forest->kit->local[type][k * piece->vertex_count + i];
                 if (!(wk > 0)) continue;
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);

@@ -474,6 +474,8 @@ typedef struct treepieces_forest {
    cost   O(pieces); about 130 bytes per piece with its bone and sway state                      */
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out);
+
+/* Release a forest; NULL is allowed. */
 TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
 
 /* ---- poses and wind ---------------------------------------------------------------------- */
@@ -593,6 +595,8 @@ typedef struct treepieces_bake_desc {
    cost    O(vertices); nothing stays allocated but the mesh                                      */
 TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_env *env,
                                           treepieces_mesh **out);
+
+/* Release a mesh; NULL is allowed. */
 TREEPIECES_API void treepieces_mesh_free(treepieces_mesh *mesh);
 
 /* ---- bark -------------------------------------------------------------------------------- */

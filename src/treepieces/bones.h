@@ -213,7 +213,7 @@ TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float
             for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
             for (int k = 0; k < piece->leaf_count; k++) {
                 const float wk = v->weights[1 + k];
-                const tpc_rim_frame *at = &forest->kit->in_rims[type][k * piece->vertex_count + i];
+                const tpc_local_vertex *at = &forest->kit->local[type][k * piece->vertex_count + i];
                 if (!(wk > 0)) continue;
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
                 tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);

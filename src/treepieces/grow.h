@@ -340,15 +340,68 @@ static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3],
     for (int i = 0; i < 3; i++) bud->heading[i] = most * stem[i] + sine * out[i];
 }
 
+/* The heading at so many degrees from the stem, towards `out`. */
+static void tpc_turn_aside(tpc_bud *bud, float degrees, const float stem[3], const float out[3]) {
+    double sine, cosine;
+    txm_sincos((double)degrees * (TXM_PI / 180), &sine, &cosine);
+    const float ahead = txm_float(cosine), aside = txm_float(sine);
+    for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
+}
+
+/* The bud at leaf rim k of a fork: the axis goes on as one of its arms. */
+static void tpc_open_arm(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+                         const float stem[3], const float out[3], tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, from->order);
+    const int arms = g->kit->pieces[c->type].leaf_count;
+    float mean = 0;
+    bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
+    for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
+    /* the thicker arm is straighter */
+    const float straighter = txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
+    tpc_turn_aside(bud, o->fork_angle * straighter, stem, out);
+    bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
+    bud->end_radius =
+        txm_maxf(bud->end_radius * c->ratios[k], txm_minf(bud->radius, tpc_thinnest(g)));
+    bud->is_forked = 1;
+    bud->is_aimed = 0;
+}
+
+/* The bud at leaf rim k, at this distance from the stem's axis, where a branch begins. */
+static void tpc_open_branch(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
+                            float offset, const float stem[3], const float out[3], tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, from->order + 1), *parent = tpc_order(g, from->order);
+    if (from->order + 1 < g->species->order_count) bud->order++;
+    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
+                        tpc_uniform(g, -1, 1) * o->angle_spread;
+    tpc_turn_aside(bud, txm_clampf(angle, 5, 175), stem, out);
+    bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
+    tpc_unit_or_up(bud->heading);
+    tpc_stand_off(bud, stem, out, c->ratios[k], offset);
+    const float t = from->is_forked || parent->start >= 1
+                        ? from->along
+                        : txm_clampf((from->along - parent->start) / (1 - parent->start), 0, 1);
+    float longer = o->profile[0] * (1 - t) * (1 - 2 * t) + o->profile[1] * 4 * t * (1 - t) +
+                   o->profile[2] * t * (2 * t - 1);
+    longer *= 1 + o->gravimorphism * out[1];
+    bud->length = from->length * o->length * txm_clampf(longer, 0.02f, 10) *
+                  tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
+    bud->step = from->length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
+    if (bud->step < 1.5f * bud->radius) bud->step = 1.5f * bud->radius;
+    bud->end_radius = txm_maxf(bud->radius * o->taper, txm_minf(bud->radius, tpc_thinnest(g)));
+    bud->along = 0;
+    bud->is_forked = 0;
+    bud->rest = 0;
+    bud->roll = tpc_uniform(g, 0, 360);
+}
+
 /* Set up the bud at leaf rim k of the piece just attached, where an axis continues or begins; on
    entry bud is a copy of from. */
 static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
-                        const float rotation[4], tpc_bud *bud) {
+                         const float rotation[4], tpc_bud *bud) {
     const treepieces_similarity *b = &g->kit->pieces[c->type].building[k];
     const float offset = g->kit->offsets[c->type][k];
     const float local[3] = {b->translation[0] * from->radius, b->translation[1] * c->length,
                             b->translation[2] * from->radius};
-    const int is_fork = c->type == TREEPIECES_Y || c->type == TREEPIECES_SPATIAL;
     const float up[3] = {0, 1, 0};
     float stem[3], out[3];
     bud->rim = (uint8_t)k;
@@ -373,50 +426,9 @@ static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_ch
     }
     const float radial[3] = {b->translation[0] / offset, 0, b->translation[2] / offset};
     tpc_rotate(rotation, radial, out);
-    double sine, cosine;
-    if (is_fork) {
-        bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
-        const treepieces_order *o = tpc_order(g, from->order);
-        float mean = 0;
-        const int arms = g->kit->pieces[c->type].leaf_count;
-        for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
-        /* the thicker arm is straighter */
-        const float angle = o->fork_angle * txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
-        txm_sincos((double)angle * (TXM_PI / 180), &sine, &cosine);
-        const float ahead = txm_float(cosine), aside = txm_float(sine);
-        for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
-        bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
-        bud->end_radius = txm_maxf(bud->end_radius * c->ratios[k],
-                                   txm_minf(bud->radius, tpc_thinnest(g)));
-        bud->is_forked = 1;
-        bud->is_aimed = 0;
-        return;
-    }
-    const treepieces_order *o = tpc_order(g, from->order + 1), *parent = tpc_order(g, from->order);
-    if (from->order + 1 < g->species->order_count) bud->order++;
-    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
-                        tpc_uniform(g, -1, 1) * o->angle_spread;
-    txm_sincos((double)txm_clampf(angle, 5, 175) * (TXM_PI / 180), &sine, &cosine);
-    const float ahead = txm_float(cosine), aside = txm_float(sine);
-    for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
-    bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
-    tpc_unit_or_up(bud->heading);
-    tpc_stand_off(bud, stem, out, c->ratios[k], offset);
-    const float t = from->is_forked || parent->start >= 1
-                        ? from->along
-                        : txm_clampf((from->along - parent->start) / (1 - parent->start), 0, 1);
-    float longer = o->profile[0] * (1 - t) * (1 - 2 * t) + o->profile[1] * 4 * t * (1 - t) +
-                   o->profile[2] * t * (2 * t - 1);
-    longer *= 1 + o->gravimorphism * out[1];
-    bud->length = from->length * o->length * txm_clampf(longer, 0.02f, 10) *
-                  tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
-    bud->step = from->length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
-    if (bud->step < 1.5f * bud->radius) bud->step = 1.5f * bud->radius;
-    bud->end_radius = txm_maxf(bud->radius * o->taper, txm_minf(bud->radius, tpc_thinnest(g)));
-    bud->along = 0;
-    bud->is_forked = 0;
-    bud->rest = 0;
-    bud->roll = tpc_uniform(g, 0, 360);
+    if (c->type == TREEPIECES_Y || c->type == TREEPIECES_SPATIAL)
+        tpc_open_arm(g, from, c, k, stem, out, bud);
+    else tpc_open_branch(g, from, c, k, offset, stem, out, bud);
 }
 
 static void tpc_add_cluster(tpc_growth *g, int type) {

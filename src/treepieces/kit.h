@@ -6,9 +6,9 @@
 /* ---- the kit ----------------------------------------------------------------------------- */
 
 /* A vertex of a piece in the frame of one of its leaf rims. */
-typedef struct tpc_rim_frame {
+typedef struct tpc_local_vertex {
     float position[3], normal[3];
-} tpc_rim_frame;
+} tpc_local_vertex;
 
 /* Average height of the quads of a band: along y in lengths, outwards in radii. */
 typedef struct tpc_band {
@@ -27,7 +27,7 @@ struct treepieces_kit {
     txm_arena arena; /* holds the kit itself and all it points to */
     int count;
     treepieces_piece pieces[TREEPIECES_MAX_TYPES];
-    tpc_rim_frame *in_rims[TREEPIECES_MAX_TYPES]; /* vertex_count for each leaf rim */
+    tpc_local_vertex *local[TREEPIECES_MAX_TYPES]; /* vertex_count for each leaf rim */
     tpc_band bands[TREEPIECES_MAX_TYPES][TREEPIECES_BANDS];
     int band_counts[TREEPIECES_MAX_TYPES]; /* 1 + the highest in use */
     float offsets[TREEPIECES_MAX_TYPES][TREEPIECES_MAX_LEAVES]; /* of leaf rims from the axis */
@@ -228,7 +228,8 @@ static txm_status tpc_check_surface(const treepieces_piece *p, int index, uint8_
     return TXM_OK;
 }
 
-static txm_status tpc_check_piece(const treepieces_piece *p, int index, uint8_t *side, txm_env *env) {
+static txm_status tpc_check_piece(const treepieces_piece *p, int index, uint8_t *side,
+                                  txm_env *env) {
     txm_status status = tpc_check_numbers(p, index, env);
     if (status == TXM_OK) status = tpc_check_vertices(p, index, env);
     for (int k = -1; status == TXM_OK && k < p->leaf_count; k++)
@@ -271,32 +272,15 @@ static void tpc_sort_cells(const treepieces_piece *p, tpc_cells *cells) {
     }
 }
 
-/* Copy a piece into the kit; its rims are moved to their exact places. */
-static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
-    const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
-    const size_t name = from->name ? strlen(from->name) : 0;
-    treepieces_vertex *v =
-        (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
-    treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
-    char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
-    tpc_rim_frame *in_rims = (tpc_rim_frame *)txm_arena_alloc(
-        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *in_rims);
-    tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
-    if (kit->arena.failed)
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
-    treepieces_piece *p = &kit->pieces[kit->count];
-    *p = *from;
-    memcpy(v, from->vertices, vertices * sizeof *v);
-    memcpy(q, from->quads, quads * sizeof *q);
-    if (name) memcpy(text, from->name, name);
-    text[name] = 0;
-    for (size_t i = 0; i < vertices; i++) {
+/* Move the rims to their exact places and bind them to their joints alone. */
+static void tpc_place_rims(const treepieces_piece *p, treepieces_vertex *v) {
+    const float own[4] = {1, 0, 0, 0};
+    for (int i = 0; i < p->vertex_count; i++) {
         v[i].rim = -1;
         v[i].reserved = 0;
     }
     for (int j = 0; j < TREEPIECES_RIM; j++) {
         treepieces_vertex *r = &v[p->root_rim[j]];
-        const float own[4] = {1, 0, 0, 0};
         tpc_rim_vertex(j, r->position, r->normal);
         memcpy(r->weights, own, sizeof own);
         for (int k = 0; k < p->leaf_count; k++) {
@@ -307,19 +291,46 @@ static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *fro
             l->rim = TREEPIECES_RIM * k + j;
         }
     }
+}
+
+/* All vertices of a piece, moved into the frame of a leaf rim. */
+static void tpc_move_into_rim(const treepieces_vertex *v, size_t count,
+                             const treepieces_similarity *b, tpc_local_vertex *local) {
+    const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
+    for (size_t i = 0; i < count; i++) {
+        float moved[3];
+        for (int c = 0; c < 3; c++)
+            moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
+        tpc_rotate(back, moved, local[i].position);
+        tpc_rotate(back, v[i].normal, local[i].normal);
+    }
+}
+
+/* Copy a piece into the kit; its rims are moved to their exact places. */
+static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *from, txm_env *env) {
+    const size_t vertices = (size_t)from->vertex_count, quads = (size_t)from->quad_count;
+    const size_t name = from->name ? strlen(from->name) : 0;
+    treepieces_vertex *v =
+        (treepieces_vertex *)txm_arena_alloc(&kit->arena, vertices, sizeof *v);
+    treepieces_quad *q = (treepieces_quad *)txm_arena_alloc(&kit->arena, quads, sizeof *q);
+    char *text = (char *)txm_arena_alloc(&kit->arena, name + 1, 1);
+    tpc_local_vertex *local = (tpc_local_vertex *)txm_arena_alloc(
+        &kit->arena, vertices * (size_t)(from->leaf_count + 1), sizeof *local);
+    tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
+    if (kit->arena.failed)
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
+    treepieces_piece *p = &kit->pieces[kit->count];
+    *p = *from;
+    memcpy(v, from->vertices, vertices * sizeof *v);
+    memcpy(q, from->quads, quads * sizeof *q);
+    if (name) memcpy(text, from->name, name);
+    text[name] = 0;
+    tpc_place_rims(p, v);
     for (int k = 0; k < p->leaf_count; k++) {
         const treepieces_similarity *b = &p->building[k];
         kit->offsets[kit->count][k] = sqrtf(b->translation[0] * b->translation[0] +
                                             b->translation[2] * b->translation[2]);
-        const float back[4] = {-b->rotation[0], -b->rotation[1], -b->rotation[2], b->rotation[3]};
-        for (size_t i = 0; i < vertices; i++) {
-            tpc_rim_frame *at = &in_rims[(size_t)k * vertices + i];
-            float moved[3];
-            for (int c = 0; c < 3; c++)
-                moved[c] = (v[i].position[c] - b->translation[c]) / b->scale;
-            tpc_rotate(back, moved, at->position);
-            tpc_rotate(back, v[i].normal, at->normal);
-        }
+        tpc_move_into_rim(v, vertices, b, local + (size_t)k * vertices);
     }
     p->vertices = v;
     p->quads = q;
@@ -329,7 +340,7 @@ static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *fro
     for (size_t i = 0; i < quads; i++)
         if (q[i].band >= kit->band_counts[kit->count]) kit->band_counts[kit->count] = q[i].band + 1;
     kit->cells[kit->count] = cells;
-    kit->in_rims[kit->count++] = in_rims;
+    kit->local[kit->count++] = local;
     return TXM_OK;
 }
 
