@@ -319,6 +319,13 @@ typedef struct txe_bar {
     size_t quiet; /* work since the last report */
 } txe_bar;
 
+static txe_bar txe_bar_make(const txm_env *env) {
+    txe_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    return bar;
+}
+
 static void txe_stage(txe_bar *bar, const char *stage, double to, double total) {
     bar->from = bar->to;
     bar->to = to;
@@ -767,9 +774,7 @@ static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
 TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
                                         const texedges_set *edges, txm_env *env,
                                         const txm_image *layers) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     txm_status status = txe_check_desc(desc, env);
     if (status == TXM_OK) status = txe_check_image(layers, "layers", 1, env);
     if (status == TXM_OK &&
@@ -959,9 +964,7 @@ TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, t
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
 
     txm_arena layers, scratch;
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     texedges_set *set = txe_set_make(levels, desc->image.width, desc->image.height, env);
     if (!set) return txe_no_memory(env);
     txm_arena_init(&layers, env);
@@ -1009,9 +1012,7 @@ static uint8_t txe_color(int layer, int levels, int channels, int channel) {
 
 TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
                                       const txm_image *image) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     txe_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
     txm_status status = txe_check_image(image, "image", 0, env);
     if (status != TXM_OK) return status;
@@ -1726,9 +1727,7 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
 
 TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
                                          txm_env *env, texedges_set **out) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (width < 1 || height < 1)
@@ -1951,9 +1950,7 @@ static txm_status txe_guide_make(const texedges_control *c, const texedges_set *
 TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
                                        const texedges_set *disturbed, txm_env *env,
                                        const txm_image *guide, const txm_image *mask) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     txm_status status = txe_check_image(guide, "guide", 1, env);
     if (status == TXM_OK) status = txe_check_image(mask, "mask", 1, env);
     txe_stage(&bar, "edges", 0.2, txe_points_of(control));

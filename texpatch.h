@@ -1338,6 +1338,20 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     return TXM_OK;
 }
 
+/* The guide of the output and its mask, which may be NULL or without pixels. */
+static txm_status txp_check_guide(const txm_image *guide, const txm_image *mask,
+                                  const txp_setup *u, int width, int height, txm_env *env) {
+    const txm_status status = txp_check_picture(guide, "guide", env);
+    if (status != TXM_OK) return status;
+    const txm_image im = txm_image_resolve(*guide);
+    if (im.width != width || im.height != height || im.channels != u->guides[0].channels ||
+        im.sample != u->guides[0].sample)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
+                           "must have the size of the output and "
+                           "the format of the exemplars' guides");
+    return mask && mask->pixels ? txp_check_mask(mask, "guide_mask", width, height, env) : TXM_OK;
+}
+
 /* The output's side of a description. */
 static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const txp_source *s,
                                    txm_env *env) {
@@ -1358,18 +1372,8 @@ static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const t
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "a guide is given of the exemplars and of the output, "
                         "or of neither");
-    if (d->guide.pixels) {
-        status = txp_check_picture(&d->guide, "guide", env);
-        if (status != TXM_OK) return status;
-        const txm_image guide = txm_image_resolve(d->guide);
-        if (guide.width != d->width || guide.height != d->height ||
-            guide.channels != u->guides[0].channels || guide.sample != u->guides[0].sample)
-            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
-                               "must have the size of the output and "
-                               "the format of the exemplars' guides");
-        if (d->guide_mask.pixels)
-            status = txp_check_mask(&d->guide_mask, "guide_mask", d->width, d->height, env);
-    }
+    if (d->guide.pixels)
+        status = txp_check_guide(&d->guide, &d->guide_mask, u, d->width, d->height, env);
     if (status != TXM_OK || !d->kept) return status;
     if (!d->keep.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "kept needs the mask keep");
     status = txp_check_mask(&d->keep, "keep", d->width, d->height, env);
@@ -2425,13 +2429,19 @@ typedef struct txp_step {
     float cost; /* of the whole, about */
 } txp_step;
 
+/* Where pixels come from. */
+typedef struct txp_origins {
+    txp_place *at;
+    float *bend; /* x, y by which each pixel's place is moved                                   */
+    float *tone; /* what is added to each compared byte, txp_lanes of them                      */
+} txp_origins;
+
 /* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
 typedef struct txp_given {
     uint8_t *pixels;     /* compared bytes: of what is fixed, and the guide of all               */
     uint8_t *fixed;      /* 1 = not to be changed                                                */
     uint8_t *free_guide; /* 1 = the guide says nothing                                           */
-    txp_place *at;       /* of what is fixed                                                     */
-    float *bend, *tone;  /* of what is fixed                                                     */
+    txp_origins from;    /* of what is fixed                                                     */
 } txp_given;
 
 struct texpatch_job {
@@ -2459,6 +2469,23 @@ struct texpatch_job {
 /* values per pixel of the field of tones */
 static inline int txp_lanes(const txp_source *s) {
     return (s->guide_at + 3) / 4 * 4;
+}
+
+/* of a finished job */
+static inline txp_origins txp_origins_of(const texpatch_job *job) {
+    txp_origins from;
+    from.at = job->canvas.at;
+    from.bend = job->bend;
+    from.tone = job->tone;
+    return from;
+}
+
+/* count pixels from pixel k of `from` on, to pixel i of `to` and on */
+static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
+                                    size_t k, size_t count, size_t lanes) {
+    memcpy(to->at + i, from->at + k, count * sizeof *to->at);
+    memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof(float));
+    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof(float));
 }
 
 static void txp_setup_steps(texpatch_job *job) {
@@ -2575,8 +2602,8 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
             if (c->fixed && kept == count) {
                 const size_t k = (size_t)(y * side) * (size_t)job->width + (size_t)(x * side);
                 c->fixed[i] = 1;
-                if (job->given.at) {
-                    txp_place p = job->given.at[k];
+                if (job->given.from.at) {
+                    txp_place p = job->given.from.at[k];
                     const int sheet = s->sheets > 1 && p.x >= 0 ? s->stack[0].sheet[p.y] : 0;
                     if (p.x >= 0) {
                         const txp_stack *t = &s->stack[level];
@@ -2649,7 +2676,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
     const size_t bytes = out->pitch * ((size_t)(out->height + TXP_PAD) + 1);
     const int block = txp_block(job, out, level);
     txm_arena_init(&scratch, env);
-    if (pixels > 300 * 300 || job->given.at) starts = 1;
+    if (pixels > 300 * 300 || job->given.from.at) starts = 1;
     for (int i = 0; i < starts; i++) {
         txp_quilt *t = &q[i];
         t->source = s;
@@ -2873,9 +2900,10 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     if (fixed) g->fixed = (uint8_t *)txm_arena_zero(memory, pixels, 1);
     if (free_guide) g->free_guide = (uint8_t *)txm_arena_zero(memory, pixels, 1);
     if (places) {
-        g->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *g->at);
-        g->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
-        g->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
+        txp_origins *o = &g->from;
+        o->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *o->at);
+        o->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
+        o->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
     }
 }
 
@@ -2973,6 +3001,7 @@ no_memory:
 static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
                              float **toned, txm_env *env) {
     const txp_source *s = job->source;
+    const txp_origins *given = &job->given.from;
     const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     txm_arena scratch;
@@ -2988,9 +3017,9 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
         goto done;
     }
-    for (size_t i = 0; i < pixels && job->given.bend; i++) {
+    for (size_t i = 0; i < pixels && given->bend; i++) {
         if (!job->given.fixed[i]) continue;
-        const float *b = job->given.bend + 2 * i, *v = job->given.tone + (size_t)lanes * i;
+        const float *b = given->bend + 2 * i, *v = given->tone + (size_t)lanes * i;
         const int x = (int)(i % (size_t)c->width), y = (int)(i / (size_t)c->width);
         float most = 0;
         memcpy(bend.value + 2 * i, b, 2 * sizeof(float));
@@ -3083,16 +3112,15 @@ static void txp_part_join(texpatch_job *job) {
     texpatch_job *part = job->part;
     const txp_source *s = job->source;
     const size_t lanes = (size_t)txp_lanes(s), n = (size_t)s->bytes;
+    const txp_origins from = txp_origins_of(part), to = txp_origins_of(job);
     for (int y = 0; y < part->height; y++) {
         for (int x = 0; x < part->width; x++) {
             const size_t i = txp_index(&part->canvas, x, y);
             const size_t k = txp_index(&job->canvas, job->part_x + x, job->part_y + y);
             if (part->given.fixed[i]) continue;
-            job->canvas.at[k] = part->canvas.at[i];
+            txp_copy_origins(&to, k, &from, i, 1, lanes);
             memcpy(txp_canvas_at(s, &job->canvas, job->part_x + x, job->part_y + y),
                    txp_canvas_at(s, &part->canvas, x, y), n);
-            memcpy(job->bend + 2 * k, part->bend + 2 * i, 2 * sizeof(float));
-            memcpy(job->tone + lanes * k, part->tone + lanes * i, lanes * sizeof(float));
         }
     }
     texpatch_free(part);
@@ -3395,6 +3423,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     txm_status status;
     txm_arena memory;
     txp_given new_guide;
+    txp_origins from;
     txm_image mask, no_mask;
     int low_x, low_y, high_x = -1, high_y = -1;
     int x0 = 0, y0 = 0, wide = 0, high = 0;
@@ -3409,15 +3438,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     if (guide) {
         if (!s->guide_bytes)
             return txm_fail(env, TXM_BAD_ARGUMENT, "the job was begun without a guide");
-        status = txp_check_picture(guide, "guide", env);
-        if (status != TXM_OK) return status;
-        if (guide->width != u->width || guide->height != u->height ||
-            txm_image_resolve(*guide).channels != u->guides[0].channels ||
-            guide->sample != u->guides[0].sample)
-            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
-                               "must have the size of the output and the exemplars' format");
-        if (guide_mask && guide_mask->pixels)
-            status = txp_check_mask(guide_mask, "guide_mask", u->width, u->height, env);
+        status = txp_check_guide(guide, guide_mask, u, u->width, u->height, env);
         if (status != TXM_OK) return status;
     }
     status = txp_run(job, env);
@@ -3486,6 +3507,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     if (high == job->height) part->setup.tileable |= u->tileable & TEXPATCH_TILE_Y;
     part->shift_x = job->shift_x + x0;
     part->shift_y = job->shift_y + y0;
+    from = txp_origins_of(job);
     for (int y = 0; y < high; y++) {
         for (int x = 0; x < wide; x++) {
             const size_t i = (size_t)y * (size_t)wide + (size_t)x;
@@ -3494,9 +3516,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
-            part->given.at[i] = job->canvas.at[k];
-            memcpy(part->given.bend + 2 * i, job->bend + 2 * k, 2 * sizeof(float));
-            memcpy(part->given.tone + lanes * i, job->tone + lanes * k, lanes * sizeof(float));
+            txp_copy_origins(&part->given.from, i, &from, k, 1, lanes);
         }
     }
     job->part = part;
@@ -3546,8 +3566,7 @@ struct texpatch_plane {
 /* A finished rectangle of the plane. */
 typedef struct txp_piece {
     int width, height; /* 0: not made yet */
-    txp_place *at;
-    float *bend, *tone;
+    txp_origins from;
     txm_arena memory;
 } txp_piece;
 
@@ -3596,11 +3615,9 @@ static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) 
             const size_t i = (size_t)cy * (size_t)job->width + (size_t)cx;
             const size_t k = (size_t)v * (size_t)p->width + (size_t)u;
             job->given.fixed[i] = 1;
-            job->given.at[i] = p->at[k];
-            memcpy(job->given.pixels + i * n, txp_stack_at(s, &s->stack[0], p->at[k].x, p->at[k].y),
-                   n);
-            memcpy(job->given.bend + 2 * i, p->bend + 2 * k, 2 * sizeof(float));
-            memcpy(job->given.tone + lanes * i, p->tone + lanes * k, lanes * sizeof(float));
+            txp_copy_origins(&job->given.from, i, &p->from, k, 1, lanes);
+            const txp_place at = p->from.at[k];
+            memcpy(job->given.pixels + i * n, txp_stack_at(s, &s->stack[0], at.x, at.y), n);
         }
     }
 }
@@ -3613,19 +3630,17 @@ static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int
     txm_status status = txp_run(job, env);
     txm_arena_init(&p->memory, env);
     if (status == TXM_OK) {
-        p->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *p->at);
-        p->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
-        p->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
+        txp_origins *o = &p->from;
+        o->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *o->at);
+        o->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
+        o->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
         if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
-    for (int v = 0; v < height && status == TXM_OK; v++) {
-        const size_t from = txp_index(&job->canvas, x, y + v), to = (size_t)v * (size_t)width;
-        memcpy(p->at + to, job->canvas.at + from, (size_t)width * sizeof *p->at);
-        memcpy(p->bend + 2 * to, job->bend + 2 * from, (size_t)width * 2 * sizeof(float));
-        memcpy(p->tone + lanes * to, job->tone + lanes * from,
-               (size_t)width * lanes * sizeof(float));
-    }
+    const txp_origins from = txp_origins_of(job);
+    for (int v = 0; v < height && status == TXM_OK; v++)
+        txp_copy_origins(&p->from, (size_t)v * (size_t)width, &from,
+                         txp_index(&job->canvas, x, y + v), (size_t)width, lanes);
     texpatch_free(job);
     if (status != TXM_OK) {
         txp_piece_free(p);

@@ -36,6 +36,13 @@ typedef struct txe_bar {
     size_t quiet; /* work since the last report */
 } txe_bar;
 
+static txe_bar txe_bar_make(const txm_env *env) {
+    txe_bar bar;
+    memset(&bar, 0, sizeof bar);
+    bar.env = env;
+    return bar;
+}
+
 static void txe_stage(txe_bar *bar, const char *stage, double to, double total) {
     bar->from = bar->to;
     bar->to = to;

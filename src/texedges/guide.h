@@ -192,9 +192,7 @@ static txm_status txe_guide_make(const texedges_control *c, const texedges_set *
 TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
                                        const texedges_set *disturbed, txm_env *env,
                                        const txm_image *guide, const txm_image *mask) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     txm_status status = txe_check_image(guide, "guide", 1, env);
     if (status == TXM_OK) status = txe_check_image(mask, "mask", 1, env);
     txe_stage(&bar, "edges", 0.2, txe_points_of(control));

@@ -289,9 +289,7 @@ static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
 TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
                                         const texedges_set *edges, txm_env *env,
                                         const txm_image *layers) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     txm_status status = txe_check_desc(desc, env);
     if (status == TXM_OK) status = txe_check_image(layers, "layers", 1, env);
     if (status == TXM_OK &&

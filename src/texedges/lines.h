@@ -164,9 +164,7 @@ TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, t
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
 
     txm_arena layers, scratch;
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     texedges_set *set = txe_set_make(levels, desc->image.width, desc->image.height, env);
     if (!set) return txe_no_memory(env);
     txm_arena_init(&layers, env);
@@ -214,9 +212,7 @@ static uint8_t txe_color(int layer, int levels, int channels, int channel) {
 
 TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
                                       const txm_image *image) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     txe_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
     txm_status status = txe_check_image(image, "image", 0, env);
     if (status != TXM_OK) return status;

@@ -285,9 +285,7 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
 
 TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
                                          txm_env *env, texedges_set **out) {
-    txe_bar bar;
-    memset(&bar, 0, sizeof bar);
-    bar.env = env;
+    txe_bar bar = txe_bar_make(env);
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (width < 1 || height < 1)

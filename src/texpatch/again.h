@@ -46,6 +46,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     txm_status status;
     txm_arena memory;
     txp_given new_guide;
+    txp_origins from;
     txm_image mask, no_mask;
     int low_x, low_y, high_x = -1, high_y = -1;
     int x0 = 0, y0 = 0, wide = 0, high = 0;
@@ -60,15 +61,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     if (guide) {
         if (!s->guide_bytes)
             return txm_fail(env, TXM_BAD_ARGUMENT, "the job was begun without a guide");
-        status = txp_check_picture(guide, "guide", env);
-        if (status != TXM_OK) return status;
-        if (guide->width != u->width || guide->height != u->height ||
-            txm_image_resolve(*guide).channels != u->guides[0].channels ||
-            guide->sample != u->guides[0].sample)
-            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
-                               "must have the size of the output and the exemplars' format");
-        if (guide_mask && guide_mask->pixels)
-            status = txp_check_mask(guide_mask, "guide_mask", u->width, u->height, env);
+        status = txp_check_guide(guide, guide_mask, u, u->width, u->height, env);
         if (status != TXM_OK) return status;
     }
     status = txp_run(job, env);
@@ -137,6 +130,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     if (high == job->height) part->setup.tileable |= u->tileable & TEXPATCH_TILE_Y;
     part->shift_x = job->shift_x + x0;
     part->shift_y = job->shift_y + y0;
+    from = txp_origins_of(job);
     for (int y = 0; y < high; y++) {
         for (int x = 0; x < wide; x++) {
             const size_t i = (size_t)y * (size_t)wide + (size_t)x;
@@ -145,9 +139,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
-            part->given.at[i] = job->canvas.at[k];
-            memcpy(part->given.bend + 2 * i, job->bend + 2 * k, 2 * sizeof(float));
-            memcpy(part->given.tone + lanes * i, job->tone + lanes * k, lanes * sizeof(float));
+            txp_copy_origins(&part->given.from, i, &from, k, 1, lanes);
         }
     }
     job->part = part;

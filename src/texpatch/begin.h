@@ -40,9 +40,10 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     if (fixed) g->fixed = (uint8_t *)txm_arena_zero(memory, pixels, 1);
     if (free_guide) g->free_guide = (uint8_t *)txm_arena_zero(memory, pixels, 1);
     if (places) {
-        g->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *g->at);
-        g->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
-        g->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
+        txp_origins *o = &g->from;
+        o->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *o->at);
+        o->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
+        o->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
     }
 }
 
@@ -140,6 +141,7 @@ no_memory:
 static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
                              float **toned, txm_env *env) {
     const txp_source *s = job->source;
+    const txp_origins *given = &job->given.from;
     const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     txm_arena scratch;
@@ -155,9 +157,9 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
         goto done;
     }
-    for (size_t i = 0; i < pixels && job->given.bend; i++) {
+    for (size_t i = 0; i < pixels && given->bend; i++) {
         if (!job->given.fixed[i]) continue;
-        const float *b = job->given.bend + 2 * i, *v = job->given.tone + (size_t)lanes * i;
+        const float *b = given->bend + 2 * i, *v = given->tone + (size_t)lanes * i;
         const int x = (int)(i % (size_t)c->width), y = (int)(i / (size_t)c->width);
         float most = 0;
         memcpy(bend.value + 2 * i, b, 2 * sizeof(float));
@@ -250,16 +252,15 @@ static void txp_part_join(texpatch_job *job) {
     texpatch_job *part = job->part;
     const txp_source *s = job->source;
     const size_t lanes = (size_t)txp_lanes(s), n = (size_t)s->bytes;
+    const txp_origins from = txp_origins_of(part), to = txp_origins_of(job);
     for (int y = 0; y < part->height; y++) {
         for (int x = 0; x < part->width; x++) {
             const size_t i = txp_index(&part->canvas, x, y);
             const size_t k = txp_index(&job->canvas, job->part_x + x, job->part_y + y);
             if (part->given.fixed[i]) continue;
-            job->canvas.at[k] = part->canvas.at[i];
+            txp_copy_origins(&to, k, &from, i, 1, lanes);
             memcpy(txp_canvas_at(s, &job->canvas, job->part_x + x, job->part_y + y),
                    txp_canvas_at(s, &part->canvas, x, y), n);
-            memcpy(job->bend + 2 * k, part->bend + 2 * i, 2 * sizeof(float));
-            memcpy(job->tone + lanes * k, part->tone + lanes * i, lanes * sizeof(float));
         }
     }
     texpatch_free(part);

@@ -155,6 +155,20 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     return TXM_OK;
 }
 
+/* The guide of the output and its mask, which may be NULL or without pixels. */
+static txm_status txp_check_guide(const txm_image *guide, const txm_image *mask,
+                                  const txp_setup *u, int width, int height, txm_env *env) {
+    const txm_status status = txp_check_picture(guide, "guide", env);
+    if (status != TXM_OK) return status;
+    const txm_image im = txm_image_resolve(*guide);
+    if (im.width != width || im.height != height || im.channels != u->guides[0].channels ||
+        im.sample != u->guides[0].sample)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
+                           "must have the size of the output and "
+                           "the format of the exemplars' guides");
+    return mask && mask->pixels ? txp_check_mask(mask, "guide_mask", width, height, env) : TXM_OK;
+}
+
 /* The output's side of a description. */
 static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const txp_source *s,
                                    txm_env *env) {
@@ -175,18 +189,8 @@ static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const t
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "a guide is given of the exemplars and of the output, "
                         "or of neither");
-    if (d->guide.pixels) {
-        status = txp_check_picture(&d->guide, "guide", env);
-        if (status != TXM_OK) return status;
-        const txm_image guide = txm_image_resolve(d->guide);
-        if (guide.width != d->width || guide.height != d->height ||
-            guide.channels != u->guides[0].channels || guide.sample != u->guides[0].sample)
-            return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
-                               "must have the size of the output and "
-                               "the format of the exemplars' guides");
-        if (d->guide_mask.pixels)
-            status = txp_check_mask(&d->guide_mask, "guide_mask", d->width, d->height, env);
-    }
+    if (d->guide.pixels)
+        status = txp_check_guide(&d->guide, &d->guide_mask, u, d->width, d->height, env);
     if (status != TXM_OK || !d->kept) return status;
     if (!d->keep.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "kept needs the mask keep");
     status = txp_check_mask(&d->keep, "keep", d->width, d->height, env);

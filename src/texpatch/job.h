@@ -17,13 +17,19 @@ typedef struct txp_step {
     float cost; /* of the whole, about */
 } txp_step;
 
+/* Where pixels come from. */
+typedef struct txp_origins {
+    txp_place *at;
+    float *bend; /* x, y by which each pixel's place is moved                                   */
+    float *tone; /* what is added to each compared byte, txp_lanes of them                      */
+} txp_origins;
+
 /* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
 typedef struct txp_given {
     uint8_t *pixels;     /* compared bytes: of what is fixed, and the guide of all               */
     uint8_t *fixed;      /* 1 = not to be changed                                                */
     uint8_t *free_guide; /* 1 = the guide says nothing                                           */
-    txp_place *at;       /* of what is fixed                                                     */
-    float *bend, *tone;  /* of what is fixed                                                     */
+    txp_origins from;    /* of what is fixed                                                     */
 } txp_given;
 
 struct texpatch_job {
@@ -51,6 +57,23 @@ struct texpatch_job {
 /* values per pixel of the field of tones */
 static inline int txp_lanes(const txp_source *s) {
     return (s->guide_at + 3) / 4 * 4;
+}
+
+/* of a finished job */
+static inline txp_origins txp_origins_of(const texpatch_job *job) {
+    txp_origins from;
+    from.at = job->canvas.at;
+    from.bend = job->bend;
+    from.tone = job->tone;
+    return from;
+}
+
+/* count pixels from pixel k of `from` on, to pixel i of `to` and on */
+static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
+                                    size_t k, size_t count, size_t lanes) {
+    memcpy(to->at + i, from->at + k, count * sizeof *to->at);
+    memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof(float));
+    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof(float));
 }
 
 static void txp_setup_steps(texpatch_job *job) {
@@ -167,8 +190,8 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
             if (c->fixed && kept == count) {
                 const size_t k = (size_t)(y * side) * (size_t)job->width + (size_t)(x * side);
                 c->fixed[i] = 1;
-                if (job->given.at) {
-                    txp_place p = job->given.at[k];
+                if (job->given.from.at) {
+                    txp_place p = job->given.from.at[k];
                     const int sheet = s->sheets > 1 && p.x >= 0 ? s->stack[0].sheet[p.y] : 0;
                     if (p.x >= 0) {
                         const txp_stack *t = &s->stack[level];
@@ -241,7 +264,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
     const size_t bytes = out->pitch * ((size_t)(out->height + TXP_PAD) + 1);
     const int block = txp_block(job, out, level);
     txm_arena_init(&scratch, env);
-    if (pixels > 300 * 300 || job->given.at) starts = 1;
+    if (pixels > 300 * 300 || job->given.from.at) starts = 1;
     for (int i = 0; i < starts; i++) {
         txp_quilt *t = &q[i];
         t->source = s;

@@ -41,8 +41,7 @@ struct texpatch_plane {
 /* A finished rectangle of the plane. */
 typedef struct txp_piece {
     int width, height; /* 0: not made yet */
-    txp_place *at;
-    float *bend, *tone;
+    txp_origins from;
     txm_arena memory;
 } txp_piece;
 
@@ -91,11 +90,9 @@ static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) 
             const size_t i = (size_t)cy * (size_t)job->width + (size_t)cx;
             const size_t k = (size_t)v * (size_t)p->width + (size_t)u;
             job->given.fixed[i] = 1;
-            job->given.at[i] = p->at[k];
-            memcpy(job->given.pixels + i * n, txp_stack_at(s, &s->stack[0], p->at[k].x, p->at[k].y),
-                   n);
-            memcpy(job->given.bend + 2 * i, p->bend + 2 * k, 2 * sizeof(float));
-            memcpy(job->given.tone + lanes * i, p->tone + lanes * k, lanes * sizeof(float));
+            txp_copy_origins(&job->given.from, i, &p->from, k, 1, lanes);
+            const txp_place at = p->from.at[k];
+            memcpy(job->given.pixels + i * n, txp_stack_at(s, &s->stack[0], at.x, at.y), n);
         }
     }
 }
@@ -108,19 +105,17 @@ static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int
     txm_status status = txp_run(job, env);
     txm_arena_init(&p->memory, env);
     if (status == TXM_OK) {
-        p->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *p->at);
-        p->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
-        p->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
+        txp_origins *o = &p->from;
+        o->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *o->at);
+        o->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
+        o->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
         if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
-    for (int v = 0; v < height && status == TXM_OK; v++) {
-        const size_t from = txp_index(&job->canvas, x, y + v), to = (size_t)v * (size_t)width;
-        memcpy(p->at + to, job->canvas.at + from, (size_t)width * sizeof *p->at);
-        memcpy(p->bend + 2 * to, job->bend + 2 * from, (size_t)width * 2 * sizeof(float));
-        memcpy(p->tone + lanes * to, job->tone + lanes * from,
-               (size_t)width * lanes * sizeof(float));
-    }
+    const txp_origins from = txp_origins_of(job);
+    for (int v = 0; v < height && status == TXM_OK; v++)
+        txp_copy_origins(&p->from, (size_t)v * (size_t)width, &from,
+                         txp_index(&job->canvas, x, y + v), (size_t)width, lanes);
     texpatch_free(job);
     if (status != TXM_OK) {
         txp_piece_free(p);
