@@ -670,7 +670,6 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     head.map_count = map_count;
     txt_list_tiles(&head, d);
 
-    textiles_set *s = NULL;
     const size_t texels = (size_t)head.side * (size_t)head.side;
     if ((size_t)head.count > TEXTILES_MAX_PIXELS / texels)
         return txm_fail(env, TXM_TOO_LARGE,
@@ -679,19 +678,15 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     head.tiles =
         (textiles_tile *)txm_arena_alloc(&head.arena, (size_t)head.count, sizeof(textiles_tile));
     head.lookup = (int32_t *)txm_arena_alloc(&head.arena, codes, sizeof(int32_t));
-    int ok = head.tiles && head.lookup;
-    for (int m = 0; m < map_count && ok; m++) {
+    for (int m = 0; m < map_count; m++) {
         head.maps[m] = maps[m];
         head.maps[m].texel = (size_t)maps[m].channels * txm_sample_bytes(maps[m].sample);
         head.maps[m].pixels = (uint8_t *)txm_arena_zero(&head.arena, all, head.maps[m].texel);
-        ok = head.maps[m].pixels != NULL;
     }
-    if (ok && with_source) {
+    if (with_source)
         head.source = (int32_t *)txm_arena_alloc(&head.arena, all, sizeof(int32_t));
-        ok = head.source != NULL;
-    }
-    if (ok) s = (textiles_set *)txm_arena_alloc(&head.arena, 1, sizeof *s);
-    if (!s) {
+    textiles_set *s = (textiles_set *)txm_arena_alloc(&head.arena, 1, sizeof *s);
+    if (head.arena.failed) {
         txm_arena_free(&head.arena);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the tile set");
     }
@@ -1465,7 +1460,7 @@ static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng
     s->queue = (uint32_t *)txm_arena_alloc(arena, s->cells, sizeof(uint32_t));
     s->queued = (uint8_t *)txm_arena_zero(arena, s->cells, 1);
     s->decisions = (txt_decision *)txm_arena_alloc(arena, s->cells, sizeof(txt_decision));
-    if (!s->trail || !s->queue || !s->queued || !s->decisions)
+    if (arena->failed)
         return txm_fail(s->env, TXM_OUT_OF_MEMORY, "no memory to solve a grid of this size");
     for (int base = 0; base < set->count / set->variants; base++) {
         const int *e = set->tiles[base * set->variants].edges;
@@ -1630,7 +1625,7 @@ TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int h
     s.colors = (uint8_t *)txm_arena_alloc(&arena, s.slots, 1);
     s.tiles = (int *)txm_arena_alloc(&arena, s.cells, sizeof(int));
     uint8_t *fixed = (uint8_t *)txm_arena_alloc(&arena, s.cells, 1);
-    if (!s.colors || !s.tiles || !fixed) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to solve a grid of this size");
         goto done;
     }
@@ -3039,28 +3034,23 @@ static txm_status txt_prepare(txt_build *b) {
     b->plane = (uint8_t *)txm_arena_zero(&b->arena, b->texels * (size_t)b->features + TXT_LANES, 1);
     b->salient = (uint8_t *)txm_arena_alloc(&b->arena, b->texels, 1);
     const int axes = b->is_triangle ? 1 : 2;
-    int ok = b->texel && b->plane && b->salient;
-    for (int a = 0; a < axes && ok; a++) {
+    for (int a = 0; a < axes; a++) {
         b->cross[a].sum = (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
         b->salience[a].sum = (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
         b->line_cost[a] = (uint16_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint16_t));
         b->along[a].sum = (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
-        ok = b->cross[a].sum && b->along[a].sum && b->salience[a].sum && b->line_cost[a];
-        for (int c = 0; c < b->set->maps[0].channels && ok; c++) {
+        for (int c = 0; c < b->set->maps[0].channels; c++)
             b->color[a][c].sum =
                 (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
-            ok = b->color[a][c].sum != NULL;
-        }
     }
-    for (int e = 0; e < b->sheet_count && ok; e++) {
+    for (int e = 0; e < b->sheet_count; e++) {
         const txt_sheet *s = &b->sheets[e];
         const size_t cells = ((size_t)s->width / TXT_CELL + 2) * ((size_t)s->height / TXT_CELL + 2);
         b->use[e] = (uint32_t *)txm_arena_zero(&b->arena, cells, sizeof(uint32_t));
         b->used[e] = (uint32_t *)txm_arena_zero(&b->arena, cells, sizeof(uint32_t));
         b->traits[e] = (double *)txm_arena_zero(&b->arena, cells, TXT_TRAITS * sizeof(double));
-        ok = b->use[e] && b->used[e] && b->traits[e];
     }
-    if (!ok) return txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
+    if (b->arena.failed) return txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
     status = txt_fill_features(b);
     if (status != TXM_OK) return status;
     txt_fill_planes(b);
@@ -3301,7 +3291,8 @@ static int txt_search(const txt_build *b, const txt_query *q, int sheet, int tur
     return count;
 }
 
-static int txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m) {
+/* memory for searches; arena->failed if there is none */
+static void txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m) {
     int width = 0;
     m->capacity = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -3316,7 +3307,6 @@ static int txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m
     m->pairs = (txm_pair *)txm_arena_alloc(arena, (size_t)m->capacity, 2 * sizeof(txm_pair));
     m->spare = m->pairs ? m->pairs + m->capacity : NULL;
     m->places = (txt_place *)txm_arena_alloc(arena, (size_t)m->capacity, sizeof(txt_place));
-    return m->sum32 && m->starts && m->pairs && m->places;
 }
 
 /* ---- corners and edges ------------------------------------------------------------------- */
@@ -3743,7 +3733,8 @@ static txm_status txt_make_frames(txt_build *b) {
     q.capacity = 256;
     q.samples = (txt_sample *)txm_arena_alloc(&arena, 256, sizeof(txt_sample));
     txm_status status = TXM_OK;
-    if (!b->strips || !which || !q.samples || !txt_scratch_make(b, &arena, &m)) {
+    txt_scratch_make(b, &arena, &m);
+    if (b->arena.failed || arena.failed) {
         status = txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the edges");
         goto done;
     }
@@ -4633,7 +4624,8 @@ static void txt_batch_cut(void *context, int k) {
     if (c->b->desc->repair != TEXTILES_REPAIR_NONE) txt_repair_tile(c, &batch->repair[k]);
 }
 
-static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_repair *r) {
+/* memory for making one tile after another; arena->failed if there is none */
+static void txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_repair *r) {
     const size_t n = (size_t)b->set->side * (size_t)b->set->side;
     memset(c, 0, sizeof *c);
     memset(r, 0, sizeof *r);
@@ -4653,7 +4645,16 @@ static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_re
     c->gap = (uint16_t *)txm_arena_alloc(arena, n, sizeof(uint16_t));
     c->query.capacity = TXT_SAMPLES;
     c->query.samples = (txt_sample *)txm_arena_alloc(arena, TXT_SAMPLES, sizeof(txt_sample));
-    if (!bytes || !labels || !c->layers || !c->shows || !c->gap || !c->query.samples) return 0;
+    txt_scratch_make(b, arena, &c->scratch);
+    txm_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
+    if (b->desc->repair != TEXTILES_REPAIR_NONE) {
+        r->image = (float *)txm_arena_alloc(arena, n, 8 * sizeof(float));
+        r->mask = (uint8_t *)txm_arena_alloc(arena, n, 1);
+        r->pool.size = txt_pool_bytes(n, (size_t)c->side);
+        r->pool.block = (uint8_t *)txm_arena_alloc(arena, r->pool.size, 1);
+    }
+    if (arena->failed) return;
+    if (r->image) r->target = r->image + 4 * n;
     c->inside = bytes;
     c->locked = bytes + n;
     c->border = bytes + 2 * n;
@@ -4662,16 +4663,6 @@ static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_re
     c->start = labels + 2 * n;
     c->best = labels + 3 * n;
     c->other = c->shows + n;
-    if (b->desc->repair != TEXTILES_REPAIR_NONE) {
-        r->image = (float *)txm_arena_alloc(arena, n, 8 * sizeof(float));
-        r->mask = (uint8_t *)txm_arena_alloc(arena, n, 1);
-        r->pool.size = txt_pool_bytes(n, (size_t)c->side);
-        r->pool.block = (uint8_t *)txm_arena_alloc(arena, r->pool.size, 1);
-        if (!r->image || !r->mask || !r->pool.block) return 0;
-        r->target = r->image + 4 * n;
-    }
-    return txt_scratch_make(b, arena, &c->scratch) &&
-           txm_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
 }
 
 /* variant 0 of a tile */
@@ -4750,10 +4741,9 @@ static txm_status txt_make_tiles(txt_build *b) {
     txm_arena_init(&arena, b->env);
     txt_batch *batch = (txt_batch *)txm_arena_zero(&arena, 1, sizeof *batch);
     b->inside = (txt_place *)txm_arena_zero(&arena, (size_t)count, sizeof(txt_place));
-    int ok = batch && b->inside;
-    for (int k = 0; k < slots && ok; k++)
-        ok = txt_canvas_make(b, &arena, &batch->canvas[k], &batch->repair[k]);
-    if (!ok) {
+    for (int k = 0; k < slots && batch; k++)
+        txt_canvas_make(b, &arena, &batch->canvas[k], &batch->repair[k]);
+    if (arena.failed) {
         status = txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory to cut tiles");
         goto done;
     }

@@ -583,28 +583,23 @@ static txm_status txt_prepare(txt_build *b) {
     b->plane = (uint8_t *)txm_arena_zero(&b->arena, b->texels * (size_t)b->features + TXT_LANES, 1);
     b->salient = (uint8_t *)txm_arena_alloc(&b->arena, b->texels, 1);
     const int axes = b->is_triangle ? 1 : 2;
-    int ok = b->texel && b->plane && b->salient;
-    for (int a = 0; a < axes && ok; a++) {
+    for (int a = 0; a < axes; a++) {
         b->cross[a].sum = (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
         b->salience[a].sum = (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
         b->line_cost[a] = (uint16_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint16_t));
         b->along[a].sum = (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
-        ok = b->cross[a].sum && b->along[a].sum && b->salience[a].sum && b->line_cost[a];
-        for (int c = 0; c < b->set->maps[0].channels && ok; c++) {
+        for (int c = 0; c < b->set->maps[0].channels; c++)
             b->color[a][c].sum =
                 (uint32_t *)txm_arena_alloc(&b->arena, b->texels, sizeof(uint32_t));
-            ok = b->color[a][c].sum != NULL;
-        }
     }
-    for (int e = 0; e < b->sheet_count && ok; e++) {
+    for (int e = 0; e < b->sheet_count; e++) {
         const txt_sheet *s = &b->sheets[e];
         const size_t cells = ((size_t)s->width / TXT_CELL + 2) * ((size_t)s->height / TXT_CELL + 2);
         b->use[e] = (uint32_t *)txm_arena_zero(&b->arena, cells, sizeof(uint32_t));
         b->used[e] = (uint32_t *)txm_arena_zero(&b->arena, cells, sizeof(uint32_t));
         b->traits[e] = (double *)txm_arena_zero(&b->arena, cells, TXT_TRAITS * sizeof(double));
-        ok = b->use[e] && b->used[e] && b->traits[e];
     }
-    if (!ok) return txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
+    if (b->arena.failed) return txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
     status = txt_fill_features(b);
     if (status != TXM_OK) return status;
     txt_fill_planes(b);

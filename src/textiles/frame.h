@@ -427,7 +427,8 @@ static txm_status txt_make_frames(txt_build *b) {
     q.capacity = 256;
     q.samples = (txt_sample *)txm_arena_alloc(&arena, 256, sizeof(txt_sample));
     txm_status status = TXM_OK;
-    if (!b->strips || !which || !q.samples || !txt_scratch_make(b, &arena, &m)) {
+    txt_scratch_make(b, &arena, &m);
+    if (b->arena.failed || arena.failed) {
         status = txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the edges");
         goto done;
     }

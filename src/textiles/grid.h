@@ -400,7 +400,7 @@ static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng
     s->queue = (uint32_t *)txm_arena_alloc(arena, s->cells, sizeof(uint32_t));
     s->queued = (uint8_t *)txm_arena_zero(arena, s->cells, 1);
     s->decisions = (txt_decision *)txm_arena_alloc(arena, s->cells, sizeof(txt_decision));
-    if (!s->trail || !s->queue || !s->queued || !s->decisions)
+    if (arena->failed)
         return txm_fail(s->env, TXM_OUT_OF_MEMORY, "no memory to solve a grid of this size");
     for (int base = 0; base < set->count / set->variants; base++) {
         const int *e = set->tiles[base * set->variants].edges;
@@ -565,7 +565,7 @@ TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int h
     s.colors = (uint8_t *)txm_arena_alloc(&arena, s.slots, 1);
     s.tiles = (int *)txm_arena_alloc(&arena, s.cells, sizeof(int));
     uint8_t *fixed = (uint8_t *)txm_arena_alloc(&arena, s.cells, 1);
-    if (!s.colors || !s.tiles || !fixed) {
+    if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to solve a grid of this size");
         goto done;
     }

@@ -46,7 +46,8 @@ static void txt_batch_cut(void *context, int k) {
     if (c->b->desc->repair != TEXTILES_REPAIR_NONE) txt_repair_tile(c, &batch->repair[k]);
 }
 
-static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_repair *r) {
+/* memory for making one tile after another; arena->failed if there is none */
+static void txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_repair *r) {
     const size_t n = (size_t)b->set->side * (size_t)b->set->side;
     memset(c, 0, sizeof *c);
     memset(r, 0, sizeof *r);
@@ -66,7 +67,16 @@ static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_re
     c->gap = (uint16_t *)txm_arena_alloc(arena, n, sizeof(uint16_t));
     c->query.capacity = TXT_SAMPLES;
     c->query.samples = (txt_sample *)txm_arena_alloc(arena, TXT_SAMPLES, sizeof(txt_sample));
-    if (!bytes || !labels || !c->layers || !c->shows || !c->gap || !c->query.samples) return 0;
+    txt_scratch_make(b, arena, &c->scratch);
+    txm_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
+    if (b->desc->repair != TEXTILES_REPAIR_NONE) {
+        r->image = (float *)txm_arena_alloc(arena, n, 8 * sizeof(float));
+        r->mask = (uint8_t *)txm_arena_alloc(arena, n, 1);
+        r->pool.size = txt_pool_bytes(n, (size_t)c->side);
+        r->pool.block = (uint8_t *)txm_arena_alloc(arena, r->pool.size, 1);
+    }
+    if (arena->failed) return;
+    if (r->image) r->target = r->image + 4 * n;
     c->inside = bytes;
     c->locked = bytes + n;
     c->border = bytes + 2 * n;
@@ -75,16 +85,6 @@ static int txt_canvas_make(txt_build *b, txm_arena *arena, txt_canvas *c, txt_re
     c->start = labels + 2 * n;
     c->best = labels + 3 * n;
     c->other = c->shows + n;
-    if (b->desc->repair != TEXTILES_REPAIR_NONE) {
-        r->image = (float *)txm_arena_alloc(arena, n, 8 * sizeof(float));
-        r->mask = (uint8_t *)txm_arena_alloc(arena, n, 1);
-        r->pool.size = txt_pool_bytes(n, (size_t)c->side);
-        r->pool.block = (uint8_t *)txm_arena_alloc(arena, r->pool.size, 1);
-        if (!r->image || !r->mask || !r->pool.block) return 0;
-        r->target = r->image + 4 * n;
-    }
-    return txt_scratch_make(b, arena, &c->scratch) &&
-           txm_flow_make(&c->flow, arena, 2 * c->half, (c->side + 2) * (c->side + 2));
 }
 
 /* variant 0 of a tile */
@@ -163,10 +163,9 @@ static txm_status txt_make_tiles(txt_build *b) {
     txm_arena_init(&arena, b->env);
     txt_batch *batch = (txt_batch *)txm_arena_zero(&arena, 1, sizeof *batch);
     b->inside = (txt_place *)txm_arena_zero(&arena, (size_t)count, sizeof(txt_place));
-    int ok = batch && b->inside;
-    for (int k = 0; k < slots && ok; k++)
-        ok = txt_canvas_make(b, &arena, &batch->canvas[k], &batch->repair[k]);
-    if (!ok) {
+    for (int k = 0; k < slots && batch; k++)
+        txt_canvas_make(b, &arena, &batch->canvas[k], &batch->repair[k]);
+    if (arena.failed) {
         status = txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory to cut tiles");
         goto done;
     }

@@ -228,7 +228,8 @@ static int txt_search(const txt_build *b, const txt_query *q, int sheet, int tur
     return count;
 }
 
-static int txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m) {
+/* memory for searches; arena->failed if there is none */
+static void txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m) {
     int width = 0;
     m->capacity = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -243,7 +244,6 @@ static int txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *m
     m->pairs = (txm_pair *)txm_arena_alloc(arena, (size_t)m->capacity, 2 * sizeof(txm_pair));
     m->spare = m->pairs ? m->pairs + m->capacity : NULL;
     m->places = (txt_place *)txm_arena_alloc(arena, (size_t)m->capacity, sizeof(txt_place));
-    return m->sum32 && m->starts && m->pairs && m->places;
 }
 
 #endif /* TEXTILES_SEARCH_H */

@@ -195,7 +195,6 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     head.map_count = map_count;
     txt_list_tiles(&head, d);
 
-    textiles_set *s = NULL;
     const size_t texels = (size_t)head.side * (size_t)head.side;
     if ((size_t)head.count > TEXTILES_MAX_PIXELS / texels)
         return txm_fail(env, TXM_TOO_LARGE,
@@ -204,19 +203,15 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     head.tiles =
         (textiles_tile *)txm_arena_alloc(&head.arena, (size_t)head.count, sizeof(textiles_tile));
     head.lookup = (int32_t *)txm_arena_alloc(&head.arena, codes, sizeof(int32_t));
-    int ok = head.tiles && head.lookup;
-    for (int m = 0; m < map_count && ok; m++) {
+    for (int m = 0; m < map_count; m++) {
         head.maps[m] = maps[m];
         head.maps[m].texel = (size_t)maps[m].channels * txm_sample_bytes(maps[m].sample);
         head.maps[m].pixels = (uint8_t *)txm_arena_zero(&head.arena, all, head.maps[m].texel);
-        ok = head.maps[m].pixels != NULL;
     }
-    if (ok && with_source) {
+    if (with_source)
         head.source = (int32_t *)txm_arena_alloc(&head.arena, all, sizeof(int32_t));
-        ok = head.source != NULL;
-    }
-    if (ok) s = (textiles_set *)txm_arena_alloc(&head.arena, 1, sizeof *s);
-    if (!s) {
+    textiles_set *s = (textiles_set *)txm_arena_alloc(&head.arena, 1, sizeof *s);
+    if (head.arena.failed) {
         txm_arena_free(&head.arena);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the tile set");
     }
