@@ -711,6 +711,12 @@ static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
 
 /* ---- public: sets ------------------------------------------------------------------------- */
 
+TEXTILES_API void textiles_set_free(textiles_set *set) {
+    if (!set) return;
+    txm_arena arena = set->arena; /* the set lies in a block of its own */
+    txm_arena_free(&arena);
+}
+
 TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_image *tiles,
                                         int tile_count, int map_count, txm_env *env,
                                         textiles_set **out) {
@@ -763,12 +769,6 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
     return TXM_OK;
 }
 
-TEXTILES_API void textiles_set_free(textiles_set *set) {
-    if (!set) return;
-    txm_arena arena = set->arena; /* the set lies in a block of its own */
-    txm_arena_free(&arena);
-}
-
 TEXTILES_API textiles_kind textiles_kind_of(const textiles_set *set) {
     return set->kind;
 }
@@ -804,6 +804,27 @@ TEXTILES_API int textiles_find(const textiles_set *set, const int edges[4], cons
     if (code < 0 || set->lookup[code] < 0) return -1;
     if (rotation) *rotation = set->lookup[code] & 3;
     return set->lookup[code] / 4;
+}
+
+TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y, float from[2]) {
+    if (!set->source || tile < 0 || tile >= set->count || x < 0 || y < 0 || x >= set->side ||
+        y >= set->side)
+        return -1;
+    const size_t side = (size_t)set->side;
+    const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
+    if (t < 0) return -1;
+    int e = 0;
+    while (e + 1 < set->exemplar_count && t >= set->sheets[e + 1].first) e++;
+    const int at = t - set->sheets[e].first, row = at / set->sheets[e].width;
+    const int column = at % set->sheets[e].width;
+    if (set->kind == TEXTILES_TRIANGLE) {
+        from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
+        from[1] = txm_float(row * 0.86602540378443864676);
+    } else {
+        from[0] = (float)column;
+        from[1] = (float)row;
+    }
+    return e;
 }
 
 /* ---- the hash ----------------------------------------------------------------------------- */
@@ -2065,6 +2086,38 @@ static txm_status txt_check_layout(const textiles_layout *layout, txm_env *env) 
     return TXM_OK;
 }
 
+TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px, int *py,
+                                int *step, float uv[4][2]) {
+    if (!layout || tile < 0 || tile >= layout->count || layout->columns < 1) return 0;
+    const textiles_layout *l = layout;
+    const int triangle = l->kind == TEXTILES_TRIANGLE, slices = l->packing == TEXTILES_SLICES;
+    const int pair = triangle && !slices, cell = pair ? tile / 2 : tile;
+    int column = cell % l->columns, row = cell / l->columns;
+    if (l->packing == TEXTILES_TORUS) {
+        txt_torus_place(l, tile / l->variants, &column, &row);
+        column += tile % l->variants * l->colors * l->colors;
+    }
+    const int down = !(pair && tile & 1); /* else upside down, its corner at the lower right */
+    const int x = column * l->pitch_x + (down ? l->gutter : l->pitch_x - 1 - l->gutter);
+    const int y = row * l->pitch_y + (down ? l->gutter : l->pitch_y - 1 - l->gutter);
+    if (px) *px = x;
+    if (py) *py = y;
+    if (step) *step = down ? 1 : -1;
+    if (uv) {
+        /* of triangles from texel centre to texel centre; of slices inside the slice */
+        static const int squares[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        static const int triangles[3][2] = {{0, 0}, {0, 1}, {1, 0}};
+        const double centre = triangle ? 0.5 : 0, side = down ? l->size : -l->size;
+        for (int k = 0; k < (triangle ? 3 : 4); k++) {
+            const int *corner = triangle ? triangles[k] : squares[k];
+            uv[k][0] = txm_float((x + centre + side * corner[0]) / l->width);
+            uv[k][1] = txm_float((y - (slices ? row * l->pitch_y : 0) + centre + side * corner[1]) /
+                                 (slices ? l->pitch_y : l->height));
+        }
+    }
+    return 1;
+}
+
 /* ---- atlas: what lies around a tile --------------------------------------------------- */
 
 /* Does square u match t, lying east of it, or (down) south of it? */
@@ -2295,38 +2348,6 @@ TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_p
     return status;
 }
 
-TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px, int *py,
-                                int *step, float uv[4][2]) {
-    if (!layout || tile < 0 || tile >= layout->count || layout->columns < 1) return 0;
-    const textiles_layout *l = layout;
-    const int triangle = l->kind == TEXTILES_TRIANGLE, slices = l->packing == TEXTILES_SLICES;
-    const int pair = triangle && !slices, cell = pair ? tile / 2 : tile;
-    int column = cell % l->columns, row = cell / l->columns;
-    if (l->packing == TEXTILES_TORUS) {
-        txt_torus_place(l, tile / l->variants, &column, &row);
-        column += tile % l->variants * l->colors * l->colors;
-    }
-    const int down = !(pair && tile & 1); /* else upside down, its corner at the lower right */
-    const int x = column * l->pitch_x + (down ? l->gutter : l->pitch_x - 1 - l->gutter);
-    const int y = row * l->pitch_y + (down ? l->gutter : l->pitch_y - 1 - l->gutter);
-    if (px) *px = x;
-    if (py) *py = y;
-    if (step) *step = down ? 1 : -1;
-    if (uv) {
-        /* of triangles from texel centre to texel centre; of slices inside the slice */
-        static const int squares[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-        static const int triangles[3][2] = {{0, 0}, {0, 1}, {1, 0}};
-        const double centre = triangle ? 0.5 : 0, side = down ? l->size : -l->size;
-        for (int k = 0; k < (triangle ? 3 : 4); k++) {
-            const int *corner = triangle ? triangles[k] : squares[k];
-            uv[k][0] = txm_float((x + centre + side * corner[0]) / l->width);
-            uv[k][1] = txm_float((y - (slices ? row * l->pitch_y : 0) + centre + side * corner[1]) /
-                                 (slices ? l->pitch_y : l->height));
-        }
-    }
-    return 1;
-}
-
 /* what the two calls that draw a set's tiles have in common: is out such a picture? */
 static txm_status txt_check_picture(const textiles_set *set, int map, const txm_image *out,
                                     int width, int height, txm_env *env) {
@@ -2459,33 +2480,15 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
 enum {
     TXT_MAX_FEATURES = 8, /* bytes of a texel that are compared                                */
     TXT_MAX_SEGMENTS = 40, /* pieces of exemplar along an edge                                  */
-    TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
-    TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
-    TXT_NEAR = 4,         /* texels from the vertex: here the corner's piece may end ...       */
-    TXT_FAR = 12,         /* ... and here it must have                                         */
-    TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
-    TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
     TXT_MISSING = 256,    /* difference to a texel beyond the exemplar, quarter gray levels    */
-    TXT_CORNERS = 160,    /* places looked at for the corner                                   */
-    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
-    TXT_TRIES = 4,        /* inside pieces cut for each tile, of which the best stays          */
-    TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
-    TXT_WINDOW = 12,      /* half width of such a place                                        */
-    TXT_POSITIONS = 1 << 17, /* places of one exemplar looked at in one search, about          */
-    TXT_SAMPLES = 2048,   /* texels compared at one place of a search, at most                 */
     TXT_LANES = 32,       /* places of a row that are compared side by side                    */
     TXT_CELL = 8,         /* texels a side of a cell in which use is counted                   */
-    TXT_SURROUNDINGS = 4, /* texels: half width of the box whose brightness is a feature       */
-    TXT_USE = 20,         /* gray levels that a place costs which another inside shows         */
-    TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
-    TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
+    TXT_SURROUNDINGS = 4  /* texels: half width of the box whose brightness is a feature       */
 };
 
 /* these meet floating-point numbers, which C++ does not like of enumerations */
 #define TXT_SCALE 16          /* units of a search's cost per gray level                     */
-#define TXT_END 8             /* texels of a joint that show the corner, about               */
 #define TXT_SURROUND_GAIN 3   /* how strongly surroundings count                             */
-#define TXT_BALANCE 0.8       /* weight of use and traits when places are ranked             */
 
 /* ---- sheets: the exemplars as texels ------------------------------------------------------- */
 
@@ -3069,6 +3072,11 @@ static txm_status txt_prepare(txt_build *b) {
 
 /* ---- searching the exemplars ------------------------------------------------------------- */
 
+enum {
+    TXT_POSITIONS = 1 << 17, /* places of one exemplar looked at in one search, about          */
+    TXT_SAMPLES = 2048    /* texels compared at one place of a search, at most                 */
+};
+
 /* A texel that a piece should show: at this distance from the piece's place, turned already. */
 typedef struct txt_sample {
     int i, j;
@@ -3310,6 +3318,15 @@ static void txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *
 }
 
 /* ---- corners and edges ------------------------------------------------------------------- */
+
+enum {
+    TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
+    TXT_NEAR = 4,         /* texels from the vertex: here the corner's piece may end ...       */
+    TXT_FAR = 12,         /* ... and here it must have                                         */
+    TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
+    TXT_CORNERS = 160     /* places looked at for the corner                                   */
+};
+#define TXT_END 8             /* texels of a joint that show the corner, about               */
 
 static int txt_zone_end(const txt_build *b) {
     return b->set->size / 4 < TXT_FAR ? b->set->size / 4 : TXT_FAR;
@@ -3758,6 +3775,16 @@ done:
 }
 
 /* ---- one tile ---------------------------------------------------------------------------- */
+
+enum {
+    TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
+    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
+    TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
+    TXT_WINDOW = 12,      /* half width of such a place                                        */
+    TXT_USE = 20,         /* gray levels that a place costs which another inside shows         */
+    TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
+    TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
+};
 
 /* A tile being made. Every texel has the number of the layer that it shows. */
 typedef struct txt_canvas {
@@ -4583,6 +4610,12 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
 
 /* ---- all tiles --------------------------------------------------------------------------- */
 
+enum {
+    TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
+    TXT_TRIES = 4         /* inside pieces cut for each tile, of which the best stays          */
+};
+#define TXT_BALANCE 0.8       /* weight of use and traits when places are ranked             */
+
 /* The pixels and sources of a finished tile. */
 static void txt_store_tile(const txt_canvas *c) {
     const txt_build *b = c->b;
@@ -4846,27 +4879,6 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     if (status != TXM_OK) textiles_set_free(b.set);
     else *out = b.set;
     return status;
-}
-
-TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y, float from[2]) {
-    if (!set->source || tile < 0 || tile >= set->count || x < 0 || y < 0 || x >= set->side ||
-        y >= set->side)
-        return -1;
-    const size_t side = (size_t)set->side;
-    const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
-    if (t < 0) return -1;
-    int e = 0;
-    while (e + 1 < set->exemplar_count && t >= set->sheets[e + 1].first) e++;
-    const int at = t - set->sheets[e].first, row = at / set->sheets[e].width;
-    const int column = at % set->sheets[e].width;
-    if (set->kind == TEXTILES_TRIANGLE) {
-        from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
-        from[1] = txm_float(row * 0.86602540378443864676);
-    } else {
-        from[0] = (float)column;
-        from[1] = (float)row;
-    }
-    return e;
 }
 
 /* ---- public: measuring ------------------------------------------------------------------- */

@@ -130,6 +130,38 @@ static txm_status txt_check_layout(const textiles_layout *layout, txm_env *env) 
     return TXM_OK;
 }
 
+TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px, int *py,
+                                int *step, float uv[4][2]) {
+    if (!layout || tile < 0 || tile >= layout->count || layout->columns < 1) return 0;
+    const textiles_layout *l = layout;
+    const int triangle = l->kind == TEXTILES_TRIANGLE, slices = l->packing == TEXTILES_SLICES;
+    const int pair = triangle && !slices, cell = pair ? tile / 2 : tile;
+    int column = cell % l->columns, row = cell / l->columns;
+    if (l->packing == TEXTILES_TORUS) {
+        txt_torus_place(l, tile / l->variants, &column, &row);
+        column += tile % l->variants * l->colors * l->colors;
+    }
+    const int down = !(pair && tile & 1); /* else upside down, its corner at the lower right */
+    const int x = column * l->pitch_x + (down ? l->gutter : l->pitch_x - 1 - l->gutter);
+    const int y = row * l->pitch_y + (down ? l->gutter : l->pitch_y - 1 - l->gutter);
+    if (px) *px = x;
+    if (py) *py = y;
+    if (step) *step = down ? 1 : -1;
+    if (uv) {
+        /* of triangles from texel centre to texel centre; of slices inside the slice */
+        static const int squares[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        static const int triangles[3][2] = {{0, 0}, {0, 1}, {1, 0}};
+        const double centre = triangle ? 0.5 : 0, side = down ? l->size : -l->size;
+        for (int k = 0; k < (triangle ? 3 : 4); k++) {
+            const int *corner = triangle ? triangles[k] : squares[k];
+            uv[k][0] = txm_float((x + centre + side * corner[0]) / l->width);
+            uv[k][1] = txm_float((y - (slices ? row * l->pitch_y : 0) + centre + side * corner[1]) /
+                                 (slices ? l->pitch_y : l->height));
+        }
+    }
+    return 1;
+}
+
 /* ---- atlas: what lies around a tile --------------------------------------------------- */
 
 /* Does square u match t, lying east of it, or (down) south of it? */
@@ -358,38 +390,6 @@ TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_p
     const txm_status status = txt_lay_out(&l, env);
     if (status == TXM_OK) *layout = l;
     return status;
-}
-
-TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px, int *py,
-                                int *step, float uv[4][2]) {
-    if (!layout || tile < 0 || tile >= layout->count || layout->columns < 1) return 0;
-    const textiles_layout *l = layout;
-    const int triangle = l->kind == TEXTILES_TRIANGLE, slices = l->packing == TEXTILES_SLICES;
-    const int pair = triangle && !slices, cell = pair ? tile / 2 : tile;
-    int column = cell % l->columns, row = cell / l->columns;
-    if (l->packing == TEXTILES_TORUS) {
-        txt_torus_place(l, tile / l->variants, &column, &row);
-        column += tile % l->variants * l->colors * l->colors;
-    }
-    const int down = !(pair && tile & 1); /* else upside down, its corner at the lower right */
-    const int x = column * l->pitch_x + (down ? l->gutter : l->pitch_x - 1 - l->gutter);
-    const int y = row * l->pitch_y + (down ? l->gutter : l->pitch_y - 1 - l->gutter);
-    if (px) *px = x;
-    if (py) *py = y;
-    if (step) *step = down ? 1 : -1;
-    if (uv) {
-        /* of triangles from texel centre to texel centre; of slices inside the slice */
-        static const int squares[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-        static const int triangles[3][2] = {{0, 0}, {0, 1}, {1, 0}};
-        const double centre = triangle ? 0.5 : 0, side = down ? l->size : -l->size;
-        for (int k = 0; k < (triangle ? 3 : 4); k++) {
-            const int *corner = triangle ? triangles[k] : squares[k];
-            uv[k][0] = txm_float((x + centre + side * corner[0]) / l->width);
-            uv[k][1] = txm_float((y - (slices ? row * l->pitch_y : 0) + centre + side * corner[1]) /
-                                 (slices ? l->pitch_y : l->height));
-        }
-    }
-    return 1;
 }
 
 /* what the two calls that draw a set's tiles have in common: is out such a picture? */

@@ -5,6 +5,16 @@
 
 /* ---- one tile ---------------------------------------------------------------------------- */
 
+enum {
+    TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
+    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
+    TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
+    TXT_WINDOW = 12,      /* half width of such a place                                        */
+    TXT_USE = 20,         /* gray levels that a place costs which another inside shows         */
+    TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
+    TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
+};
+
 /* A tile being made. Every texel has the number of the layer that it shows. */
 typedef struct txt_canvas {
     const txt_build *b;

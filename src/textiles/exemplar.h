@@ -8,33 +8,15 @@
 enum {
     TXT_MAX_FEATURES = 8, /* bytes of a texel that are compared                                */
     TXT_MAX_SEGMENTS = 40, /* pieces of exemplar along an edge                                  */
-    TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
-    TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
-    TXT_NEAR = 4,         /* texels from the vertex: here the corner's piece may end ...       */
-    TXT_FAR = 12,         /* ... and here it must have                                         */
-    TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
-    TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
     TXT_MISSING = 256,    /* difference to a texel beyond the exemplar, quarter gray levels    */
-    TXT_CORNERS = 160,    /* places looked at for the corner                                   */
-    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
-    TXT_TRIES = 4,        /* inside pieces cut for each tile, of which the best stays          */
-    TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
-    TXT_WINDOW = 12,      /* half width of such a place                                        */
-    TXT_POSITIONS = 1 << 17, /* places of one exemplar looked at in one search, about          */
-    TXT_SAMPLES = 2048,   /* texels compared at one place of a search, at most                 */
     TXT_LANES = 32,       /* places of a row that are compared side by side                    */
     TXT_CELL = 8,         /* texels a side of a cell in which use is counted                   */
-    TXT_SURROUNDINGS = 4, /* texels: half width of the box whose brightness is a feature       */
-    TXT_USE = 20,         /* gray levels that a place costs which another inside shows         */
-    TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
-    TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
+    TXT_SURROUNDINGS = 4  /* texels: half width of the box whose brightness is a feature       */
 };
 
 /* these meet floating-point numbers, which C++ does not like of enumerations */
 #define TXT_SCALE 16          /* units of a search's cost per gray level                     */
-#define TXT_END 8             /* texels of a joint that show the corner, about               */
 #define TXT_SURROUND_GAIN 3   /* how strongly surroundings count                             */
-#define TXT_BALANCE 0.8       /* weight of use and traits when places are ranked             */
 
 /* ---- sheets: the exemplars as texels ------------------------------------------------------- */
 

@@ -5,6 +5,15 @@
 
 /* ---- corners and edges ------------------------------------------------------------------- */
 
+enum {
+    TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
+    TXT_NEAR = 4,         /* texels from the vertex: here the corner's piece may end ...       */
+    TXT_FAR = 12,         /* ... and here it must have                                         */
+    TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
+    TXT_CORNERS = 160     /* places looked at for the corner                                   */
+};
+#define TXT_END 8             /* texels of a joint that show the corner, about               */
+
 static int txt_zone_end(const txt_build *b) {
     return b->set->size / 4 < TXT_FAR ? b->set->size / 4 : TXT_FAR;
 }

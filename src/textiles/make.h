@@ -5,6 +5,12 @@
 
 /* ---- all tiles --------------------------------------------------------------------------- */
 
+enum {
+    TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
+    TXT_TRIES = 4         /* inside pieces cut for each tile, of which the best stays          */
+};
+#define TXT_BALANCE 0.8       /* weight of use and traits when places are ranked             */
+
 /* The pixels and sources of a finished tile. */
 static void txt_store_tile(const txt_canvas *c) {
     const txt_build *b = c->b;
@@ -268,27 +274,6 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     if (status != TXM_OK) textiles_set_free(b.set);
     else *out = b.set;
     return status;
-}
-
-TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y, float from[2]) {
-    if (!set->source || tile < 0 || tile >= set->count || x < 0 || y < 0 || x >= set->side ||
-        y >= set->side)
-        return -1;
-    const size_t side = (size_t)set->side;
-    const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
-    if (t < 0) return -1;
-    int e = 0;
-    while (e + 1 < set->exemplar_count && t >= set->sheets[e + 1].first) e++;
-    const int at = t - set->sheets[e].first, row = at / set->sheets[e].width;
-    const int column = at % set->sheets[e].width;
-    if (set->kind == TEXTILES_TRIANGLE) {
-        from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
-        from[1] = txm_float(row * 0.86602540378443864676);
-    } else {
-        from[0] = (float)column;
-        from[1] = (float)row;
-    }
-    return e;
 }
 
 #endif /* TEXTILES_MAKE_H */

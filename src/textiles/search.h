@@ -6,6 +6,11 @@
 
 /* ---- searching the exemplars ------------------------------------------------------------- */
 
+enum {
+    TXT_POSITIONS = 1 << 17, /* places of one exemplar looked at in one search, about          */
+    TXT_SAMPLES = 2048    /* texels compared at one place of a search, at most                 */
+};
+
 /* A texel that a piece should show: at this distance from the piece's place, turned already. */
 typedef struct txt_sample {
     int i, j;

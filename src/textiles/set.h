@@ -236,6 +236,12 @@ static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
 
 /* ---- public: sets ------------------------------------------------------------------------- */
 
+TEXTILES_API void textiles_set_free(textiles_set *set) {
+    if (!set) return;
+    txm_arena arena = set->arena; /* the set lies in a block of its own */
+    txm_arena_free(&arena);
+}
+
 TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_image *tiles,
                                         int tile_count, int map_count, txm_env *env,
                                         textiles_set **out) {
@@ -288,12 +294,6 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
     return TXM_OK;
 }
 
-TEXTILES_API void textiles_set_free(textiles_set *set) {
-    if (!set) return;
-    txm_arena arena = set->arena; /* the set lies in a block of its own */
-    txm_arena_free(&arena);
-}
-
 TEXTILES_API textiles_kind textiles_kind_of(const textiles_set *set) {
     return set->kind;
 }
@@ -329,6 +329,27 @@ TEXTILES_API int textiles_find(const textiles_set *set, const int edges[4], cons
     if (code < 0 || set->lookup[code] < 0) return -1;
     if (rotation) *rotation = set->lookup[code] & 3;
     return set->lookup[code] / 4;
+}
+
+TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y, float from[2]) {
+    if (!set->source || tile < 0 || tile >= set->count || x < 0 || y < 0 || x >= set->side ||
+        y >= set->side)
+        return -1;
+    const size_t side = (size_t)set->side;
+    const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
+    if (t < 0) return -1;
+    int e = 0;
+    while (e + 1 < set->exemplar_count && t >= set->sheets[e + 1].first) e++;
+    const int at = t - set->sheets[e].first, row = at / set->sheets[e].width;
+    const int column = at % set->sheets[e].width;
+    if (set->kind == TEXTILES_TRIANGLE) {
+        from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
+        from[1] = txm_float(row * 0.86602540378443864676);
+    } else {
+        from[0] = (float)column;
+        from[1] = (float)row;
+    }
+    return e;
 }
 
 #endif /* TEXTILES_SET_H */
