@@ -535,6 +535,13 @@ static uint8_t *txt_texel(const textiles_set *s, int map, int tile, int x, int y
            (((size_t)tile * side + (size_t)y) * side + (size_t)x) * s->maps[map].texel;
 }
 
+/* the exemplar of which a sheet holds the texel of this number */
+static int txt_sheet_of(const textiles_set *s, int32_t texel) {
+    int e = 0;
+    while (e + 1 < s->exemplar_count && texel >= s->sheets[e + 1].first) e++;
+    return e;
+}
+
 /* sample i of a row, as it is stored: not scaled to 0..1 */
 static double txt_stored(txm_sample sample, const void *row, size_t i) {
     if (sample == TXM_F32) return (double)((const float *)row)[i];
@@ -697,6 +704,14 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     return TXM_OK;
 }
 
+/* Does square u match t, lying east of it, or (down) south of it? */
+static int txt_joins(const textiles_set *s, int t, int u, int down) {
+    const int *a = s->tiles[t].edges, *b = s->tiles[u].edges;
+    if (s->kind == TEXTILES_CORNER)
+        return down ? a[3] == b[0] && a[2] == b[1] : a[1] == b[0] && a[2] == b[3];
+    return down ? a[2] == b[0] : a[1] == b[3];
+}
+
 /* non-zero if no sample is infinite or NaN; of a triangle's square only the triangle counts */
 static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
     for (int y = 0; y < im->height; y++) {
@@ -813,9 +828,7 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
     const size_t side = (size_t)set->side;
     const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
     if (t < 0) return -1;
-    int e = 0;
-    while (e + 1 < set->exemplar_count && t >= set->sheets[e + 1].first) e++;
-    const int at = t - set->sheets[e].first, row = at / set->sheets[e].width;
+    const int e = txt_sheet_of(set, t), at = t - set->sheets[e].first, row = at / set->sheets[e].width;
     const int column = at % set->sheets[e].width;
     if (set->kind == TEXTILES_TRIANGLE) {
         from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
@@ -829,9 +842,14 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
 
 /* ---- the hash ----------------------------------------------------------------------------- */
 
-/* 32 bits that depend on a place of the plane, on what is asked for there and on the seed. In 32-bit
-   integers, since shaders/textiles.glsl computes the same. The two multipliers of the mixing step are
-   C. Wellons's ("prospecting for hash functions"). */
+/* Which tile lies where is read off
+
+       hash(seed, what, x, y) = txt_at(txt_column(seed, x), what, y),
+
+   32 bits that depend on the place, on what is asked for there and on the seed. The inner half depends
+   on the column only, so that a column of the plane, or two edges at the same column, share it. In
+   32-bit integers, since shaders/textiles.glsl computes the same; coordinates are taken modulo 2^32.
+   The two multipliers of the mixing step are C. Wellons's ("prospecting for hash functions"). */
 static uint32_t txt_mix(uint32_t h) {
     h ^= h >> 16;
     h *= 0x7feb352du;
@@ -840,37 +858,22 @@ static uint32_t txt_mix(uint32_t h) {
     return h ^ (h >> 16);
 }
 
-static uint32_t txt_hash(uint32_t seed, uint32_t what, int x, int y) {
-    return txt_mix(txt_mix((uint32_t)x + seed) ^ ((uint32_t)y * 0x9e3779b9u + what * 0x85ebca6bu));
+static uint32_t txt_column(uint32_t seed, uint32_t x) {
+    return txt_mix(x + seed);
+}
+
+/* what is asked for at row y: the same for all columns */
+static uint32_t txt_key(uint32_t what, uint32_t y) {
+    return y * 0x9e3779b9u + what * 0x85ebca6bu;
+}
+
+static uint32_t txt_at(uint32_t column, uint32_t what, uint32_t y) {
+    return txt_mix(column ^ txt_key(what, y));
 }
 
 /* a hash as a number of 0..n-1 */
 static int txt_below(uint32_t hash, int n) {
     return (int)((hash >> 8) * (uint32_t)n >> 24);
-}
-
-/* ---- the plane: which tile lies where --------------------------------------------------- */
-
-/* Everything is read off txt_hash(seed, what, x, y). Its inner half depends on the column only, so
-   that a column of the plane, or two edges at the same column, share it:
-
-       txt_hash(seed, what, x, y) = txt_at(txt_column(seed, x), what, y)
-
-   Coordinates are taken modulo 2^32. A square (x, y) asks for
-
-       what 0   the colour of its north edge; its south edge is the north edge of (x, y + 1)
-       what 1   the colour of its west edge; its east edge is the west edge of (x + 1, y)
-       what 2   of corner tiles, the colour of its north-west corner
-       what 3   variants of the upper left and lower right square of a block of 2 x 2
-       what 4   variants of the other two
-
-   and colours are txt_below(hash, colors). */
-static uint32_t txt_column(uint32_t seed, uint32_t x) {
-    return txt_mix(x + seed);
-}
-
-static uint32_t txt_at(uint32_t column, uint32_t what, uint32_t y) {
-    return txt_mix(column ^ (y * 0x9e3779b9u + what * 0x85ebca6bu));
 }
 
 /* the upper and lower 16 bits of a hash as numbers of 0..n-1 */
@@ -880,6 +883,18 @@ static int txt_upper(uint32_t hash, int n) {
 static int txt_lower(uint32_t hash, int n) {
     return (int)((hash & 0xffffu) * (uint32_t)n >> 16);
 }
+
+/* ---- the plane: which tile lies where --------------------------------------------------- */
+
+/* A square (x, y) asks for
+
+       what 0   the colour of its north edge; its south edge is the north edge of (x, y + 1)
+       what 1   the colour of its west edge; its east edge is the west edge of (x + 1, y)
+       what 2   of corner tiles, the colour of its north-west corner
+       what 3   variants of the upper left and lower right square of a block of 2 x 2
+       what 4   variants of the other two
+
+   and colours are txt_below(hash, colors). */
 
 /* Number k of the variants that are neither a nor d. */
 static int txt_other_variant(int k, int a, int d) {
@@ -928,7 +943,7 @@ typedef struct txt_strip {
 
 static void txt_strip_colors(const uint32_t *column, int count, uint32_t what, uint32_t y, int colors,
                              int *out) {
-    const uint32_t key = y * 0x9e3779b9u + what * 0x85ebca6bu; /* as in txt_at */
+    const uint32_t key = txt_key(what, y);
     for (int i = 0; i < count; i++) out[i] = txt_below(txt_mix(column[i] ^ key), colors);
 }
 
@@ -1071,7 +1086,7 @@ TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int
     const int32_t entry = plane->table[code];
     int variant = 0;
     if (plane->variants > 1) {
-        const uint32_t h = txt_hash(plane->seed, 11, a, b);
+        const uint32_t h = txt_at(here, 11, v);
         variant = one ? 2 * txt_lower(h, plane->variants / 2) + 1
                       : 2 * txt_upper(h, (plane->variants + 1) / 2);
     }
@@ -2120,14 +2135,6 @@ TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px
 
 /* ---- atlas: what lies around a tile --------------------------------------------------- */
 
-/* Does square u match t, lying east of it, or (down) south of it? */
-static int txt_joins(const textiles_set *s, int t, int u, int down) {
-    const int *a = s->tiles[t].edges, *b = s->tiles[u].edges;
-    if (s->kind == TEXTILES_CORNER)
-        return down ? a[3] == b[0] && a[2] == b[1] : a[1] == b[0] && a[2] == b[3];
-    return down ? a[2] == b[0] : a[1] == b[3];
-}
-
 /* The nine tiles of which a square is the middle one; -1: nothing fits. The corners match the tiles
    above or below and to their side, where the set has such a tile. */
 static void txt_around(const textiles_set *s, int tile, int around[3][3]) {
@@ -2597,13 +2604,6 @@ static int32_t txt_number(const txt_build *b, int sheet, int i, int j) {
     return s->first + j * s->width + k;
 }
 
-/* the sheet that a texel lies in */
-static int txt_sheet_of(const txt_build *b, int32_t t) {
-    int e = 0;
-    while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
-    return e;
-}
-
 /* number of the texel that a layer shows at (x, y) of a tile; -1: none */
 static int32_t txt_shown(const txt_build *b, const txt_layer *l, int x, int y) {
     int i, j;
@@ -2977,7 +2977,7 @@ static txm_status txt_fill_salience(txt_build *b) {
 
 /* Traits of one texel; 0 for those that there are none of. */
 static void txt_texel_traits(const txt_build *b, int32_t t, double traits[TXT_TRAITS]) {
-    const int e = txt_sheet_of(b, t);
+    const int e = txt_sheet_of(b->set, t);
     const txt_sheet *s = &b->sheets[e];
     const int at = t - s->first, x = at % s->width, y = at / s->width;
     for (int k = 0; k < TXT_TRAITS; k++) traits[k] = 0;
@@ -4213,7 +4213,7 @@ static void txt_count_use(txt_build *b, const txt_canvas *c) {
             const int p = y * c->side + x;
             if (!c->inside[p] || c->layers[c->label[p]].is_frame) continue;
             const int32_t t = c->shows[p];
-            const int e = txt_sheet_of(b, t);
+            const int e = txt_sheet_of(b->set, t);
             const int w = b->sheets[e].width, at = t - b->sheets[e].first;
             const int across = w / TXT_CELL + 2;
             const uint32_t weight = 8 + b->salient[t] / 2; /* 16 of usual salience */
@@ -4509,7 +4509,7 @@ static size_t txt_pool_bytes(size_t texels, size_t side) {
 
 /* the value of a map at a texel of the sheets */
 static float txt_sheet_value(const txt_build *b, int map, int32_t t, int channel) {
-    const txt_sheet *s = &b->sheets[txt_sheet_of(b, t)];
+    const txt_sheet *s = &b->sheets[txt_sheet_of(b->set, t)];
     const int at = t - s->first;
     return txm_image_get(&s->maps[map], at % s->width, at / s->width, channel);
 }
@@ -4626,7 +4626,7 @@ static void txt_store_tile(const txt_canvas *c) {
         source[p] = c->inside[p] ? c->shows[p] : -1;
         if (!c->inside[p]) continue;
         const int32_t t = c->shows[p];
-        const int e = txt_sheet_of(b, t);
+        const int e = txt_sheet_of(b->set, t);
         const int at = t - b->sheets[e].first, w = b->sheets[e].width;
         for (int m = 0; m < set->map_count; m++) {
             const char *row = (const char *)txm_image_row_const(&b->sheets[e].maps[m], at / w);
@@ -4965,14 +4965,9 @@ static void txt_count_joint(txt_tally *t, double step, double inside) {
 static void txt_measure_squares(const textiles_set *s, int map, int a, int b, const double *inside,
                                 txt_tally *tally) {
     const int last = s->size - 1;
-    const int *p = s->tiles[a].edges, *q = s->tiles[b].edges;
-    const int is_corner = s->kind == TEXTILES_CORNER;
     for (int axis = 0; axis < 2; axis++) { /* 0: b under a, 1: b right of a */
-        const int legal = is_corner ? axis ? p[1] == q[0] && p[2] == q[3] : p[3] == q[0] && p[2] == q[1]
-                          : axis    ? p[1] == q[3]
-                                    : p[2] == q[0];
         double sum = 0;
-        if (!legal) continue;
+        if (!txt_joins(s, a, b, !axis)) continue;
         for (int k = 0; k <= last; k++)
             sum += txt_texel_step(&s->maps[map],
                                   txt_texel(s, map, a, axis ? last : k, axis ? k : last),

@@ -113,25 +113,37 @@ static void test_sets_triangles(void **state) {
 /* ---- the plane -------------------------------------------------------------------------- */
 
 /* The formulas as shaders/textiles.glsl has them, written down once more. */
+static uint32_t mix(uint32_t h) {
+    h = (h ^ h >> 16) * 0x7feb352du;
+    h = (h ^ h >> 15) * 0x846ca68bu;
+    return h ^ h >> 16;
+}
+static uint32_t hash(uint32_t seed, uint32_t what, int x, int y) {
+    return mix(mix((uint32_t)x + seed) ^ ((uint32_t)y * 0x9e3779b9u + what * 0x85ebca6bu));
+}
+static int below(uint32_t h, int n) {
+    return (int)((h >> 8) * (uint32_t)n >> 24);
+}
+
 static int formula_tile(const textiles_plane *p, int x, int y) {
     const int x1 = wrapped(x, 1), y1 = wrapped(y, 1), c = p->colors, v = p->variants;
     const uint32_t s = p->seed;
     int e[4], code = 0, variant = 0;
     if (p->kind == TEXTILES_WANG) {
-        e[0] = txt_below(txt_hash(s, 0, x, y), c);
-        e[1] = txt_below(txt_hash(s, 1, x1, y), c);
-        e[2] = txt_below(txt_hash(s, 0, x, y1), c);
-        e[3] = txt_below(txt_hash(s, 1, x, y), c);
+        e[0] = below(hash(s, 0, x, y), c);
+        e[1] = below(hash(s, 1, x1, y), c);
+        e[2] = below(hash(s, 0, x, y1), c);
+        e[3] = below(hash(s, 1, x, y), c);
     } else {
-        e[0] = txt_below(txt_hash(s, 2, x, y), c);
-        e[1] = txt_below(txt_hash(s, 2, x1, y), c);
-        e[2] = txt_below(txt_hash(s, 2, x1, y1), c);
-        e[3] = txt_below(txt_hash(s, 2, x, y1), c);
+        e[0] = below(hash(s, 2, x, y), c);
+        e[1] = below(hash(s, 2, x1, y), c);
+        e[2] = below(hash(s, 2, x1, y1), c);
+        e[3] = below(hash(s, 2, x, y1), c);
     }
     for (int k = 0; k < 4; k++) code = code * c + e[k];
     if (v > 1) {
         const int bx = (int)((uint32_t)x >> 1), by = (int)((uint32_t)y >> 1);
-        const uint32_t h = txt_hash(s, 3, bx, by), g = txt_hash(s, 4, bx, by);
+        const uint32_t h = hash(s, 3, bx, by), g = hash(s, 4, bx, by);
         const int a = (int)((h >> 16) * (uint32_t)v >> 16);
         const int d = v == 2 ? a : (int)((h & 65535) * (uint32_t)v >> 16);
         if ((x & 1) == (y & 1)) {
@@ -241,24 +253,24 @@ static int formula_triangle(const textiles_set *set, const textiles_plane *p, in
                             int half, int *rotation) {
     const int a1 = wrapped(a, 1), b1 = wrapped(b, 1), v = p->variants;
     const int corners[2][3][2] = {{{a, b}, {a, b1}, {a1, b}}, {{a1, b1}, {a1, b}, {a, b1}}};
-    const int colors[2][3] = {{txt_below(txt_hash(p->seed, 9, a, b), p->colors),
-                               txt_below(txt_hash(p->seed, 10, a, b), p->colors),
-                               txt_below(txt_hash(p->seed, 8, a, b), p->colors)},
-                              {txt_below(txt_hash(p->seed, 9, a1, b), p->colors),
-                               txt_below(txt_hash(p->seed, 10, a, b), p->colors),
-                               txt_below(txt_hash(p->seed, 8, a, b1), p->colors)}};
+    const int colors[2][3] = {{below(hash(p->seed, 9, a, b), p->colors),
+                               below(hash(p->seed, 10, a, b), p->colors),
+                               below(hash(p->seed, 8, a, b), p->colors)},
+                              {below(hash(p->seed, 9, a1, b), p->colors),
+                               below(hash(p->seed, 10, a, b), p->colors),
+                               below(hash(p->seed, 8, a, b1), p->colors)}};
     int edges[4] = {0, 0, 0, 0}, directions[3];
     for (int k = 0; k < 3; k++) {
         const int *from = corners[half][k], *to = corners[half][(k + 1) % 3];
-        const uint32_t low = txt_hash(p->seed, 7, from[0], from[1]);
-        const uint32_t high = txt_hash(p->seed, 7, to[0], to[1]);
+        const uint32_t low = hash(p->seed, 7, from[0], from[1]);
+        const uint32_t high = hash(p->seed, 7, to[0], to[1]);
         int up = low < high;
         if (low == high && from[0] != to[0]) up = (uint32_t)from[0] < (uint32_t)to[0];
         else if (low == high) up = (uint32_t)from[1] < (uint32_t)to[1];
         edges[k] = colors[half][k];
         directions[k] = up ? 1 : -1;
     }
-    const uint32_t h = txt_hash(p->seed, 11, a, b);
+    const uint32_t h = hash(p->seed, 11, a, b);
     const int even = 2 * (int)((h >> 16) * (uint32_t)((v + 1) / 2) >> 16);
     const int odd = 2 * (int)((h & 65535) * (uint32_t)(v / 2) >> 16) + 1;
     return textiles_find(set, edges, directions, rotation) + (v == 1 ? 0 : half ? odd : even);
@@ -337,7 +349,7 @@ static void test_plane_triangles(void **state) {
 }
 
 /* Two neighbours of equal rank: one pair in 2^32, but it can be computed. The points (a+1, b) and
-   (a, b+1) have the same rank if (z + G) ^ z = X for z = G b + 7 W, G and W the factors of txt_hash and
+   (a, b+1) have the same rank if (z + G) ^ z = X for z = G b + 7 W, G and W the factors of hash and
    X known from a; bit by bit this says what is carried, and z where it is free. */
 static void test_plane_equal_ranks(void **state) {
     (void)state;
@@ -350,11 +362,11 @@ static void test_plane_equal_ranks(void **state) {
     assert_int_equal(textiles_plane_make(set, 12345, NULL, &p), TXM_OK);
     for (int a = 0; a < 4000000 && found < 4; a++) {
         const uint32_t x =
-            txt_mix((uint32_t)a + p.seed) ^ txt_mix((uint32_t)a + 1 + p.seed);
+            mix((uint32_t)a + p.seed) ^ mix((uint32_t)a + 1 + p.seed);
         const uint32_t carry = g ^ x, forced = ~(g ^ carry); /* where G and carry agree */
         if (carry & 1 || (forced & (carry >> 1 ^ g)) << 1) continue;
         const int b = (int)(((carry >> 1) - 7 * w) * inverse);
-        if (txt_hash(p.seed, 7, wrapped(a, 1), b) != txt_hash(p.seed, 7, a, wrapped(b, 1))) continue;
+        if (hash(p.seed, 7, wrapped(a, 1), b) != hash(p.seed, 7, a, wrapped(b, 1))) continue;
         found++;
         for (int half = 0; half < 2; half++) {
             int r = 7, wanted = 7;

@@ -164,14 +164,6 @@ TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px
 
 /* ---- atlas: what lies around a tile --------------------------------------------------- */
 
-/* Does square u match t, lying east of it, or (down) south of it? */
-static int txt_joins(const textiles_set *s, int t, int u, int down) {
-    const int *a = s->tiles[t].edges, *b = s->tiles[u].edges;
-    if (s->kind == TEXTILES_CORNER)
-        return down ? a[3] == b[0] && a[2] == b[1] : a[1] == b[0] && a[2] == b[3];
-    return down ? a[2] == b[0] : a[1] == b[3];
-}
-
 /* The nine tiles of which a square is the middle one; -1: nothing fits. The corners match the tiles
    above or below and to their side, where the set has such a tile. */
 static void txt_around(const textiles_set *s, int tile, int around[3][3]) {

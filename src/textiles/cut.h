@@ -442,7 +442,7 @@ static void txt_count_use(txt_build *b, const txt_canvas *c) {
             const int p = y * c->side + x;
             if (!c->inside[p] || c->layers[c->label[p]].is_frame) continue;
             const int32_t t = c->shows[p];
-            const int e = txt_sheet_of(b, t);
+            const int e = txt_sheet_of(b->set, t);
             const int w = b->sheets[e].width, at = t - b->sheets[e].first;
             const int across = w / TXT_CELL + 2;
             const uint32_t weight = 8 + b->salient[t] / 2; /* 16 of usual salience */

@@ -125,13 +125,6 @@ static int32_t txt_number(const txt_build *b, int sheet, int i, int j) {
     return s->first + j * s->width + k;
 }
 
-/* the sheet that a texel lies in */
-static int txt_sheet_of(const txt_build *b, int32_t t) {
-    int e = 0;
-    while (e + 1 < b->sheet_count && t >= b->sheets[e + 1].first) e++;
-    return e;
-}
-
 /* number of the texel that a layer shows at (x, y) of a tile; -1: none */
 static int32_t txt_shown(const txt_build *b, const txt_layer *l, int x, int y) {
     int i, j;
@@ -505,7 +498,7 @@ static txm_status txt_fill_salience(txt_build *b) {
 
 /* Traits of one texel; 0 for those that there are none of. */
 static void txt_texel_traits(const txt_build *b, int32_t t, double traits[TXT_TRAITS]) {
-    const int e = txt_sheet_of(b, t);
+    const int e = txt_sheet_of(b->set, t);
     const txt_sheet *s = &b->sheets[e];
     const int at = t - s->first, x = at % s->width, y = at / s->width;
     for (int k = 0; k < TXT_TRAITS; k++) traits[k] = 0;

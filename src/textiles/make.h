@@ -21,7 +21,7 @@ static void txt_store_tile(const txt_canvas *c) {
         source[p] = c->inside[p] ? c->shows[p] : -1;
         if (!c->inside[p]) continue;
         const int32_t t = c->shows[p];
-        const int e = txt_sheet_of(b, t);
+        const int e = txt_sheet_of(b->set, t);
         const int at = t - b->sheets[e].first, w = b->sheets[e].width;
         for (int m = 0; m < set->map_count; m++) {
             const char *row = (const char *)txm_image_row_const(&b->sheets[e].maps[m], at / w);

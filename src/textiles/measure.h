@@ -87,14 +87,9 @@ static void txt_count_joint(txt_tally *t, double step, double inside) {
 static void txt_measure_squares(const textiles_set *s, int map, int a, int b, const double *inside,
                                 txt_tally *tally) {
     const int last = s->size - 1;
-    const int *p = s->tiles[a].edges, *q = s->tiles[b].edges;
-    const int is_corner = s->kind == TEXTILES_CORNER;
     for (int axis = 0; axis < 2; axis++) { /* 0: b under a, 1: b right of a */
-        const int legal = is_corner ? axis ? p[1] == q[0] && p[2] == q[3] : p[3] == q[0] && p[2] == q[1]
-                          : axis    ? p[1] == q[3]
-                                    : p[2] == q[0];
         double sum = 0;
-        if (!legal) continue;
+        if (!txt_joins(s, a, b, !axis)) continue;
         for (int k = 0; k <= last; k++)
             sum += txt_texel_step(&s->maps[map],
                                   txt_texel(s, map, a, axis ? last : k, axis ? k : last),

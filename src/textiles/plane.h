@@ -5,9 +5,14 @@
 
 /* ---- the hash ----------------------------------------------------------------------------- */
 
-/* 32 bits that depend on a place of the plane, on what is asked for there and on the seed. In 32-bit
-   integers, since shaders/textiles.glsl computes the same. The two multipliers of the mixing step are
-   C. Wellons's ("prospecting for hash functions"). */
+/* Which tile lies where is read off
+
+       hash(seed, what, x, y) = txt_at(txt_column(seed, x), what, y),
+
+   32 bits that depend on the place, on what is asked for there and on the seed. The inner half depends
+   on the column only, so that a column of the plane, or two edges at the same column, share it. In
+   32-bit integers, since shaders/textiles.glsl computes the same; coordinates are taken modulo 2^32.
+   The two multipliers of the mixing step are C. Wellons's ("prospecting for hash functions"). */
 static uint32_t txt_mix(uint32_t h) {
     h ^= h >> 16;
     h *= 0x7feb352du;
@@ -16,37 +21,22 @@ static uint32_t txt_mix(uint32_t h) {
     return h ^ (h >> 16);
 }
 
-static uint32_t txt_hash(uint32_t seed, uint32_t what, int x, int y) {
-    return txt_mix(txt_mix((uint32_t)x + seed) ^ ((uint32_t)y * 0x9e3779b9u + what * 0x85ebca6bu));
+static uint32_t txt_column(uint32_t seed, uint32_t x) {
+    return txt_mix(x + seed);
+}
+
+/* what is asked for at row y: the same for all columns */
+static uint32_t txt_key(uint32_t what, uint32_t y) {
+    return y * 0x9e3779b9u + what * 0x85ebca6bu;
+}
+
+static uint32_t txt_at(uint32_t column, uint32_t what, uint32_t y) {
+    return txt_mix(column ^ txt_key(what, y));
 }
 
 /* a hash as a number of 0..n-1 */
 static int txt_below(uint32_t hash, int n) {
     return (int)((hash >> 8) * (uint32_t)n >> 24);
-}
-
-/* ---- the plane: which tile lies where --------------------------------------------------- */
-
-/* Everything is read off txt_hash(seed, what, x, y). Its inner half depends on the column only, so
-   that a column of the plane, or two edges at the same column, share it:
-
-       txt_hash(seed, what, x, y) = txt_at(txt_column(seed, x), what, y)
-
-   Coordinates are taken modulo 2^32. A square (x, y) asks for
-
-       what 0   the colour of its north edge; its south edge is the north edge of (x, y + 1)
-       what 1   the colour of its west edge; its east edge is the west edge of (x + 1, y)
-       what 2   of corner tiles, the colour of its north-west corner
-       what 3   variants of the upper left and lower right square of a block of 2 x 2
-       what 4   variants of the other two
-
-   and colours are txt_below(hash, colors). */
-static uint32_t txt_column(uint32_t seed, uint32_t x) {
-    return txt_mix(x + seed);
-}
-
-static uint32_t txt_at(uint32_t column, uint32_t what, uint32_t y) {
-    return txt_mix(column ^ (y * 0x9e3779b9u + what * 0x85ebca6bu));
 }
 
 /* the upper and lower 16 bits of a hash as numbers of 0..n-1 */
@@ -56,6 +46,18 @@ static int txt_upper(uint32_t hash, int n) {
 static int txt_lower(uint32_t hash, int n) {
     return (int)((hash & 0xffffu) * (uint32_t)n >> 16);
 }
+
+/* ---- the plane: which tile lies where --------------------------------------------------- */
+
+/* A square (x, y) asks for
+
+       what 0   the colour of its north edge; its south edge is the north edge of (x, y + 1)
+       what 1   the colour of its west edge; its east edge is the west edge of (x + 1, y)
+       what 2   of corner tiles, the colour of its north-west corner
+       what 3   variants of the upper left and lower right square of a block of 2 x 2
+       what 4   variants of the other two
+
+   and colours are txt_below(hash, colors). */
 
 /* Number k of the variants that are neither a nor d. */
 static int txt_other_variant(int k, int a, int d) {
@@ -104,7 +106,7 @@ typedef struct txt_strip {
 
 static void txt_strip_colors(const uint32_t *column, int count, uint32_t what, uint32_t y, int colors,
                              int *out) {
-    const uint32_t key = y * 0x9e3779b9u + what * 0x85ebca6bu; /* as in txt_at */
+    const uint32_t key = txt_key(what, y);
     for (int i = 0; i < count; i++) out[i] = txt_below(txt_mix(column[i] ^ key), colors);
 }
 
@@ -247,7 +249,7 @@ TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int
     const int32_t entry = plane->table[code];
     int variant = 0;
     if (plane->variants > 1) {
-        const uint32_t h = txt_hash(plane->seed, 11, a, b);
+        const uint32_t h = txt_at(here, 11, v);
         variant = one ? 2 * txt_lower(h, plane->variants / 2) + 1
                       : 2 * txt_upper(h, (plane->variants + 1) / 2);
     }

@@ -32,7 +32,7 @@ static size_t txt_pool_bytes(size_t texels, size_t side) {
 
 /* the value of a map at a texel of the sheets */
 static float txt_sheet_value(const txt_build *b, int map, int32_t t, int channel) {
-    const txt_sheet *s = &b->sheets[txt_sheet_of(b, t)];
+    const txt_sheet *s = &b->sheets[txt_sheet_of(b->set, t)];
     const int at = t - s->first;
     return txm_image_get(&s->maps[map], at % s->width, at / s->width, channel);
 }

@@ -60,6 +60,13 @@ static uint8_t *txt_texel(const textiles_set *s, int map, int tile, int x, int y
            (((size_t)tile * side + (size_t)y) * side + (size_t)x) * s->maps[map].texel;
 }
 
+/* the exemplar of which a sheet holds the texel of this number */
+static int txt_sheet_of(const textiles_set *s, int32_t texel) {
+    int e = 0;
+    while (e + 1 < s->exemplar_count && texel >= s->sheets[e + 1].first) e++;
+    return e;
+}
+
 /* sample i of a row, as it is stored: not scaled to 0..1 */
 static double txt_stored(txm_sample sample, const void *row, size_t i) {
     if (sample == TXM_F32) return (double)((const float *)row)[i];
@@ -222,6 +229,14 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     return TXM_OK;
 }
 
+/* Does square u match t, lying east of it, or (down) south of it? */
+static int txt_joins(const textiles_set *s, int t, int u, int down) {
+    const int *a = s->tiles[t].edges, *b = s->tiles[u].edges;
+    if (s->kind == TEXTILES_CORNER)
+        return down ? a[3] == b[0] && a[2] == b[1] : a[1] == b[0] && a[2] == b[3];
+    return down ? a[2] == b[0] : a[1] == b[3];
+}
+
 /* non-zero if no sample is infinite or NaN; of a triangle's square only the triangle counts */
 static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
     for (int y = 0; y < im->height; y++) {
@@ -338,9 +353,7 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
     const size_t side = (size_t)set->side;
     const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
     if (t < 0) return -1;
-    int e = 0;
-    while (e + 1 < set->exemplar_count && t >= set->sheets[e + 1].first) e++;
-    const int at = t - set->sheets[e].first, row = at / set->sheets[e].width;
+    const int e = txt_sheet_of(set, t), at = t - set->sheets[e].first, row = at / set->sheets[e].width;
     const int column = at % set->sheets[e].width;
     if (set->kind == TEXTILES_TRIANGLE) {
         from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
