@@ -1,11 +1,11 @@
 /* bench_treepieces.c - seconds and memory of treepieces.h: bench_treepieces [ANYTHING...]
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Grows 1,000 trees of each species with so few pieces that they have some 4,000 base triangles each,
-   and 1,000 with as many as they come with; moves their bones in the wind; bakes one. One thread. The
-   best of several runs: "grown" in memory that was used before, as by a program that keeps a pool,
-   "fresh" in memory that malloc has from the system, whose first touch is most of the time there.
-   Names of pictures, which `make bench` gives to every benchmark, are not looked at.             */
+   Grows 1,000 trees of each species with a limit of pieces that gives them some 4,000 base triangles
+   each, and 1,000 with the default limit; moves their bones in the wind; bakes one tree. One thread,
+   the best of several runs. "grown": in memory that was used before, as by a program that keeps a
+   pool; "fresh": in memory new from the system, where first access takes most of the time. Names of
+   pictures, which `make bench` gives to every benchmark, are ignored.                            */
 #define _XOPEN_SOURCE 700 /* clock_gettime, setenv */
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +18,7 @@
 
 enum { TREES = 1000, RUNS = 7, FEW = 154 };
 
-/* ---- a pool: blocks one behind the other, all released at once ---------------------------------- */
+/* ---- a pool: blocks one after the other, all released at once ----------------------------------- */
 
 static unsigned char *pool;
 static size_t pool_size, pool_used;

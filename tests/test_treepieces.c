@@ -1,4 +1,4 @@
-/* test_treepieces.c - trees: how they grow, their records, poses, wind and skin
+/* test_treepieces.c - trees: growing, records, poses, wind and skinning
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
@@ -42,7 +42,8 @@ static void free_skinned(skinned *s) {
     free(s->first);
 }
 
-/* The rims of children and parents in a skinned tree: equal to the bit. Marks the pairs met. */
+/* The rims of children and parents in a skinned tree are equal to the bit. met: counts pairs of
+   pieces. */
 static void compare_rims(const treepieces_forest *f, const skinned *s,
                          int met[ALL_TYPES][MOST_RIMS][ALL_TYPES]) {
     for (uint32_t i = 0; i < f->node_count; i++) {
@@ -61,7 +62,7 @@ static void compare_rims(const treepieces_forest *f, const skinned *s,
     }
 }
 
-/* 1,000 random poses, all pairs of pieces: no gap at all, and no step of the normals. */
+/* 1,000 random poses, all pairs of pieces: no gap at all, and no discontinuity of normals. */
 static void test_rims(void **state) {
     (void)state;
     static int met[ALL_TYPES][MOST_RIMS][ALL_TYPES];
@@ -88,7 +89,7 @@ static void test_rims(void **state) {
             for (int b = 0; b < ALL_TYPES; b++) assert_true(met[a][r][b] > 0);
 }
 
-/* Wind too leaves the rims closed. */
+/* Rims stay closed in wind, too. */
 static void test_rims_in_wind(void **state) {
     (void)state;
     static int met[ALL_TYPES][MOST_RIMS][ALL_TYPES];
@@ -160,7 +161,7 @@ static void test_records(void **state) {
     treepieces_forest_free(f);
 }
 
-/* Where two pieces meet, as many tiles lie on both sides of the rim. */
+/* The number of tiles is the same on both sides of a rim. */
 static void test_bark_continues(void **state) {
     (void)state;
     treepieces_forest_desc d = describe(5, 500);
@@ -180,7 +181,7 @@ static void test_bark_continues(void **state) {
             const uint32_t above = bands[tree->first_node + i];
             const uint32_t below = bands[tree->first_node + (uint32_t)n->parent] >>
                                    (8 * ((n->joint >> 3) + 1));
-            const uint32_t foot = (above & 7) + (above >> 5 & 1); /* halving: twice at the foot */
+            const uint32_t foot = (above & 7) + (above >> 5 & 1); /* halving: twice as many at the base */
             assert_int_equal(foot, below & 7);
             halved += (above >> 5 & 1) != 0;
             (void)up;
@@ -201,7 +202,7 @@ static uint64_t hash_tree(const treepieces_forest *f, int tree) {
     return h;
 }
 
-/* The same from the same seed, in any company and on threads; others from other seeds. */
+/* The same tree from the same seed, in any forest and with threads; others from other seeds. */
 static void test_seeds(void **state) {
     (void)state;
     treepieces_place places[70];
@@ -235,7 +236,7 @@ static void test_seeds(void **state) {
     treepieces_forest_free(f);
 }
 
-/* Fewer pieces: no more than asked for, all ends closed, the thick parts still there. */
+/* With fewer pieces: no more than the limit, all ends closed, the thick parts still there. */
 static void test_budget(void **state) {
     (void)state;
     for (int most = 8; most <= 3000; most = most * 3 / 2) {
@@ -247,7 +248,7 @@ static void test_budget(void **state) {
     }
 }
 
-/* The paper's rules: I and Y in turn, and by chance. */
+/* The rules of the paper: I and Y alternate, or are random. */
 static void test_rules(void **state) {
     (void)state;
     treepieces_forest_desc d = describe(1, 300);
@@ -269,7 +270,7 @@ static void test_rules(void **state) {
     treepieces_forest_free(f);
 }
 
-/* Nothing grows out of its envelope by more than a piece, or where it is dark. */
+/* Nothing leaves the envelope by more than one piece, or grows where it is too dark. */
 static void test_pruning(void **state) {
     (void)state;
     treepieces_species s = oak;
@@ -302,7 +303,7 @@ static void test_pruning(void **state) {
 
 /* ---- poses and wind ------------------------------------------------------------------------ */
 
-/* A bone is a rotation times diag(radius, length, radius), and stands where the parent's says. */
+/* A bone is a rotation times diag(radius, length, radius), at the position that the parent's gives. */
 static void test_bones(void **state) {
     (void)state;
     treepieces_forest_desc d = describe(3, 400);
@@ -347,7 +348,8 @@ static float farthest(const float *a, const float *b, uint32_t nodes) {
     return most;
 }
 
-/* In steady wind trees lean and come to rest there, by steps of any length; without they stand up. */
+/* In steady wind trees lean and come to rest, with steps of any length; without wind they stand
+   upright. */
 static void test_wind(void **state) {
     (void)state;
     treepieces_forest_desc d = describe(2, 300);
@@ -367,7 +369,7 @@ static void test_wind(void **state) {
             assert_int_equal(treepieces_sway(f, &wind, time, steps[i], NULL, NULL, sway, bones),
                              TXM_OK);
             time += steps[i] < 1e6 ? steps[i] : 0;
-            if (k % 16 == 0) /* never farther than a swing past where it comes to rest */
+            if (k % 16 == 0) /* never further than one swing past the equilibrium */
                 assert_true(farthest(rest, bones, f->node_count) <
                             2.2f * farthest(rest, lean, f->node_count));
         }
@@ -376,14 +378,14 @@ static void test_wind(void **state) {
     wind.speed = 0;
     for (int k = 0; k < 10; k++) treepieces_sway(f, &wind, 0, 100, NULL, NULL, sway, bones);
     assert_true(farthest(rest, bones, f->node_count) < 1e-3f);
-    /* two steps are one */
+    /* two steps are as good as one */
     wind.speed = 10;
     float *twice = (float *)room(f->node_count, 16);
     memset(sway, 0, f->node_count * 16);
     treepieces_sway(f, &wind, 0.2, 0.2, NULL, NULL, sway, lean);
     treepieces_sway(f, &wind, 0.1, 0.1, NULL, NULL, twice, bones);
     treepieces_sway(f, &wind, 0.2, 0.1, NULL, NULL, twice, bones);
-    const float way = farthest(rest, lean, f->node_count); /* where it rests changes as it leans */
+    const float way = farthest(rest, lean, f->node_count); /* the equilibrium changes with the lean */
     assert_true(way > 0.01f && farthest(lean, bones, f->node_count) < 0.1f * way);
     free(twice);
     free(sway);
@@ -393,7 +395,7 @@ static void test_wind(void **state) {
     treepieces_forest_free(f);
 }
 
-/* Trees of one seed in different places do not sway alike: the correlation of their tops' way. */
+/* Trees of one seed in different places do not sway in unison: the correlation of their tops. */
 static void test_no_unison(void **state) {
     (void)state;
     enum { TREES = 8, STEPS = 400 };
@@ -439,7 +441,7 @@ static void test_no_unison(void **state) {
     treepieces_forest_free(f);
 }
 
-/* Gusts travel with the wind: what is here now is downwind later, changed a little. */
+/* Gusts travel with the wind: later they are downwind, a little changed. */
 static void test_gusts(void **state) {
     (void)state;
     const treepieces_wind wind = {0, 10, 1, 4};
@@ -547,8 +549,8 @@ static void test_faults(void **state) {
     assert_true(tk_sweep(make_forest, &d, TK_CANCEL) == 4);
 }
 
-/* What a forest says it takes is what it takes, and 1,000 trees of 4,000 triangles stay below 24 KB
-   each, bones and sway included. */
+/* forest->bytes is right, and 1,000 trees of 4,000 triangles take less than 24 KB each, bones and
+   sway state included. */
 static void test_memory(void **state) {
     (void)state;
     tk_memory memory;

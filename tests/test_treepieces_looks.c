@@ -88,7 +88,7 @@ static void test_cloud(void **state) {
     assert_int_equal(treepieces_cloud(NULL, 1, cards), 0);
 }
 
-/* A look is always the same, and no two are alike. */
+/* The same look gives the same cloud, different looks different ones. */
 static void test_looks(void **state) {
     (void)state;
     enum { LOOKS = 16 };
@@ -109,8 +109,8 @@ static void test_looks(void **state) {
     }
 }
 
-/* Over many looks: as much on one side as on the other, most of it outside, normals outwards; and
-   flat clouds are flat. */
+/* Over many looks cards are balanced about the centre, mostly near the surface, with normals
+   outwards; flat clouds are flat. */
 static void test_cloud_spread(void **state) {
     (void)state;
     enum { LOOKS = 64 };
@@ -175,7 +175,7 @@ static void test_leaves(void **state) {
     for (int shape = 0; shape < SHAPES; shape++) free(shapes[shape].pixels);
 }
 
-/* The same bytes on any number of threads and in any rows; others with another seed. */
+/* The same bytes with threads and with any stride; others with another seed. */
 static void test_leaves_repeat(void **state) {
     (void)state;
     enum { WIDTH = 50, HEIGHT = 150, STRIDE = 256 };
@@ -209,7 +209,7 @@ static void test_leaves_repeat(void **state) {
     }
 }
 
-/* However small or long the picture. */
+/* Images of any size and proportion. */
 static void test_leaves_sizes(void **state) {
     (void)state;
     static const int sizes[][2] = {{1, 1}, {16, 16}, {1, 200}, {200, 1}, {17, 31}, {130, 65}};
@@ -263,7 +263,7 @@ static void test_leaves_refusals(void **state) {
 
 /* ---- impostors --------------------------------------------------------------------------- */
 
-/* A view along forward: right is made level. */
+/* A view along forward, right horizontal. */
 static void set_view(treepieces_impostor_desc *d, float x, float y, float z) {
     const float length = sqrtf(x * x + y * y + z * z), level = sqrtf(x * x + z * z);
     const float f[3] = {x / length, y / length, z / length};
@@ -295,8 +295,8 @@ static float depth_at(const txm_image *depth, int x, int y) {
     return ((const float *)txm_image_row_const(depth, y))[x];
 }
 
-/* The texel where a ray meets a card, or NULL; *z: how far towards the eye. In three dimensions, by
-   doubles. */
+/* The texel where a ray hits a card, or NULL; *z: distance towards the eye. In three dimensions, in
+   double. */
 static const uint8_t *cast_ray(const treepieces_impostor_desc *d, const treepieces_card *card,
                                double x, double y, double *z) {
     double n[3], st[2], facing = 0, size = 0, away = 0;
@@ -330,7 +330,7 @@ static const uint8_t *cast_ray(const treepieces_impostor_desc *d, const treepiec
     return texel[3] < 128 ? NULL : texel;
 }
 
-/* How light a card is, as the header says. */
+/* The brightness of a card, by the formula of the header. */
 static double light_of(const treepieces_impostor_desc *d, const treepieces_card *card) {
     double lit = 0, through = 0;
     for (int k = 0; k < 3; k++) {
@@ -399,7 +399,7 @@ static void test_impostor(void **state) {
     free(depth.pixels);
 }
 
-/* From the other side the silhouette is the mirror image. */
+/* From the opposite side the silhouette is mirrored. */
 static void test_impostor_behind(void **state) {
     (void)state;
     treepieces_card cards[MOST_CARDS];
@@ -429,7 +429,7 @@ static void test_impostor_behind(void **state) {
     free(leaves.pixels);
 }
 
-/* One card that faces the eye: where it lies, which way up, what hides what. */
+/* A card that faces the eye: position, orientation, occlusion. */
 static void test_impostor_card(void **state) {
     (void)state;
     static const treepieces_card pair[2] = {
@@ -635,7 +635,7 @@ static float at(const txm_image *image, int x, int y, int c) {
     return txm_image_get(image, x, y, c);
 }
 
-/* All tiles have the same border, and their insides differ; the same again for the same seed. */
+/* All tiles have the same border and different insides; the same seed gives the same tiles. */
 static void test_draw_bark(void **state) {
     (void)state;
     static const char *const names[] = {"oak", "birch"};
@@ -672,8 +672,8 @@ static double line_difference(const txm_image *sheet, int a, int b, int is_colum
     return sqrt(sum / (3 * SHEET));
 }
 
-/* Layer 0 goes on without end: no seam between tiles, nor round the sheet, is more than what lies
-   side by side anyhow. */
+/* Layer 0 repeats seamlessly: the difference across tile borders and across the sheet's border is
+   no more than that between any neighbouring lines. */
 static void test_bark_plain(void **state) {
     (void)state;
     txm_image tiles[TILES];
@@ -743,7 +743,7 @@ static void test_bark_layers(void **state) {
     free_tiles(tiles, TILES);
 }
 
-/* A halving cell ends in two tiles of half the size, each half a pixel of the next. */
+/* A halving cell ends in two tiles of half the size. */
 static void test_bark_halving(void **state) {
     (void)state;
     txm_image tile;
@@ -760,7 +760,7 @@ static void test_bark_halving(void **state) {
     free_tiles(&tile, 1);
 }
 
-/* Own classes: their tiles whole, in the middle of 2 x 2 cells, where quads look for them. */
+/* Classes of the caller: whole tiles in the middle of 2 x 2 cells, where quads expect them. */
 static void test_bark_own(void **state) {
     (void)state;
     static const int classes[TILES] = {0, 0, 0, 5, 7, 0};

@@ -23,7 +23,7 @@ static int compare_keys(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Sides of triangles as sorted keys from << 32 | to. */
+/* The sides of triangles as sorted keys: from << 32 | to. */
 static uint64_t *sort_sides(const uint32_t *indices, size_t corners) {
     uint64_t *sides = (uint64_t *)room(corners, sizeof *sides);
     for (size_t i = 0; i < corners; i++)
@@ -39,8 +39,8 @@ static int has_side(const uint64_t *sides, size_t count, uint32_t from, uint32_t
 
 /* ---- the pattern --------------------------------------------------------------------------- */
 
-/* One pattern: the points lie where they should, triangles face one way, fill the square and have
-   no crack: every side but those of the border is met from both sides. */
+/* One pattern: the vertices are where they should be, the triangles have the same orientation, fill
+   the square and leave no crack: every side except those of the border belongs to two triangles. */
 static void check_pattern(const int edges[4], int inner) {
     static float coords[2 * MOST_POINTS];
     static uint16_t indices[3 * MOST_TRIANGLES];
@@ -88,7 +88,7 @@ static void check_pattern(const int edges[4], int inner) {
             /* the step is rounded to 2^-16, as on graphics cards, then multiplied */
             assert_true(fabsf(coords[2 * i + axis] - place) < 4e-6f * (float)inside + 1e-6f);
         }
-    for (int k = 0, first = 0; k < 4; first += edges[k++]) /* places along sides, symmetric */
+    for (int k = 0, first = 0; k < 4; first += edges[k++]) /* positions along sides, symmetric */
         for (int i = 1; i < edges[k]; i++) {
             const float *a = coords + 2 * (first + i), *b = coords + 2 * (first + edges[k] - i);
             const int axis = k == 0 || k == 2;
@@ -101,7 +101,7 @@ static void check_pattern(const int edges[4], int inner) {
 static void test_pattern(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(3, 0);
-    for (int i = 0; i < 10000; i++) { /* all levels of edges, each with one inside */
+    for (int i = 0; i < 10000; i++) { /* all levels of edges, each with one inner level */
         const int edges[4] = {1 + i % 10, 1 + i / 10 % 10, 1 + i / 100 % 10, 1 + i / 1000};
         check_pattern(edges, 1 + (i + i / 10 + i / 100 + i / 1000) % 10);
     }
@@ -116,7 +116,8 @@ static void test_pattern(void **state) {
     assert_int_equal(triangles, 2);
 }
 
-/* Two quads at one edge, in all orientations: the same level, and the same points to the bit. */
+/* Two quads that share an edge, in all orientations: the same level there, and the same points to
+   the bit. */
 static void test_shared_edges(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(8, 0);
@@ -137,7 +138,7 @@ static void test_shared_edges(void **state) {
                 const float length = sqrtf(dot(normal, normal));
                 for (int k = 0; k < 3; k++) normal[k] /= length;
             }
-        for (int e = 0; e < 2; e++) { /* the second meets the edge the other way round */
+        for (int e = 0; e < 2; e++) { /* the second has the edge in the opposite direction */
             const int from = 3 * ((side[0] + e) % 4), to = 3 * ((side[1] + 1 - e) % 4);
             memcpy(p[1] + to, p[0] + from, 12);
             memcpy(n[1] + to, n[0] + from, 12);
@@ -165,7 +166,7 @@ static void test_shared_edges(void **state) {
     }
 }
 
-/* Levels fall by half with every half_distance and are those of the formula. */
+/* Levels halve over half_distance and agree with the formula. */
 static void test_levels(void **state) {
     (void)state;
     treepieces_lod lod = {{0, 0, 0}, 10, 5, 0};
@@ -180,7 +181,7 @@ static void test_levels(void **state) {
         assert_int_equal(treepieces_edge_level(&lod, b, a), level);
     }
     txm_rng rng = txm_rng_make(5, 0);
-    for (int i = 0; i < 200000; i++) { /* from either end the same */
+    for (int i = 0; i < 200000; i++) { /* symmetric in the ends */
         float ends[6];
         for (int k = 0; k < 6; k++) ends[k] = 20 * txm_rng_float(&rng) - 10;
         assert_int_equal(treepieces_edge_level(&lod, ends, ends + 3),
@@ -191,7 +192,7 @@ static void test_levels(void **state) {
     assert_int_equal(treepieces_edge_level(&lod, here, here), 1);
 }
 
-/* Six flat sides become nearly round: shape 0 stands for 0.6. */
+/* Six flat sides become nearly round; shape 0 means 0.6. */
 static void test_phong(void **state) {
     (void)state;
     const float c = 0.5f, s = 0.8660254f; /* a side of a hexagonal tube of radius 1 */
@@ -215,7 +216,7 @@ static uint32_t find_root(uint32_t *root, uint32_t i) {
     return i;
 }
 
-/* One component, oriented, no side met twice, borders only where expected; joints in range. */
+/* Connected, oriented, manifold, with borders only where expected; joints in range. */
 static void audit(const treepieces_mesh *m, uint32_t nodes, size_t borders) {
     const size_t corners = 3 * m->triangle_count;
     uint64_t *sides = sort_sides(m->indices, corners);
@@ -247,7 +248,7 @@ static void audit(const treepieces_mesh *m, uint32_t nodes, size_t borders) {
     free(sides);
 }
 
-/* Every species, without tessellation, with levels from 10 to 1, and capped. */
+/* Every species: without tessellation, with levels from 10 to 1, and capped. */
 static void test_species_meshes(void **state) {
     (void)state;
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
@@ -262,7 +263,7 @@ static void test_species_meshes(void **state) {
             d.lod = kind ? &lod : NULL;
             assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
             size_t borders = 6;
-            if (kind) { /* as the levels of the root rim say */
+            if (kind) { /* as many as the levels of the root rim give */
                 const treepieces_node *n = &g.forest->nodes[0];
                 const treepieces_piece *piece = treepieces_kit_piece(kit, n->type);
                 float p[3 * TREEPIECES_MAX_VERTICES];
@@ -286,7 +287,7 @@ static void test_species_meshes(void **state) {
     }
 }
 
-/* Which way a triangle looks, the longer the rounder it is: 0 if it is a line. */
+/* The normal of a triangle, its length a measure of how well shaped it is; 0 if degenerate. */
 static void face_direction(const treepieces_mesh *m, size_t t, double out[3]) {
     double a[3], b[3], longest = 0;
     const float *p[3];
@@ -300,7 +301,7 @@ static void face_direction(const treepieces_mesh *m, size_t t, double out[3]) {
         out[k] = (a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]) / longest;
 }
 
-/* The foot is closed by faces that look down, whatever the levels and the shape of the rim. */
+/* The base is closed by faces that point down, whatever the levels and the shape of the rim. */
 static void test_cap(void **state) {
     (void)state;
     grown g = grow_preset(0, 20, 0.1f, 5);
@@ -320,7 +321,7 @@ static void test_cap(void **state) {
         audit(closed, g.forest->node_count, 0);
         const size_t n = open->triangle_count, more = closed->triangle_count - n;
         if (kind == 8) assert_int_equal(more, 4);
-        assert_int_equal(closed->vertex_count - open->vertex_count, kind < 8); /* the middle */
+        assert_int_equal(closed->vertex_count - open->vertex_count, kind < 8); /* the centre */
         assert_memory_equal(open->indices, closed->indices, n * 12);
         assert_memory_equal(open->uvs, closed->uvs, n * 24);
         for (size_t t = n; t < n + more; t++) {
@@ -348,7 +349,7 @@ static float weight_of(const treepieces_mesh *m, size_t i, uint32_t joint) {
     return sum;
 }
 
-/* The two triangles of a quad have its corners, and its place in the sheet there. */
+/* The two triangles of a quad have its corners, with their texture coordinates. */
 static void check_quad(const treepieces_mesh *m, size_t t, const treepieces_quad *quad,
                        const float *p, uint32_t bands, int cell) {
     for (size_t i = 3 * t; i < 3 * t + 6; i++) {
@@ -366,8 +367,9 @@ static void check_quad(const treepieces_mesh *m, size_t t, const treepieces_quad
     }
 }
 
-/* A mesh holds what skinning gives, to the bit, with the weights of the pieces: those of a rim hang
-   on one joint, that of the piece above it. Triangles come piece after piece, quad after quad. */
+/* The mesh is what skinning gives, to the bit, with the weights of the pieces: vertices of a rim
+   are bound to one joint, that of the piece above it. Triangles are in the order of pieces and
+   quads. */
 static void test_mesh_is_skin(void **state) {
     (void)state;
     grown g = grow_preset(5, 80, 0.1f, 3);
@@ -417,7 +419,7 @@ static void test_mesh_is_skin(void **state) {
     free_grown(&g);
 }
 
-/* A tree among others is baked as if it stood alone. */
+/* A tree in a forest is baked as if it were alone. */
 static void test_company(void **state) {
     (void)state;
     treepieces_species species[2];
@@ -462,7 +464,7 @@ static void test_company(void **state) {
     for (int i = 0; i < 2; i++) treepieces_mesh_free(mesh[i]);
 }
 
-/* A value and the area that has it. */
+/* A value and the area where it holds. */
 typedef struct share {
     double value, area;
 } share;
@@ -472,7 +474,7 @@ static int compare_shares(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* The value below which so much of the area lies; shares sorted. */
+/* The quantile of the values weighted by area; sorts the shares. */
 static double quantile(share *shares, size_t count, double part) {
     double all = 0, sum = 0;
     qsort(shares, count, sizeof *shares, compare_shares);
@@ -484,8 +486,8 @@ static double quantile(share *shares, size_t count, double part) {
     return 0;
 }
 
-/* Texels per metre, and how much more of them one way than the other (the ratio of the singular
-   values of the map from the surface to texels), of one triangle. Returns its area. */
+/* Texels per metre on a triangle, and their anisotropy: the ratio of the singular values of the map
+   from the surface to texels. Returns the area of the triangle. */
 static double measure_texels(const treepieces_mesh *m, size_t t, double *density, double *ratio) {
     const float *p[3], *uv = m->uvs + 6 * t;
     double a[3], b[3], n[3];
@@ -512,7 +514,6 @@ static double measure_texels(const treepieces_mesh *m, size_t t, double *density
     return area;
 }
 
-/* Bark is about as fine everywhere and not drawn out. Faces look as their corners' normals do. */
 /* Does a triangle face away from where the normals of its corners point? */
 static int faces_away(const treepieces_mesh *m, size_t t) {
     double face[3], sum = 0;
@@ -523,6 +524,8 @@ static int faces_away(const treepieces_mesh *m, size_t t) {
     return sum < 0;
 }
 
+/* Texel density is about the same everywhere, texels are not stretched, and faces are on the side
+   of the normals of their corners. */
 static void test_bark_on_species(void **state) {
     (void)state;
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
@@ -600,7 +603,7 @@ static void test_faults(void **state) {
     free_grown(&g);
 }
 
-/* Bones that are no numbers and meshes that are too large are refused; nothing is left. */
+/* Bones that are not finite and meshes that are too large are refused; nothing stays allocated. */
 static void test_refusals(void **state) {
     (void)state;
     static const float bad[4] = {(float)NAN, (float)INFINITY, -3e38f, 0};

@@ -1,4 +1,4 @@
-/* test_treepieces_species.c - species as text, the presets, and what a piece of a kit must be
+/* test_treepieces_species.c - species as text, presets, and the checks of a kit's pieces
    SPDX-License-Identifier: MIT OR Unlicense
 
    cc -std=gnu99 -I. -Itests tests/test_treepieces_species.c -lcmocka -lpthread -lm           */
@@ -22,7 +22,7 @@ static txm_status parse(const char *text, txm_env *env, treepieces_species *spec
     return treepieces_species_parse(text, strlen(text), env, species);
 }
 
-/* Parse what must not be: the status, the message's beginning, the species untouched. */
+/* Parse an invalid text: the status, the beginning of the message, the species untouched. */
 static void assert_bad(const char *text, size_t size, const char *message) {
     treepieces_species species, before;
     txm_env env;
@@ -37,7 +37,7 @@ static void assert_bad(const char *text, size_t size, const char *message) {
     assert_int_equal(treepieces_species_parse(text, size, NULL, &species), TXM_BAD_DATA);
 }
 
-/* Prints as text that reads back as the same. */
+/* Printed and parsed again it is the same. */
 static void assert_round_trip(const treepieces_species *species) {
     static char text[ROOM];
     treepieces_species back;
@@ -235,7 +235,7 @@ static void every_fault_has_its_message(void **state) {
     assert_int_equal(treepieces_species_parse("", 0, NULL, NULL), TXM_BAD_ARGUMENT);
 }
 
-/* the fields of the two tables, at both ends of their ranges and beyond them */
+/* all fields, at both ends of their ranges and beyond */
 static void ranges_are_the_same_read_and_checked(void **state) {
     (void)state;
     for (int i = 0; i < TPC_FIELDS + TPC_ORDER_FIELDS; i++) {
@@ -253,7 +253,7 @@ static void ranges_are_the_same_read_and_checked(void **state) {
             int n = snprintf(text, sizeof text, "%s\n%s", in_order ? "order 2" : "# none", f->key);
             for (int j = 0; j < f->count; j++)
                 n += snprintf(text + n, sizeof text - (size_t)n, " %s", number);
-            /* the crown stays in order */
+            /* keep crown_top above crown_base */
             if (!strcmp(f->key, "crown_base"))
                 snprintf(text + n, sizeof text - (size_t)n, "\ncrown_top 3");
             const txm_status status = parse(text, &env, &species);
@@ -264,7 +264,7 @@ static void ranges_are_the_same_read_and_checked(void **state) {
             if (!strcmp(f->key, "crown_base")) species.crown_top = 3;
             if (!strcmp(f->key, "crown_top")) species.crown_base = 0;
             const int fits = tpc_species_check(&species, &env) == TXM_OK;
-            /* beech has no more orders than it has */
+            /* only the orders that beech has */
             if (!strcmp(f->key, "order_count") && k == 1) continue;
             if (fits != (k < 2)) fail_msg("%s %s: %s", f->key, number, env.message);
             if (k >= 2) assert_non_null(strstr(env.message, f->key));
@@ -355,11 +355,11 @@ static void numbers_are_read_exactly(void **state) {
         double read = -1;
         memcpy(&x, &bits, sizeof x);
         if (!txm_is_finite((double)x)) continue;
-        /* what C writes is read as C reads it, to the float */
+        /* what printf writes is read as strtod reads it, to the float */
         snprintf(text, sizeof text, n & 1 ? "%.9g" : "%.17e", (double)x);
         assert_int_equal(tpc_read_number(text, text + strlen(text), &read), 1);
         if ((float)read != x) fail_msg("%s is read as %.17g", text, read);
-        /* what we write C reads, and we do */
+        /* what is written here is read by strtod and here */
         tpc_write_number(x, number);
         assert_true(strlen(number) < TPC_NUMBER);
         if (strtof(number, NULL) != x) fail_msg("%.9g is written as %s", (double)x, number);
@@ -405,14 +405,14 @@ static void printing_stops_at_the_capacity(void **state) {
         assert_int_equal(part[kept], 0);
         assert_memory_equal(part, whole, kept);
     }
-    /* what cannot be read is printed without harm */
+    /* an invalid species is printed without harm */
     memset(&species, 0xff, sizeof species);
     assert_true(treepieces_species_print(&species, part, sizeof part) < sizeof part);
     species.order_count = INT_MAX;
     assert_true(treepieces_species_print(&species, part, sizeof part) < sizeof part);
 }
 
-/* a locale whose decimal point is a comma, made here if the machine has none but could */
+/* a locale whose decimal point is a comma; built here if none is installed but can be built */
 static const char *find_comma(void) {
     static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "fr_FR.utf8",
                                         "pl_PL.UTF-8", "comma"};
@@ -447,7 +447,7 @@ static void the_locale_does_not_matter(void **state) {
     assert_memory_equal(before, after, length);
 }
 
-/* Presets with bytes changed, cut, doubled and swapped: read or refused, never worse. */
+/* Presets with bytes changed, cut, doubled and swapped: they are read or refused. */
 static void mutated_texts_do_no_harm(void **state) {
     (void)state;
     static const char *const pieces[] = {"like oak\n", "order 4\n", "1e9", "\n",
@@ -475,7 +475,7 @@ static void mutated_texts_do_no_harm(void **state) {
                 size += count;
             }
         }
-        /* of exactly this size, so that the sanitizer sees a byte too many */
+        /* of exactly this size, so that the sanitizer notices a read beyond */
         char *exact = (char *)malloc(size ? size : 1);
         memcpy(exact, text, size);
         treepieces_species species;
@@ -508,7 +508,8 @@ typedef struct own_piece {
     treepieces_quad quads[300];
 } own_piece;
 
-/* A copy of a built-in one, as a user would make it: the library's marks at the rims not there. */
+/* A copy of a built-in piece as a caller would make it, without the marks of the library at the
+   rims. */
 static void copy_builtin(own_piece *own, int type) {
     treepieces_kit *kit = NULL;
     assert_int_equal(treepieces_kit_make(NULL, 0, NULL, &kit), TXM_OK);
@@ -579,7 +580,7 @@ static void own_pieces_are_taken(void **state) {
     if (treepieces_kit_make(pieces, TREEPIECES_BUILTIN + 1, &env, &kit) != TXM_OK)
         fail_msg("%s", env.message);
     assert_int_equal(treepieces_kit_count(kit), 2 * TREEPIECES_BUILTIN + 1);
-    for (int i = 0; i < TREEPIECES_BUILTIN; i++) { /* a copy becomes what it was copied from */
+    for (int i = 0; i < TREEPIECES_BUILTIN; i++) { /* a copy of a built-in piece becomes the same piece */
         const treepieces_piece *a = treepieces_kit_piece(kit, i);
         const treepieces_piece *b = treepieces_kit_piece(kit, TREEPIECES_BUILTIN + i);
         assert_memory_equal(a->vertices, b->vertices,
@@ -589,7 +590,7 @@ static void own_pieces_are_taken(void **state) {
         assert_ptr_not_equal(b->vertices, own[i].vertices);
     }
     const treepieces_piece *tube = treepieces_kit_piece(kit, 2 * TREEPIECES_BUILTIN);
-    for (int k = 0; k < 6; k++) { /* moved onto the hexagon, and marked */
+    for (int k = 0; k < 6; k++) { /* moved onto the hexagon and marked */
         assert_true(tube->vertices[k].rim == k && tube->vertices[24 + k].rim == -1);
         assert_true(tube->vertices[24 + k].position[1] == 0);
         assert_true(tube->vertices[6 + k].rim == -1);
@@ -602,7 +603,7 @@ static void own_pieces_are_taken(void **state) {
     treepieces_kit_free(NULL);
 }
 
-/* a rule that grows nothing but tubes, then a tip */
+/* a rule that grows only tubes, then a tip */
 static void choose_tubes(void *user, const treepieces_site *site, txm_rng *rng,
                          treepieces_choice *choice) {
     (void)rng;
@@ -623,7 +624,7 @@ static void own_pieces_grow(void **state) {
     memset(&env, 0, sizeof env);
     make_tube(&own);
     assert_int_equal(treepieces_kit_make(&own.piece, 1, &env, &kit), TXM_OK);
-    memset(&own, 0xff, sizeof own); /* all was copied */
+    memset(&own, 0xff, sizeof own); /* the kit has its own copy */
     assert_int_equal(treepieces_preset("oak", &env, &species), TXM_OK);
     memset(&desc, 0, sizeof desc);
     desc.kit = kit;
@@ -638,7 +639,7 @@ static void own_pieces_grow(void **state) {
     float *bones = (float *)malloc(21 * TREEPIECES_BONE * sizeof *bones);
     assert_int_equal(treepieces_bones(forest, NULL, &env, bones), TXM_OK);
     float below[90], above[90];
-    for (uint32_t i = 0; i + 1 < 20; i++) { /* the rims meet to the bit */
+    for (uint32_t i = 0; i + 1 < 20; i++) { /* the rims are equal to the bit */
         treepieces_skin(forest, bones, type, i, below, NULL);
         treepieces_skin(forest, bones, type, i + 1, above, NULL);
         const int turn = (int)(i + 1) % 6;
@@ -650,7 +651,7 @@ static void own_pieces_grow(void **state) {
     treepieces_kit_free(kit);
 }
 
-/* What can be wrong with a tube, and what the message must name. */
+/* Faults of a tube, and what the message must name. */
 typedef struct piece_fault {
     void (*spoil)(own_piece *own);
     const char *where, *what;
@@ -689,14 +690,14 @@ SPOIL(scale_infinite) { own->piece.building[0].scale = HUGE_VALF; }
 SPOIL(translation_nan) { own->piece.building[0].translation[2] = (float)NAN; }
 SPOIL(root_moved) { own->vertices[26].position[0] += 0.001f; }
 SPOIL(leaf_moved) { own->vertices[4].position[1] += 0.001f; }
-SPOIL(leaf_turned) { /* the rim's places are one on */
+SPOIL(leaf_turned) { /* the vertices of the rim are shifted by one */
     for (int k = 0; k < 6; k++) own->piece.leaf_rims[0][k] = (k + 1) % 6;
 }
 SPOIL(root_normal) { own->vertices[27].normal[0] = -1; own->vertices[27].normal[1] = 0; }
 SPOIL(leaf_normal) { own->vertices[3].normal[0] = -1; own->vertices[3].normal[1] = 0; }
 SPOIL(root_weights) { own->vertices[25].weights[0] = 0.75f; own->vertices[25].weights[1] = 0.25f; }
 SPOIL(leaf_weights) { own->vertices[2].weights[0] = 0.25f; own->vertices[2].weights[1] = 0.75f; }
-SPOIL(rim_twice) { /* the leaf rim is the root rim too */
+SPOIL(rim_twice) { /* the leaf rim is also the root rim */
     own->piece.leaf_count = 2;
     own->piece.building[1] = own->piece.building[0];
     memcpy(own->piece.leaf_rims[1], own->piece.leaf_rims[0], sizeof own->piece.leaf_rims[0]);
@@ -715,7 +716,7 @@ SPOIL(inside_out) {
 }
 SPOIL(three_quads_at_a_side) { own->quads[own->piece.quad_count++] = own->quads[5]; }
 SPOIL(hole) { own->quads[5] = own->quads[--own->piece.quad_count]; }
-SPOIL(capped) { /* the root rim is closed by two quads: it is no border any more */
+SPOIL(capped) { /* two quads close the root rim, which is no longer a border */
     static const uint8_t a[4] = {24, 27, 26, 25}, b[4] = {24, 29, 28, 27};
     memcpy(own->quads[own->piece.quad_count++].corners, a, 4);
     memcpy(own->quads[own->piece.quad_count++].corners, b, 4);
@@ -724,7 +725,7 @@ SPOIL(unused) {
     own->vertices[30] = own->vertices[12];
     own->piece.vertex_count++;
 }
-SPOIL(apart) { /* a cube of its own */
+SPOIL(apart) { /* a separate cube */
     static const uint8_t cube[6][4] = {{0, 1, 2, 3}, {7, 6, 5, 4}, {0, 4, 5, 1},
                                        {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
     for (int i = 0; i < 8; i++) own->vertices[30 + i] = own->vertices[12];
@@ -734,7 +735,7 @@ SPOIL(apart) { /* a cube of its own */
             own->quads[own->piece.quad_count + i].corners[k] = (uint8_t)(30 + cube[i][k]);
     own->piece.quad_count += 6;
 }
-SPOIL(touching) { /* that cube hangs on vertex 14 by a corner */
+SPOIL(touching) { /* that cube touches vertex 14 with a corner */
     apart(own);
     own->piece.vertex_count--;
     for (int i = own->piece.quad_count - 6; i < own->piece.quad_count; i++)
