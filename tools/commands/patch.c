@@ -63,7 +63,7 @@ typedef struct names {
     int count;
 } names;
 
-typedef struct job {
+typedef struct patch_job {
     cli run;
     char extension[8];
 
@@ -85,12 +85,13 @@ typedef struct job {
     int path_count;
     txm_image out[TEXPATCH_MAX_MAPS];
     texpatch_source *from; /* of all pixels; NULL: nobody asks */
-} job;
+} patch_job;
 
 /* ---- lists ------------------------------------------------------------------------------- */
 
 /* Take a list apart at its separators; most names, none empty. */
-static int split(job *j, const char *option, const char *list, char separator, int most, names *n) {
+static int patch_split(patch_job *j, const char *option, const char *list, char separator, int most,
+                       names *n) {
     const size_t size = strlen(list) + 1;
     n->storage = (char *)malloc(size);
     if (!n->storage) return fail_memory(&j->run);
@@ -108,7 +109,7 @@ static int split(job *j, const char *option, const char *list, char separator, i
 }
 
 /* "1,3": mark these maps. */
-static int mark_maps(job *j, const char *option, const char *list, int mark,
+static int mark_maps(patch_job *j, const char *option, const char *list, int mark,
                      int marks[TEXPATCH_MAX_MAPS]) {
     double numbers[TEXPATCH_MAX_MAPS];
     if (!list) return CLI_DONE;
@@ -128,7 +129,7 @@ static int mark_maps(job *j, const char *option, const char *list, int mark,
 /* ---- what goes together ------------------------------------------------------------------- */
 
 /* The maps of all exemplars, and how each is treated. */
-static int parse_maps(job *j) {
+static int parse_maps(patch_job *j) {
     names groups = {0};
     double weights[TEXPATCH_MAX_MAPS] = {1};
     int normals[TEXPATCH_MAX_MAPS] = {0}, labels[TEXPATCH_MAX_MAPS] = {0};
@@ -139,7 +140,7 @@ static int parse_maps(job *j) {
     j->exemplar_names.count = 1;
     if (j->more) {
         names more = {0};
-        status = split(j, "--exemplars", j->more, ',', TEXPATCH_MAX_EXEMPLARS - 1, &more);
+        status = patch_split(j, "--exemplars", j->more, ',', TEXPATCH_MAX_EXEMPLARS - 1, &more);
         j->exemplar_names.storage = more.storage;
         for (int e = 0; e < more.count; e++)
             j->exemplar_names.at[j->exemplar_names.count++] = more.at[e];
@@ -147,9 +148,10 @@ static int parse_maps(job *j) {
     d->exemplar_count = j->exemplar_names.count;
     d->map_count = 1;
     if (!status && j->map_list) {
-        status = split(j, "--maps", j->map_list, ';', TEXPATCH_MAX_EXEMPLARS, &groups);
+        status = patch_split(j, "--maps", j->map_list, ';', TEXPATCH_MAX_EXEMPLARS, &groups);
         for (int e = 0; e < groups.count && !status; e++)
-            status = split(j, "--maps", groups.at[e], ',', TEXPATCH_MAX_MAPS - 1, &j->map_names[e]);
+            status = patch_split(j, "--maps", groups.at[e], ',', TEXPATCH_MAX_MAPS - 1,
+                                 &j->map_names[e]);
         d->map_count += j->map_names[0].count;
         if (!status && groups.count != d->exemplar_count)
             status = cli_fail(&j->run, CLI_USAGE, "--maps has maps of %d exemplars, there are %d; "
@@ -206,7 +208,7 @@ static int parse_place(const char **text, int64_t low, int64_t high, char behind
     return 1;
 }
 
-static int parse_window(job *j) {
+static int parse_window(patch_job *j) {
     const char *at = j->window;
     int64_t w, h;
     if (!parse_place(&at, -MAX_PLACE, MAX_PLACE, ',', &j->window_x) ||
@@ -222,7 +224,7 @@ static int parse_window(job *j) {
 }
 
 /* What the endless plane has not. */
-static int check_window(job *j) {
+static int check_window(patch_job *j) {
     const struct {
         const char *name;
         int is_given;
@@ -237,7 +239,7 @@ static int check_window(job *j) {
     return parse_window(j);
 }
 
-static int parse_lattice(job *j) {
+static int parse_lattice(patch_job *j) {
     double v[4];
     if (!j->lattice || !strcmp(j->lattice, "auto")) return CLI_DONE;
     if (!strcmp(j->lattice, "none")) {
@@ -259,7 +261,7 @@ static int parse_lattice(job *j) {
 }
 
 /* Refuse, before any work, what does not go together. */
-static int check_options(job *j) {
+static int patch_check_options(patch_job *j) {
     cli *run = &j->run;
     texpatch_desc *d = &j->desc;
     int status = j->window ? check_window(j) : CLI_DONE;
@@ -343,7 +345,7 @@ static size_t own_name(const char *path, const char *exemplar, const char **name
 }
 
 /* OUT-normal-2.png: level 2 of a map. */
-static int name_output(job *j, int map, int level, char path[MAX_PATH]) {
+static int name_output(patch_job *j, int map, int level, char path[MAX_PATH]) {
     const size_t n = strlen(j->run.output) - strlen(j->extension);
     const char *name = "";
     size_t length = 0;
@@ -357,7 +359,7 @@ static int name_output(job *j, int map, int level, char path[MAX_PATH]) {
 }
 
 /* All paths that will be written. */
-static int name_outputs(job *j) {
+static int patch_name_outputs(patch_job *j) {
     const int levels = 1 + j->lod, count = j->desc.map_count * levels;
     int status = CLI_DONE;
     file_extension(j->run.output, j->extension);
@@ -381,7 +383,7 @@ static int name_outputs(job *j) {
 /* ---- reading ------------------------------------------------------------------------------- */
 
 /* 8 bits as 16. */
-static int widen(job *j, txm_image *image) {
+static int widen(patch_job *j, txm_image *image) {
     txm_image wide;
     const int status =
         new_picture(&j->run, image->width, image->height, image->channels, TXM_U16, &wide);
@@ -396,12 +398,13 @@ static int widen(job *j, txm_image *image) {
 }
 
 /* Read a picture with so many channels of that sample type. */
-static int read_as(job *j, const char *path, int channels, txm_sample sample, txm_image *image) {
+static int read_as(patch_job *j, const char *path, int channels, txm_sample sample,
+                   txm_image *image) {
     const int status = read_picture(&j->run, path, channels, sample, image);
     return !status && image->sample != sample ? widen(j, image) : status;
 }
 
-static int check_extent(job *j, const char *what, const char *path, const txm_image *image,
+static int check_extent(patch_job *j, const char *what, const char *path, const txm_image *image,
                         int width, int height, const char *like) {
     if (image->width == width && image->height == height) return CLI_DONE;
     return cli_fail(&j->run, CLI_FAILED, "%s '%s' is %d x %d; make it %d x %d as %s", what, path,
@@ -409,7 +412,7 @@ static int check_extent(job *j, const char *what, const char *path, const txm_im
 }
 
 /* Exemplar e and its maps; all exemplars have the channels and the depths of the first. */
-static int read_exemplar(job *j, int e) {
+static int read_exemplar(patch_job *j, int e) {
     texpatch_exemplar *x = &j->exemplars[e];
     const char *path = j->exemplar_names.at[e];
     int status = CLI_DONE;
@@ -428,9 +431,9 @@ static int read_exemplar(job *j, int e) {
 }
 
 /* A list of masks or guides, one for each exemplar. */
-static int read_for_exemplars(job *j, const char *option, const char *list, int channels) {
+static int read_for_exemplars(patch_job *j, const char *option, const char *list, int channels) {
     names n = {0};
-    int status = split(j, option, list, ',', TEXPATCH_MAX_EXEMPLARS, &n);
+    int status = patch_split(j, option, list, ',', TEXPATCH_MAX_EXEMPLARS, &n);
     if (!status && n.count != j->desc.exemplar_count)
         status = cli_fail(&j->run, CLI_USAGE, "%s '%s': give %d, one for each exemplar", option,
                           list, j->desc.exemplar_count);
@@ -447,17 +450,17 @@ static int read_for_exemplars(job *j, const char *option, const char *list, int 
     return status;
 }
 
-static int read_sized(job *j, const char *what, const char *path, int channels, txm_sample sample,
-                      txm_image *image) {
+static int read_sized(patch_job *j, const char *what, const char *path, int channels,
+                      txm_sample sample, txm_image *image) {
     const int status = read_as(j, path, channels, sample, image);
     if (status) return status;
     return check_extent(j, what, path, image, j->desc.width, j->desc.height, "--size says");
 }
 
-static int read_kept(job *j) {
+static int read_kept(patch_job *j) {
     names n = {0};
     texpatch_desc *d = &j->desc;
-    int status = split(j, "--keep", j->kept_list, ',', TEXPATCH_MAX_MAPS, &n);
+    int status = patch_split(j, "--keep", j->kept_list, ',', TEXPATCH_MAX_MAPS, &n);
     if (!status && n.count != d->map_count)
         status = cli_fail(&j->run, CLI_USAGE, "--keep '%s': give %d, one for each map",
                           j->kept_list, d->map_count);
@@ -471,7 +474,7 @@ static int read_kept(job *j) {
 }
 
 /* All pictures; then it is known what OUT has to hold. */
-static int read_all(job *j) {
+static int patch_read_all(patch_job *j) {
     texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
     for (int e = 0; e < d->exemplar_count && !status; e++) status = read_exemplar(j, e);
@@ -629,7 +632,7 @@ static int parse_strokes(strokes *s, const cJSON *json) {
     return 1;
 }
 
-static int read_strokes(job *j, strokes *s) {
+static int read_strokes(patch_job *j, strokes *s) {
     size_t size;
     unsigned char *bytes = file_read(j->control, &size);
     if (!bytes)
@@ -644,7 +647,7 @@ static int read_strokes(job *j, strokes *s) {
 }
 
 /* Layers of the exemplars as their guides, the disturbed strokes as the guide of the output. */
-static int follow_strokes(job *j, strokes *s) {
+static int follow_strokes(patch_job *j, strokes *s) {
     texpatch_desc *d = &j->desc;
     texedges_set *edges = NULL, *disturbed = NULL;
     texedges_control control = s->control;
@@ -675,7 +678,7 @@ static int follow_strokes(job *j, strokes *s) {
     return status;
 }
 
-static int take_strokes(job *j) {
+static int patch_take_strokes(patch_job *j) {
     strokes s;
     memset(&s, 0, sizeof s);
     int status = read_strokes(j, &s);
@@ -692,7 +695,7 @@ static int take_strokes(job *j) {
 /* ---- synthesis ----------------------------------------------------------------------------- */
 
 /* Room for the result. */
-static int make_room(job *j) {
+static int make_room(patch_job *j) {
     const texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
     for (int m = 0; m < d->map_count && !status; m++)
@@ -707,7 +710,7 @@ static int make_room(job *j) {
     return status;
 }
 
-static void tell_lattice(job *j, const texpatch_job *made, char text[80]) {
+static void tell_lattice(patch_job *j, const texpatch_job *made, char text[80]) {
     float v[4] = {0, 0, 0, 0};
     const int has = texpatch_lattice(made, v);
     cli *run = &j->run;
@@ -720,7 +723,7 @@ static void tell_lattice(job *j, const texpatch_job *made, char text[80]) {
              (double)v[1], (double)v[2], (double)v[3]);
 }
 
-static int make_picture(job *j, char text[80]) {
+static int make_picture(patch_job *j, char text[80]) {
     const texpatch_desc *d = &j->desc;
     texpatch_job *made = NULL;
     txm_env *env = &j->run.env;
@@ -743,7 +746,7 @@ static int make_picture(job *j, char text[80]) {
     return check_result(&j->run, result, j->run.inputs[0]);
 }
 
-static int make_window(job *j, char text[80]) {
+static int make_window(patch_job *j, char text[80]) {
     texpatch_plane *plane = NULL;
     cli_stage(&j->run, "prepare");
     txm_status result = texpatch_plane_make(&j->desc, &j->run.env, &plane);
@@ -771,7 +774,7 @@ static int goes_on(const texpatch_source *p, const texpatch_source *q, int is_do
 }
 
 /* The share of neighbours that are neighbours in the exemplar. */
-static double measure_continuous(const job *j) {
+static double measure_continuous(const patch_job *j) {
     const size_t w = (size_t)j->desc.width, h = (size_t)j->desc.height;
     double pairs = 0, good = 0;
     for (size_t y = 0; y < h; y++) {
@@ -786,7 +789,7 @@ static double measure_continuous(const job *j) {
 }
 
 /* A PFM: floats with the low byte first, rows from bottom to top. */
-static unsigned char *encode_sources(const job *j, size_t *size) {
+static unsigned char *encode_sources(const patch_job *j, size_t *size) {
     const size_t w = (size_t)j->desc.width, h = (size_t)j->desc.height;
     char head[48];
     size_t bytes;
@@ -813,7 +816,7 @@ static unsigned char *encode_sources(const job *j, size_t *size) {
 
 /* ---- writing ------------------------------------------------------------------------------- */
 
-static int encode(job *j, const txm_image *image, int index, cli_file *file,
+static int encode(patch_job *j, const txm_image *image, int index, cli_file *file,
                   unsigned char **bytes) {
     file->name = j->paths[index];
     const int status = encode_picture(&j->run, file->name, image, bytes, &file->size);
@@ -822,7 +825,7 @@ static int encode(job *j, const txm_image *image, int index, cli_file *file,
 }
 
 /* A map and its coarser levels; the finer one is given up as soon as the next is made. */
-static int encode_levels(job *j, int map, cli_file *files, unsigned char **bytes) {
+static int encode_levels(patch_job *j, int map, cli_file *files, unsigned char **bytes) {
     const int first = map * (1 + j->lod);
     txm_image *image = &j->out[map];
     int status = encode(j, image, first, &files[first], &bytes[first]);
@@ -841,7 +844,7 @@ static int encode_levels(job *j, int map, cli_file *files, unsigned char **bytes
     return status;
 }
 
-static int write_outputs(job *j) {
+static int patch_write_outputs(patch_job *j) {
     const size_t count = (size_t)j->path_count;
     cli_file *files = (cli_file *)calloc(count, sizeof *files);
     unsigned char **bytes = (unsigned char **)calloc(count, sizeof *bytes);
@@ -868,7 +871,7 @@ static int write_outputs(job *j) {
 
 /* ---- the command ---------------------------------------------------------------------------- */
 
-static int run_job(job *j, int argc, char **argv) {
+static int run_job(patch_job *j, int argc, char **argv) {
     cli *run = &j->run;
     texpatch_desc *d = &j->desc;
     char text[80] = "";
@@ -930,13 +933,13 @@ static int run_job(job *j, int argc, char **argv) {
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (cli_begin(run, &patch_manual, options, argc, argv, &status)) return status;
-    status = check_options(j);
-    if (!status) status = name_outputs(j);
+    status = patch_check_options(j);
+    if (!status) status = patch_name_outputs(j);
     if (status) return status;
 
     cli_stage(run, "read");
-    status = read_all(j);
-    if (!status && j->control) status = take_strokes(j);
+    status = patch_read_all(j);
+    if (!status && j->control) status = patch_take_strokes(j);
     if (!status) status = make_room(j);
     if (status) return status;
     cli_figure(run, "width", d->width);
@@ -945,14 +948,14 @@ static int run_job(job *j, int argc, char **argv) {
     cli_figure(run, "exemplars", d->exemplar_count);
     status = j->window ? make_window(j, text) : make_picture(j, text);
     if (!status && run->stats) cli_figure(run, "continuous", measure_continuous(j));
-    if (!status) status = write_outputs(j);
+    if (!status) status = patch_write_outputs(j);
     if (!status && !run->quiet)
         printf("%s: %d x %d pixels, %s, %.1f s\n", run->output, d->width, d->height, text,
                cli_seconds(run));
     return status;
 }
 
-static void free_job(job *j) {
+static void free_job(patch_job *j) {
     for (int e = 0; e < TEXPATCH_MAX_EXEMPLARS; e++) {
         for (int m = 0; m < TEXPATCH_MAX_MAPS; m++) image_free(&j->pictures[e][m]);
         image_free(&j->exemplars[e].guide);
@@ -973,7 +976,7 @@ static void free_job(job *j) {
 }
 
 static int run_patch(int argc, char **argv) {
-    job *j = (job *)calloc(1, sizeof *j); /* too large for a small stack */
+    patch_job *j = (patch_job *)calloc(1, sizeof *j); /* too large for a small stack */
     if (!j) {
         fprintf(stderr, "texkit patch: out of memory\n");
         return CLI_FAILED;

@@ -49,7 +49,7 @@ static const cli_manual retile_manual = {
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
     1, "mesh", 0, "take fewer vertices"};
 
-typedef struct job {
+typedef struct retile_job {
     cli run;
     char extension[8];
 
@@ -76,12 +76,12 @@ typedef struct job {
     int prototype_count;
     float *placements; /* of all instances: translations, then rotations, then scales */
     size_t placed;
-} job;
+} retile_job;
 
 /* ---- the command line ---------------------------------------------------------------------- */
 
 /* Refuse, before any work, what does not go together. */
-static int check_options(job *j, const char *method) {
+static int check_options(retile_job *j, const char *method) {
     static const char *const methods[] = {"lattice", "repel", NULL};
     const char *why;
     cli *run = &j->run;
@@ -112,14 +112,14 @@ static int check_options(job *j, const char *method) {
 
 /* ---- reading ------------------------------------------------------------------------------- */
 
-static int read_mesh(job *j, const char *path, int points_too, mesh_data *mesh) {
+static int read_mesh(retile_job *j, const char *path, int points_too, mesh_data *mesh) {
     const char *why;
     if (mesh_read(path, points_too, mesh, &why)) return CLI_DONE;
     return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
 }
 
 /* A picture as PNG: the file itself if it is one. */
-static int read_png(job *j, const char *path, txm_image *image) {
+static int read_png(retile_job *j, const char *path, txm_image *image) {
     static const unsigned char magic[] = {0x89, 'P', 'N', 'G'};
     const char *why;
     size_t size;
@@ -140,7 +140,7 @@ static int read_png(job *j, const char *path, txm_image *image) {
 
 /* Wanted edge lengths from a picture on the input's texture coordinates: where it is white a
    quarter of what they are where it is black. *scale is for free(). */
-static int read_density(job *j, float **scale) {
+static int read_density(retile_job *j, float **scale) {
     const mesh_data *m = &j->input;
     txm_image map;
     if (!m->uvs)
@@ -163,18 +163,9 @@ static int read_density(job *j, float **scale) {
 
 /* ---- what the input has on it --------------------------------------------------------------- */
 
-static txm_mesh view_of(const mesh_data *m) {
-    txm_mesh view = {0};
-    view.positions = m->positions;
-    view.indices = m->indices;
-    view.vertex_count = m->vertex_count;
-    view.face_count = m->triangle_count;
-    return view;
-}
-
-static int carry_colors(job *j) {
+static int carry_colors(retile_job *j) {
     const size_t from = 4 * j->input.vertex_count, count = j->result->vertex_count;
-    const txm_mesh input = view_of(&j->input);
+    const txm_mesh input = mesh_view(&j->input);
     float *values = (float *)new_array(from, sizeof(float));
     float *carried = (float *)new_array(4 * count, sizeof(float));
     trimesh_values v = {0};
@@ -197,9 +188,9 @@ static int carry_colors(job *j) {
     return status;
 }
 
-static int carry_uvs(job *j) {
+static int carry_uvs(retile_job *j) {
     const size_t corners = 3 * j->input.triangle_count;
-    const txm_mesh input = view_of(&j->input), mesh = trimesh_as_view(j->result);
+    const txm_mesh input = mesh_view(&j->input), mesh = trimesh_as_view(j->result);
     uint32_t *own = (uint32_t *)new_array(corners, sizeof(uint32_t)); /* each corner has its own */
     trimesh_values v = {0};
     int status = CLI_DONE;
@@ -287,7 +278,7 @@ static int parse_tiles(const cJSON *json, tile_file *f, const char **why) {
 }
 
 /* A set in which only the colors matter: all its tiles share one small gray picture. */
-static txm_status import_tiles(job *j, tile_file *f, textiles_set **set) {
+static txm_status import_tiles(retile_job *j, tile_file *f, textiles_set **set) {
     static unsigned char gray[(TEXTILES_MIN_SIZE + 1) * (TEXTILES_MIN_SIZE + 1)];
     txm_image *images = (txm_image *)calloc((size_t)f->count, sizeof *images);
     if (!images) return TXM_OUT_OF_MEMORY;
@@ -317,7 +308,7 @@ static int same_tiles(const textiles_set *set, const tile_file *f) {
 }
 
 /* tiles.json and atlas.png of the folder. */
-static int read_tiles(job *j, tile_file *f, textiles_set **set) {
+static int read_tiles(retile_job *j, tile_file *f, textiles_set **set) {
     char path[MAX_PATH];
     const char *why = "";
     txm_image atlas;
@@ -341,7 +332,8 @@ static int read_tiles(job *j, tile_file *f, textiles_set **set) {
 }
 
 /* Texture coordinates from the tiles chosen for all triangles. */
-static int place_tiles(job *j, const int *tiles, const int *rotations, const float *uv, int count) {
+static int place_tiles(retile_job *j, const int *tiles, const int *rotations, const float *uv,
+                       int count) {
     const size_t triangles = j->result->triangle_count;
     j->output.uvs = (float *)new_array(triangles, 6 * sizeof(float));
     if (!j->output.uvs) return fail_memory(&j->run);
@@ -349,7 +341,7 @@ static int place_tiles(job *j, const int *tiles, const int *rotations, const flo
                                                      &j->run.env, j->output.uvs), j->run.inputs[0]);
 }
 
-static int dress_with_tiles(job *j) {
+static int dress_with_tiles(retile_job *j) {
     const trimesh_mesh *m = j->result;
     textiles_set *set = NULL;
     tile_file f;
@@ -374,7 +366,7 @@ static int dress_with_tiles(job *j) {
 
 /* The layout of a picture of patches: with the gutter, or if there is none, without; a row of pixels
    more or less, which rounding makes, does not matter. */
-static int find_layout(job *j, const txm_image *picture, trimesh_atlas *atlas) {
+static int find_layout(retile_job *j, const txm_image *picture, trimesh_atlas *atlas) {
     const int pitch = picture->width / j->patch_count;
     const int gutters[2] = {j->gutter < 0 ? 8 : j->gutter, j->gutter < 0 ? 0 : j->gutter};
     for (int k = 0; k < 2 && picture->width % j->patch_count == 0; k++) {
@@ -393,7 +385,7 @@ static int find_layout(job *j, const txm_image *picture, trimesh_atlas *atlas) {
         j->patches, picture->width, picture->height, j->patch_count, j->patch_count);
 }
 
-static int dress_with_patches(job *j) {
+static int dress_with_patches(retile_job *j) {
     const txm_mesh mesh = trimesh_as_view(j->result);
     trimesh_choose_desc choose = {0};
     trimesh_atlas atlas;
@@ -422,7 +414,7 @@ static int dress_with_patches(job *j) {
 /* ---- instances ------------------------------------------------------------------------------ */
 
 /* The prototype of this color, made if there is none yet; -1: too many, -2: no memory. */
-static int sphere_of(job *j, const unsigned char color[4]) {
+static int sphere_of(retile_job *j, const unsigned char color[4]) {
     for (int i = 0; i < j->prototype_count; i++) {
         if (!memcmp(j->prototypes[i].colors, color, 4)) return i;
     }
@@ -462,7 +454,7 @@ static int take_point(const mesh_data *m, size_t i, float scale, trimesh_point *
 }
 
 /* Points become spheres. Without --dot these touch if the points are spread evenly. */
-static int take_points(job *j, trimesh_point *points) {
+static int take_points(retile_job *j, trimesh_point *points) {
     static const unsigned char plain[4] = {200, 200, 200, 255};
     const mesh_data *m = &j->patch;
     const double radius = j->dot ? j->dot / 100.0 : 0.5 * sqrt(0.5 / (double)m->vertex_count);
@@ -483,7 +475,7 @@ static int take_points(job *j, trimesh_point *points) {
 }
 
 /* A mesh is one thing, held in the middle of the triangle. */
-static void take_mesh(job *j, trimesh_point *point) {
+static void take_mesh(retile_job *j, trimesh_point *point) {
     mesh_data *m = &j->prototypes[j->prototype_count++];
     *m = j->patch;
     memset(&j->patch, 0, sizeof j->patch);
@@ -496,7 +488,7 @@ static void take_mesh(job *j, trimesh_point *point) {
 }
 
 /* Instances sorted by prototype into the arrays that a writer takes. */
-static int sort_instances(job *j, const trimesh_instance *list, size_t count) {
+static int sort_instances(retile_job *j, const trimesh_instance *list, size_t count) {
     size_t at[MAX_PROTOTYPES + 1] = {0};
     j->placements = (float *)new_array(count, 10 * sizeof(float));
     if (!j->placements) return fail_memory(&j->run);
@@ -522,7 +514,7 @@ static int sort_instances(job *j, const trimesh_instance *list, size_t count) {
     return CLI_DONE;
 }
 
-static int place_instances(job *j) {
+static int retile_place_instances(retile_job *j) {
     trimesh_patch patch = {0};
     trimesh_scatter_desc d = {0};
     trimesh_instance *list = NULL;
@@ -654,14 +646,13 @@ static double angle_of(double a, double b, double c) {
     return acos(x < -1 ? -1 : x > 1 ? 1 : x) * 180 / 3.14159265358979;
 }
 
-/* Measure the result for --stats; returns the mean quality and the share of valence 6. */
-static int measure(job *j, double *mean_quality, double *valence_6) {
-    const trimesh_mesh *m = j->result;
-    const trimesh_report *r = &j->report;
+/* Measure the mesh for --stats; returns the mean quality and the share of valence 6. */
+static int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r,
+                        double *mean_quality, double *valence_6) {
     spread edges = {0, 0, 0}, areas = {0, 0, 0}, qualities = {0, 0, 0};
     double least_quality = 1, least_angle = 180;
     figures f;
-    if (!count_edges(m, &f)) return fail_memory(&j->run);
+    if (!count_edges(m, &f)) return fail_memory(run);
     for (size_t t = 0; t < m->triangle_count; t++) {
         double side[3];
         for (size_t k = 0; k < 3; k++) { /* side k is opposite to corner k */
@@ -689,7 +680,6 @@ static int measure(job *j, double *mean_quality, double *valence_6) {
     }
     const int mended[7] = {(int)r->welded, (int)r->unused, (int)r->degenerate, (int)r->duplicate,
                            (int)r->fins, (int)r->turned, (int)r->split};
-    cli *run = &j->run;
     *mean_quality = spread_mean(&qualities);
     *valence_6 = f.inner > 0 ? f.six / f.inner : 0;
     cli_figure(run, "vertices", (double)m->vertex_count);
@@ -707,14 +697,13 @@ static int measure(job *j, double *mean_quality, double *valence_6) {
     cli_figure(run, "edge_variation", spread_variation(&edges));
     cli_figure(run, "area_variation", spread_variation(&areas));
     cli_figure(run, "least_angle", least_angle);
-    if (j->instances) cli_figure(run, "instances", (double)j->placed);
     return CLI_DONE;
 }
 
 /* ---- writing -------------------------------------------------------------------------------- */
 
 /* Things baked into one mesh; spheres shrink to points, with the point's normal and color. */
-static int bake(job *j, mesh_data *baked) {
+static int bake(retile_job *j, mesh_data *baked) {
     static float zero[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     mesh_data points[MAX_PROTOTYPES];
     mesh_instances list[MAX_PROTOTYPES];
@@ -734,7 +723,7 @@ static int bake(job *j, mesh_data *baked) {
     return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->run.output, why);
 }
 
-static int write_output(job *j) {
+static int write_output(retile_job *j) {
     cli *run = &j->run;
     cli_file files[3] = {{0}, {0}, {0}};
     unsigned char *bytes = NULL, *mtl = NULL;
@@ -783,13 +772,13 @@ static int write_output(job *j) {
 
 /* ---- the command ---------------------------------------------------------------------------- */
 
-static int retile(job *j) {
+static int retile(retile_job *j) {
     float *scale = NULL;
     int status = CLI_DONE;
     if (j->density) status = read_density(j, &scale);
     if (!status) {
         cli_stage(&j->run, "retile");
-        j->desc.surface = view_of(&j->input);
+        j->desc.surface = mesh_view(&j->input);
         j->desc.scale = scale;
         j->desc.seed = j->run.seed;
         status = check_result(&j->run,
@@ -806,7 +795,7 @@ static int retile(job *j) {
     return CLI_DONE;
 }
 
-static int dress(job *j) {
+static int retile_dress(retile_job *j) {
     int status = CLI_DONE;
     cli_stage(&j->run, "dress");
     if (j->input.colors) status = carry_colors(j);
@@ -824,11 +813,11 @@ static int dress(job *j) {
     const float crease = j->desc.crease_angle > 0 ? j->desc.crease_angle : CREASE;
     if (!status && j->report.crease_edges && !mesh_crease(&j->output, crease))
         status = fail_memory(&j->run);
-    if (!status && j->instances) status = place_instances(j);
+    if (!status && j->instances) status = retile_place_instances(j);
     return status;
 }
 
-static void free_job(job *j) {
+static void free_job(retile_job *j) {
     for (int i = 0; i < j->prototype_count; i++) mesh_free(&j->prototypes[i]);
     mesh_free(&j->input);
     mesh_free(&j->patch);
@@ -841,7 +830,7 @@ static void free_job(job *j) {
     free(j);
 }
 
-static int run_job(job *j, int argc, char **argv) {
+static int run_job(retile_job *j, int argc, char **argv) {
     int vertices = 0, crease = 0, adapt = 0, spacing = 0, status;
     const char *method = "lattice";
     double quality = 0, valence_6 = 0;
@@ -884,10 +873,11 @@ static int run_job(job *j, int argc, char **argv) {
     status = read_mesh(j, j->run.inputs[0], 0, &j->input);
     if (!status && j->instances) status = read_mesh(j, j->instances, 1, &j->patch);
     if (!status) status = retile(j);
-    if (!status) status = dress(j);
+    if (!status) status = retile_dress(j);
     if (!status) {
         cli_stage(&j->run, "measure");
-        status = measure(j, &quality, &valence_6);
+        status = mesh_figures(&j->run, j->result, &j->report, &quality, &valence_6);
+        if (j->instances) cli_figure(&j->run, "instances", (double)j->placed);
     }
     if (!status) {
         cli_stage(&j->run, "encode");
@@ -902,7 +892,7 @@ static int run_job(job *j, int argc, char **argv) {
 }
 
 static int run_retile(int argc, char **argv) {
-    job *j = (job *)calloc(1, sizeof *j); /* too large for a small stack */
+    retile_job *j = (retile_job *)calloc(1, sizeof *j); /* too large for a small stack */
     if (!j) {
         fprintf(stderr, "texkit retile: out of memory\n");
         return CLI_FAILED;

@@ -30,6 +30,16 @@ typedef struct mesh_data {
     char message[120];
 } mesh_data;
 
+/* The mesh as the libraries take it. */
+static inline txm_mesh mesh_view(const mesh_data *m) {
+    txm_mesh view = {0};
+    view.positions = m->positions;
+    view.indices = m->indices;
+    view.vertex_count = m->vertex_count;
+    view.face_count = m->triangle_count;
+    return view;
+}
+
 /* What a surface looks like. */
 typedef struct mesh_material {
     const char *name;    /* letters and digits                                      */
