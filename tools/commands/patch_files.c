@@ -1,0 +1,298 @@
+/* patch_files.c - the pictures of 'texkit patch', in and out
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "patch.h"
+#include "files/image_io.h"
+
+#include <stdio.h>
+
+/* ---- the outputs' names ------------------------------------------------------------------- */
+
+static int is_separator(char c) {
+    return c == '-' || c == '_' || c == '.' || c == ' ';
+}
+
+/* The length of a file's name without its extension; *name is behind the last slash. */
+static size_t stem_of(const char *path, const char **name) {
+    const char *slash = strrchr(path, '/'), *dot;
+    *name = slash ? slash + 1 : path;
+    dot = strrchr(*name, '.');
+    return dot && dot > *name ? (size_t)(dot - *name) : strlen(*name);
+}
+
+/* What tells a map from its exemplar: "normal" of bricks_normal.png beside bricks.png or
+   bricks_albedo.png. The whole stem if that leaves nothing. */
+static size_t own_name(const char *path, const char *exemplar, const char **name) {
+    const char *other;
+    const size_t n = stem_of(path, name), m = stem_of(exemplar, &other);
+    size_t same = 0, cut = 0;
+    while (same < n && same < m && (*name)[same] == other[same]) {
+        same++;
+        if (is_separator(other[same - 1])) cut = same;
+    }
+    if (same == m && same < n && is_separator((*name)[same])) cut = same + 1;
+    if (cut >= n) cut = 0;
+    *name += cut;
+    return n - cut;
+}
+
+/* OUT-normal-2.png: level 2 of a map. */
+static int name_output(patch_job *j, int map, int level, char path[MAX_PATH]) {
+    const size_t n = strlen(j->run.output) - strlen(j->extension);
+    const char *name = "";
+    size_t length = 0;
+    char number[16] = "";
+    if (level) snprintf(number, sizeof number, "-%d", level);
+    if (map) length = own_name(j->map_names[0].at[map - 1], j->run.inputs[0], &name);
+    const int size = snprintf(path, MAX_PATH, "%.*s%s%.*s%s%s", (int)n, j->run.output,
+                              map ? "-" : "", (int)length, name, number, j->run.output + n);
+    if (size < MAX_PATH) return CLI_DONE;
+    return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->run.output);
+}
+
+/* All paths that will be written. */
+int patch_name_outputs(patch_job *j) {
+    const int levels = 1 + j->lod, count = j->desc.map_count * levels;
+    int status = CLI_DONE;
+    file_extension(j->run.output, j->extension);
+    j->paths = (char(*)[MAX_PATH])calloc((size_t)count + 1, MAX_PATH);
+    if (!j->paths) return fail_memory(&j->run);
+    for (int i = 0; i < count && !status; i++) {
+        status = name_output(j, i / levels, i % levels, j->paths[i]);
+        if (!status && i > 0) status = cli_writes(&j->run, j->paths[i]); /* the first is -o */
+    }
+    j->path_count = count;
+    if (!status && j->sources) {
+        if (strlen(j->sources) >= MAX_PATH)
+            return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->sources);
+        memcpy(j->paths[j->path_count++], j->sources, strlen(j->sources) + 1);
+    }
+    if (!status)
+        status = check_picture_path(&j->run, j->run.output, j->desc.width, j->desc.height, 0);
+    return status;
+}
+
+/* ---- reading ------------------------------------------------------------------------------- */
+
+/* 8 bits as 16. */
+static int widen(patch_job *j, txm_image *image) {
+    txm_image wide;
+    const int status =
+        new_picture(&j->run, image->width, image->height, image->channels, TXM_U16, &wide);
+    const size_t count = (size_t)image->width * (size_t)image->height * (size_t)image->channels;
+    const uint8_t *from = (const uint8_t *)image->pixels;
+    for (size_t i = 0; i < count && !status; i++) {
+        ((uint16_t *)wide.pixels)[i] = (uint16_t)(from[i] * 257);
+    }
+    image_free(image);
+    *image = wide;
+    return status;
+}
+
+/* Read a picture with so many channels of that sample type. */
+static int read_as(patch_job *j, const char *path, int channels, txm_sample sample,
+                   txm_image *image) {
+    const int status = read_picture(&j->run, path, channels, sample, image);
+    return !status && image->sample != sample ? widen(j, image) : status;
+}
+
+static int check_extent(patch_job *j, const char *what, const char *path, const txm_image *image,
+                        int width, int height, const char *like) {
+    if (image->width == width && image->height == height) return CLI_DONE;
+    return cli_fail(&j->run, CLI_FAILED, "%s '%s' is %d x %d; make it %d x %d as %s", what, path,
+                    image->width, image->height, width, height, like);
+}
+
+/* Exemplar e and its maps; all exemplars have the channels and the depths of the first. */
+static int read_exemplar(patch_job *j, int e) {
+    texpatch_exemplar *x = &j->exemplars[e];
+    const char *path = j->exemplar_names.at[e];
+    int status = CLI_DONE;
+    x->maps = j->pictures[e];
+    for (int m = 0; m < j->desc.map_count && !status; m++) {
+        const txm_image *first = &j->pictures[0][m];
+        txm_image *image = &j->pictures[e][m];
+        const char *name = m ? j->map_names[e].at[m - 1] : path;
+        if (e) status = read_as(j, name, first->channels, first->sample, image);
+        else status = read_picture(&j->run, name, 0, TXM_U16, image);
+        if (!status && m)
+            status = check_extent(j, "the map", name, image, x->maps[0].width, x->maps[0].height,
+                                  path);
+    }
+    return status;
+}
+
+/* A list of masks or guides, one for each exemplar. */
+static int read_for_exemplars(patch_job *j, const char *option, const char *list, int channels) {
+    names n = {0};
+    int status = patch_split(j, option, list, ',', TEXPATCH_MAX_EXEMPLARS, &n);
+    if (!status && n.count != j->desc.exemplar_count)
+        status = cli_fail(&j->run, CLI_USAGE, "%s '%s': give %d, one for each exemplar", option,
+                          list, j->desc.exemplar_count);
+    for (int e = 0; e < n.count && !status; e++) {
+        texpatch_exemplar *x = &j->exemplars[e];
+        txm_image *image = channels ? &x->mask : &x->guide;
+        const int as_first = channels ? channels : j->exemplars[0].guide.channels; /* 0: as it is */
+        status = read_as(j, n.at[e], as_first, TXM_U8, image);
+        if (!status)
+            status = check_extent(j, channels ? "the mask" : "the guide", n.at[e], image,
+                                  x->maps[0].width, x->maps[0].height, j->exemplar_names.at[e]);
+    }
+    free(n.storage);
+    return status;
+}
+
+static int read_sized(patch_job *j, const char *what, const char *path, int channels,
+                      txm_sample sample, txm_image *image) {
+    const int status = read_as(j, path, channels, sample, image);
+    if (status) return status;
+    return check_extent(j, what, path, image, j->desc.width, j->desc.height, "--size says");
+}
+
+static int read_kept(patch_job *j) {
+    names n = {0};
+    texpatch_desc *d = &j->desc;
+    int status = patch_split(j, "--keep", j->kept_list, ',', TEXPATCH_MAX_MAPS, &n);
+    if (!status && n.count != d->map_count)
+        status = cli_fail(&j->run, CLI_USAGE, "--keep '%s': give %d, one for each map",
+                          j->kept_list, d->map_count);
+    for (int m = 0; m < n.count && !status; m++)
+        status = read_sized(j, "the picture", n.at[m], j->pictures[0][m].channels,
+                            j->pictures[0][m].sample, &j->kept[m]);
+    free(n.storage);
+    if (!status) status = read_sized(j, "the mask", j->keep, 1, TXM_U8, &d->keep);
+    d->kept = j->kept;
+    return status;
+}
+
+/* All pictures; then it is known what OUT has to hold. */
+int patch_read_all(patch_job *j) {
+    texpatch_desc *d = &j->desc;
+    int status = CLI_DONE;
+    for (int e = 0; e < d->exemplar_count && !status; e++) status = read_exemplar(j, e);
+    for (int m = 0; m < d->map_count && !status; m++) {
+        const txm_image *image = &j->pictures[0][m];
+        const char *path = j->paths[m * (1 + j->lod)];
+        status = check_picture_path(&j->run, path, d->width, d->height, image->channels);
+        if (!status && image->sample == TXM_U16 && strcmp(j->extension, ".png") != 0)
+            status = cli_fail(&j->run, CLI_USAGE, "cannot write '%s': of these formats only PNG "
+                              "takes 16 bits a sample; use .png", path);
+    }
+    if (!status && j->masks) status = read_for_exemplars(j, "--mask", j->masks, 1);
+    if (!status && j->guides) status = read_for_exemplars(j, "--guide", j->guides, 0);
+    if (!status && j->target)
+        status = read_sized(j, "the target", j->target, j->exemplars[0].guide.channels, TXM_U8,
+                            &d->guide);
+    if (!status && j->target_mask)
+        status = read_sized(j, "the mask", j->target_mask, 1, TXM_U8, &d->guide_mask);
+    if (!status && j->keep) status = read_kept(j);
+    return status;
+}
+
+/* ---- where pixels come from ---------------------------------------------------------------- */
+
+/* Does q follow p in the exemplar as it does in the output, one step to the right or down? */
+static int goes_on(const texpatch_source *p, const texpatch_source *q, int is_down) {
+    /* what becomes of a step to the right by so many quarter turns back; y points down */
+    static const int turned[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+    if (p->exemplar < 0 || p->exemplar != q->exemplar || p->turn != q->turn) return 0;
+    const int *step = turned[(p->turn + is_down) & 3];
+    const float dx = q->x - p->x - (float)(p->turn >= 4 ? -step[0] : step[0]);
+    const float dy = q->y - p->y - (float)step[1];
+    return dx > -0.25f && dx < 0.25f && dy > -0.25f && dy < 0.25f;
+}
+
+/* The share of neighbours that are neighbours in the exemplar. */
+double patch_continuous(const patch_job *j) {
+    const size_t w = (size_t)j->desc.width, h = (size_t)j->desc.height;
+    double pairs = 0, good = 0;
+    for (size_t y = 0; y < h; y++) {
+        for (size_t x = 0; x < w; x++) {
+            const texpatch_source *p = &j->from[y * w + x];
+            if (x + 1 < w) good += goes_on(p, p + 1, 0);
+            if (y + 1 < h) good += goes_on(p, p + w, 1);
+            pairs += (x + 1 < w) + (y + 1 < h);
+        }
+    }
+    return pairs > 0 ? good / pairs : 1;
+}
+
+/* A PFM: floats with the low byte first, rows from bottom to top. */
+static unsigned char *encode_sources(const patch_job *j, size_t *size) {
+    const size_t w = (size_t)j->desc.width, h = (size_t)j->desc.height;
+    char head[48];
+    size_t bytes;
+    const int n = snprintf(head, sizeof head, "PF\n%zu %zu\n-1.0\n", w, h);
+    if (!txm_mul(w, h, 12, &bytes) || !txm_add(bytes, (size_t)n, size)) return NULL;
+    unsigned char *file = (unsigned char *)malloc(*size), *to = file;
+    if (!file) return NULL;
+    memcpy(to, head, (size_t)n);
+    to += n;
+    for (size_t y = h; y-- > 0;) {
+        for (size_t x = 0; x < w; x++) {
+            const texpatch_source *p = &j->from[y * w + x];
+            const float values[3] = {p->x, p->y,
+                                     p->exemplar < 0 ? -1 : (float)(8 * p->exemplar + p->turn)};
+            for (int k = 0; k < 3; k++) {
+                uint32_t bits;
+                memcpy(&bits, &values[k], sizeof bits);
+                for (int b = 0; b < 4; b++) *to++ = (unsigned char)(bits >> (8 * b) & 255);
+            }
+        }
+    }
+    return file;
+}
+
+/* ---- writing ------------------------------------------------------------------------------- */
+
+static int encode(patch_job *j, const txm_image *image, int index, cli_file *file,
+                  unsigned char **bytes) {
+    file->name = j->paths[index];
+    const int status = encode_picture(&j->run, file->name, image, bytes, &file->size);
+    file->bytes = *bytes;
+    return status;
+}
+
+/* A map and its coarser levels; the finer one is given up as soon as the next is made. */
+static int encode_levels(patch_job *j, int map, cli_file *files, unsigned char **bytes) {
+    const int first = map * (1 + j->lod);
+    txm_image *image = &j->out[map];
+    int status = encode(j, image, first, &files[first], &bytes[first]);
+    for (int level = 1; level <= j->lod && !status; level++) {
+        const int i = first + level;
+        txm_image half;
+        status = new_picture(&j->run, (image->width + 1) / 2, (image->height + 1) / 2,
+                             image->channels, image->sample, &half);
+        if (!status)
+            status = check_result(&j->run, texpatch_half(image, &j->maps[map], &j->run.env, &half),
+                                  j->run.inputs[0]);
+        free(image->pixels);
+        *image = half;
+        if (!status) status = encode(j, image, i, &files[i], &bytes[i]);
+    }
+    return status;
+}
+
+int patch_write_outputs(patch_job *j) {
+    const size_t count = (size_t)j->path_count;
+    cli_file *files = (cli_file *)calloc(count, sizeof *files);
+    unsigned char **bytes = (unsigned char **)calloc(count, sizeof *bytes);
+    double sum = 0;
+    int status = files && bytes ? CLI_DONE : fail_memory(&j->run);
+    cli_stage(&j->run, "encode");
+    for (int m = 0; m < j->desc.map_count && !status; m++)
+        status = encode_levels(j, m, files, bytes);
+    if (!status && j->sources) {
+        cli_file *last = &files[count - 1];
+        last->name = j->sources;
+        last->bytes = bytes[count - 1] = encode_sources(j, &last->size);
+        if (!last->bytes) status = fail_memory(&j->run);
+    }
+    for (size_t i = 0; i < count && !status; i++) sum += (double)files[i].size;
+    cli_figure(&j->run, "files", (double)count);
+    cli_figure(&j->run, "file_bytes", sum);
+    if (!status) status = cli_finish_files(&j->run, files, (int)count);
+    for (size_t i = 0; i < count && bytes; i++) free(bytes[i]);
+    free(bytes);
+    free(files);
+    return status;
+}

@@ -1,0 +1,60 @@
+/* retile.h - what the files of 'texkit retile' share
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   retile.c holds the command, retile_dress.c what the result has on it, retile_instances.c what stands
+   on it, mesh_figures.c measures it.                                                            */
+#ifndef RETILE_H
+#define RETILE_H
+
+#include "command.h"
+#include "files/mesh_io.h"
+#include "trimesh_relax.h"
+
+enum { MAX_PROTOTYPES = 64 }; /* distinct colors of instanced points */
+
+typedef struct retile_job {
+    cli run;
+    char extension[8];
+
+    /* options */
+    trimesh_desc desc;
+    const char *tiles, *patches, *instances, *texture, *density;
+    int patch_count, gutter, dot, curved;
+
+    mesh_data input, patch;
+    trimesh_mesh *result;
+    trimesh_report report;
+
+    /* the output: positions, normals and indices are the result's, the rest our own */
+    mesh_data output;
+
+    /* its picture; name: behind the last '/' */
+    unsigned char *png;
+    size_t png_size;
+    char png_path[MAX_PATH], mtl_path[MAX_PATH];
+
+    /* what stands on it */
+    mesh_data prototypes[MAX_PROTOTYPES];
+    mesh_instances instanced[MAX_PROTOTYPES];
+    int prototype_count;
+    float *placements; /* of all instances: translations, then rotations, then scales */
+    size_t placed;
+} retile_job;
+
+/* ---- retile_dress.c ---- */
+
+/* Colors, texture coordinates, the picture and instances. */
+int retile_dress(retile_job *j);
+
+/* ---- retile_instances.c ---- */
+
+/* What --instances says, on every triangle. */
+int retile_place_instances(retile_job *j);
+
+/* ---- mesh_figures.c ---- */
+
+/* Measure the mesh for --stats; returns the mean quality and the share of valence 6. */
+int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, double *mean_quality,
+                 double *valence_6);
+
+#endif /* RETILE_H */

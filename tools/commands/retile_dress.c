@@ -1,0 +1,305 @@
+/* retile_dress.c - what the result of 'texkit retile' has on it: colors, tiles, patches
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "retile.h"
+#include "files/image_io.h"
+#include "textiles.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <stdio.h>
+
+enum { CREASE = 50 }; /* degrees, where --crease is not given */
+
+/* A picture as PNG: the file itself if it is one. */
+static int read_png(retile_job *j, const char *path, txm_image *image) {
+    static const unsigned char magic[] = {0x89, 'P', 'N', 'G'};
+    const char *why;
+    size_t size;
+    unsigned char *bytes = file_read(path, &size);
+    if (!bytes) return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, strerror(errno));
+    if (!image_decode(bytes, size, 0, image, &why)) {
+        free(bytes);
+        return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
+    }
+    if (size > sizeof magic && !memcmp(bytes, magic, sizeof magic)) {
+        j->png = bytes;
+        j->png_size = size;
+        return CLI_DONE;
+    }
+    free(bytes);
+    return encode_picture(&j->run, j->png_path, image, &j->png, &j->png_size);
+}
+
+/* ---- what the input has on it --------------------------------------------------------------- */
+
+static int carry_colors(retile_job *j) {
+    const size_t from = 4 * j->input.vertex_count, count = j->result->vertex_count;
+    const txm_mesh input = mesh_view(&j->input);
+    float *values = (float *)new_array(from, sizeof(float));
+    float *carried = (float *)new_array(4 * count, sizeof(float));
+    trimesh_values v = {0};
+    int status = CLI_DONE;
+    j->output.colors = (unsigned char *)new_array(count, 4);
+    if (!values || !carried || !j->output.colors) {
+        status = fail_memory(&j->run);
+    } else {
+        for (size_t i = 0; i < from; i++) values[i] = (float)j->input.colors[i];
+        v.values = values;
+        v.count = j->input.vertex_count;
+        v.channels = 4;
+        status = check_result(&j->run, trimesh_transfer(&input, &v, j->result->sources, count,
+                                                        &j->run.env, carried), j->run.inputs[0]);
+    }
+    for (size_t i = 0; i < 4 * count && !status; i++)
+        j->output.colors[i] = (unsigned char)(txm_clampf(carried[i], 0, 255) + 0.5f);
+    free(values);
+    free(carried);
+    return status;
+}
+
+static int carry_uvs(retile_job *j) {
+    const size_t corners = 3 * j->input.triangle_count;
+    const txm_mesh input = mesh_view(&j->input), mesh = trimesh_as_view(j->result);
+    uint32_t *own = (uint32_t *)new_array(corners, sizeof(uint32_t)); /* each corner has its own */
+    trimesh_values v = {0};
+    int status = CLI_DONE;
+    j->output.uvs = (float *)new_array(j->result->triangle_count, 6 * sizeof(float));
+    if (!own || !j->output.uvs) {
+        status = fail_memory(&j->run);
+    } else {
+        for (size_t c = 0; c < corners; c++) own[c] = (uint32_t)c;
+        v.values = j->input.uvs;
+        v.count = corners;
+        v.indices = own;
+        v.channels = 2;
+        status = check_result(&j->run,
+                              trimesh_transfer_corners(&input, &v, &mesh, j->result->sources,
+                                                       &j->run.env, j->output.uvs),
+                              j->run.inputs[0]);
+    }
+    free(own);
+    return status;
+}
+
+/* ---- tiles ---------------------------------------------------------------------------------- */
+
+/* A triangle set as its tiles.json tells it. */
+typedef struct tile_file {
+    textiles_desc desc;
+    textiles_tile *tiles;
+    float *uv; /* 6 per tile */
+    int count;
+} tile_file;
+
+static int get_three(const cJSON *tile, const char *name, int low, int high, int values[3]) {
+    const cJSON *list = cJSON_GetObjectItemCaseSensitive(tile, name);
+    for (int k = 0; k < 3; k++) {
+        if (!json_int(cJSON_GetArrayItem(list, k), NULL, low, high, &values[k])) return 0;
+    }
+    return cJSON_GetArraySize(list) == 3;
+}
+
+static int get_tile(const cJSON *json, int colors, textiles_tile *tile, float uv[6]) {
+    const cJSON *list = cJSON_GetObjectItemCaseSensitive(json, "uv");
+    memset(tile, 0, sizeof *tile);
+    for (int k = 0; k < 6; k++) {
+        const cJSON *x = cJSON_GetArrayItem(cJSON_GetArrayItem(list, k / 2), k % 2);
+        if (!cJSON_IsNumber(x) || !(x->valuedouble >= 0 && x->valuedouble <= 1)) return 0;
+        uv[k] = (float)x->valuedouble;
+    }
+    return get_three(json, "edges", 0, colors - 1, tile->edges) &&
+           get_three(json, "directions", -1, 1, tile->directions) &&
+           json_int(json, "variant", 0, TEXTILES_MAX_VARIANTS - 1, &tile->variant);
+}
+
+/* 0 with *why if this is no triangle set */
+static int parse_tiles(const cJSON *json, tile_file *f, const char **why) {
+    textiles_desc *d = &f->desc;
+    const cJSON *kind = cJSON_GetObjectItemCaseSensitive(json, "kind");
+    const cJSON *atlas = cJSON_GetObjectItemCaseSensitive(json, "atlas");
+    const cJSON *packing = cJSON_GetObjectItemCaseSensitive(atlas, "packing");
+    const cJSON *tiles = cJSON_GetObjectItemCaseSensitive(json, "tiles"), *tile;
+    if (!cJSON_IsString(kind) || !cJSON_IsString(packing) || !cJSON_IsArray(tiles))
+        return *why = "not a file of 'texkit tiles'", 0;
+    if (strcmp(kind->valuestring, "triangle") != 0)
+        return *why = "not a set of triangles; make one with --kind triangle", 0;
+    if (strcmp(packing->valuestring, "packed") != 0)
+        return *why = "not packed into one picture; make the set with --packing packed", 0;
+    *why = "a field is missing or out of range; make the set again";
+    if (!json_int(json, "colors", 2, TEXTILES_MAX_COLORS, &d->colors) ||
+        !json_int(json, "variants", 1, TEXTILES_MAX_VARIANTS, &d->variants))
+        return 0;
+    const int c = d->colors, reduced = 2 * c * c * c * d->variants;
+    const int whole = (8 * c * c * c + 4 * c) / 3 * d->variants;
+    f->count = cJSON_GetArraySize(tiles);
+    if (f->count != reduced && f->count != whole)
+        return *why = "not the number of tiles that such a set has; make it again", 0;
+    d->reduced = f->count == reduced;
+    f->tiles = (textiles_tile *)new_array((size_t)f->count, sizeof *f->tiles);
+    f->uv = (float *)new_array((size_t)f->count, 6 * sizeof(float));
+    if (!f->tiles || !f->uv) return *why = "out of memory", 0;
+    int i = 0;
+    cJSON_ArrayForEach(tile, tiles) {
+        if (!get_tile(tile, c, &f->tiles[i], f->uv + 6 * i)) return 0;
+        i++;
+    }
+    return 1;
+}
+
+/* A set in which only the colors matter: all its tiles share one small gray picture. */
+static txm_status import_tiles(retile_job *j, tile_file *f, textiles_set **set) {
+    static unsigned char gray[(TEXTILES_MIN_SIZE + 1) * (TEXTILES_MIN_SIZE + 1)];
+    txm_image *images = (txm_image *)calloc((size_t)f->count, sizeof *images);
+    if (!images) return TXM_OUT_OF_MEMORY;
+    for (int i = 0; i < f->count; i++) {
+        images[i].pixels = gray;
+        images[i].width = images[i].height = TEXTILES_MIN_SIZE + 1;
+        images[i].channels = 1;
+    }
+    f->desc.kind = TEXTILES_TRIANGLE;
+    f->desc.size = TEXTILES_MIN_SIZE;
+    const txm_status result = textiles_import(&f->desc, images, f->count, 1, &j->run.env, set);
+    free(images);
+    return result;
+}
+
+/* Are the file's tiles those of the set, in its order? */
+static int same_tiles(const textiles_set *set, const tile_file *f) {
+    for (int i = 0; i < f->count; i++) {
+        textiles_tile t;
+        if (!textiles_tile_at(set, i, &t) || t.variant != f->tiles[i].variant) return 0;
+        for (int k = 0; k < 3; k++) {
+            if (t.edges[k] != f->tiles[i].edges[k] || t.directions[k] != f->tiles[i].directions[k])
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* tiles.json and atlas.png of the folder. */
+static int read_tiles(retile_job *j, tile_file *f, textiles_set **set) {
+    char path[MAX_PATH];
+    const char *why = "";
+    txm_image atlas;
+    cJSON *json;
+    int status = read_tiles_json(&j->run, j->tiles, &json);
+    if (status) return status;
+    const int ok = parse_tiles(json, f, &why);
+    cJSON_Delete(json);
+    snprintf(path, sizeof path, "%s/tiles.json", j->tiles);
+    if (!ok) return cli_fail(&j->run, CLI_FAILED, "'%s': %s", path, why);
+    const txm_status result = import_tiles(j, f, set);
+    status = check_result(&j->run, result, path);
+    if (status) return status;
+    if (!same_tiles(*set, f))
+        return cli_fail(&j->run, CLI_FAILED, "'%s': its tiles are not in their order; make the set "
+                        "again", path);
+    snprintf(path, sizeof path, "%s/atlas.png", j->tiles);
+    status = read_png(j, path, &atlas);
+    if (!status) image_free(&atlas);
+    return status;
+}
+
+/* Texture coordinates from the tiles chosen for all triangles. */
+static int place_tiles(retile_job *j, const int *tiles, const int *rotations, const float *uv,
+                       int count) {
+    const size_t triangles = j->result->triangle_count;
+    j->output.uvs = (float *)new_array(triangles, 6 * sizeof(float));
+    if (!j->output.uvs) return fail_memory(&j->run);
+    return check_result(&j->run, trimesh_place_tiles(triangles, tiles, rotations, uv, (size_t)count,
+                                                     &j->run.env, j->output.uvs), j->run.inputs[0]);
+}
+
+static int dress_with_tiles(retile_job *j) {
+    const trimesh_mesh *m = j->result;
+    textiles_set *set = NULL;
+    tile_file f;
+    memset(&f, 0, sizeof f);
+    int *tiles = (int *)new_array(2 * m->triangle_count, sizeof(int));
+    int status = tiles ? read_tiles(j, &f, &set) : fail_memory(&j->run);
+    if (!status)
+        status = check_result(&j->run,
+                              textiles_assign_triangles(set, m->indices, m->triangle_count,
+                                                        m->vertex_count, j->run.seed, &j->run.env,
+                                                        tiles, tiles + m->triangle_count),
+                              j->tiles);
+    if (!status) status = place_tiles(j, tiles, tiles + m->triangle_count, f.uv, f.count);
+    textiles_set_free(set);
+    free(f.tiles);
+    free(f.uv);
+    free(tiles);
+    return status;
+}
+
+/* ---- patches -------------------------------------------------------------------------------- */
+
+/* The layout of a picture of patches: with the gutter, or if there is none, without; a row of pixels
+   more or less, which rounding makes, does not matter. */
+static int find_layout(retile_job *j, const txm_image *picture, trimesh_atlas *atlas) {
+    const int pitch = picture->width / j->patch_count;
+    const int gutters[2] = {j->gutter < 0 ? 8 : j->gutter, j->gutter < 0 ? 0 : j->gutter};
+    for (int k = 0; k < 2 && picture->width % j->patch_count == 0; k++) {
+        const int size = pitch - 2 * gutters[k];
+        if (size < 2 ||
+            trimesh_atlas_make(j->patch_count, size, gutters[k], &j->run.env, atlas) != TXM_OK)
+            continue;
+        if (abs(atlas->height - picture->height) > 1) continue;
+        atlas->height = picture->height;
+        return CLI_DONE;
+    }
+    return cli_fail(
+        &j->run, CLI_FAILED,
+        "'%s' is %d x %d; %d patches in a row with gutters of G pixels are %d W wide and "
+        "(W - 2 G) sqrt(3)/2 + 2 G high; see --patch-count and --gutter",
+        j->patches, picture->width, picture->height, j->patch_count, j->patch_count);
+}
+
+static int dress_with_patches(retile_job *j) {
+    const txm_mesh mesh = trimesh_as_view(j->result);
+    trimesh_choose_desc choose = {0};
+    trimesh_atlas atlas;
+    txm_image picture = {0};
+    int *patches = (int *)new_array(2 * mesh.face_count, sizeof(int));
+    float *uv = (float *)new_array((size_t)j->patch_count, 6 * sizeof(float));
+    choose.patches = j->patch_count;
+    choose.seed = j->run.seed;
+    int status = patches && uv ? read_png(j, j->patches, &picture) : fail_memory(&j->run);
+    if (!status) status = find_layout(j, &picture, &atlas);
+    if (!status)
+        status = check_result(&j->run,
+                              trimesh_choose(&mesh, &choose, &j->run.env, patches,
+                                             patches + mesh.face_count),
+                              j->run.inputs[0]);
+    if (!status) {
+        trimesh_atlas_uv(&atlas, -1, uv);
+        status = place_tiles(j, patches, patches + mesh.face_count, uv, j->patch_count);
+    }
+    image_free(&picture);
+    free(patches);
+    free(uv);
+    return status;
+}
+
+/* ---- all of it ------------------------------------------------------------------------------ */
+
+int retile_dress(retile_job *j) {
+    int status = CLI_DONE;
+    cli_stage(&j->run, "dress");
+    if (j->input.colors) status = carry_colors(j);
+    if (!status && j->tiles) status = dress_with_tiles(j);
+    else if (!status && j->patches) status = dress_with_patches(j);
+    else if (!status && j->input.uvs) status = carry_uvs(j);
+    if (!status && j->texture) {
+        txm_image picture = {0};
+        if (!j->output.uvs)
+            return cli_fail(&j->run, CLI_FAILED, "--texture: '%s' has no texture coordinates",
+                            j->run.inputs[0]);
+        status = read_png(j, j->texture, &picture);
+        image_free(&picture);
+    }
+    const float crease = j->desc.crease_angle > 0 ? j->desc.crease_angle : CREASE;
+    if (!status && j->report.crease_edges && !mesh_crease(&j->output, crease))
+        status = fail_memory(&j->run);
+    if (!status && j->instances) status = retile_place_instances(j);
+    return status;
+}
