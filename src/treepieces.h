@@ -16,19 +16,15 @@
      #include <stdio.h>
 
      int main(void) {
-         treepieces_forest_desc desc;
-         treepieces_bake_desc bake;
-         treepieces_wind wind;
+         static treepieces_forest_desc desc;  // static: all zero, the default for every field
+         static treepieces_bake_desc bake;
+         static treepieces_wind wind;
+         static txm_env env;                  // malloc, silent, serial; receives the message
          treepieces_species oak;
          treepieces_kit *kit;
          treepieces_forest *tree;
          treepieces_mesh *mesh;
-         txm_env env;
          float *bones, *sway;                 // the caller owns what changes from frame to frame
-         memset(&desc, 0, sizeof desc);       // zero = the default, for every field
-         memset(&bake, 0, sizeof bake);
-         memset(&wind, 0, sizeof wind);
-         memset(&env, 0, sizeof env);         // malloc, silent, serial; receives the message
          if (treepieces_kit_make(NULL, 0, &env, &kit) != TXM_OK ||
              treepieces_preset("oak", &env, &oak) != TXM_OK)
              return 1;
