@@ -143,9 +143,9 @@ GOLDEN = $(addprefix $(BUILD)/golden/golden_,texmath texsyn texpatch texedges te
 golden: $(GOLDEN)
 	tests/wide/golden/compare.sh --write $(GOLDEN)
 
-$(BUILD)/golden/%: tests/wide/golden/%.c tests/wide/golden/golden.h tests/testkit.h $(SOURCES)
+$(BUILD)/golden/%: tests/wide/golden/%.c tests/wide/golden/golden.h tests/kit/testkit.h $(SOURCES)
 	@mkdir -p $(@D)
-	$(CC) -std=gnu99 -O2 -ffp-contract=off -Isrc -I. -Itests -Itests/wide/golden $< -o $@ -lpthread -lm
+	$(CC) -std=gnu99 -O2 -ffp-contract=off -Isrc -I. -Itests/kit -Itests/wide/golden $< -o $@ -lpthread -lm
 
 # clang-tidy 14 finds uninitialised va_lists that are none once it reads several files in one run
 lint:

@@ -1,9 +1,9 @@
 #!/bin/sh
 # run.sh [--full] [NAME...] - run the tests and count them
 #
-# Every tests/test_*.c is a cmocka program, built here with the address and undefined-behaviour
+# Every tests/unit/test_*.c is a cmocka program, built here with the address and undefined-behaviour
 # sanitizers, together with the files that its line "Built with:" names, if it has one; every
-# tests/test_*.sh is a script that prints "ok - what" or "not ok - what" for each of its tests. NAME
+# script in tests/tool, tests/look and tests/wide prints "ok - what" or "not ok - what" for each of its tests. NAME
 # picks some of them (cli, texmath ...). --full widens what the scripts try, as does naming some in
 # WIDE, as CI does. The last line counts everything.
 set -u
@@ -20,9 +20,9 @@ mkdir -p "$OUT"
 
 # unit NAME: build and run one cmocka program; its log and status stay in $OUT
 unit() {
-    source=tests/test_$1.c
+    source=tests/unit/test_$1.c
     # shellcheck disable=SC2086 # flags are words
-    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -I. -Itests -Itools "$source" \
+    if $CC -std=gnu99 $SANITIZE -ffp-contract=off -Wall -Wextra -Isrc -Itests/kit -Itools "$source" \
         $(sed -n 's/^   Built with: \([a-z_./* ]*[a-z]\).*/\1/p' "$source") \
         -o "$OUT/test_$1" -lcmocka -lpthread -lm >"$OUT/$1.log" 2>&1; then
         "$OUT/test_$1" >>"$OUT/$1.log" 2>&1
@@ -34,7 +34,7 @@ unit() {
 # script NAME: run one script; its log and status stay in $OUT
 script() {
     case " ${WIDE:-} " in *" $1 "*) FULL=1 ;; esac
-    sh "tests/test_$1.sh" >"$OUT/$1.log" 2>&1
+    sh tests/*/"$1.sh" >"$OUT/$1.log" 2>&1
     echo $? >"$OUT/$1.status"
 }
 case ${1:-} in
@@ -64,11 +64,12 @@ wanted() {
 }
 names=$*
 
-# run_all KIND SUFFIX: the wanted tests/test_*SUFFIX, two at a time, counted in order afterwards
+# run_all KIND FILES...: those that are wanted, two at a time, counted in order afterwards
 run_all() {
-    chosen=
-    for source in tests/test_*"$2"; do
-        name=$(basename "$source" "$2")
+    kind=$1 chosen=
+    shift
+    for source in "$@"; do
+        name=$(basename "${source%.*}")
         name=${name#test_}
         wanted "$name" || continue
         case $name in # the longest first, so that none is left to run alone
@@ -78,13 +79,13 @@ run_all() {
         echo "before its end" >"$OUT/$name.status" # not that of an earlier run
     done
     # shellcheck disable=SC2086 # names are words
-    [ -z "$chosen" ] || printf '%s\n' $chosen | xargs -n 1 -P 2 sh tests/run.sh "--$1"
+    [ -z "$chosen" ] || printf '%s\n' $chosen | xargs -n 1 -P 2 sh tests/run.sh "--$kind"
     for name in $chosen; do
         count "$name" "$OUT/$name.log" "$(cat "$OUT/$name.status")"
     done
 }
 
-run_all unit .c
+run_all unit tests/unit/test_*.c
 
 # the scripts use the tool as released and with the sanitizers, and the helpers of tools/
 if ! { make -s all helpers && make -s BUILD="$OUT/asan" CFLAGS="$SANITIZE" all; } \
@@ -92,7 +93,7 @@ if ! { make -s all helpers && make -s BUILD="$OUT/asan" CFLAGS="$SANITIZE" all; 
     count make "$OUT/make.log" 1
 fi
 
-run_all script .sh
+run_all script tests/tool/*.sh tests/look/*.sh tests/wide/*.sh
 
 echo "$passed passed, $failed failed"
 [ "$failed" = 0 ] && [ "$passed" -gt 0 ]

@@ -1,0 +1,82 @@
+#!/bin/sh
+# shaders/treepieces.glsl does what treepieces.h does: tests/look/gl_treepieces.c explains how that is
+# known. examples/forest_gl draws pictures without a window, and refuses what it cannot. Mesa's
+# software driver is enough for both.
+. tests/kit/tap.sh
+
+gl=$OUT/gl_treepieces forest=$PWD/build/examples/forest_gl
+if [ ! "$gl" -nt tests/look/gl_treepieces.c ] || [ -n "$(find examples/forest_gl -newer "$gl")" ] ||
+    [ ! "$gl" -nt tests/kit/treekit.h ] || [ ! "$gl" -nt treepieces.h ] || [ ! "$gl" -nt texmath.h ]; then
+    # shellcheck disable=SC2086 # flags are words
+    check "gl_treepieces builds" $CC -std=c99 -O2 -ffp-contract=off -Wall -Wextra -I. \
+        tests/look/gl_treepieces.c build/files/stb.o -o "$gl" -lEGL -lOpenGL -lcjson -lm || exit 1
+fi
+"$gl" 2>&1 | sed '/^ok\|^not ok/!s/^/    # /'
+
+check "forest_gl builds" make -s "${forest#"$PWD/"}" || exit 1
+cd "$tmp" || exit 1
+
+# draw ARGUMENTS...: small pictures, quick to draw
+draw() { "$forest" --size 96x80 --smooth 1 --pieces 60 "$@" >out.log 2>err.log; }
+# value NAME: of the last drawing
+value() { sed -n "s/^$1 //p" out.log; }
+# refuses TEXT ARGUMENTS...: a message of one line on stderr, and no picture
+refuses() {
+    text=$1
+    shift
+    rm -f no.png
+    draw --headless no.png "$@" && { echo "it takes $*"; return 1; }
+    [ ! -e no.png ] || { echo "there is a picture"; return 1; }
+    grep -q -- "$text" err.log || { echo "the message lacks '$text':"; cat err.log; return 1; }
+}
+
+pictures() {
+    draw --species oak,pine,willow --count 5 --headless a.png || { cat err.log; return 1; }
+    [ -s a.png ] && [ "$(value trees)" = 5 ] && [ "$(value draws)" -le 10 ] || return 1
+    draw --species oak,pine,willow --count 5 --headless b.png && cmp a.png b.png || return 1
+    draw --species oak,pine,willow --count 5 --seed 2 --headless b.png && ! cmp -s a.png b.png
+}
+check "forest_gl draws a forest, the same again, and another one for another seed" pictures
+
+calls() {
+    draw --count 1 --headless a.png && one=$(value draws) || return 1
+    draw --count 300 --pieces 8 --headless a.png || { cat err.log; return 1; }
+    [ "$(value trees)" = 300 ] && [ "$(value draws)" = "$one" ] || { cat out.log; return 1; }
+}
+check "forest_gl needs as many draw calls for 300 trees as for one" calls
+
+looks() {
+    for option in --bare --wire "--time 3" "--wind 20" "--level 1" "--half 2" "--orbit 50,20,9" \
+        "--orbit 40,3"; do
+        # shellcheck disable=SC2086 # an option and its value
+        draw --headless b.png $option && [ -s b.png ] || { echo "$option"; cat err.log; return 1; }
+        ! cmp -s a.png b.png || { echo "$option changes nothing"; return 1; }
+    done
+}
+draw --headless a.png
+check "forest_gl: bare, levels in colours, time, wind, tessellation, other views" looks
+
+frames() {
+    draw --headless f%02d.png --frames 3 --wind 9 || { cat err.log; return 1; }
+    [ -s f00.png ] && [ -s f02.png ] && [ ! -e f03.png ] && ! cmp -s f00.png f02.png
+}
+check "forest_gl: frames of the wind" frames
+
+# on a screen that nobody sees; SDL takes the signal for a click on the window's close button
+window() {
+    xvfb-run -a -s "-screen 0 640x480x24" sh -c '"$0" --size 160x120 --pieces 8 >out.log 2>err.log &
+        sleep 6; kill $!; wait $!' "$forest" || { cat err.log; return 1; }
+    [ ! -s err.log ]
+}
+if has xvfb-run && has sdl2-config; then
+    check "forest_gl opens a window and closes it" window
+fi
+
+bad() {
+    refuses "preset\|species" --species fern && refuses "cannot\|species" --species ./none.txt &&
+        refuses "not a set of tiles" --bark . && refuses "cannot read" --leaf none.png &&
+        refuses usage --count 0 && refuses usage --size 8 && refuses usage --orbit 1 &&
+        refuses usage --frames 2 && refuses usage --nonsense && refuses usage --count &&
+        refuses "cannot find" --shaders . && refuses usage --wind wet
+}
+check "forest_gl refuses what it cannot, with a message" bad

@@ -1,0 +1,591 @@
+#!/bin/sh
+# The command line keeps its contract: options, exit status, messages, formats, files after failure.
+. tests/kit/tap.sh
+. tests/kit/texkit.sh
+
+texkit=$(pwd)/$OUT/asan/texkit   # with the sanitizers
+released=$(pwd)/build/texkit     # as users have it
+draw=$(pwd)/build/draw
+shape=$(pwd)/build/shape
+check_tiles="/usr/bin/python3 $(pwd)/tests/tool/check_tiles.py"
+cd "$tmp" || exit 1
+
+# refuses STATUS TEXT ARGUMENTS...: both in one test
+refuses() {
+    status=$1 text=$2
+    shift 2
+    check "status $status, \"$text\": texkit $(echo "$*" | tail -c 70)" \
+        refuses_so "$status" "$text" "$@"
+}
+
+# kind FILE: width, height and channels in the header of a PNG, BMP, TGA or JPEG file
+byte() { od -An -tu1 -j"$2" -N1 "$1" | tr -d ' '; }
+word() { od -An -tu2 -j"$2" -N2 "$1" | tr -d ' '; }
+png_is() { # FILE WIDTH HEIGHT COLOUR-TYPE, sizes under 256
+    [ "$(byte "$1" 19) $(byte "$1" 23) $(byte "$1" 25)" = "$2 $3 $4" ]
+}
+
+"$draw" sand sand.png 48
+"$draw" cells gray.png 48 1
+"$draw" cells gray-alpha.png 48 2
+"$draw" cells rgba.png 48 4
+"$draw" sand tiny.png 8
+cp sand.png 'odd name;$(x).png'
+size="--size 40x30"
+
+# ---- help and version
+check "--help" run 0 --help
+check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log && grep -q patch out.log &&
+    grep -q edges out.log && grep -q tiles out.log && grep -q retile out.log &&
+    grep -q tree out.log && grep -q forest out.log"
+check "--version" run 0 --version
+check "--version names the headers" \
+    grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, texedges [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, trimesh_cover [0-9.]*, treepieces [0-9.]*)$' out.log
+for command in learn synth patch edges tiles retile tree forest; do
+    check "$command --help" run 0 $command --help
+    check "$command --help has an example" grep -q "  texkit $command .*-o" out.log
+    input=sand.png
+    case $command in tree | forest) input= ;; esac
+    check "$command -h, behind other arguments" run 0 $command $input --seed 3 -h
+    check "$command --version" run 0 $command --version
+    check "no line of $command --help is wider than 100 columns" \
+        sh -c "'$texkit' $command --help | awk 'length > 100 { exit 1 }'"
+done
+
+# ---- the main path
+check "learn" run 0 learn sand.png -o sand.txs
+check "learn tells what it made" grep -q 'sand.txs: .* bytes' out.log
+check "synth from a model" run 0 synth sand.txs -o a.png $size
+check "the result has the size asked for and is RGB" png_is a.png 40 30 2
+check "synth from a picture" run 0 synth sand.png -o b.png $size
+check "the model's content counts, not its name" sh -c "cp sand.txs sand.png.bin; cp sand.png picture"
+check "synth from a model of another name" run 0 synth sand.png.bin -o c.png $size
+check "the same model, the same picture" cmp a.png c.png
+check "synth from a picture without an extension" run 0 synth picture -o d.png $size
+check "the same picture, the same result" cmp b.png d.png
+check "a file name with odd characters" run 0 synth 'odd name;$(x).png' -o 'odd out.png' $size
+check "one pixel" run 0 synth sand.txs -o one.png --size 1x1
+check "a narrow strip" run 0 synth sand.txs -o strip.png --size 3x200
+check "--tileable" run 0 synth sand.txs -o tile.png $size --tileable
+check "--quality -2" run 0 synth sand.txs -o fast.png $size --quality -2
+check "--quality=2" run 0 synth sand.txs -o best.png $size --quality=2
+check "--quiet says nothing" sh -c "'$texkit' synth sand.txs -o q.png $size --quiet | wc -c | grep -qx 0"
+check "options of learn" run 0 learn sand.png -o s.txs --max-distance 8 --types 4 --levels 1
+check "an existing output is replaced" sh -c "
+    echo old >over.png; '$texkit' synth sand.txs -o over.png $size --quiet && cmp a.png over.png"
+check "an output behind a symbolic link" sh -c "
+    echo old >target.png; ln -s target.png link.png
+    '$texkit' synth sand.txs -o link.png $size --quiet && cmp a.png target.png && test -L link.png"
+check "an output to /dev/null" sh -c "ln -s /dev/null null.png; '$texkit' synth sand.txs -o null.png $size --quiet"
+check "no temporary file is left" sh -c "! ls | grep -q tmp"
+
+# ---- options anywhere, in both spellings
+for order in "sand.txs -o x.png --size 40x30 --seed 5" "--seed 5 --size 40x30 -o x.png sand.txs" \
+    "-o x.png sand.txs --size=40x30 --seed=5" "--seed 1 --size 9x9 sand.txs -o x.png --size 40x30 --seed 5" \
+    "--size 40x30 --seed 5 -o x.png -- sand.txs"; do
+    rm -f x.png
+    check "synth $order" run 0 synth $order
+    [ -e first.png ] || cp x.png first.png
+    check "makes the same picture" cmp first.png x.png
+done
+check "another seed, another picture" sh -c "! cmp -s a.png first.png"
+
+# ---- the number of threads does not matter
+for threads in 1 2 8; do
+    check "learn --threads $threads" run 0 learn sand.png -o t$threads.txs --threads $threads
+    check "makes the same model" cmp sand.txs t$threads.txs
+    check "synth --threads $threads" run 0 synth sand.txs -o t$threads.png $size --threads $threads
+    check "makes the same picture" cmp a.png t$threads.png
+done
+
+# ---- formats
+for extension in png tga bmp jpg jpeg PNG; do
+    check "writes .$extension" run 0 synth sand.txs -o f.$extension $size
+    check "reads .$extension" run 0 synth f.$extension -o g.png --size 20x20
+done
+check ".png is PNG" test "$(byte f.png 1)" = 80
+check ".bmp is BMP" test "$(byte f.bmp 0)$(byte f.bmp 1)" = 6677
+check ".jpg is JPEG" test "$(byte f.jpg 0)$(byte f.jpg 1)" = 255216
+check ".tga is TGA of 40 x 30" test "$(word f.tga 12) $(word f.tga 14)" = "40 30"
+{ printf 'P6\n48 48\n255\n'; head -c 6912 /dev/urandom; } >noise.ppm
+{ printf 'P5\n48 48\n255\n'; head -c 2304 /dev/urandom; } >noise.pgm
+check "reads PPM" run 0 synth noise.ppm -o ppm.png $size
+check "RGB stays RGB" png_is ppm.png 40 30 2
+check "reads PGM" run 0 synth noise.pgm -o pgm.png $size
+check "gray stays gray" png_is pgm.png 40 30 0
+check "gray PNG" run 0 synth gray.png -o gray-out.png $size
+check "gray PNG stays gray" png_is gray-out.png 40 30 0
+check "RGBA PNG" run 0 synth rgba.png -o rgba-out.png $size
+check "RGBA stays RGBA" png_is rgba-out.png 40 30 6
+check "gray with alpha" run 0 synth gray-alpha.png -o ga-out.png $size
+check "gray with alpha becomes RGBA" png_is ga-out.png 40 30 6
+check "RGBA as TGA" run 0 synth rgba.png -o rgba.tga $size
+check "RGBA as BMP" run 0 synth rgba.png -o rgba.bmp $size
+check "and back from TGA" sh -c "'$texkit' synth rgba.tga -o r.png --size 9x9 --quiet"
+check "RGBA comes back from TGA" png_is r.png 9 9 6
+
+# ---- masks
+"$draw" cells mask.png 48 1
+check "learn --mask" run 0 learn sand.png --mask mask.png -o masked.txs
+{ printf 'P5\n48 48\n255\n'; head -c 2304 /dev/zero; } >black.pgm
+{ printf 'P5\n48 40\n255\n'; head -c 1920 /dev/zero; } >short.pgm
+refuses 1 "" learn sand.png --mask black.pgm -o n.txs
+refuses 1 "48 x 48" learn sand.png --mask short.pgm -o n.txs
+refuses 1 "cannot read" learn sand.png --mask missing.png -o n.txs
+
+# ---- statistics
+check "learn --stats" run 0 learn sand.png -o s.txs --stats learn.json
+check "synth --stats" run 0 synth sand.txs -o s.png $size --stats synth.json
+for key in command seed threads seconds total peak_bytes result model_bytes clique_types; do
+    check "--stats has $key" sh -c "grep -q '\"$key\": ' learn.json && grep -q '\"$key\": ' synth.json"
+done
+check "model_bytes is the size of the file" \
+    grep -q "\"model_bytes\": $(wc -c <s.txs)," learn.json
+if has python3; then
+    check "--stats is JSON" sh -c "python3 -m json.tool <learn.json && python3 -m json.tool <synth.json"
+fi
+
+# ---- usage errors: status 2
+"$texkit" >out.log 2>err.log
+check "no command: status 2" test $? = 2
+check "no command: one line" test "$(wc -l <err.log)" = 1
+refuses 2 "unknown command" frobnicate sand.png
+refuses 2 "unknown command" --seed 1 learn sand.png -o n.txs
+refuses 2 "no exemplar" learn
+refuses 2 "no exemplar" learn -o n.txs
+refuses 2 "add -o" learn sand.png
+refuses 2 "needs a value" learn sand.png -o
+refuses 2 "needs a value" learn sand.png -o --quiet
+refuses 2 "is empty" learn sand.png -o ""
+refuses 2 "unexpected" learn sand.png rgba.png -o n.txs
+refuses 2 "unknown option" learn sand.png -o n.txs --size 10x10
+refuses 2 "unknown option" learn sand.png -o n.txs --frob
+refuses 2 "unknown option" learn sand.png -o n.txs -x
+refuses 2 "no value" learn sand.png -o n.txs --quiet=1
+refuses 2 ".txs" learn sand.png -o n.png
+refuses 2 ".txs" learn sand.png -o n
+refuses 2 "add --size" synth sand.txs -o n.png
+for bad in 0x0 0x5 5x0 -1x5 5x-1 99999999x99999999 16777217x1 5 5x x5 5x5x5 5.5x5 axb 5x5a " 5x5" \
+    "5 x5" "5x 5" 0x10 +5x5 99999999999999999999x1 5X5; do
+    refuses 2 "such as 512x512" synth sand.txs -o n.png --size "$bad"
+done
+refuses 2 "pixels in all" synth sand.txs -o n.png --size 1000000x1000000
+refuses 2 "65535" synth sand.txs -o n.jpg --size 70000x10
+refuses 2 "65535" synth sand.txs -o n.tga --size 10x70000
+for extension in gif txs "" png.gz; do
+    refuses 2 "end the name in" synth sand.txs -o "n.$extension" $size
+done
+refuses 2 "end the name in" synth sand.txs -o png $size
+refuses 2 "end the name in" synth missing.png -o n.xyz $size
+for bad in -1 1.5 x "" 1x 18446744073709551616 " 1" +1; do
+    refuses 2 "--seed" synth sand.txs -o n.png $size --seed "$bad"
+done
+for bad in 0 -1 257 x 1.5 "" 2x; do
+    refuses 2 "--threads" synth sand.txs -o n.png $size --threads "$bad"
+done
+for bad in 3 -3 x 0x1; do refuses 2 "--quality" synth sand.txs -o n.png $size --quality $bad; done
+for bad in 1 61 0 x; do refuses 2 "--max-distance" learn sand.png -o n.txs --max-distance $bad; done
+for bad in 0 61 x; do refuses 2 "--types" learn sand.png -o n.txs --types $bad; done
+for bad in 0 7 x; do refuses 2 "--levels" learn sand.png -o n.txs --levels $bad; done
+refuses 2 "the same file" learn sand.png -o n.txs --stats n.txs
+
+# ---- failures of the work: status 1
+refuses 1 "No such file" learn missing.png -o n.txs
+refuses 1 "No such file" synth missing.txs -o n.png $size
+refuses 1 "cannot read" learn . -o n.txs
+refuses 1 "cannot write" learn sand.png -o nowhere/n.txs
+refuses 1 "cannot write" synth sand.txs -o n.png $size --stats nowhere/n.json
+mkdir folder.png
+refuses 1 "cannot write" synth sand.txs -o folder.png $size
+refuses 1 "16" learn tiny.png -o n.txs
+refuses 2 "alpha" synth rgba.png -o n.jpg $size
+check "a full disk: status 1" run 1 synth sand.txs -o s.png $size --stats /dev/full
+: >empty.png
+refuses 1 "empty" learn empty.png -o n.txs
+refuses 1 "" synth empty.png -o n.png $size
+head -c 3000 /dev/urandom >noise.png
+refuses 1 "noise.png" learn noise.png -o n.txs
+refuses 1 "noise.png" synth noise.png -o n.png $size
+for file in sand.png f.jpg f.bmp f.tga noise.ppm noise.pgm; do
+    bytes=$(wc -c <$file)
+    for part in 1 10 50 90 99; do
+        cut=cut-$part-percent-of-$file
+        head -c $((bytes * part / 100)) $file >"$cut"
+        refuses 1 "cannot read '$cut'" learn "$cut" -o n.txs
+        rm "$cut"
+    done
+done
+# a header that promises 30000 x 30000 pixels and has none
+{ printf 'P6\n30000 30000\n255\n'; head -c 100 /dev/zero; } >huge.ppm
+refuses 1 "huge.ppm" learn huge.ppm -o n.txs
+{ printf 'P6\n2000000 2000000\n255\n'; head -c 100 /dev/zero; } >huge.ppm
+refuses 1 "huge.ppm" learn huge.ppm -o n.txs
+
+# ---- hostile models: never a crash, always one line
+bytes=$(wc -c <sand.txs)
+accepts_or_refuses() { # FILE: a picture, or status 1 and one line, but nothing else
+    "$texkit" synth "$1" -o m.png --size 8x8 --quiet >out.log 2>err.log
+    case $? in
+    0) [ ! -s err.log ] ;;
+    1) [ "$(wc -l <err.log)" = 1 ] ;;
+    *) return 1 ;;
+    esac || { cat err.log; return 1; }
+}
+for cut in 1 3 4 8 12 16 $((bytes / 4)) $((bytes / 2)) $((bytes - 4)) $((bytes - 1)); do
+    head -c "$cut" sand.txs >cut.txs
+    refuses 1 "cut.txs" synth cut.txs -o n.png $size
+done
+flips=40
+[ "$FULL" = 1 ] && flips=400
+changed_bytes() { # the first 16 bytes, then some all over the file
+    i=0
+    while [ $i -lt $flips ]; do
+        at=$((i < 16 ? i : i * bytes / flips))
+        cp sand.txs flip.txs
+        printf "\\$(printf %o $((($(byte sand.txs $at) + 1 + i * 37) % 256)))" |
+            dd of=flip.txs bs=1 seek=$at conv=notrunc 2>/dev/null
+        accepts_or_refuses flip.txs || { echo "byte $at changed"; return 1; }
+        i=$((i + 1))
+    done
+}
+check "$flips models with one byte changed" changed_bytes
+{ cat sand.txs; echo more; } >long.txs
+check "a model with bytes behind its end" accepts_or_refuses long.txs
+{ head -c 8 sand.txs; head -c 2000 /dev/urandom; } >random.txs
+refuses 1 "random.txs" synth random.txs -o n.png $size
+
+# ---- tiles: all kinds
+"$draw" cells cells.png 96
+"$draw" cells cells-gray.png 96 1
+"$draw" clouds clouds.png 96
+"$draw" sand other.png 100
+# holds FOLDER NAME...: exactly these files
+holds() {
+    folder=$1
+    shift
+    [ "$(ls -A "$folder")" = "$(printf '%s\n' "$@" | sort)" ] || { ls -lA "$folder"; return 1; }
+}
+for kind in wang corner triangle frame; do
+    check "tiles --kind $kind" run 0 tiles cells.png -o $kind --kind $kind --size 32
+    check "tells what it made" grep -q "^$kind: .* tiles, atlas .* steps at joints" out.log
+    check "makes the folder with three files" holds $kind atlas.png preview.png tiles.json
+    check "the set is whole and true" $check_tiles $kind
+    $check_tiles $kind --damaged
+done
+# tiles_so WHAT OPTIONS...: a set with these options is as the schema and check_tiles.py want it
+tiles_so() {
+    rm -rf so
+    run 0 tiles cells.png -o so --size 32 "$@" || return 1
+    how=
+    case "$*" in *--reduced*) how=--reduced ;; esac
+    $check_tiles so $how
+}
+check "wang --reduced" tiles_so --kind wang --reduced
+check "triangle --reduced" tiles_so --kind triangle --reduced
+check "wang, 3 colors" tiles_so --kind wang --colors 3
+check "corner, 3 colors, torus" tiles_so --kind corner --colors 3 --packing torus
+check "wang, 2 variants, torus" tiles_so --kind wang --variants 2 --packing torus
+check "triangle, 3 colors, 2 variants, gutter 13" \
+    tiles_so --kind triangle --colors 3 --variants 2 --gutter 13
+check "a gutter is rounded up to a power of two" grep -q '"gutter": 16' so/tiles.json
+check "triangle, no gutter" tiles_so --kind triangle --gutter 0
+check "triangle, slices" tiles_so --kind triangle --packing slices
+check "wang, slices, gutter 1" tiles_so --kind wang --packing slices --gutter 1
+check "frame, 1 color, 16 variants" tiles_so --kind frame --colors 1 --variants 16
+check "corner, odd size" tiles_so --kind corner --size 45
+check "wang, --repair none" tiles_so --kind wang --repair none
+classes='0,0,0,0;0,1,0,0;1,1,0,1'
+check "frame --classes" run 0 tiles cells.png -o classes --size 32 --kind frame \
+    --classes "$classes" --variants 2
+check "has these classes" $check_tiles classes --classes "$classes"
+check "and not others" sh -c "! $check_tiles classes --classes '0,0,0,0;0,1,0,0;1,1,0,0'"
+check "four variants of a frame" run 0 tiles cells.png -o variants --size 32 --kind frame \
+    --colors 1 --variants 4
+check "are four pictures" $check_tiles variants --different
+check "gray" run 0 tiles cells-gray.png -o gray --kind wang --size 32
+check "gray stays gray" test "$(byte gray/atlas.png 25) $(byte gray/preview.png 25)" = "0 0"
+check "the gray set is whole" $check_tiles gray
+
+# ---- tiles: the folder
+check "a name that ends in /" run 0 tiles cells.png -o slash/ --kind frame --size 32
+check "makes the same folder" holds slash atlas.png preview.png tiles.json
+mkdir there
+echo old >there/atlas.png
+echo mine >there/mine.txt
+check "an existing folder" run 0 tiles cells.png -o there --kind wang --size 32
+check "its other files stay" sh -c "grep -q mine there/mine.txt && cmp there/atlas.png wang/atlas.png"
+check "nothing else is in it" holds there atlas.png mine.txt preview.png tiles.json
+check "--quiet says nothing" sh -c "
+    '$texkit' tiles cells.png -o q --kind frame --size 32 --quiet | wc -c | grep -qx 0"
+check "an odd name" run 0 tiles cells.png -o 'odd tiles;$(x)' --kind frame --size 32
+
+# ---- tiles: maps and more pictures
+check "--maps" run 0 tiles cells.png -o maps --kind wang --size 32 --maps clouds.png,cells-gray.png
+check "an atlas for each map" holds maps atlas.png atlas-2.png atlas-3.png preview.png tiles.json
+check "the set with maps is whole" $check_tiles maps
+check "maps keep their channels" \
+    test "$(byte maps/atlas-2.png 25) $(byte maps/atlas-3.png 25)" = "2 0"
+check "--maps of the same picture" run 0 tiles cells.png -o twin --kind triangle --size 32 \
+    --maps cells.png
+check "is cut in register" cmp twin/atlas.png twin/atlas-2.png
+check "--more" run 0 tiles cells.png -o more --kind wang --size 32 --more other.png,clouds.png
+check "--edges" run 0 tiles cells.png -o edges --kind wang --size 32 --edges cells.png,clouds.png
+check "the set with chosen edges is whole" $check_tiles edges
+
+# ---- tiles: the same bytes
+for threads in 1 2 8; do
+    check "tiles --threads $threads" run 0 tiles cells.png -o t$threads --kind wang --size 32 \
+        --threads $threads
+    check "makes the same files" diff -r wang t$threads
+done
+check "tiles --seed 1" run 0 tiles cells.png -o seed1 --kind triangle --size 32 --seed 1
+check "is the default" diff -r triangle seed1
+check "tiles --seed 2" run 0 tiles cells.png -o seed2 --kind triangle --size 32 --seed 2
+check "another seed, another set" sh -c "! cmp -s triangle/atlas.png seed2/atlas.png"
+check "the set of another seed is whole" $check_tiles seed2
+
+# ---- tiles: statistics
+check "tiles --stats" run 0 tiles cells.png -o wang --kind wang --size 32 --stats tiles-stats.json
+for key in command seed threads seconds read cut measure draw encode total peak_bytes result tiles \
+    atlas_width atlas_height joint_pairs joint_mean joint_worst; do
+    check "tiles --stats has $key" grep -q "\"$key\": " tiles-stats.json
+done
+check "16 tiles, 4 x 4 cells of 48 pixels" sh -c "
+    grep -q '\"tiles\": 16,' tiles-stats.json && grep -q '\"atlas_width\": 192,' tiles-stats.json"
+check "tiles --stats is JSON" /usr/bin/python3 -m json.tool tiles-stats.json
+
+# ---- tiles: usage errors and failures leave nothing behind
+refuses 2 "no exemplar" tiles
+refuses 2 "add -o" tiles cells.png --kind wang
+refuses 2 "no kind" tiles cells.png -o n
+refuses 2 "wang, corner, triangle, frame" tiles cells.png -o n --kind hexagon
+refuses 2 "needs a value" tiles cells.png -o n --kind
+refuses 2 "--colors 1" tiles cells.png -o n --kind wang --colors 1
+for bad in 0 5 x 2.5; do refuses 2 "--colors" tiles cells.png -o n --kind wang --colors $bad; done
+for bad in 0 17 x; do refuses 2 "--variants" tiles cells.png -o n --kind wang --variants $bad; done
+for bad in 31 1025 x 64x64; do refuses 2 "--size" tiles cells.png -o n --kind wang --size $bad; done
+for bad in -1 513 x; do refuses 2 "--gutter" tiles cells.png -o n --kind wang --gutter $bad; done
+refuses 2 "packed, torus, slices" tiles cells.png -o n --kind wang --packing loose
+refuses 2 "poisson, none" tiles cells.png -o n --kind wang --repair all
+for bad in 0 0,0,0 0,0,0,0,0 '0,0,0,0;' ';0,0,0,0' 0,0,0,x 0,0,,0 '0,0,0,0;0,0,0' ' 0,0,0,0' \
+    0,0,0,10 -1,0,0,0; do
+    refuses 2 "--classes" tiles cells.png -o n --kind frame --classes "$bad"
+done
+many=$(i=0; while [ $i -lt 64 ]; do printf '0,0,0,0;'; i=$((i + 1)); done)
+refuses 2 "--classes" tiles cells.png -o n --kind frame --classes "${many}0,0,0,0"
+refuses 2 "--maps" tiles cells.png -o n --kind wang --maps clouds.png --more other.png
+refuses 2 "--maps" tiles cells.png -o n --kind wang --maps clouds.png --edges clouds.png,cells.png
+refuses 2 "give 2 pictures" tiles cells.png -o n --kind wang --edges clouds.png
+refuses 2 "give 3 pictures" tiles cells.png -o n --kind wang --colors 3 --edges clouds.png,cells.png
+refuses 2 "at most 2" tiles cells.png -o n --kind wang --edges clouds.png,cells.png,other.png
+refuses 2 "empty" tiles cells.png -o n --kind wang --more other.png,
+refuses 1 "clouds.png,cells.png" tiles clouds.png,cells.png -o n --kind wang
+refuses 1 "make it 96 x 96" tiles cells.png -o n --kind wang --size 32 --maps clouds.png,other.png
+refuses 1 "missing.png" tiles cells.png -o n --kind wang --maps missing.png
+refuses 1 "missing.png" tiles cells.png -o n --kind wang --more other.png,missing.png
+refuses 1 "missing.png" tiles missing.png -o n --kind wang
+# options that do not go together
+refuses_with_any_status() {
+    run 1 tiles cells.png -o n --size 32 --kind "$@" || run 2 tiles cells.png -o n --size 32 --kind "$@"
+}
+for bad in "frame --classes 0,0,0,3" "wang --classes 0,0,0,0" "corner --reduced" "frame --reduced" \
+    "triangle --packing torus" "wang --reduced --packing torus" "frame --packing torus" \
+    "corner --colors 4 --packing torus" "wang --packing torus --gutter 4" "wang --gutter 17" \
+    "corner --edges clouds.png,cells.png"; do
+    check "does not go together: $bad" refuses_with_any_status $bad
+done
+refuses 1 "64 pixels" tiles sand.png -o n --kind wang --size 32
+refuses 1 "cannot write into 'sand.png'" tiles cells.png -o sand.png --kind wang --size 32
+refuses 1 "cannot write" tiles cells.png -o nowhere/n --kind wang --size 32
+refuses 1 "cannot write" tiles cells.png -o n --kind wang --size 32 --stats nowhere/n.json
+mkdir taken taken/preview.png
+refuses 1 "taken/preview.png" tiles cells.png -o taken --kind frame --size 32
+check "a full disk: the folder is not made" run 1 tiles cells.png -o n --kind frame --size 32 \
+    --stats /dev/full
+check "a folder of the system: status 1" run 1 tiles cells.png -o /proc/n --kind frame --size 32
+# root may write anywhere: without capabilities it may not
+mkdir locked
+chmod 555 locked
+locked() {
+    if [ "$(id -u)" != 0 ]; then "$texkit" "$@"
+    else setpriv --bounding-set=-all --inh-caps=-all "$texkit" "$@"
+    fi 2>err.log
+    [ $? = 1 ] && says "cannot write" && [ "$(wc -l <err.log)" = 1 ] && [ -z "$(ls -A locked)" ]
+}
+check "a read-only folder" locked tiles cells.png -o locked --kind frame --size 32
+check "a folder in a read-only folder" locked tiles cells.png -o locked/n --kind frame --size 32
+chmod 755 locked
+for part in 10 50 90; do
+    head -c $(($(wc -c <cells.png) * part / 100)) cells.png >cut.png
+    refuses 1 "cannot read 'cut.png'" tiles cut.png -o n --kind wang --size 32
+    refuses 1 "cannot read 'cut.png'" tiles cells.png -o n --kind wang --size 32 --more cut.png
+done
+
+# ---- no input is written over, and no two outputs are one file, whatever links lead there
+mkdir over over/set over/folder over/links
+cd over || exit 1
+for name in a.png a-height.png mask.png; do "$draw" cells $name 64; done
+for name in set/atlas.png folder/atlas.png folder/atlas-2.png folder/preview.png out-height.png \
+    out-1.png out-height-1.png out-atlas.png out-texture.png out-bark.png out-leaves.png \
+    out-bark-2.png m.txs s.pfm; do
+    cp mask.png $name
+done
+echo '{"strokes": [{"points": [[8,8], [50,40]]}]}' >strokes.json
+echo '{}' >set/tiles.json
+"$shape" torus mesh.obj 16
+"$released" tree -o birch.txt --species birch --quiet
+cp birch.txt out.mtl
+for kind in png txs txt ply obj; do # hard links, links to links, and a folder by another name
+    ln a.png links/hard.$kind
+    ln -s hard.$kind links/soft.$kind
+done
+ln -s links again
+ln mesh.obj links/mesh.obj
+ln birch.txt links/birch.txt
+# keeps OUTPUT INPUT ARGUMENTS...: refused; the message names both
+keeps() {
+    output=$1 input=$2
+    shift 2
+    check "'$output' would destroy '$input': $*" keeps_both "would destroy" "$@"
+}
+# once OUTPUT OUTPUT ARGUMENTS...: the same of two outputs that are one file
+once() {
+    output=$1 input=$2
+    shift 2
+    check "'$output' is '$input' too: $*" keeps_both "written twice" "$@"
+}
+keeps_both() {
+    text=$1
+    shift
+    run 2 "$@" || return 1
+    says "'$output'" && says "'$input'" && says "$text" || { cat err.log; return 1; }
+}
+
+# -o and --stats of every command against its input
+for way in ./a links/hard again/soft; do
+    keeps $way.png a.png synth a.png -o $way.png $size
+    keeps $way.png a.png patch a.png -o $way.png $size
+    keeps $way.png a.png edges a.png -o $way.png
+    keeps $way.png a.png learn a.png -o n.txs --stats $way.png
+    keeps $way.png a.png tiles a.png -o n --kind wang --size 32 --stats $way.png
+    keeps $way.png a.png tree -o n.obj --leaf a.png --stats $way.png
+    keeps $way.png a.png forest --count 2 -o n.obj --leaf a.png --stats $way.png
+done
+for command in synth patch edges; do
+    more=
+    [ $command = edges ] || more=$size
+    keeps a.png again/soft.png $command again/soft.png -o a.png $more
+    keeps links/hard.png a.png $command a.png -o n.png $more --stats links/hard.png
+done
+keeps links/soft.txs a.png learn a.png -o links/soft.txs
+keeps m.txs ./m.txs synth ./m.txs -o n.png $size --stats m.txs
+keeps links/mesh.obj mesh.obj retile mesh.obj -o links/mesh.obj --vertices 200
+keeps mesh.obj links/mesh.obj retile links/mesh.obj -o n.ply --vertices 200 --stats mesh.obj
+keeps birch.txt links/birch.txt tree --species links/birch.txt -o birch.txt
+keeps links/birch.txt birch.txt forest --count 2 --species oak,birch.txt -o n.ply --stats links/birch.txt
+from_stdin() {
+    "$texkit" synth /dev/stdin -o a.png $size --quiet <a.png 2>err.log
+    [ $? = 2 ] && says "'a.png' would destroy '/dev/stdin'"
+}
+check "an input that comes in by /dev/stdin" from_stdin
+
+# the other inputs of each, and the outputs whose names are derived
+keeps links/hard.png ./a.png learn mask.png -o n.txs --mask ./a.png --stats links/hard.png
+patch="patch a.png $size"
+keeps a.png a.png $patch -o a.png --maps a-height.png
+cp a-height.png mask-height.png
+keeps a-height.png ./a-height.png patch mask.png $size -o a.png --maps mask-height.png,./a-height.png
+keeps out-height.png ./out-height.png $patch -o out.png --maps a-height.png --mask ./out-height.png
+keeps out-height.png ./out-height.png $patch -o out.png --exemplars mask.png \
+    --maps 'a-height.png;./out-height.png'
+keeps out-height.png ./out-height.png $patch -o out.png --exemplars ./out-height.png \
+    --maps 'a-height.png;mask.png'
+keeps out-1.png ./out-1.png $patch -o out.png --lod 2 --mask ./out-1.png
+keeps out-height-1.png ./out-height-1.png $patch -o out.png --lod 1 --maps a-height.png \
+    --guide mask.png --target ./out-height-1.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --guide ./out-1.png --target mask.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --guide mask.png --target mask.png \
+    --target-mask ./out-1.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --keep ./out-1.png --keep-mask mask.png
+keeps out-1.png ./out-1.png $patch -o out.png --lod 1 --keep mask.png --keep-mask ./out-1.png
+keeps links/hard.txt ./a.png patch mask.png $size -o n.png --guide mask.png,./a.png --exemplars mask.png \
+    --target mask.png --stats links/hard.txt
+keeps strokes.json ./strokes.json $patch -o n.png --control ./strokes.json --stats strokes.json
+keeps s.pfm ./s.pfm $patch -o n.png --mask ./s.pfm --sources s.pfm
+keeps links/soft.png a.png edges a.png -o n.svg --layers links/soft.png
+keeps a.png links/hard.png edges links/hard.png -o n.json --layers a.png
+tiles="--kind wang --size 32"
+keeps folder/atlas.png folder/atlas.png tiles folder/atlas.png -o folder $tiles
+keeps folder//atlas-2.png folder/atlas-2.png tiles a.png -o folder/ $tiles --maps folder/atlas-2.png
+keeps folder/preview.png ./folder/preview.png tiles a.png -o folder $tiles --more mask.png,./folder/preview.png
+keeps folder/preview.png ./folder/preview.png tiles a.png -o folder $tiles \
+    --edges mask.png,./folder/preview.png
+keeps links/hard.txt ./a.png tiles mask.png -o n $tiles --more ./a.png --stats links/hard.txt
+retile="retile mesh.obj --vertices 200"
+keeps out-texture.png ./out-texture.png $retile -o out.ply --texture ./out-texture.png
+keeps out-atlas.png ./out-atlas.png $retile -o out.glb --patches ./out-atlas.png
+keeps out-texture.png ./out-texture.png $retile -o out.glb --texture mask.png --density ./out-texture.png
+keeps out.mtl ./out.mtl $retile -o out.obj --texture mask.png --density ./out.mtl
+keeps links/hard.ply ./a.png $retile -o links/hard.ply --density ./a.png
+keeps set/tiles.json set/tiles.json $retile -o n.obj --tiles set --stats set/tiles.json
+keeps ./set/atlas.png set/atlas.png $retile -o n.obj --tiles set --stats ./set/atlas.png
+for trees in "tree" "forest --count 2"; do
+    keeps out-bark.png ./out-bark.png $trees -o out.obj --leaf ./out-bark.png
+    keeps out-leaves.png ./out-leaves.png $trees -o out.obj --leaf ./out-leaves.png
+    keeps out.mtl ./out.mtl $trees -o out.obj --species ./out.mtl
+    keeps set/tiles.json set/tiles.json $trees -o n.glb --tiles set --stats set/tiles.json
+    keeps ./set/atlas.png set/atlas.png $trees -o n.glb --tiles set --stats ./set/atlas.png
+done
+keeps out-bark-2.png ./out-bark-2.png forest --count 2 -o out.obj --species oak,birch \
+    --leaf ./out-bark-2.png
+check "names that are not made are free" run 0 tree -o out.obj --bare --leaf ./out-leaves.png --pieces 20
+
+# two outputs
+once n.png ./n.png synth a.png -o ./n.png $size --stats n.png
+once ./n.png again/../n.png synth a.png -o again/../n.png $size --stats ./n.png
+rm -r links/*
+ln mask.png links/one.png
+ln mask.png links/two.png
+ln -s one.png links/three.png
+for pair in "two one" "three one" "three two"; do
+    first=links/${pair% *}.png second=again/${pair#* }.png
+    once $first $second edges a.png -o $first --layers $second
+    once $first $second synth a.png -o $first $size --stats $second
+done
+ln -s two.png links/n.txs
+once links/n.txs links/one.png learn a.png -o links/n.txs --stats links/one.png
+once ./folder/atlas.png folder/atlas.png tiles a.png -o folder $tiles --stats ./folder/atlas.png
+once ./out-height.png out-height.png $patch -o out.png --maps a-height.png --stats ./out-height.png
+once ./n.pfm n.pfm $patch -o n.png --sources ./n.pfm --stats n.pfm
+once ./out-atlas.png out-atlas.png $retile -o out.ply --tiles set --stats ./out-atlas.png
+once ./out.mtl out.mtl tree -o out.obj --stats ./out.mtl
+once ./out-leaves-2.png out-leaves-2.png forest --count 2 -o out.obj --species oak,birch \
+    --stats ./out-leaves-2.png
+cd ..
+
+# ---- stopped, out of memory (the tool as released)
+stop() {
+    "$released" synth sand.txs -o stopped.png --size 6000x6000 --quality 2 --quiet 2>err.log &
+    child=$!
+    sleep 0.3
+    kill -TERM $child
+    wait $child
+    [ $? = 1 ] && says "stopped" && [ ! -e stopped.png ]
+}
+check "stopped by a signal: status 1 and nothing written" stop
+starve() {
+    (ulimit -v 200000 && "$released" synth sand.txs -o starved.png --size 8000x8000 \
+        --threads 1 2>err.log)
+    [ $? = 1 ] && says "memory" && [ "$(wc -l <err.log)" = 1 ] && [ ! -e starved.png ]
+}
+check "out of memory: status 1, one line" starve
+
+# ---- the progress bar: on a terminal, for work of over a second, unless --quiet
+if has script && script -qec true /dev/null >/dev/null 2>&1; then
+    check "a progress bar on a terminal" sh -c "
+        script -qec \"'$released' synth sand.txs -o bar.png --size 1600x1600 --threads 1\" \
+            /dev/null | grep -q '##.*%'"
+    check "no progress bar with --quiet" sh -c "
+        ! script -qec \"'$released' synth sand.txs -o bar.png --size 1600x1600 --quiet\" \
+            /dev/null | grep -q '%'"
+fi

@@ -1,0 +1,880 @@
+/* test_treepieces_species.c - species as text, presets, and the checks of a kit's pieces
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   make build/tests/unit/test_treepieces_species && build/tests/unit/test_treepieces_species */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#define TREEPIECES_IMPLEMENTATION
+#include "treepieces.h"
+
+#include "testkit.h"
+
+#include <locale.h>
+
+enum { ROOM = 16384, FILL = 0x5c };
+
+static txm_status parse(const char *text, txm_env *env, treepieces_species *species) {
+    return treepieces_species_parse(text, strlen(text), env, species);
+}
+
+/* Parse an invalid text: the status, the beginning of the message, the species untouched. */
+static void assert_bad(const char *text, size_t size, const char *message) {
+    treepieces_species species, before;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    memset(&species, FILL, sizeof species);
+    before = species;
+    const txm_status status = treepieces_species_parse(text, size, &env, &species);
+    if (status != TXM_BAD_DATA) fail_msg("\"%.60s\" gave status %d", text, status);
+    if (strncmp(env.message, message, strlen(message)))
+        fail_msg("\"%.60s\" gave the message\n\"%s\", not\n\"%s\"", text, env.message, message);
+    assert_memory_equal(&species, &before, sizeof species);
+    assert_int_equal(treepieces_species_parse(text, size, NULL, &species), TXM_BAD_DATA);
+}
+
+/* Printed and parsed again it is the same. */
+static void assert_round_trip(const treepieces_species *species) {
+    static char text[ROOM];
+    treepieces_species back;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    memset(&back, FILL, sizeof back);
+    const size_t length = treepieces_species_print(species, text, sizeof text);
+    assert_true(length < sizeof text);
+    assert_int_equal(strlen(text), length);
+    if (treepieces_species_parse(text, length, &env, &back) != TXM_OK)
+        fail_msg("%s in\n%s", env.message, text);
+    assert_memory_equal(species, &back, sizeof back);
+}
+
+/* ---- presets ---------------------------------------------------------------------------- */
+
+static void every_preset_is_read(void **state) {
+    (void)state;
+    static const char *const wanted[] = {"oak",    "beech", "maple", "birch",  "poplar",
+                                         "willow", "almond", "pine",  "spruce", "dead"};
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    assert_true(treepieces_preset_count() >= (int)(sizeof wanted / sizeof wanted[0]));
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
+        treepieces_species species;
+        memset(&species, FILL, sizeof species);
+        assert_int_equal(treepieces_preset(wanted[i], &env, &species), TXM_OK);
+        assert_string_equal(species.name, wanted[i]);
+        assert_int_equal(tpc_species_check(&species, &env), TXM_OK);
+        assert_true(species.orders[0].length > 3 && species.orders[0].length < 40);
+        assert_int_equal(species.leaf_count == 0, !strcmp(wanted[i], "dead"));
+        assert_round_trip(&species);
+    }
+    for (int i = 0; i < treepieces_preset_count(); i++) {
+        treepieces_species species, by_name;
+        assert_non_null(treepieces_preset_text(i));
+        assert_int_equal(parse(treepieces_preset_text(i), &env, &species), TXM_OK);
+        assert_int_equal(treepieces_preset(species.name, NULL, &by_name), TXM_OK);
+        assert_memory_equal(&species, &by_name, sizeof species);
+    }
+    assert_null(treepieces_preset_text(-1));
+    assert_null(treepieces_preset_text(treepieces_preset_count()));
+}
+
+static void an_unknown_preset_names_the_others(void **state) {
+    (void)state;
+    treepieces_species species, before;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    memset(&species, FILL, sizeof species);
+    before = species;
+    assert_int_equal(treepieces_preset("fern", &env, &species), TXM_BAD_ARGUMENT);
+    assert_non_null(strstr(env.message, "no species \"fern\""));
+    for (int i = 0; i < treepieces_preset_count(); i++) {
+        treepieces_species s;
+        assert_int_equal(parse(treepieces_preset_text(i), NULL, &s), TXM_OK);
+        assert_non_null(strstr(env.message, s.name));
+    }
+    assert_int_equal(treepieces_preset(NULL, &env, &species), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_preset("oak", &env, NULL), TXM_BAD_ARGUMENT);
+    assert_memory_equal(&species, &before, sizeof species);
+}
+
+/* ---- text ------------------------------------------------------------------------------- */
+
+static void a_short_text_is_a_tree(void **state) {
+    (void)state;
+    treepieces_species species;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    assert_int_equal(treepieces_species_parse(NULL, 0, &env, &species), TXM_OK);
+    assert_int_equal(tpc_species_check(&species, &env), TXM_OK);
+    assert_true(species.order_count >= 2);
+    assert_int_equal(parse("name bush\norder 0\nlength 3\norder 4\nlength 0.25", &env, &species),
+                     TXM_OK);
+    assert_int_equal(species.order_count, 5);
+    assert_true(species.orders[0].length == 3 && species.orders[4].length == 0.25f);
+    assert_true(species.orders[3].segments >= 1);
+    assert_int_equal(tpc_species_check(&species, &env), TXM_OK);
+    assert_round_trip(&species);
+
+    treepieces_kit *kit = NULL;
+    treepieces_forest *forest = NULL;
+    treepieces_forest_desc desc;
+    assert_int_equal(treepieces_kit_make(NULL, 0, &env, &kit), TXM_OK);
+    memset(&desc, 0, sizeof desc);
+    desc.kit = kit;
+    desc.species = &species;
+    desc.species_count = desc.tree_count = 1;
+    assert_int_equal(treepieces_forest_make(&desc, &env, &forest), TXM_OK);
+    assert_true(forest->node_count > 100);
+    assert_true(forest->cluster_count > 20);
+    treepieces_forest_free(forest);
+    treepieces_kit_free(kit);
+}
+
+static void blanks_comments_and_line_ends(void **state) {
+    (void)state;
+    treepieces_species a, b;
+    assert_int_equal(parse("name grey alder\nflare 2\nenvelope cone\norder 1\nprofile 1 2 3\n"
+                           "sag -1.5e1\n", NULL, &a), TXM_OK);
+    assert_string_equal(a.name, "grey alder");
+    assert_int_equal(a.envelope, TREEPIECES_CONE);
+    assert_true(a.orders[1].profile[2] == 3 && a.orders[1].sag == -15);
+    assert_int_equal(parse("# a tree\r\n\r\n  name \t grey alder  \r\nflare +2.0 # wide\r\n\n"
+                           "envelope cone#\r\n \t \r\norder 1\r\n\tprofile 1 2. 3e0\r\n"
+                           "sag -.15E+02", NULL, &b), TXM_OK);
+    assert_memory_equal(&a, &b, sizeof a);
+}
+
+static void like_starts_from_a_preset(void **state) {
+    (void)state;
+    treepieces_species oak, mine;
+    assert_int_equal(treepieces_preset("oak", NULL, &oak), TXM_OK);
+    assert_int_equal(parse("# mine\nlike oak\n", NULL, &mine), TXM_OK);
+    assert_memory_equal(&oak, &mine, sizeof oak);
+    assert_int_equal(parse("like oak\nname holm\norder 1\nsag 7\n", NULL, &mine), TXM_OK);
+    memset(oak.name, 0, sizeof oak.name);
+    memcpy(oak.name, "holm", 4);
+    oak.orders[1].sag = 7;
+    assert_memory_equal(&oak, &mine, sizeof oak);
+    assert_int_equal(parse("like oak\norder_count 2\nname x", NULL, &mine), TXM_OK);
+    assert_int_equal(mine.order_count, 2);
+    treepieces_order none;
+    memset(&none, 0, sizeof none);
+    assert_memory_equal(&mine.orders[2], &none, sizeof none);
+    assert_round_trip(&mine);
+}
+
+static void every_fault_has_its_message(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *message;
+    } bad[] = {
+        {"colour 1", "line 1: colour: is not a key"},
+        {"name x\n\n# y\nflair 1", "line 4: flair: is not a key"},
+        {"flare", "line 1: flare: a value is missing"},
+        {"name", "line 1: name: a value is missing"},
+        {"name # oak", "line 1: name: a value is missing"},
+        {"like", "line 1: like: a value is missing"},
+        {"order", "line 1: order: a value is missing"},
+        {"envelope # none", "line 1: envelope: a value is missing"},
+        {"leaf_color 0.1 0.2", "line 1: leaf_color: a value is missing"},
+        {"leaf_color 0.1 0.2 0.3 0.4", "line 1: leaf_color: has too many values"},
+        {"flare 1 2", "line 1: flare: has too many values"},
+        {"order 1 2", "line 1: order: has too many values"},
+        {"like oak tree", "line 1: like: has too many values"},
+        {"flare wide", "line 1: wide: is not a number"},
+        {"flare 1,5", "line 1: 1,5: is not a number"},
+        {"flare 0x2", "line 1: 0x2: is not a number"},
+        {"flare nan", "line 1: nan: is not a number"},
+        {"flare inf", "line 1: inf: is not a number"},
+        {"flare 1e", "line 1: 1e: is not a number"},
+        {"flare 1e+", "line 1: 1e+: is not a number"},
+        {"flare .", "line 1: .: is not a number"},
+        {"flare -", "line 1: -: is not a number"},
+        {"flare 1.2.3", "line 1: 1.2.3: is not a number"},
+        {"flare 0.5", "line 1: 0.5: flare must be 1 to 4"},
+        {"flare -2", "line 1: -2: flare must be 1 to 4"},
+        {"flare 1e999999999999", "line 1: 1e999999999999: flare must be 1 to 4"},
+        {"flare 1e-999999999999", "line 1: 1e-999999999999: flare must be 1 to 4"},
+        {"leaf_count 2.5", "line 1: 2.5: leaf_count must be a whole number of 0 to 256"},
+        {"leaf_count 257", "line 1: 257: leaf_count must be a whole number of 0 to 256"},
+        {"order_count 0", "line 1: 0: order_count must be a whole number of 1 to 5"},
+        {"order 5", "line 1: 5: order must be a whole number of 0 to 4"},
+        {"order -1", "line 1: -1: order must be a whole number of 0 to 4"},
+        {"order 0.5", "line 1: 0.5: order must be a whole number of 0 to 4"},
+        {"order two", "line 1: two: is not a number"},
+        {"order 0\nsag 361", "line 2: 361: sag must be -360 to 360"},
+        {"sag 3", "line 1: sag: needs a line \"order N\" before it"},
+        {"like oak\nsag 3", "line 2: sag: needs a line \"order N\" before it"},
+        {"envelope 1", "line 1: 1: envelope must be one of free ellipsoid cone cylinder"},
+        {"envelope Cone", "line 1: Cone: envelope must be one of free ellipsoid cone cylinder"},
+        {"leaf_shape fern",
+         "line 1: fern: leaf_shape must be one of oval lobed lance heart needle blossom"},
+        {"name x\nlike oak", "line 2: like: must come before all other keys"},
+        {"like oak\nlike oak", "line 2: like: must come before all other keys"},
+        {"order 1\nlike oak", "line 2: like: must come before all other keys"},
+        {"like Oak", "line 1: Oak: is not a built-in species"},
+        {"like oakoak", "line 1: oakoak: is not a built-in species"},
+        {"name 12345678901234567890123456789012", "line 1: name: longer than 31 characters"},
+        {"name a\tb", "line 1: name: contains a control character"},
+        {"crown_base 0.5\ncrown_top 0.5\nname x", "line 2: crown_top must be above crown_base"},
+        {"crown_base 1.5", "line 1: crown_top must be above crown_base"},
+        {"\001\002\377%s%n", "line 1: ???%s%n: is not a key"},
+        {"abcdefghijklmnopqrstuvwxyzabcdefghijklmnopqrstuvwxyz 1",
+         "line 1: abcdefghijklmnopqrstuvwx...: is not a key"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        assert_bad(bad[i].text, strlen(bad[i].text), bad[i].message);
+    assert_bad("name a\0b", 8, "line 1: name: contains a control character");
+    assert_bad("fla\0re 1", 8, "line 1: fla?re: is not a key");
+    treepieces_species species;
+    assert_int_equal(treepieces_species_parse(NULL, 3, NULL, &species), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_species_parse("", 0, NULL, NULL), TXM_BAD_ARGUMENT);
+}
+
+/* all fields, at both ends of their ranges and beyond */
+static void ranges_are_the_same_read_and_checked(void **state) {
+    (void)state;
+    for (int i = 0; i < TPC_FIELDS + TPC_ORDER_FIELDS; i++) {
+        const int in_order = i >= TPC_FIELDS;
+        const tpc_field *f = in_order ? &tpc_order_fields[i - TPC_FIELDS] : &tpc_fields[i];
+        if (f->kind == TPC_ENVELOPE || f->kind == TPC_LEAF) continue;
+        const float step = f->kind == TPC_WHOLE ? 1 : 1e-3f * (f->high - f->low);
+        const float values[4] = {f->low, f->high, f->low - step, f->high + step};
+        for (int k = 0; k < 4; k++) {
+            char text[200], number[TPC_NUMBER];
+            treepieces_species species;
+            txm_env env;
+            memset(&env, 0, sizeof env);
+            tpc_write_number(values[k], number);
+            int n = snprintf(text, sizeof text, "%s\n%s", in_order ? "order 2" : "# none", f->key);
+            for (int j = 0; j < f->count; j++)
+                n += snprintf(text + n, sizeof text - (size_t)n, " %s", number);
+            /* keep crown_top above crown_base */
+            if (!strcmp(f->key, "crown_base"))
+                snprintf(text + n, sizeof text - (size_t)n, "\ncrown_top 3");
+            const txm_status status = parse(text, &env, &species);
+            if (status != (k < 2 ? TXM_OK : TXM_BAD_DATA)) fail_msg("%s: %s", text, env.message);
+            assert_int_equal(treepieces_preset("beech", NULL, &species), TXM_OK);
+            void *base = in_order ? (void *)&species.orders[2] : (void *)&species;
+            tpc_set(f, base, f->count - 1, values[k]);
+            if (!strcmp(f->key, "crown_base")) species.crown_top = 3;
+            if (!strcmp(f->key, "crown_top")) species.crown_base = 0;
+            const int fits = tpc_species_check(&species, &env) == TXM_OK;
+            /* only the orders that beech has */
+            if (!strcmp(f->key, "order_count") && k == 1) continue;
+            if (fits != (k < 2)) fail_msg("%s %s: %s", f->key, number, env.message);
+            if (k >= 2) assert_non_null(strstr(env.message, f->key));
+            if (k >= 2) assert_non_null(strstr(env.message, "species beech"));
+            if (k >= 2 && in_order) assert_non_null(strstr(env.message, "order 2: "));
+        }
+        if (f->kind != TPC_REAL) continue;
+        treepieces_species species;
+        txm_env env;
+        memset(&env, 0, sizeof env);
+        assert_int_equal(treepieces_preset("beech", NULL, &species), TXM_OK);
+        tpc_set(f, in_order ? (void *)&species.orders[0] : (void *)&species, f->count - 1,
+                (float)NAN);
+        assert_int_equal(tpc_species_check(&species, &env), TXM_BAD_ARGUMENT);
+        assert_non_null(strstr(env.message, f->key));
+    }
+}
+
+static void a_forest_refuses_a_bad_species(void **state) {
+    (void)state;
+    treepieces_kit *kit = NULL;
+    assert_int_equal(treepieces_kit_make(NULL, 0, NULL, &kit), TXM_OK);
+    for (int fault = 0; fault < 8; fault++) {
+        static const char *const messages[] = {"name",      "name",    "name",        "envelope",
+                                               "leaf_shape", "roll",   "crown_top must be above",
+                                               "order_count"};
+        treepieces_species species;
+        treepieces_forest *forest = (treepieces_forest *)&species;
+        treepieces_forest_desc desc;
+        txm_env env;
+        memset(&env, 0, sizeof env);
+        assert_int_equal(treepieces_preset("pine", NULL, &species), TXM_OK);
+        if (fault == 0) memset(species.name, 'x', sizeof species.name);
+        if (fault == 1) species.name[1] = '\n';
+        if (fault == 2) species.name[0] = ' ';
+        if (fault == 3) species.envelope = 4;
+        if (fault == 4) species.leaf_shape = -1;
+        if (fault == 5) species.orders[1].roll = HUGE_VALF;
+        if (fault == 6) species.crown_base = species.crown_top;
+        if (fault == 7) species.order_count = INT_MAX;
+        memset(&desc, 0, sizeof desc);
+        desc.kit = kit;
+        desc.species = &species;
+        desc.species_count = desc.tree_count = 1;
+        assert_int_equal(treepieces_forest_make(&desc, &env, &forest), TXM_BAD_ARGUMENT);
+        assert_null(forest);
+        if (!strstr(env.message, messages[fault])) fail_msg("%s", env.message);
+    }
+    treepieces_kit_free(kit);
+}
+
+static void random_species_round_trip(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(11, 4);
+    for (int n = 0; n < 200; n++) {
+        treepieces_species species;
+        memset(&species, 0, sizeof species);
+        for (int i = 0; i < TPC_FIELDS; i++)
+            for (int k = 0; k < tpc_fields[i].count; k++)
+                tpc_set(&tpc_fields[i], &species, k,
+                        tpc_fields[i].low +
+                            (tpc_fields[i].high - tpc_fields[i].low) * txm_rng_float(&rng));
+        for (int o = 0; o < species.order_count; o++)
+            for (int i = 0; i < TPC_ORDER_FIELDS; i++)
+                for (int k = 0; k < tpc_order_fields[i].count; k++) {
+                    const tpc_field *f = &tpc_order_fields[i];
+                    tpc_set(f, &species.orders[o], k,
+                            f->low + (f->high - f->low) * txm_rng_float(&rng));
+                }
+        species.crown_base *= 0.5f;
+        species.crown_top += 1;
+        if (species.crown_top > 3) species.crown_top = 3;
+        const int length = (int)txm_rng_below(&rng, TREEPIECES_MAX_NAME);
+        for (int i = 0; i < length; i++)
+            species.name[i] = i && i + 1 < length && i % 5 == 0 ? ' ' : (char)('a' + i % 26);
+        assert_int_equal(tpc_species_check(&species, NULL), TXM_OK);
+        assert_round_trip(&species);
+    }
+}
+
+static void numbers_are_read_exactly(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(3, 9);
+    for (int n = 0; n < 20000; n++) {
+        char text[64], number[TPC_NUMBER];
+        const uint32_t bits = txm_rng_next(&rng);
+        float x;
+        double read = -1;
+        memcpy(&x, &bits, sizeof x);
+        if (!txm_is_finite((double)x)) continue;
+        /* what printf writes is read as strtod reads it, to the float */
+        snprintf(text, sizeof text, n & 1 ? "%.9g" : "%.17e", (double)x);
+        assert_int_equal(tpc_read_number(text, text + strlen(text), &read), 1);
+        if ((float)read != x) fail_msg("%s is read as %.17g", text, read);
+        /* what is written here is read by strtod and here */
+        tpc_write_number(x, number);
+        assert_true(strlen(number) < TPC_NUMBER);
+        if (strtof(number, NULL) != x) fail_msg("%.9g is written as %s", (double)x, number);
+        assert_int_equal(tpc_read_number(number, number + strlen(number), &read), 1);
+        assert_true((float)read == x);
+    }
+    static const struct {
+        float value;
+        const char *text;
+    } shortest[] = {
+        {0, "0"},           {1, "1"},           {-1, "-1"},         {0.1f, "0.1"},
+        {0.05f, "0.05"},    {100, "100"},       {1500, "1500"},     {12.5f, "12.5"},
+        {-0.25f, "-0.25"},  {1e6f, "1000000"},  {1e-4f, "0.0001"},  {1e-6f, "1e-6"},
+        {1.5e12f, "1.5e12"}, {137.5f, "137.5"}, {3.14159265f, "3.1415927"},
+        {99.99999f, "99.99999"}, {0.99999994f, "0.99999994"},
+    };
+    for (size_t i = 0; i < sizeof shortest / sizeof shortest[0]; i++) {
+        char number[TPC_NUMBER];
+        tpc_write_number(shortest[i].value, number);
+        assert_string_equal(number, shortest[i].text);
+    }
+    double x = 5;
+    const char *long_number = "0000000000000000000001234567890123456789012345678901234567890.25";
+    assert_int_equal(tpc_read_number(long_number, long_number + strlen(long_number), &x), 1);
+    assert_true(fabs(x / 1.2345678901234568e39 - 1) < 1e-14);
+}
+
+static void printing_stops_at_the_capacity(void **state) {
+    (void)state;
+    static char whole[ROOM], part[ROOM];
+    treepieces_species species;
+    assert_int_equal(treepieces_preset("willow", NULL, &species), TXM_OK);
+    const size_t length = treepieces_species_print(&species, whole, sizeof whole);
+    assert_int_equal(treepieces_species_print(&species, NULL, 0), length);
+    assert_int_equal(treepieces_species_print(&species, NULL, 99), length);
+    assert_int_equal(treepieces_species_print(NULL, whole, 5), 0);
+    for (size_t capacity = 0; capacity < length + 3; capacity += capacity < 40 ? 1 : 97) {
+        memset(part, FILL, sizeof part);
+        assert_int_equal(treepieces_species_print(&species, part, capacity), length);
+        for (size_t i = capacity; i < capacity + 50; i++) assert_int_equal(part[i], FILL);
+        if (!capacity) continue;
+        const size_t kept = length < capacity ? length : capacity - 1;
+        assert_int_equal(part[kept], 0);
+        assert_memory_equal(part, whole, kept);
+    }
+    /* an invalid species is printed without harm */
+    memset(&species, 0xff, sizeof species);
+    assert_true(treepieces_species_print(&species, part, sizeof part) < sizeof part);
+    species.order_count = INT_MAX;
+    assert_true(treepieces_species_print(&species, part, sizeof part) < sizeof part);
+}
+
+/* a locale whose decimal point is a comma; built here if none is installed but can be built */
+static const char *find_comma(void) {
+    static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "fr_FR.utf8",
+                                        "pl_PL.UTF-8", "comma"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+        if (setlocale(LC_ALL, names[i])) return names[i];
+    if (system("mkdir -p build/tests/locale && localedef -i de_DE -f UTF-8 "
+               "build/tests/locale/comma >build/tests/locale/log 2>&1") == -1)
+        return NULL;
+    setenv("LOCPATH", "build/tests/locale", 1);
+    return setlocale(LC_ALL, "comma");
+}
+
+static void the_locale_does_not_matter(void **state) {
+    (void)state;
+    static char before[ROOM], after[ROOM];
+    treepieces_species a, b;
+    char comma[16];
+    assert_int_equal(treepieces_preset("birch", NULL, &a), TXM_OK);
+    const size_t length = treepieces_species_print(&a, before, sizeof before);
+    if (!find_comma()) {
+        print_message("no locale with a comma here\n");
+        return;
+    }
+    snprintf(comma, sizeof comma, "%.1f", 0.5);
+    const txm_status status = treepieces_preset("birch", NULL, &b);
+    const size_t again = treepieces_species_print(&b, after, sizeof after);
+    setlocale(LC_ALL, "C");
+    assert_string_equal(comma, "0,5");
+    assert_int_equal(status, TXM_OK);
+    assert_memory_equal(&a, &b, sizeof a);
+    assert_int_equal(again, length);
+    assert_memory_equal(before, after, length);
+}
+
+/* Presets with bytes changed, cut, doubled and swapped: they are read or refused. */
+static void mutated_texts_do_no_harm(void **state) {
+    (void)state;
+    static const char *const pieces[] = {"like oak\n", "order 4\n", "1e9", "\n",
+                                         "#",          "\r",         " -",  "."};
+    txm_rng rng = txm_rng_make(77, 1);
+    int read = 0, refused = 0;
+    for (int n = 0; n < 6000; n++) {
+        const char *from = treepieces_preset_text(
+            (int)txm_rng_below(&rng, (uint32_t)treepieces_preset_count()));
+        size_t size = strlen(from);
+        char *text = (char *)malloc(size + 64);
+        memcpy(text, from, size);
+        for (uint32_t k = txm_rng_below(&rng, 4) + 1; k > 0 && size; k--) {
+            const size_t at = txm_rng_below(&rng, (uint32_t)size);
+            const char *piece = pieces[txm_rng_below(&rng, 8)];
+            const size_t count = strlen(piece);
+            switch (txm_rng_below(&rng, 5)) {
+            case 0: text[at] = (char)txm_rng_next(&rng); break;
+            case 1: text[at] = (char)(text[at] ^ 1 << txm_rng_below(&rng, 8)); break;
+            case 2: size = at; break;
+            case 3: memcpy(text + at, piece, count < size - at ? count : size - at); break;
+            default:
+                memmove(text + at + count, text + at, size - at);
+                memcpy(text + at, piece, count);
+                size += count;
+            }
+        }
+        /* of exactly this size, so that the sanitizer notices a read beyond */
+        char *exact = (char *)malloc(size ? size : 1);
+        memcpy(exact, text, size);
+        treepieces_species species;
+        txm_env env;
+        memset(&env, 0, sizeof env);
+        memset(&species, 0, sizeof species);
+        const txm_status status = treepieces_species_parse(exact, size, &env, &species);
+        if (status == TXM_OK) {
+            read++;
+            assert_int_equal(tpc_species_check(&species, &env), TXM_OK);
+            assert_round_trip(&species);
+        } else {
+            refused++;
+            assert_int_equal(status, TXM_BAD_DATA);
+            assert_int_equal(strncmp(env.message, "line ", 5), 0);
+            for (const char *p = env.message; *p; p++) assert_true(*p >= ' ' && *p < 127);
+        }
+        free(exact);
+        free(text);
+    }
+    assert_true(read > 300 && refused > 300);
+}
+
+/* ---- kits ------------------------------------------------------------------------------- */
+
+/* A piece whose parts can be changed. */
+typedef struct own_piece {
+    treepieces_piece piece;
+    treepieces_vertex vertices[300];
+    treepieces_quad quads[300];
+} own_piece;
+
+/* A copy of a built-in piece as a caller would make it, without the marks of the library at the
+   rims. */
+static void copy_builtin(own_piece *own, int type) {
+    treepieces_kit *kit = NULL;
+    assert_int_equal(treepieces_kit_make(NULL, 0, NULL, &kit), TXM_OK);
+    memset(own, 0, sizeof *own);
+    own->piece = *treepieces_kit_piece(kit, type);
+    memcpy(own->vertices, own->piece.vertices,
+           (size_t)own->piece.vertex_count * sizeof *own->vertices);
+    memcpy(own->quads, own->piece.quads, (size_t)own->piece.quad_count * sizeof *own->quads);
+    for (int i = 0; i < own->piece.vertex_count; i++) own->vertices[i].rim = 0;
+    own->piece.name = "mine";
+    own->piece.vertices = own->vertices;
+    own->piece.quads = own->quads;
+    treepieces_kit_free(kit);
+}
+
+/* A tube of three rings between its rims, numbered from the top down. */
+static void make_tube(own_piece *own) {
+    static const float own_weights[5] = {0, 0.25f, 0.5f, 0.75f, 1};
+    treepieces_piece *p = &own->piece;
+    memset(own, 0, sizeof *own);
+    p->name = "tube";
+    p->vertices = own->vertices;
+    p->quads = own->quads;
+    p->vertex_count = 30;
+    p->leaf_count = 1;
+    p->building[0].translation[1] = 1;
+    p->building[0].rotation[3] = 1;
+    p->building[0].scale = 0.8f;
+    for (int i = 0; i < p->vertex_count; i++) {
+        treepieces_vertex *v = &own->vertices[i];
+        const int ring = i / 6, k = i % 6;
+        const float r = 0.8f + 0.05f * (float)ring;
+        v->position[0] = r * (float)cos(k * TXM_PI / 3);
+        v->position[1] = 1 - 0.25f * (float)ring;
+        v->position[2] = -r * (float)sin(k * TXM_PI / 3);
+        v->normal[0] = 10 / sqrtf(101) * (float)cos(k * TXM_PI / 3);
+        v->normal[1] = 1 / sqrtf(101);
+        v->normal[2] = -10 / sqrtf(101) * (float)sin(k * TXM_PI / 3);
+        v->weights[0] = own_weights[ring];
+        v->weights[1] = 1 - own_weights[ring];
+    }
+    for (int k = 0; k < 6; k++) {
+        p->leaf_rims[0][k] = k;
+        p->root_rim[k] = 24 + k;
+        for (int ring = 0; ring < 4; ring++) {
+            treepieces_quad *q = &own->quads[p->quad_count++];
+            q->corners[0] = (uint8_t)(6 * ring + k);
+            q->corners[1] = (uint8_t)(6 * ring + 6 + k);
+            q->corners[2] = (uint8_t)(6 * ring + 6 + (k + 1) % 6);
+            q->corners[3] = (uint8_t)(6 * ring + (k + 1) % 6);
+            q->tile_class = (uint8_t)(k == 2 && ring == 1 ? TREEPIECES_OWN : TREEPIECES_BARK);
+            q->band = (uint8_t)(ring < 2);
+        }
+    }
+}
+
+static void own_pieces_are_taken(void **state) {
+    (void)state;
+    static own_piece own[TREEPIECES_BUILTIN + 1];
+    treepieces_piece pieces[TREEPIECES_BUILTIN + 1];
+    treepieces_kit *kit = NULL;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    for (int i = 0; i < TREEPIECES_BUILTIN; i++) copy_builtin(&own[i], i);
+    make_tube(&own[TREEPIECES_BUILTIN]);
+    for (int i = 0; i <= TREEPIECES_BUILTIN; i++) pieces[i] = own[i].piece;
+    pieces[2].name = NULL;
+    if (treepieces_kit_make(pieces, TREEPIECES_BUILTIN + 1, &env, &kit) != TXM_OK)
+        fail_msg("%s", env.message);
+    assert_int_equal(treepieces_kit_count(kit), 2 * TREEPIECES_BUILTIN + 1);
+    for (int i = 0; i < TREEPIECES_BUILTIN; i++) { /* a copy of a built-in piece becomes the same piece */
+        const treepieces_piece *a = treepieces_kit_piece(kit, i);
+        const treepieces_piece *b = treepieces_kit_piece(kit, TREEPIECES_BUILTIN + i);
+        assert_memory_equal(a->vertices, b->vertices,
+                            (size_t)a->vertex_count * sizeof *a->vertices);
+        assert_memory_equal(a->quads, b->quads, (size_t)a->quad_count * sizeof *a->quads);
+        assert_string_equal(b->name, i == 2 ? "" : "mine");
+        assert_ptr_not_equal(b->vertices, own[i].vertices);
+    }
+    const treepieces_piece *tube = treepieces_kit_piece(kit, 2 * TREEPIECES_BUILTIN);
+    for (int k = 0; k < 6; k++) { /* moved onto the hexagon and marked */
+        assert_true(tube->vertices[k].rim == k && tube->vertices[24 + k].rim == -1);
+        assert_true(tube->vertices[24 + k].position[1] == 0);
+        assert_true(tube->vertices[6 + k].rim == -1);
+    }
+    assert_null(treepieces_kit_piece(kit, -1));
+    assert_null(treepieces_kit_piece(kit, 2 * TREEPIECES_BUILTIN + 1));
+    assert_null(treepieces_kit_piece(NULL, 0));
+    assert_int_equal(treepieces_kit_count(NULL), 0);
+    treepieces_kit_free(kit);
+    treepieces_kit_free(NULL);
+}
+
+/* a rule that grows only tubes, then a tip */
+static void choose_tubes(void *user, const treepieces_site *site, txm_rng *rng,
+                         treepieces_choice *choice) {
+    (void)rng;
+    choice->type = site->depth < 20 ? *(const int *)user : TREEPIECES_TIP;
+    choice->turn = site->depth % 6;
+    choice->ratios[0] = 0.9f;
+}
+
+static void own_pieces_grow(void **state) {
+    (void)state;
+    static own_piece own;
+    int type = TREEPIECES_BUILTIN;
+    treepieces_kit *kit = NULL;
+    treepieces_forest *forest = NULL;
+    treepieces_species species;
+    treepieces_forest_desc desc;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    make_tube(&own);
+    assert_int_equal(treepieces_kit_make(&own.piece, 1, &env, &kit), TXM_OK);
+    memset(&own, 0xff, sizeof own); /* the kit has its own copy */
+    assert_int_equal(treepieces_preset("oak", &env, &species), TXM_OK);
+    memset(&desc, 0, sizeof desc);
+    desc.kit = kit;
+    desc.species = &species;
+    desc.species_count = desc.tree_count = 1;
+    desc.own_rule = choose_tubes;
+    desc.own_user = &type;
+    if (treepieces_forest_make(&desc, &env, &forest) != TXM_OK) fail_msg("%s", env.message);
+    assert_int_equal(forest->node_count, 21);
+    assert_int_equal(forest->batches[TREEPIECES_BUILTIN].count, 20);
+    assert_int_equal(forest->batches[TREEPIECES_TIP].count, 1);
+    float *bones = (float *)malloc(21 * TREEPIECES_BONE * sizeof *bones);
+    assert_int_equal(treepieces_bones(forest, NULL, &env, bones), TXM_OK);
+    float below[90], above[90];
+    for (uint32_t i = 0; i + 1 < 20; i++) { /* the rims are equal to the bit */
+        treepieces_skin(forest, bones, type, i, below, NULL);
+        treepieces_skin(forest, bones, type, i + 1, above, NULL);
+        const int turn = (int)(i + 1) % 6;
+        for (int k = 0; k < 6; k++)
+            assert_memory_equal(below + 3 * k, above + 3 * (24 + (k + 6 - turn) % 6), 12);
+    }
+    free(bones);
+    treepieces_forest_free(forest);
+    treepieces_kit_free(kit);
+}
+
+/* Faults of a tube, and what the message must name. */
+typedef struct piece_fault {
+    void (*spoil)(own_piece *own);
+    const char *where, *what;
+} piece_fault;
+
+#define SPOIL(name) static void name(own_piece *own)
+SPOIL(no_vertices) { own->piece.vertices = NULL; }
+SPOIL(too_few_vertices) { own->piece.vertex_count = 6; }
+SPOIL(too_many_vertices) { own->piece.vertex_count = 256; }
+SPOIL(no_quads) { own->piece.quads = NULL; }
+SPOIL(too_few_quads) { own->piece.quad_count = 5; }
+SPOIL(too_many_quads) { own->piece.quad_count = 256; }
+SPOIL(too_many_leaves) { own->piece.leaf_count = 4; }
+SPOIL(negative_leaves) { own->piece.leaf_count = -1; }
+SPOIL(corner_beyond) { own->quads[7].corners[2] = 30; }
+SPOIL(corner_twice) { own->quads[7].corners[2] = own->quads[7].corners[0]; }
+SPOIL(bad_band) { own->quads[9].band = 4; }
+SPOIL(halving) { own->quads[9].tile_class = TREEPIECES_HALVING; }
+SPOIL(class_beyond) { own->quads[9].tile_class = 64; }
+SPOIL(rim_beyond) { own->piece.leaf_rims[0][3] = 30; }
+SPOIL(rim_negative) { own->piece.root_rim[5] = -1; }
+SPOIL(position_nan) { own->vertices[11].position[1] = (float)NAN; }
+SPOIL(normal_infinite) { own->vertices[11].normal[2] = HUGE_VALF; }
+SPOIL(normal_short) { own->vertices[11].normal[0] = 0.1f; }
+SPOIL(weight_negative) {
+    own->vertices[8].weights[0] = -0.25f;
+    own->vertices[8].weights[1] = 1.25f;
+}
+SPOIL(weight_nan) { own->vertices[8].weights[0] = (float)NAN; }
+SPOIL(weight_of_none) { own->vertices[8].weights[2] = 0.25f; own->vertices[8].weights[0] = 0; }
+SPOIL(weight_sum) { own->vertices[8].weights[0] = 0.5f; }
+SPOIL(rotation_long) { own->piece.building[0].rotation[3] = 2; }
+SPOIL(rotation_nan) { own->piece.building[0].rotation[0] = (float)NAN; }
+SPOIL(scale_zero) { own->piece.building[0].scale = 0; }
+SPOIL(scale_infinite) { own->piece.building[0].scale = HUGE_VALF; }
+SPOIL(translation_nan) { own->piece.building[0].translation[2] = (float)NAN; }
+SPOIL(root_moved) { own->vertices[26].position[0] += 0.001f; }
+SPOIL(leaf_moved) { own->vertices[4].position[1] += 0.001f; }
+SPOIL(leaf_turned) { /* the vertices of the rim are shifted by one */
+    for (int k = 0; k < 6; k++) own->piece.leaf_rims[0][k] = (k + 1) % 6;
+}
+SPOIL(root_normal) { own->vertices[27].normal[0] = -1; own->vertices[27].normal[1] = 0; }
+SPOIL(leaf_normal) { own->vertices[3].normal[0] = -1; own->vertices[3].normal[1] = 0; }
+SPOIL(root_weights) { own->vertices[25].weights[0] = 0.75f; own->vertices[25].weights[1] = 0.25f; }
+SPOIL(leaf_weights) { own->vertices[2].weights[0] = 0.25f; own->vertices[2].weights[1] = 0.75f; }
+SPOIL(rim_twice) { /* the leaf rim is also the root rim */
+    own->piece.leaf_count = 2;
+    own->piece.building[1] = own->piece.building[0];
+    memcpy(own->piece.leaf_rims[1], own->piece.leaf_rims[0], sizeof own->piece.leaf_rims[0]);
+}
+SPOIL(flipped) { /* quad 8: columns 2, from ring 0 */
+    const uint8_t c = own->quads[8].corners[0];
+    own->quads[8].corners[0] = own->quads[8].corners[2];
+    own->quads[8].corners[2] = c;
+}
+SPOIL(inside_out) {
+    for (int i = 0; i < own->piece.quad_count; i++) {
+        const uint8_t c = own->quads[i].corners[0];
+        own->quads[i].corners[0] = own->quads[i].corners[2];
+        own->quads[i].corners[2] = c;
+    }
+}
+SPOIL(three_quads_at_a_side) { own->quads[own->piece.quad_count++] = own->quads[5]; }
+SPOIL(hole) { own->quads[5] = own->quads[--own->piece.quad_count]; }
+SPOIL(capped) { /* two quads close the root rim, which is no longer a border */
+    static const uint8_t a[4] = {24, 27, 26, 25}, b[4] = {24, 29, 28, 27};
+    memcpy(own->quads[own->piece.quad_count++].corners, a, 4);
+    memcpy(own->quads[own->piece.quad_count++].corners, b, 4);
+}
+SPOIL(unused) {
+    own->vertices[30] = own->vertices[12];
+    own->piece.vertex_count++;
+}
+SPOIL(apart) { /* a separate cube */
+    static const uint8_t cube[6][4] = {{0, 1, 2, 3}, {7, 6, 5, 4}, {0, 4, 5, 1},
+                                       {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
+    for (int i = 0; i < 8; i++) own->vertices[30 + i] = own->vertices[12];
+    own->piece.vertex_count += 8;
+    for (int i = 0; i < 6; i++)
+        for (int k = 0; k < 4; k++)
+            own->quads[own->piece.quad_count + i].corners[k] = (uint8_t)(30 + cube[i][k]);
+    own->piece.quad_count += 6;
+}
+SPOIL(touching) { /* that cube touches vertex 14 with a corner */
+    apart(own);
+    own->piece.vertex_count--;
+    for (int i = own->piece.quad_count - 6; i < own->piece.quad_count; i++)
+        for (int k = 0; k < 4; k++)
+            if (own->quads[i].corners[k] == 37) own->quads[i].corners[k] = 14;
+}
+#undef SPOIL
+
+static void every_fault_of_a_piece_is_named(void **state) {
+    (void)state;
+    static const piece_fault faults[] = {
+        {no_vertices, "", "needs 7 to 255 vertices"},
+        {too_few_vertices, "", "needs 7 to 255 vertices"},
+        {too_many_vertices, "", "needs 7 to 255 vertices"},
+        {no_quads, "", "needs 6 to 255 quads"},
+        {too_few_quads, "", "needs 6 to 255 quads"},
+        {too_many_quads, "", "needs 6 to 255 quads"},
+        {too_many_leaves, "", "leaf_count must be 0 to 3"},
+        {negative_leaves, "", "leaf_count must be 0 to 3"},
+        {corner_beyond, "quad 7", "a corner is not a vertex"},
+        {corner_twice, "quad 7", "two corners are one vertex"},
+        {bad_band, "quad 9", "band"},
+        {halving, "quad 9", "tile_class"},
+        {class_beyond, "quad 9", "tile_class"},
+        {rim_beyond, "place 3", "not a vertex"},
+        {rim_negative, "place 5", "not a vertex"},
+        {position_nan, "vertex 11", "is not finite"},
+        {normal_infinite, "vertex 11", "is not finite"},
+        {normal_short, "vertex 11", "length is not 1"},
+        {weight_negative, "vertex 8", "weight is negative"},
+        {weight_nan, "vertex 8", "weight is negative"},
+        {weight_of_none, "vertex 8", "of a joint that does not exist"},
+        {weight_sum, "vertex 8", "sum of the weights is not 1"},
+        {rotation_long, "leaf rim 0", "unit quaternion"},
+        {rotation_nan, "leaf rim 0", "unit quaternion"},
+        {scale_zero, "leaf rim 0", "scale"},
+        {scale_infinite, "leaf rim 0", "scale"},
+        {translation_nan, "vertex 0", "place on a leaf rim"},
+        {root_moved, "vertex 26", "place on the root rim"},
+        {leaf_moved, "vertex 4", "place on a leaf rim"},
+        {leaf_turned, "vertex 1", "place on a leaf rim"},
+        {root_normal, "vertex 27", "cone"},
+        {leaf_normal, "vertex 3", "cone"},
+        {root_weights, "vertex 25", "own bone alone"},
+        {leaf_weights, "vertex 2", "terminal joint alone"},
+        {rim_twice, "vertex 0", ""},
+        {flipped, "vertex ", "of opposite orientation"},
+        {inside_out, "vertex 24", "runs the wrong way"},
+        {three_quads_at_a_side, "vertex ", "of opposite orientation"},
+        {hole, "", "border that is not a rim"},
+        {capped, "vertex 24", "is no border"},
+        {unused, "vertex 30", "is unused"},
+        {apart, "vertex 30", "is not connected to vertex 0"},
+        {touching, "vertex 14", "touches itself"},
+    };
+    static own_piece own[2];
+    for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++) {
+        treepieces_kit *kit = (treepieces_kit *)own;
+        tk_memory memory = {0};
+        tk_progress progress = {0};
+        txm_env env = tk_env(&memory, &progress);
+        char where[64];
+        make_tube(&own[0]);
+        make_tube(&own[1]);
+        faults[i].spoil(&own[1]);
+        const treepieces_piece pieces[2] = {own[0].piece, own[1].piece};
+        const txm_status status = treepieces_kit_make(pieces, 2, &env, &kit);
+        if (status != TXM_BAD_ARGUMENT)
+            fail_msg("fault %d (%s) gives status %d", (int)i, faults[i].what, status);
+        assert_null(kit);
+        assert_int_equal(tk_leaks(&memory), 0);
+        snprintf(where, sizeof where, "piece 1 (tube)%s%s", faults[i].where[0] ? ", " : ": ",
+                 faults[i].where);
+        if (strncmp(env.message, where, strlen(where)) || !strstr(env.message, faults[i].what))
+            fail_msg("\"%s\" does not say \"%s\" and \"%s\"", env.message, where, faults[i].what);
+    }
+}
+
+static void a_kit_checks_its_arguments(void **state) {
+    (void)state;
+    static own_piece own;
+    static treepieces_piece many[TREEPIECES_MAX_TYPES - TREEPIECES_BUILTIN + 1];
+    treepieces_kit *kit = NULL;
+    make_tube(&own);
+    for (size_t i = 0; i < sizeof many / sizeof many[0]; i++) many[i] = own.piece;
+    const int most = TREEPIECES_MAX_TYPES - TREEPIECES_BUILTIN;
+    assert_int_equal(treepieces_kit_make(many, most + 1, NULL, &kit), TXM_TOO_LARGE);
+    assert_int_equal(treepieces_kit_make(many, -1, NULL, &kit), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_kit_make(NULL, 1, NULL, &kit), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_kit_make(many, most, NULL, NULL), TXM_BAD_ARGUMENT);
+    assert_null(kit);
+    assert_int_equal(treepieces_kit_make(many, most, NULL, &kit), TXM_OK);
+    assert_int_equal(treepieces_kit_count(kit), TREEPIECES_MAX_TYPES);
+    treepieces_kit_free(kit);
+}
+
+/* Two tubes and a preset, which needs no memory. */
+static txm_status make_kit(void *context, txm_env *env) {
+    const long calls = ((const tk_memory *)env->memory_user)->calls;
+    treepieces_kit *kit = (treepieces_kit *)env;
+    treepieces_species species;
+    assert_int_equal(treepieces_preset("spruce", env, &species), TXM_OK);
+    assert_int_equal(((const tk_memory *)env->memory_user)->calls, calls);
+    const txm_status status = treepieces_kit_make((const treepieces_piece *)context, 2, env, &kit);
+    if (status != TXM_OK) assert_null(kit);
+    treepieces_kit_free(kit);
+    return status;
+}
+
+static void kits_and_species_survive_failing_memory(void **state) {
+    (void)state;
+    static own_piece own[2];
+    make_tube(&own[0]);
+    make_tube(&own[1]);
+    treepieces_piece pieces[2] = {own[0].piece, own[1].piece};
+    assert_true(tk_sweep(make_kit, pieces, TK_ALLOCATION) > 40);
+    assert_true(tk_sweep(make_kit, pieces, TK_ONWARD) > 40);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_preset_is_read),
+        cmocka_unit_test(an_unknown_preset_names_the_others),
+        cmocka_unit_test(a_short_text_is_a_tree),
+        cmocka_unit_test(blanks_comments_and_line_ends),
+        cmocka_unit_test(like_starts_from_a_preset),
+        cmocka_unit_test(every_fault_has_its_message),
+        cmocka_unit_test(ranges_are_the_same_read_and_checked),
+        cmocka_unit_test(a_forest_refuses_a_bad_species),
+        cmocka_unit_test(random_species_round_trip),
+        cmocka_unit_test(numbers_are_read_exactly),
+        cmocka_unit_test(printing_stops_at_the_capacity),
+        cmocka_unit_test(the_locale_does_not_matter),
+        cmocka_unit_test(mutated_texts_do_no_harm),
+        cmocka_unit_test(own_pieces_are_taken),
+        cmocka_unit_test(own_pieces_grow),
+        cmocka_unit_test(every_fault_of_a_piece_is_named),
+        cmocka_unit_test(a_kit_checks_its_arguments),
+        cmocka_unit_test(kits_and_species_survive_failing_memory),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

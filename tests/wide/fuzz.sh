@@ -1,0 +1,25 @@
+#!/bin/sh
+# The model loader against hostile bytes: a few thousand mutations here, a million with --full.
+. tests/kit/tap.sh
+
+mkdir "$tmp/seeds"
+for kind in sand:3 cells:1 blades:4; do
+    name=${kind%:*}
+    build/draw "$name" "$tmp/$name.png" 48 "${kind#*:}"
+    build/texkit learn "$tmp/$name.png" -o "$tmp/seeds/$name.txs" --types 3 --quiet
+done
+
+runs=20000
+[ "$FULL" = 1 ] && runs=200000
+check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
+    tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_standalone" -lm &&
+    check "$runs mutated models" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*.txs
+
+if [ "$FULL" = 1 ] && has clang; then
+    check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \
+        -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined -I. \
+        tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_libfuzzer" -lm &&
+        check "300,000 runs of libFuzzer" "$OUT/fuzz_libfuzzer" -runs=300000 -seed=1 \
+            -max_len=16384 -timeout=20 -rss_limit_mb=2000 -verbosity=0 \
+            -artifact_prefix="$OUT/" "$tmp/seeds"
+fi

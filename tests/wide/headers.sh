@@ -1,0 +1,46 @@
+#!/bin/sh
+# Every header compiles without a warning: by itself, twice in one unit, and in two units of one
+# program of which one holds the implementation; as C and as C++.
+. tests/kit/tap.sh
+
+warn="-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror"
+c_standards=c99 cxx_standards=c++11
+if [ "$FULL" = 1 ]; then
+    c_standards="c99 c11 c17 c2x" cxx_standards="c++11 c++14 c++17 c++20"
+fi
+
+# matrix COMPILER STANDARD LANGUAGE: all forms of all headers. Some warnings take an optimiser; what it
+# sees does not change with the standard, so once for each language will do.
+matrix() {
+    level=-O0
+    case $2 in c99 | c++11) level=-O2 ;; esac
+    for header in *.h; do
+        macro=$(basename "$header" .h | tr '[:lower:]' '[:upper:]')
+        printf '#include "%s"\n' "$header" >"$tmp/alone.x"
+        printf '#include "%s"\n#include "%s"\n' "$header" "$header" >"$tmp/twice.x"
+        printf '#define %s_IMPLEMENTATION\n#include "%s"\n' "$macro" "$header" >"$tmp/whole.x"
+        cat "$tmp/whole.x" "$tmp/alone.x" >"$tmp/whole-twice.x"
+        { cat "$tmp/alone.x" && printf 'int main(void) { return 0; }\n'; } >"$tmp/user.x"
+        {
+            printf '#define %s_STATIC\n' "$macro"
+            cat "$tmp/whole.x"
+        } >"$tmp/static.x"
+        for form in alone twice whole-twice; do
+            check "$header $form, $1 $2" \
+                $1 -std=$2 $warn -fsyntax-only -I. -x "$3" "$tmp/$form.x"
+        done
+        check "$header static, $1 $2" \
+            $1 -std=$2 $warn -Wno-unused-function -fsyntax-only -I. -x "$3" "$tmp/static.x"
+        check "$header in two units, $1 $2" sh -c "
+            $1 -std=$2 $warn $level -I. -x $3 -c '$tmp/whole.x' -o '$tmp/whole.o' &&
+            $1 -std=$2 $warn $level -I. -x $3 -c '$tmp/user.x' -o '$tmp/user.o' &&
+            $1 '$tmp/whole.o' '$tmp/user.o' -o '$tmp/program' -lm && '$tmp/program'"
+    done
+}
+
+for cc in $(compilers); do
+    for standard in $c_standards; do matrix "$cc" "$standard" c; done
+    case $cc in gcc) cxx=g++ ;; clang) cxx=clang++ ;; *) cxx=$CXX ;; esac
+    has "$cxx" || continue
+    for standard in $cxx_standards; do matrix "$cxx" "$standard" c++; done
+done

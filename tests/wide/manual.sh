@@ -1,0 +1,58 @@
+#!/bin/sh
+# What the headers, the README and the change log say of themselves holds: the QUICK START block of
+# each head comment builds and runs in a folder with nothing but the header and texmath.h, and
+# versions agree everywhere.
+. tests/kit/tap.sh
+
+# The lines between QUICK START and the next heading, without their common indentation.
+quick_start() {
+    awk '
+        /QUICK START/ { inside = 1; next }
+        inside && /^ ? ? ?[A-Z][A-Z]/ { exit }
+        inside && /\*\/ *$/ { exit }
+        inside {
+            match($0, /^ */)
+            if (NF && (!n || RLENGTH < least)) least = RLENGTH
+            line[++n] = $0
+        }
+        END { for (i = 1; i <= n; i++) print substr(line[i], least + 1) }' "$1"
+}
+
+for header in *.h; do
+    name=$(basename "$header" .h)
+    macro=$(echo "$name" | tr '[:lower:]' '[:upper:]')
+    folder=$tmp/$name
+    mkdir "$folder"
+    cp texmath.h "$folder"
+    [ "$header" = texmath.h ] || cp "$header" "$folder"
+    quick_start "$header" >"$folder/main.c"
+    check "$header has a QUICK START" test -s "$folder/main.c"
+    for cc in $(compilers); do
+        check "QUICK START of $header builds and runs, $cc" sh -c "
+            cd '$folder' && $cc -std=c99 -O1 -Wall -Wextra -Werror main.c -o main -lm && ./main"
+    done
+
+    version=$(sed -n "s/^#define ${macro}_VERSION \"\([0-9.]*\)\".*/\1/p" "$header")
+    check "$header has a version" test -n "$version"
+    check "the first line of $header says v$version" \
+        sh -c "head -n 1 '$header' | grep -qF '/* $header - v$version - '"
+    check "line 2 of $header is its SPDX line" \
+        sh -c "sed -n 2p '$header' | grep -q 'SPDX-License-Identifier: MIT'"
+    check "CHANGELOG.md knows $header $version" grep -qF "\`$header\` $version" CHANGELOG.md
+    check "README.md lists $header" grep -qF "\`$header\`" README.md
+done
+
+# the C code of the README builds as it stands there
+awk '/^```c$/ { inside = 1; next } /^```$/ { inside = 0 } inside' README.md >"$tmp/readme.c"
+for cc in $(compilers); do
+    check "the C code of README.md builds, $cc" \
+        $cc -std=c99 -Wall -Wextra -Werror -I. -c "$tmp/readme.c" -o "$tmp/readme.o"
+done
+
+tool=$(sed -n 's/^#define TEXKIT_VERSION "\(.*\)"/\1/p' tools/cli.h)
+check "CHANGELOG.md knows texkit $tool" grep -qF "## $tool" CHANGELOG.md
+for command in $(build/texkit --help | sed -n 's/^  \([a-z]*\)  .*/\1/p'); do
+    check "README.md knows 'texkit $command'" grep -qF "texkit $command" README.md
+    check "'texkit $command --help' shows an example" \
+        sh -c "build/texkit $command --help | grep -A1 '^Example' | grep -q 'texkit $command'"
+done

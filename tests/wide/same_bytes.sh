@@ -1,0 +1,75 @@
+#!/bin/sh
+# The same bytes as tests/wide/golden/golden.txt says, module by module and case by case: at -O2 on 1
+# and 3 threads; widely from each compiler, at each level of optimisation, on 1, 2 and 8 threads and
+# with the indices of each parallel loop taken backwards (0 below), with fused multiply-add allowed to
+# the compiler, and from plain C as with SIMD.
+. tests/kit/tap.sh
+
+golden=tests/wide/golden
+modules=$(sed 's/ .*//' $golden/golden.txt | uniq)
+plain="-DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD"
+
+# same COMPILER "FLAGS" THREADS...: all modules, built so, on so many threads
+same() {
+    cc=$1 flags=$2
+    shift 2
+    for module in $modules; do
+        program=$tmp/golden_$module runs=
+        # shellcheck disable=SC2086 # flags are words
+        check "builds golden_$module, $cc $flags" $cc -std=gnu99 $flags -ffp-contract=off -Isrc -I. \
+            -Itests/kit -I$golden $golden/golden_$module.c -o "$program" -lpthread -lm || continue
+        for threads in "$@"; do
+            check "the golden bytes of $module, $cc $flags, threads $threads" \
+                $golden/compare.sh "$program $threads"
+        done
+    done
+}
+
+if [ "$FULL" = 1 ]; then
+    for cc in $(compilers); do
+        for level in -O0 -O1 -O2; do same "$cc" $level 2; done
+        same "$cc" -O3 1 2 8 0
+        if grep -q '^flags.*\<fma\>' /proc/cpuinfo 2>/dev/null; then
+            same "$cc" "-O3 -mfma -mavx2" 2
+        fi
+    done
+    set -- $(compilers)
+    same "$1" "-O2 $plain" 2
+else
+    set -- $(compilers)
+    same "$1" -O2 1 3
+fi
+
+# the message tells module and case; lines that are missing or foreign are noticed
+set -- $modules
+"$tmp/golden_$1" 1 >"$tmp/lines"
+name=$(sed -n '2s/ [^ ]*$//p' "$tmp/lines")
+differs() {
+    sed "$1" "$tmp/lines" >"$tmp/changed"
+    $golden/compare.sh "cat $tmp/changed" && { echo "$1 goes unnoticed"; return 1; }
+    $golden/compare.sh "cat $tmp/changed" | grep -q "^module ${name% *}, case ${name#* }: "
+}
+check "a different hash is noticed, with module and case" differs '2s/.$/x/'
+check "a missing case is noticed, with module and case" differs 2d
+check "a foreign case is noticed" sh -c "sed '2s/ / other-/' '$tmp/lines' >'$tmp/changed' &&
+    ! $golden/compare.sh 'cat $tmp/changed'"
+
+# the tool with OpenMP agrees with itself
+build/draw cells "$tmp/cells.png" 64
+for threads in 1 2 8; do
+    build/texkit learn "$tmp/cells.png" -o "$tmp/$threads.txs" --threads $threads --quiet
+    build/texkit synth "$tmp/1.txs" -o "$tmp/$threads.png" --size 150x90 --threads $threads --quiet
+    check "texkit learn, the same model with --threads $threads" \
+        cmp "$tmp/1.txs" "$tmp/$threads.txs"
+    check "texkit synth, the same picture with --threads $threads" \
+        cmp "$tmp/1.png" "$tmp/$threads.png"
+done
+
+# no thread steps on another's data
+if [ "$FULL" = 1 ] && has clang; then
+    for module in $modules; do
+        check "$module is clean under the thread sanitizer" sh -c "
+            clang -std=gnu99 -O1 -g -fsanitize=thread -ffp-contract=off -Isrc -I. -Itests/kit -I$golden \
+                $golden/golden_$module.c -o '$tmp/tsan' -lpthread -lm && '$tmp/tsan' 4"
+    done
+fi
