@@ -175,12 +175,13 @@ typedef enum texsyn_kind {
 
 /* One clique type of a model's neighbourhood system. */
 typedef struct texsyn_clique {
+    int level;        /* 0 = full resolution                                                   */
     texsyn_kind kind;
-    int level;       /* 0 = full resolution                                                      */
-    int band, other; /* tail band b, head band c (equal within a band)                           */
-    int dx, dy;      /* displacement d in pixels of that level                                   */
-    int ex, ey;      /* displacement e                                                           */
-    int phase; /* of a pair of neighbours: 0 = all, 1 = tails at even, 2 = at odd coordinates */
+    int band, other;  /* tail band b, head band c (equal within a band)                        */
+    int dx, dy;       /* displacement d in pixels of that level                                */
+    int ex, ey;       /* displacement e                                                        */
+    int phase;        /* of a pair of neighbours: 0 = all, 1 = tails at even, 2 = at odd
+                         coordinates                                                           */
 } texsyn_clique;
 
 TEXSYN_API int texsyn_channels(const texsyn_model *model);    /* of the example: 1, 3 or 4 */
