@@ -1,4 +1,4 @@
-/* gl_treepieces.c - shaders/treepieces.glsl does what treepieces.h does
+/* gl_treepieces.c - shaders/treepieces.glsl computes what treepieces.h does
    SPDX-License-Identifier: MIT OR Unlicense
 
    cc -I. tests/look/gl_treepieces.c build/files/stb.o -o gl_treepieces -lEGL -lOpenGL -lcjson -lm
@@ -7,16 +7,16 @@
    llvmpipe on machines without a graphics card), and prints "ok - what" or "not ok - what" for each
    test. The example is part of this program, so that its own buffers and draw calls are tested.
 
-   Rims: 1,000 trees of pieces at random, each in a pose of its own. What the vertex shader makes of
-   them, by transform feedback: rims of parents and children, and treepieces_skin.
+   Rims: 1,000 trees of random pieces in different poses. The output of the vertex shader, by transform
+   feedback: rims of parents against those of children, and all against treepieces_skin.
 
-   Cracks: a tree tessellated in mixed levels, by transform feedback: the vertices of two patches
-   along the edge that they share, and treepieces_bake.
+   Cracks: a tree tessellated in mixed levels, by transform feedback: the vertices of two patches along
+   the edge that they share, and all against treepieces_bake.
 
    Impostors: pixel by pixel against those of treepieces_impostor.
 
    Pictures: coverage and depth against a rasterisation of what treepieces_bake and
-   treepieces_impostor make.
+   treepieces_impostor give.
 
    Draw calls: those of the example, counted where it calls OpenGL.                             */
 #define _XOPEN_SOURCE 600 /* as headless.c says, which comes too late */
@@ -27,7 +27,7 @@
 #include <GL/glext.h>
 
 static int draw_calls;
-static GLsizei most_instances = 0x7fffffff; /* drawn by a call, for forests that would take long */
+static GLsizei most_instances = 0x7fffffff; /* limit per draw call, for forests that would take long */
 
 static GLsizei limit(GLsizei instances) {
     draw_calls++;
@@ -75,7 +75,7 @@ static void report(int good, const char *what, const char *format, ...) {
     failures += !good;
 }
 
-/* what must be, or nothing can be tested */
+/* without this nothing can be tested */
 static void must(int good, const forest_gl *f) {
     if (good) return;
     printf("not ok - %s\n", f->failed[0] ? f->failed : "no memory");
@@ -115,7 +115,7 @@ static void close_scene(forest_gl *f) {
     close_forest(f);
 }
 
-/* As the example has it, with all that takes. */
+/* The complete scene of the example. */
 static forest_gl *open_scene(forest_gl *f) {
     must(read_species(f) && grow_trees(f) && make_pictures(f) && upload_scene(f, "forest_gl"), f);
     choose_view(f);
@@ -123,7 +123,7 @@ static forest_gl *open_scene(forest_gl *f) {
     return f;
 }
 
-/* Trees about the origin in poses of their own, with nothing but what the pieces' shaders read. */
+/* Trees about the origin in random poses, with only what the shaders of pieces read. */
 static forest_gl *open_trees(int trees, int pieces, treepieces_rule_function *rule, float amount) {
     forest_gl *f = new_scene(trees, pieces);
     treepieces_forest_desc desc = {0};
@@ -178,7 +178,7 @@ static GLuint feedback_program(forest_gl *f, int has_patches, const char *const 
     return program;
 }
 
-/* What drawing type t puts out, up to `bytes` of it; returns how many primitives there were. */
+/* Record up to `bytes` of what drawing type t puts out; returns the number of primitives. */
 static size_t record(forest_gl *f, GLuint program, int t, int has_patches, void *out,
                      size_t bytes) {
     const treepieces_batch *b = &f->forest->batches[t];
@@ -218,7 +218,7 @@ typedef struct skinned {
     float position[3], normal[3];
 } skinned;
 
-/* All vertices of all pieces as the vertex shader has them; first: of each node. */
+/* All vertices of all pieces as the vertex shader computes them; first: first vertex of each node. */
 static skinned *skin_all(forest_gl *f, size_t *first) {
     static const char *const names[] = {"vertex_place", "vertex_normal"};
     const GLuint program = feedback_program(f, 0, names, 2);
@@ -276,7 +276,7 @@ static void test_rims_meet(const forest_gl *f, const skinned *all, const size_t 
     report(step <= 1e-6f, "vertex shader: the normals of rims agree", "within %.1e", (double)step);
 }
 
-/* Within 1e-5 of the radius, and the rounding of coordinates. */
+/* Equal within 1e-5 of the radius and the rounding of coordinates? */
 static void test_skin(const forest_gl *f, const skinned *all, const size_t *first) {
     float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
     float most = 0, most_normal = 0;
@@ -320,7 +320,7 @@ static void test_rims(void) {
 
 /* ---- cracks ------------------------------------------------------------------------------ */
 
-/* a vertex of a triangle, as it is recorded */
+/* a recorded vertex of a triangle */
 typedef struct tessellated {
     float place[3], normal[3];
     int32_t instance, quad;
@@ -328,7 +328,7 @@ typedef struct tessellated {
     int32_t layer;
 } tessellated;
 
-/* a vertex along a side of a patch: of the edge between two corners, the lower one first */
+/* a vertex on a side of a patch, with the edge between two corners, the lower one first */
 typedef struct side_vertex {
     uint32_t edge[2], place[3], patch;
     float normal[3];
@@ -349,12 +349,12 @@ static int compare_sides(const void *a, const void *b) {
     return memcmp(a, b, offsetof(side_vertex, normal));
 }
 
-/* Does the pattern's place lie at corner k? */
+/* Is this position of the pattern corner k? */
 static int is_corner(const float at[2], int k) {
     return at[0] == (float)(k >> 1) && at[1] == (float)(k == 1 || k == 2);
 }
 
-/* Both arrays of places, sorted; returns how many different ones are left. */
+/* Sort positions and remove duplicates; returns how many are left. */
 static size_t sort_places(float *places, size_t count) {
     size_t kept = 0;
     for (size_t i = 0; i < 3 * count; i++) places[i] += 0.0f; /* -0 is 0 */
@@ -440,7 +440,7 @@ static side_vertex *list_sides(const patches *p, size_t *count) {
     return list;
 }
 
-/* An edge's vertices must come in pairs from the same two patches. A border edge has one patch. */
+/* The vertices of an edge must come in pairs from the same two patches. A border edge has one patch. */
 static void test_edges(const patches *p, int trees) {
     size_t count, alone = 0, borders = 0, edges = 0, levels[65] = {0};
     side_vertex *list = list_sides(p, &count);
@@ -510,7 +510,7 @@ static void test_bake(const patches *p, const treepieces_mesh *mesh) {
     free(theirs);
 }
 
-/* Bark at the corners of all patches: layer and place in the sheet. */
+/* Bark at the corners of all patches: layer and position in the sheet. */
 static void test_tiles(const forest_gl *f, const patches *p) {
     size_t corners = 0, wrong = 0;
     for (size_t i = 0; i < p->vertex_count; i++) {
@@ -544,7 +544,7 @@ static void test_cracks(treepieces_rule_function *rule, int pieces, float eye_he
     desc.lod = &lod;
     must(check(f, treepieces_bake(&desc, &f->env, &mesh)), f);
     memcpy(f->frame.eye, lod.eye, sizeof lod.eye);
-    f->frame.view_projection[15] = 1; /* all is in the middle of the picture */
+    f->frame.view_projection[15] = 1; /* everything is at the centre of the image */
     f->frame.lod[0] = lod.max_level;
     f->frame.lod[1] = lod.half_distance;
     f->frame.lod[2] = lod.shape;
@@ -569,7 +569,7 @@ static void test_cracks(treepieces_rule_function *rule, int pieces, float eye_he
 
 /* ---- pictures ------------------------------------------------------------------------------ */
 
-/* nearest depth, 1: nothing there; row 0 at the bottom, as OpenGL has it */
+/* nearest depth, 1 = background; row 0 at the bottom, as in OpenGL */
 typedef struct picture {
     int width, height;
     float *depth;
@@ -601,7 +601,7 @@ static void put(picture *p, int x, int y, double depth) {
     if (depth >= 0 && depth < (double)*d) *d = (float)depth;
 }
 
-/* Pixels whose middles lie in the triangle, if it faces the eye. */
+/* Rasterise a triangle that faces the eye. */
 static void raster_triangle(picture *p, double v[3][4]) {
     const double area = (v[1][0] - v[0][0]) * (v[2][1] - v[0][1]) -
                         (v[2][0] - v[0][0]) * (v[1][1] - v[0][1]);
@@ -648,7 +648,7 @@ static void raster_trees(forest_gl *f, picture *p) {
     }
 }
 
-/* What treepieces_impostor makes, for the view. */
+/* The result of treepieces_impostor for the view. */
 static void make_impostor(forest_gl *f, uint32_t look, txm_image color, txm_image depth) {
     treepieces_card cards[256];
     treepieces_impostor_desc desc = {0};
@@ -662,7 +662,7 @@ static void make_impostor(forest_gl *f, uint32_t look, txm_image color, txm_imag
     must(check(f, treepieces_impostor(&desc, &f->env, color, depth)), f);
 }
 
-/* An impostor's depths in the place of a cluster of leaves. */
+/* Draw the depths of an impostor at the position of a cluster. */
 static void raster_cloud(const forest_gl *f, const treepieces_cluster *c, const float *depth,
                          picture *p) {
     float center[3], corner[3], near[3];
@@ -708,7 +708,7 @@ static void raster_clouds(forest_gl *f, picture *p) {
     free(depth.pixels);
 }
 
-/* What the graphics card has, without ground and sky. */
+/* The depths of the graphics card, without ground and sky. */
 static picture draw_depth(forest_gl *f) {
     picture p = new_picture(f);
     const GLuint target = make_target(p.width, p.height);
@@ -727,14 +727,14 @@ static picture draw_depth(forest_gl *f) {
     return p;
 }
 
-/* metres in front of the eye */
+/* distance from the eye, metres */
 static double distance_of(const forest_gl *f, float depth) {
     const double n = (double)f->near_plane, far = (double)f->far_plane;
     return far * n / (far - (double)depth * (far - n));
 }
 
-/* coverage: what both cover of what either covers, of which a share is no farther apart than `near`
-   metres */
+/* Of the pixels that either covers, both must cover the fraction `coverage`, and of those a fraction
+   `share` must differ by at most `near` metres in distance. */
 static void compare_pictures(const forest_gl *f, const char *what, const picture *a,
                              const picture *b, double coverage, double share, double near) {
     int both = 0, either = 0, same = 0;
@@ -750,7 +750,7 @@ static void compare_pictures(const forest_gl *f, const char *what, const picture
            100.0 * both / either, 100.0 * same / both);
 }
 
-/* The impostors themselves: the share of pixels in which either is a leaf that both have, alike. */
+/* The impostors themselves: of the pixels where either shows a leaf, the share where both show the same. */
 static void test_impostors(void) {
     enum { PIXELS = CLOUD_SIDE * CLOUD_SIDE };
     forest_gl *f = open_scene(new_scene(1, 8));
@@ -844,12 +844,12 @@ int main(void) {
     display = f->display;
     glGenVertexArrays(1, &array);
     glBindVertexArray(array);
-    make_target(64, 64); /* without a frame buffer nothing is drawn, nor recorded */
+    make_target(64, 64); /* without a frame buffer nothing is drawn or recorded */
     test_rims();
     test_cracks(NULL, 150, 2, 2.5f);
     test_cracks(any_piece, 100, 1, 1.5f);
     test_impostors();
-    /* leaves' outlines differ: filtered here, not there; behind them it is far to the next leaf */
+    /* outlines of leaves differ, as only OpenGL filters them, and behind them is a leaf far away */
     test_picture("a bare tree: as treepieces_bake's, drawn without OpenGL", 1, 0.99, 0.99, 0.02);
     test_picture("in leaf: as treepieces_impostor's, drawn without OpenGL", 0, 0.98, 0.92, 0.1);
     test_calls();
