@@ -28,7 +28,7 @@ static inline void assert_between(double x, double low, double high) {
 }
 
 static inline void *need(size_t bytes) {
-    void *p = malloc(bytes);
+    void *p = calloc(1, bytes);
     if (!p) abort();
     return p;
 }

@@ -207,56 +207,18 @@ static void test_bad_kinds(void **state) {
 
 /* ---- tests: memory and cancelling -------------------------------------------------------------------- */
 
-static txm_status try_make(const textiles_desc *d, txm_env *env) {
+static txm_status try_make(void *context, txm_env *env) {
     textiles_set *set = (textiles_set *)env;
-    const txm_status status = textiles_make(d, env, &set);
+    const txm_status status = textiles_make((const textiles_desc *)context, env, &set);
     if (status == TXM_OK) assert_non_null(set);
     else assert_null(set);
     textiles_set_free(set);
     return status;
 }
 
-/* Allocations fail, alone and onward: each of the first ones, from `all` on one in `step`. */
-static void sweep(const textiles_desc *d, long all, long step) {
-    for (int onward = 0; onward < 2; onward++) {
-        for (long k = 1;; k += k < all ? 1 : step) {
-            tk_memory memory = {0};
-            tk_progress progress = {0};
-            memory.fail_at = k;
-            memory.fail_onward = onward;
-            txm_env env = tk_env(&memory, &progress);
-            const txm_status status = try_make(d, &env);
-            assert_int_equal(tk_leaks(&memory), 0);
-            assert_int_equal(progress.errors, 0);
-            if (memory.calls < k) {
-                assert_int_equal(status, TXM_OK);
-                assert_true(k > 20);
-                break;
-            }
-            if (status != TXM_OUT_OF_MEMORY) fail_msg("allocation %ld: status %d", k, status);
-            assert_true(env.message[0] != 0);
-        }
-    }
-}
-
-static void sweep_cancel(const textiles_desc *d) {
-    for (long k = 1;; k++) {
-        tk_memory memory = {0};
-        tk_progress progress = {0};
-        progress.cancel_at = k;
-        txm_env env = tk_env(&memory, &progress);
-        const txm_status status = try_make(d, &env);
-        assert_int_equal(tk_leaks(&memory), 0);
-        assert_int_equal(progress.errors, 0);
-        assert_int_equal(progress.late, 0);
-        if (progress.calls < k) {
-            assert_int_equal(status, TXM_OK);
-            assert_true(k > 4 && progress.last == 1.0f);
-            break;
-        }
-        if (status != TXM_CANCELLED) fail_msg("call %ld: status %d", k, status);
-        assert_true(env.message[0] != 0);
-    }
+static void sweep_memory(textiles_desc *d) {
+    assert_true(tk_sweep(try_make, d, TK_ALLOCATION) > 19);
+    assert_true(tk_sweep(try_make, d, TK_ONWARD) > 19);
 }
 
 static void test_failing(void **state) {
@@ -267,15 +229,15 @@ static void test_failing(void **state) {
     const textiles_exemplar exemplars[2] = {{maps + 2, 1}, {maps + 2, 1}}, plain = {maps + 3, 1};
     textiles_desc d = desc_of(TEXTILES_FRAME, exemplars, 2, 32);
     d.colors = 1;
-    sweep(&d, 1000, 1);
+    sweep_memory(&d);
     d.exemplar_count = 1;
     d.variants = 9; /* more than are at work at a time */
-    sweep_cancel(&d);
+    assert_true(tk_sweep(try_make, &d, TK_CANCEL) > 3);
     d = desc_of(TEXTILES_TRIANGLE, &plain, 1, 32);
     d.reduced = 1;
-    sweep(&d, 34, 60);
+    sweep_memory(&d);
     d = desc_of(TEXTILES_CORNER, &plain, 1, 32);
-    sweep(&d, 1, 90);
+    sweep_memory(&d);
     for (int m = 0; m < 4; m++) free(maps[m].pixels);
 }
 
