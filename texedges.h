@@ -246,10 +246,10 @@ typedef struct texedges_control {
           band), inside to the right; or NULL on any error. levels, thresholds and beside are the
           exemplar's. Release it with texedges_set_free.
           A line deviates from its stroke (the edge of its band) by 4 pixels at most; from short
-          strokes and narrow bands by less, 1/16 of the length and 7/16 of the width. Where the stroke
-          turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
-          cross itself. If the exemplar has no edge of that layer of 64 pixels or more, and with
-          disturb = -1, it is the stroke itself
+          strokes and narrow bands by less, 1/16 of the length and 7/16 of the width. Where the
+          stroke turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) the
+          line does not cross itself. If the exemplar has no edge of that layer of 64 pixels or
+          more, and with disturb = -1, it is the stroke itself
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
           edges that texedges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26 pixels;
           TXM_OUT_OF_MEMORY; TXM_CANCELLED
@@ -289,44 +289,45 @@ TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
 /* ---- constants and progress ------------------------------------------------------------ */
 
 enum {
-    TXE_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
-    TXE_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
-    TXE_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
-    TXE_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
-    TXE_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+    TXE_MAX_SIDE = 1 << 20,   /* pixels: up to here a float tells half pixels apart              */
+    TXE_MAX_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t             */
+    TXE_MAX_LENGTH = 1 << 26, /* pixels, of all strokes                                          */
+    TXE_REPORT = 1 << 15,     /* work, in units of a few ns, between two progress reports        */
+    TXE_AROUND = 8, /* pixels around a stroke in which the guide asks for its neighbouring layer */
 
-    TXE_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
-    TXE_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
-    TXE_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
-    TXE_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
-    TXE_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
-    TXE_BINS = 16,   /* directions told apart in half a turn                                    */
-    TXE_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
-    TXE_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
-    TXE_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
-    TXE_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
-    TXE_GOOD = 8,    /* of them so many that join best are looked at closer                     */
-    TXE_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+    TXE_STEP_BLUR = 2,       /* pixels: radius of a blur that removes the steps of pixels        */
+    TXE_CORNER_BLUR = 3,     /* pixels: radius of the blur that rounds the corners of a stroke   */
+    TXE_COURSE_BLUR = 32,    /* pixels: radius of the blur that makes the smooth course of a line */
+    TXE_DIRECTION_BLUR = 24, /* pixels: the same, for the course that directions are relative to */
+    TXE_CHORD = 6,     /* pixels to either side, between which a smooth line's direction is taken */
+    TXE_BINS = 16,     /* directions of a histogram over half a turn                             */
+    TXE_PIECE = 48,    /* samples: longest piece of roughness; the shortest is a third of it     */
+    TXE_JOIN = 8,      /* samples over which the end of a piece is blended into the next         */
+    TXE_MIN_LINE = 64, /* samples: shorter lines of the exemplar are not measured                */
+    TXE_TRIES = 64,    /* candidates for each piece; four times as many for the closing one      */
+    TXE_BEST = 8,      /* candidates with the best joints, of which the directions decide        */
+    TXE_LOOP = 64      /* points: shorter loops of a disturbed line are cut off                  */
 };
-#define TXE_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
-#define TXE_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+#define TXE_MAX_OFFSET 3.5  /* pixels from the stroke, for roughness (0.5 more for chords)       */
+#define TXE_KEPT_OFFSET 2.0 /* pixels: larger offsets are compressed, smaller ones kept          */
 
-/* The bar of one call: a stage fills from..to of it in total pieces of work. */
-typedef struct txe_bar {
+/* The progress of one call: the current stage covers from..to of it, `total` units of work. */
+typedef struct txe_progress {
     const txm_env *env;
     const char *stage;
     double from, to, total, done;
-    size_t quiet; /* work since the last report */
-} txe_bar;
+    size_t unreported; /* work since the last report */
+} txe_progress;
 
-static txe_bar txe_bar_make(const txm_env *env) {
-    txe_bar bar;
+static txe_progress txe_progress_of(const txm_env *env) {
+    txe_progress bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
     return bar;
 }
 
-static void txe_stage(txe_bar *bar, const char *stage, double to, double total) {
+/* Begin a stage that ends at `to` of the whole. */
+static void txe_stage(txe_progress *bar, const char *stage, double to, double total) {
     bar->from = bar->to;
     bar->to = to;
     bar->stage = stage;
@@ -334,12 +335,12 @@ static void txe_stage(txe_bar *bar, const char *stage, double to, double total) 
     bar->done = 0;
 }
 
-/* So much work is done; non-zero: stop. */
-static inline int txe_tick(txe_bar *bar, size_t work) {
-    bar->quiet += work;
-    if (bar->quiet < TXE_TICK) return 0;
-    bar->done += (double)bar->quiet;
-    bar->quiet = 0;
+/* Add finished work; non-zero: the caller cancels. */
+static inline int txe_advance(txe_progress *bar, size_t work) {
+    bar->unreported += work;
+    if (bar->unreported < TXE_REPORT) return 0;
+    bar->done += (double)bar->unreported;
+    bar->unreported = 0;
     const double part = bar->done < bar->total ? bar->done / bar->total : 1;
     return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
 }
@@ -354,7 +355,7 @@ static txm_status txe_stopped(txm_env *env) {
 
 /* ---- sets ------------------------------------------------------------------------------ */
 
-/* An empty set, which lies in its own memory; NULL: there is none. */
+/* An empty set, which lies in its own memory; NULL if there is no memory. */
 static texedges_set *txe_set_make(int levels, int width, int height, const txm_env *env) {
     txm_arena memory;
     txm_arena_init(&memory, env);
@@ -373,13 +374,13 @@ TEXEDGES_API void texedges_set_free(texedges_set *set) {
 
 /* ---- checks of what the caller gives --------------------------------------------------- */
 
-/* A picture that edges can be found in, or (bytes: U8, 1 channel) a guide can be drawn into. */
+/* Any picture of a valid size, or (bytes) one of TXM_U8 with 1 channel. */
 static txm_status txe_check_image(const txm_image *image, const char *name, int bytes,
                                   txm_env *env) {
-    const size_t most = TEXEDGES_MAX_PIXELS < TXE_PIXELS ? TEXEDGES_MAX_PIXELS : TXE_PIXELS;
+    const size_t most = TEXEDGES_MAX_PIXELS < TXE_MAX_PIXELS ? TEXEDGES_MAX_PIXELS : TXE_MAX_PIXELS;
     const txm_status status = txm_image_check(image, name, most, env);
     if (status != TXM_OK) return status;
-    if (image->width > TXE_SIDE || image->height > TXE_SIDE)
+    if (image->width > TXE_MAX_SIDE || image->height > TXE_MAX_SIDE)
         return txm_fail_at(env, TXM_TOO_LARGE, name, "a side is longer than 2^20 pixels");
     if (bytes && (image->sample != TXM_U8 || image->channels > 1))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be TXM_U8 with 1 channel");
@@ -403,13 +404,13 @@ static txm_status txe_check_desc(const texedges_desc *desc, txm_env *env) {
     return txe_check_image(&desc->image, "image", 0, env);
 }
 
-/* Edges as one of the functions here makes them. is_found: as texedges_find does, in unit
-   steps from corner to corner. */
+/* A set as one of the functions here makes it. is_found: as texedges_find does, with steps of one
+   pixel from corner to corner. */
 static txm_status txe_check_edges(const texedges_set *edges, const char *name, int is_found,
-                                  txe_bar *bar, txm_env *env) {
-    const char *foreign = "not as texedges_find or texedges_disturb made it";
+                                  txe_progress *bar, txm_env *env) {
+    const char *foreign = "is not as texedges_find or texedges_disturb made it";
     if (!edges || edges->levels < 2 || edges->levels > TEXEDGES_MAX_LEVELS || edges->width < 1 ||
-        edges->height < 1 || edges->width > TXE_SIDE || edges->height > TXE_SIDE ||
+        edges->height < 1 || edges->width > TXE_MAX_SIDE || edges->height > TXE_MAX_SIDE ||
         !txe_thresholds_are_good(edges->thresholds, edges->levels) ||
         (edges->line_count && !edges->lines) || (edges->point_count && !edges->points))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
@@ -425,7 +426,7 @@ static txm_status txe_check_edges(const texedges_set *edges, const char *name, i
         txm_vec2 p = edges->points[line->first + line->count - 1];
         for (size_t j = 0; j < line->count; j++) {
             const txm_vec2 q = edges->points[line->first + j];
-            const float most = (float)(2 * TXE_SIDE);
+            const float most = (float)(2 * TXE_MAX_SIDE);
             int good = q.x >= -most && q.x <= most && q.y >= -most && q.y <= most;
             if (good && is_found) {
                 const float dx = q.x - p.x, dy = q.y - p.y;
@@ -434,7 +435,7 @@ static txm_status txe_check_edges(const texedges_set *edges, const char *name, i
                        q.x == (float)(int)q.x && q.y == (float)(int)q.y;
             }
             if (!good) return txm_fail_at(env, TXM_BAD_ARGUMENT, name, foreign);
-            if (txe_tick(bar, 1)) return txe_stopped(env);
+            if (txe_advance(bar, 1)) return txe_stopped(env);
             p = q;
         }
     }
@@ -442,28 +443,29 @@ static txm_status txe_check_edges(const texedges_set *edges, const char *name, i
 }
 
 static txm_status txe_check_stroke(const texedges_stroke *s, int levels, double *length,
-                                   txe_bar *bar, txm_env *env) {
+                                   txe_progress *bar, txm_env *env) {
     if (!s->points || s->count < (s->is_closed ? 3 : 2))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "needs 2 points or more, closed 3");
     if (s->layer < 0 || s->layer >= levels)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "layer must be 0 to levels - 1");
     if (s->width != 0 && !(s->width >= 2 && s->width <= 256))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "width must be 0 or 2 to 256 pixels");
-    const float most = (float)TXE_SIDE;
+    const float most = (float)TXE_MAX_SIDE;
     double own = 0;
     for (int i = 0; i < s->count; i++) {
         const txm_vec2 p = s->points[i], q = s->points[i ? i - 1 : 0];
         const double dx = (double)p.x - q.x, dy = (double)p.y - q.y;
         if (!(p.x >= -most && p.x <= most && p.y >= -most && p.y <= most))
             return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke",
-                               "a coordinate is not a number or beyond 2^20 pixels");
+                               "a coordinate is not finite or beyond 2^20 pixels");
         own += sqrt(dx * dx + dy * dy);
-        if (txe_tick(bar, 1)) return txe_stopped(env);
+        if (txe_advance(bar, 1)) return txe_stopped(env);
     }
     if (!(own > 1e-3))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke", "has no length: its points are one");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "stroke",
+                           "has no length: all its points are the same");
     *length += own;
-    if (*length > (double)TXE_LENGTH)
+    if (*length > (double)TXE_MAX_LENGTH)
         return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "are longer than 2^26 pixels");
     return TXM_OK;
 }
@@ -472,12 +474,12 @@ static double txe_points_of(const texedges_control *c) {
     return c && c->edges ? (double)c->edges->point_count : 0;
 }
 
-/* All that texedges_disturb and texedges_guide look at. */
-static txm_status txe_check_control(const texedges_control *c, txe_bar *bar, txm_env *env) {
+/* Everything that texedges_disturb and texedges_guide read. */
+static txm_status txe_check_control(const texedges_control *c, txe_progress *bar, txm_env *env) {
     double length = 0;
     if (!c) return txm_fail(env, TXM_BAD_ARGUMENT, "control is NULL");
     if (c->stroke_count < 0 || (c->stroke_count && !c->strokes))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "strokes", "NULL, or fewer than none");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "strokes", "are NULL, or their count negative");
     if (!(c->disturb == -1 || (c->disturb >= 0 && c->disturb <= 4)))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturb", "must be -1 or 0 to 4");
     txm_status status = txe_check_edges(c->edges, "edges", 1, bar, env);
@@ -491,7 +493,7 @@ static txm_status txe_check_control(const texedges_control *c, txe_bar *bar, txm
 /* ---- from a picture to layers ---------------------------------------------------------- */
 
 /* The gray of each pixel, 0..1. 0 = cancelled, -1 = a sample is not finite, 1 = done. */
-static int txe_gray(const txm_image *image, float *gray, txe_bar *bar) {
+static int txe_gray(const txm_image *image, float *gray, txe_progress *bar) {
     const int is_color = image->channels >= 3;
     for (int y = 0; y < image->height; y++) {
         for (int x = 0; x < image->width; x++) {
@@ -501,16 +503,16 @@ static int txe_gray(const txm_image *image, float *gray, txe_bar *bar) {
                     0.0722 * txm_image_get(image, x, y, 2);
             if (!txm_is_finite(g)) return -1;
             *gray++ = txm_float(g < 0 ? 0 : g > 1 ? 1 : g);
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
     }
     return 1;
 }
 
-/* Blur by the weights 1 - |d| / (radius + 1), rows then columns; beyond its border the picture goes
-   on as it ends. scratch: as large as gray. 0 = cancelled. */
+/* Blur with the weights 1 - |d| / (radius + 1), rows then columns; border pixels are repeated
+   outwards. scratch: as large as gray. 0 = cancelled. */
 static int txe_blur(float *gray, float *scratch, int width, int height, double radius,
-                    txe_bar *bar) {
+                    txe_progress *bar) {
     const int reach = (int)radius;
     double weight[17] = {1}, sum = 0;
     for (int d = 0; d <= reach; d++) {
@@ -533,30 +535,30 @@ static int txe_blur(float *gray, float *scratch, int width, int height, double r
                          ((double)from[i - (size_t)back * step] + from[i + (size_t)ahead * step]);
                 }
                 to[i] = txm_float(g / sum);
-                if (txe_tick(bar, (size_t)reach + 1)) return 0;
+                if (txe_advance(bar, (size_t)reach + 1)) return 0;
             }
         }
     }
     return 1;
 }
 
-/* Thresholds that part count grays into layers of about the same area.
+/* Thresholds that divide count grays into layers of about the same area.
 
-   In a histogram of 256 bins, cut k lies where k / levels of the area are darker, or up to a
-   quarter of a layer's area beside that, where the two bins next to the cut hold least; of a gap
-   in the middle. Where one bin holds too much for that, on its nearer side. 0 = cancelled. */
-static int txe_divide(const float *gray, size_t count, int levels, float *thresholds,
-                      txe_bar *bar) {
+   In a histogram of 256 bins, cut k lies where k / levels of the area is darker, or within a
+   quarter of a layer's area of that, where the two bins next to the cut hold least; in a gap, in
+   its middle. If one bin holds too much for that, the cut is on its nearer side. 0 = cancelled. */
+static int txe_choose_thresholds(const float *gray, size_t count, int levels, float *thresholds,
+                                 txe_progress *bar) {
     size_t bins[256], below[257];
     int previous = 0;
     memset(bins, 0, sizeof bins);
     for (size_t i = 0; i < count; i++) {
         bins[(int)((double)gray[i] * 255 + 0.5)]++;
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     below[0] = 0;
     for (int b = 0; b < 256; b++) below[b + 1] = below[b] + bins[b];
-    for (int k = 1; k < levels; k++) { /* all areas times 4 levels: whole numbers */
+    for (int k = 1; k < levels; k++) { /* areas are multiplied by 4 levels, to stay whole */
         const uint64_t target = 4 * (uint64_t)k * count, quarter = count;
         const int most = 256 - (levels - k);
         int best = 0;
@@ -584,12 +586,14 @@ static int txe_divide(const float *gray, size_t count, int levels, float *thresh
     return 1;
 }
 
-/* The neighbour of a pixel beyond its side 0 = top, 1 = right, 2 = bottom, 3 = left; a crack is run
-   through clockwise, so that its pixel lies to the right: along the top to the right, and so on. */
-static const int txe_side_x[4] = {0, 1, 0, -1}, txe_side_y[4] = {-1, 0, 1, 0};
+/* Steps from a pixel to its neighbour across side 0 = top, 1 = right, 2 = bottom, 3 = left. The
+   cracks around a pixel are followed clockwise, so that the pixel lies to the right: along the top
+   to the right, and so on. */
+static const int txe_step_x[4] = {0, 1, 0, -1}, txe_step_y[4] = {-1, 0, 1, 0};
 
-/* Connected pixels of one layer are a region. It is known by one of its pixels, its root; next
-   links root and boundary pixels to a circle. Two circles are joined by swapping one link each. */
+/* Connected pixels of one layer are a region, in a union-find forest; one of its pixels is its
+   root. next links the root and the boundary pixels in a ring; swapping one link of each joins two
+   rings. */
 typedef struct txe_regions {
     int width, height;
     int32_t *parent, *next;
@@ -608,32 +612,32 @@ static int32_t txe_unite(txe_regions *r, int32_t a, int32_t b) {
     return r->parent[b] = a;
 }
 
-/* the pixel beyond a side of p, -1: none */
-static int32_t txe_beyond(const txe_regions *r, int32_t p, int side) {
-    const int x = p % r->width + txe_side_x[side], y = p / r->width + txe_side_y[side];
+/* the pixel across a side of p, -1: none */
+static int32_t txe_neighbour(const txe_regions *r, int32_t p, int side) {
+    const int x = p % r->width + txe_step_x[side], y = p / r->width + txe_step_y[side];
     if (x < 0 || y < 0 || x >= r->width || y >= r->height) return -1;
-    return p + txe_side_x[side] + txe_side_y[side] * r->width;
+    return p + txe_step_x[side] + txe_step_y[side] * r->width;
 }
 
-static int txe_regions_make(txe_regions *r, txe_bar *bar) {
+static int txe_regions_make(txe_regions *r, txe_progress *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int32_t p = 0; p < count; p++) {
         r->parent[p] = r->next[p] = p;
         r->length[p] = 0;
         int32_t root = p;
         for (int side = 3; side >= 0; side -= 3) { /* left and above */
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             if (q < 0 || r->layer[q] != r->layer[p]) continue;
             const int32_t other = txe_root(r, q);
             if (other != root) root = txe_unite(r, root, other);
         }
-        if (txe_tick(bar, 2)) return 0;
+        if (txe_advance(bar, 2)) return 0;
     }
     for (int32_t p = 0; p < count; p++) {
         const int32_t root = txe_root(r, p);
         int cracks = 0;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             cracks += q < 0 || r->layer[q] != r->layer[p];
         }
         r->length[root] += cracks;
@@ -641,21 +645,21 @@ static int txe_regions_make(txe_regions *r, txe_bar *bar) {
             r->next[p] = r->next[root];
             r->next[root] = p;
         }
-        if (txe_tick(bar, 2)) return 0;
+        if (txe_advance(bar, 2)) return 0;
     }
     return 1;
 }
 
-/* Give a region to the layer with which it shares most of its boundary, the darkest of several, and
+/* Give a region to the layer with which it shares most of its boundary (of equals the darkest) and
    unite it with all regions of that layer around it. Returns the new root, -1 if the region is the
-   whole picture. Pixels that are on no boundary any more are taken out of the circle. */
+   whole picture. Pixels that are no longer on a boundary are removed from the ring. */
 static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
     int32_t shared[TEXEDGES_MAX_LEVELS];
     memset(shared, 0, sizeof shared);
     for (int32_t before = region, p = region;;) {
         int inner = 1;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             const int32_t other = q < 0 ? region : txe_root(r, q);
             if (other == region) continue;
             inner = 0;
@@ -674,9 +678,9 @@ static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
     if (shared[target] == 0) return -1;
     int32_t root = region, length = r->length[region] - 2 * shared[target];
     for (int32_t p = region, after;; p = after) {
-        after = r->next[p]; /* what is joined in behind p is not walked through */
+        after = r->next[p]; /* pixels that are linked in behind p are skipped */
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             const int32_t other = q < 0 ? root : txe_root(r, q);
             if (other == root || r->layer[other] != target) continue;
             const int32_t link = r->next[p];
@@ -693,10 +697,10 @@ static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
     return root;
 }
 
-/* Dissolve regions until all have a boundary of least cracks or more: first those under 8, then
-   under 16 and so on, each time in raster order of the roots. A region of n cracks is one of
-   O(pixels / n), so all this takes O(pixels log least). 0 = cancelled. */
-static int txe_regions_clean(txe_regions *r, int least, txe_bar *bar) {
+/* Dissolve regions until all have a boundary of at least `least` cracks: first those under 8, then
+   under 16 and so on, each time in raster order of the roots. There are O(pixels / n) regions of n
+   cracks, so all this takes O(pixels log least). 0 = cancelled. */
+static int txe_regions_clean(txe_regions *r, int least, txe_progress *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int bound = 4; bound < least;) {
         bound = bound < least / 2 ? 2 * bound : least;
@@ -705,23 +709,23 @@ static int txe_regions_clean(txe_regions *r, int least, txe_bar *bar) {
             while (region >= 0 && r->length[region] < bound) {
                 size_t work = 0;
                 region = txe_dissolve(r, region, &work);
-                if (txe_tick(bar, 8 * work)) return 0;
+                if (txe_advance(bar, 8 * work)) return 0;
             }
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
     }
     for (int32_t p = 0; p < count; p++) {
         r->layer[p] = r->layer[txe_root(r, p)];
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     return 1;
 }
 
 /* The layer of each pixel. is_given: thresholds holds levels - 1 of them, else it receives them.
-   to: the part of the bar that is full then. */
-static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
-                            float *thresholds, uint8_t *layer, double to, txe_bar *bar,
-                            txm_arena *arena, txm_env *env) {
+   to: the progress of the call when this is done. */
+static txm_status txe_layers_find(const texedges_desc *desc, int levels, int is_given,
+                                  float *thresholds, uint8_t *layer, double to, txe_progress *bar,
+                                  txm_arena *arena, txm_env *env) {
     const int width = desc->image.width, height = desc->image.height;
     const size_t count = (size_t)width * (size_t)height;
     const double smooth = desc->smooth;
@@ -731,18 +735,18 @@ static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
     const int good = txe_gray(&desc->image, gray, bar);
     if (good < 0)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is infinite or not a number");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is not finite");
     if (!good || (smooth > 0 && !txe_blur(gray, scratch, width, height, smooth, bar)) ||
-        (!is_given && !txe_divide(gray, count, levels, thresholds, bar)))
+        (!is_given && !txe_choose_thresholds(gray, count, levels, thresholds, bar)))
         return txe_stopped(env);
     for (size_t i = 0; i < count; i++) {
         int k = 0;
         while (k < levels - 1 && gray[i] >= thresholds[k]) k++;
         layer[i] = (uint8_t)k;
-        if (txe_tick(bar, 1)) return txe_stopped(env);
+        if (txe_advance(bar, 1)) return txe_stopped(env);
     }
     txm_arena_free(arena);
-    if (desc->least <= 4) return TXM_OK; /* nothing is shorter */
+    if (desc->least <= 4) return TXM_OK; /* no boundary is shorter */
 
     txe_regions r;
     r.width = width;
@@ -759,14 +763,14 @@ static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
     return TXM_OK;
 }
 
-/* Turn layers into grays. 0 = cancelled. */
-static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
+/* Replace the number of each pixel's layer by its gray. 0 = cancelled. */
+static int txe_layers_to_gray(uint8_t *layer, size_t count, int levels, txe_progress *bar) {
     uint8_t gray[TEXEDGES_MAX_LEVELS] = {0};
     for (int k = 0; k < levels; k++)
         gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
     for (size_t i = 0; i < count; i++) {
         layer[i] = gray[layer[i]];
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     return 1;
 }
@@ -774,15 +778,15 @@ static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
 TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
                                         const texedges_set *edges, txm_env *env,
                                         const txm_image *layers) {
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     txm_status status = txe_check_desc(desc, env);
     if (status == TXM_OK) status = txe_check_image(layers, "layers", 1, env);
     if (status == TXM_OK &&
         (layers->width != desc->image.width || layers->height != desc->image.height))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must have the size of the image");
     if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXEDGES_MAX_LEVELS ||
                              !txe_thresholds_are_good(edges->thresholds, edges->levels)))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texedges_find made it");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "is not as texedges_find made it");
     if (status != TXM_OK) return status;
 
     float thresholds[TEXEDGES_MAX_LEVELS];
@@ -792,9 +796,11 @@ TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
     memcpy(thresholds, edges->thresholds, sizeof thresholds);
     const size_t width = (size_t)layers->width;
     uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
-    status = layer ? txe_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+    const int levels = edges->levels;
+    const size_t count = width * (size_t)layers->height;
+    status = layer ? txe_layers_find(desc, levels, 1, thresholds, layer, 1, &bar, &scratch, env)
                    : txe_no_memory(env);
-    if (status == TXM_OK && !txe_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+    if (status == TXM_OK && !txe_layers_to_gray(layer, count, levels, &bar))
         status = txe_stopped(env);
     for (int y = 0; y < layers->height && status == TXM_OK; y++)
         memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);
@@ -805,22 +811,22 @@ TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
 
 /* ---- from layers to lines -------------------------------------------------------------- */
 
-/* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the
-   upper four the sides of the pixel whose cracks are still to be run through. */
+/* The map of layers while lines are traced: the lower four bits of a byte are the layer, the upper
+   four the sides of the pixel whose cracks have not been followed yet. */
 typedef struct txe_map {
     int width, height;
     uint8_t *at;
 } txe_map;
 
 /* is the pixel of this layer? */
-static int txe_is(const txe_map *m, int x, int y, int layer) {
+static int txe_is_layer(const txe_map *m, int x, int y, int layer) {
     if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
     return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
 }
 
-/* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
-static int txe_mark(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_MAX_LEVELS],
-                    txe_bar *bar) {
+/* Mark all cracks and count them. shared: cracks between each two layers. 0 = cancelled. */
+static int txe_mark_cracks(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_MAX_LEVELS],
+                           txe_progress *bar) {
     const int w = m->width;
     *cracks = 0;
     for (int y = 0; y < m->height; y++) {
@@ -828,32 +834,32 @@ static int txe_mark(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_
             uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
             const int layer = *at & 15;
             for (int side = 0; side < 4; side++) {
-                const int u = x + txe_side_x[side], v = y + txe_side_y[side];
-                if (txe_is(m, u, v, layer)) continue;
+                const int u = x + txe_step_x[side], v = y + txe_step_y[side];
+                if (txe_is_layer(m, u, v, layer)) continue;
                 *at = (uint8_t)(*at | 16 << side);
                 ++*cracks;
                 if (u >= 0 && v >= 0 && u < w && v < m->height)
                     shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
             }
-            if (txe_tick(bar, 4)) return 0;
+            if (txe_advance(bar, 4)) return 0;
         }
     }
     return 1;
 }
 
-/* Run through the cracks of one line, from side `side` of pixel (x, y), and unmark them.
+/* Follow the cracks of one line, from side `side` of pixel (x, y), and unmark them.
 
-           l | a      p: the pixel to the right of the way (here upwards, along its left side)
-             ^        a: the next one on the same hand, l: the one across
+           l | a      p: the pixel to the right of the line (here upwards, along its left side)
+             ^        a: the next pixel on the right side, l: the one across from a
            - | p      a is of another layer: turn right, around p, whatever l is;
-                      a and l are of p's: turn left, around the corner of what lies between;
-                      only a is: straight on
+                      a and l are both of p's layer: turn left;
+                      only a is of p's layer: straight on
 
-   As each crack has one successor and is that of one, the way comes back to its beginning.
+   Each crack has one successor and one predecessor, so the line returns to its start.
    points  receives the corners, or NULL; returns their number; 0 = cancelled
    area    receives the area to the right, negative if the line is a hole's                   */
 static size_t txe_trace(const txe_map *m, int x, int y, int side, txm_vec2 *points,
-                        int64_t *area, txe_bar *bar) {
+                        int64_t *area, txe_progress *bar) {
     const int x0 = x, y0 = y, side0 = side, w = m->width;
     const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
     size_t count = 0;
@@ -866,34 +872,33 @@ static size_t txe_trace(const txe_map *m, int x, int y, int side, txm_vec2 *poin
         count++;
         if (side == 1) *area += x + 1; /* integral of x dy */
         if (side == 3) *area -= x;
-        const int ahead = (side + 1) & 3; /* the side across which a lies */
-        const int ax = x + txe_side_x[ahead], ay = y + txe_side_y[ahead];
-        if (!txe_is(m, ax, ay, layer)) {
+        const int ahead = (side + 1) & 3; /* the side between p and a */
+        const int ax = x + txe_step_x[ahead], ay = y + txe_step_y[ahead];
+        if (!txe_is_layer(m, ax, ay, layer)) {
             side = ahead;
         } else {
             x = ax;
             y = ay;
-            const int lx = ax + txe_side_x[side], ly = ay + txe_side_y[side];
-            if (txe_is(m, lx, ly, layer)) {
+            const int lx = ax + txe_step_x[side], ly = ay + txe_step_y[side];
+            if (txe_is_layer(m, lx, ly, layer)) {
                 x = lx;
                 y = ly;
                 side = (side + 3) & 3;
             }
         }
-        if (txe_tick(bar, 4)) return 0;
+        if (txe_advance(bar, 4)) return 0;
     } while (x != x0 || y != y0 || side != side0);
     return count;
 }
 
-/* All lines in raster order of where they begin: run through once to count them, once to keep
-   them. */
-static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
+/* All lines in raster order of their first points: traced once to count them, once to keep them. */
+static txm_status txe_trace_all(const txe_map *m, txe_progress *bar, texedges_set *e,
                                 txm_env *env) {
     size_t shared[TEXEDGES_MAX_LEVELS][TEXEDGES_MAX_LEVELS], cracks;
     for (int pass = 0; pass < 2; pass++) {
         size_t lines = 0, points = 0;
         memset(shared, 0, sizeof shared);
-        if (!txe_mark(m, &cracks, shared, bar)) return txe_stopped(env);
+        if (!txe_mark_cracks(m, &cracks, shared, bar)) return txe_stopped(env);
         if (pass == 1) {
             e->lines =
                 (texedges_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
@@ -918,7 +923,7 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
                     points += count;
                     lines++;
                 }
-                if (txe_tick(bar, 1)) return txe_stopped(env);
+                if (txe_advance(bar, 1)) return txe_stopped(env);
             }
         }
         e->line_count = lines;
@@ -934,7 +939,7 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
     return TXM_OK;
 }
 
-static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *layers,
+static txm_status txe_find(const texedges_desc *desc, txe_progress *bar, txm_arena *layers,
                            txm_arena *scratch, texedges_set *e, txm_env *env) {
     txe_map map;
     const size_t count = (size_t)e->width * (size_t)e->height;
@@ -944,8 +949,8 @@ static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *l
         e->thresholds[k] = desc->thresholds[k];
     map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
     if (!map.at) return txe_no_memory(env);
-    const txm_status status = txe_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
-                                        map.at, 0.7, bar, scratch, env);
+    const txm_status status = txe_layers_find(desc, e->levels, desc->thresholds != NULL,
+                                              e->thresholds, map.at, 0.7, bar, scratch, env);
     if (status != TXM_OK) return status;
     txe_stage(bar, "lines", 1, (double)count * 14);
     return txe_trace_all(&map, bar, e, env);
@@ -961,10 +966,10 @@ TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, t
                            "must be 0 or 2 to TEXEDGES_MAX_LEVELS");
     const int levels = desc->levels ? desc->levels : 4;
     if (desc->thresholds && !txe_thresholds_are_good(desc->thresholds, levels))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie within 0 to 1");
 
     txm_arena layers, scratch;
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     texedges_set *set = txe_set_make(levels, desc->image.width, desc->image.height, env);
     if (!set) return txe_no_memory(env);
     txm_arena_init(&layers, env);
@@ -977,30 +982,30 @@ TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, t
     return status;
 }
 
-/* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
-   twice a pixel. 0 = cancelled. */
+/* Mark the pixels along a line with layer + 1: those under points half a pixel to its right, two
+   points a pixel. 0 = cancelled. */
 static int txe_draw_line(const texedges_set *e, const texedges_polyline *line, uint8_t *marks,
-                         int width, int height, txe_bar *bar) {
+                         int width, int height, txe_progress *bar) {
     const txm_vec2 *points = e->points + line->first;
     for (size_t j = 0; j < line->count; j++) {
         const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
         const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
         const double length = sqrt(dx * dx + dy * dy);
         const int steps = 2 * (int)length + 1;
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
         for (int i = 0; i < steps && length > 0; i++) {
             const double t = (i + 0.5) / steps;
             const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
             if (x >= 0 && y >= 0 && x < width && y < height)
                 marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
-            if (txe_tick(bar, 2)) return 0;
+            if (txe_advance(bar, 2)) return 0;
         }
     }
     return 1;
 }
 
-/* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
-   not quite black. One channel: gray. */
+/* The colour of a layer, on a ramp from black over purple, red and yellow to white; the darkest
+   layer is not quite black. One channel: gray. */
 static uint8_t txe_color(int layer, int levels, int channels, int channel) {
     static const int ramp[5][3] = {
         {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
@@ -1012,7 +1017,7 @@ static uint8_t txe_color(int layer, int levels, int channels, int channel) {
 
 TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
                                       const txm_image *image) {
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     txe_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
     txm_status status = txe_check_image(image, "image", 0, env);
     if (status != TXM_OK) return status;
@@ -1047,7 +1052,7 @@ TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_
     return status;
 }
 
-/* ---- lines as rows of points ----------------------------------------------------------- */
+/* ---- lines as arrays of points --------------------------------------------------------- */
 
 typedef struct txe_point {
     double x, y;
@@ -1065,12 +1070,12 @@ static double txe_distance(txe_point a, txe_point b) {
     return sqrt(dx * dx + dy * dy);
 }
 
-/* Length of n points; closed: back to the first. Negative: cancelled. */
-static double txe_length(const txe_point *p, size_t n, int is_closed, txe_bar *bar) {
+/* Length of the line through n points; closed: back to the first. Negative: cancelled. */
+static double txe_length(const txe_point *p, size_t n, int is_closed, txe_progress *bar) {
     double sum = 0;
     for (size_t i = 1; i < n + (is_closed != 0); i++) {
         sum += txe_distance(p[i - 1], p[i < n ? i : 0]);
-        if (txe_tick(bar, 1)) return -1;
+        if (txe_advance(bar, 1)) return -1;
     }
     return sum;
 }
@@ -1078,7 +1083,7 @@ static double txe_length(const txe_point *p, size_t n, int is_closed, txe_bar *b
 /* m points at equal distances along a line of n points and this length: closed from the first point
    on, open from the first to the last. 0 = cancelled. */
 static int txe_resample(const txe_point *p, size_t n, int is_closed, double length,
-                        txe_point *out, size_t m, txe_bar *bar) {
+                        txe_point *out, size_t m, txe_progress *bar) {
     const size_t segments = is_closed ? n : n - 1;
     const double step = length / (double)(is_closed ? m : m - 1);
     size_t i = 0;
@@ -1089,19 +1094,19 @@ static int txe_resample(const txe_point *p, size_t n, int is_closed, double leng
             from += span;
             i++;
             span = txe_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
         const double t = span > 0 ? (at - from) / span : 0;
         out[k] = txe_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     return 1;
 }
 
-/* Blur a line by the weights radius + 1 - |d|, whole numbers. Closed: around (n > radius); open:
-   near the ends with as small a radius as they need, so that they stay. 0 = cancelled. */
+/* Blur a line with the weights radius + 1 - |d|, whole numbers. Closed: cyclically (n > radius);
+   open: the radius shrinks towards the ends, which stay where they are. 0 = cancelled. */
 static int txe_soften(const txe_point *p, size_t n, int is_closed, size_t radius,
-                      txe_point *out, txe_bar *bar) {
+                      txe_point *out, txe_progress *bar) {
     for (size_t i = 0; i < n; i++) {
         size_t reach = radius;
         if (!is_closed && reach > i) reach = i;
@@ -1117,12 +1122,12 @@ static int txe_soften(const txe_point *p, size_t n, int is_closed, size_t radius
         const double weight = (double)(reach + 1), sum = weight * weight;
         out[i].x = (x + weight * p[i].x) / sum;
         out[i].y = (y + weight * p[i].y) / sum;
-        if (txe_tick(bar, reach + 1)) return 0;
+        if (txe_advance(bar, reach + 1)) return 0;
     }
     return 1;
 }
 
-/* The unit vector from a to b; if they are one point, as it was before. */
+/* The unit vector from a to b; unchanged if they are the same point. */
 static void txe_direction(txe_point a, txe_point b, txe_point *direction) {
     const double length = txe_distance(a, b);
     if (!(length > 1e-9)) return;
@@ -1130,46 +1135,47 @@ static void txe_direction(txe_point a, txe_point b, txe_point *direction) {
     direction->y = (b.y - a.y) / length;
 }
 
-/* ---- the unrest of the exemplar's edges ------------------------------------------------ */
+/* ---- the roughness of the exemplar's edges --------------------------------------------- */
 
-/* One sample of a line of the exemplar, a pixel of its length from the next: how far its smooth
-   course moves on meanwhile, and where the line lies from there, ahead and to the right. */
+/* One sample of a line of the exemplar, one pixel of length before the next: how far its smooth
+   course advances to the next sample, and the offset of the line from the course, ahead and to the
+   right. */
 typedef struct txe_sample {
     double step, ahead, right;
-    double length; /* of the line to the next sample, tamed as it is                           */
-    int bin;       /* its direction against its course                                         */
+    double length; /* of the line to the next sample, its offsets limited                      */
+    int bin;       /* direction of the line relative to its course                             */
 } txe_sample;
 
-/* The unrest of one layer: rows of samples one behind the other, and the places at which a piece of
+/* The roughness of one layer: the samples of all its lines, and the indices at which a piece of
    TXE_PIECE + TXE_JOIN samples can begin. */
-typedef struct txe_unrest {
+typedef struct txe_roughness {
     txe_sample *samples;
     size_t *starts;
     size_t count, start_count;
-    double amount;            /* by which the exemplar's is multiplied                          */
-    double step;              /* mean of all steps                                              */
-    double share[TXE_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
-} txe_unrest;
+    double amount;          /* factor of the exemplar's roughness                               */
+    double step;            /* mean of all steps                                                */
+    double share[TXE_BINS]; /* histogram of the directions of the exemplar's edges, sum 1       */
+} txe_roughness;
 
-/* Room for the work on one line of up to count points. */
-typedef struct txe_bench {
+/* Scratch for one line of up to count points. */
+typedef struct txe_scratch {
     txe_point *a, *b, *c;
-} txe_bench;
+} txe_scratch;
 
-static void txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
-    bench->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
-    bench->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
-    bench->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
+static void txe_scratch_make(txe_scratch *scratch, txm_arena *arena, size_t count) {
+    scratch->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *scratch->a);
+    scratch->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *scratch->b);
+    scratch->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *scratch->c);
 }
 
-/* The factor that makes a vector of this length no longer than TXE_STRAY: 1 up to TXE_LINEAR,
-   then the length grows slower and slower. */
-static double txe_tame(double length) {
-    const double room = TXE_STRAY - TXE_LINEAR, more = length - TXE_LINEAR;
-    return more > 0 ? (TXE_LINEAR + room * more / (more + room)) / length : 1;
+/* The factor that limits an offset of this length to TXE_MAX_OFFSET: 1 up to TXE_KEPT_OFFSET, then
+   soft compression. */
+static double txe_limit(double length) {
+    const double room = TXE_MAX_OFFSET - TXE_KEPT_OFFSET, more = length - TXE_KEPT_OFFSET;
+    return more > 0 ? (TXE_KEPT_OFFSET + room * more / (more + room)) / length : 1;
 }
 
-/* The direction of (ahead, right), no matter which way: 0 = straight on, then every 16th of half a
+/* The direction of (ahead, right) or its opposite: 0 = straight on, then in steps of 1/16 of half a
    turn to the right. The table: cosine and sine of 1/2, 3/2, ... of such a step. */
 static int txe_bin(double ahead, double right) {
     static const double edge[TXE_BINS / 2][2] = {
@@ -1182,16 +1188,16 @@ static int txe_bin(double ahead, double right) {
     return (ahead < 0) != (right < 0) ? (TXE_BINS - k) % TXE_BINS : k % TXE_BINS;
 }
 
-/* The directions of a line of n points in bench->b against its course, its blur of radius
-   TXE_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
-   of a line with `amount` times the unrest, or put into the samples of its points.
+/* The directions of a line of n points in scratch->b relative to its course, its blur of radius
+   TXE_DIRECTION_BLUR; a blur of `radius` removes the steps of pixels first. Added to share, as if
+   the line had `amount` times its roughness, or stored in the samples of its points.
    0 = cancelled. */
-static int txe_directions(const txe_bench *bench, size_t n, int is_closed, size_t light,
-                          double amount, double *share, txe_sample *samples, txe_bar *bar) {
-    const txe_point *line = bench->a, *course = bench->c;
-    const size_t trim = is_closed || !share ? 0 : TXE_COURSE; /* the ends of the course are bad */
-    if (!txe_soften(bench->b, n, is_closed, light, bench->a, bar) ||
-        !txe_soften(bench->b, n, is_closed, TXE_COURSE, bench->c, bar))
+static int txe_directions(const txe_scratch *scratch, size_t n, int is_closed, size_t radius,
+                          double amount, double *share, txe_sample *samples, txe_progress *bar) {
+    const txe_point *line = scratch->a, *course = scratch->c;
+    const size_t trim = is_closed || !share ? 0 : TXE_DIRECTION_BLUR; /* ends have no course */
+    if (!txe_soften(scratch->b, n, is_closed, radius, scratch->a, bar) ||
+        !txe_soften(scratch->b, n, is_closed, TXE_DIRECTION_BLUR, scratch->c, bar))
         return 0;
     for (size_t i = trim; i < n - trim; i++) {
         size_t at[4]; /* the course from at[0] to at[3], the line from at[1] to at[2] */
@@ -1208,32 +1214,33 @@ static int txe_directions(const txe_bench *bench, size_t n, int is_closed, size_
             samples[i].bin = bin;
             samples[i].length = txe_distance(line[i], line[at[2]]);
         }
-        if (txe_tick(bar, 4)) return 0;
+        if (txe_advance(bar, 4)) return 0;
     }
     return 1;
 }
 
-/* Take in one line: n points in bench->a, a pixel apart at most. With S the blur of radius
-   TXE_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
-   would shrink. Ends of open lines are left out, where the course is bad. 0 = cancelled. */
-static int txe_listen(txe_unrest *u, const txe_bench *bench, size_t n, int is_closed,
-                      txe_bar *bar) {
-    txe_point *line = bench->b, *blurred = bench->a, *course = bench->c;
-    if (n < TXE_SHORT) return 1;
-    const double length = txe_length(bench->a, n, is_closed, bar);
+/* Add the samples of one line: n points in scratch->a, a pixel apart at most. With S the blur of
+   radius TXE_COURSE_BLUR, the smooth course of the line P is 2 S P - S S P, which keeps curves that
+   S alone would shrink. The ends of open lines, which have no course, are left out.
+   0 = cancelled. */
+static int txe_measure_run(txe_roughness *u, const txe_scratch *scratch, size_t n, int is_closed,
+                           txe_progress *bar) {
+    txe_point *line = scratch->b, *blurred = scratch->a, *course = scratch->c;
+    if (n < TXE_MIN_LINE) return 1;
+    const double length = txe_length(scratch->a, n, is_closed, bar);
     if (length < 0) return 0;
     const size_t m = (size_t)(length + 0.5) + !is_closed; /* at most n */
-    const size_t trim = is_closed ? 0 : TXE_SCALE;
-    if (m < TXE_SHORT + 2 * trim) return 1;
-    if (!txe_resample(bench->a, n, is_closed, length, line, m, bar) ||
-        !txe_soften(line, m, is_closed, TXE_SCALE, blurred, bar) ||
-        !txe_soften(blurred, m, is_closed, TXE_SCALE, course, bar))
+    const size_t trim = is_closed ? 0 : TXE_COURSE_BLUR;
+    if (m < TXE_MIN_LINE + 2 * trim) return 1;
+    if (!txe_resample(scratch->a, n, is_closed, length, line, m, bar) ||
+        !txe_soften(line, m, is_closed, TXE_COURSE_BLUR, blurred, bar) ||
+        !txe_soften(blurred, m, is_closed, TXE_COURSE_BLUR, course, bar))
         return 0;
     for (size_t i = 0; i < m; i++) {
         course[i].x = 2 * blurred[i].x - course[i].x;
         course[i].y = 2 * blurred[i].y - course[i].y;
     }
-    /* a closed line goes on beyond its end, so that pieces can begin anywhere */
+    /* a closed line is repeated beyond its end, so that pieces can begin anywhere */
     const size_t room = TXE_PIECE + TXE_JOIN, end = is_closed ? m + room : m - trim;
     txe_sample *first = u->samples + u->count;
     txe_point direction;
@@ -1252,26 +1259,26 @@ static int txe_listen(txe_unrest *u, const txe_bench *bench, size_t n, int is_cl
             u->step += s->step;
         }
         u->count++;
-        if (txe_tick(bar, 4)) return 0;
+        if (txe_advance(bar, 4)) return 0;
     }
-    if (!txe_directions(bench, m, is_closed, TXE_LIGHT, u->amount, u->share, NULL, bar))
+    if (!txe_directions(scratch, m, is_closed, TXE_STEP_BLUR, u->amount, u->share, NULL, bar))
         return 0;
-    /* Tame the unrest and count its directions once more, along a straight course; smoother than
-       the exemplar's, as a line loses some when it is drawn in pixels. So as much as the exemplar
-       shows will be seen in the end. */
+    /* Limit the offsets and take the directions once more, along a straight course, smoothed a
+       little more than the exemplar's: a line that is drawn in pixels loses some of its roughness,
+       and in the end as much shall be visible as in the exemplar. */
     double x = 0;
     const size_t count = end - trim;
     for (size_t i = 0; i < count; i++) {
         txe_sample *s = first + i;
-        const double factor = txe_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
+        const double factor = txe_limit(sqrt(s->ahead * s->ahead + s->right * s->right));
         s->ahead *= factor;
         s->right *= factor;
         line[i].x = x + s->ahead;
         line[i].y = s->right;
         x += s->step;
-        if (txe_tick(bar, 2)) return 0;
+        if (txe_advance(bar, 2)) return 0;
     }
-    return txe_directions(bench, count, 0, TXE_LIGHT + 1, 1, NULL, first, bar);
+    return txe_directions(scratch, count, 0, TXE_STEP_BLUR + 1, 1, NULL, first, bar);
 }
 
 /* does the crack from p to q run along the picture's border? */
@@ -1280,68 +1287,68 @@ static int txe_on_border(const texedges_set *e, txm_vec2 p, txm_vec2 q) {
            (p.y == q.y && (p.y == 0 || p.y == (float)e->height));
 }
 
-/* Take in the parts of a line that lie inside the picture. 0 = cancelled. */
-static int txe_listen_line(txe_unrest *u, const txe_bench *bench, const texedges_set *e,
-                           const texedges_polyline *line, txe_bar *bar) {
+/* Add the parts of a line that do not run along the picture's border. 0 = cancelled. */
+static int txe_measure_line(txe_roughness *u, const txe_scratch *scratch, const texedges_set *e,
+                            const texedges_polyline *line, txe_progress *bar) {
     const txm_vec2 *p = e->points + line->first;
     size_t start = line->count, n = 0;
-    for (size_t j = 0; j < line->count && start == line->count; j++) { /* the first on the border */
+    for (size_t j = 0; j < line->count && start == line->count; j++) { /* first on the border */
         if (txe_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     const int is_closed = start == line->count;
     for (size_t k = 0; k < line->count; k++) {
         const size_t j = (start + k) % line->count, next = (j + 1) % line->count;
         if (txe_on_border(e, p[j], p[next])) {
-            if (!txe_listen(u, bench, n, 0, bar)) return 0;
+            if (!txe_measure_run(u, scratch, n, 0, bar)) return 0;
             n = 0;
-        } else { /* the middle of the crack: so a slope of one pixel in one is a straight line */
-            bench->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
-            bench->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
+        } else { /* middles of cracks: a slope of 1 is a straight line */
+            scratch->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
+            scratch->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
             n++;
         }
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
-    return txe_listen(u, bench, n, is_closed, bar);
+    return txe_measure_run(u, scratch, n, is_closed, bar);
 }
 
-/* The unrest of a layer, amount times that of the exemplar, with memory from the arena. */
-static txm_status txe_listen_layer(txe_unrest *u, const texedges_set *e, int layer,
-                                   double amount, txm_arena *arena, txe_bar *bar,
-                                   txm_env *env) {
+/* The roughness of a layer, amount times that of the exemplar, in memory of the arena. */
+static txm_status txe_measure_layer(txe_roughness *u, const texedges_set *e, int layer,
+                                    double amount, txm_arena *arena, txe_progress *bar,
+                                    txm_env *env) {
     const size_t room = TXE_PIECE + TXE_JOIN;
-    txe_bench bench;
+    txe_scratch scratch;
     size_t most = 0, longest = 0;
     double sum = 0;
     memset(u, 0, sizeof *u);
     u->amount = amount;
     for (size_t i = 0; i < e->line_count; i++) {
         const texedges_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXE_SHORT) continue;
+        if (line->layer != layer || line->count < TXE_MIN_LINE) continue;
         most += line->count + room;
         if (line->count > longest) longest = line->count;
     }
     if (most == 0) return TXM_OK;
     u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
-    txe_bench_make(&bench, arena, longest + room);
+    txe_scratch_make(&scratch, arena, longest + room);
     if (arena->failed) return txe_no_memory(env);
     for (size_t i = 0; i < e->line_count; i++) {
         const texedges_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXE_SHORT) continue;
-        if (!txe_listen_line(u, &bench, e, line, bar)) return txe_stopped(env);
+        if (line->layer != layer || line->count < TXE_MIN_LINE) continue;
+        if (!txe_measure_line(u, &scratch, e, line, bar)) return txe_stopped(env);
     }
     for (int b = 0; b < TXE_BINS; b++) sum += u->share[b];
     for (int b = 0; b < TXE_BINS && sum > 0; b++) u->share[b] /= sum;
     if (u->start_count) u->step /= (double)u->start_count;
-    if (u->step < 0.125) u->step = 0.125; /* of a line that turns in place */
+    if (u->step < 0.125) u->step = 0.125; /* of lines that turn on the spot */
     return TXM_OK;
 }
 
-/* ---- new unrest out of pieces ---------------------------------------------------------- */
+/* ---- new roughness out of pieces ------------------------------------------------------- */
 
-/* How badly TXE_JOIN samples go together: place and, as there are several, slope. */
-static double txe_gap(const txe_sample *a, const txe_sample *b) {
+/* The squared distance of two runs of TXE_JOIN samples: it compares offsets and slopes. */
+static double txe_mismatch(const txe_sample *a, const txe_sample *b) {
     double sum = 0;
     for (int j = 0; j < TXE_JOIN; j++) {
         const double ahead = a[j].ahead - b[j].ahead, right = a[j].right - b[j].right;
@@ -1350,8 +1357,8 @@ static double txe_gap(const txe_sample *a, const txe_sample *b) {
     return sum;
 }
 
-/* Let a piece begin where the tail of the last one is: the difference of their first samples is
-   taken back over TXE_JOIN samples. Fading from one to the other would even out both. */
+/* Make a piece begin where the tail of the last one is: the difference of their first samples is
+   removed gradually over TXE_JOIN samples. A cross-fade would smooth both. */
 static void txe_join(const txe_sample *tail, txe_sample *piece) {
     const double ahead = tail->ahead - piece->ahead, right = tail->right - piece->right;
     for (int j = 0; j < TXE_JOIN; j++) {
@@ -1361,18 +1368,18 @@ static void txe_join(const txe_sample *tail, txe_sample *piece) {
     }
 }
 
-/* What the next piece of a row is chosen by. */
-typedef struct txe_row {
-    const txe_sample *tail; /* how the last piece would go on; NULL: there is none           */
-    double length;            /* of the line so far                                            */
-    double bins[TXE_BINS];  /* and of its parts by direction                                 */
-} txe_row;
+/* The pieces chosen so far, as far as the choice of the next one depends on them. */
+typedef struct txe_chain {
+    const txe_sample *tail; /* how the last piece continues in the exemplar; NULL: there is none */
+    double length;          /* of the line so far                                                */
+    double bins[TXE_BINS];  /* the same by direction                                             */
+} txe_chain;
 
-/* How far the directions are from their shares once a piece is there. */
-static double txe_deviation(const txe_row *row, const double *share, const txe_sample *piece,
-                            size_t length) {
-    double bins[TXE_BINS], total = row->length, sum = 0;
-    memcpy(bins, row->bins, sizeof bins);
+/* How far the histogram of directions would be from the exemplar's with this piece. */
+static double txe_direction_error(const txe_chain *chain, const double *share,
+                                  const txe_sample *piece, size_t length) {
+    double bins[TXE_BINS], total = chain->length, sum = 0;
+    memcpy(bins, chain->bins, sizeof bins);
     for (size_t j = 0; j < length; j++) {
         bins[piece[j].bin] += piece[j].length;
         total += piece[j].length;
@@ -1384,19 +1391,20 @@ static double txe_deviation(const txe_row *row, const double *share, const txe_s
     return sum;
 }
 
-/* Choose a piece of this length: of some taken at random those that join best, to the tail and at
-   the end to head (NULL: to nothing, one of the piece itself: to its own beginning); of these the
-   one that brings the directions nearest to their shares. */
-static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe_row *row,
-                                    size_t length, int closes, const txe_sample *head) {
-    const txe_sample *good[TXE_GOOD + 1] = {NULL}, *best;
-    double gaps[TXE_GOOD + 1] = {0}, least;
+/* Choose a piece of this length. Of random candidates those with the best joints stay: to the tail,
+   and if the piece closes the line to head (NULL: to its own beginning). Of these the one is taken
+   that brings the histogram of directions nearest to the exemplar's. */
+static const txe_sample *txe_choose_piece(const txe_roughness *u, txm_rng *rng,
+                                          const txe_chain *chain, size_t length, int closes,
+                                          const txe_sample *head) {
+    const txe_sample *good[TXE_BEST + 1] = {NULL}, *best;
+    double gaps[TXE_BEST + 1] = {0}, least;
     int count = 0;
     for (int i = 0; i < TXE_TRIES * (closes ? 4 : 1); i++) {
         const size_t pick = (size_t)(txm_rng_double(rng) * (double)u->start_count);
         const txe_sample *piece = u->samples + u->starts[pick];
-        double gap = row->tail ? txe_gap(row->tail, piece) : 0;
-        if (closes) gap += txe_gap(piece + length, head ? head : piece);
+        double gap = chain->tail ? txe_mismatch(chain->tail, piece) : 0;
+        if (closes) gap += txe_mismatch(piece + length, head ? head : piece);
         int at = count;
         for (; at > 0 && gap < gaps[at - 1]; at--) {
             gaps[at] = gaps[at - 1];
@@ -1404,12 +1412,12 @@ static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe
         }
         gaps[at] = gap;
         good[at] = piece;
-        if (count < TXE_GOOD) count++;
+        if (count < TXE_BEST) count++;
     }
     best = good[0];
-    least = closes ? 0 : txe_deviation(row, u->share, best, length);
+    least = closes ? 0 : txe_direction_error(chain, u->share, best, length);
     for (int i = 1; i < count && !closes; i++) {
-        const double off = txe_deviation(row, u->share, good[i], length);
+        const double off = txe_direction_error(chain, u->share, good[i], length);
         if (off >= least) continue;
         best = good[i];
         least = off;
@@ -1417,12 +1425,12 @@ static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe
     return best;
 }
 
-/* String pieces together to a closed row of m samples, m >= TXE_PIECE / 3. 0 = cancelled. */
-static int txe_weave(const txe_unrest *u, txm_rng *rng, txe_sample *samples, size_t m,
-                     txe_bar *bar) {
+/* Join pieces to a closed line of m samples, m >= TXE_PIECE / 3. 0 = cancelled. */
+static int txe_chain_pieces(const txe_roughness *u, txm_rng *rng, txe_sample *samples, size_t m,
+                            txe_progress *bar) {
     const size_t shortest = TXE_PIECE / 3;
-    txe_row row;
-    memset(&row, 0, sizeof row);
+    txe_chain chain;
+    memset(&chain, 0, sizeof chain);
     for (size_t k = 0; k < m;) {
         const size_t rest = m - k;
         size_t length = rest;
@@ -1430,18 +1438,18 @@ static int txe_weave(const txe_unrest *u, txm_rng *rng, txe_sample *samples, siz
             length = shortest + txm_rng_below(rng, TXE_PIECE - (uint32_t)shortest + 1);
         if (length < rest && rest - length < shortest) length = rest - shortest;
         const txe_sample *piece =
-            txe_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
+            txe_choose_piece(u, rng, &chain, length, length == rest, k ? samples : NULL);
         memcpy(samples + k, piece, length * sizeof *samples);
-        if (row.tail) txe_join(row.tail, samples + k);
+        if (chain.tail) txe_join(chain.tail, samples + k);
         for (size_t j = 0; j < length; j++) {
-            row.bins[piece[j].bin] += piece[j].length;
-            row.length += piece[j].length;
+            chain.bins[piece[j].bin] += piece[j].length;
+            chain.length += piece[j].length;
         }
-        row.tail = piece + length;
+        chain.tail = piece + length;
         k += length;
-        if (txe_tick(bar, 64 * TXE_TRIES)) return 0;
+        if (txe_advance(bar, 64 * TXE_TRIES)) return 0;
     }
-    txe_join(row.tail, samples);
+    txe_join(chain.tail, samples);
     return 1;
 }
 
@@ -1453,7 +1461,7 @@ typedef struct txe_outline {
     size_t count;
 } txe_outline;
 
-static void txe_put(txe_outline *o, double x, double y) {
+static void txe_outline_add(txe_outline *o, double x, double y) {
     if (o->points) {
         o->points[o->count].x = x;
         o->points[o->count].y = y;
@@ -1461,14 +1469,14 @@ static void txe_put(txe_outline *o, double x, double y) {
     o->count++;
 }
 
-/* One side of a band around n points, to the left of the way (back: of the way back), and the round
-   end behind it. Where the line turns outwards the gap is filled in steps of a pixel or so. */
-static int txe_side(const txe_point *p, size_t n, int back, double half, txe_outline *o,
-                    txe_bar *bar) {
+/* One side of a band around n points, to the left of the line (back: of the reversed line), and the
+   round cap at its end. Where the line turns away the gap is filled in steps of about a pixel. */
+static int txe_band_side(const txe_point *p, size_t n, int back, double half, txe_outline *o,
+                         txe_progress *bar) {
     txe_point d, before;
     d.x = 1;
     d.y = 0;
-    for (size_t i = 1; i < n; i++) { /* a direction to begin with */
+    for (size_t i = 1; i < n; i++) { /* the first direction there is */
         const size_t at = back ? n - i : i - 1, next = back ? at - 1 : at + 1;
         if (txe_distance(p[at], p[next]) > 1e-9) {
             txe_direction(p[at], p[next], &d);
@@ -1486,28 +1494,27 @@ static int txe_side(const txe_point *p, size_t n, int back, double half, txe_out
             zero.x = zero.y = 0;
             mid = before;
             txe_direction(zero, txe_between(before, d, (double)k / (turns + 1)), &mid);
-            txe_put(o, p[at].x + half * mid.y, p[at].y - half * mid.x);
+            txe_outline_add(o, p[at].x + half * mid.y, p[at].y - half * mid.x);
         }
-        txe_put(o, p[at].x + half * d.y, p[at].y - half * d.x);
-        if (txe_tick(bar, (size_t)turns + 1)) return 0;
+        txe_outline_add(o, p[at].x + half * d.y, p[at].y - half * d.x);
+        if (txe_advance(bar, (size_t)turns + 1)) return 0;
     }
-    /* half a circle, in two quarters ((1 - t^2) u + 2 t v) / (1 + t^2), from left over ahead to
-       right */
+    /* a half circle of two quarters ((1 - t^2) u + 2 t v) / (1 + t^2): left, ahead, right */
     const txe_point end = p[back ? 0 : n - 1];
     const int steps = (int)(1.6 * half) + 1;
     for (int k = 1; k < 2 * steps; k++) {
         const double t = (double)(k < steps ? k : k - steps) / steps;
         const double c = half * (1 - t * t) / (1 + t * t), s = half * 2 * t / (1 + t * t);
         const double left = k < steps ? c : -s, ahead = k < steps ? s : c;
-        txe_put(o, end.x + left * d.y + ahead * d.x, end.y - left * d.x + ahead * d.y);
+        txe_outline_add(o, end.x + left * d.y + ahead * d.x, end.y - left * d.x + ahead * d.y);
     }
-    return !txe_tick(bar, 4 * (size_t)steps);
+    return !txe_advance(bar, 4 * (size_t)steps);
 }
 
-/* The outline of a stroke as a closed line, its inside to the right: of a closed one, its points in
-   the right order; of an open one, both sides of its band. */
+/* The outline of a stroke as a closed line with its inside to the right: of a closed stroke its
+   points in that order; of an open one both sides of its band. */
 static txm_status txe_outline_make(const texedges_stroke *s, txe_outline *o, txm_arena *arena,
-                                   txe_bar *bar, txm_env *env) {
+                                   txe_progress *bar, txm_env *env) {
     const size_t n = (size_t)s->count;
     txe_point *given = (txe_point *)txm_arena_alloc(arena, n, sizeof *given);
     double area = 0;
@@ -1518,7 +1525,7 @@ static txm_status txe_outline_make(const texedges_stroke *s, txe_outline *o, txm
         given[i].y = p.y;
         area += ((double)p.x - p0.x) * ((double)q.y - p0.y) -
                 ((double)q.x - p0.x) * ((double)p.y - p0.y);
-        if (txe_tick(bar, 1)) return txe_stopped(env);
+        if (txe_advance(bar, 1)) return txe_stopped(env);
     }
     if (s->is_closed) {
         for (size_t i = 0, j = n - 1; i < j && area < 0; i++, j--) {
@@ -1536,7 +1543,7 @@ static txm_status txe_outline_make(const texedges_stroke *s, txe_outline *o, txm
     txe_point *even = (txe_point *)txm_arena_alloc(arena, 2 * m, sizeof *even);
     if (!even) return txe_no_memory(env);
     if (!txe_resample(given, n, 0, length, even, m, bar) ||
-        !txe_soften(even, m, 0, TXE_CORNER, even + m, bar))
+        !txe_soften(even, m, 0, TXE_CORNER_BLUR, even + m, bar))
         return txe_stopped(env);
     const double half = 0.5 * (s->width > 0 ? s->width : 8);
     for (int pass = 0; pass < 2; pass++) { /* count, then keep */
@@ -1544,14 +1551,15 @@ static txm_status txe_outline_make(const texedges_stroke *s, txe_outline *o, txm
             pass ? (txe_point *)txm_arena_alloc(arena, o->count, sizeof *o->points) : NULL;
         if (pass && !o->points) return txe_no_memory(env);
         o->count = 0;
-        if (!txe_side(even + m, m, 0, half, o, bar) || !txe_side(even + m, m, 1, half, o, bar))
+        if (!txe_band_side(even + m, m, 0, half, o, bar) ||
+            !txe_band_side(even + m, m, 1, half, o, bar))
             return txe_stopped(env);
     }
     return TXM_OK;
 }
 
-/* The place at u on a closed line of n points. */
-static txe_point txe_at(const txe_point *p, size_t n, double u) {
+/* The point at index u, a fraction, of a closed line of n points. */
+static txe_point txe_point_at(const txe_point *p, size_t n, double u) {
     const double wide = (double)n;
     if (u < 0) u += wide;
     if (u >= wide) u -= wide;
@@ -1560,7 +1568,7 @@ static txe_point txe_at(const txe_point *p, size_t n, double u) {
     return txe_between(p[i], p[i + 1 < n ? i + 1 : 0], u - (double)i);
 }
 
-/* Do the segments a b and c d cross? Touching does not count. */
+/* Do the segments a b and c d cross? Where they only touch they do not. */
 static int txe_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 *at) {
     if (txm_maxf(a.x, b.x) < txm_minf(c.x, d.x) || txm_maxf(c.x, d.x) < txm_minf(a.x, b.x) ||
         txm_maxf(a.y, b.y) < txm_minf(c.y, d.y) || txm_maxf(c.y, d.y) < txm_minf(a.y, b.y))
@@ -1577,28 +1585,28 @@ static int txe_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d, txm_vec2 *a
     return 1;
 }
 
-/* Cut loops of fewer than TXE_LOOP points off a closed line: points are put on a stack; where the
-   segment to the next one crosses an earlier one, the stack goes back to that and on from where
-   they cross. Then once more from another point, for loops through the first. Returns how many
-   points remain; 0 = cancelled.
+/* Cut loops of fewer than TXE_LOOP points off a closed line. Points are pushed onto a stack; where
+   the segment to the next one crosses an earlier one, the stack is cut back to that and continues
+   from the crossing. A second pass starts from another point, for loops through the first. Returns
+   how many points remain; 0 = cancelled.
    scratch: room for n points */
-static size_t txe_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txe_bar *bar) {
+static size_t txe_cut_loops(txm_vec2 *points, size_t n, txm_vec2 *scratch, txe_progress *bar) {
     for (int round = 0; round < 2; round++) {
         const size_t turn = n / 2;
         size_t top = 0;
-        for (size_t i = 0; i <= n; i++) { /* the last is the first again */
+        for (size_t i = 0; i <= n; i++) { /* the first point again at the end */
             const txm_vec2 next = points[(turn + i) % n];
-            for (size_t k = 2; top > k && k <= TXE_LOOP; k++) { /* youngest first: small loops */
+            for (size_t k = 2; top > k && k <= TXE_LOOP; k++) { /* newest first: small loops */
                 const txm_vec2 *old = scratch + top - k - 1;
                 txm_vec2 at;
-                if (i == n && old == scratch) break; /* these two meet in the first point */
+                if (i == n && old == scratch) break; /* they share the first point */
                 if (!txe_cross(scratch[top - 1], next, old[0], old[1], &at)) continue;
                 top -= k;
                 scratch[top++] = at;
                 k = 1;
             }
             if (i < n) scratch[top++] = next;
-            if (txe_tick(bar, TXE_LOOP)) return 0;
+            if (txe_advance(bar, TXE_LOOP)) return 0;
         }
         n = top;
         memcpy(points, scratch, n * sizeof *points);
@@ -1606,15 +1614,15 @@ static size_t txe_unloop(txm_vec2 *points, size_t n, txm_vec2 *scratch, txe_bar 
     return n;
 }
 
-/* The outline o disturbed by up to stray pixels, in memory from the arena. */
-static txm_status txe_shake(const txe_unrest *u, double stray, txm_rng *rng,
-                            const txe_outline *o, txm_vec2 **points, size_t *count,
-                            txm_arena *arena, txe_bar *bar, txm_env *env) {
+/* The outline o displaced by up to `most` pixels, in memory of the arena. */
+static txm_status txe_displace(const txe_roughness *u, double most, txm_rng *rng,
+                               const txe_outline *o, txm_vec2 **points, size_t *count,
+                               txm_arena *arena, txe_progress *bar, txm_env *env) {
     const double length = txe_length(o->points, o->count, 1, bar);
     if (length < 0) return txe_stopped(env);
-    if (stray > length / 16) stray = length / 16;
-    if (length > 4 * (double)TXE_LENGTH)
-        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "turn too often for their width");
+    if (most > length / 16) most = length / 16;
+    if (length > 4 * (double)TXE_MAX_LENGTH)
+        return txm_fail_at(env, TXM_TOO_LARGE, "strokes", "have too many turns for their width");
     const size_t n = length > 16 ? (size_t)(length + 0.5) : 16, shortest = TXE_PIECE / 3;
     size_t m = (size_t)(length / u->step + 0.5);
     if (m < shortest) m = shortest;
@@ -1623,43 +1631,44 @@ static txm_status txe_shake(const txe_unrest *u, double stray, txm_rng *rng,
     txm_vec2 *line = (txm_vec2 *)txm_arena_alloc(arena, m + 1, 2 * sizeof *line);
     if (arena->failed) return txe_no_memory(env);
     const txe_point *soft = even + n;
-    const size_t corner = n < 8 * TXE_CORNER ? n / 8 : (size_t)TXE_CORNER;
+    const size_t corner = n < 8 * TXE_CORNER_BLUR ? n / 8 : (size_t)TXE_CORNER_BLUR;
     if (!txe_resample(o->points, o->count, 1, length, even, n, bar) ||
-        !txe_soften(even, n, 1, corner, even + n, bar) || !txe_weave(u, rng, row, m, bar))
+        !txe_soften(even, n, 1, corner, even + n, bar) || !txe_chain_pieces(u, rng, row, m, bar))
         return txe_stopped(env);
 
     double sum = 0, at = 0;
     for (size_t k = 0; k < m; k++) sum += row[k].step;
-    const double stretch = sum > 0 ? (double)n / sum : 0; /* samples of the stroke for each step */
-    const double scale = stray / TXE_STRAY;
+    const double stretch = sum > 0 ? (double)n / sum : 0; /* stroke samples per step */
+    const double scale = most / TXE_MAX_OFFSET;
     const double chord = n < 4 * TXE_CHORD ? (double)n / 4 : (double)TXE_CHORD;
     txe_point direction;
     direction.x = 1;
     direction.y = 0;
     for (size_t k = 0; k < m; k++) {
-        const txe_point p = txe_at(soft, n, at), given = txe_at(even, n, at);
-        txe_direction(txe_at(soft, n, at - chord), txe_at(soft, n, at + chord), &direction);
-        const double most = stray - txe_distance(p, given);
+        const txe_point p = txe_point_at(soft, n, at), given = txe_point_at(even, n, at);
+        txe_direction(txe_point_at(soft, n, at - chord), txe_point_at(soft, n, at + chord),
+                      &direction);
+        const double room = most - txe_distance(p, given);
         const double ahead = row[k].ahead * scale, right = row[k].right * scale;
         const double off = sqrt(ahead * ahead + right * right);
-        const double factor = off <= most ? 1 : most > 0 ? most / off : 0;
+        const double factor = off <= room ? 1 : room > 0 ? room / off : 0;
         line[k].x = txm_float(p.x + factor * (ahead * direction.x - right * direction.y));
         line[k].y = txm_float(p.y + factor * (ahead * direction.y + right * direction.x));
         at += row[k].step * stretch;
-        if (txe_tick(bar, 4)) return txe_stopped(env);
+        if (txe_advance(bar, 4)) return txe_stopped(env);
     }
     *points = line;
-    *count = txe_unloop(line, m, line + m + 1, bar);
+    *count = txe_cut_loops(line, m, line + m + 1, bar);
     return *count ? TXM_OK : txe_stopped(env);
 }
 
-/* One stroke: its line, in memory from `lines`. */
-static txm_status txe_stroke(const texedges_control *c, int i, const txe_unrest *u,
-                             txm_vec2 **points, size_t *count, txm_arena *lines, txe_bar *bar,
+/* The line of one stroke, in memory of `lines`. */
+static txm_status txe_stroke(const texedges_control *c, int i, const txe_roughness *u,
+                             txm_vec2 **points, size_t *count, txm_arena *lines, txe_progress *bar,
                              txm_env *env) {
     const texedges_stroke *s = &c->strokes[i];
-    const double width = s->is_closed ? 256 : s->width > 0 ? s->width : 8; /* sides must not meet */
-    const double stray = width < 8 ? width * TXE_STRAY / 8 : TXE_STRAY;
+    const double width = s->is_closed ? 256 : s->width > 0 ? s->width : 8; /* sides stay apart */
+    const double most = width < 8 ? width * TXE_MAX_OFFSET / 8 : TXE_MAX_OFFSET;
     txm_arena work;
     txe_outline o;
     txm_vec2 *made = NULL;
@@ -1667,25 +1676,25 @@ static txm_status txe_stroke(const texedges_control *c, int i, const txe_unrest 
     txm_arena_init(&work, env);
     memset(&o, 0, sizeof o);
     txm_status status = txe_outline_make(s, &o, &work, bar, env);
-    const int is_still = c->disturb < 0 || u->start_count == 0;
+    const int is_plain = c->disturb < 0 || u->start_count == 0;
     *count = o.count;
-    if (status == TXM_OK && !is_still)
-        status = txe_shake(u, stray, &rng, &o, &made, count, &work, bar, env);
+    if (status == TXM_OK && !is_plain)
+        status = txe_displace(u, most, &rng, &o, &made, count, &work, bar, env);
     if (status == TXM_OK) {
         *points = (txm_vec2 *)txm_arena_alloc(lines, *count, sizeof **points);
         if (!*points) status = txe_no_memory(env);
     }
     for (size_t k = 0; k < *count && status == TXM_OK; k++) {
         (*points)[k] =
-            is_still ? txm_v2(txm_float(o.points[k].x), txm_float(o.points[k].y)) : made[k];
-        if (txe_tick(bar, 1)) status = txe_stopped(env);
+            is_plain ? txm_v2(txm_float(o.points[k].x), txm_float(o.points[k].y)) : made[k];
+        if (txe_advance(bar, 1)) status = txe_stopped(env);
     }
     txm_arena_free(&work);
     return status;
 }
 
-/* All strokes, layer by layer, so that the unrest of one layer at a time is held. */
-static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena *lines,
+/* All strokes, layer by layer, so that the roughness of one layer at a time is held. */
+static txm_status txe_disturb(const texedges_control *c, txe_progress *bar, txm_arena *lines,
                               texedges_set *e, txm_env *env) {
     const size_t n = (size_t)c->stroke_count;
     txm_vec2 **points = (txm_vec2 **)txm_arena_alloc(lines, n, sizeof(txm_vec2 *));
@@ -1693,15 +1702,15 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
     if (lines->failed || e->memory.failed) return txe_no_memory(env);
     for (int layer = 0; layer < e->levels; layer++) {
         txm_arena held;
-        txe_unrest u;
+        txe_roughness u;
         int is_used = 0;
         txm_status status = TXM_OK;
         memset(&u, 0, sizeof u);
         for (int i = 0; i < c->stroke_count; i++) is_used |= c->strokes[i].layer == layer;
         txm_arena_init(&held, env);
         if (is_used && c->disturb >= 0)
-            status = txe_listen_layer(&u, c->edges, layer, c->disturb > 0 ? c->disturb : 1, &held,
-                                      bar, env);
+            status = txe_measure_layer(&u, c->edges, layer, c->disturb > 0 ? c->disturb : 1, &held,
+                                       bar, env);
         for (int i = 0; i < c->stroke_count && status == TXM_OK && is_used; i++) {
             if (c->strokes[i].layer != layer) continue;
             e->lines[i].layer = layer;
@@ -1720,19 +1729,19 @@ static txm_status txe_disturb(const texedges_control *c, txe_bar *bar, txm_arena
     if (!e->points) return txe_no_memory(env);
     for (size_t i = 0; i < n; i++) {
         memcpy(e->points + e->lines[i].first, points[i], e->lines[i].count * sizeof *e->points);
-        if (txe_tick(bar, e->lines[i].count)) return txe_stopped(env);
+        if (txe_advance(bar, e->lines[i].count)) return txe_stopped(env);
     }
     return TXM_OK;
 }
 
 TEXEDGES_API txm_status texedges_disturb(const texedges_control *control, int width, int height,
                                          txm_env *env, texedges_set **out) {
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (width < 1 || height < 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
-    if (width > TXE_SIDE || height > TXE_SIDE)
+    if (width > TXE_MAX_SIDE || height > TXE_MAX_SIDE)
         return txm_fail(env, TXM_TOO_LARGE, "a side is longer than 2^20 pixels");
     txe_stage(&bar, "edges", 0.1, txe_points_of(control));
     txm_status status = txe_check_control(control, &bar, env);
@@ -1769,7 +1778,7 @@ typedef struct txe_guide {
     uint8_t *at;
 } txe_guide;
 
-/* Coordinates in 256ths of a pixel, in which all that follows is exact. */
+/* Fixed-point coordinates of 1/256 pixel: all that follows is exact. */
 static int64_t txe_fixed(float x) {
     return (int64_t)floor((double)x * 256 + 0.5);
 }
@@ -1779,11 +1788,11 @@ static int64_t txe_ceil(int64_t a, int64_t b) {
     return a / b + (a % b > 0);
 }
 
-/* The rows whose centres a segment passes, in first..end-1, and where: its upper end counts, its
-   lower one does not, so that a corner counts once and a level segment not at all. */
+/* The rows first..end-1 whose centre lines a segment crosses, and where. Its upper end counts, its
+   lower one does not: a corner counts once, a horizontal segment not at all. */
 typedef struct txe_slope {
     int64_t x, y, dx, dy; /* of the upper end, and from there to the lower one */
-    int first, end, down; /* down: 1 if the segment runs so, else 0             */
+    int first, end, down; /* down: 1 if the segment runs downwards, else 0      */
 } txe_slope;
 
 static txe_slope txe_slope_of(txm_vec2 p, txm_vec2 q, int height) {
@@ -1808,10 +1817,10 @@ static uint32_t txe_column(const txe_slope *s, int row, int width) {
     return (uint32_t)(column < 0 ? 0 : column > width ? width : column);
 }
 
-/* Fill the inside of a line (winding number not 0) with value. The places where it passes the rows'
-   centres are listed by rows, each row is sorted by columns, and filled between them. */
+/* Fill the inside of a line (winding number not 0) with value: its crossings with the centre lines
+   of rows are listed row by row, sorted by column, and the spans between them are filled. */
 static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int value,
-                           txm_arena *arena, txe_bar *bar, txm_env *env) {
+                           txm_arena *arena, txe_progress *bar, txm_env *env) {
     int top = g->height, bottom = 0;
     size_t total = 0, longest = 0;
     for (size_t i = 0; i < n; i++) {
@@ -1819,10 +1828,10 @@ static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int 
         if (s.first < s.end && s.first < top) top = s.first;
         if (s.first < s.end && s.end > bottom) bottom = s.end;
         total += (size_t)(s.end - s.first);
-        if (txe_tick(bar, 4)) return txe_stopped(env);
+        if (txe_advance(bar, 4)) return txe_stopped(env);
     }
     if (total == 0) return TXM_OK;
-    /* next[r]: where the next passage of row top + r goes; in the end, where the row ends */
+    /* next[r]: index of the next crossing of row top + r; in the end, where the row ends */
     const size_t rows = (size_t)(bottom - top);
     size_t *next = (size_t *)txm_arena_zero(arena, rows + 1, sizeof *next);
     txm_pair *list = (txm_pair *)txm_arena_alloc(arena, total, sizeof *list);
@@ -1837,11 +1846,11 @@ static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int 
                     list[*at].value = (uint32_t)s.down;
                 }
                 ++*at;
-                if (txe_tick(bar, 4)) return txe_stopped(env);
+                if (txe_advance(bar, 4)) return txe_stopped(env);
             }
-            if (txe_tick(bar, 1)) return txe_stopped(env);
+            if (txe_advance(bar, 1)) return txe_stopped(env);
         }
-        for (size_t r = 0, sum = 0; r < rows && pass == 0; r++) { /* from how many to where */
+        for (size_t r = 0, sum = 0; r < rows && pass == 0; r++) { /* counts become indices */
             const size_t count = next[r];
             if (count > longest) longest = count;
             next[r] = sum;
@@ -1859,47 +1868,48 @@ static txm_status txe_fill(const txe_guide *g, const txm_vec2 *p, size_t n, int 
             winding += list[i].value ? 1 : -1;
             if (winding) memset(row + list[i].key, value, list[i + 1].key - list[i].key);
         }
-        if (txe_tick(bar, (size_t)g->width / 16 + 8 * count + 512)) return txe_stopped(env);
+        if (txe_advance(bar, (size_t)g->width / 16 + 8 * count + 512)) return txe_stopped(env);
     }
     return TXM_OK;
 }
 
-/* With a free background: around the strokes the layer that the nearest one borders on. Of each
-   pixel of a row first the distance to the nearest stroke in the row, then over the rows above and
-   below the least sum of squares; of several as near the left, then the upper one.
-   off, what: two bytes for each pixel. 0 = cancelled */
-static int txe_ring(const txe_guide *g, const int *beside, uint8_t *off, uint8_t *what,
-                    txe_bar *bar) {
+/* With a free background: the surroundings of strokes get the layer that borders most on that of
+   the nearest stroke. An exact distance transform: first the distance to the nearest stroke in the
+   same row, then the least sum of squares over the rows above and below; of equals the left, then
+   the upper one.
+   off, what: two bytes for each pixel, the distance and the stroke's layer + 1. 0 = cancelled */
+static int txe_fill_around(const txe_guide *g, const int *beside, uint8_t *off, uint8_t *what,
+                           txe_progress *bar) {
     const size_t w = (size_t)g->width;
     for (int y = 0; y < g->height; y++) {
         const uint8_t *row = g->at + (size_t)y * w;
         uint8_t *distance = off + (size_t)y * w, *mark = what + (size_t)y * w;
-        int since = TXE_RING + 1, last = 0; /* how far back, and what */
+        int since = TXE_AROUND + 1, last = 0; /* pixels since the last stroke, and its mark */
         for (size_t x = 0; x < w; x++) {
-            since = row[x] ? 0 : since <= TXE_RING ? since + 1 : since;
+            since = row[x] ? 0 : since <= TXE_AROUND ? since + 1 : since;
             if (row[x]) last = row[x];
             distance[x] = (uint8_t)since;
             mark[x] = (uint8_t)last;
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
-        since = TXE_RING + 1;
+        since = TXE_AROUND + 1;
         for (size_t x = w; x-- > 0;) {
-            since = row[x] ? 0 : since <= TXE_RING ? since + 1 : since;
+            since = row[x] ? 0 : since <= TXE_AROUND ? since + 1 : since;
             if (row[x]) last = row[x];
             if (since < distance[x]) {
                 distance[x] = (uint8_t)since;
                 mark[x] = (uint8_t)last;
             }
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
     }
     for (int y = 0; y < g->height; y++) {
-        const int low = y > TXE_RING ? y - TXE_RING : 0;
-        const int high = y + TXE_RING < g->height ? y + TXE_RING : g->height - 1;
+        const int low = y > TXE_AROUND ? y - TXE_AROUND : 0;
+        const int high = y + TXE_AROUND < g->height ? y + TXE_AROUND : g->height - 1;
         for (size_t x = 0; x < w; x++) {
             uint8_t *at = g->at + (size_t)y * w + x;
-            int least = TXE_RING * TXE_RING + 1, mark = 0;
-            if (txe_tick(bar, 2)) return 0;
+            int least = TXE_AROUND * TXE_AROUND + 1, mark = 0;
+            if (txe_advance(bar, 2)) return 0;
             if (off[(size_t)y * w + x] == 0) continue; /* inside a stroke */
             for (int v = low; v <= high; v++) {
                 const int dx = off[(size_t)v * w + x], dy = v - y;
@@ -1908,17 +1918,17 @@ static int txe_ring(const txe_guide *g, const int *beside, uint8_t *off, uint8_t
                 mark = what[(size_t)v * w + x];
             }
             *at = (uint8_t)(mark ? beside[mark - 1] + 1 : 0);
-            if (txe_tick(bar, 8)) return 0;
+            if (txe_advance(bar, 8)) return 0;
         }
     }
     return 1;
 }
 
-/* Draw all lines, and what is around them. mask, what: with a free background two more bytes for
-   each pixel, else NULL. In the end g holds grays, mask what there is to say. */
+/* Draw all lines and their surroundings. mask, what: with a free background two more bytes for each
+   pixel, else NULL. In the end g holds grays, and mask where they count. */
 static txm_status txe_guide_make(const texedges_control *c, const texedges_set *lines,
                                  const txe_guide *g, uint8_t *mask, uint8_t *what,
-                                 txe_bar *bar, txm_env *env) {
+                                 txe_progress *bar, txm_env *env) {
     const size_t count = (size_t)g->width * (size_t)g->height;
     for (size_t i = 0; i < lines->line_count; i++) {
         const texedges_polyline *line = &lines->lines[i];
@@ -1932,25 +1942,25 @@ static txm_status txe_guide_make(const texedges_control *c, const texedges_set *
     txe_stage(bar, "surroundings", 1, (mask ? 12 : 2) * (double)count);
     if (mask) {
         int beside[TEXEDGES_MAX_LEVELS];
-        for (int k = 0; k < lines->levels; k++) { /* a layer that borders on none: any other one */
+        for (int k = 0; k < lines->levels; k++) { /* without a neighbour: any other layer */
             beside[k] = c->edges->beside[k];
             if (beside[k] < 0) beside[k] = k ? k - 1 : 1;
         }
-        if (!txe_ring(g, beside, mask, what, bar)) return txe_stopped(env);
+        if (!txe_fill_around(g, beside, mask, what, bar)) return txe_stopped(env);
     }
     for (size_t i = 0; i < count; i++) {
         const int layer = g->at[i] ? g->at[i] - 1 : mask ? 0 : c->background;
         if (mask) mask[i] = g->at[i] ? 255 : 0;
         g->at[i] = (uint8_t)layer;
-        if (txe_tick(bar, 1)) return txe_stopped(env);
+        if (txe_advance(bar, 1)) return txe_stopped(env);
     }
-    return txe_show(g->at, count, lines->levels, bar) ? TXM_OK : txe_stopped(env);
+    return txe_layers_to_gray(g->at, count, lines->levels, bar) ? TXM_OK : txe_stopped(env);
 }
 
 TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
                                        const texedges_set *disturbed, txm_env *env,
                                        const txm_image *guide, const txm_image *mask) {
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     txm_status status = txe_check_image(guide, "guide", 1, env);
     if (status == TXM_OK) status = txe_check_image(mask, "mask", 1, env);
     txe_stage(&bar, "edges", 0.2, txe_points_of(control));
@@ -1967,7 +1977,7 @@ TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
         same = disturbed->lines[i].layer == control->strokes[i].layer;
     if (!same)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "disturbed",
-                           "made of other strokes than control holds");
+                           "was made of other strokes than control holds");
 
     const size_t w = (size_t)guide->width, count = w * (size_t)guide->height;
     const int is_free = control->background < 0;
@@ -1978,14 +1988,15 @@ TEXEDGES_API txm_status texedges_guide(const texedges_control *control,
     g.width = guide->width;
     g.height = guide->height;
     g.at = (uint8_t *)txm_arena_zero(&arena, count, is_free ? 3 : 1);
-    uint8_t *told = g.at && is_free ? g.at + count : NULL;
+    uint8_t *counts = g.at && is_free ? g.at + count : NULL; /* the mask */
     status =
-        g.at ? txe_guide_make(control, disturbed, &g, told, told ? told + count : NULL, &bar, env)
+        g.at ? txe_guide_make(control, disturbed, &g, counts, counts ? counts + count : NULL, &bar,
+                              env)
              : txe_no_memory(env);
     for (int y = 0; y < g.height && g.at && status == TXM_OK; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(mask, y);
         memcpy(txm_image_row(guide, y), g.at + (size_t)y * w, w);
-        if (told) memcpy(row, told + (size_t)y * w, w);
+        if (counts) memcpy(row, counts + (size_t)y * w, w);
         else memset(row, 255, w);
     }
     txm_arena_free(&arena);

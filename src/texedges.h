@@ -246,10 +246,10 @@ typedef struct texedges_control {
           band), inside to the right; or NULL on any error. levels, thresholds and beside are the
           exemplar's. Release it with texedges_set_free.
           A line deviates from its stroke (the edge of its band) by 4 pixels at most; from short
-          strokes and narrow bands by less, 1/16 of the length and 7/16 of the width. Where the stroke
-          turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) it does not
-          cross itself. If the exemplar has no edge of that layer of 64 pixels or more, and with
-          disturb = -1, it is the stroke itself
+          strokes and narrow bands by less, 1/16 of the length and 7/16 of the width. Where the
+          stroke turns gently (radii over 8 pixels, no part nearer than 8 pixels to another) the
+          line does not cross itself. If the exemplar has no edge of that layer of 64 pixels or
+          more, and with disturb = -1, it is the stroke itself
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, coordinates that are not finite,
           edges that texedges_find did not make; TXM_TOO_LARGE for strokes longer than 2^26 pixels;
           TXM_OUT_OF_MEMORY; TXM_CANCELLED

@@ -6,44 +6,45 @@
 /* ---- constants and progress ------------------------------------------------------------ */
 
 enum {
-    TXE_SIDE = 1 << 20,   /* pixels: a float tells corners and halves of them apart up to here  */
-    TXE_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t                */
-    TXE_LENGTH = 1 << 26, /* pixels, of all strokes                                             */
-    TXE_TICK = 1 << 15,   /* pieces of work of a few ns each between two reports                */
-    TXE_RING = 8,         /* pixels around a stroke in which the guide says what it is not      */
+    TXE_MAX_SIDE = 1 << 20,   /* pixels: up to here a float tells half pixels apart              */
+    TXE_MAX_PIXELS = 1 << 28, /* of a picture; four cracks each still fit an int32_t             */
+    TXE_MAX_LENGTH = 1 << 26, /* pixels, of all strokes                                          */
+    TXE_REPORT = 1 << 15,     /* work, in units of a few ns, between two progress reports        */
+    TXE_AROUND = 8, /* pixels around a stroke in which the guide asks for its neighbouring layer */
 
-    TXE_LIGHT = 2,   /* pixels: a blur of this radius takes the steps out of a line of cracks   */
-    TXE_CORNER = 3,  /* pixels: the blur of a stroke, for its corners                           */
-    TXE_SCALE = 32,  /* pixels: what varies faster along a line is its unrest                   */
-    TXE_COURSE = 24, /* pixels: blur of the line against which its directions are counted       */
-    TXE_CHORD = 6,   /* pixels to both sides, by which the direction of a smooth line is taken  */
-    TXE_BINS = 16,   /* directions told apart in half a turn                                    */
-    TXE_PIECE = 48,  /* samples: longest piece of unrest; the shortest is a third of it         */
-    TXE_JOIN = 8,    /* samples over which a piece is led on from the last one                  */
-    TXE_SHORT = 64,  /* samples: shorter lines of the exemplar tell nothing                     */
-    TXE_TRIES = 64,  /* pieces looked at for each join; four times as many to close a line      */
-    TXE_GOOD = 8,    /* of them so many that join best are looked at closer                     */
-    TXE_LOOP = 64    /* points: shorter loops of a disturbed line are cut off                   */
+    TXE_STEP_BLUR = 2,       /* pixels: radius of a blur that removes the steps of pixels        */
+    TXE_CORNER_BLUR = 3,     /* pixels: radius of the blur that rounds the corners of a stroke   */
+    TXE_COURSE_BLUR = 32,    /* pixels: radius of the blur that makes the smooth course of a line */
+    TXE_DIRECTION_BLUR = 24, /* pixels: the same, for the course that directions are relative to */
+    TXE_CHORD = 6,     /* pixels to either side, between which a smooth line's direction is taken */
+    TXE_BINS = 16,     /* directions of a histogram over half a turn                             */
+    TXE_PIECE = 48,    /* samples: longest piece of roughness; the shortest is a third of it     */
+    TXE_JOIN = 8,      /* samples over which the end of a piece is blended into the next         */
+    TXE_MIN_LINE = 64, /* samples: shorter lines of the exemplar are not measured                */
+    TXE_TRIES = 64,    /* candidates for each piece; four times as many for the closing one      */
+    TXE_BEST = 8,      /* candidates with the best joints, of which the directions decide        */
+    TXE_LOOP = 64      /* points: shorter loops of a disturbed line are cut off                  */
 };
-#define TXE_STRAY 3.5  /* pixels: how far unrest goes from the stroke (0.5 more for chords)     */
-#define TXE_LINEAR 2.0 /* pixels: up to here it is as it was in the exemplar                    */
+#define TXE_MAX_OFFSET 3.5  /* pixels from the stroke, for roughness (0.5 more for chords)       */
+#define TXE_KEPT_OFFSET 2.0 /* pixels: larger offsets are compressed, smaller ones kept          */
 
-/* The bar of one call: a stage fills from..to of it in total pieces of work. */
-typedef struct txe_bar {
+/* The progress of one call: the current stage covers from..to of it, `total` units of work. */
+typedef struct txe_progress {
     const txm_env *env;
     const char *stage;
     double from, to, total, done;
-    size_t quiet; /* work since the last report */
-} txe_bar;
+    size_t unreported; /* work since the last report */
+} txe_progress;
 
-static txe_bar txe_bar_make(const txm_env *env) {
-    txe_bar bar;
+static txe_progress txe_progress_of(const txm_env *env) {
+    txe_progress bar;
     memset(&bar, 0, sizeof bar);
     bar.env = env;
     return bar;
 }
 
-static void txe_stage(txe_bar *bar, const char *stage, double to, double total) {
+/* Begin a stage that ends at `to` of the whole. */
+static void txe_stage(txe_progress *bar, const char *stage, double to, double total) {
     bar->from = bar->to;
     bar->to = to;
     bar->stage = stage;
@@ -51,12 +52,12 @@ static void txe_stage(txe_bar *bar, const char *stage, double to, double total) 
     bar->done = 0;
 }
 
-/* So much work is done; non-zero: stop. */
-static inline int txe_tick(txe_bar *bar, size_t work) {
-    bar->quiet += work;
-    if (bar->quiet < TXE_TICK) return 0;
-    bar->done += (double)bar->quiet;
-    bar->quiet = 0;
+/* Add finished work; non-zero: the caller cancels. */
+static inline int txe_advance(txe_progress *bar, size_t work) {
+    bar->unreported += work;
+    if (bar->unreported < TXE_REPORT) return 0;
+    bar->done += (double)bar->unreported;
+    bar->unreported = 0;
     const double part = bar->done < bar->total ? bar->done / bar->total : 1;
     return txm_progress(bar->env, txm_float(bar->from + (bar->to - bar->from) * part), bar->stage);
 }
@@ -71,7 +72,7 @@ static txm_status txe_stopped(txm_env *env) {
 
 /* ---- sets ------------------------------------------------------------------------------ */
 
-/* An empty set, which lies in its own memory; NULL: there is none. */
+/* An empty set, which lies in its own memory; NULL if there is no memory. */
 static texedges_set *txe_set_make(int levels, int width, int height, const txm_env *env) {
     txm_arena memory;
     txm_arena_init(&memory, env);

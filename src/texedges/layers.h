@@ -6,7 +6,7 @@
 /* ---- from a picture to layers ---------------------------------------------------------- */
 
 /* The gray of each pixel, 0..1. 0 = cancelled, -1 = a sample is not finite, 1 = done. */
-static int txe_gray(const txm_image *image, float *gray, txe_bar *bar) {
+static int txe_gray(const txm_image *image, float *gray, txe_progress *bar) {
     const int is_color = image->channels >= 3;
     for (int y = 0; y < image->height; y++) {
         for (int x = 0; x < image->width; x++) {
@@ -16,16 +16,16 @@ static int txe_gray(const txm_image *image, float *gray, txe_bar *bar) {
                     0.0722 * txm_image_get(image, x, y, 2);
             if (!txm_is_finite(g)) return -1;
             *gray++ = txm_float(g < 0 ? 0 : g > 1 ? 1 : g);
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
     }
     return 1;
 }
 
-/* Blur by the weights 1 - |d| / (radius + 1), rows then columns; beyond its border the picture goes
-   on as it ends. scratch: as large as gray. 0 = cancelled. */
+/* Blur with the weights 1 - |d| / (radius + 1), rows then columns; border pixels are repeated
+   outwards. scratch: as large as gray. 0 = cancelled. */
 static int txe_blur(float *gray, float *scratch, int width, int height, double radius,
-                    txe_bar *bar) {
+                    txe_progress *bar) {
     const int reach = (int)radius;
     double weight[17] = {1}, sum = 0;
     for (int d = 0; d <= reach; d++) {
@@ -48,30 +48,30 @@ static int txe_blur(float *gray, float *scratch, int width, int height, double r
                          ((double)from[i - (size_t)back * step] + from[i + (size_t)ahead * step]);
                 }
                 to[i] = txm_float(g / sum);
-                if (txe_tick(bar, (size_t)reach + 1)) return 0;
+                if (txe_advance(bar, (size_t)reach + 1)) return 0;
             }
         }
     }
     return 1;
 }
 
-/* Thresholds that part count grays into layers of about the same area.
+/* Thresholds that divide count grays into layers of about the same area.
 
-   In a histogram of 256 bins, cut k lies where k / levels of the area are darker, or up to a
-   quarter of a layer's area beside that, where the two bins next to the cut hold least; of a gap
-   in the middle. Where one bin holds too much for that, on its nearer side. 0 = cancelled. */
-static int txe_divide(const float *gray, size_t count, int levels, float *thresholds,
-                      txe_bar *bar) {
+   In a histogram of 256 bins, cut k lies where k / levels of the area is darker, or within a
+   quarter of a layer's area of that, where the two bins next to the cut hold least; in a gap, in
+   its middle. If one bin holds too much for that, the cut is on its nearer side. 0 = cancelled. */
+static int txe_choose_thresholds(const float *gray, size_t count, int levels, float *thresholds,
+                                 txe_progress *bar) {
     size_t bins[256], below[257];
     int previous = 0;
     memset(bins, 0, sizeof bins);
     for (size_t i = 0; i < count; i++) {
         bins[(int)((double)gray[i] * 255 + 0.5)]++;
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     below[0] = 0;
     for (int b = 0; b < 256; b++) below[b + 1] = below[b] + bins[b];
-    for (int k = 1; k < levels; k++) { /* all areas times 4 levels: whole numbers */
+    for (int k = 1; k < levels; k++) { /* areas are multiplied by 4 levels, to stay whole */
         const uint64_t target = 4 * (uint64_t)k * count, quarter = count;
         const int most = 256 - (levels - k);
         int best = 0;
@@ -99,12 +99,14 @@ static int txe_divide(const float *gray, size_t count, int levels, float *thresh
     return 1;
 }
 
-/* The neighbour of a pixel beyond its side 0 = top, 1 = right, 2 = bottom, 3 = left; a crack is run
-   through clockwise, so that its pixel lies to the right: along the top to the right, and so on. */
-static const int txe_side_x[4] = {0, 1, 0, -1}, txe_side_y[4] = {-1, 0, 1, 0};
+/* Steps from a pixel to its neighbour across side 0 = top, 1 = right, 2 = bottom, 3 = left. The
+   cracks around a pixel are followed clockwise, so that the pixel lies to the right: along the top
+   to the right, and so on. */
+static const int txe_step_x[4] = {0, 1, 0, -1}, txe_step_y[4] = {-1, 0, 1, 0};
 
-/* Connected pixels of one layer are a region. It is known by one of its pixels, its root; next
-   links root and boundary pixels to a circle. Two circles are joined by swapping one link each. */
+/* Connected pixels of one layer are a region, in a union-find forest; one of its pixels is its
+   root. next links the root and the boundary pixels in a ring; swapping one link of each joins two
+   rings. */
 typedef struct txe_regions {
     int width, height;
     int32_t *parent, *next;
@@ -123,32 +125,32 @@ static int32_t txe_unite(txe_regions *r, int32_t a, int32_t b) {
     return r->parent[b] = a;
 }
 
-/* the pixel beyond a side of p, -1: none */
-static int32_t txe_beyond(const txe_regions *r, int32_t p, int side) {
-    const int x = p % r->width + txe_side_x[side], y = p / r->width + txe_side_y[side];
+/* the pixel across a side of p, -1: none */
+static int32_t txe_neighbour(const txe_regions *r, int32_t p, int side) {
+    const int x = p % r->width + txe_step_x[side], y = p / r->width + txe_step_y[side];
     if (x < 0 || y < 0 || x >= r->width || y >= r->height) return -1;
-    return p + txe_side_x[side] + txe_side_y[side] * r->width;
+    return p + txe_step_x[side] + txe_step_y[side] * r->width;
 }
 
-static int txe_regions_make(txe_regions *r, txe_bar *bar) {
+static int txe_regions_make(txe_regions *r, txe_progress *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int32_t p = 0; p < count; p++) {
         r->parent[p] = r->next[p] = p;
         r->length[p] = 0;
         int32_t root = p;
         for (int side = 3; side >= 0; side -= 3) { /* left and above */
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             if (q < 0 || r->layer[q] != r->layer[p]) continue;
             const int32_t other = txe_root(r, q);
             if (other != root) root = txe_unite(r, root, other);
         }
-        if (txe_tick(bar, 2)) return 0;
+        if (txe_advance(bar, 2)) return 0;
     }
     for (int32_t p = 0; p < count; p++) {
         const int32_t root = txe_root(r, p);
         int cracks = 0;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             cracks += q < 0 || r->layer[q] != r->layer[p];
         }
         r->length[root] += cracks;
@@ -156,21 +158,21 @@ static int txe_regions_make(txe_regions *r, txe_bar *bar) {
             r->next[p] = r->next[root];
             r->next[root] = p;
         }
-        if (txe_tick(bar, 2)) return 0;
+        if (txe_advance(bar, 2)) return 0;
     }
     return 1;
 }
 
-/* Give a region to the layer with which it shares most of its boundary, the darkest of several, and
+/* Give a region to the layer with which it shares most of its boundary (of equals the darkest) and
    unite it with all regions of that layer around it. Returns the new root, -1 if the region is the
-   whole picture. Pixels that are on no boundary any more are taken out of the circle. */
+   whole picture. Pixels that are no longer on a boundary are removed from the ring. */
 static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
     int32_t shared[TEXEDGES_MAX_LEVELS];
     memset(shared, 0, sizeof shared);
     for (int32_t before = region, p = region;;) {
         int inner = 1;
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             const int32_t other = q < 0 ? region : txe_root(r, q);
             if (other == region) continue;
             inner = 0;
@@ -189,9 +191,9 @@ static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
     if (shared[target] == 0) return -1;
     int32_t root = region, length = r->length[region] - 2 * shared[target];
     for (int32_t p = region, after;; p = after) {
-        after = r->next[p]; /* what is joined in behind p is not walked through */
+        after = r->next[p]; /* pixels that are linked in behind p are skipped */
         for (int side = 0; side < 4; side++) {
-            const int32_t q = txe_beyond(r, p, side);
+            const int32_t q = txe_neighbour(r, p, side);
             const int32_t other = q < 0 ? root : txe_root(r, q);
             if (other == root || r->layer[other] != target) continue;
             const int32_t link = r->next[p];
@@ -208,10 +210,10 @@ static int32_t txe_dissolve(txe_regions *r, int32_t region, size_t *work) {
     return root;
 }
 
-/* Dissolve regions until all have a boundary of least cracks or more: first those under 8, then
-   under 16 and so on, each time in raster order of the roots. A region of n cracks is one of
-   O(pixels / n), so all this takes O(pixels log least). 0 = cancelled. */
-static int txe_regions_clean(txe_regions *r, int least, txe_bar *bar) {
+/* Dissolve regions until all have a boundary of at least `least` cracks: first those under 8, then
+   under 16 and so on, each time in raster order of the roots. There are O(pixels / n) regions of n
+   cracks, so all this takes O(pixels log least). 0 = cancelled. */
+static int txe_regions_clean(txe_regions *r, int least, txe_progress *bar) {
     const int32_t count = (int32_t)r->width * r->height;
     for (int bound = 4; bound < least;) {
         bound = bound < least / 2 ? 2 * bound : least;
@@ -220,23 +222,23 @@ static int txe_regions_clean(txe_regions *r, int least, txe_bar *bar) {
             while (region >= 0 && r->length[region] < bound) {
                 size_t work = 0;
                 region = txe_dissolve(r, region, &work);
-                if (txe_tick(bar, 8 * work)) return 0;
+                if (txe_advance(bar, 8 * work)) return 0;
             }
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
     }
     for (int32_t p = 0; p < count; p++) {
         r->layer[p] = r->layer[txe_root(r, p)];
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     return 1;
 }
 
 /* The layer of each pixel. is_given: thresholds holds levels - 1 of them, else it receives them.
-   to: the part of the bar that is full then. */
-static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
-                            float *thresholds, uint8_t *layer, double to, txe_bar *bar,
-                            txm_arena *arena, txm_env *env) {
+   to: the progress of the call when this is done. */
+static txm_status txe_layers_find(const texedges_desc *desc, int levels, int is_given,
+                                  float *thresholds, uint8_t *layer, double to, txe_progress *bar,
+                                  txm_arena *arena, txm_env *env) {
     const int width = desc->image.width, height = desc->image.height;
     const size_t count = (size_t)width * (size_t)height;
     const double smooth = desc->smooth;
@@ -246,18 +248,18 @@ static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
     const int good = txe_gray(&desc->image, gray, bar);
     if (good < 0)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is infinite or not a number");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is not finite");
     if (!good || (smooth > 0 && !txe_blur(gray, scratch, width, height, smooth, bar)) ||
-        (!is_given && !txe_divide(gray, count, levels, thresholds, bar)))
+        (!is_given && !txe_choose_thresholds(gray, count, levels, thresholds, bar)))
         return txe_stopped(env);
     for (size_t i = 0; i < count; i++) {
         int k = 0;
         while (k < levels - 1 && gray[i] >= thresholds[k]) k++;
         layer[i] = (uint8_t)k;
-        if (txe_tick(bar, 1)) return txe_stopped(env);
+        if (txe_advance(bar, 1)) return txe_stopped(env);
     }
     txm_arena_free(arena);
-    if (desc->least <= 4) return TXM_OK; /* nothing is shorter */
+    if (desc->least <= 4) return TXM_OK; /* no boundary is shorter */
 
     txe_regions r;
     r.width = width;
@@ -274,14 +276,14 @@ static txm_status txe_split(const texedges_desc *desc, int levels, int is_given,
     return TXM_OK;
 }
 
-/* Turn layers into grays. 0 = cancelled. */
-static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
+/* Replace the number of each pixel's layer by its gray. 0 = cancelled. */
+static int txe_layers_to_gray(uint8_t *layer, size_t count, int levels, txe_progress *bar) {
     uint8_t gray[TEXEDGES_MAX_LEVELS] = {0};
     for (int k = 0; k < levels; k++)
         gray[k] = (uint8_t)((2 * 255 * k + levels - 1) / (2 * (levels - 1)));
     for (size_t i = 0; i < count; i++) {
         layer[i] = gray[layer[i]];
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     return 1;
 }
@@ -289,15 +291,15 @@ static int txe_show(uint8_t *layer, size_t count, int levels, txe_bar *bar) {
 TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
                                         const texedges_set *edges, txm_env *env,
                                         const txm_image *layers) {
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     txm_status status = txe_check_desc(desc, env);
     if (status == TXM_OK) status = txe_check_image(layers, "layers", 1, env);
     if (status == TXM_OK &&
         (layers->width != desc->image.width || layers->height != desc->image.height))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must be as large as the image");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "layers", "must have the size of the image");
     if (status == TXM_OK && (!edges || edges->levels < 2 || edges->levels > TEXEDGES_MAX_LEVELS ||
                              !txe_thresholds_are_good(edges->thresholds, edges->levels)))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "not as texedges_find made it");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "edges", "is not as texedges_find made it");
     if (status != TXM_OK) return status;
 
     float thresholds[TEXEDGES_MAX_LEVELS];
@@ -307,9 +309,11 @@ TEXEDGES_API txm_status texedges_layers(const texedges_desc *desc,
     memcpy(thresholds, edges->thresholds, sizeof thresholds);
     const size_t width = (size_t)layers->width;
     uint8_t *layer = (uint8_t *)txm_arena_alloc(&map, width, (size_t)layers->height);
-    status = layer ? txe_split(desc, edges->levels, 1, thresholds, layer, 1, &bar, &scratch, env)
+    const int levels = edges->levels;
+    const size_t count = width * (size_t)layers->height;
+    status = layer ? txe_layers_find(desc, levels, 1, thresholds, layer, 1, &bar, &scratch, env)
                    : txe_no_memory(env);
-    if (status == TXM_OK && !txe_show(layer, width * (size_t)layers->height, edges->levels, &bar))
+    if (status == TXM_OK && !txe_layers_to_gray(layer, count, levels, &bar))
         status = txe_stopped(env);
     for (int y = 0; y < layers->height && status == TXM_OK; y++)
         memcpy(txm_image_row(layers, y), layer + (size_t)y * width, width);

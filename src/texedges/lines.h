@@ -5,22 +5,22 @@
 
 /* ---- from layers to lines -------------------------------------------------------------- */
 
-/* The map of layers while lines are traced: the layer in the lower four bits of a byte, in the
-   upper four the sides of the pixel whose cracks are still to be run through. */
+/* The map of layers while lines are traced: the lower four bits of a byte are the layer, the upper
+   four the sides of the pixel whose cracks have not been followed yet. */
 typedef struct txe_map {
     int width, height;
     uint8_t *at;
 } txe_map;
 
 /* is the pixel of this layer? */
-static int txe_is(const txe_map *m, int x, int y, int layer) {
+static int txe_is_layer(const txe_map *m, int x, int y, int layer) {
     if (x < 0 || y < 0 || x >= m->width || y >= m->height) return 0;
     return (m->at[(size_t)y * (size_t)m->width + (size_t)x] & 15) == layer;
 }
 
-/* Mark all cracks and count them. shared: cracks of each layer with each other. 0 = cancelled. */
-static int txe_mark(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_MAX_LEVELS],
-                    txe_bar *bar) {
+/* Mark all cracks and count them. shared: cracks between each two layers. 0 = cancelled. */
+static int txe_mark_cracks(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_MAX_LEVELS],
+                           txe_progress *bar) {
     const int w = m->width;
     *cracks = 0;
     for (int y = 0; y < m->height; y++) {
@@ -28,32 +28,32 @@ static int txe_mark(const txe_map *m, size_t *cracks, size_t (*shared)[TEXEDGES_
             uint8_t *at = m->at + (size_t)y * (size_t)w + (size_t)x;
             const int layer = *at & 15;
             for (int side = 0; side < 4; side++) {
-                const int u = x + txe_side_x[side], v = y + txe_side_y[side];
-                if (txe_is(m, u, v, layer)) continue;
+                const int u = x + txe_step_x[side], v = y + txe_step_y[side];
+                if (txe_is_layer(m, u, v, layer)) continue;
                 *at = (uint8_t)(*at | 16 << side);
                 ++*cracks;
                 if (u >= 0 && v >= 0 && u < w && v < m->height)
                     shared[layer][m->at[(size_t)v * (size_t)w + (size_t)u] & 15]++;
             }
-            if (txe_tick(bar, 4)) return 0;
+            if (txe_advance(bar, 4)) return 0;
         }
     }
     return 1;
 }
 
-/* Run through the cracks of one line, from side `side` of pixel (x, y), and unmark them.
+/* Follow the cracks of one line, from side `side` of pixel (x, y), and unmark them.
 
-           l | a      p: the pixel to the right of the way (here upwards, along its left side)
-             ^        a: the next one on the same hand, l: the one across
+           l | a      p: the pixel to the right of the line (here upwards, along its left side)
+             ^        a: the next pixel on the right side, l: the one across from a
            - | p      a is of another layer: turn right, around p, whatever l is;
-                      a and l are of p's: turn left, around the corner of what lies between;
-                      only a is: straight on
+                      a and l are both of p's layer: turn left;
+                      only a is of p's layer: straight on
 
-   As each crack has one successor and is that of one, the way comes back to its beginning.
+   Each crack has one successor and one predecessor, so the line returns to its start.
    points  receives the corners, or NULL; returns their number; 0 = cancelled
    area    receives the area to the right, negative if the line is a hole's                   */
 static size_t txe_trace(const txe_map *m, int x, int y, int side, txm_vec2 *points,
-                        int64_t *area, txe_bar *bar) {
+                        int64_t *area, txe_progress *bar) {
     const int x0 = x, y0 = y, side0 = side, w = m->width;
     const int layer = m->at[(size_t)y * (size_t)w + (size_t)x] & 15;
     size_t count = 0;
@@ -66,34 +66,33 @@ static size_t txe_trace(const txe_map *m, int x, int y, int side, txm_vec2 *poin
         count++;
         if (side == 1) *area += x + 1; /* integral of x dy */
         if (side == 3) *area -= x;
-        const int ahead = (side + 1) & 3; /* the side across which a lies */
-        const int ax = x + txe_side_x[ahead], ay = y + txe_side_y[ahead];
-        if (!txe_is(m, ax, ay, layer)) {
+        const int ahead = (side + 1) & 3; /* the side between p and a */
+        const int ax = x + txe_step_x[ahead], ay = y + txe_step_y[ahead];
+        if (!txe_is_layer(m, ax, ay, layer)) {
             side = ahead;
         } else {
             x = ax;
             y = ay;
-            const int lx = ax + txe_side_x[side], ly = ay + txe_side_y[side];
-            if (txe_is(m, lx, ly, layer)) {
+            const int lx = ax + txe_step_x[side], ly = ay + txe_step_y[side];
+            if (txe_is_layer(m, lx, ly, layer)) {
                 x = lx;
                 y = ly;
                 side = (side + 3) & 3;
             }
         }
-        if (txe_tick(bar, 4)) return 0;
+        if (txe_advance(bar, 4)) return 0;
     } while (x != x0 || y != y0 || side != side0);
     return count;
 }
 
-/* All lines in raster order of where they begin: run through once to count them, once to keep
-   them. */
-static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
+/* All lines in raster order of their first points: traced once to count them, once to keep them. */
+static txm_status txe_trace_all(const txe_map *m, txe_progress *bar, texedges_set *e,
                                 txm_env *env) {
     size_t shared[TEXEDGES_MAX_LEVELS][TEXEDGES_MAX_LEVELS], cracks;
     for (int pass = 0; pass < 2; pass++) {
         size_t lines = 0, points = 0;
         memset(shared, 0, sizeof shared);
-        if (!txe_mark(m, &cracks, shared, bar)) return txe_stopped(env);
+        if (!txe_mark_cracks(m, &cracks, shared, bar)) return txe_stopped(env);
         if (pass == 1) {
             e->lines =
                 (texedges_polyline *)txm_arena_alloc(&e->memory, e->line_count, sizeof *e->lines);
@@ -118,7 +117,7 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
                     points += count;
                     lines++;
                 }
-                if (txe_tick(bar, 1)) return txe_stopped(env);
+                if (txe_advance(bar, 1)) return txe_stopped(env);
             }
         }
         e->line_count = lines;
@@ -134,7 +133,7 @@ static txm_status txe_trace_all(const txe_map *m, txe_bar *bar, texedges_set *e,
     return TXM_OK;
 }
 
-static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *layers,
+static txm_status txe_find(const texedges_desc *desc, txe_progress *bar, txm_arena *layers,
                            txm_arena *scratch, texedges_set *e, txm_env *env) {
     txe_map map;
     const size_t count = (size_t)e->width * (size_t)e->height;
@@ -144,8 +143,8 @@ static txm_status txe_find(const texedges_desc *desc, txe_bar *bar, txm_arena *l
         e->thresholds[k] = desc->thresholds[k];
     map.at = (uint8_t *)txm_arena_alloc(layers, count, 1);
     if (!map.at) return txe_no_memory(env);
-    const txm_status status = txe_split(desc, e->levels, desc->thresholds != NULL, e->thresholds,
-                                        map.at, 0.7, bar, scratch, env);
+    const txm_status status = txe_layers_find(desc, e->levels, desc->thresholds != NULL,
+                                              e->thresholds, map.at, 0.7, bar, scratch, env);
     if (status != TXM_OK) return status;
     txe_stage(bar, "lines", 1, (double)count * 14);
     return txe_trace_all(&map, bar, e, env);
@@ -161,10 +160,10 @@ TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, t
                            "must be 0 or 2 to TEXEDGES_MAX_LEVELS");
     const int levels = desc->levels ? desc->levels : 4;
     if (desc->thresholds && !txe_thresholds_are_good(desc->thresholds, levels))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie in 0 to 1");
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "thresholds", "must rise and lie within 0 to 1");
 
     txm_arena layers, scratch;
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     texedges_set *set = txe_set_make(levels, desc->image.width, desc->image.height, env);
     if (!set) return txe_no_memory(env);
     txm_arena_init(&layers, env);
@@ -177,30 +176,30 @@ TEXEDGES_API txm_status texedges_find(const texedges_desc *desc, txm_env *env, t
     return status;
 }
 
-/* Mark the pixels along a line, layer + 1: those that hold points half a pixel to its right, taken
-   twice a pixel. 0 = cancelled. */
+/* Mark the pixels along a line with layer + 1: those under points half a pixel to its right, two
+   points a pixel. 0 = cancelled. */
 static int txe_draw_line(const texedges_set *e, const texedges_polyline *line, uint8_t *marks,
-                         int width, int height, txe_bar *bar) {
+                         int width, int height, txe_progress *bar) {
     const txm_vec2 *points = e->points + line->first;
     for (size_t j = 0; j < line->count; j++) {
         const txm_vec2 p = points[j], q = points[j + 1 < line->count ? j + 1 : 0];
         const double dx = (double)q.x - p.x, dy = (double)q.y - p.y;
         const double length = sqrt(dx * dx + dy * dy);
         const int steps = 2 * (int)length + 1;
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
         for (int i = 0; i < steps && length > 0; i++) {
             const double t = (i + 0.5) / steps;
             const double x = p.x + t * dx - 0.5 * dy / length, y = p.y + t * dy + 0.5 * dx / length;
             if (x >= 0 && y >= 0 && x < width && y < height)
                 marks[(size_t)y * (size_t)width + (size_t)x] = (uint8_t)(line->layer + 1);
-            if (txe_tick(bar, 2)) return 0;
+            if (txe_advance(bar, 2)) return 0;
         }
     }
     return 1;
 }
 
-/* The colour of a layer: black, purple, red, yellow, white at equal distances; the darkest layer is
-   not quite black. One channel: gray. */
+/* The colour of a layer, on a ramp from black over purple, red and yellow to white; the darkest
+   layer is not quite black. One channel: gray. */
 static uint8_t txe_color(int layer, int levels, int channels, int channel) {
     static const int ramp[5][3] = {
         {0, 0, 0}, {112, 0, 144}, {224, 48, 48}, {240, 192, 32}, {255, 255, 255}};
@@ -212,7 +211,7 @@ static uint8_t txe_color(int layer, int levels, int channels, int channel) {
 
 TEXEDGES_API txm_status texedges_draw(const texedges_set *edges, int layer, txm_env *env,
                                       const txm_image *image) {
-    txe_bar bar = txe_bar_make(env);
+    txe_progress bar = txe_progress_of(env);
     txe_stage(&bar, "edges", 0.5, edges ? (double)edges->point_count : 0);
     txm_status status = txe_check_image(image, "image", 0, env);
     if (status != TXM_OK) return status;

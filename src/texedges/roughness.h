@@ -3,7 +3,7 @@
 
 #include "check.h"
 
-/* ---- lines as rows of points ----------------------------------------------------------- */
+/* ---- lines as arrays of points --------------------------------------------------------- */
 
 typedef struct txe_point {
     double x, y;
@@ -21,12 +21,12 @@ static double txe_distance(txe_point a, txe_point b) {
     return sqrt(dx * dx + dy * dy);
 }
 
-/* Length of n points; closed: back to the first. Negative: cancelled. */
-static double txe_length(const txe_point *p, size_t n, int is_closed, txe_bar *bar) {
+/* Length of the line through n points; closed: back to the first. Negative: cancelled. */
+static double txe_length(const txe_point *p, size_t n, int is_closed, txe_progress *bar) {
     double sum = 0;
     for (size_t i = 1; i < n + (is_closed != 0); i++) {
         sum += txe_distance(p[i - 1], p[i < n ? i : 0]);
-        if (txe_tick(bar, 1)) return -1;
+        if (txe_advance(bar, 1)) return -1;
     }
     return sum;
 }
@@ -34,7 +34,7 @@ static double txe_length(const txe_point *p, size_t n, int is_closed, txe_bar *b
 /* m points at equal distances along a line of n points and this length: closed from the first point
    on, open from the first to the last. 0 = cancelled. */
 static int txe_resample(const txe_point *p, size_t n, int is_closed, double length,
-                        txe_point *out, size_t m, txe_bar *bar) {
+                        txe_point *out, size_t m, txe_progress *bar) {
     const size_t segments = is_closed ? n : n - 1;
     const double step = length / (double)(is_closed ? m : m - 1);
     size_t i = 0;
@@ -45,19 +45,19 @@ static int txe_resample(const txe_point *p, size_t n, int is_closed, double leng
             from += span;
             i++;
             span = txe_distance(p[i], p[i + 1 < n ? i + 1 : 0]);
-            if (txe_tick(bar, 1)) return 0;
+            if (txe_advance(bar, 1)) return 0;
         }
         const double t = span > 0 ? (at - from) / span : 0;
         out[k] = txe_between(p[i], p[i + 1 < n ? i + 1 : 0], t < 1 ? t : 1);
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     return 1;
 }
 
-/* Blur a line by the weights radius + 1 - |d|, whole numbers. Closed: around (n > radius); open:
-   near the ends with as small a radius as they need, so that they stay. 0 = cancelled. */
+/* Blur a line with the weights radius + 1 - |d|, whole numbers. Closed: cyclically (n > radius);
+   open: the radius shrinks towards the ends, which stay where they are. 0 = cancelled. */
 static int txe_soften(const txe_point *p, size_t n, int is_closed, size_t radius,
-                      txe_point *out, txe_bar *bar) {
+                      txe_point *out, txe_progress *bar) {
     for (size_t i = 0; i < n; i++) {
         size_t reach = radius;
         if (!is_closed && reach > i) reach = i;
@@ -73,12 +73,12 @@ static int txe_soften(const txe_point *p, size_t n, int is_closed, size_t radius
         const double weight = (double)(reach + 1), sum = weight * weight;
         out[i].x = (x + weight * p[i].x) / sum;
         out[i].y = (y + weight * p[i].y) / sum;
-        if (txe_tick(bar, reach + 1)) return 0;
+        if (txe_advance(bar, reach + 1)) return 0;
     }
     return 1;
 }
 
-/* The unit vector from a to b; if they are one point, as it was before. */
+/* The unit vector from a to b; unchanged if they are the same point. */
 static void txe_direction(txe_point a, txe_point b, txe_point *direction) {
     const double length = txe_distance(a, b);
     if (!(length > 1e-9)) return;
@@ -86,46 +86,47 @@ static void txe_direction(txe_point a, txe_point b, txe_point *direction) {
     direction->y = (b.y - a.y) / length;
 }
 
-/* ---- the unrest of the exemplar's edges ------------------------------------------------ */
+/* ---- the roughness of the exemplar's edges --------------------------------------------- */
 
-/* One sample of a line of the exemplar, a pixel of its length from the next: how far its smooth
-   course moves on meanwhile, and where the line lies from there, ahead and to the right. */
+/* One sample of a line of the exemplar, one pixel of length before the next: how far its smooth
+   course advances to the next sample, and the offset of the line from the course, ahead and to the
+   right. */
 typedef struct txe_sample {
     double step, ahead, right;
-    double length; /* of the line to the next sample, tamed as it is                           */
-    int bin;       /* its direction against its course                                         */
+    double length; /* of the line to the next sample, its offsets limited                      */
+    int bin;       /* direction of the line relative to its course                             */
 } txe_sample;
 
-/* The unrest of one layer: rows of samples one behind the other, and the places at which a piece of
+/* The roughness of one layer: the samples of all its lines, and the indices at which a piece of
    TXE_PIECE + TXE_JOIN samples can begin. */
-typedef struct txe_unrest {
+typedef struct txe_roughness {
     txe_sample *samples;
     size_t *starts;
     size_t count, start_count;
-    double amount;            /* by which the exemplar's is multiplied                          */
-    double step;              /* mean of all steps                                              */
-    double share[TXE_BINS]; /* of the exemplar's edges, how much has each direction; sum 1    */
-} txe_unrest;
+    double amount;          /* factor of the exemplar's roughness                               */
+    double step;            /* mean of all steps                                                */
+    double share[TXE_BINS]; /* histogram of the directions of the exemplar's edges, sum 1       */
+} txe_roughness;
 
-/* Room for the work on one line of up to count points. */
-typedef struct txe_bench {
+/* Scratch for one line of up to count points. */
+typedef struct txe_scratch {
     txe_point *a, *b, *c;
-} txe_bench;
+} txe_scratch;
 
-static void txe_bench_make(txe_bench *bench, txm_arena *arena, size_t count) {
-    bench->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->a);
-    bench->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->b);
-    bench->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *bench->c);
+static void txe_scratch_make(txe_scratch *scratch, txm_arena *arena, size_t count) {
+    scratch->a = (txe_point *)txm_arena_alloc(arena, count, sizeof *scratch->a);
+    scratch->b = (txe_point *)txm_arena_alloc(arena, count, sizeof *scratch->b);
+    scratch->c = (txe_point *)txm_arena_alloc(arena, count, sizeof *scratch->c);
 }
 
-/* The factor that makes a vector of this length no longer than TXE_STRAY: 1 up to TXE_LINEAR,
-   then the length grows slower and slower. */
-static double txe_tame(double length) {
-    const double room = TXE_STRAY - TXE_LINEAR, more = length - TXE_LINEAR;
-    return more > 0 ? (TXE_LINEAR + room * more / (more + room)) / length : 1;
+/* The factor that limits an offset of this length to TXE_MAX_OFFSET: 1 up to TXE_KEPT_OFFSET, then
+   soft compression. */
+static double txe_limit(double length) {
+    const double room = TXE_MAX_OFFSET - TXE_KEPT_OFFSET, more = length - TXE_KEPT_OFFSET;
+    return more > 0 ? (TXE_KEPT_OFFSET + room * more / (more + room)) / length : 1;
 }
 
-/* The direction of (ahead, right), no matter which way: 0 = straight on, then every 16th of half a
+/* The direction of (ahead, right) or its opposite: 0 = straight on, then in steps of 1/16 of half a
    turn to the right. The table: cosine and sine of 1/2, 3/2, ... of such a step. */
 static int txe_bin(double ahead, double right) {
     static const double edge[TXE_BINS / 2][2] = {
@@ -138,16 +139,16 @@ static int txe_bin(double ahead, double right) {
     return (ahead < 0) != (right < 0) ? (TXE_BINS - k) % TXE_BINS : k % TXE_BINS;
 }
 
-/* The directions of a line of n points in bench->b against its course, its blur of radius
-   TXE_COURSE, once a blur of radius `light` has taken out the pixels' steps: added to share, as
-   of a line with `amount` times the unrest, or put into the samples of its points.
+/* The directions of a line of n points in scratch->b relative to its course, its blur of radius
+   TXE_DIRECTION_BLUR; a blur of `radius` removes the steps of pixels first. Added to share, as if
+   the line had `amount` times its roughness, or stored in the samples of its points.
    0 = cancelled. */
-static int txe_directions(const txe_bench *bench, size_t n, int is_closed, size_t light,
-                          double amount, double *share, txe_sample *samples, txe_bar *bar) {
-    const txe_point *line = bench->a, *course = bench->c;
-    const size_t trim = is_closed || !share ? 0 : TXE_COURSE; /* the ends of the course are bad */
-    if (!txe_soften(bench->b, n, is_closed, light, bench->a, bar) ||
-        !txe_soften(bench->b, n, is_closed, TXE_COURSE, bench->c, bar))
+static int txe_directions(const txe_scratch *scratch, size_t n, int is_closed, size_t radius,
+                          double amount, double *share, txe_sample *samples, txe_progress *bar) {
+    const txe_point *line = scratch->a, *course = scratch->c;
+    const size_t trim = is_closed || !share ? 0 : TXE_DIRECTION_BLUR; /* ends have no course */
+    if (!txe_soften(scratch->b, n, is_closed, radius, scratch->a, bar) ||
+        !txe_soften(scratch->b, n, is_closed, TXE_DIRECTION_BLUR, scratch->c, bar))
         return 0;
     for (size_t i = trim; i < n - trim; i++) {
         size_t at[4]; /* the course from at[0] to at[3], the line from at[1] to at[2] */
@@ -164,32 +165,33 @@ static int txe_directions(const txe_bench *bench, size_t n, int is_closed, size_
             samples[i].bin = bin;
             samples[i].length = txe_distance(line[i], line[at[2]]);
         }
-        if (txe_tick(bar, 4)) return 0;
+        if (txe_advance(bar, 4)) return 0;
     }
     return 1;
 }
 
-/* Take in one line: n points in bench->a, a pixel apart at most. With S the blur of radius
-   TXE_SCALE, the smooth course of the line P is 2 S P - S S P, which keeps curves that S alone
-   would shrink. Ends of open lines are left out, where the course is bad. 0 = cancelled. */
-static int txe_listen(txe_unrest *u, const txe_bench *bench, size_t n, int is_closed,
-                      txe_bar *bar) {
-    txe_point *line = bench->b, *blurred = bench->a, *course = bench->c;
-    if (n < TXE_SHORT) return 1;
-    const double length = txe_length(bench->a, n, is_closed, bar);
+/* Add the samples of one line: n points in scratch->a, a pixel apart at most. With S the blur of
+   radius TXE_COURSE_BLUR, the smooth course of the line P is 2 S P - S S P, which keeps curves that
+   S alone would shrink. The ends of open lines, which have no course, are left out.
+   0 = cancelled. */
+static int txe_measure_run(txe_roughness *u, const txe_scratch *scratch, size_t n, int is_closed,
+                           txe_progress *bar) {
+    txe_point *line = scratch->b, *blurred = scratch->a, *course = scratch->c;
+    if (n < TXE_MIN_LINE) return 1;
+    const double length = txe_length(scratch->a, n, is_closed, bar);
     if (length < 0) return 0;
     const size_t m = (size_t)(length + 0.5) + !is_closed; /* at most n */
-    const size_t trim = is_closed ? 0 : TXE_SCALE;
-    if (m < TXE_SHORT + 2 * trim) return 1;
-    if (!txe_resample(bench->a, n, is_closed, length, line, m, bar) ||
-        !txe_soften(line, m, is_closed, TXE_SCALE, blurred, bar) ||
-        !txe_soften(blurred, m, is_closed, TXE_SCALE, course, bar))
+    const size_t trim = is_closed ? 0 : TXE_COURSE_BLUR;
+    if (m < TXE_MIN_LINE + 2 * trim) return 1;
+    if (!txe_resample(scratch->a, n, is_closed, length, line, m, bar) ||
+        !txe_soften(line, m, is_closed, TXE_COURSE_BLUR, blurred, bar) ||
+        !txe_soften(blurred, m, is_closed, TXE_COURSE_BLUR, course, bar))
         return 0;
     for (size_t i = 0; i < m; i++) {
         course[i].x = 2 * blurred[i].x - course[i].x;
         course[i].y = 2 * blurred[i].y - course[i].y;
     }
-    /* a closed line goes on beyond its end, so that pieces can begin anywhere */
+    /* a closed line is repeated beyond its end, so that pieces can begin anywhere */
     const size_t room = TXE_PIECE + TXE_JOIN, end = is_closed ? m + room : m - trim;
     txe_sample *first = u->samples + u->count;
     txe_point direction;
@@ -208,26 +210,26 @@ static int txe_listen(txe_unrest *u, const txe_bench *bench, size_t n, int is_cl
             u->step += s->step;
         }
         u->count++;
-        if (txe_tick(bar, 4)) return 0;
+        if (txe_advance(bar, 4)) return 0;
     }
-    if (!txe_directions(bench, m, is_closed, TXE_LIGHT, u->amount, u->share, NULL, bar))
+    if (!txe_directions(scratch, m, is_closed, TXE_STEP_BLUR, u->amount, u->share, NULL, bar))
         return 0;
-    /* Tame the unrest and count its directions once more, along a straight course; smoother than
-       the exemplar's, as a line loses some when it is drawn in pixels. So as much as the exemplar
-       shows will be seen in the end. */
+    /* Limit the offsets and take the directions once more, along a straight course, smoothed a
+       little more than the exemplar's: a line that is drawn in pixels loses some of its roughness,
+       and in the end as much shall be visible as in the exemplar. */
     double x = 0;
     const size_t count = end - trim;
     for (size_t i = 0; i < count; i++) {
         txe_sample *s = first + i;
-        const double factor = txe_tame(sqrt(s->ahead * s->ahead + s->right * s->right));
+        const double factor = txe_limit(sqrt(s->ahead * s->ahead + s->right * s->right));
         s->ahead *= factor;
         s->right *= factor;
         line[i].x = x + s->ahead;
         line[i].y = s->right;
         x += s->step;
-        if (txe_tick(bar, 2)) return 0;
+        if (txe_advance(bar, 2)) return 0;
     }
-    return txe_directions(bench, count, 0, TXE_LIGHT + 1, 1, NULL, first, bar);
+    return txe_directions(scratch, count, 0, TXE_STEP_BLUR + 1, 1, NULL, first, bar);
 }
 
 /* does the crack from p to q run along the picture's border? */
@@ -236,68 +238,68 @@ static int txe_on_border(const texedges_set *e, txm_vec2 p, txm_vec2 q) {
            (p.y == q.y && (p.y == 0 || p.y == (float)e->height));
 }
 
-/* Take in the parts of a line that lie inside the picture. 0 = cancelled. */
-static int txe_listen_line(txe_unrest *u, const txe_bench *bench, const texedges_set *e,
-                           const texedges_polyline *line, txe_bar *bar) {
+/* Add the parts of a line that do not run along the picture's border. 0 = cancelled. */
+static int txe_measure_line(txe_roughness *u, const txe_scratch *scratch, const texedges_set *e,
+                            const texedges_polyline *line, txe_progress *bar) {
     const txm_vec2 *p = e->points + line->first;
     size_t start = line->count, n = 0;
-    for (size_t j = 0; j < line->count && start == line->count; j++) { /* the first on the border */
+    for (size_t j = 0; j < line->count && start == line->count; j++) { /* first on the border */
         if (txe_on_border(e, p[j], p[j + 1 < line->count ? j + 1 : 0])) start = j;
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
     const int is_closed = start == line->count;
     for (size_t k = 0; k < line->count; k++) {
         const size_t j = (start + k) % line->count, next = (j + 1) % line->count;
         if (txe_on_border(e, p[j], p[next])) {
-            if (!txe_listen(u, bench, n, 0, bar)) return 0;
+            if (!txe_measure_run(u, scratch, n, 0, bar)) return 0;
             n = 0;
-        } else { /* the middle of the crack: so a slope of one pixel in one is a straight line */
-            bench->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
-            bench->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
+        } else { /* middles of cracks: a slope of 1 is a straight line */
+            scratch->a[n].x = 0.5 * ((double)p[j].x + p[next].x);
+            scratch->a[n].y = 0.5 * ((double)p[j].y + p[next].y);
             n++;
         }
-        if (txe_tick(bar, 1)) return 0;
+        if (txe_advance(bar, 1)) return 0;
     }
-    return txe_listen(u, bench, n, is_closed, bar);
+    return txe_measure_run(u, scratch, n, is_closed, bar);
 }
 
-/* The unrest of a layer, amount times that of the exemplar, with memory from the arena. */
-static txm_status txe_listen_layer(txe_unrest *u, const texedges_set *e, int layer,
-                                   double amount, txm_arena *arena, txe_bar *bar,
-                                   txm_env *env) {
+/* The roughness of a layer, amount times that of the exemplar, in memory of the arena. */
+static txm_status txe_measure_layer(txe_roughness *u, const texedges_set *e, int layer,
+                                    double amount, txm_arena *arena, txe_progress *bar,
+                                    txm_env *env) {
     const size_t room = TXE_PIECE + TXE_JOIN;
-    txe_bench bench;
+    txe_scratch scratch;
     size_t most = 0, longest = 0;
     double sum = 0;
     memset(u, 0, sizeof *u);
     u->amount = amount;
     for (size_t i = 0; i < e->line_count; i++) {
         const texedges_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXE_SHORT) continue;
+        if (line->layer != layer || line->count < TXE_MIN_LINE) continue;
         most += line->count + room;
         if (line->count > longest) longest = line->count;
     }
     if (most == 0) return TXM_OK;
     u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
-    txe_bench_make(&bench, arena, longest + room);
+    txe_scratch_make(&scratch, arena, longest + room);
     if (arena->failed) return txe_no_memory(env);
     for (size_t i = 0; i < e->line_count; i++) {
         const texedges_polyline *line = &e->lines[i];
-        if (line->layer != layer || line->count < TXE_SHORT) continue;
-        if (!txe_listen_line(u, &bench, e, line, bar)) return txe_stopped(env);
+        if (line->layer != layer || line->count < TXE_MIN_LINE) continue;
+        if (!txe_measure_line(u, &scratch, e, line, bar)) return txe_stopped(env);
     }
     for (int b = 0; b < TXE_BINS; b++) sum += u->share[b];
     for (int b = 0; b < TXE_BINS && sum > 0; b++) u->share[b] /= sum;
     if (u->start_count) u->step /= (double)u->start_count;
-    if (u->step < 0.125) u->step = 0.125; /* of a line that turns in place */
+    if (u->step < 0.125) u->step = 0.125; /* of lines that turn on the spot */
     return TXM_OK;
 }
 
-/* ---- new unrest out of pieces ---------------------------------------------------------- */
+/* ---- new roughness out of pieces ------------------------------------------------------- */
 
-/* How badly TXE_JOIN samples go together: place and, as there are several, slope. */
-static double txe_gap(const txe_sample *a, const txe_sample *b) {
+/* The squared distance of two runs of TXE_JOIN samples: it compares offsets and slopes. */
+static double txe_mismatch(const txe_sample *a, const txe_sample *b) {
     double sum = 0;
     for (int j = 0; j < TXE_JOIN; j++) {
         const double ahead = a[j].ahead - b[j].ahead, right = a[j].right - b[j].right;
@@ -306,8 +308,8 @@ static double txe_gap(const txe_sample *a, const txe_sample *b) {
     return sum;
 }
 
-/* Let a piece begin where the tail of the last one is: the difference of their first samples is
-   taken back over TXE_JOIN samples. Fading from one to the other would even out both. */
+/* Make a piece begin where the tail of the last one is: the difference of their first samples is
+   removed gradually over TXE_JOIN samples. A cross-fade would smooth both. */
 static void txe_join(const txe_sample *tail, txe_sample *piece) {
     const double ahead = tail->ahead - piece->ahead, right = tail->right - piece->right;
     for (int j = 0; j < TXE_JOIN; j++) {
@@ -317,18 +319,18 @@ static void txe_join(const txe_sample *tail, txe_sample *piece) {
     }
 }
 
-/* What the next piece of a row is chosen by. */
-typedef struct txe_row {
-    const txe_sample *tail; /* how the last piece would go on; NULL: there is none           */
-    double length;            /* of the line so far                                            */
-    double bins[TXE_BINS];  /* and of its parts by direction                                 */
-} txe_row;
+/* The pieces chosen so far, as far as the choice of the next one depends on them. */
+typedef struct txe_chain {
+    const txe_sample *tail; /* how the last piece continues in the exemplar; NULL: there is none */
+    double length;          /* of the line so far                                                */
+    double bins[TXE_BINS];  /* the same by direction                                             */
+} txe_chain;
 
-/* How far the directions are from their shares once a piece is there. */
-static double txe_deviation(const txe_row *row, const double *share, const txe_sample *piece,
-                            size_t length) {
-    double bins[TXE_BINS], total = row->length, sum = 0;
-    memcpy(bins, row->bins, sizeof bins);
+/* How far the histogram of directions would be from the exemplar's with this piece. */
+static double txe_direction_error(const txe_chain *chain, const double *share,
+                                  const txe_sample *piece, size_t length) {
+    double bins[TXE_BINS], total = chain->length, sum = 0;
+    memcpy(bins, chain->bins, sizeof bins);
     for (size_t j = 0; j < length; j++) {
         bins[piece[j].bin] += piece[j].length;
         total += piece[j].length;
@@ -340,19 +342,20 @@ static double txe_deviation(const txe_row *row, const double *share, const txe_s
     return sum;
 }
 
-/* Choose a piece of this length: of some taken at random those that join best, to the tail and at
-   the end to head (NULL: to nothing, one of the piece itself: to its own beginning); of these the
-   one that brings the directions nearest to their shares. */
-static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe_row *row,
-                                    size_t length, int closes, const txe_sample *head) {
-    const txe_sample *good[TXE_GOOD + 1] = {NULL}, *best;
-    double gaps[TXE_GOOD + 1] = {0}, least;
+/* Choose a piece of this length. Of random candidates those with the best joints stay: to the tail,
+   and if the piece closes the line to head (NULL: to its own beginning). Of these the one is taken
+   that brings the histogram of directions nearest to the exemplar's. */
+static const txe_sample *txe_choose_piece(const txe_roughness *u, txm_rng *rng,
+                                          const txe_chain *chain, size_t length, int closes,
+                                          const txe_sample *head) {
+    const txe_sample *good[TXE_BEST + 1] = {NULL}, *best;
+    double gaps[TXE_BEST + 1] = {0}, least;
     int count = 0;
     for (int i = 0; i < TXE_TRIES * (closes ? 4 : 1); i++) {
         const size_t pick = (size_t)(txm_rng_double(rng) * (double)u->start_count);
         const txe_sample *piece = u->samples + u->starts[pick];
-        double gap = row->tail ? txe_gap(row->tail, piece) : 0;
-        if (closes) gap += txe_gap(piece + length, head ? head : piece);
+        double gap = chain->tail ? txe_mismatch(chain->tail, piece) : 0;
+        if (closes) gap += txe_mismatch(piece + length, head ? head : piece);
         int at = count;
         for (; at > 0 && gap < gaps[at - 1]; at--) {
             gaps[at] = gaps[at - 1];
@@ -360,12 +363,12 @@ static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe
         }
         gaps[at] = gap;
         good[at] = piece;
-        if (count < TXE_GOOD) count++;
+        if (count < TXE_BEST) count++;
     }
     best = good[0];
-    least = closes ? 0 : txe_deviation(row, u->share, best, length);
+    least = closes ? 0 : txe_direction_error(chain, u->share, best, length);
     for (int i = 1; i < count && !closes; i++) {
-        const double off = txe_deviation(row, u->share, good[i], length);
+        const double off = txe_direction_error(chain, u->share, good[i], length);
         if (off >= least) continue;
         best = good[i];
         least = off;
@@ -373,12 +376,12 @@ static const txe_sample *txe_choose(const txe_unrest *u, txm_rng *rng, const txe
     return best;
 }
 
-/* String pieces together to a closed row of m samples, m >= TXE_PIECE / 3. 0 = cancelled. */
-static int txe_weave(const txe_unrest *u, txm_rng *rng, txe_sample *samples, size_t m,
-                     txe_bar *bar) {
+/* Join pieces to a closed line of m samples, m >= TXE_PIECE / 3. 0 = cancelled. */
+static int txe_chain_pieces(const txe_roughness *u, txm_rng *rng, txe_sample *samples, size_t m,
+                            txe_progress *bar) {
     const size_t shortest = TXE_PIECE / 3;
-    txe_row row;
-    memset(&row, 0, sizeof row);
+    txe_chain chain;
+    memset(&chain, 0, sizeof chain);
     for (size_t k = 0; k < m;) {
         const size_t rest = m - k;
         size_t length = rest;
@@ -386,18 +389,18 @@ static int txe_weave(const txe_unrest *u, txm_rng *rng, txe_sample *samples, siz
             length = shortest + txm_rng_below(rng, TXE_PIECE - (uint32_t)shortest + 1);
         if (length < rest && rest - length < shortest) length = rest - shortest;
         const txe_sample *piece =
-            txe_choose(u, rng, &row, length, length == rest, k ? samples : NULL);
+            txe_choose_piece(u, rng, &chain, length, length == rest, k ? samples : NULL);
         memcpy(samples + k, piece, length * sizeof *samples);
-        if (row.tail) txe_join(row.tail, samples + k);
+        if (chain.tail) txe_join(chain.tail, samples + k);
         for (size_t j = 0; j < length; j++) {
-            row.bins[piece[j].bin] += piece[j].length;
-            row.length += piece[j].length;
+            chain.bins[piece[j].bin] += piece[j].length;
+            chain.length += piece[j].length;
         }
-        row.tail = piece + length;
+        chain.tail = piece + length;
         k += length;
-        if (txe_tick(bar, 64 * TXE_TRIES)) return 0;
+        if (txe_advance(bar, 64 * TXE_TRIES)) return 0;
     }
-    txe_join(row.tail, samples);
+    txe_join(chain.tail, samples);
     return 1;
 }
 

@@ -33,7 +33,7 @@ static const cli_manual patch_manual = {
     "  Only points must be given, the rest is what you see here by default. 'texkit edges'\n"
     "  shows the layers of the same levels, smooth and least; 0 is the darkest. A closed stroke\n"
     "  is filled with its layer, an open one is as wide as width says. background is the layer\n"
-    "  elsewhere, -1 leaves it free; disturb, 0 to 4, is how much of the unrest of EXEMPLAR's\n"
+    "  elsewhere, -1 leaves it free; disturb, 0 to 4, is how much of the roughness of EXEMPLAR's\n"
     "  edges the strokes take on.\n"
     "--window X,Y,W,H is a part of a plane without end; all windows show the same plane.\n"
     "--lod K writes K coarser levels, each half as wide: OUT-1.png, OUT-2.png ...\n"
