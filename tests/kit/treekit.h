@@ -1,13 +1,11 @@
-/* treekit.h - what the tests of treepieces.h share
-   SPDX-License-Identifier: MIT OR Unlicense
-
-   Include treepieces.h with its implementation first.                                           */
+/* treekit.h - a rule of the caller for the tests of treepieces.h
+   SPDX-License-Identifier: MIT OR Unlicense                                                     */
 #ifndef TREEKIT_H
 #define TREEKIT_H
 
 #include "treepieces.h"
 
-/* Any piece on any rim, in any direction: own_rule of the tests that look at all pairs. */
+/* An own_rule that attaches random pieces in random directions, so that all pairs of pieces occur. */
 static inline void any_piece(void *user, const treepieces_site *site, txm_rng *rng,
                              treepieces_choice *choice) {
     (void)user;

@@ -61,7 +61,7 @@ static void counted_arrays(GLenum mode, GLint first, GLsizei count) {
 #include "examples/forest_gl/headless.c"
 #include "examples/forest_gl/main.c"
 #undef main
-#include "treekit.h"
+#include "tests/kit/treekit.h"
 
 static int failures;
 

@@ -18,6 +18,15 @@ static grown grow_preset(int preset, int pieces, float pose_amount, uint64_t see
     return grow_posed(&d, pose_amount, 0);
 }
 
+/* its first tree, without tessellation */
+static treepieces_bake_desc describe_bake(const grown *g) {
+    treepieces_bake_desc d;
+    memset(&d, 0, sizeof d);
+    d.forest = g->forest;
+    d.bones = g->bones;
+    return d;
+}
+
 static int compare_keys(const void *a, const void *b) {
     const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return x < y ? -1 : x > y;
@@ -255,11 +264,8 @@ static void test_species_meshes(void **state) {
         for (int kind = 0; kind < 3; kind++) {
             grown g = grow_preset(preset, kind ? 60 : 500, kind ? 0.1f : 0, (uint64_t)preset + 40);
             const treepieces_lod lod = {{0.8f, 1, 0.5f}, 10, 1.2f, 0};
-            treepieces_bake_desc d;
+            treepieces_bake_desc d = describe_bake(&g);
             treepieces_mesh *m;
-            memset(&d, 0, sizeof d);
-            d.forest = g.forest;
-            d.bones = g.bones;
             d.lod = kind ? &lod : NULL;
             assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
             size_t borders = 6;
@@ -309,11 +315,8 @@ static void test_cap(void **state) {
     for (int kind = 0; kind < 9; kind++) {
         const treepieces_lod lod = {
             {0.5f, 0.2f, 0.3f}, kind & 1 ? 10.0f : 3.0f, 0.6f, shapes[kind / 2 % 4]};
-        treepieces_bake_desc d;
+        treepieces_bake_desc d = describe_bake(&g);
         treepieces_mesh *open, *closed;
-        memset(&d, 0, sizeof d);
-        d.forest = g.forest;
-        d.bones = g.bones;
         d.lod = kind == 8 ? NULL : &lod;
         assert_int_equal(treepieces_bake(&d, NULL, &open), TXM_OK);
         d.capped = 1;
@@ -373,11 +376,8 @@ static void check_quad(const treepieces_mesh *m, size_t t, const treepieces_quad
 static void test_mesh_is_skin(void **state) {
     (void)state;
     grown g = grow_preset(5, 80, 0.1f, 3);
-    treepieces_bake_desc d;
+    treepieces_bake_desc d = describe_bake(&g);
     treepieces_mesh *m;
-    memset(&d, 0, sizeof d);
-    d.forest = g.forest;
-    d.bones = g.bones;
     assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
     char *seen = (char *)room(m->vertex_count, 1);
     size_t triangles = 0;
@@ -438,15 +438,12 @@ static void test_company(void **state) {
     }
     for (int alone = 0; alone < 2; alone++) {
         treepieces_forest_desc d = describe(alone ? 1 : 3, 90);
-        treepieces_bake_desc b;
-        memset(&b, 0, sizeof b);
-        d.species = species;
+                d.species = species;
         d.species_count = 2;
         d.places = places + alone;
         grown g = grow_posed(&d, 0, 0);
-        b.forest = g.forest;
+        treepieces_bake_desc b = describe_bake(&g);
         b.tree = alone ? 0 : 1;
-        b.bones = g.bones;
         b.lod = &lod;
         b.capped = 1;
         assert_int_equal(treepieces_bake(&b, NULL, &mesh[alone]), TXM_OK);
@@ -531,12 +528,9 @@ static void test_bark_on_species(void **state) {
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
         for (int pieces = 165; pieces <= 1320; pieces *= 2) {
             grown g = grow_preset(preset, pieces, 0, 9);
-            treepieces_bake_desc d;
+            treepieces_bake_desc d = describe_bake(&g);
             treepieces_mesh *m;
             size_t away = 0;
-            memset(&d, 0, sizeof d);
-            d.forest = g.forest;
-            d.bones = g.bones;
             assert_int_equal(treepieces_bake(&d, NULL, &m), TXM_OK);
             share *density = (share *)room(m->triangle_count, sizeof *density);
             share *ratio = (share *)room(m->triangle_count, sizeof *ratio);
@@ -573,10 +567,7 @@ static void test_faults(void **state) {
     (void)state;
     grown g = grow_preset(0, 200, 0, 1);
     const treepieces_lod lod = {{0, 1, 0}, 3, 2, 0};
-    treepieces_bake_desc d;
-    memset(&d, 0, sizeof d);
-    d.forest = g.forest;
-    d.bones = g.bones;
+    treepieces_bake_desc d = describe_bake(&g);
     d.lod = &lod;
     assert_true(tk_sweep(bake, &d, TK_ALLOCATION) > 7);
     assert_true(tk_sweep(bake, &d, TK_ONWARD) > 7);
@@ -611,13 +602,10 @@ static void test_refusals(void **state) {
         grown g = grow_preset(1, 60, 0, 2);
         const treepieces_lod lod = {{0, 1, 0}, 4, 2, 0};
         tk_memory memory;
-        treepieces_bake_desc d;
+        treepieces_bake_desc d = describe_bake(&g);
         treepieces_mesh *m = (treepieces_mesh *)1;
         memset(&memory, 0, sizeof memory);
-        memset(&d, 0, sizeof d);
         txm_env env = tk_env(&memory, NULL);
-        d.forest = g.forest;
-        d.bones = g.bones;
         d.capped = 1;
         d.lod = kind & 4 ? &lod : NULL;
         for (int i = 0; i < TREEPIECES_BONE; i++)
@@ -631,13 +619,10 @@ static void test_refusals(void **state) {
     grown g = grow_preset(0, 12000, 0, 2);
     const treepieces_lod fine = {{0, 0, 0}, 64, 1e30f, 0};
     tk_memory memory;
-    treepieces_bake_desc d;
+    treepieces_bake_desc d = describe_bake(&g);
     treepieces_mesh *m = (treepieces_mesh *)1;
     memset(&memory, 0, sizeof memory);
-    memset(&d, 0, sizeof d);
     txm_env env = tk_env(&memory, NULL);
-    d.forest = g.forest;
-    d.bones = g.bones;
     d.lod = &fine;
     assert_int_equal(treepieces_bake(&d, &env, &m), TXM_TOO_LARGE);
     assert_null(m);

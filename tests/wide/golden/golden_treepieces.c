@@ -4,6 +4,7 @@
 #include "treepieces.h"
 
 #include "golden.h"
+#include "treekit.h"
 
 enum { TREES = 4, PICTURE = 48, NODES = 4 * 300 };
 static treepieces_species species;
@@ -92,14 +93,7 @@ static uint64_t presets(txm_env *env) {
 /* a rule of the caller's own, which asks for all that a site tells */
 static void own_rule(void *user, const treepieces_site *site, txm_rng *rng,
                      treepieces_choice *choice) {
-    (void)user;
-    choice->type = (int)txm_rng_below(rng, TREEPIECES_BUILTIN);
-    choice->turn = (int)txm_rng_below(rng, TREEPIECES_RIM);
-    for (int k = 0; k < 3; k++) {
-        choice->direction[k] = site->direction[k] + txm_rng_float(rng) - 0.5f;
-        choice->ratios[k] = 0.3f + 0.7f * txm_rng_float(rng);
-    }
-    choice->length = site->radius * (0.5f + 3 * txm_rng_float(rng));
+    any_piece(user, site, rng, choice);
     choice->leaves = site->depth % 3 == 2;
 }
 
