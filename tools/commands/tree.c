@@ -47,7 +47,7 @@ static const cli_manual forest_manual = {
     "  texkit forest --count 20 -o grove.obj --species poplar --spacing 6 --pieces 200\n",
     0, NULL, 0, "take fewer --pieces or trees"};
 
-static int is_glb(const tree_job *j) {
+static int tree_is_glb(const tree_job *j) {
     return !strcmp(j->extension, ".glb");
 }
 
@@ -68,7 +68,7 @@ static int read_species(tree_job *j, const char *name, treepieces_species *speci
     return check_result(&j->run, result, name);
 }
 
-static int read_all_species(tree_job *j) {
+static int tree_read_species(tree_job *j) {
     char name[MAX_PATH];
     const char *list = j->species_list;
     while (list) {
@@ -129,7 +129,7 @@ static int pose(tree_job *j) {
     const treepieces_pose bent = {j->run.seed, (float)j->pose, NULL};
     const size_t nodes = j->forest->node_count;
     const treepieces_wind wind = tree_wind(j);
-    const int has_rig = is_glb(j) && !j->is_forest;
+    const int has_rig = tree_is_glb(j) && !j->is_forest;
     txm_status result = TXM_OK;
     j->posed = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
     if (has_rig) j->rest = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
@@ -159,6 +159,18 @@ static void grown_figures(tree_job *j) {
     cli_figure(&j->run, "bytes_per_tree", (double)f->bytes / f->tree_count);
 }
 
+/* The trees, and their bones. */
+static int tree_grow(tree_job *j) {
+    cli_stage(&j->run, "grow");
+    int status =
+        check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
+    if (!status) status = grow(j);
+    if (status) return status;
+    grown_figures(j);
+    cli_stage(&j->run, "pose");
+    return pose(j);
+}
+
 /* ---- looks --------------------------------------------------------------------------------- */
 
 /* Of all species the brightest bark in each channel: what copies darken each to its own. */
@@ -169,13 +181,13 @@ static void brightest_bark(const tree_job *j, float color[3]) {
             if (j->species[s].bark_color[k] > color[k]) color[k] = j->species[s].bark_color[k];
 }
 
-static int has_one_bark(const tree_job *j) {
-    return j->tiles || is_glb(j);
+static int tree_has_one_bark(const tree_job *j) {
+    return j->tiles || tree_is_glb(j);
 }
 
 /* Is a picture made of the bark of species s? */
-static int has_bark(const tree_job *j, int s) {
-    return s == 0 || !has_one_bark(j);
+static int tree_has_bark(const tree_job *j, int s) {
+    return s == 0 || !tree_has_one_bark(j);
 }
 
 static void set_material(const tree_job *j, const picture *p, int is_cut_out, mesh_material *m) {
@@ -183,20 +195,20 @@ static void set_material(const tree_job *j, const picture *p, int is_cut_out, me
     m->is_cut_out = is_cut_out;
     m->repeats = !is_cut_out;
     m->texture = name_in(p->path);
-    if (!is_glb(j)) return;
+    if (!tree_is_glb(j)) return;
     m->png = p->png;
     m->png_size = p->size;
 }
 
 /* Bark and leaves, but for a .ply, which shows none. */
-static int dress(tree_job *j, float tint[3]) {
+static int tree_dress(tree_job *j, float tint[3]) {
     int status = CLI_DONE;
     brightest_bark(j, tint);
     if (!strcmp(j->extension, ".ply")) return CLI_DONE;
     for (int s = 0; s < j->species_count && !status; s++) {
-        if (has_bark(j, s))
-            status = make_bark(j, s, has_one_bark(j) ? tint : j->species[s].bark_color);
-        if (!status) status = make_leaves(j, s);
+        if (tree_has_bark(j, s))
+            status = tree_make_bark(j, s, tree_has_one_bark(j) ? tint : j->species[s].bark_color);
+        if (!status) status = tree_make_leaves(j, s);
         set_material(j, &j->bark[s], 0, &j->bark_materials[s]);
         set_material(j, &j->leaves[s], 1, &j->leaf_materials[s]);
     }
@@ -296,8 +308,8 @@ static void free_built(built *b) {
     }
     treepieces_mesh_free(b->bark);
     treepieces_mesh_free(b->leaves);
-    free_rig(&b->rig);
-    free_copies(&b->copies);
+    tree_free_rig(&b->rig);
+    tree_free_copies(&b->copies);
     cJSON_free(b->extras);
 }
 
@@ -315,7 +327,7 @@ static int build_baked(tree_job *j, built *b) {
         treepieces_mesh *bark = NULL, *leaves = NULL;
         const int species = j->forest->trees[t].species;
         const treepieces_species *s = &j->species[species];
-        const int to_wood = is_ply || has_one_bark(j) ? 0 : species;
+        const int to_wood = is_ply || tree_has_one_bark(j) ? 0 : species;
         status = bake_tree(j, t, j->posed, &bark, &leaves);
         if (!status) status = append(j, bark, is_ply ? s->bark_color : NULL, &b->wood[to_wood]);
         if (!status && leaves)
@@ -340,11 +352,11 @@ static int rigged_view(tree_job *j, const tree_rig *rig, const treepieces_mesh *
     to->normals = from->normals;
     to->indices = from->indices;
     to->uvs = from->uvs;
-    return bind_mesh(j, rig, from, to);
+    return tree_bind_mesh(j, rig, from, to);
 }
 
 static int build_rigged(tree_job *j, built *b) {
-    int status = make_rig(j, &b->rig);
+    int status = tree_make_rig(j, &b->rig);
     if (!status) status = bake_tree(j, 0, j->rest, &b->bark, &b->leaves);
     if (!status) status = rigged_view(j, &b->rig, b->bark, &b->wood[0]);
     if (!status && b->leaves) status = rigged_view(j, &b->rig, b->leaves, &b->foliage[0]);
@@ -357,7 +369,7 @@ static int build_rigged(tree_job *j, built *b) {
 }
 
 static int build_copies(tree_job *j, const float tint[3], built *b) {
-    const int status = make_copies(j, tint, &b->copies);
+    const int status = tree_make_copies(j, tint, &b->copies);
     b->scene.instances = b->copies.list;
     b->scene.instance_count = b->copies.count;
     cli_figure(&j->run, "nodes", b->copies.count);
@@ -453,21 +465,13 @@ static void print_summary(const tree_job *j, const built *b, size_t triangles) {
 /* Grow, pose, dress and write. */
 static int grow_trees(tree_job *j, built *b) {
     float tint[3];
-    cli_stage(&j->run, "grow");
-    int status =
-        check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
-    if (!status) status = grow(j);
-    if (!status) {
-        grown_figures(j);
-        cli_stage(&j->run, "pose");
-        status = pose(j);
-    }
+    int status = tree_grow(j);
     if (status) return status;
     cli_stage(&j->run, "dress");
-    status = dress(j, tint);
+    status = tree_dress(j, tint);
     if (status) return status;
     cli_stage(&j->run, "build");
-    if (!is_glb(j)) status = build_baked(j, b);
+    if (!tree_is_glb(j)) status = build_baked(j, b);
     else status = j->is_forest ? build_copies(j, tint, b) : build_rigged(j, b);
     if (!status) status = make_extras(j, b);
     if (status) return status;
@@ -489,7 +493,7 @@ static int name_files(tree_job *j) {
         char number[12] = "";
         if (s > 0) snprintf(number, sizeof number, "-%d", s + 1);
         snprintf(ending, sizeof ending, "-bark%s.png", number);
-        if (has_bark(j, s)) status = path_beside(&j->run, ending, j->bark[s].path);
+        if (tree_has_bark(j, s)) status = path_beside(&j->run, ending, j->bark[s].path);
         snprintf(ending, sizeof ending, "-leaves%s.png", number);
         if (!status && j->species[s].leaf_count)
             status = path_beside(&j->run, ending, j->leaves[s].path);
@@ -511,12 +515,12 @@ static int run_job(tree_job *j, int needs_glb) {
     built *b;
     int status = check_output_kind(j);
     if (status) return status;
-    if (needs_glb && !is_glb(j))
+    if (needs_glb && !tree_is_glb(j))
         return cli_fail(&j->run, CLI_USAGE, "--bones, --seconds and --rate go with an OUT in .glb");
-    if (j->level > 1 && j->is_forest && is_glb(j))
+    if (j->level > 1 && j->is_forest && tree_is_glb(j))
         return cli_fail(&j->run, CLI_USAGE, "--level does not go with a forest in .glb");
     cli_stage(&j->run, "read");
-    status = read_all_species(j);
+    status = tree_read_species(j);
     if (status) return status;
     if (!strcmp(j->extension, ".txt")) return write_species(j);
     status = name_files(j);
@@ -529,7 +533,7 @@ static int run_job(tree_job *j, int needs_glb) {
     return status;
 }
 
-static void free_job(tree_job *j) {
+static void free_tree_job(tree_job *j) {
     for (int s = 0; s < MAX_SPECIES; s++) {
         free(j->bark[s].png);
         free(j->leaves[s].png);
@@ -541,7 +545,7 @@ static void free_job(tree_job *j) {
     free(j);
 }
 
-static tree_job *new_job(int is_forest) {
+static tree_job *new_tree_job(int is_forest) {
     tree_job *j = (tree_job *)calloc(1, sizeof *j);
     if (!j) {
         fprintf(stderr, "texkit %s: out of memory\n", is_forest ? "forest" : "tree");
@@ -557,7 +561,7 @@ static tree_job *new_job(int is_forest) {
 }
 
 static int run_tree(int argc, char **argv) {
-    tree_job *j = new_job(0);
+    tree_job *j = new_tree_job(0);
     const char *wind = NULL, *seconds = NULL, *bend = NULL;
     int status;
     if (!j) return CLI_FAILED;
@@ -593,12 +597,12 @@ static int run_tree(int argc, char **argv) {
             status = cli_fail(&j->run, CLI_USAGE, "--seconds and --rate go with --wind SPEED");
         if (!status) status = run_job(j, needs_glb);
     }
-    free_job(j);
+    free_tree_job(j);
     return status;
 }
 
 static int run_forest(int argc, char **argv) {
-    tree_job *j = new_job(1);
+    tree_job *j = new_tree_job(1);
     const char *wind = NULL, *spacing = NULL, *bend = NULL;
     int status;
     if (!j) return CLI_FAILED;
@@ -633,7 +637,7 @@ static int run_forest(int argc, char **argv) {
             status = cli_fail(&j->run, CLI_USAGE, "no number of trees given; add --count N");
         if (!status) status = run_job(j, 0);
     }
-    free_job(j);
+    free_tree_job(j);
     return status;
 }
 

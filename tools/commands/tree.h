@@ -55,10 +55,10 @@ treepieces_wind tree_wind(const tree_job *j);
 /* ---- tree_looks.c ---- */
 
 /* Draw or read the bark of species s, tinted by the color given; an exit status. */
-int make_bark(tree_job *j, int s, const float color[3]);
+int tree_make_bark(tree_job *j, int s, const float color[3]);
 
 /* The same for its leaves, if it has any. */
-int make_leaves(tree_job *j, int s);
+int tree_make_leaves(tree_job *j, int s);
 
 /* ---- tree_rig.c ---- */
 
@@ -72,13 +72,13 @@ typedef struct tree_rig {
 } tree_rig;
 
 /* Rotation of a bone as a unit quaternion. */
-txm_quat bone_rotation(const float *bone);
+txm_quat tree_bone_rotation(const float *bone);
 
-int make_rig(tree_job *j, tree_rig *rig);
-void free_rig(tree_rig *rig);
+int tree_make_rig(tree_job *j, tree_rig *rig);
+void tree_free_rig(tree_rig *rig);
 
 /* Joints and weights of a baked mesh in the rig's numbers. */
-int bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to);
+int tree_bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to);
 
 /* ---- tree_copies.c ---- */
 
@@ -93,7 +93,7 @@ typedef struct tree_copies {
 } tree_copies;
 
 /* tint: sRGB 0..1, the color that the bark's picture was drawn with */
-int make_copies(tree_job *j, const float tint[3], tree_copies *copies);
-void free_copies(tree_copies *copies);
+int tree_make_copies(tree_job *j, const float tint[3], tree_copies *copies);
+void tree_free_copies(tree_copies *copies);
 
 #endif /* TREE_H */

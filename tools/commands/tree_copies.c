@@ -185,7 +185,7 @@ static int copy_pieces(tree_job *j, int type, const unsigned char *species, cons
     for (uint32_t i = 0; i < b->count; i++) {
         const uint32_t node = b->words[(size_t)i * b->stride];
         const float *bone = bone_of(j, node), place[3] = {bone[3], bone[7], bone[11]};
-        place_copy(t, i, place, bone_rotation(bone), column_length(bone, 0),
+        place_copy(t, i, place, tree_bone_rotation(bone), column_length(bone, 0),
                    column_length(bone, 1));
         if (t->colors)
             bark_factor(&j->species[species[node]], tint, copies->colors[own] + 4 * (size_t)i);
@@ -262,7 +262,7 @@ static int copy_cloud(tree_job *j, int s, uint32_t look, uint32_t looks,
 
 /* ---- all of it ----------------------------------------------------------------------------- */
 
-int make_copies(tree_job *j, const float tint[3], tree_copies *copies) {
+int tree_make_copies(tree_job *j, const float tint[3], tree_copies *copies) {
     unsigned char *species = list_species(j);
     int status = species ? CLI_DONE : fail_memory(&j->run);
     memset(copies, 0, sizeof *copies);
@@ -277,7 +277,7 @@ int make_copies(tree_job *j, const float tint[3], tree_copies *copies) {
     return status;
 }
 
-void free_copies(tree_copies *copies) {
+void tree_free_copies(tree_copies *copies) {
     for (int i = 0; i < copies->count; i++) {
         mesh_free(&copies->meshes[i]);
         free(copies->blocks[i]);

@@ -136,7 +136,7 @@ static int draw_tiles(tree_job *j, const treepieces_species *species, int side, 
 
 /* ---- the sheet ----------------------------------------------------------------------------- */
 
-int make_bark(tree_job *j, int s, const float color[3]) {
+int tree_make_bark(tree_job *j, int s, const float color[3]) {
     txm_image tiles[MAX_TILES], sheet = {0};
     treepieces_bark_desc desc = {0};
     treepieces_species species = j->species[s];
@@ -164,7 +164,7 @@ int make_bark(tree_job *j, int s, const float color[3]) {
     return status;
 }
 
-int make_leaves(tree_job *j, int s) {
+int tree_make_leaves(tree_job *j, int s) {
     txm_image image = {0};
     int status;
     if (j->species[s].leaf_count == 0) return CLI_DONE;

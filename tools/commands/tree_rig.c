@@ -11,7 +11,7 @@
 /* ---- rotations ----------------------------------------------------------------------------- */
 
 /* The columns X, Y, Z of a bone are at right angles; made unit vectors they are a rotation. */
-txm_quat bone_rotation(const float *bone) {
+txm_quat tree_bone_rotation(const float *bone) {
     txm_dvec3 axis[3];
     for (int c = 0; c < 3; c++) axis[c] = txm_d3_unit(txm_d3(bone[c], bone[4 + c], bone[8 + c]));
     return txm_quat_unit(txm_quat_from_axes(axis[0], axis[1], axis[2]));
@@ -93,14 +93,14 @@ static void make_joint(const tree_job *j, const tree_rig *rig, uint32_t node, me
     const treepieces_node *n = &j->forest->nodes[node];
     const float *rest = j->rest + TREEPIECES_BONE * (size_t)node;
     const float *posed = j->posed + TREEPIECES_BONE * (size_t)node;
-    txm_quat local = bone_rotation(posed);
+    txm_quat local = tree_bone_rotation(posed);
     snprintf(joint->name, sizeof joint->name, "%s %lu", names[n->order < 2 ? n->order : 2],
              (unsigned long)node);
     joint->parent = -1;
     store_place(joint->translation, bone_place(posed));
     if (n->parent >= 0) {
         const float *below = j->posed + TREEPIECES_BONE * (size_t)n->parent;
-        const txm_quat parent = bone_rotation(below);
+        const txm_quat parent = tree_bone_rotation(below);
         const txm_dvec3 way = txm_d3_sub(bone_place(posed), bone_place(below));
         joint->parent = (int)rig->joint_of[n->parent];
         local = rotation_from(parent, local);
@@ -109,7 +109,7 @@ static void make_joint(const tree_job *j, const tree_rig *rig, uint32_t node, me
     store_rotation(joint->rotation, local, 1);
 
     /* from the mesh, which is at rest, into the joint: turned back about its place */
-    const txm_quat back = txm_quat_conjugate(bone_rotation(rest));
+    const txm_quat back = txm_quat_conjugate(tree_bone_rotation(rest));
     memset(joint->bind, 0, sizeof joint->bind);
     for (int c = 0; c < 3; c++)
         store_place(joint->bind + 4 * c, txm_quat_rotate(back, txm_d3(c == 0, c == 1, c == 2)));
@@ -127,9 +127,9 @@ static void store_turns(const tree_job *j, const tree_rig *rig, const float *bon
         const int32_t parent = j->forest->nodes[i].parent;
         const size_t joint = rig->joint_of[i];
         if (!is_joint(j, rig, i)) continue;
-        txm_quat local = bone_rotation(bones + TREEPIECES_BONE * (size_t)i);
+        txm_quat local = tree_bone_rotation(bones + TREEPIECES_BONE * (size_t)i);
         if (parent >= 0)
-            local = rotation_from(bone_rotation(bones + TREEPIECES_BONE * (size_t)parent), local);
+            local = rotation_from(tree_bone_rotation(bones + TREEPIECES_BONE * (size_t)parent), local);
         const float *last = rig->joints[joint].rotation;
         if (before) last = before + 4 * joint * before_stride;
         const double dot = local.x * (double)last[0] + local.y * (double)last[1] +
@@ -217,7 +217,7 @@ static int make_clip(tree_job *j, tree_rig *rig) {
 
 /* ---- the rig ------------------------------------------------------------------------------- */
 
-int make_rig(tree_job *j, tree_rig *rig) {
+int tree_make_rig(tree_job *j, tree_rig *rig) {
     const uint32_t nodes = j->forest->node_count;
     const uint32_t most = j->bones > 0 ? (uint32_t)j->bones : 65535;
     const uint32_t count = nodes < most ? nodes : most;
@@ -235,14 +235,14 @@ int make_rig(tree_job *j, tree_rig *rig) {
     return j->wind > 0 ? make_clip(j, rig) : CLI_DONE;
 }
 
-void free_rig(tree_rig *rig) {
+void tree_free_rig(tree_rig *rig) {
     free(rig->joint_of);
     free(rig->joints);
     free(rig->times);
     free(rig->turns);
 }
 
-int bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to) {
+int tree_bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to) {
     const size_t count = 4 * from->vertex_count;
     uint32_t *joints = (uint32_t *)new_array(count, sizeof(uint32_t));
     float *weights = (float *)new_array(count, sizeof(float));
