@@ -1,8 +1,9 @@
 /* tree.h - what the files of 'texkit tree' and 'texkit forest' share
    SPDX-License-Identifier: MIT OR Unlicense
 
-   tree.c holds the commands, tree_looks.c the pictures of bark and leaves, tree_rig.c the skeleton
-   and its animation, tree_copies.c the instances of a forest.                                   */
+   tree_job.c reads the species, grows and poses. On it stand tree_looks.c, the pictures of bark and
+   leaves; tree_rig.c, the skeleton and its animation; tree_copies.c, the instances of a forest. On
+   these stands tree.c, which bakes, writes and holds the commands. Calls run only downward.     */
 #ifndef TREE_H
 #define TREE_H
 
@@ -49,16 +50,36 @@ typedef struct tree_job {
     mesh_material bark_materials[MAX_SPECIES], leaf_materials[MAX_SPECIES];
 } tree_job;
 
+/* ---- tree_job.c ---- */
+
+/* The defaults of both commands; NULL after a message. */
+tree_job *new_tree_job(int is_forest);
+void free_tree_job(tree_job *j);
+
+int tree_is_glb(const tree_job *j);
+
+/* All species of --species. */
+int tree_read_species(tree_job *j);
+
+/* The trees, and their bones. */
+int tree_grow(tree_job *j);
+
 /* The steady and the gusty part of --wind. */
 treepieces_wind tree_wind(const tree_job *j);
 
+/* Rotation of a bone as a unit quaternion. */
+txm_quat tree_bone_rotation(const float *bone);
+
 /* ---- tree_looks.c ---- */
 
-/* Draw or read the bark of species s, tinted by the color given; an exit status. */
-int tree_make_bark(tree_job *j, int s, const float color[3]);
+/* Do all species have the bark of the first? */
+int tree_has_one_bark(const tree_job *j);
 
-/* The same for its leaves, if it has any. */
-int tree_make_leaves(tree_job *j, int s);
+/* Is a picture made of the bark of species s? */
+int tree_has_bark(const tree_job *j, int s);
+
+/* Bark and leaves, but for a .ply, which shows none. tint: the color of one bark for all. */
+int tree_dress(tree_job *j, float tint[3]);
 
 /* ---- tree_rig.c ---- */
 
@@ -70,9 +91,6 @@ typedef struct tree_rig {
     float *times, *turns;
     uint32_t *joint_of; /* per node: the joint that moves it */
 } tree_rig;
-
-/* Rotation of a bone as a unit quaternion. */
-txm_quat tree_bone_rotation(const float *bone);
 
 int tree_make_rig(tree_job *j, tree_rig *rig);
 void tree_free_rig(tree_rig *rig);

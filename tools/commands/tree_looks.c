@@ -136,7 +136,7 @@ static int draw_tiles(tree_job *j, const treepieces_species *species, int side, 
 
 /* ---- the sheet ----------------------------------------------------------------------------- */
 
-int tree_make_bark(tree_job *j, int s, const float color[3]) {
+static int make_bark(tree_job *j, int s, const float color[3]) {
     txm_image tiles[MAX_TILES], sheet = {0};
     treepieces_bark_desc desc = {0};
     treepieces_species species = j->species[s];
@@ -164,7 +164,7 @@ int tree_make_bark(tree_job *j, int s, const float color[3]) {
     return status;
 }
 
-int tree_make_leaves(tree_job *j, int s) {
+static int make_leaves(tree_job *j, int s) {
     txm_image image = {0};
     int status;
     if (j->species[s].leaf_count == 0) return CLI_DONE;
@@ -179,5 +179,49 @@ int tree_make_leaves(tree_job *j, int s) {
     }
     if (!status) status = encode(j, &image, "leaves", s, &j->leaves[s]);
     free(image.pixels);
+    return status;
+}
+
+/* ---- all species ----------------------------------------------------------------------------- */
+
+/* Of all species the brightest bark in each channel: what copies darken each to its own. */
+static void brightest_bark(const tree_job *j, float color[3]) {
+    memcpy(color, j->species[0].bark_color, 3 * sizeof(float));
+    for (int s = 1; s < j->species_count; s++)
+        for (int k = 0; k < 3; k++)
+            if (j->species[s].bark_color[k] > color[k]) color[k] = j->species[s].bark_color[k];
+}
+
+int tree_has_one_bark(const tree_job *j) {
+    return j->tiles || tree_is_glb(j);
+}
+
+/* Is a picture made of the bark of species s? */
+int tree_has_bark(const tree_job *j, int s) {
+    return s == 0 || !tree_has_one_bark(j);
+}
+
+static void set_material(const tree_job *j, const picture *p, int is_cut_out, mesh_material *m) {
+    m->name = p->name;
+    m->is_cut_out = is_cut_out;
+    m->repeats = !is_cut_out;
+    m->texture = name_in(p->path);
+    if (!tree_is_glb(j)) return;
+    m->png = p->png;
+    m->png_size = p->size;
+}
+
+/* Bark and leaves, but for a .ply, which shows none. */
+int tree_dress(tree_job *j, float tint[3]) {
+    int status = CLI_DONE;
+    brightest_bark(j, tint);
+    if (!strcmp(j->extension, ".ply")) return CLI_DONE;
+    for (int s = 0; s < j->species_count && !status; s++) {
+        if (tree_has_bark(j, s))
+            status = make_bark(j, s, tree_has_one_bark(j) ? tint : j->species[s].bark_color);
+        if (!status) status = make_leaves(j, s);
+        set_material(j, &j->bark[s], 0, &j->bark_materials[s]);
+        set_material(j, &j->leaves[s], 1, &j->leaf_materials[s]);
+    }
     return status;
 }

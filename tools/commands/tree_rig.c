@@ -10,13 +10,6 @@
 
 /* ---- rotations ----------------------------------------------------------------------------- */
 
-/* The columns X, Y, Z of a bone are at right angles; made unit vectors they are a rotation. */
-txm_quat tree_bone_rotation(const float *bone) {
-    txm_dvec3 axis[3];
-    for (int c = 0; c < 3; c++) axis[c] = txm_d3_unit(txm_d3(bone[c], bone[4 + c], bone[8 + c]));
-    return txm_quat_unit(txm_quat_from_axes(axis[0], axis[1], axis[2]));
-}
-
 static txm_dvec3 bone_place(const float *bone) {
     return txm_d3(bone[3], bone[7], bone[11]);
 }

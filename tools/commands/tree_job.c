@@ -1,0 +1,158 @@
+/* tree_job.c - what 'texkit tree' and 'texkit forest' begin with: species, grown trees, their bones
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "tree.h"
+#include "files/image_io.h"
+
+#define TREEPIECES_IMPLEMENTATION
+#include "treepieces.h"
+
+#include <errno.h>
+#include <stdio.h>
+
+/* ---- the job ------------------------------------------------------------------------------- */
+
+tree_job *new_tree_job(int is_forest) {
+    tree_job *j = (tree_job *)calloc(1, sizeof *j);
+    if (!j) {
+        fprintf(stderr, "texkit %s: out of memory\n", is_forest ? "forest" : "tree");
+        return NULL;
+    }
+    j->is_forest = is_forest;
+    j->species_list = "oak";
+    j->count = is_forest ? 0 : 1;
+    j->level = 1;
+    j->seconds = 4;
+    j->sheet = 512;
+    return j;
+}
+
+void free_tree_job(tree_job *j) {
+    for (int s = 0; s < MAX_SPECIES; s++) {
+        free(j->bark[s].png);
+        free(j->leaves[s].png);
+    }
+    free(j->rest);
+    free(j->posed);
+    treepieces_forest_free(j->forest);
+    treepieces_kit_free(j->kit);
+    free(j);
+}
+
+int tree_is_glb(const tree_job *j) {
+    return !strcmp(j->extension, ".glb");
+}
+
+/* ---- species ------------------------------------------------------------------------------- */
+
+/* A built-in species, or one from a file: names with a dot or a slash are files. */
+static int read_species(tree_job *j, const char *name, treepieces_species *species) {
+    size_t size;
+    if (!strpbrk(name, "./"))
+        return check_result(&j->run, treepieces_preset(name, &j->run.env, species), name);
+    const int status = cli_reads(&j->run, name);
+    if (status) return status;
+    unsigned char *text = file_read(name, &size);
+    if (!text) return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", name, strerror(errno));
+    const txm_status result =
+        treepieces_species_parse((const char *)text, size, &j->run.env, species);
+    free(text);
+    return check_result(&j->run, result, name);
+}
+
+int tree_read_species(tree_job *j) {
+    char name[MAX_PATH];
+    const char *list = j->species_list;
+    while (list) {
+        if (j->species_count == MAX_SPECIES)
+            return cli_fail(&j->run, CLI_USAGE, "--species: at most %d", MAX_SPECIES);
+        if (!cli_take_name(&list, j->is_forest ? "," : "", name))
+            return cli_fail(&j->run, CLI_USAGE, "--species: a name is empty or too long");
+        const int status = read_species(j, name, &j->species[j->species_count]);
+        if (status) return status;
+        if (j->bare) j->species[j->species_count].leaf_count = 0;
+        j->species_count++;
+    }
+    return CLI_DONE;
+}
+
+/* ---- growing ------------------------------------------------------------------------------- */
+
+treepieces_wind tree_wind(const tree_job *j) {
+    treepieces_wind wind = {0, 0, 0.6f, 0};
+    wind.speed = (float)j->wind;
+    wind.seed = (uint32_t)j->run.seed;
+    return wind;
+}
+
+static int grow(tree_job *j) {
+    const treepieces_place place = {{0, 0, 0}, 0, 1, 0, j->run.seed};
+    treepieces_forest_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.kit = j->kit;
+    desc.species = j->species;
+    desc.species_count = j->species_count;
+    desc.places = j->is_forest ? NULL : &place;
+    desc.tree_count = j->count;
+    desc.spacing = (float)j->spacing;
+    desc.max_pieces = j->pieces;
+    desc.seed = j->run.seed;
+    return check_result(&j->run, treepieces_forest_make(&desc, &j->run.env, &j->forest),
+                        j->species[0].name);
+}
+
+/* Bones as the trees are to be seen: posed, and in the wind unless that is a clip of a rig, which needs
+   those at rest too. */
+static int pose(tree_job *j) {
+    const treepieces_pose bent = {j->run.seed, (float)j->pose, NULL};
+    const size_t nodes = j->forest->node_count;
+    const treepieces_wind wind = tree_wind(j);
+    const int has_rig = tree_is_glb(j) && !j->is_forest;
+    txm_status result = TXM_OK;
+    j->posed = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
+    if (has_rig) j->rest = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
+    if (!j->posed || (has_rig && !j->rest)) return fail_memory(&j->run);
+    if (has_rig) result = treepieces_bones(j->forest, NULL, &j->run.env, j->rest);
+    if (result == TXM_OK) result = treepieces_bones(j->forest, &bent, &j->run.env, j->posed);
+    if (result == TXM_OK && j->wind > 0 && !has_rig) {
+        float *state = (float *)new_array(nodes, 4 * sizeof(float));
+        if (!state) return fail_memory(&j->run);
+        for (int i = WARM_UP - 1; i >= 0 && result == TXM_OK; i--)
+            result = treepieces_sway(j->forest, &wind, -0.1 * i, 0.1, &bent, &j->run.env, state,
+                                     j->posed);
+        free(state);
+    }
+    return check_result(&j->run, result, j->species[0].name);
+}
+
+static void grown_figures(tree_job *j) {
+    const treepieces_forest *f = j->forest;
+    float height = 0;
+    for (int t = 0; t < f->tree_count; t++)
+        if (f->trees[t].height > height) height = f->trees[t].height;
+    cli_figure(&j->run, "trees", f->tree_count);
+    cli_figure(&j->run, "pieces", f->node_count);
+    cli_figure(&j->run, "clusters", f->cluster_count);
+    cli_figure(&j->run, "height", (double)height);
+    cli_figure(&j->run, "bytes_per_tree", (double)f->bytes / f->tree_count);
+}
+
+/* The trees, and their bones. */
+int tree_grow(tree_job *j) {
+    cli_stage(&j->run, "grow");
+    int status =
+        check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
+    if (!status) status = grow(j);
+    if (status) return status;
+    grown_figures(j);
+    cli_stage(&j->run, "pose");
+    return pose(j);
+}
+
+/* ---- bones --------------------------------------------------------------------------------- */
+
+/* The columns X, Y, Z of a bone are at right angles; made unit vectors they are a rotation. */
+txm_quat tree_bone_rotation(const float *bone) {
+    txm_dvec3 axis[3];
+    for (int c = 0; c < 3; c++) axis[c] = txm_d3_unit(txm_d3(bone[c], bone[4 + c], bone[8 + c]));
+    return txm_quat_unit(txm_quat_from_axes(axis[0], axis[1], axis[2]));
+}
