@@ -56,7 +56,7 @@ check "as TIFF too" "$root/tests/tool/check_tiff.py" small/plane.tif small.ppm
 export TEXKIT=false
 for make in parallel xargs; do
     [ $make = xargs ] && PATH=$tmp/bin:$PATH
-    check "a tile that cannot be made, with $make" refuses "call it again to go on" \
+    check "a tile that cannot be made, with $make" refuses "run it again to continue" \
         sh "$plane" cells.png broken --size 300x220 --tile 160
 done
 check "and no picture" test ! -e broken/plane.tif

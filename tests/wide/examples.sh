@@ -1,0 +1,102 @@
+#!/bin/sh
+# The examples of one file, built as a user builds them: against the headers at the root and nothing
+# else of this repository but stb.c. Each does what its head comment says, and refuses what it cannot.
+. tests/kit/tap.sh
+
+warn="-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror"
+mkdir "$tmp/include" && cp ./*.h "$tmp/include/"
+make -s build/files/stb.o build/draw build/shape || exit 1
+build/draw bricks "$tmp/bricks.png" 96
+build/draw bricks-height "$tmp/height.png" 96
+build/draw clouds "$tmp/clouds.png" 96
+build/shape blob "$tmp/blob.obj"
+
+# example NAME: build it, and see that it explains itself if it is called without arguments
+example() {
+    # shellcheck disable=SC2086 # flags are words
+    check "$1 builds against the headers alone" $CC -std=c99 -O1 -ffp-contract=off $warn \
+        -I"$tmp/include" "examples/$1.c" build/files/stb.o -o "$tmp/$1" -lm || exit 1
+    check "$1 says how it is called" usage "$1"
+}
+usage() {
+    "$tmp/$1" >"$tmp/out.log" 2>&1
+    [ $? = 2 ] && grep -q "^usage: $1 " "$tmp/out.log"
+}
+# refuses TEXT COMMAND...: status 1, and TEXT on stderr
+refuses() {
+    text=$1
+    shift
+    "$@" >"$tmp/out.log" 2>"$tmp/err.log"
+    [ $? = 1 ] && grep -q "$text" "$tmp/err.log" || { cat "$tmp/err.log"; return 1; }
+}
+# size FILE.png: its width and height
+size() { od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }'; }
+
+synthesise() {
+    (cd "$tmp" && ./synthesise clouds.png c.txs c.png) || return 1
+    [ "$(head -c 4 "$tmp/c.txs")" = TXS1 ] && [ "$(size "$tmp/c.png")" = "512 512" ]
+}
+example synthesise
+check "synthesise writes a model and a texture" synthesise
+check "synthesise needs a photograph" refuses "^synthesise: " "$tmp/synthesise" none.png m.txs o.png
+
+# the others take longer to build
+[ "$FULL" = 1 ] || exit 0
+
+wall() {
+    (cd "$tmp" && ./wall w bricks.png height.png && ./wall again bricks.png height.png) || return 1
+    [ "$(size "$tmp/w-0.png")" = "512 512" ] && [ "$(size "$tmp/w-1.png")" = "512 512" ] &&
+        [ ! -e "$tmp/w-2.png" ] && cmp "$tmp/w-0.png" "$tmp/again-0.png" && cmp "$tmp/w-1.png" "$tmp/again-1.png" &&
+        ! cmp -s "$tmp/w-0.png" "$tmp/w-1.png"
+}
+example wall
+check "wall writes all maps of a material, the same again" wall
+check "wall needs maps of one size" refuses "^wall: " "$tmp/wall" "$tmp/bad" "$tmp/bricks.png" "$tmp/c.png"
+
+strokes() {
+    "$tmp/strokes" "$tmp/clouds.png" "$tmp/s.png" && [ "$(size "$tmp/s.png")" = "512 512" ]
+}
+example strokes
+check "strokes writes a texture" strokes
+check "strokes needs a photograph" refuses "^strokes: " "$tmp/strokes" none.png o.png
+
+floor() {
+    "$tmp/floor" "$tmp/clouds.png" "$tmp/f.png" && [ "$(size "$tmp/f.png")" = "960 540" ]
+}
+example floor
+check "floor writes a picture" floor
+check "floor needs a photograph" refuses "^floor: " "$tmp/floor" none.png o.png
+
+# a scale is 5 vertices and 4 triangles; a closed surface of V vertices has 2 V - 4 triangles
+scales() {
+    "$tmp/scales" "$tmp/blob.obj" "$tmp/scales.obj" 300 || return 1
+    [ "$(grep -c '^v ' "$tmp/scales.obj")" = $((5 * 596)) ] &&
+        [ "$(grep -c '^f ' "$tmp/scales.obj")" = $((4 * 596)) ] && ! grep -q nan "$tmp/scales.obj"
+}
+example scales
+check "scales puts one scale on each triangle" scales
+check "scales needs a mesh" refuses "cannot read" "$tmp/scales" none.obj o.obj
+check "scales needs vertices enough" refuses "^scales: " "$tmp/scales" "$tmp/blob.obj" o.obj 3
+
+# every face has numbers of vertices and of texture coordinates that are there; bark may go round its
+# sheet twice
+tree() {
+    (cd "$tmp" && mkdir -p t && ./tree birch t/birch 3) || return 1
+    grep -qx 'mtllib birch.mtl' "$tmp/t/birch.obj" || return 1
+    for picture in $(sed -n 's/^map_[A-Za-z]* //p' "$tmp/t/birch.mtl"); do
+        [ -s "$tmp/t/$picture" ] || { echo "no $picture"; return 1; }
+    done
+    tr / ' ' <"$tmp/t/birch.obj" | awk '
+        $1 == "v" { v++ }
+        $1 == "vn" { n++ }
+        $1 == "vt" { t++; if ($2 < 0 || $2 > 2 || $3 < 0 || $3 > 1) bad++ }
+        $1 == "f" {
+            f++
+            for (i = 2; i <= 10; i += 3)
+                if ($i < 1 || $i > v || $(i + 1) < 1 || $(i + 1) > t || $(i + 2) > n) bad++
+        }
+        END { print v, t, f, bad + 0; exit !(f > 1000 && v == n && !bad) }'
+}
+example tree
+check "tree writes a mesh, its materials and their pictures" tree
+check "tree knows its species" refuses 'no species "fern"' "$tmp/tree" fern "$tmp/fern"
