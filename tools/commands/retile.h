@@ -8,6 +8,7 @@
 
 #include "command.h"
 #include "files/mesh_io.h"
+#include "trimesh_cover.h"
 #include "trimesh_relax.h"
 
 enum { MAX_PROTOTYPES = 64 }; /* distinct colors of instanced points */
