@@ -1596,6 +1596,22 @@ static inline uint32_t txm_mesh_high(const txm_mesh *mesh, size_t i) {
     return a < b ? b : a;
 }
 
+/* Does side i run from the higher vertex to the lower? From a vertex to itself: the last side of a
+   face does, so that they do not all run one way round. */
+static inline int txm_mesh_runs_down(const txm_mesh *mesh, size_t i) {
+    const size_t next = txm_mesh_next(mesh, i);
+    const uint32_t a = mesh->indices[i], b = mesh->indices[next];
+    return a == b ? next < i : a > b;
+}
+
+/* A color 0..colors-1 for the edge of side i, by hash of its two vertices: all that color the edges
+   of a mesh with the same seed and number agree. */
+static inline int txm_mesh_edge_color(const txm_mesh *mesh, size_t i, uint64_t seed, int colors) {
+    const uint64_t edge = (uint64_t)txm_mesh_high(mesh, i) << 32 | txm_mesh_low(mesh, i);
+    const uint64_t hash = txm_hash(txm_hash(seed ^ 0x7465787475726573u) + edge) >> 32;
+    return (int)(hash * (uint64_t)colors >> 32);
+}
+
 /* Which sides share an edge, that is, have the same two vertices: sort the sides by the lower, then
    by the higher vertex of their edge. Those of one edge lie together, the lowest number first.
 

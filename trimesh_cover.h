@@ -1088,14 +1088,9 @@ TRIMESH_COVER_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int color
         return txm_fail(env, TXM_BAD_ARGUMENT, "colors must be 1 to 65536");
     if (mesh->face_count && !edge_colors)
         return txm_fail(env, TXM_BAD_ARGUMENT, "edge_colors is NULL");
-    const uint64_t base = txm_hash(seed ^ 0x7465787475726573u);
     for (size_t i = 0; i < 3 * mesh->face_count; i++) {
-        const uint32_t low = txm_mesh_low(mesh, i), high = txm_mesh_high(mesh, i);
-        const uint64_t h = txm_hash(base + ((uint64_t)high << 32 | low)) >> 32;
-        edge_colors[i] = (int)(h * (uint64_t)colors >> 32);
-        /* from a vertex to itself: by the corners' numbers, so that not all three go one way */
-        const int against = low == high ? i % 3 == 2 : mesh->indices[i] == high;
-        if (directions) directions[i] = against ? -1 : 1;
+        edge_colors[i] = txm_mesh_edge_color(mesh, i, seed, colors);
+        if (directions) directions[i] = txm_mesh_runs_down(mesh, i) ? -1 : 1;
     }
     return TXM_OK;
 }
@@ -1245,7 +1240,7 @@ enum {
 typedef struct tmc_item {
     double w[3]; /* weights of the patch's corners                                        */
     double height, scale;
-    double turn[4]; /* unit quaternion                                                    */
+    txm_quat turn;  /* of length 1                                                        */
     uint32_t prototype;
     uint32_t before;      /* sixths of the points before this one                         */
     uint8_t side, corner; /* on which it lies; TMC_NONE = inside. Of a corner both     */
@@ -1287,7 +1282,8 @@ static txm_status tmc_check_point(const trimesh_point *p, size_t patch, size_t i
 }
 
 static void tmc_ready_point(const trimesh_point *p, tmc_item *item) {
-    double turn = 0, sum = 0;
+    const txm_quat turn = {p->rotation[0], p->rotation[1], p->rotation[2], p->rotation[3]};
+    double sum = 0;
     int zeros = 0;
     item->w[0] = 1.0 - p->u - p->v;
     item->w[1] = p->u;
@@ -1306,9 +1302,7 @@ static void tmc_ready_point(const trimesh_point *p, tmc_item *item) {
     for (int k = 0; k < 3; k++) item->w[k] /= sum;
     item->height = p->height;
     item->scale = p->scale > 0 ? p->scale : 1;
-    for (int k = 0; k < 4; k++) turn += (double)p->rotation[k] * p->rotation[k];
-    for (int k = 0; k < 4; k++)
-        item->turn[k] = turn > 0 ? p->rotation[k] / sqrt(turn) : k == 3;
+    item->turn = txm_quat_unit(turn);
     item->prototype = p->prototype;
 }
 
@@ -1507,28 +1501,6 @@ static void tmc_count_block(const void *job, size_t first, size_t end) {
 
 /* ---- geometry on triangles: frames ----------------------------------------------------------- */
 
-/* a after b */
-static void tmc_quat_mul(const double a[4], const double b[4], double out[4]) {
-    out[0] = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1];
-    out[1] = a[3] * b[1] + a[1] * b[3] + a[2] * b[0] - a[0] * b[2];
-    out[2] = a[3] * b[2] + a[2] * b[3] + a[0] * b[1] - a[1] * b[0];
-    out[3] = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2];
-}
-
-/* The quaternion of the frame x, y, z, by its largest component [Shepperd 1978]; not of length 1. */
-static void tmc_quat_frame(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z, double q[4]) {
-    const double c[4] = {1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z, 1 - x.x - y.y + z.z,
-                         1 + x.x + y.y + z.z};
-    int k = 3;
-    for (int i = 0; i < 3; i++) {
-        if (c[i] > c[k]) k = i;
-    }
-    q[0] = k == 0 ? c[0] : k == 1 ? y.x + x.y : k == 2 ? z.x + x.z : y.z - z.y;
-    q[1] = k == 0 ? y.x + x.y : k == 1 ? c[1] : k == 2 ? z.y + y.z : z.x - x.z;
-    q[2] = k == 0 ? z.x + x.z : k == 1 ? z.y + y.z : k == 2 ? c[2] : x.y - y.x;
-    q[3] = k == 0 ? y.z - z.y : k == 1 ? z.x - x.z : k == 2 ? x.y - y.x : c[3];
-}
-
 /* A unit vector at a right angle to the unit vector n, near x if there is one. */
 static txm_dvec3 tmc_tangent(txm_dvec3 x, txm_dvec3 n) {
     x = txm_d3_mad(x, n, -txm_d3_dot(x, n));
@@ -1576,7 +1548,7 @@ static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, do
 }
 
 /* A random turn about z: half the angle is that of a random point of the disc. */
-static void tmc_spin(uint64_t h, double q[4]) {
+static txm_quat tmc_spin(uint64_t h) {
     double x, y, r;
     do {
         h = txm_hash(h + 1);
@@ -1584,9 +1556,8 @@ static void tmc_spin(uint64_t h, double q[4]) {
         y = (double)(int32_t)(uint32_t)(h >> 32) / 2147483648.0;
         r = x * x + y * y;
     } while (r > 1 || r < 0.01);
-    q[0] = q[1] = 0;
-    q[2] = x / sqrt(r);
-    q[3] = y / sqrt(r);
+    const txm_quat q = {0, 0, x / sqrt(r), y / sqrt(r)};
+    return q;
 }
 
 static uint32_t tmc_mix(const tmc_scatter *s, uint64_t h) {
@@ -1615,20 +1586,17 @@ static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_it
     const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
     const txm_dvec3 x = tmc_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
     const txm_dvec3 z = txm_d3_scale(n, side);
-    double q[4], r[4], spin[4];
-    tmc_quat_frame(x, txm_d3_cross(z, x), z, q);
-    tmc_quat_mul(q, item->turn, r);
-    if (d->spin) {
-        tmc_spin(h, spin);
-        tmc_quat_mul(r, spin, q);
-        memcpy(r, q, sizeof r);
-    }
-    const double length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]);
-    const double scale = r[3] < 0 ? -1 / length : 1 / length;
+    txm_quat q = txm_quat_mul(txm_quat_from_axes(x, txm_d3_cross(z, x), z), item->turn);
+    if (d->spin) q = txm_quat_mul(q, tmc_spin(h));
+    const double length = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+    const double scale = q.w < 0 ? -1 / length : 1 / length;
     out->position[0] = txm_float(p.x);
     out->position[1] = txm_float(p.y);
     out->position[2] = txm_float(p.z);
-    for (int k = 0; k < 4; k++) out->rotation[k] = txm_float(r[k] * scale);
+    out->rotation[0] = txm_float(q.x * scale);
+    out->rotation[1] = txm_float(q.y * scale);
+    out->rotation[2] = txm_float(q.z * scale);
+    out->rotation[3] = txm_float(q.w * scale);
     out->scale = txm_float(item->scale * b->unit);
     out->prototype = s->mix ? tmc_mix(s, txm_hash(h)) : item->prototype;
 }

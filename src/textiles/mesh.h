@@ -34,13 +34,8 @@ static int32_t txt_face_entry(const txt_cover *c, uint32_t face) {
         for (int k = 3; k >= 0; k--) code = code * s->colors + c->color[first + (uint32_t)k];
         return s->lookup[code];
     }
-    const uint32_t *v = c->mesh.indices + first;
-    for (int k = 0; k < 3; k++) {
-        /* Along an edge to the same vertex there is no direction; that of the corners' numbers keeps
-           the three from running one way round. */
-        const int n = (k + 1) % 3, against = v[k] > v[n] || (v[k] == v[n] && k > n);
-        code = code * s->symbols + 2 * c->color[first + (uint32_t)k] + against;
-    }
+    for (uint32_t side = first; side < first + 3; side++)
+        code = code * s->symbols + 2 * c->color[side] + txm_mesh_runs_down(&c->mesh, side);
     return s->lookup[code];
 }
 
@@ -190,15 +185,13 @@ static txm_status txt_check_sides(const txt_cover *c) {
 
 /* Colours by hash (edges NULL), or as given for quads; 0 when cancelled. */
 static int txt_color_sides(txt_cover *c, const int *edges) {
-    const uint64_t seed = c->seed ^ 0x7465787475726573u;
     for (uint32_t i = 0; i < c->sides; i++) {
         if (i % (4 * TXT_REPORT_FACES) == 0 &&
             txm_progress(c->env, 0.5f * (float)i / (float)c->sides, "edges"))
             return 0;
-        const uint64_t edge = (uint64_t)txm_mesh_high(&c->mesh, i) << 32 | txm_mesh_low(&c->mesh, i);
-        const uint64_t h = txm_hash(txm_hash(seed) + edge) >> 32;
-        c->color[i] = (uint8_t)(edges ? edges[i - i % 4 + (3 - i % 4)]
-                                      : (int)(h * (uint64_t)c->set->colors >> 32));
+        c->color[i] =
+            (uint8_t)(edges ? edges[i - i % 4 + (3 - i % 4)]
+                            : txm_mesh_edge_color(&c->mesh, i, c->seed, c->set->colors));
     }
     return 1;
 }

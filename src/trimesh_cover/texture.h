@@ -172,14 +172,9 @@ TRIMESH_COVER_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int color
         return txm_fail(env, TXM_BAD_ARGUMENT, "colors must be 1 to 65536");
     if (mesh->face_count && !edge_colors)
         return txm_fail(env, TXM_BAD_ARGUMENT, "edge_colors is NULL");
-    const uint64_t base = txm_hash(seed ^ 0x7465787475726573u);
     for (size_t i = 0; i < 3 * mesh->face_count; i++) {
-        const uint32_t low = txm_mesh_low(mesh, i), high = txm_mesh_high(mesh, i);
-        const uint64_t h = txm_hash(base + ((uint64_t)high << 32 | low)) >> 32;
-        edge_colors[i] = (int)(h * (uint64_t)colors >> 32);
-        /* from a vertex to itself: by the corners' numbers, so that not all three go one way */
-        const int against = low == high ? i % 3 == 2 : mesh->indices[i] == high;
-        if (directions) directions[i] = against ? -1 : 1;
+        edge_colors[i] = txm_mesh_edge_color(mesh, i, seed, colors);
+        if (directions) directions[i] = txm_mesh_runs_down(mesh, i) ? -1 : 1;
     }
     return TXM_OK;
 }

@@ -255,6 +255,39 @@ static void test_edges_of_a_torus(void **state) {
     }
 }
 
+/* Colours and directions depend on the two vertices only, whichever side of the edge is asked. */
+static void test_edge_colors(void **state) {
+    (void)state;
+    static soup s;
+    int count[5] = {0}, other_seed = 0;
+    make_soup(&s, MOST_FACES, 3, 60, 1000, 7);
+    txm_mesh_sort_sides(&s.mesh, s.sorted);
+    for (size_t i = 0, end; i < 3 * MOST_FACES; i = end) {
+        const uint32_t first = s.sorted[i];
+        const int color = txm_mesh_edge_color(&s.mesh, first, 11, 5);
+        end = txm_mesh_edge_end(&s.mesh, s.sorted, i);
+        assert_true(color >= 0 && color < 5);
+        count[color]++;
+        other_seed += txm_mesh_edge_color(&s.mesh, first, 12, 5) != color;
+        assert_int_equal(txm_mesh_edge_color(&s.mesh, first, 11, 1), 0);
+        for (size_t k = i; k < end; k++)
+            assert_int_equal(txm_mesh_edge_color(&s.mesh, s.sorted[k], 11, 5), color);
+    }
+    for (int c = 0; c < 5; c++) assert_true(count[c] > 120); /* of some 900 edges */
+    assert_true(other_seed > 600);
+
+    static const uint32_t triangle[3] = {5, 2, 9}, point[4] = {3, 3, 3, 3};
+    txm_mesh m;
+    memset(&m, 0, sizeof m);
+    m.indices = triangle;
+    assert_true(txm_mesh_runs_down(&m, 0) && !txm_mesh_runs_down(&m, 1));
+    assert_true(txm_mesh_runs_down(&m, 2));
+    m.indices = point;
+    for (size_t i = 0; i < 3; i++) assert_int_equal(txm_mesh_runs_down(&m, i), i == 2);
+    m.corners = 4;
+    for (size_t i = 0; i < 4; i++) assert_int_equal(txm_mesh_runs_down(&m, i), i == 3);
+}
+
 static void test_no_faces(void **state) {
     (void)state;
     txm_mesh m;
@@ -271,6 +304,7 @@ int main(void) {
         cmocka_unit_test(test_corners),
         cmocka_unit_test(test_edges_of_soups),
         cmocka_unit_test(test_edges_of_a_torus),
+        cmocka_unit_test(test_edge_colors),
         cmocka_unit_test(test_no_faces),
     };
     return cmocka_run_group_tests_name("texmath meshes", tests, NULL, NULL);
