@@ -17,7 +17,6 @@ LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 SOURCES := $(wildcard src/*.h src/*/*.h)
 HEADERS := $(notdir $(wildcard src/*.h))
-TOOL    := $(wildcard tools/*.[ch] tools/*/*.[ch])
 TEXKIT   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/*.c tools/commands/*.c tools/files/*.c))
 IMAGES   = $(BUILD)/files/image_io.o $(BUILD)/files/stb.o
 MESHES   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/files/mesh*.c))
@@ -61,9 +60,11 @@ headers:
 setup:
 	@CC="$(CC)" tools/setup.sh tool
 
-$(BUILD)/%.o: tools/%.c $(filter %.h,$(TOOL)) $(SOURCES) Makefile | setup
+# the compiler notes in a .d file which headers an object stands on
+$(BUILD)/%.o: tools/%.c Makefile | setup
 	@mkdir -p $(@D)
-	$(COMPILE) -c $< -o $@
+	$(COMPILE) -MMD -MP -c $< -o $@
+-include $(wildcard $(BUILD)/*.d $(BUILD)/commands/*.d $(BUILD)/files/*.d $(BUILD)/helpers/*.d)
 
 # stb shifts into the sign bit on purpose; that is not what our sanitizer runs look for
 $(BUILD)/files/stb.o: COMPILE += -fno-sanitize=undefined
