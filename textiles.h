@@ -1,13 +1,14 @@
-/* textiles.h - v0.1.0 - cut tile sets that join invisibly out of photographs, and lay them
+/* textiles.h - v0.1.0 - cut tiles that join without seams out of photographs, and lay them
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     From one photograph of a texture it cuts a set of tiles - squares with colours on their edges
-     (Wang tiles) or corners, equilateral triangles with directed colours on their edges, squares
-     whose whole frame is fixed - such that tiles with equal colours join without a seam, while
-     their insides differ: endless texture that never repeats, out of a small atlas. Then it lays
-     them: the infinite plane in constant time per tile, finite grids under constraints, triangle
-     and quad meshes. Finished tiles of other make can be laid as well.
+     It cuts a set of tiles out of one photograph of a texture: squares with colours on their edges
+     (Wang tiles) or on their corners, equilateral triangles with directed colours on their edges,
+     or squares whose whole border is fixed. Tiles with equal colours join without a visible seam,
+     while their interiors differ, so that a small atlas gives a texture without end and without
+     period. Then it decides which tile goes where: on the infinite plane in constant time per tile,
+     on finite grids under constraints, on triangle and quad meshes. Tiles made elsewhere can be
+     used as well.
 
    QUICK START                                 (tests build and run this very block)
      // Cut Wang tiles and cover some of the plane with them. cc -std=c99 quick.c -lm
@@ -59,32 +60,33 @@
      }
 
    WHICH KIND
-     wang      the usual choice on a plane: C colours per axis, C^4 tiles. One corner is shared by
-               all tiles. A reduced set has 2 C^2 tiles, for scan-line order only.
-     corner    the same number of tiles, no corner shared by all; neighbours across the corner
-               match too.
-     triangle  for surfaces of any shape: ((2 C)^3 + 4 C) / 3 tiles cover any triangle mesh, each
-               edge pattern included. Its texture turns with the triangles, so it suits what looks
-               alike in all directions.
+     wang      the usual choice for a plane: C colours per axis, C^4 tiles. All tiles have the same
+               pixels at their corners. A reduced set has 2 C^2 tiles, for scan-line order only.
+     corner    the same number of tiles; corners differ, and diagonal neighbours match too.
+     triangle  for surfaces of any shape: ((2 C)^3 + 4 C) / 3 tiles cover any triangle mesh, since
+               every combination of edges has a tile. The texture turns with the triangles, so it
+               should look alike in all directions.
      frame     for the quads of a model whose edges have fixed colours [5]: a class of tiles for
-               each kind of quad, any number of insides for each.
-     Two colours with two variants show no period at a glance; three colours are far better where
-     an eye may dwell. A tile should be some three times as wide as the largest element of the
-     texture, and the exemplar three times as wide as a tile; it may be as small as 64 x 64, but
-     then the tiles repeat what little there is. Bricks and other exact layouts lose their order.
-     (stb_herringbone_wang_tile.h lays maps out of hand-made templates, at a third of a
-     microsecond per tile; it cuts no pictures. textiles_import takes hand-made tiles.)
+               each kind of quad, each class with any number of interiors.
+     Two colours with two variants show no period at a glance; three colours are better where the
+     surface is seen for long. A tile should be about three times as wide as the largest element of
+     the texture, and the exemplar three times as wide as a tile. The exemplar may be as small as
+     64 x 64, but then the tiles repeat its content. Regular layouts, bricks for example, become
+     irregular. (stb_herringbone_wang_tile.h assembles maps from hand-made templates, in a third of
+     a microsecond per tile; it makes no tiles from pictures. textiles_import takes hand-made ones.)
 
    HOW IT WORKS
-     Corners first: unremarkable places of the exemplar. Then for each colour an edge: a strip of
-     untouched exemplar on both sides of the joint, so that the joint itself is a place of the
-     exemplar; chosen to agree with the corners at its ends, to be as rough, bright and busy as is
-     usual, and apart from the others. Two pixels on either side of it are locked. The inside is a
-     piece of the exemplar that fits the frame, chosen so that all of the exemplar is used and the
-     set has its mean colour, roughness and contrast; it is joined to the frame by graph cuts
-     (expansion moves) instead of the diamonds of [1], then the worst places along the cuts are
-     mended with further pieces. Steps of colour left at the cuts are spread by a Poisson equation.
-     Triangles live on a triangular lattice, so that turning them needs no resampling.
+     First a place of the exemplar with typical colour and roughness is chosen for each corner.
+     Then, for each colour, a place for its edges: a strip of unmodified exemplar that covers both
+     sides of the joint, so that the joint itself is a line of the exemplar. It must agree with the
+     corners at its ends, be typical in roughness, brightness and contrast, and lie apart from the
+     other edges. The two pixels on either side of a joint are the same in all tiles with that
+     colour. The interior is a piece of the exemplar that fits the border, chosen so that the tiles
+     show all of the exemplar and the set keeps its mean colour, roughness and contrast. Graph cuts
+     (expansion moves [7]) join it to the border [8], instead of the diamonds of [1]; then the worst
+     places along the cuts are covered with further pieces. Steps of colour that remain at the cuts
+     are spread by a Poisson equation [9]. Triangles are made on a triangular lattice, on which
+     turning by 60 degrees needs no resampling.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXTILES_STATIC       every function static to the including file (set it everywhere)
@@ -93,17 +95,17 @@
                            AVX2 where the processor has it. The bytes are the same.
 
    MEMORY
-     A set keeps its tiles' pixels and 4 bytes per pixel that tell where each comes from. Making
-     one takes besides, for each pixel of the exemplars, some 35 bytes and 9 per channel of the
-     first map, and for each of eight tiles at work 1 MB and 190 bytes per pixel of a tile. Laying
-     the plane takes none.
+     A set holds the pixels of its tiles and, for each pixel, 4 bytes that say where it comes from.
+     While it is made there are also about 35 bytes per pixel of the exemplars and 9 per channel of
+     their first map, and 1 MB and 190 bytes per pixel of a tile for each of up to eight tiles that
+     are made at the same time. The plane needs no memory.
 
    TIME   (one core of 2023; make bench measures yours)
-     About 0.1 s for a tile of 128 x 128 out of 512 x 512 pixels, RGB: 16 Wang tiles in 1.5 s,
-     24 triangles in 2 s. The parallel-for hook spreads the tiles, eight at a time.
+     About 0.1 s for a tile of 128 x 128 from 512 x 512 pixels, RGB: 16 Wang tiles in 1.5 s, 24
+     triangles in 2 s. With a parallel-for hook eight tiles are made at a time.
 
    THREADS
-     No global state. Calls with different env and outputs may overlap; a set may be used by many.
+     No global state. Calls with different env and outputs may overlap, and may share a set.
 
    SAME BYTES
      All choices are made in integers, or in double and rounded once: the same bytes on any number
@@ -112,10 +114,10 @@
 
    LIMITS
      Tiles of 32 to 1024 pixels, 2 to 4 colours, 1 to 16 variants, up to 8 maps and 8 exemplars of
-     64 x 64 pixels or more. Joints are as rough as insides within a few percent on average and
-     35 % for any pair (textiles_measure tells), unless the tiles are under 64 pixels or the
-     exemplar has smooth parts and rough ones larger than a tile. Cuts look at 8 channels at most; float maps are compared after scaling
-     to their range.
+     64 x 64 pixels or more. Joints are as rough as interiors within a few percent on average and
+     35 % for any pair (textiles_measure reports it), unless the tiles are smaller than 64 pixels or
+     the exemplar has smooth and rough areas larger than a tile. Cuts compare at most 8 channels;
+     float maps are scaled to their range before.
 
    REFERENCES
      [1] M. F. Cohen, J. Shade, S. Hiller, O. Deussen. Wang tiles for image and texture generation.
@@ -179,13 +181,14 @@ typedef enum textiles_kind {
     TEXTILES_FRAME     /* squares of a few classes: all four edge colours are the class's  */
 } textiles_kind;
 
-/* What a tile matches. Squares are seen as pictures are, rows from top to bottom. Two lie side by
-   side where east equals west, one above the other where south equals north (the two axes have
-   colours of their own); corner tiles where the two shared corners agree.
+/* What a tile matches. Squares are pictures with rows from top to bottom. Two may lie side by
+   side if the east colour of the left one is the west colour of the right one, one above the other
+   if south equals north (the two axes have colours of their own); corner tiles if the two corners
+   that they share have equal colours.
 
    A triangle is stored on the lattice of its texels: texel (i, j), i + j <= size, lies at
-   (i + j / 2, j sqrt(3) / 2) of the plane, rows downwards. Corners and sides go round
-   counter-clockwise as one sees them, so that they fit faces that do:
+   (i + j / 2, j sqrt(3) / 2) of the plane, rows downwards. Its corners and sides are numbered
+   counter-clockwise, as the corners of faces are:
 
            0 . . . . 2     corner 0 = (0, 0), 1 = (0, size), 2 = (size, 0)
             . .   . .      side k runs from corner k to corner k + 1
@@ -206,13 +209,13 @@ typedef struct textiles_tile {
 /* One exemplar: a photograph, or several maps of one material in register. */
 typedef struct textiles_exemplar {
     const txm_image *maps; /* map_count pictures of one size; the first counts most when cutting */
-    int map_count;         /* 1..TEXTILES_MAX_MAPS; all exemplars have the same maps: number,
-                              channels and sample type, which the tiles have as well             */
+    int map_count;         /* 1..TEXTILES_MAX_MAPS; all exemplars have equally many maps, with the
+                              same channels and sample types, and so have the tiles              */
 } textiles_exemplar;
 
 typedef enum textiles_repair {
     TEXTILES_REPAIR_DEFAULT = 0, /* = POISSON                                                   */
-    TEXTILES_REPAIR_NONE,        /* every pixel is one of the exemplar                          */
+    TEXTILES_REPAIR_NONE,        /* every pixel is a pixel of the exemplar                      */
     TEXTILES_REPAIR_POISSON      /* steps of colour at cuts inside a tile are spread over a few
                                     pixels; the pixels at its border stay as they are           */
 } textiles_repair;
@@ -226,15 +229,15 @@ typedef struct textiles_desc {
     int colors;   /* per axis, or of corners, or of triangle edges: 2..4 (frame: 1..4); 0 = 2    */
     int variants; /* tiles with the same colours, 1..16; 0 = 1                                   */
     int reduced;  /* wang: only two tiles (times variants) for each pair of north and west colour,
-                     enough for textiles_scanline; triangle: leave out those whose three sides all
-                     run one way round, which textiles_assign_triangles never needs              */
+                     enough for textiles_scanline; triangle: without the tiles whose three edges all
+                     have the same direction, which textiles_assign_triangles never needs        */
     const int (*classes)[4]; /* frame: the edge colours of each class, north, east, south, west;
                      NULL = class 0 is 0 0 0 0, class k < colors is 0 k 0 k                      */
     int class_count;         /* 1..TEXTILES_MAX_CLASSES; 0 = colors, with classes NULL           */
     const int *edge_exemplars; /* wang, triangle, frame: for each colour the exemplar that its edges
-                     show, colors entries; NULL = whichever suits                                */
+                     show, colors entries; NULL = any                                            */
     textiles_repair repair;
-    uint64_t seed; /* another seed, another set                                                  */
+    uint64_t seed; /* another seed gives another set                                             */
 } textiles_desc;
 
 /* A set of tiles; never changed after it is made. */
@@ -244,18 +247,18 @@ typedef struct textiles_set textiles_set;
 
    env    NULL, or how to allocate, report and spread the work
    out    receives the set, or NULL on any error; release it with textiles_set_free
-   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps that do not go together or
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps that do not fit together or
           samples that are not finite; TXM_TOO_SMALL for an exemplar under 64 x 64;
           TXM_TOO_LARGE above TEXTILES_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(exemplar + tiles * (size^2 + exemplar)), of which no more than 131,072 places are looked
           at in one search; see MEMORY and TIME                                               */
 TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, textiles_set **out);
 
-/* A set from finished pictures, hand-made ones say: what follows works for them as well. desc gives
-   kind, size, colors, variants, reduced and classes; its exemplars are not looked at. tiles holds
-   the pictures of map_count maps tile by tile, tiles[tile * map_count + map], in the order of
-   textiles_tile_at: size x size, of a triangle (size + 1) x (size + 1) with texel (i, j) at column
-   i, row j, what lies beyond i + j = size ignored. Pass tile_count to have it checked.          */
+/* Make a set of finished pictures, for example hand-made ones; all that follows works for it too.
+   Of desc only kind, size, colors, variants, reduced and classes are read. tiles holds the pictures
+   of map_count maps tile by tile, tiles[tile * map_count + map], in the order of textiles_tile_at:
+   size x size, of a triangle (size + 1) x (size + 1) with texel (i, j) at column i, row j; texels
+   beyond i + j = size are ignored. tile_count must be the number of tiles that such a set has. */
 TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_image *tiles,
                                         int tile_count, int map_count, txm_env *env,
                                         textiles_set **out);
@@ -263,7 +266,7 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
 /* Release a set by the allocator it was made with; NULL is allowed. */
 TEXTILES_API void textiles_set_free(textiles_set *set);
 
-/* ---- looking into a set ------------------------------------------------------------------ */
+/* ---- properties of a set ----------------------------------------------------------------- */
 
 TEXTILES_API textiles_kind textiles_kind_of(const textiles_set *set);
 TEXTILES_API int textiles_count(const textiles_set *set); /* tiles, variants included        */
@@ -273,24 +276,26 @@ TEXTILES_API int textiles_variants(const textiles_set *set);
 TEXTILES_API int textiles_map_count(const textiles_set *set);
 TEXTILES_API int textiles_channels(const textiles_set *set, int map); /* 1..4; 0: no such map */
 
-/* Tile index of 0..count-1; 0 for a bad index. Tiles of equal colours follow each other, variant 0
-   first; complete wang and corner sets are in the order of their colours read as digits. */
+/* The tile with an index of 0..count-1; returns 0 for a bad index. Tiles of equal colours follow
+   each other, variant 0 first; complete wang and corner sets are sorted by their colours read as
+   digits. */
 TEXTILES_API int textiles_tile_at(const textiles_set *set, int index, textiles_tile *tile);
 
 /* The tile (variant 0) with these colours and, of a triangle, directions; -1: none. Triangles are
-   stored once for their three rotations: *rotation (may be NULL) receives r so that side k asked
-   for is side (k + r) mod 3 of the tile. */
+   stored once for their three rotations: *rotation (may be NULL) receives r such that side k of the
+   request is side (k + r) mod 3 of the tile. */
 TEXTILES_API int textiles_find(const textiles_set *set, const int edges[4], const int directions[3],
                                int *rotation);
 
-/* Where pixel (x, y) of a tile comes from: the exemplar's number, and its pixel (of triangles, whose
-   texels lie between pixels, the place). -1 for a bad index or an imported set. */
+/* Where pixel (x, y) of a tile comes from: returns the number of the exemplar, from receives the
+   pixel there (of triangles, whose texels lie between pixels, the position). -1 for a bad index or
+   an imported set. */
 TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y, float from[2]);
 
-/* How well the tiles join, over all pairs that may lie side by side: the mean absolute difference of
-   neighbouring pixels across the joint, over that between all neighbours inside the two tiles in the
-   same direction (of triangles, whose edge texels are shared, between the rows on both sides of
-   the edge and it). */
+/* How well the tiles join. For each pair that may lie side by side: the mean absolute difference of
+   neighbouring pixels across the joint, divided by that of all neighbours inside the two tiles in
+   the same direction. (Triangles share the texels on the edge: differences between these and the
+   rows on both sides.) 1 = the joint is as rough as the interiors. */
 typedef struct textiles_joints {
     double mean, worst, least; /* of the ratio over all pairs             */
     double overall;            /* mean step over all joints / mean inside */
@@ -302,17 +307,17 @@ TEXTILES_API txm_status textiles_measure(const textiles_set *set, int map, txm_e
 /* ---- pictures of a set ------------------------------------------------------------------- */
 
 typedef enum textiles_packing {
-    TEXTILES_PACKED = 0, /* each tile by itself, surrounded by a gutter that continues it            */
-    TEXTILES_TORUS,      /* Wei's layout: complete wang and corner sets (corner: 2 or 3 colours) so
-                            that every tile's neighbours match it, round the picture's borders too:
-                            no gutter, filtering and mip-maps need none                              */
-    TEXTILES_SLICES      /* one under the other, each with its gutter: pitch_x x pitch_y pixels of
-                            the picture after the other are the layers of a texture array, layer =
-                            tile. (OpenGL promises no more than 256 of them.)                         */
+    TEXTILES_PACKED = 0, /* each tile with a gutter around it that continues the texture         */
+    TEXTILES_TORUS,      /* Wei's layout [6] of complete wang and corner sets (corner: 2 or 3
+                            colours): every tile's neighbours match it, across the borders of the
+                            picture too, so that filtering and mip-maps need no gutter           */
+    TEXTILES_SLICES      /* one under the other, each with its gutter: layer t of a texture array
+                            is rows t * pitch_y to (t + 1) * pitch_y - 1. (OpenGL guarantees no
+                            more than 256 layers.)                                               */
 } textiles_packing;
 
-/* Where the tiles lie in one picture; a plain value. Tile t has its pixel (x, y) at
-   (px + sx * x, py + sx * y) for the px, py, sx of textiles_place. */
+/* Where the tiles lie in one picture; a plain value. Pixel (x, y) of a tile lies at
+   (px + step * x, py + step * y) with px, py and step of textiles_place. */
 typedef struct textiles_layout {
     int size, colors, variants, count; /* of the set                           */
     textiles_kind kind;
@@ -323,40 +328,40 @@ typedef struct textiles_layout {
     int width, height;    /* pixels of the whole picture                       */
 } textiles_layout;
 
-/* Lay a set out.
+/* Compute where each tile lies.
 
-   gutter  0..size/2 pixels around each tile, filled with what a matching neighbour shows there: 1 is
-           enough for bilinear filtering, 2^n for mip-map level n; -1 = 8 (TORUS: must be 0 or -1).
-           Rounded up to a power of two; tiles and gutters begin at multiples of it, so that the
-           pixels of these levels do not straddle tiles. The first 2 pixels are the same whichever
-           neighbour a tile of a made set gets, deeper ones are one of those that it may get.
+   gutter  0..size/2 pixels around each tile, filled with what a matching neighbour shows there: 1
+           is enough for bilinear filtering, 2^n for mip-map level n; -1 = 8 (TORUS: must be 0 or
+           -1). Rounded up to a power of two; tiles and gutters begin at multiples of it, so that no
+           pixel of these levels belongs to two tiles. In a set of textiles_make the first 2 pixels
+           are the same for all neighbours that match; the others are those of one such neighbour.
    return  TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
 TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_packing packing,
                                              int gutter, txm_env *env, textiles_layout *layout);
 
-/* Where pixel (0, 0) of a tile lies, and the step (+1, or -1 for triangles stored upside down) to the
-   next; uv (may be NULL) receives the corners in texture coordinates, v downwards: of a square its
-   outer corners nw, ne, se, sw, of a triangle the centres of its corner texels 0, 1, 2 (uv[3] is left
-   as it is). Of SLICES px and py lie in the whole picture, uv in the tile's own layer. 0 for a bad
-   index. */
+/* Where pixel (0, 0) of a tile lies, and the step to the next: +1, or -1 for triangles stored
+   upside down. uv receives the corners in texture coordinates, v downwards: of a square its outer
+   corners nw, ne, se, sw, of a triangle the centres of its corner texels 0, 1, 2 (uv[3] is not
+   written). With SLICES px and py refer to the whole picture, uv to the layer of the tile. All
+   outputs may be NULL. Returns 0 for a bad index. */
 TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px, int *py, int *step,
                                 float uv[4][2]);
 
 /* Draw the atlas of one map. out: layout width x height, channels and sample type of the map;
-   untouched after an error. What no tile or gutter covers is filled with the nearest gutter. */
+   untouched after an error. Pixels outside all tiles and gutters repeat the nearest gutter. */
 TEXTILES_API txm_status textiles_draw_atlas(const textiles_set *set, const textiles_layout *layout,
                                             int map, txm_env *env, txm_image out);
 
-/* One tile with a gutter around it: (size + 2 gutter) a side, of triangles (size + 1 + 2 gutter)
-   with texel (0, 0) at (gutter, gutter). */
+/* Draw one tile with a gutter around it: (size + 2 gutter) a side, of triangles (size + 1 + 2
+   gutter) with texel (0, 0) at (gutter, gutter). */
 TEXTILES_API txm_status textiles_draw_tile(const textiles_set *set, int tile, int gutter, int map,
                                            txm_env *env, txm_image out);
 
 /* ---- the infinite plane ------------------------------------------------------------------ */
 
-/* The plane covered without end and without period by a set: which tile lies where is computed from
-   the place and the seed alone, in constant time. Needs a complete wang, corner or triangle set (a
-   reduced triangle set will do). A plain value, small enough to copy; valid as long as the set. */
+/* A plane without end and without period, covered by a set: which tile lies where is computed from
+   the position and the seed alone, in constant time. Needs a complete wang, corner or triangle set
+   (a reduced triangle set will do). A plain value that may be copied; valid as long as the set. */
 typedef struct textiles_plane {
     int colors, variants;
     textiles_kind kind;
@@ -367,31 +372,33 @@ typedef struct textiles_plane {
 TEXTILES_API txm_status textiles_plane_make(const textiles_set *set, uint32_t seed, txm_env *env,
                                             textiles_plane *plane);
 
-/* The tile of the square at column x, row y; any int, they wrap around. With two variants or more no
-   tile lies three times in a row, across or down. -1 on a plane of triangles. */
+/* The tile of the square at column x, row y; any int, they wrap around. With two variants or more
+   no three equal tiles lie in a row or column. -1 on a plane of triangles. */
 TEXTILES_API int textiles_plane_tile(const textiles_plane *plane, int x, int y);
 
 /* The same for a window of width x height squares; the fastest way. */
 TEXTILES_API void textiles_plane_fill(const textiles_plane *plane, int x, int y, int width,
                                       int height, int *tiles);
 
-/* Triangles: the lattice point (a, b) lies at (a + b / 2, b sqrt(3) / 2) sides, rows downwards. half 0
-   is the triangle (a, b), (a, b+1), (a+1, b); half 1 is (a+1, b+1), (a+1, b), (a, b+1). Corner k of
-   the triangle, in this order, shows corner (k + *rotation) mod 3 of the tile; rotation may be NULL.
-   With two variants or more no tile lies beside itself. -1 on a plane of squares. */
+/* Triangles: the lattice point (a, b) lies at (a + b / 2, b sqrt(3) / 2) sides, rows downwards.
+   half 0 is the triangle (a, b), (a, b+1), (a+1, b); half 1 is (a+1, b+1), (a+1, b), (a, b+1).
+   Corner k of the triangle, in this order, shows corner (k + *rotation) mod 3 of the tile; rotation
+   may be NULL. With two variants or more equal tiles are never neighbours. -1 on a plane of
+   squares. */
 TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int b, int half,
                                          int *rotation);
 
-/* The table of a triangle set for the GPU: (2 colors)^3 entries tile * 4 + rotation, -1 where there is
-   none, by the symbols (2 color + (direction < 0)) of sides 0, 1, 2 as digits. NULL for squares. */
+/* The table of a triangle set for the GPU: (2 colors)^3 entries tile * 4 + rotation, -1 where there
+   is none, by the symbols (2 color + (direction < 0)) of sides 0, 1, 2 as digits. NULL for squares. */
 TEXTILES_API const int32_t *textiles_plane_table(const textiles_plane *plane, int *count);
 
 /* Draw a window of the plane from an atlas, with bilinear filtering, as shaders/textiles.glsl does.
 
-   atlas   of textiles_draw_atlas by this layout
-   x, y    of the picture's top left corner on the plane, in pixels of the tiles: a square has size
-           of them a side, a triangle too. step: such pixels per pixel of the picture, > 0; with
-           whole x, y and step 1 squares are copied as they are. Up to 10^9 tiles from the origin
+   atlas   drawn by textiles_draw_atlas with this layout
+   x, y    position of the picture's top left corner on the plane, in pixels of the tiles (a side of
+           a tile has size of them), up to 10^9 tiles from the origin
+   step    pixels of the tiles per pixel of the picture, > 0; with whole x, y and step 1 squares are
+           copied unfiltered
    return  TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
 TEXTILES_API txm_status textiles_draw_plane(const textiles_plane *plane,
                                             const textiles_layout *layout, const txm_image *atlas,
@@ -400,37 +407,40 @@ TEXTILES_API txm_status textiles_draw_plane(const textiles_plane *plane,
 
 /* ---- finite grids ------------------------------------------------------------------------ */
 
-/* Stochastic tiling in scan-line order [Cohen 2003]: each tile is drawn at random among those that
-   match the ones above and to the left. Any square set that has one for each such pair (a reduced set
-   too); no tile three times in a row while there is another.
-   return TXM_OK; TXM_BAD_ARGUMENT: triangles, a size below 1, or a set with a dead end, which is a pair
-          of colours that tiles have to the south and east and none has to the north and west;
-          TXM_TOO_LARGE                                                                          */
+/* Stochastic tiling in scan-line order [1]: each tile is drawn at random among those that match the
+   tiles above and to the left, without three equal ones in a row where possible. For any square
+   set, reduced ones too, that has a tile for each such pair of colours.
+
+   return TXM_OK; TXM_BAD_ARGUMENT: triangles, a size below 1, or a set with a dead end, that is, a
+          pair of colours that occur to the south and east of tiles but that no tile has to the
+          north and west; TXM_TOO_LARGE                                                          */
 TEXTILES_API txm_status textiles_scanline(const textiles_set *set, int width, int height,
                                           uint64_t seed, txm_env *env, int *tiles);
 
-/* Tiling under constraints: cells that hold a tile's number keep it, cells with -1 are filled so that
-   all match. Any square set.
+/* Tiling under constraints: cells that hold a tile's number keep it, cells with -1 are filled so
+   that all match. Any square set.
+
    periodic  non-zero: the grid continues across its own borders
-   tiles     width * height, rows from the top; in: wishes, out: the tiling (untouched after an error)
-   return    TXM_OK; TXM_BAD_ARGUMENT: triangles, a bad size or number, or two wishes that contradict
-             each other (the message says where); TXM_BAD_DATA: no tiling found, be it that there is
-             none or that 64 searches gave up; TXM_TOO_LARGE above 2^27 cells; TXM_OUT_OF_MEMORY;
-             TXM_CANCELLED
+   tiles     width * height, rows from the top; in: tiles to keep, or -1; out: the tiling (untouched
+             after an error)
+   return    TXM_OK; TXM_BAD_ARGUMENT: triangles, a bad size or number, or tiles to keep that
+             contradict each other (the message says where); TXM_BAD_DATA: no tiling found, because
+             there is none or because 64 searches gave up; TXM_TOO_LARGE above 2^27 cells;
+             TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost      O(width * height * tiles) for complete sets; others are searched              */
 TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int height, int periodic,
                                        uint64_t seed, txm_env *env, int *tiles);
 
 /* ---- meshes ------------------------------------------------------------------------------ */
 
-/* Cover a triangle mesh. Every edge gets a color by hash and runs from its lower to its higher
-   vertex number; every face the tile with these. Any connectivity will do: borders, edges with more
-   than two faces, unequal winding. Tiles do not lie beside themselves where colours and variants
-   can avoid it.
+/* Cover a triangle mesh. Every edge gets a color by hash and the direction from its lower to its
+   higher vertex number, every face a tile with these edges. Any connectivity will do: borders,
+   edges of more than two faces, inconsistent winding. Equal tiles are not neighbours where colours
+   and variants can avoid it.
 
    indices    3 * face_count vertex numbers below vertex_count, faces counter-clockwise
    tiles      receives the tile of each face
-   rotations  receives r: corner k of the face shows corner (k + r) mod 3 of the tile
+   rotations  receives r for each face: its corner k shows corner (k + r) mod 3 of the tile
    return     TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED (outputs
               untouched)
    cost       O(faces), 40 bytes per face                                                        */
@@ -439,22 +449,22 @@ TEXTILES_API txm_status textiles_assign_triangles(const textiles_set *set, const
                                                   uint64_t seed, txm_env *env, int *tiles,
                                                   int *rotations);
 
-/* Cover a mesh of quads with wang or frame tiles. Corner 0, 1, 2, 3 of a quad is nw, sw, se, ne of its
-   tile (counter-clockwise), so the edges 0-1, 1-2, 2-3, 3-0 are west, south, east, north.
+/* Cover a mesh of quads with wang or frame tiles. Corner 0, 1, 2, 3 of a quad is nw, sw, se, ne of
+   its tile (counter-clockwise), so the edges 0-1, 1-2, 2-3, 3-0 are west, south, east, north.
 
    indices   4 * face_count vertex numbers below vertex_count
    edges     4 * face_count colours north, east, south, west; NULL = colours by hash (complete wang
              sets)
-   return    TXM_OK; TXM_BAD_ARGUMENT, also where an edge is shared by more than two faces or by two
-             sides that cannot match (north with south, east with west, walked in opposite
-             directions), or no tile has these colours: the message names the faces; TXM_TOO_LARGE;
-             TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                   */
+   return    TXM_OK; TXM_BAD_ARGUMENT, also if an edge is shared by more than two faces or by two
+             sides that do not match (north matches south, east matches west, in opposite
+             directions), or if no tile has the colours of a face: the message names the faces;
+             TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED                                    */
 TEXTILES_API txm_status textiles_assign_quads(const textiles_set *set, const uint32_t *indices,
                                               size_t face_count, size_t vertex_count,
                                               const int *edges, uint64_t seed, txm_env *env,
                                               int *tiles);
 
-/* Texture coordinates of a face's corners 0, 1, 2 (3) for the tile and rotation it was given; v
+/* Texture coordinates of the corners 0, 1, 2 (3) of a face with this tile and rotation, v
    downwards. Returns the number of corners, 0 for a bad index or rotation. */
 TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int rotation,
                                   float uv[4][2]);
@@ -555,7 +565,7 @@ static txm_status txt_cancelled(txm_env *env) {
 
 /* ---- which tiles a set has ---------------------------------------------------------------- */
 
-/* What is the same for made and imported sets: refuse a description that makes no sense. */
+/* The checks of a description that made and imported sets have in common. */
 static txm_status txt_check_kind(const textiles_desc *d, txm_env *env) {
     const int low = d->kind == TEXTILES_FRAME ? 1 : 2;
     if ((int)d->kind < TEXTILES_WANG || (int)d->kind > TEXTILES_FRAME)
@@ -590,7 +600,7 @@ static txm_status txt_check_kind(const textiles_desc *d, txm_env *env) {
     return TXM_OK;
 }
 
-/* Append the variants of a tile, and enter it in the table under its code and, of a triangle, under
+/* Append the variants of a tile; enter it in the table under its code and, of a triangle, under
    those of its rotations. With tiles NULL it only counts. */
 static void txt_add_tile(textiles_set *s, const int edges[4], const int directions[3]) {
     const int rotations = s->kind == TEXTILES_TRIANGLE ? 3 : 1;
@@ -601,7 +611,7 @@ static void txt_add_tile(textiles_set *s, const int edges[4], const int directio
             for (int k = 0; k < 3; k++) t->directions[k] = directions[k];
             t->variant = v;
         }
-        for (int r = rotations - 1; r >= 0; r--) { /* side k asked for is side k + r of the tile */
+        for (int r = rotations - 1; r >= 0; r--) { /* side k here is side k + r of the tile */
             int e[4] = {edges[0], edges[1], edges[2], edges[3]}, d[3] = {0, 0, 0};
             for (int k = 0; k < 3 && rotations == 3; k++) {
                 e[k] = edges[(k + r) % 3];
@@ -613,8 +623,9 @@ static void txt_add_tile(textiles_set *s, const int edges[4], const int directio
     s->count += s->variants;
 }
 
-/* All sets of three directed edges up to rotation, ((2 C)^3 + 4 C) / 3 of them; of a reduced set
-   only those that do not run one way round, 2 C^3. Each is listed by the least of its codes. */
+/* All triples of directed edges up to rotation, ((2 C)^3 + 4 C) / 3 of them; in a reduced set
+   without those whose edges all have the same direction, 2 C^3. Each is listed under its smallest
+   code. */
 static void txt_list_triangles(textiles_set *s) {
     const int n = s->symbols;
     for (int a = 0; a < n; a++) {
@@ -640,8 +651,8 @@ static void txt_list_tiles(textiles_set *s, const textiles_desc *d) {
         txt_list_triangles(s);
     } else if (s->kind == TEXTILES_FRAME) {
         for (int k = 0; k < (d->classes ? d->class_count : c); k++) {
-            const int usual[4] = {0, k, 0, k};
-            txt_add_tile(s, d->classes ? d->classes[k] : usual, none);
+            const int plain[4] = {0, k, 0, k};
+            txt_add_tile(s, d->classes ? d->classes[k] : plain, none);
         }
     } else if (s->reduced) {
         /* (north, west) -> (east, south) is one to one for each of the two tiles, so that all
@@ -659,8 +670,8 @@ static void txt_list_tiles(textiles_set *s, const textiles_desc *d) {
     }
 }
 
-/* A set with its tiles listed and room for their texels; the maps' channels and sample are the
-   caller's to fill in before (maps[m]). NULL: no memory, or beyond TEXTILES_MAX_PIXELS. */
+/* A set with its tiles listed and memory for their texels. Of maps only channels and sample are
+   read. */
 static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int map_count,
                                int with_source, txm_env *env, textiles_set **out) {
     textiles_set head;
@@ -704,7 +715,7 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     return TXM_OK;
 }
 
-/* Does square u match t, lying east of it, or (down) south of it? */
+/* May square u lie east of t, or (down) south of it? */
 static int txt_joins(const textiles_set *s, int t, int u, int down) {
     const int *a = s->tiles[t].edges, *b = s->tiles[u].edges;
     if (s->kind == TEXTILES_CORNER)
@@ -712,7 +723,7 @@ static int txt_joins(const textiles_set *s, int t, int u, int down) {
     return down ? a[2] == b[0] : a[1] == b[3];
 }
 
-/* non-zero if no sample is infinite or NaN; of a triangle's square only the triangle counts */
+/* Are all samples finite? Of a triangle's square only the triangle counts. */
 static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
     for (int y = 0; y < im->height; y++) {
         txm_image row = *im;
@@ -828,8 +839,8 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
     const size_t side = (size_t)set->side;
     const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
     if (t < 0) return -1;
-    const int e = txt_sheet_of(set, t), at = t - set->sheets[e].first, row = at / set->sheets[e].width;
-    const int column = at % set->sheets[e].width;
+    const int e = txt_sheet_of(set, t), at = t - set->sheets[e].first, width = set->sheets[e].width;
+    const int row = at / width, column = at % width;
     if (set->kind == TEXTILES_TRIANGLE) {
         from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
         from[1] = txm_float(row * 0.86602540378443864676);
@@ -842,14 +853,15 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
 
 /* ---- the hash ----------------------------------------------------------------------------- */
 
-/* Which tile lies where is read off
+/* Which tile lies where is computed from
 
        hash(seed, what, x, y) = txt_at(txt_column(seed, x), what, y),
 
-   32 bits that depend on the place, on what is asked for there and on the seed. The inner half depends
-   on the column only, so that a column of the plane, or two edges at the same column, share it. In
-   32-bit integers, since shaders/textiles.glsl computes the same; coordinates are taken modulo 2^32.
-   The two multipliers of the mixing step are C. Wellons's ("prospecting for hash functions"). */
+   32 bits that depend on the position, on the property wanted there (what) and on the seed. The
+   inner half depends on the column only and is shared by all cells of a column, and by two edges of
+   one. In 32-bit integers, since shaders/textiles.glsl computes the same; coordinates are taken
+   modulo 2^32. The two multipliers of the mixing step are those of C. Wellons ("prospecting for
+   hash functions"). */
 static uint32_t txt_mix(uint32_t h) {
     h ^= h >> 16;
     h *= 0x7feb352du;
@@ -862,7 +874,7 @@ static uint32_t txt_column(uint32_t seed, uint32_t x) {
     return txt_mix(x + seed);
 }
 
-/* what is asked for at row y: the same for all columns */
+/* the part of the hash that is the same for all columns */
 static uint32_t txt_key(uint32_t what, uint32_t y) {
     return y * 0x9e3779b9u + what * 0x85ebca6bu;
 }
@@ -886,7 +898,7 @@ static int txt_lower(uint32_t hash, int n) {
 
 /* ---- the plane: which tile lies where --------------------------------------------------- */
 
-/* A square (x, y) asks for
+/* The hashes of a square (x, y):
 
        what 0   the colour of its north edge; its south edge is the north edge of (x, y + 1)
        what 1   the colour of its west edge; its east edge is the west edge of (x + 1, y)
@@ -894,9 +906,9 @@ static int txt_lower(uint32_t hash, int n) {
        what 3   variants of the upper left and lower right square of a block of 2 x 2
        what 4   variants of the other two
 
-   and colours are txt_below(hash, colors). */
+   Colours are txt_below(hash, colors). */
 
-/* Number k of the variants that are neither a nor d. */
+/* the k-th of the variants that are neither a nor d */
 static int txt_other_variant(int k, int a, int d) {
     const int low = a < d ? a : d, high = a < d ? d : a;
     k += k >= low;
@@ -908,9 +920,9 @@ static int txt_other_variant(int k, int a, int d) {
        a b      a and d at random (two variants: d = a),
        c d      b and c at random among those that are neither a nor d.
 
-   Of three squares in a row two belong to the same block, and these have different variants. So no
-   tile lies three times in a row, whatever the colours. h = hash(3, bx, by), g = hash(4, bx, by) for
-   bx = x / 2, by = y / 2 of the coordinates as unsigned numbers. */
+   Of three squares in a row two belong to the same block, and these have different variants, so
+   that three equal tiles never lie in a row, whatever their colours. h = hash(3, bx, by), g =
+   hash(4, bx, by) for bx = x / 2, by = y / 2 of the coordinates as unsigned numbers. */
 static void txt_block_variants(uint32_t h, uint32_t g, int variants, int v[4]) {
     const int a = txt_upper(h, variants), d = variants == 2 ? a : txt_lower(h, variants);
     const int others = variants - 1 - (a != d);
@@ -929,9 +941,9 @@ static int txt_square_variant(uint32_t seed, int variants, uint32_t x, uint32_t 
     return v[(y & 1) * 2 + (x & 1)];
 }
 
-enum { TXT_STRIP = 256 }; /* columns that textiles_plane_fill does at a time; even */
+enum { TXT_STRIP = 256 }; /* columns that textiles_plane_fill computes at a time; even */
 
-/* What a strip of the plane keeps from row to row; place i is column x + i. */
+/* A strip of the plane, filled row by row; element i belongs to column x + i. */
 typedef struct txt_strip {
     uint32_t column[TXT_STRIP + 1];    /* txt_column of the columns            */
     uint32_t block[TXT_STRIP / 2 + 1]; /* and of the blocks of two             */
@@ -1002,12 +1014,12 @@ TEXTILES_API txm_status textiles_plane_make(const textiles_set *set, uint32_t se
     if (!set || !plane) return txm_fail(env, TXM_BAD_ARGUMENT, "set or plane is NULL");
     if (set->kind == TEXTILES_FRAME)
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "a frame set has not all combinations of colors that the plane needs; use "
+                        "a frame set lacks combinations of colors that the plane needs; use "
                         "textiles_solve");
     if (!set->complete)
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "a reduced wang set has not all combinations of colors that the plane "
-                        "needs; make the set without reduced, or use textiles_scanline");
+                        "a reduced wang set lacks combinations of colors that the plane needs; "
+                        "make the set without reduced, or use textiles_scanline");
     plane->kind = set->kind;
     plane->colors = set->colors;
     plane->variants = set->variants;
@@ -1051,16 +1063,17 @@ TEXTILES_API void textiles_plane_fill(const textiles_plane *plane, int x, int y,
     }
 }
 
-/* Triangles ask at lattice points (a, b), modulo 2^32 again, for
+/* The hashes of lattice points (a, b) of triangles, coordinates again modulo 2^32:
 
-       what 7    the rank of the point; edges run from the lower to the higher rank, of equal ones
+       what 7    the rank of the point. Edges run from the lower to the higher rank, of equal ranks
                  (2^-32 of all) from the lower to the higher a, of equal a from the lower b. As ranks
-                 are an order, no triangle's sides run one way round: a reduced set will do
+                 are an order, the three edges of a triangle never have the same direction: a reduced
+                 set will do
        what 8    the colour of the edge (a, b) - (a+1, b)
        what 9    the colour of the edge (a, b) - (a, b+1)
        what 10   the colour of the edge (a+1, b) - (a, b+1)
-       what 11   the variants: of half 0 an even one by the upper 16 bits, of half 1 an odd one by the
-                 lower. Every neighbour of a half 0 is a half 1, so none shows the same tile */
+       what 11   the variants: an even one for half 0 from the upper 16 bits, an odd one for half 1
+                 from the lower. All neighbours of a half 0 are halves 1, so neighbours differ */
 TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int b, int half,
                                          int *rotation) {
     const uint32_t u = (uint32_t)a, v = (uint32_t)b, one = half != 0;
@@ -1101,9 +1114,9 @@ TEXTILES_API const int32_t *textiles_plane_table(const textiles_plane *plane, in
 
 /* ---- grids: scan-line order ------------------------------------------------------------- */
 
-/* The tiles, variants aside, that fit what lies above and to the left. A key has a digit for each
-   colour that must agree, 0..colors-1 or colors for "any": north and west; of corner tiles nw, ne and
-   sw. There are at most 256 tiles to list, each under 4 or 8 keys. */
+/* The tiles (first variants only) that match the cells above and to the left. A key has a digit for
+   each colour that must agree, 0..colors-1 or colors for "any": north and west; of corner tiles nw,
+   ne and sw. There are at most 256 such tiles, each listed under 4 or 8 keys. */
 enum { TXT_KEYS = 5 * 5 * 5, TXT_MAX_BASES = 256 };
 
 typedef struct txt_choice {
@@ -1138,7 +1151,7 @@ static void txt_choice_make(const textiles_set *s, txt_choice *choice) {
     }
 }
 
-/* Does a pair of colours that tiles above and to the left can have leave no tile? */
+/* Is there a tile for each pair of colours that the cells above and to the left can have? */
 static txm_status txt_choice_check(const textiles_set *s, const txt_choice *choice, int width,
                                    int height, txm_env *env) {
     int south = 0, east = 0; /* sets of colours */
@@ -1160,8 +1173,8 @@ static txm_status txt_choice_check(const textiles_set *s, const txt_choice *choi
     return TXM_OK;
 }
 
-/* One of the tiles under a key, if possible neither `row` nor `column`, which would lie three times
-   in a row (-1: nothing to avoid). */
+/* One of the tiles under a key, if possible neither `row` nor `column`, which would be the third
+   equal one in a row or column (-1: nothing to avoid). */
 static int txt_choose(const textiles_set *s, const txt_choice *choice, int key, int row, int column,
                       txm_rng *rng) {
     const uint8_t *bases = choice->bases + choice->first[key];
@@ -1184,7 +1197,7 @@ static int txt_choose(const textiles_set *s, const txt_choice *choice, int key, 
     }
 }
 
-/* What scanline and solve ask of their arguments. */
+/* the checks that textiles_scanline and textiles_solve have in common */
 static txm_status txt_check_grid(const textiles_set *set, int width, int height, const int *tiles,
                                  txm_env *env) {
     size_t bytes;
@@ -1209,7 +1222,7 @@ TEXTILES_API txm_status textiles_scanline(const textiles_set *set, int width, in
     status = txt_choice_check(set, &choice, width, height, env);
     if (status != TXM_OK) return status;
 
-    txm_rng rng = txm_rng_make(seed, 40);
+    txm_rng rng = txm_rng_make(seed, 40); /* streams: 40 here, 41 in textiles_solve */
     const int any = set->colors, corner = set->kind == TEXTILES_CORNER;
     const ptrdiff_t up = width;
     int *t = tiles;
@@ -1233,19 +1246,21 @@ TEXTILES_API txm_status textiles_scanline(const textiles_set *set, int width, in
 
 /* ---- grids: tiling under constraints ---------------------------------------------------- */
 
-/* The unknowns are the slots between the cells: horizontal edges, then vertical edges; of corner sets
-   the corners. Each has a set of colours it may still take. In a complete set any colours will do,
-   so that the wishes decide some slots and the rest is drawn at random, in one go.
+/* The unknowns are the slots between the cells: horizontal edges, then vertical edges; of corner
+   sets the corners. Each has a set of colours it may still take. In a complete set every
+   combination has a tile, so that the given tiles decide some slots and the rest is drawn at
+   random, in one pass.
 
-   Reduced wang sets and frame sets (at most 64 tiles, variants aside) are searched: a cell's domain
-   are the tiles that its four slots allow, a slot keeps the colours that the domains on both sides
-   show; what that excludes is propagated [AC-3, Mackworth 1977]. Cells are then decided in scan-line
-   order, with propagation after each, and the latest decision is taken back on failure. After
-   too many failures in one place it starts afresh with other random numbers. */
+   With reduced wang sets and frame sets (at most 64 tiles, variants not counted) there is a search.
+   The domain of a cell is the set of tiles that its four slots allow; a slot keeps the colours that
+   occur in the domains on both sides; this is propagated until nothing changes [AC-3, Mackworth
+   1977]. Cells are decided in scan-line order, with propagation after each; on failure the latest
+   decision is undone. After too many failures without progress the search restarts with other
+   random numbers. */
 enum {
-    TXT_ATTEMPTS = 64,         /* ours: fresh starts                                          */
+    TXT_ATTEMPTS = 64,         /* ours: restarts                                              */
     TXT_FAILURES = 1000,       /* ours: failures without getting any further, and 8 a column  */
-    TXT_REDRAWS = 8,           /* ours: draws to avoid three in a row                          */
+    TXT_REDRAWS = 8,           /* ours: draws to avoid three equal tiles in a row              */
     TXT_SLOTS = 1 << 28,       /* a trail entry is slot * 16 + colours, in 32 bits             */
     TXT_REPORT_CELLS = 1 << 14 /* cells done from one report to the next                       */
 };
@@ -1263,13 +1278,13 @@ typedef struct txt_solver {
     int width, height, periodic;
     uint32_t cells, slots;
     uint8_t *colors; /* by slot: set of colours                                       */
-    int *tiles;      /* by cell: the wish or the result, -1 = none yet                */
+    int *tiles;      /* by cell: the given tile or the result, -1 = none yet          */
     /* for the search only */
     uint64_t having[4][TEXTILES_MAX_COLORS]; /* tiles that show this colour there        */
     uint64_t allowing[4][1 << TEXTILES_MAX_COLORS]; /* tiles that show one of these colours */
-    uint64_t all;                            /* tiles that may lie beside themselves if the
-                                                period is 1, else all of them            */
-    uint32_t *trail, trail_length;           /* slots narrowed, with the colours before  */
+    uint64_t all;                            /* all tiles; with a period of 1 those that
+                                                match themselves                         */
+    uint32_t *trail, trail_length;           /* changed slots with their colours before  */
     uint32_t *queue, queue_length;           /* cells to look at again                   */
     uint8_t *queued;                         /* by cell                                  */
     txt_decision *decisions;
@@ -1351,7 +1366,8 @@ static void txt_enqueue(txt_solver *s, uint32_t cell) {
     s->queue[s->queue_length++] = cell;
 }
 
-/* Narrow a cell's slots to what the tiles of a domain show; its neighbours there are looked at. */
+/* Reduce the slots of a cell to the colours of the tiles of a domain; enqueue the neighbours at
+   slots that change. */
 static void txt_narrow(txt_solver *s, uint32_t cell, const uint32_t slot[4], uint64_t domain) {
     const uint32_t w = (uint32_t)s->width, x = cell % w, last = s->cells - w;
     for (int k = 0; k < 4; k++) {
@@ -1371,7 +1387,7 @@ static void txt_narrow(txt_solver *s, uint32_t cell, const uint32_t slot[4], uin
     }
 }
 
-/* Work off the queue; 0 if a cell is left without a tile (failed_at), or when cancelled. */
+/* Process the queue; 0 if a cell has no tile left (failed_at), or when cancelled. */
 static int txt_propagate(txt_solver *s) {
     while (s->queue_length) {
         uint32_t slot[4];
@@ -1403,8 +1419,8 @@ static void txt_undo(txt_solver *s, uint32_t mark) {
     }
 }
 
-/* A tile for the next cell out of its domain; without variants not the third in a row if another
-   is left. */
+/* A random tile of the domain of a cell; without variants not the third equal one in a row or
+   column, if the domain has another. */
 static int txt_draw_base(const txt_solver *s, uint32_t cell, uint64_t domain, txm_rng *rng) {
     const uint32_t w = (uint32_t)s->width;
     uint64_t good = domain;
@@ -1419,12 +1435,12 @@ static int txt_draw_base(const txt_solver *s, uint32_t cell, uint64_t domain, tx
     return txt_random_bit(good ? good : domain, rng);
 }
 
-/* One attempt. 1 = every cell is decided, 0 = too many failures or cancelled, -1 = all possibilities
-   were tried, there is no tiling.
+/* One attempt. 1 = every cell is decided, 0 = too many failures or cancelled, -1 = all
+   possibilities were tried, there is no tiling.
 
-   A cell that no tile suits is decided next at each level that the search falls back to, until one
-   does: what is to blame is often a decision a row earlier, and all the cells between would be tried
-   in vain in all combinations ["last conflict", Lecoutre 2009]. */
+   After a failure the cell without a tile is decided first at each level that the search returns
+   to, until that succeeds: the cause is often a decision a row earlier, and all combinations of the
+   cells between would be tried in vain ["last conflict", Lecoutre 2009]. */
 static int txt_attempt(txt_solver *s, txm_rng *rng) {
     const uint32_t most = TXT_FAILURES + 8 * (uint32_t)s->width;
     uint32_t depth = 0, failures = 0, scan = 0, furthest = 0, urgent = s->cells;
@@ -1464,8 +1480,8 @@ static int txt_attempt(txt_solver *s, txm_rng *rng) {
     return 1;
 }
 
-/* Enter the wishes. 0: two of them disagree at the cell failed_at. */
-static int txt_enter_wishes(txt_solver *s) {
+/* Enter the given tiles. 0: two of them disagree at the cell failed_at, or cancelled. */
+static int txt_enter_given(txt_solver *s) {
     for (uint32_t cell = 0; cell < s->cells; cell++) {
         uint32_t slot[4];
         if (txt_solver_report(s, 1, 0)) return 0;
@@ -1485,11 +1501,11 @@ static int txt_enter_wishes(txt_solver *s) {
 static txm_status txt_contradiction(txt_solver *s) {
     if (s->cancelled) return txt_cancelled(s->env);
     return txm_fail_numbers(s->env, TXM_BAD_ARGUMENT,
-                            "tiles: the wishes near column #, row # contradict each other",
+                            "tiles: those given near column #, row # contradict each other",
                             s->failed_at % (uint32_t)s->width, s->failed_at / (uint32_t)s->width);
 }
 
-/* Reduced wang and frame sets: fill in the numbers of tiles, variant 0, where there is no wish. */
+/* Reduced wang and frame sets: fill in the numbers of tiles, variant 0, where none is given. */
 static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng) {
     const textiles_set *set = s->set;
     s->trail = (uint32_t *)txm_arena_alloc(arena, s->slots, 3 * sizeof(uint32_t));
@@ -1513,14 +1529,14 @@ static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng
         }
     }
 
-    /* first without the wishes: is it the set that has no such tiling? */
-    for (int with_wishes = 0; with_wishes < 2; with_wishes++) {
-        if (with_wishes && !txt_enter_wishes(s)) return txt_contradiction(s);
+    /* first without the given tiles: is it the set that has no such tiling? */
+    for (int with_given = 0; with_given < 2; with_given++) {
+        if (with_given && !txt_enter_given(s)) return txt_contradiction(s);
         for (uint32_t cell = s->cells; cell-- > 0;) txt_enqueue(s, cell);
         if (txt_propagate(s)) {
             s->trail_length = 0; /* never to be undone */
         } else {
-            if (with_wishes || s->cancelled) return txt_contradiction(s);
+            if (with_given || s->cancelled) return txt_contradiction(s);
             return txm_fail(s->env, TXM_BAD_DATA, "the set has no tiling of this size");
         }
     }
@@ -1530,22 +1546,23 @@ static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng
         found = txt_attempt(s, rng);
         if (s->cancelled) return txt_cancelled(s->env);
     }
-    if (found < 0) return txm_fail(s->env, TXM_BAD_DATA, "no tiling fulfils the wishes");
+    if (found < 0) return txm_fail(s->env, TXM_BAD_DATA, "no tiling has the given tiles");
     if (!found)
         return txm_fail(s->env, TXM_BAD_DATA,
-                        "no tiling found in 64 attempts; another seed or fewer wishes may help");
+                        "no tiling found in 64 attempts; another seed or fewer given tiles may "
+                        "help");
     for (uint32_t cell = 0; cell < s->cells; cell++) {
         if (s->tiles[cell] < 0) s->tiles[cell] = txt_decided_base(s, cell) * set->variants;
     }
     return TXM_OK;
 }
 
-/* Complete sets: draw what the wishes left open. A tile without variants that would be the third in
-   a row is drawn again a few times. */
+/* Complete sets: draw the cells that are not given. Without variants a tile that would be the third
+   equal one in a row is drawn again a few times. */
 static txm_status txt_draw_tiles(txt_solver *s, txm_rng *rng) {
     const uint32_t w = (uint32_t)s->width;
     const int n = s->set->colors, v = s->set->variants, all = (1 << n) - 1;
-    if (!txt_enter_wishes(s)) return txt_contradiction(s);
+    if (!txt_enter_given(s)) return txt_contradiction(s);
     for (uint32_t cell = 0; cell < s->cells; cell++) {
         uint32_t slot[4];
         int *t = s->tiles + cell, color[4], row = -1, column = -1;
@@ -1574,13 +1591,13 @@ static txm_status txt_draw_tiles(txt_solver *s, txm_rng *rng) {
     return TXM_OK;
 }
 
-/* How many rows of three equal tiles, across and down, hold this cell. */
+/* How many runs of three equal tiles, across and down, contain this cell. */
 static int txt_runs(const txt_solver *s, int x, int y) {
     const int at[2] = {x, y}, length[2] = {s->width, s->height};
     const int tile = s->tiles[(size_t)y * (size_t)s->width + (size_t)x];
     int runs = 0;
     for (int axis = 0; axis < 2; axis++) {
-        int equal = 0; /* so far, one after the other */
+        int equal = 0; /* length of the run so far */
         if (length[axis] == 1) continue;
         for (int d = -2; d <= 2; d++) {
             int p[2] = {x, y};
@@ -1596,9 +1613,10 @@ static int txt_runs(const txt_solver *s, int x, int y) {
     return runs;
 }
 
-/* Choose variants where there is no wish (free cells): those of the plane, which never lie three in a
-   row; then, as wishes and the period may have it otherwise, the best for each cell by itself. */
-static txm_status txt_choose_variants(txt_solver *s, const uint8_t *fixed, uint32_t seed) {
+/* Choose the variants of cells that are not given: first those of the plane, which have no three
+   equal tiles in a row; then, since given tiles and the period may break that, the best for each
+   cell. */
+static txm_status txt_choose_variants(txt_solver *s, const uint8_t *given, uint32_t seed) {
     const int variants = s->set->variants;
     for (int pass = 0; pass < 4 && variants > 1; pass++) {
         int changed = 0;
@@ -1607,7 +1625,7 @@ static txm_status txt_choose_variants(txt_solver *s, const uint8_t *fixed, uint3
             if (txt_solver_report(s, (uint32_t)s->width, 0.9f)) return txt_cancelled(s->env);
             for (int x = 0; x < s->width; x++, cell++) {
                 int *t = s->tiles + cell;
-                if (fixed[cell]) continue;
+                if (given[cell]) continue;
                 if (pass == 0) {
                     *t += txt_square_variant(seed, variants, (uint32_t)x, (uint32_t)y);
                     continue;
@@ -1660,19 +1678,19 @@ TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int h
     txm_arena_init(&arena, env);
     s.colors = (uint8_t *)txm_arena_alloc(&arena, s.slots, 1);
     s.tiles = (int *)txm_arena_alloc(&arena, s.cells, sizeof(int));
-    uint8_t *fixed = (uint8_t *)txm_arena_alloc(&arena, s.cells, 1);
+    uint8_t *given = (uint8_t *)txm_arena_alloc(&arena, s.cells, 1);
     if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to solve a grid of this size");
         goto done;
     }
     memset(s.colors, (1 << set->colors) - 1, s.slots);
     memcpy(s.tiles, tiles, s.cells * sizeof(int));
-    for (uint32_t i = 0; i < s.cells; i++) fixed[i] = tiles[i] >= 0;
+    for (uint32_t i = 0; i < s.cells; i++) given[i] = tiles[i] >= 0;
 
     {
         txm_rng rng = txm_rng_make(seed, 41);
         status = set->complete ? txt_draw_tiles(&s, &rng) : txt_search_tiles(&s, &arena, &rng);
-        if (status == TXM_OK) status = txt_choose_variants(&s, fixed, txm_rng_next(&rng));
+        if (status == TXM_OK) status = txt_choose_variants(&s, given, txm_rng_next(&rng));
     }
     if (status == TXM_OK && txm_progress(env, 1, "tiling")) status = txt_cancelled(env);
     if (status == TXM_OK) memcpy(tiles, s.tiles, s.cells * sizeof(int));

@@ -5,9 +5,9 @@
 
 /* ---- grids: scan-line order ------------------------------------------------------------- */
 
-/* The tiles, variants aside, that fit what lies above and to the left. A key has a digit for each
-   colour that must agree, 0..colors-1 or colors for "any": north and west; of corner tiles nw, ne and
-   sw. There are at most 256 tiles to list, each under 4 or 8 keys. */
+/* The tiles (first variants only) that match the cells above and to the left. A key has a digit for
+   each colour that must agree, 0..colors-1 or colors for "any": north and west; of corner tiles nw,
+   ne and sw. There are at most 256 such tiles, each listed under 4 or 8 keys. */
 enum { TXT_KEYS = 5 * 5 * 5, TXT_MAX_BASES = 256 };
 
 typedef struct txt_choice {
@@ -42,7 +42,7 @@ static void txt_choice_make(const textiles_set *s, txt_choice *choice) {
     }
 }
 
-/* Does a pair of colours that tiles above and to the left can have leave no tile? */
+/* Is there a tile for each pair of colours that the cells above and to the left can have? */
 static txm_status txt_choice_check(const textiles_set *s, const txt_choice *choice, int width,
                                    int height, txm_env *env) {
     int south = 0, east = 0; /* sets of colours */
@@ -64,8 +64,8 @@ static txm_status txt_choice_check(const textiles_set *s, const txt_choice *choi
     return TXM_OK;
 }
 
-/* One of the tiles under a key, if possible neither `row` nor `column`, which would lie three times
-   in a row (-1: nothing to avoid). */
+/* One of the tiles under a key, if possible neither `row` nor `column`, which would be the third
+   equal one in a row or column (-1: nothing to avoid). */
 static int txt_choose(const textiles_set *s, const txt_choice *choice, int key, int row, int column,
                       txm_rng *rng) {
     const uint8_t *bases = choice->bases + choice->first[key];
@@ -88,7 +88,7 @@ static int txt_choose(const textiles_set *s, const txt_choice *choice, int key, 
     }
 }
 
-/* What scanline and solve ask of their arguments. */
+/* the checks that textiles_scanline and textiles_solve have in common */
 static txm_status txt_check_grid(const textiles_set *set, int width, int height, const int *tiles,
                                  txm_env *env) {
     size_t bytes;
@@ -113,7 +113,7 @@ TEXTILES_API txm_status textiles_scanline(const textiles_set *set, int width, in
     status = txt_choice_check(set, &choice, width, height, env);
     if (status != TXM_OK) return status;
 
-    txm_rng rng = txm_rng_make(seed, 40);
+    txm_rng rng = txm_rng_make(seed, 40); /* streams: 40 here, 41 in textiles_solve */
     const int any = set->colors, corner = set->kind == TEXTILES_CORNER;
     const ptrdiff_t up = width;
     int *t = tiles;
@@ -137,19 +137,21 @@ TEXTILES_API txm_status textiles_scanline(const textiles_set *set, int width, in
 
 /* ---- grids: tiling under constraints ---------------------------------------------------- */
 
-/* The unknowns are the slots between the cells: horizontal edges, then vertical edges; of corner sets
-   the corners. Each has a set of colours it may still take. In a complete set any colours will do,
-   so that the wishes decide some slots and the rest is drawn at random, in one go.
+/* The unknowns are the slots between the cells: horizontal edges, then vertical edges; of corner
+   sets the corners. Each has a set of colours it may still take. In a complete set every
+   combination has a tile, so that the given tiles decide some slots and the rest is drawn at
+   random, in one pass.
 
-   Reduced wang sets and frame sets (at most 64 tiles, variants aside) are searched: a cell's domain
-   are the tiles that its four slots allow, a slot keeps the colours that the domains on both sides
-   show; what that excludes is propagated [AC-3, Mackworth 1977]. Cells are then decided in scan-line
-   order, with propagation after each, and the latest decision is taken back on failure. After
-   too many failures in one place it starts afresh with other random numbers. */
+   With reduced wang sets and frame sets (at most 64 tiles, variants not counted) there is a search.
+   The domain of a cell is the set of tiles that its four slots allow; a slot keeps the colours that
+   occur in the domains on both sides; this is propagated until nothing changes [AC-3, Mackworth
+   1977]. Cells are decided in scan-line order, with propagation after each; on failure the latest
+   decision is undone. After too many failures without progress the search restarts with other
+   random numbers. */
 enum {
-    TXT_ATTEMPTS = 64,         /* ours: fresh starts                                          */
+    TXT_ATTEMPTS = 64,         /* ours: restarts                                              */
     TXT_FAILURES = 1000,       /* ours: failures without getting any further, and 8 a column  */
-    TXT_REDRAWS = 8,           /* ours: draws to avoid three in a row                          */
+    TXT_REDRAWS = 8,           /* ours: draws to avoid three equal tiles in a row              */
     TXT_SLOTS = 1 << 28,       /* a trail entry is slot * 16 + colours, in 32 bits             */
     TXT_REPORT_CELLS = 1 << 14 /* cells done from one report to the next                       */
 };
@@ -167,13 +169,13 @@ typedef struct txt_solver {
     int width, height, periodic;
     uint32_t cells, slots;
     uint8_t *colors; /* by slot: set of colours                                       */
-    int *tiles;      /* by cell: the wish or the result, -1 = none yet                */
+    int *tiles;      /* by cell: the given tile or the result, -1 = none yet          */
     /* for the search only */
     uint64_t having[4][TEXTILES_MAX_COLORS]; /* tiles that show this colour there        */
     uint64_t allowing[4][1 << TEXTILES_MAX_COLORS]; /* tiles that show one of these colours */
-    uint64_t all;                            /* tiles that may lie beside themselves if the
-                                                period is 1, else all of them            */
-    uint32_t *trail, trail_length;           /* slots narrowed, with the colours before  */
+    uint64_t all;                            /* all tiles; with a period of 1 those that
+                                                match themselves                         */
+    uint32_t *trail, trail_length;           /* changed slots with their colours before  */
     uint32_t *queue, queue_length;           /* cells to look at again                   */
     uint8_t *queued;                         /* by cell                                  */
     txt_decision *decisions;
@@ -255,7 +257,8 @@ static void txt_enqueue(txt_solver *s, uint32_t cell) {
     s->queue[s->queue_length++] = cell;
 }
 
-/* Narrow a cell's slots to what the tiles of a domain show; its neighbours there are looked at. */
+/* Reduce the slots of a cell to the colours of the tiles of a domain; enqueue the neighbours at
+   slots that change. */
 static void txt_narrow(txt_solver *s, uint32_t cell, const uint32_t slot[4], uint64_t domain) {
     const uint32_t w = (uint32_t)s->width, x = cell % w, last = s->cells - w;
     for (int k = 0; k < 4; k++) {
@@ -275,7 +278,7 @@ static void txt_narrow(txt_solver *s, uint32_t cell, const uint32_t slot[4], uin
     }
 }
 
-/* Work off the queue; 0 if a cell is left without a tile (failed_at), or when cancelled. */
+/* Process the queue; 0 if a cell has no tile left (failed_at), or when cancelled. */
 static int txt_propagate(txt_solver *s) {
     while (s->queue_length) {
         uint32_t slot[4];
@@ -307,8 +310,8 @@ static void txt_undo(txt_solver *s, uint32_t mark) {
     }
 }
 
-/* A tile for the next cell out of its domain; without variants not the third in a row if another
-   is left. */
+/* A random tile of the domain of a cell; without variants not the third equal one in a row or
+   column, if the domain has another. */
 static int txt_draw_base(const txt_solver *s, uint32_t cell, uint64_t domain, txm_rng *rng) {
     const uint32_t w = (uint32_t)s->width;
     uint64_t good = domain;
@@ -323,12 +326,12 @@ static int txt_draw_base(const txt_solver *s, uint32_t cell, uint64_t domain, tx
     return txt_random_bit(good ? good : domain, rng);
 }
 
-/* One attempt. 1 = every cell is decided, 0 = too many failures or cancelled, -1 = all possibilities
-   were tried, there is no tiling.
+/* One attempt. 1 = every cell is decided, 0 = too many failures or cancelled, -1 = all
+   possibilities were tried, there is no tiling.
 
-   A cell that no tile suits is decided next at each level that the search falls back to, until one
-   does: what is to blame is often a decision a row earlier, and all the cells between would be tried
-   in vain in all combinations ["last conflict", Lecoutre 2009]. */
+   After a failure the cell without a tile is decided first at each level that the search returns
+   to, until that succeeds: the cause is often a decision a row earlier, and all combinations of the
+   cells between would be tried in vain ["last conflict", Lecoutre 2009]. */
 static int txt_attempt(txt_solver *s, txm_rng *rng) {
     const uint32_t most = TXT_FAILURES + 8 * (uint32_t)s->width;
     uint32_t depth = 0, failures = 0, scan = 0, furthest = 0, urgent = s->cells;
@@ -368,8 +371,8 @@ static int txt_attempt(txt_solver *s, txm_rng *rng) {
     return 1;
 }
 
-/* Enter the wishes. 0: two of them disagree at the cell failed_at. */
-static int txt_enter_wishes(txt_solver *s) {
+/* Enter the given tiles. 0: two of them disagree at the cell failed_at, or cancelled. */
+static int txt_enter_given(txt_solver *s) {
     for (uint32_t cell = 0; cell < s->cells; cell++) {
         uint32_t slot[4];
         if (txt_solver_report(s, 1, 0)) return 0;
@@ -389,11 +392,11 @@ static int txt_enter_wishes(txt_solver *s) {
 static txm_status txt_contradiction(txt_solver *s) {
     if (s->cancelled) return txt_cancelled(s->env);
     return txm_fail_numbers(s->env, TXM_BAD_ARGUMENT,
-                            "tiles: the wishes near column #, row # contradict each other",
+                            "tiles: those given near column #, row # contradict each other",
                             s->failed_at % (uint32_t)s->width, s->failed_at / (uint32_t)s->width);
 }
 
-/* Reduced wang and frame sets: fill in the numbers of tiles, variant 0, where there is no wish. */
+/* Reduced wang and frame sets: fill in the numbers of tiles, variant 0, where none is given. */
 static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng) {
     const textiles_set *set = s->set;
     s->trail = (uint32_t *)txm_arena_alloc(arena, s->slots, 3 * sizeof(uint32_t));
@@ -417,14 +420,14 @@ static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng
         }
     }
 
-    /* first without the wishes: is it the set that has no such tiling? */
-    for (int with_wishes = 0; with_wishes < 2; with_wishes++) {
-        if (with_wishes && !txt_enter_wishes(s)) return txt_contradiction(s);
+    /* first without the given tiles: is it the set that has no such tiling? */
+    for (int with_given = 0; with_given < 2; with_given++) {
+        if (with_given && !txt_enter_given(s)) return txt_contradiction(s);
         for (uint32_t cell = s->cells; cell-- > 0;) txt_enqueue(s, cell);
         if (txt_propagate(s)) {
             s->trail_length = 0; /* never to be undone */
         } else {
-            if (with_wishes || s->cancelled) return txt_contradiction(s);
+            if (with_given || s->cancelled) return txt_contradiction(s);
             return txm_fail(s->env, TXM_BAD_DATA, "the set has no tiling of this size");
         }
     }
@@ -434,22 +437,23 @@ static txm_status txt_search_tiles(txt_solver *s, txm_arena *arena, txm_rng *rng
         found = txt_attempt(s, rng);
         if (s->cancelled) return txt_cancelled(s->env);
     }
-    if (found < 0) return txm_fail(s->env, TXM_BAD_DATA, "no tiling fulfils the wishes");
+    if (found < 0) return txm_fail(s->env, TXM_BAD_DATA, "no tiling has the given tiles");
     if (!found)
         return txm_fail(s->env, TXM_BAD_DATA,
-                        "no tiling found in 64 attempts; another seed or fewer wishes may help");
+                        "no tiling found in 64 attempts; another seed or fewer given tiles may "
+                        "help");
     for (uint32_t cell = 0; cell < s->cells; cell++) {
         if (s->tiles[cell] < 0) s->tiles[cell] = txt_decided_base(s, cell) * set->variants;
     }
     return TXM_OK;
 }
 
-/* Complete sets: draw what the wishes left open. A tile without variants that would be the third in
-   a row is drawn again a few times. */
+/* Complete sets: draw the cells that are not given. Without variants a tile that would be the third
+   equal one in a row is drawn again a few times. */
 static txm_status txt_draw_tiles(txt_solver *s, txm_rng *rng) {
     const uint32_t w = (uint32_t)s->width;
     const int n = s->set->colors, v = s->set->variants, all = (1 << n) - 1;
-    if (!txt_enter_wishes(s)) return txt_contradiction(s);
+    if (!txt_enter_given(s)) return txt_contradiction(s);
     for (uint32_t cell = 0; cell < s->cells; cell++) {
         uint32_t slot[4];
         int *t = s->tiles + cell, color[4], row = -1, column = -1;
@@ -478,13 +482,13 @@ static txm_status txt_draw_tiles(txt_solver *s, txm_rng *rng) {
     return TXM_OK;
 }
 
-/* How many rows of three equal tiles, across and down, hold this cell. */
+/* How many runs of three equal tiles, across and down, contain this cell. */
 static int txt_runs(const txt_solver *s, int x, int y) {
     const int at[2] = {x, y}, length[2] = {s->width, s->height};
     const int tile = s->tiles[(size_t)y * (size_t)s->width + (size_t)x];
     int runs = 0;
     for (int axis = 0; axis < 2; axis++) {
-        int equal = 0; /* so far, one after the other */
+        int equal = 0; /* length of the run so far */
         if (length[axis] == 1) continue;
         for (int d = -2; d <= 2; d++) {
             int p[2] = {x, y};
@@ -500,9 +504,10 @@ static int txt_runs(const txt_solver *s, int x, int y) {
     return runs;
 }
 
-/* Choose variants where there is no wish (free cells): those of the plane, which never lie three in a
-   row; then, as wishes and the period may have it otherwise, the best for each cell by itself. */
-static txm_status txt_choose_variants(txt_solver *s, const uint8_t *fixed, uint32_t seed) {
+/* Choose the variants of cells that are not given: first those of the plane, which have no three
+   equal tiles in a row; then, since given tiles and the period may break that, the best for each
+   cell. */
+static txm_status txt_choose_variants(txt_solver *s, const uint8_t *given, uint32_t seed) {
     const int variants = s->set->variants;
     for (int pass = 0; pass < 4 && variants > 1; pass++) {
         int changed = 0;
@@ -511,7 +516,7 @@ static txm_status txt_choose_variants(txt_solver *s, const uint8_t *fixed, uint3
             if (txt_solver_report(s, (uint32_t)s->width, 0.9f)) return txt_cancelled(s->env);
             for (int x = 0; x < s->width; x++, cell++) {
                 int *t = s->tiles + cell;
-                if (fixed[cell]) continue;
+                if (given[cell]) continue;
                 if (pass == 0) {
                     *t += txt_square_variant(seed, variants, (uint32_t)x, (uint32_t)y);
                     continue;
@@ -564,19 +569,19 @@ TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int h
     txm_arena_init(&arena, env);
     s.colors = (uint8_t *)txm_arena_alloc(&arena, s.slots, 1);
     s.tiles = (int *)txm_arena_alloc(&arena, s.cells, sizeof(int));
-    uint8_t *fixed = (uint8_t *)txm_arena_alloc(&arena, s.cells, 1);
+    uint8_t *given = (uint8_t *)txm_arena_alloc(&arena, s.cells, 1);
     if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to solve a grid of this size");
         goto done;
     }
     memset(s.colors, (1 << set->colors) - 1, s.slots);
     memcpy(s.tiles, tiles, s.cells * sizeof(int));
-    for (uint32_t i = 0; i < s.cells; i++) fixed[i] = tiles[i] >= 0;
+    for (uint32_t i = 0; i < s.cells; i++) given[i] = tiles[i] >= 0;
 
     {
         txm_rng rng = txm_rng_make(seed, 41);
         status = set->complete ? txt_draw_tiles(&s, &rng) : txt_search_tiles(&s, &arena, &rng);
-        if (status == TXM_OK) status = txt_choose_variants(&s, fixed, txm_rng_next(&rng));
+        if (status == TXM_OK) status = txt_choose_variants(&s, given, txm_rng_next(&rng));
     }
     if (status == TXM_OK && txm_progress(env, 1, "tiling")) status = txt_cancelled(env);
     if (status == TXM_OK) memcpy(tiles, s.tiles, s.cells * sizeof(int));

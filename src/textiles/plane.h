@@ -5,14 +5,15 @@
 
 /* ---- the hash ----------------------------------------------------------------------------- */
 
-/* Which tile lies where is read off
+/* Which tile lies where is computed from
 
        hash(seed, what, x, y) = txt_at(txt_column(seed, x), what, y),
 
-   32 bits that depend on the place, on what is asked for there and on the seed. The inner half depends
-   on the column only, so that a column of the plane, or two edges at the same column, share it. In
-   32-bit integers, since shaders/textiles.glsl computes the same; coordinates are taken modulo 2^32.
-   The two multipliers of the mixing step are C. Wellons's ("prospecting for hash functions"). */
+   32 bits that depend on the position, on the property wanted there (what) and on the seed. The
+   inner half depends on the column only and is shared by all cells of a column, and by two edges of
+   one. In 32-bit integers, since shaders/textiles.glsl computes the same; coordinates are taken
+   modulo 2^32. The two multipliers of the mixing step are those of C. Wellons ("prospecting for
+   hash functions"). */
 static uint32_t txt_mix(uint32_t h) {
     h ^= h >> 16;
     h *= 0x7feb352du;
@@ -25,7 +26,7 @@ static uint32_t txt_column(uint32_t seed, uint32_t x) {
     return txt_mix(x + seed);
 }
 
-/* what is asked for at row y: the same for all columns */
+/* the part of the hash that is the same for all columns */
 static uint32_t txt_key(uint32_t what, uint32_t y) {
     return y * 0x9e3779b9u + what * 0x85ebca6bu;
 }
@@ -49,7 +50,7 @@ static int txt_lower(uint32_t hash, int n) {
 
 /* ---- the plane: which tile lies where --------------------------------------------------- */
 
-/* A square (x, y) asks for
+/* The hashes of a square (x, y):
 
        what 0   the colour of its north edge; its south edge is the north edge of (x, y + 1)
        what 1   the colour of its west edge; its east edge is the west edge of (x + 1, y)
@@ -57,9 +58,9 @@ static int txt_lower(uint32_t hash, int n) {
        what 3   variants of the upper left and lower right square of a block of 2 x 2
        what 4   variants of the other two
 
-   and colours are txt_below(hash, colors). */
+   Colours are txt_below(hash, colors). */
 
-/* Number k of the variants that are neither a nor d. */
+/* the k-th of the variants that are neither a nor d */
 static int txt_other_variant(int k, int a, int d) {
     const int low = a < d ? a : d, high = a < d ? d : a;
     k += k >= low;
@@ -71,9 +72,9 @@ static int txt_other_variant(int k, int a, int d) {
        a b      a and d at random (two variants: d = a),
        c d      b and c at random among those that are neither a nor d.
 
-   Of three squares in a row two belong to the same block, and these have different variants. So no
-   tile lies three times in a row, whatever the colours. h = hash(3, bx, by), g = hash(4, bx, by) for
-   bx = x / 2, by = y / 2 of the coordinates as unsigned numbers. */
+   Of three squares in a row two belong to the same block, and these have different variants, so
+   that three equal tiles never lie in a row, whatever their colours. h = hash(3, bx, by), g =
+   hash(4, bx, by) for bx = x / 2, by = y / 2 of the coordinates as unsigned numbers. */
 static void txt_block_variants(uint32_t h, uint32_t g, int variants, int v[4]) {
     const int a = txt_upper(h, variants), d = variants == 2 ? a : txt_lower(h, variants);
     const int others = variants - 1 - (a != d);
@@ -92,9 +93,9 @@ static int txt_square_variant(uint32_t seed, int variants, uint32_t x, uint32_t 
     return v[(y & 1) * 2 + (x & 1)];
 }
 
-enum { TXT_STRIP = 256 }; /* columns that textiles_plane_fill does at a time; even */
+enum { TXT_STRIP = 256 }; /* columns that textiles_plane_fill computes at a time; even */
 
-/* What a strip of the plane keeps from row to row; place i is column x + i. */
+/* A strip of the plane, filled row by row; element i belongs to column x + i. */
 typedef struct txt_strip {
     uint32_t column[TXT_STRIP + 1];    /* txt_column of the columns            */
     uint32_t block[TXT_STRIP / 2 + 1]; /* and of the blocks of two             */
@@ -165,12 +166,12 @@ TEXTILES_API txm_status textiles_plane_make(const textiles_set *set, uint32_t se
     if (!set || !plane) return txm_fail(env, TXM_BAD_ARGUMENT, "set or plane is NULL");
     if (set->kind == TEXTILES_FRAME)
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "a frame set has not all combinations of colors that the plane needs; use "
+                        "a frame set lacks combinations of colors that the plane needs; use "
                         "textiles_solve");
     if (!set->complete)
         return txm_fail(env, TXM_BAD_ARGUMENT,
-                        "a reduced wang set has not all combinations of colors that the plane "
-                        "needs; make the set without reduced, or use textiles_scanline");
+                        "a reduced wang set lacks combinations of colors that the plane needs; "
+                        "make the set without reduced, or use textiles_scanline");
     plane->kind = set->kind;
     plane->colors = set->colors;
     plane->variants = set->variants;
@@ -214,16 +215,17 @@ TEXTILES_API void textiles_plane_fill(const textiles_plane *plane, int x, int y,
     }
 }
 
-/* Triangles ask at lattice points (a, b), modulo 2^32 again, for
+/* The hashes of lattice points (a, b) of triangles, coordinates again modulo 2^32:
 
-       what 7    the rank of the point; edges run from the lower to the higher rank, of equal ones
+       what 7    the rank of the point. Edges run from the lower to the higher rank, of equal ranks
                  (2^-32 of all) from the lower to the higher a, of equal a from the lower b. As ranks
-                 are an order, no triangle's sides run one way round: a reduced set will do
+                 are an order, the three edges of a triangle never have the same direction: a reduced
+                 set will do
        what 8    the colour of the edge (a, b) - (a+1, b)
        what 9    the colour of the edge (a, b) - (a, b+1)
        what 10   the colour of the edge (a+1, b) - (a, b+1)
-       what 11   the variants: of half 0 an even one by the upper 16 bits, of half 1 an odd one by the
-                 lower. Every neighbour of a half 0 is a half 1, so none shows the same tile */
+       what 11   the variants: an even one for half 0 from the upper 16 bits, an odd one for half 1
+                 from the lower. All neighbours of a half 0 are halves 1, so neighbours differ */
 TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int b, int half,
                                          int *rotation) {
     const uint32_t u = (uint32_t)a, v = (uint32_t)b, one = half != 0;

@@ -80,7 +80,7 @@ static txm_status txt_cancelled(txm_env *env) {
 
 /* ---- which tiles a set has ---------------------------------------------------------------- */
 
-/* What is the same for made and imported sets: refuse a description that makes no sense. */
+/* The checks of a description that made and imported sets have in common. */
 static txm_status txt_check_kind(const textiles_desc *d, txm_env *env) {
     const int low = d->kind == TEXTILES_FRAME ? 1 : 2;
     if ((int)d->kind < TEXTILES_WANG || (int)d->kind > TEXTILES_FRAME)
@@ -115,7 +115,7 @@ static txm_status txt_check_kind(const textiles_desc *d, txm_env *env) {
     return TXM_OK;
 }
 
-/* Append the variants of a tile, and enter it in the table under its code and, of a triangle, under
+/* Append the variants of a tile; enter it in the table under its code and, of a triangle, under
    those of its rotations. With tiles NULL it only counts. */
 static void txt_add_tile(textiles_set *s, const int edges[4], const int directions[3]) {
     const int rotations = s->kind == TEXTILES_TRIANGLE ? 3 : 1;
@@ -126,7 +126,7 @@ static void txt_add_tile(textiles_set *s, const int edges[4], const int directio
             for (int k = 0; k < 3; k++) t->directions[k] = directions[k];
             t->variant = v;
         }
-        for (int r = rotations - 1; r >= 0; r--) { /* side k asked for is side k + r of the tile */
+        for (int r = rotations - 1; r >= 0; r--) { /* side k here is side k + r of the tile */
             int e[4] = {edges[0], edges[1], edges[2], edges[3]}, d[3] = {0, 0, 0};
             for (int k = 0; k < 3 && rotations == 3; k++) {
                 e[k] = edges[(k + r) % 3];
@@ -138,8 +138,9 @@ static void txt_add_tile(textiles_set *s, const int edges[4], const int directio
     s->count += s->variants;
 }
 
-/* All sets of three directed edges up to rotation, ((2 C)^3 + 4 C) / 3 of them; of a reduced set
-   only those that do not run one way round, 2 C^3. Each is listed by the least of its codes. */
+/* All triples of directed edges up to rotation, ((2 C)^3 + 4 C) / 3 of them; in a reduced set
+   without those whose edges all have the same direction, 2 C^3. Each is listed under its smallest
+   code. */
 static void txt_list_triangles(textiles_set *s) {
     const int n = s->symbols;
     for (int a = 0; a < n; a++) {
@@ -165,8 +166,8 @@ static void txt_list_tiles(textiles_set *s, const textiles_desc *d) {
         txt_list_triangles(s);
     } else if (s->kind == TEXTILES_FRAME) {
         for (int k = 0; k < (d->classes ? d->class_count : c); k++) {
-            const int usual[4] = {0, k, 0, k};
-            txt_add_tile(s, d->classes ? d->classes[k] : usual, none);
+            const int plain[4] = {0, k, 0, k};
+            txt_add_tile(s, d->classes ? d->classes[k] : plain, none);
         }
     } else if (s->reduced) {
         /* (north, west) -> (east, south) is one to one for each of the two tiles, so that all
@@ -184,8 +185,8 @@ static void txt_list_tiles(textiles_set *s, const textiles_desc *d) {
     }
 }
 
-/* A set with its tiles listed and room for their texels; the maps' channels and sample are the
-   caller's to fill in before (maps[m]). NULL: no memory, or beyond TEXTILES_MAX_PIXELS. */
+/* A set with its tiles listed and memory for their texels. Of maps only channels and sample are
+   read. */
 static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int map_count,
                                int with_source, txm_env *env, textiles_set **out) {
     textiles_set head;
@@ -229,7 +230,7 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     return TXM_OK;
 }
 
-/* Does square u match t, lying east of it, or (down) south of it? */
+/* May square u lie east of t, or (down) south of it? */
 static int txt_joins(const textiles_set *s, int t, int u, int down) {
     const int *a = s->tiles[t].edges, *b = s->tiles[u].edges;
     if (s->kind == TEXTILES_CORNER)
@@ -237,7 +238,7 @@ static int txt_joins(const textiles_set *s, int t, int u, int down) {
     return down ? a[2] == b[0] : a[1] == b[3];
 }
 
-/* non-zero if no sample is infinite or NaN; of a triangle's square only the triangle counts */
+/* Are all samples finite? Of a triangle's square only the triangle counts. */
 static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
     for (int y = 0; y < im->height; y++) {
         txm_image row = *im;
@@ -353,8 +354,8 @@ TEXTILES_API int textiles_source(const textiles_set *set, int tile, int x, int y
     const size_t side = (size_t)set->side;
     const int32_t t = set->source[((size_t)tile * side + (size_t)y) * side + (size_t)x];
     if (t < 0) return -1;
-    const int e = txt_sheet_of(set, t), at = t - set->sheets[e].first, row = at / set->sheets[e].width;
-    const int column = at % set->sheets[e].width;
+    const int e = txt_sheet_of(set, t), at = t - set->sheets[e].first, width = set->sheets[e].width;
+    const int row = at / width, column = at % width;
     if (set->kind == TEXTILES_TRIANGLE) {
         from[0] = (float)column + (row & 1 ? 0.5f : 0.0f);
         from[1] = txm_float(row * 0.86602540378443864676);
