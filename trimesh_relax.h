@@ -24,13 +24,13 @@
          desc.surface.vertex_count = 4;
          desc.surface.face_count = 4;
          desc.vertices = 500;
-         if (trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) {
+         if (trimesh_retile(&desc, &env, &mesh) != TXM_OK) {
              fprintf(stderr, "retile: %s\n", env.message);
              return 1;
          }
          printf("%lu vertices, %lu triangles, edges of %.3f\n", (unsigned long)mesh->vertex_count,
                 (unsigned long)mesh->triangle_count, mesh->edge_length);
-         trimesh_free(mesh);
+         trimesh_mesh_free(mesh);
          return 0;
      }
 
@@ -113,7 +113,7 @@ typedef enum trimesh_kind {
     TRIMESH_CORNER = 3  /* where lines meet, end or turn: never moves */
 } trimesh_kind;
 
-/* A finished mesh; read only, released by trimesh_free. Triangles are counter-clockwise seen from
+/* A finished mesh; read only, released by trimesh_mesh_free. Triangles are counter-clockwise seen from
    outside. Every vertex is used. */
 typedef struct trimesh_mesh {
     size_t vertex_count, triangle_count;
@@ -122,6 +122,8 @@ typedef struct trimesh_mesh {
     uint32_t *indices;       /* 3 per triangle                                             */
     txm_mesh_place *sources; /* 1 per vertex: where it lies on the input                    */
     uint8_t *kinds;          /* 1 per vertex: a trimesh_kind                               */
+    int32_t *old_vertices;   /* of trimesh_update: 1 per vertex, which one of the old mesh it was,
+                                -1 = new; else NULL                                        */
     double edge_length;      /* that was aimed at, in units of the input                   */
     txm_arena memory;        /* where all this lies                                        */
 } trimesh_mesh;
@@ -170,72 +172,78 @@ typedef struct trimesh_desc {
                               bounding box, 0..0.01; 0 = only those in equal places             */
     int iterations;        /* TRIMESH_REPEL: at most so many rounds of repulsion, 1..1000; 0 = 40 */
     uint64_t seed;         /* another number, another result                                    */
+    trimesh_report *report; /* out: receives what was found in the input, also after an error;
+                              NULL = not wanted                                                 */
 } trimesh_desc;
 
 /* Retile a surface.
 
    desc    see there
-   report  receives what was found in the input, also after an error; NULL = not wanted
-   out     receives the mesh, or NULL on any error
-   return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range; TXM_BAD_DATA for a surface that
-           cannot be mended (message and report name the first bad edge); TXM_TOO_SMALL if the
-           surface cannot be covered with so few vertices (the message says how many are needed);
-           TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED                                       */
-TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
-                                      trimesh_report *report, trimesh_mesh **out);
+   mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free
+   return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, an index that is not below
+           vertex_count, a position that is not finite; TXM_BAD_DATA for a surface that cannot be
+           mended (message and report name the first bad edge); TXM_TOO_SMALL if the surface cannot
+           be covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
+           TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                      */
+TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh);
 
 /* A result as a mesh of texmath.h, which shows its arrays: for trimesh_cover.h. */
 TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
 
 /* Release a mesh; NULL is allowed. */
-TRIMESH_API void trimesh_free(trimesh_mesh *mesh);
+TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh);
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
 /* A retiling under way, for viewers that show it and programs that have other things to do in
-   between. trimesh_retile is trimesh_begin, trimesh_step until done, trimesh_end. */
+   between. trimesh_retile is trimesh_begin, trimesh_step while there is more, trimesh_get_mesh,
+   trimesh_free. */
 typedef struct trimesh_job trimesh_job;
+
+/* Check the descriptor and mend the surface.
+
+   desc    what it points to must stay as it is until the job is gone, the struct itself and the
+           report need not
+   job     receives the job, or NULL on any error; release it with trimesh_free
+   return  as trimesh_retile                                                                   */
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job);
+
+/* Do the next piece: with TRIMESH_REPEL strew the points, join them, one round of repulsion, ...,
+   finish. Does nothing once the job is done.
+
+   env    for hooks and message of this call; the allocator stays that of trimesh_begin
+   more   receives 0 when nothing is left to do, also after an error; NULL is allowed
+   return TXM_OK; after anything else the job can only be released: every later call returns the
+          same                                                                                 */
+TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more);
 
 /* How far a job is. All pointers are valid until the next call for the job. */
 typedef struct trimesh_state {
     const char *stage;       /* what the last step did: "mend", "strew", "join", "repel", "lattice",
                                 "subdivide", "finish"                                          */
     int round;               /* of repulsion, from 1; 0 before                                 */
-    float fraction;          /* 0..1 of the whole, never falling                               */
-    int done;                /* non-zero: call trimesh_end, there are no more steps            */
     float mean, largest;     /* movement of the points in the last round, in edge lengths      */
-    size_t points;           /* 0 before there are any                                         */
+    size_t points;           /* 0 before there are any, and after an error                     */
     const float *positions;  /* 3 per point, in the caller's units                             */
     size_t triangles;        /* 0 until points are joined                                      */
     const uint32_t *indices; /* 3 per triangle, of points                                      */
 } trimesh_state;
 
-/* Check the descriptor and mend the surface.
+/* What a viewer shows between two steps; makes the arrays.
 
-   desc    what it points to must stay as it is until the job is gone, the struct itself need not
-   report  as in trimesh_retile
-   job     receives the job, or NULL on any error; release it with trimesh_end or trimesh_job_free
-   return  as trimesh_retile                                                                   */
-TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
-                                     trimesh_report *report, trimesh_job **job);
+   return  TXM_OK; TXM_OUT_OF_MEMORY, then the state is all zero and the job can go on          */
+TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state);
 
-/* Do the next piece: with TRIMESH_REPEL strew the points, join them, one round of repulsion, ...,
-   finish. Does nothing once the job is done.
+/* The mesh of a job that is done. Each call makes one.
 
-   env    for hooks and message of this call; the allocator stays that of trimesh_begin
-   state  receives how far the job is, also after an error (then without points); NULL = not wanted,
-          which saves making the arrays
-   return TXM_OK; after anything else the job can only be released: every later call returns the
-          same                                                                                 */
-TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, trimesh_state *state);
+   mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free; it does not
+           need the job any more
+   return  TXM_OK; TXM_BAD_ARGUMENT if the job is not done; TXM_OUT_OF_MEMORY; if a step has failed
+           what that step returned                                                             */
+TRIMESH_API txm_status trimesh_get_mesh(trimesh_job *job, txm_env *env, trimesh_mesh **mesh);
 
-/* Do what is left, hand the mesh over and release the job, also after an error.
-
-   out     receives the mesh, or NULL on any error                                             */
-TRIMESH_API txm_status trimesh_end(trimesh_job *job, txm_env *env, trimesh_mesh **out);
-
-/* Release a job without finishing it; NULL is allowed. */
-TRIMESH_API void trimesh_job_free(trimesh_job *job);
+/* Release a job, done or not; NULL is allowed. */
+TRIMESH_API void trimesh_free(trimesh_job *job);
 
 /* ---- after the surface has changed --------------------------------------------------------- */
 
@@ -265,14 +273,12 @@ typedef struct trimesh_update_desc {
    kind again; none stays so near to a new line that it would crowd the points there.
 
    old     a result for the surface as it was
-   out     receives the mesh, or NULL on any error
-   map     NULL, or receives out->vertex_count numbers: which vertex of old each one was, -1 = new;
-           they are released with the mesh
+   mesh    receives the mesh, or NULL on any error; its old_vertices say which vertex of old each
+           one was
    return  as trimesh_retile, but for desc.vertices = 0
    cost    O((old + surface) log), as retiling with TRIMESH_REPEL without the repulsion          */
 TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
-                                      txm_env *env, trimesh_report *report, trimesh_mesh **out,
-                                      const int32_t **map);
+                                      txm_env *env, trimesh_mesh **mesh);
 
 #ifdef __cplusplus
 }
@@ -290,6 +296,13 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include <assert.h>
 #define TRIMESH_ASSERT(x) assert(x)
 #endif
+
+/* ---- memory ------------------------------------------------------------------------------- */
+
+/* Have all requests to the arena been met? Functions ask for all they need, then look once. */
+static txm_status tmr_check_memory(const txm_arena *arena) {
+    return arena->failed ? TXM_OUT_OF_MEMORY : TXM_OK;
+}
 
 /* ---- corners ----------------------------------------------------------------------------- */
 
@@ -470,8 +483,7 @@ static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scrat
     m->list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
     m->pairs = (txm_pair *)txm_arena_alloc(scratch, 6 * f, sizeof(txm_pair));
     m->table = (int32_t *)txm_arena_alloc(scratch, m->table_size, sizeof(int32_t));
-    if (!m->vertex || !m->opposite || !m->origin || !m->turn || !m->rename || !m->flag ||
-        !m->list || !m->pairs || !m->table)
+    if (arena->failed || scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     m->degree = m->rename + v;
     m->stamp = m->degree + v;
@@ -1230,8 +1242,7 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     s->point = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->corner = (int32_t *)txm_arena_alloc(arena, v, sizeof(int32_t));
     if (m->desc->scale) s->scale = (float *)txm_arena_alloc(arena, v, sizeof(float));
-    if (!s->point || !s->corner || (m->desc->scale && !s->scale))
-        return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory for the surface");
+    if (arena->failed) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory for the surface");
     memset(s->edge_kind, 0, 3 * f);
     tmr_number_fans(m, s, s->edge_kind);
     for (size_t c = 0; c < 3 * f; c++)
@@ -1360,7 +1371,7 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
     s->vertex_normal = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->component = (int32_t *)txm_arena_alloc(arena, f, sizeof(int32_t));
     int32_t *list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
-    if (!s->normal || !s->vertex_normal || !s->component || !list)
+    if (arena->failed || scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory for the surface");
     tmr_face_normals(m, s, list, &count);
     if (count == s->face_count || !(s->area > 0))
@@ -1508,11 +1519,11 @@ static int tmr_speaks(const tmr_surface *s, int32_t c) {
     return s->opposite[c] < c;
 }
 
-static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends) {
+static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends) {
     const int32_t n = s->vertex_count;
     int32_t total = 0;
     ends->first = (int32_t *)txm_arena_zero(arena, (size_t)n + 2, sizeof(int32_t));
-    if (!ends->first) return 0;
+    if (!ends->first) return TXM_OUT_OF_MEMORY;
     int32_t *count = ends->first + 1;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
@@ -1521,7 +1532,7 @@ static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends)
         total += 2;
     }
     ends->corner = (int32_t *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(int32_t));
-    if (!ends->corner) return 0;
+    if (!ends->corner) return TXM_OUT_OF_MEMORY;
     int32_t sum = 0; /* first[v + 1] counts up from the place of v's first entry to its end */
     for (int32_t v = 0; v < n; v++) {
         const int32_t k = count[v];
@@ -1533,16 +1544,16 @@ static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends)
         ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
         ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Creases that hang together to less than the given length in all are noise: make them plain. */
-static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
-                                  txm_arena *arena) {
+static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
+                                         txm_arena *arena) {
     const int32_t n = s->vertex_count;
     int32_t *stack = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
     uint8_t *seen = (uint8_t *)txm_arena_zero(arena, (size_t)n, 1);
-    if (!stack || !seen) return 0;
+    if (!stack || !seen) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < n; v++) {
         int32_t size = 0, done = 0;
         double length = 0;
@@ -1571,7 +1582,7 @@ static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double l
             }
         }
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Direction from v along the line that starts with the edge of corner c, over about the distance
@@ -1593,11 +1604,11 @@ static txm_dvec3 tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, 
 
 /* The kind of every vertex; corners where lines meet, end, or turn by more than 40 degrees over
    the distance reach (the sharpest vertex of each bend only). */
-static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double reach,
-                            txm_arena *arena, uint8_t *kind) {
+static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double reach,
+                                   txm_arena *arena, uint8_t *kind) {
     const int32_t n = s->vertex_count;
     float *turn = (float *)txm_arena_zero(arena, (size_t)n, sizeof(float));
-    if (!turn) return 0;
+    if (!turn) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < n; v++) {
         const int32_t k = ends->first[v], count = ends->first[v + 1] - k;
         kind[v] = TRIMESH_FREE;
@@ -1629,7 +1640,7 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
         }
         if (sharpest) kind[v] = TRIMESH_CORNER;
     }
-    return 1;
+    return TXM_OK;
 }
 
 enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are near it is no tip */
@@ -1672,15 +1683,16 @@ static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *
     return sum >= TMR_TIP_DEFECT;
 }
 
-/* Make the tips corners, so that they stay. 0: no memory. */
-static int tmr_find_tips(const tmr_surface *s, double reach, txm_arena *scratch, uint8_t *kind) {
+/* Make the tips corners, so that they stay. */
+static txm_status tmr_find_tips(const tmr_surface *s, double reach, txm_arena *scratch,
+                                uint8_t *kind) {
     float *defect = (float *)txm_arena_alloc(scratch, (size_t)s->vertex_count, sizeof(float));
-    if (!defect) return 0;
+    if (!defect) return TXM_OUT_OF_MEMORY;
     tmr_angle_defects(s, defect);
     for (int32_t v = 0; v < s->vertex_count; v++)
         if (kind[v] == TRIMESH_FREE && defect[v] > 0 && tmr_is_tip(s, defect, kind, v, reach))
             kind[v] = TRIMESH_CORNER;
-    return 1;
+    return TXM_OK;
 }
 
 /* Follow the line from v over the edge of corner c to its end, as one more line. */
@@ -1713,16 +1725,18 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
 }
 
 /* Find all lines. spacing: the edge length to come, by which short creases and slight bends are
-   told from real ones. 0: no memory. */
-static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
-                           txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
+   told from real ones. */
+static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
+                                  txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
     tmr_ends ends;
     const size_t n = (size_t)s->vertex_count, corners = 3 * (size_t)s->face_count;
+    txm_status status;
     if (tmr_find_creases(s, angle)) {
-        if (!tmr_list_ends(s, scratch, &ends)) return 0;
-        if (!tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch)) return 0;
+        if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
+        status = tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch);
+        if (status != TXM_OK) return status;
     }
-    if (!tmr_list_ends(s, scratch, &ends)) return 0;
+    if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
     /* each edge is listed at both its ends and becomes one segment; no line is without segments */
     const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
     l->line_count = l->segment_count = 0;
@@ -1738,11 +1752,11 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
     l->edge = (int32_t *)txm_arena_zero(arena, corners, sizeof(int32_t));
     l->kind = (uint8_t *)txm_arena_alloc(arena, n, 1);
     l->segment = (int32_t *)txm_arena_zero(arena, n, sizeof(int32_t));
-    if (!l->first || !l->closed || !l->border || !l->length || !l->a || !l->b || !l->face ||
-        !l->line || !l->start || !l->edge || !l->kind || !l->segment)
-        return 0;
-    if (!tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind)) return 0;
-    if (angle < 180 && !tmr_find_tips(s, 0.75 * spacing, scratch, l->kind)) return 0;
+    if ((status = tmr_check_memory(arena)) != TXM_OK) return status;
+    status = tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind);
+    if (status == TXM_OK && angle < 180)
+        status = tmr_find_tips(s, 0.75 * spacing, scratch, l->kind);
+    if (status != TXM_OK) return status;
     for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
         for (int32_t v = 0; v < s->vertex_count; v++) {
             if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
@@ -1753,7 +1767,7 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
     *crease_edges = 0;
     for (int32_t i = 0; i < l->line_count; i++)
         if (!l->border[i]) *crease_edges += (size_t)(l->first[i + 1] - l->first[i]);
-    return 1;
+    return TXM_OK;
 }
 
 /* the segment behind (step 1) or before (-1) segment k of its line; -1 at the end */
@@ -1852,13 +1866,13 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
 
 /* Shorten the wanted edge lengths where the surface bends, such that an edge turns by no more than
    TMR_TURN_PER_EDGE, fully or in part (adapt); and let them grow with the distance no faster than by
-   a third of it. 0: no memory. */
-static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
-                           txm_arena *scratch) {
+   a third of it. */
+static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
+                                  txm_arena *scratch) {
     const size_t n = (size_t)s->vertex_count;
     float *curvature = (float *)txm_arena_alloc(scratch, n, sizeof(float));
     float *scale = (float *)txm_arena_alloc(arena, n, sizeof(float));
-    if (!curvature || !scale) return 0;
+    if (!curvature || !scale) return TXM_OUT_OF_MEMORY;
     tmr_curvature(s, curvature);
     for (size_t v = 0; v < n; v++) {
         const double wanted = curvature[v] > 0 ? TMR_TURN_PER_EDGE / curvature[v] / spacing : 1;
@@ -1875,7 +1889,7 @@ static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_are
         }
     }
     s->scale = scale;
-    return 1;
+    return TXM_OK;
 }
 
 /* ---- the mesh that changes ---------------------------------------------------------------- */
@@ -2280,7 +2294,6 @@ typedef struct tmr_work {
     float *height;     /* 1 per triangle: room for the height of the surface over it            */
     uint8_t *mask;     /* of relaxation: NULL, or 1 per vertex: may it move?                    */
     uint8_t *mask_room; /* 1 per vertex: room for that                                           */
-    int cancelled;     /* somewhere the caller wanted no more; looked at after each stage       */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
 } tmr_work;
@@ -2365,8 +2378,8 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
-/* Arrays for so many vertices and triangles; the mesh in them is empty. 0: no memory. */
-static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
+/* Arrays for so many vertices and triangles; the mesh in them is empty. */
+static txm_status tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
     tmr_mesh *m = &w->m;
     const size_t nv = (size_t)vertices, nc = 3 * (size_t)faces;
     m->vertex_limit = vertices;
@@ -2387,9 +2400,7 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
     w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
     w->flag = (uint8_t *)txm_arena_alloc(arena, (size_t)faces, 1);
-    return m->p && m->n && m->source && m->corner && m->flags && m->valence && m->vertex &&
-           m->opposite && m->edge && w->size && w->moved && w->landed && w->bad && w->mask_room &&
-           w->flag;
+    return tmr_check_memory(arena);
 }
 
 /* Copy the surface into w->m, its border loops closed by ghosts, with room for `more` vertices.
@@ -2410,7 +2421,8 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
     memset(m, 0, sizeof *m);
     if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
         return txm_fail(w->env, TXM_TOO_LARGE, "the surface and its borders are too large");
-    if (!tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena)) return TXM_OUT_OF_MEMORY;
+    const txm_status status = tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena);
+    if (status != TXM_OK) return status;
     m->vertex_count = m->live = s->vertex_count;
     m->face_count = m->live_faces = s->face_count;
     const size_t corners = 3 * (size_t)s->face_count;
@@ -3084,7 +3096,8 @@ static void tmr_transport(txm_dvec3 n0, txm_dvec3 x0, txm_dvec3 n1, txm_dvec3 x1
     out[1] = length > 1e-12 ? im / length : 0;
 }
 
-static int tmr_level_alloc(tmr_level *level, int32_t count, int32_t links, txm_arena *arena) {
+static txm_status tmr_level_alloc(tmr_level *level, int32_t count, int32_t links,
+                                  txm_arena *arena) {
     const size_t n = (size_t)count, k = (size_t)links;
     level->count = count;
     level->links = links;
@@ -3101,18 +3114,16 @@ static int tmr_level_alloc(tmr_level *level, int32_t count, int32_t links, txm_a
     level->to = (int32_t *)txm_arena_alloc(arena, k + 1, sizeof(int32_t));
     level->weight = (float *)txm_arena_alloc(arena, k + 1, sizeof(float));
     level->turn = (float(*)[2])txm_arena_alloc(arena, k + 1, 2 * sizeof(float));
-    return level->p && level->n && level->x && level->q && level->area && level->scale &&
-           level->z && level->fixed && level->parent && level->first && level->to &&
-           level->weight && level->turn;
+    return tmr_check_memory(arena);
 }
 
 /* Level 0: the vertices. */
-static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
+static txm_status tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
     const tmr_mesh *m = &w->m;
     int32_t count = 0, links = 0;
     f->node = (int32_t *)txm_arena_alloc(arena, (size_t)m->vertex_count, sizeof(int32_t));
     f->vertex = (int32_t *)txm_arena_alloc(arena, (size_t)m->live, sizeof(int32_t));
-    if (!f->node || !f->vertex) return 0;
+    if (!f->node || !f->vertex) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         f->node[v] = -1;
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
@@ -3121,7 +3132,8 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         links += m->valence[v];
     }
     tmr_level *level = &f->level[0];
-    if (!tmr_level_alloc(level, count, links, arena)) return 0;
+    const txm_status status = tmr_level_alloc(level, count, links, arena);
+    if (status != TXM_OK) return status;
     int32_t k = 0;
     for (int32_t i = 0; i < count; i++) {
         const int32_t v = f->vertex[i], first = m->corner[v];
@@ -3157,15 +3169,16 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         }
     }
     level->first[count] = level->links = k;
-    return 1;
+    return TXM_OK;
 }
 
 /* The next level: each node joined with the neighbour that is most like it. */
-static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_arena *scratch) {
+static txm_status tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena,
+                               txm_arena *scratch) {
     int32_t count = 0;
     int32_t *child = (int32_t *)txm_arena_alloc(scratch, 2 * (size_t)a->count, sizeof(int32_t));
     int32_t *seen = (int32_t *)txm_arena_alloc(scratch, (size_t)a->count, sizeof(int32_t));
-    if (!child || !seen) return 0;
+    if (!child || !seen) return TXM_OUT_OF_MEMORY;
     for (int32_t i = 0; i < a->count; i++) a->parent[i] = -1;
     for (int32_t i = 0; i < a->count; i++) {
         double best_score = -2;
@@ -3187,7 +3200,8 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
         child[2 * count + 1] = best;
         count++;
     }
-    if (!tmr_level_alloc(b, count, a->links, arena)) return 0;
+    const txm_status status = tmr_level_alloc(b, count, a->links, arena);
+    if (status != TXM_OK) return status;
     int32_t k = 0;
     for (int32_t i = 0; i < count; i++) seen[i] = -1;
     for (int32_t i = 0; i < count; i++) {
@@ -3237,7 +3251,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
         }
     }
     b->first[count] = b->links = k;
-    return 1;
+    return TXM_OK;
 }
 
 static void tmr_level_turns(tmr_level *level) {
@@ -3435,18 +3449,20 @@ static void tmr_solve_points(tmr_fields *f) {
     }
 }
 
-static int tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
+static txm_status tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
     txm_arena scratch;
-    int ok = tmr_level_zero(w, f, arena);
+    txm_status status = tmr_level_zero(w, f, arena);
     f->count = 1;
-    while (ok && f->count < TMR_MAX_LEVELS && f->level[f->count - 1].count > 8) {
+    while (status == TXM_OK && f->count < TMR_MAX_LEVELS && f->level[f->count - 1].count > 8) {
         txm_arena_init(&scratch, w->env);
-        ok = tmr_level_up(&f->level[f->count - 1], &f->level[f->count], arena, &scratch);
+        status = tmr_level_up(&f->level[f->count - 1], &f->level[f->count], arena, &scratch);
         txm_arena_free(&scratch);
-        if (!ok || f->level[f->count].count * 20.0 > f->level[f->count - 1].count * 19.0) break;
+        if (status != TXM_OK ||
+            f->level[f->count].count * 20.0 > f->level[f->count - 1].count * 19.0)
+            break;
         f->count++;
     }
-    return ok;
+    return status;
 }
 
 /* ---- from the lattice to a mesh ----------------------------------------------------------- */
@@ -3483,12 +3499,12 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
 
 /* Collapse the edges whose ends share a lattice point, the shortest first. moved[v] holds the
    lattice point of v, and bad[v] how many vertices went into it. */
-static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
+static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const size_t most = (size_t)m->live_faces * 3 / 2 + 1; /* edges of a closed mesh */
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
-    if (!pairs || !room) return 0;
+    if (!pairs || !room) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         w->bad[v] = 1;
         w->moved[v] = f->node[v] >= 0 ? f->level[0].q[f->node[v]] : m->p[v];
@@ -3539,7 +3555,7 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
         w->landed[v] = at.face;
     }
     tmr_settle(w);
-    return 1;
+    return TXM_OK;
 }
 
 /* ---- the right number --------------------------------------------------------------------- */
@@ -3575,18 +3591,18 @@ static int tmr_claim(tmr_work *w, int32_t c) {
 }
 
 /* Split or collapse where it harms the pattern least, until there are so many vertices; a few
-   rounds of relaxation in between. ok: no memory otherwise. How many vertices are missing (over:
-   negative) at the end goes to *missing. */
-static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
-                         int32_t *missing) {
+   rounds of relaxation in between. How many vertices are missing (over: negative) at the end goes to
+   *missing. */
+static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
+                                int32_t *missing) {
     tmr_mesh *m = &w->m;
     const size_t most = (size_t)m->face_limit * 3 / 2 + 1; /* edges there can ever be */
     txm_pair *pairs, *room;
     *missing = target - m->live;
-    if (*missing == 0) return 1;
+    if (*missing == 0) return TXM_OK;
     pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
-    if (!pairs || !room) return 0;
+    if (!pairs || !room) return TXM_OUT_OF_MEMORY;
     for (int pass = 0; pass < 60 && *missing; pass++) {
         const int sign = *missing > 0 ? 1 : -1;
         size_t count = 0;
@@ -3627,13 +3643,13 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
         w->mask = NULL;
         if (done == 0 && pass >= 40) break;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* ---- resampling --------------------------------------------------------------------------- */
 
-/* Bring the copy of the surface to about two vertices per lattice point to come. 0: cancelled. */
-static int tmr_resample(tmr_work *w) {
+/* Bring the copy of the surface to about two vertices per lattice point to come. */
+static txm_status tmr_resample(tmr_work *w) {
     const double aim = sqrt(0.5); /* of edges, relative to w->length */
     /* lines first: what is inside is split to fit them */
     tmr_split_long(w, 1e9, 1.0);
@@ -3642,7 +3658,7 @@ static int tmr_resample(tmr_work *w) {
     while (limit < 0.72 * aim) {
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
         limit *= 1.5;
-        if (txm_progress(w->env, 0, "resample")) return 0;
+        if (txm_progress(w->env, 0, "resample")) return TXM_CANCELLED;
     }
     for (int round = 0; round < 24; round++) {
         const int32_t split = tmr_split_long(w, 1.4 * aim, 1.4);
@@ -3650,19 +3666,18 @@ static int tmr_resample(tmr_work *w) {
         const int32_t gone = tmr_collapse_short(w, 0.7 * aim, 0.7, 1.4 * aim, 0);
         tmr_flip_delaunay(w, 2);
         if (round >= 3 && (split + gone) * 200.0 < w->m.live) break;
-        if (txm_progress(w->env, 0, "resample")) return 0;
+        if (txm_progress(w->env, 0, "resample")) return TXM_CANCELLED;
     }
-    return 1;
+    return TXM_OK;
 }
 
-/* Take away what a line has more of edges than fit its length; the rest is spread evenly later.
-   0: no memory. */
-static int tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
+/* Take away what a line has more of edges than fit its length; the rest is spread evenly later. */
+static txm_status tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const tmr_lines *l = w->l;
-    if (l->line_count == 0) return 1;
+    if (l->line_count == 0) return TXM_OK;
     int32_t *over = (int32_t *)txm_arena_alloc(scratch, (size_t)l->line_count, sizeof(int32_t));
-    if (!over) return 0;
+    if (!over) return TXM_OUT_OF_MEMORY;
     for (int32_t i = 0; i < l->line_count; i++) {
         const int32_t fit = (int32_t)(l->length[i] / (w->length * w->line_scale) + 0.5);
         const int32_t least = l->closed[i] ? 3 : 1;
@@ -3675,7 +3690,7 @@ static int tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
         const int32_t line = m->edge[c] - 1;
         over[line] -= tmr_try_collapse(w, c, 0, 0);
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Spread the vertices of each line evenly along it. */
@@ -3791,9 +3806,9 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
     int32_t *where = (int32_t *)txm_arena_alloc(scratch, (size_t)old.face_count, sizeof(int32_t));
     if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
         return txm_fail(w->env, TXM_TOO_LARGE, "too many triangles");
-    if (!number || !middle || !where ||
-        !tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena))
-        return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_check_memory(scratch);
+    if (status == TXM_OK) status = tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena);
+    if (status != TXM_OK) return status;
     for (int32_t v = 0; v < old.vertex_count; v++) {
         if (old.corner[v] < 0) continue;
         TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
@@ -3980,15 +3995,15 @@ static void tmr_height_chunk(void *context, int index) {
         w->height[f] = tmr_is_dead(m, f) || tmr_is_ghost_face(m, f) ? 0 : (float)tmr_height_over(w, f);
 }
 
-static int tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
+static txm_status tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
     w->height = (float *)txm_arena_alloc(scratch, (size_t)w->m.face_count, sizeof(float));
-    if (!w->height) return 0;
+    if (!w->height) return TXM_OUT_OF_MEMORY;
     for (int round = 0; round < rounds; round++) {
         txm_parallel_for(w->env, (w->m.face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_height_chunk, w);
         txm_parallel_for(w->env, (w->m.vertex_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_fit_chunk, w);
         tmr_settle(w);
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* ---- is the result sound? ----------------------------------------------------------------- */
@@ -4096,15 +4111,16 @@ static void tmr_mark_near(const tmr_work *w, uint8_t *near) {
     }
 }
 
-/* The cells of all triangles, or of those near, in order. 0: no memory. */
-static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, txm_arena *arena) {
+/* The cells of all triangles, or of those near, in order. */
+static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g,
+                                 txm_arena *arena) {
     const tmr_mesh *m = &w->m;
     memset(g, 0, sizeof *g);
     g->cell = w->length * 0.65;
     g->limit = (size_t)m->live_faces * 10 + 1000;
     g->entry = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
     g->spare = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
-    if (!g->entry || !g->spare) return 0;
+    if (!g->entry || !g->spare) return TXM_OUT_OF_MEMORY;
     do { /* in coarser cells if there are many large triangles */
         g->cell *= 2;
         g->count = 0;
@@ -4116,17 +4132,19 @@ static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, 
         }
     } while (g->overflow);
     txm_sort_pairs(g->entry, g->spare, g->count);
-    return 1;
+    return TXM_OK;
 }
 
-/* How many pairs of triangles cross each other, and mark their vertices in w->bad? -1: no memory.
+/* Count the pairs of triangles that cross each other in *found, and mark their vertices in w->bad.
    near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
    Linear in the number of triangles. */
-static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch) {
+static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch,
+                                      long *found) {
     const tmr_mesh *m = &w->m;
     tmr_cells g;
-    long found = 0;
-    if (!tmr_cells_make(w, near, &g, scratch)) return -1;
+    *found = 0;
+    const txm_status status = tmr_cells_make(w, near, &g, scratch);
+    if (status != TXM_OK) return status;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
@@ -4142,14 +4160,14 @@ static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_a
                 if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
                     low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h, rim))
                     continue;
-                found++;
+                ++*found;
                 for (int k = 0; k < 3; k++)
                     w->bad[m->vertex[3 * f + k]] = w->bad[m->vertex[3 * h + k]] = 1;
             }
         }
         i = end;
     }
-    return found;
+    return TXM_OK;
 }
 
 enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one spot */
@@ -4305,35 +4323,34 @@ static void tmr_improve_spots(tmr_work *w, int rounds) {
 enum { TMR_SPOT_ROUNDS = 16 };
 
 /* Mend the few spots where triangles cross or face against the surface, by smoothing around them,
-   wider and wider; the best state found stays. *faults: how many are left; 0: no memory. */
-static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
+   wider and wider; the best state found stays. *faults: how many are left. */
+static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     const size_t count = (size_t)w->m.vertex_count;
     txm_arena arena;
     long best = -1;
     txm_dvec3 *kept = NULL;
     int32_t *kept_source = NULL;
-    uint8_t *near;
-    txm_arena_init(&arena, env);
-    near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
-    if (!near) goto no_memory;
-    for (int round = 0; round <= TMR_SPOT_ROUNDS; round++) {
+    txm_arena_init(&arena, w->env);
+    uint8_t *near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
+    txm_status status = tmr_check_memory(&arena);
+    for (int round = 0; round <= TMR_SPOT_ROUNDS && status == TXM_OK; round++) {
         txm_arena scratch;
-        long doubtful;
+        long crossings, doubtful;
         if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
         memset(w->bad, 0, count);
-        txm_arena_init(&scratch, env);
-        const long crossings = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch);
+        txm_arena_init(&scratch, w->env);
+        status = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch, &crossings);
         txm_arena_free(&scratch);
-        if (crossings < 0) goto no_memory;
+        if (status != TXM_OK) break;
         const long turned = tmr_count_turned(w, &doubtful);
         const long score = 1000 * (crossings + turned) + doubtful;
         if (best < 0 || score < best) {
-            best = score;
             if (score > 0 && !kept) {
                 kept = (txm_dvec3 *)txm_arena_alloc(&arena, count, sizeof(txm_dvec3));
                 kept_source = (int32_t *)txm_arena_alloc(&arena, count, sizeof(int32_t));
-                if (!kept || !kept_source) goto no_memory;
+                if ((status = tmr_check_memory(&arena)) != TXM_OK) break;
             }
+            best = score;
             if (kept) memcpy(kept, w->m.p, count * sizeof(txm_dvec3));
             if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
         }
@@ -4342,16 +4359,13 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         for (int k = 0; k < 1 + round / 6; k++) tmr_grow_marks(w);
         tmr_smooth_marked(w, round >= 6);
     }
-    if (best > 0) {
+    if (status == TXM_OK && best > 0) {
         memcpy(w->m.p, kept, count * sizeof(txm_dvec3));
         memcpy(w->m.source, kept_source, count * sizeof(int32_t));
     }
     *faults = best / 1000;
     txm_arena_free(&arena);
-    return 1;
-no_memory:
-    txm_arena_free(&arena);
-    return 0;
+    return status;
 }
 
 /* ---- points that repel each other [1, sections 3.1 to 3.3] --------------------------------- */
@@ -4617,9 +4631,9 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
 
 /* Cut a line at places given by their distance from its beginning in wanted edge lengths, rising.
    A vertex of the surface very near to one of them is taken for it. vertices: NULL, or receives the
-   vertex for each place. ok: no room otherwise. */
-static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t count,
-                        int32_t *vertices) {
+   vertex for each place. TXM_TOO_SMALL: there is no room for so many vertices. */
+static txm_status tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t count,
+                               int32_t *vertices) {
     tmr_work *w = t->w;
     const tmr_surface *s = w->s;
     const tmr_lines *l = w->l;
@@ -4636,7 +4650,7 @@ static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t
             if (u * weight >= near && (1 - u) * weight >= near) {
                 const int32_t c = tmr_find_edge(&w->m, left, b);
                 v = c < 0 ? -1 : tmr_cut_edge(t, tmr_prev(c));
-                if (v < 0) return 0;
+                if (v < 0) return TXM_TOO_SMALL;
                 w->m.flags[v] = l->border[line] ? TRIMESH_BORDER : TRIMESH_CREASE;
                 tmr_put_on_line(
                     w, v, txm_d3_mad(s->point[a], txm_d3_sub(s->point[b], s->point[a]), u), k);
@@ -4649,7 +4663,7 @@ static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t
         way += weight;
     }
     for (; done < count && vertices; done++) vertices[done] = -1;
-    return 1;
+    return TXM_OK;
 }
 
 /* spread the lower ten bits to every third */
@@ -4880,7 +4894,7 @@ static double tmr_strewn_room(double points) {
     return points + floor(points / 4) + 1000;
 }
 
-static int tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
+static txm_status tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
     const tmr_surface *s = t->w->s;
     const tmr_mesh *m = &t->w->m;
     const size_t n = (size_t)s->component_count;
@@ -4897,29 +4911,37 @@ static int tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
         if (steps > t->line_room) t->line_room = steps;
     }
     t->ways = (double *)txm_arena_alloc(scratch, (size_t)t->line_room + 1, sizeof(double));
-    if (!t->ways || !t->inside || !t->keep || !t->fixed || !t->wanted || !t->spare || !t->weight ||
-        !t->piece)
-        return 0;
+    const txm_status status = tmr_check_memory(scratch);
+    if (status != TXM_OK) return status;
     for (int32_t f = 0; f < m->face_count; f++) t->inside[f] = f < s->face_count ? f : -1;
     for (int32_t f = 0; f < s->face_count; f++) t->piece[f] = tmr_face_weight(s, f);
-    return 1;
+    return TXM_OK;
 }
 
 /* Corners and the points on lines. */
-static int tmr_strew_lines(tmr_strewn *t) {
+static txm_status tmr_strew_lines(tmr_strewn *t) {
     const tmr_surface *s = t->w->s;
     const tmr_lines *l = t->w->l;
     const tmr_mesh *m = &t->w->m;
+    uint64_t points = 0;
     for (int32_t v = 0; v < s->vertex_count; v++) t->keep[v] = l->kind[v] == TRIMESH_CORNER;
     for (int32_t i = 0; i < l->line_count; i++) {
         const int32_t steps = tmr_line_steps(t, i), first = l->closed[i] ? 0 : 1;
         const double step = tmr_line_weight(s, l, i) / steps;
         for (int32_t k = first; k < steps; k++) t->ways[k - first] = k * step;
-        if (!tmr_cut_line(t, i, t->ways, steps - first, NULL)) return 0;
+        if (tmr_cut_line(t, i, t->ways, steps - first, NULL) != TXM_OK) {
+            for (; i < l->line_count; i++) points += (uint64_t)tmr_line_steps(t, i);
+            return txm_fail_numbers(
+                t->w->env, TXM_TOO_SMALL,
+                "creases and borders alone take # vertices, and # are asked for;"
+                " give more, or a larger line_spacing",
+                points, t->desc->vertices);
+        }
+        points += (uint64_t)steps;
     }
     for (int32_t v = 0; v < m->vertex_count; v++)
         if (t->keep[v]) t->fixed[s->component[tmr_face_of(t->w, v)]]++;
-    return 1;
+    return TXM_OK;
 }
 
 /* Strew desc->vertices points over a mesh that is a copy of the surface, with room as
@@ -4932,9 +4954,10 @@ static txm_status tmr_strew(tmr_strewn *t, tmr_work *w, const trimesh_desc *desc
     t->desc = desc;
     t->length = w->length =
         tmr_strewn_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
-    if (!tmr_strewn_alloc(t, scratch)) return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_strewn_alloc(t, scratch);
+    if (status != TXM_OK) return status;
     tmr_least_points(t);
-    if (!tmr_strew_lines(t)) return txm_fail(w->env, TXM_TOO_SMALL, "no room for lines");
+    if ((status = tmr_strew_lines(t)) != TXM_OK) return status;
     tmr_share_points(t, total);
     return tmr_strew_faces(t, scratch);
 }
@@ -4944,9 +4967,7 @@ static txm_status tmr_join_points(tmr_strewn *t, txm_arena *scratch) {
     int32_t missing;
     const txm_status status = tmr_take_out(t->w, t->keep, 0.15f);
     if (status != TXM_OK) return status;
-    return tmr_fix_count(t->w, (int32_t)t->desc->vertices, 1, scratch, &missing)
-               ? TXM_OK
-               : TXM_OUT_OF_MEMORY;
+    return tmr_fix_count(t->w, (int32_t)t->desc->vertices, 1, scratch, &missing);
 }
 
 /* ---- repulsion ------------------------------------------------------------------------------ */
@@ -5089,17 +5110,18 @@ enum {
 
 /* Rounds of relaxation and flips. A strong pull brings the density into balance, a weak one the
    angles. */
-static void tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, double step) {
+static txm_status tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, double step) {
     w->pull = pull;
     w->step = step;
     for (int round = 0; round < rounds; round++) {
-        if (!w->cancelled) w->cancelled = txm_progress(w->env, 0, "relax") != 0; /* never falls */
-        if (w->cancelled) return;
+        /* the fraction stays at the highest so far: tmr_job_report */
+        if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
         tmr_flip_valences(w, 3, 0.4);
     }
+    return TXM_OK;
 }
 
 /* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
@@ -5118,10 +5140,11 @@ static void tmr_set_spacing(tmr_work *w, int32_t target) {
         0.982 * tmr_ideal_length(w) * sqrt(faces / (faces + 2.0 * (target - w->m.live)));
 }
 
-/* Directions, lattice points, and the mesh collapsed onto them. 0: no memory. */
-static int tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
+/* Directions, lattice points, and the mesh collapsed onto them. */
+static txm_status tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
     tmr_fields f;
-    if (!tmr_fields_build(w, &f, arena)) return 0;
+    const txm_status status = tmr_fields_build(w, &f, arena);
+    if (status != TXM_OK) return status;
     tmr_solve_directions(&f, seed);
     tmr_solve_points(&f);
     return tmr_collapse_lattice(w, &f, arena);
@@ -5131,41 +5154,40 @@ static int tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
 static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
-    if (!tmr_resample(w)) return TXM_CANCELLED;
+    txm_status status = tmr_resample(w);
+    if (status != TXM_OK) return status;
     txm_arena_init(&arena, w->env);
-    int ok = tmr_thin_lines(w, &arena);
-    if (ok) {
+    status = tmr_thin_lines(w, &arena);
+    if (status == TXM_OK) {
         tmr_even_lines(w);
         tmr_set_spacing(w, target);
-        ok = tmr_solve_lattice(w, seed, &arena);
+        status = tmr_solve_lattice(w, seed, &arena);
     }
-    for (int round = 0; round < 4 && ok; round++) { /* what the lattice left undone */
+    for (int round = 0; round < 4 && status == TXM_OK; round++) { /* what the lattice left undone */
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, 0.3);
         for (int k = 0; k < 3; k++) tmr_relax(w);
         tmr_split_long(w, 1.5, 1.6);
         tmr_collapse_short(w, 0.55, 0.5, 1.5, 1);
     }
-    ok = ok && tmr_fix_count(w, target, 2, &arena, &missing);
-    if (ok) tmr_improve(w, 6, 3, 1.5, 0.8);
+    if (status == TXM_OK) status = tmr_fix_count(w, target, 2, &arena, &missing);
+    if (status == TXM_OK) status = tmr_improve(w, 6, 3, 1.5, 0.8);
     txm_arena_free(&arena);
-    return ok ? TXM_OK : TXM_OUT_OF_MEMORY;
+    return status;
 }
 
 /* The last part of every method: the exact number, and as much regularity as pays. */
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
-    if (!tmr_fix_count(w, target, 2, scratch, &missing)) return TXM_OUT_OF_MEMORY;
-    tmr_improve(w, 1, 2, 1.5, 0.8);
-    tmr_improve(w, 2, 2, 1.2, 1);
+    txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
+    if (status == TXM_OK) status = tmr_improve(w, 1, 2, 1.5, 0.8);
+    if (status == TXM_OK) status = tmr_improve(w, 2, 2, 1.2, 1);
+    if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
-    if (w->m.live != target) {
-        char text[160];
-        snprintf(text, sizeof text, "reached %ld vertices instead of %ld", (long)w->m.live,
-                 (long)target);
-        return txm_fail(w->env, TXM_TOO_SMALL, text);
-    }
-    if (!tmr_fit_surface(w, 2, scratch)) return TXM_OUT_OF_MEMORY;
+    if (w->m.live != target)
+        return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
+                                (uint64_t)w->m.live, (uint64_t)target);
+    if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
     for (int round = 0; round < 8; round++)
         if (tmr_open_folds(w, 0.06) == 0) break;
     return TXM_OK;
@@ -5200,8 +5222,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         mesh->kinds = (uint8_t *)txm_arena_alloc(&arena, n, 1);
         mesh->indices = (uint32_t *)txm_arena_alloc(&arena, faces, 3 * sizeof(uint32_t));
     }
-    if (!mesh || !number || !mesh->positions || !mesh->normals || !mesh->sources || !mesh->kinds ||
-        !mesh->indices) {
+    if (!mesh || arena.failed || scratch.failed) {
         txm_arena_free(&arena);
         txm_arena_free(&scratch);
         return TXM_OUT_OF_MEMORY;
@@ -5246,7 +5267,7 @@ TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh) {
     return view;
 }
 
-TRIMESH_API void trimesh_free(trimesh_mesh *mesh) {
+TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh) {
     if (!mesh) return;
     txm_arena arena = mesh->memory; /* the mesh lies in it */
     txm_arena_free(&arena);
@@ -5337,17 +5358,18 @@ static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
 static txm_status tmr_job_mend(trimesh_job *job) {
     size_t crease_edges = 0;
     const float angle = job->desc.crease_angle > 0 ? job->desc.crease_angle : TMR_CREASE_ANGLE;
-    const txm_status status =
+    txm_status status =
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
     if (status != TXM_OK) return status;
     if (tmr_check_least(job, &job->env) != TXM_OK) return TXM_TOO_SMALL;
     tmr_normalize_scale(&job->s);
-    if (job->desc.adapt > 0 &&
-        !tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input, &job->scratch))
-        return TXM_OUT_OF_MEMORY;
-    if (!tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
-                         &crease_edges, &job->l))
-        return TXM_OUT_OF_MEMORY;
+    if (job->desc.adapt > 0)
+        status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
+                                 &job->scratch);
+    if (status == TXM_OK)
+        status = tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
+                                 &crease_edges, &job->l);
+    if (status != TXM_OK) return status;
     job->report.crease_edges = crease_edges;
     job->w.s = &job->s;
     job->w.l = &job->l;
@@ -5391,9 +5413,9 @@ static txm_status tmr_job_repel(trimesh_job *job) {
     tmr_repel_round(&job->w, tmr_repel_force(job->round, job->rounds), &job->mean, &job->largest);
     job->round++;
     if (job->round < job->rounds && job->mean >= TMR_CALM) return TXM_OK;
-    tmr_improve(&job->w, 10, 2, 0.8, 1); /* more than the lattice needs: it is regular already */
     job->stage = TMR_STAGE_FINISH;
-    return TXM_OK;
+    return tmr_improve(&job->w, 10, 2, 0.8,
+                       1); /* more than the lattice, which is regular already */
 }
 
 static txm_status tmr_job_lattice(trimesh_job *job) {
@@ -5420,38 +5442,40 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
 static txm_status tmr_job_subdivide(trimesh_job *job) {
     tmr_work *w = &job->w;
     for (int left = job->cut;; left--) {
-        const txm_status status = tmr_rebuild(w, left > 0, &job->second, &job->scratch);
+        txm_status status = tmr_rebuild(w, left > 0, &job->second, &job->scratch);
         if (status != TXM_OK) return status;
         txm_arena_free(&job->first);
         txm_arena_free(&job->scratch);
         job->first = job->second;
         txm_arena_init(&job->second, &job->env);
-        if (left) tmr_improve(w, 2, 2, 1, 1);
+        if (left) status = tmr_improve(w, 2, 2, 1, 1);
+        if (status != TXM_OK) return status;
         if (left <= 1) break;
     }
     job->stage = TMR_STAGE_FINISH;
     return TXM_OK;
 }
 
-/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. -1: no
-   memory. */
-static int tmr_surface_crosses(trimesh_job *job, int rim) {
+/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. */
+static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
     tmr_work w = job->w;
     txm_arena arena;
-    long found = -1;
+    long found = 0;
     txm_arena_init(&arena, &job->env);
-    if (tmr_copy_surface(&w, 0, &arena) == TXM_OK)
-        found = tmr_count_crossings(&w, NULL, rim, &arena);
+    txm_status status = tmr_copy_surface(&w, 0, &arena);
+    if (status == TXM_OK) status = tmr_count_crossings(&w, NULL, rim, &arena, &found);
     txm_arena_free(&arena);
-    return found < 0 ? -1 : found > 0;
+    *crosses = found > 0;
+    return status;
 }
 
 /* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
-   surface bends. 0: nothing is left to try. */
-static int tmr_job_retry(trimesh_job *job, txm_status *status) {
+   surface bends. *retries: 0 if nothing is left to try. */
+static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     const int coarse = job->w.line_scale > 1;
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
-    if (!coarse && !quartered && job->retries == 2) return 0;
+    *retries = coarse || quartered || job->retries < 2;
+    if (!*retries) return TXM_OK;
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
@@ -5462,40 +5486,39 @@ static int tmr_job_retry(trimesh_job *job, txm_status *status) {
     } else {
         job->s.scale = job->retries ? job->plain_scale : job->s.scale;
         job->plain_scale = job->s.scale;
-        if (!tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input,
-                             &job->scratch)) {
-            *status = TXM_OUT_OF_MEMORY;
-            return 1;
-        }
+        const txm_status status = tmr_adapt_scale(
+            &job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input, &job->scratch);
+        if (status != TXM_OK) return status;
         job->retries++;
     }
     job->stage = TMR_STAGE_LATTICE;
-    *status = TXM_OK;
-    return 1;
+    return TXM_OK;
 }
 
 /* Finish, and see that nothing is turned over or crosses: a result that is not sound never leaves. */
 static txm_status tmr_job_finish(trimesh_job *job) {
-    char text[160];
-    const long target = (long)job->desc.vertices;
-    txm_status status = tmr_polish(&job->w, (int32_t)target, &job->scratch);
+    int again, crosses = 0;
+    txm_status status = tmr_polish(&job->w, (int32_t)job->desc.vertices, &job->scratch);
     if (status != TXM_OK && status != TXM_TOO_SMALL) return status;
     const int exact = status == TXM_OK;
     if (exact) {
         long faults;
         job->stage = TMR_STAGE_DONE;
-        if (!tmr_mend_spots(&job->w, &faults, &job->env)) return TXM_OUT_OF_MEMORY;
-        const int crosses = faults == 0 ? 1 : tmr_surface_crosses(job, 0);
-        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+        status = tmr_mend_spots(&job->w, &faults);
+        if (status != TXM_OK || faults == 0) return status;
+        status = tmr_surface_crosses(job, 0, &crosses);
+        if (status != TXM_OK || crosses) return status;
     }
-    if (tmr_job_retry(job, &status)) return status;
+    status = tmr_job_retry(job, &again);
+    if (status != TXM_OK || again) return status;
     if (exact) { /* as the last resort: sheets that touch edge to edge may be meant to cross */
-        const int crosses = tmr_surface_crosses(job, 1);
-        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+        status = tmr_surface_crosses(job, 1, &crosses);
+        if (status != TXM_OK || crosses) return status;
     }
-    snprintf(text, sizeof text, "the surface has parts too thin or too fine for %ld vertices without "
-             "crossings; give about %ld", target, 2 * target);
-    return txm_fail(&job->env, TXM_TOO_SMALL, text);
+    return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
+                            "the surface has parts too thin or too fine for # vertices without "
+                            "crossings; give about #",
+                            job->desc.vertices, 2 * (uint64_t)job->desc.vertices);
 }
 
 static const char *tmr_stage_name(int stage) {
@@ -5526,7 +5549,6 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
-    if (status == TXM_OK && job->w.cancelled) status = TXM_CANCELLED;
     if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its flags are there */
     job->shown = stage;
     job->status = status;
@@ -5584,14 +5606,11 @@ static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
 
 static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
-    memset(state, 0, sizeof *state);
     state->stage = tmr_stage_name(job->shown);
     state->round = job->round;
-    state->fraction = tmr_job_fraction(job);
-    state->done = job->stage == TMR_STAGE_DONE;
     state->mean = txm_float(job->mean);
     state->largest = txm_float(job->largest);
-    if (job->status != TXM_OK || m->vertex_count == 0) return job->status;
+    if (job->status != TXM_OK || m->vertex_count == 0) return TXM_OK;
     int32_t *number =
         (int32_t *)txm_arena_alloc(&job->view, (size_t)m->vertex_count, sizeof(int32_t));
     if (!number) return TXM_OUT_OF_MEMORY;
@@ -5631,9 +5650,8 @@ static txm_status tmr_job_leave(const trimesh_job *job, txm_env *env, txm_status
     return status == TXM_OK ? TXM_OK : txm_fail(env, status, job->env.message);
 }
 
-TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
-                                     trimesh_report *report, trimesh_job **job) {
-    if (report) memset(report, 0, sizeof *report);
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job) {
+    if (desc && desc->report) memset(desc->report, 0, sizeof *desc->report);
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     *job = NULL;
     txm_status status = tmr_check_desc(desc, env);
@@ -5650,53 +5668,51 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
     txm_arena_init(&j->scratch, env);
     txm_arena_init(&j->view, env);
     status = tmr_job_advance(j);
-    if (report) *report = j->report;
+    if (desc->report) *desc->report = j->report;
     tmr_job_leave(j, env, status);
-    if (status != TXM_OK) trimesh_job_free(j);
+    if (status != TXM_OK) trimesh_free(j);
     else *job = j;
     return status;
 }
 
-TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, trimesh_state *state) {
-    if (state) memset(state, 0, sizeof *state);
+TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more) {
+    if (more) *more = 0;
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     tmr_job_enter(job, env);
     txm_arena_free(&job->view);
-    txm_status status = tmr_job_advance(job);
-    if (state && status == TXM_OK) {
-        status = tmr_show(job, state);
-        if (status != TXM_OK) { /* the job itself goes on */
-            txm_arena_free(&job->view);
-            state->points = state->triangles = 0;
-            state->positions = NULL;
-            state->indices = NULL;
-            txm_fail(&job->env, status, "no memory for the state; the job can go on");
-        }
-    } else if (state) {
-        tmr_show(job, state);
+    const txm_status status = tmr_job_advance(job);
+    if (more) *more = status == TXM_OK && job->stage != TMR_STAGE_DONE;
+    return tmr_job_leave(job, env, status);
+}
+
+TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state) {
+    if (state) memset(state, 0, sizeof *state);
+    if (!job || !state) return txm_fail(env, TXM_BAD_ARGUMENT, "job or state is NULL");
+    tmr_job_enter(job, env);
+    txm_arena_free(&job->view);
+    const txm_status status = tmr_show(job, state);
+    if (status != TXM_OK) {
+        txm_arena_free(&job->view);
+        memset(state, 0, sizeof *state);
+        txm_fail(&job->env, status, "no memory for the state; the job can go on");
     }
     return tmr_job_leave(job, env, status);
 }
 
-TRIMESH_API txm_status trimesh_end(trimesh_job *job, txm_env *env, trimesh_mesh **out) {
-    if (out) *out = NULL;
-    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
-    txm_status status = TXM_OK;
+TRIMESH_API txm_status trimesh_get_mesh(trimesh_job *job, txm_env *env, trimesh_mesh **mesh) {
+    if (mesh) *mesh = NULL;
+    if (!job || !mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "job or mesh is NULL");
     tmr_job_enter(job, env);
-    if (!out) status = txm_fail(&job->env, TXM_BAD_ARGUMENT, "out is NULL");
-    while (status == TXM_OK && job->stage != TMR_STAGE_DONE) status = tmr_job_advance(job);
-    if (status == TXM_OK) status = job->status;
-    if (status == TXM_OK) {
-        status = tmr_write(&job->w, out);
-        if (status != TXM_OK)
-            txm_fail(&job->env, status, "no memory for the mesh");
-    }
-    tmr_job_leave(job, env, status);
-    trimesh_job_free(job);
-    return status;
+    txm_status status = job->status;
+    if (status != TXM_OK) txm_fail(&job->env, status, "the job has failed before");
+    else if (job->stage != TMR_STAGE_DONE)
+        status = txm_fail(&job->env, TXM_BAD_ARGUMENT, "the job is not done; call trimesh_step");
+    else if ((status = tmr_write(&job->w, mesh)) != TXM_OK)
+        txm_fail(&job->env, status, "no memory for the mesh");
+    return tmr_job_leave(job, env, status);
 }
 
-TRIMESH_API void trimesh_job_free(trimesh_job *job) {
+TRIMESH_API void trimesh_free(trimesh_job *job) {
     if (!job) return;
     const txm_env env = job->env;
     txm_arena_free(&job->input);
@@ -5707,13 +5723,16 @@ TRIMESH_API void trimesh_job_free(trimesh_job *job) {
     txm_free(&env, job);
 }
 
-TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
-                                      trimesh_report *report, trimesh_mesh **out) {
+TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh) {
     trimesh_job *job;
-    if (out) *out = NULL;
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    const txm_status status = trimesh_begin(desc, env, report, &job);
-    return status == TXM_OK ? trimesh_end(job, env, out) : status;
+    int more = 1;
+    if (mesh) *mesh = NULL;
+    if (!mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "mesh is NULL");
+    txm_status status = trimesh_begin(desc, env, &job);
+    while (status == TXM_OK && more) status = trimesh_step(job, env, &more);
+    if (status == TXM_OK) status = trimesh_get_mesh(job, env, mesh);
+    trimesh_free(job);
+    return status;
 }
 
 /* ---- after the surface has changed ---------------------------------------------------------- */
@@ -5741,8 +5760,8 @@ static void tmr_grow_box(txm_dvec3 *low, txm_dvec3 *high, txm_dvec3 p) {
     *high = txm_d3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
 }
 
-static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *vertex, int32_t count,
-                          txm_arena *arena) {
+static txm_status tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *vertex,
+                                 int32_t count, txm_arena *arena) {
     t->point = point;
     t->vertex = vertex;
     t->count = count;
@@ -5753,7 +5772,8 @@ static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *ve
     txm_pair *room = (txm_pair *)txm_arena_alloc(arena, (size_t)count, sizeof(txm_pair));
     t->low = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
     t->high = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
-    if (!t->order || !room || !t->low || !t->high) return 0;
+    const txm_status status = tmr_check_memory(arena);
+    if (status != TXM_OK) return status;
     for (int32_t f = 0; f < count; f++) {
         const int32_t *v = vertex + 3 * f;
         t->order[f].value = (uint32_t)f;
@@ -5781,7 +5801,7 @@ static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *ve
         t->low[i] = low;
         t->high[i] = high;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* squared distance from p to the box of a node */
@@ -5842,17 +5862,18 @@ static int32_t tmr_grid_slot(const tmr_grid *g, double x, double y, double z) {
     return (int32_t)(h & (uint64_t)g->mask);
 }
 
-static int tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vertices,
-                          txm_arena *arena) {
+static txm_status tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vertices,
+                                 txm_arena *arena) {
     int32_t size = 16;
     while (size < points && size < (1 << 28)) size *= 2;
     g->cell = cell;
     g->mask = size - 1;
     g->head = (int32_t *)txm_arena_alloc(arena, (size_t)size, sizeof(int32_t));
     g->next = (int32_t *)txm_arena_alloc(arena, (size_t)vertices, sizeof(int32_t));
-    if (!g->head || !g->next) return 0;
+    const txm_status status = tmr_check_memory(arena);
+    if (status != TXM_OK) return status;
     for (int32_t i = 0; i < size; i++) g->head[i] = -1;
-    return 1;
+    return TXM_OK;
 }
 
 static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
@@ -6024,8 +6045,8 @@ static int32_t tmr_fill_gap(tmr_update *u, double from, double to, double spacin
 }
 
 /* Points on a line: old ones that keep their distance, the gaps filled. */
-static int tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, size_t count,
-                           int32_t *olds, int32_t *vertices, int32_t room) {
+static txm_status tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, size_t count,
+                                  int32_t *olds, int32_t *vertices, int32_t room) {
     const double length = tmr_line_weight(&u->s, &u->l, line);
     const double scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double spacing = u->t.length * scale;
@@ -6054,7 +6075,6 @@ static int tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, s
             olds[n++] = -1;
         }
         n = tmr_fill_gap(u, last, length, steps ? length / steps : spacing, n, room, olds);
-        if (!tmr_cut_line(&u->t, line, u->t.ways, n, vertices)) return 0;
     } else { /* round the end of the ring to the first one; those beyond it come first again */
         n = tmr_fill_gap(u, last, begin + length, spacing, n, room, olds);
         int32_t over = 0;
@@ -6066,42 +6086,48 @@ static int tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, s
             u->t.ways[0] = way;
             olds[0] = -1;
         }
-        if (!tmr_cut_line(&u->t, line, u->t.ways, n, vertices)) return 0;
     }
+    const txm_status status = tmr_cut_line(&u->t, line, u->t.ways, n, vertices);
+    if (status != TXM_OK) return status;
     for (int32_t k = 0; k < n; k++) {
         if (olds[k] < 0 || vertices[k] < 0 || u->was[vertices[k]] >= 0) continue;
         u->was[vertices[k]] = olds[k];
         u->now[olds[k]] = vertices[k];
     }
-    return 1;
+    return TXM_OK;
 }
 
-static int tmr_update_lines(tmr_update *u) {
+static txm_status tmr_update_lines(tmr_update *u) {
     const size_t n = u->old->vertex_count;
     const int32_t room = 3 * u->t.line_room + 16;
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&u->scratch, 2 * n, sizeof(txm_pair));
     int32_t *olds = (int32_t *)txm_arena_alloc(&u->scratch, 2 * (size_t)room, sizeof(int32_t));
     u->t.ways = (double *)txm_arena_alloc(&u->scratch, (size_t)room, sizeof(double));
-    if (!pairs || !olds || !u->t.ways) return 0;
+    txm_status status = tmr_check_memory(&u->scratch);
+    if (status != TXM_OK) return status;
     for (int32_t v = 0; v < u->s.vertex_count; v++) u->t.keep[v] = u->l.kind[v] == TRIMESH_CORNER;
     const size_t count = tmr_order_on_lines(u, pairs, pairs + n);
     size_t k = 0;
-    for (int32_t line = 0; line < u->l.line_count; line++) {
+    for (int32_t line = 0; line < u->l.line_count && status == TXM_OK; line++) {
         const size_t first = k;
         while (k < count && pairs[k].key == (uint32_t)line) k++;
-        if (!tmr_update_line(u, line, pairs + first, k - first, olds, olds + room, room)) return 0;
+        status = tmr_update_line(u, line, pairs + first, k - first, olds, olds + room, room);
     }
-    return 1;
+    if (status == TXM_TOO_SMALL)
+        txm_fail(u->w.env, status,
+                 "creases and borders take more vertices than there is room for; "
+                 "give more, or a larger line_spacing");
+    return status;
 }
 
 /* ---- the update: points on faces -------------------------------------------------------------- */
 
 /* Put the old vertices on faces into the mesh, face by face, but for those in the way of lines. */
-static int tmr_update_old(tmr_update *u) {
+static txm_status tmr_update_old(tmr_update *u) {
     const size_t n = u->old->vertex_count;
     size_t count = 0;
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&u->scratch, 2 * n, sizeof(txm_pair));
-    if (!pairs) return 0;
+    if (!pairs) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < u->w.m.vertex_count; v++)
         if (u->t.keep[v]) tmr_grid_add(&u->grid, u->w.m.p[v], v);
     for (size_t i = 0; i < n; i++) {
@@ -6122,7 +6148,7 @@ static int tmr_update_old(tmr_update *u) {
         u->was[v] = i;
         tmr_grid_add(&u->grid, u->w.m.p[v], v);
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Is a place of the new surface covered by a triangle of the old mesh all of whose corners are
@@ -6169,9 +6195,10 @@ static txm_status tmr_update_strew(tmr_update *u) {
     static const double distance[] = {0.85, 0.75, 0.65, 0.55};
     const size_t n = (size_t)u->s.face_count;
     const int exact = u->desc.vertices > 0;
-    txm_status status = TXM_OK;
     int32_t live = 0;
-    if (!tmr_update_lines(u) || !tmr_update_old(u)) return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_update_lines(u);
+    if (status == TXM_OK) status = tmr_update_old(u);
+    if (status != TXM_OK) return status;
     txm_pair *order = (txm_pair *)txm_arena_alloc(&u->scratch, 2 * n, sizeof(txm_pair));
     if (!order) return TXM_OUT_OF_MEMORY;
     tmr_order_faces(&u->s, order, order + n);
@@ -6198,13 +6225,13 @@ static int tmr_has_edge(const uint64_t *table, size_t mask, int32_t a, int32_t b
 }
 
 /* Turn edges between old vertices to what they were. */
-static int tmr_turn_back(tmr_update *u) {
+static txm_status tmr_turn_back(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const size_t n = 3 * u->old->triangle_count;
     size_t size = 16;
     while (size < 2 * n) size *= 2; /* an edge has a triangle or two: at most half of it is used */
     uint64_t *table = (uint64_t *)txm_arena_zero(&u->scratch, size, sizeof(uint64_t));
-    if (!table) return 0;
+    if (!table) return TXM_OUT_OF_MEMORY;
     for (size_t c = 0; c < n; c++) {
         const int32_t a = u->now[u->old->indices[c]];
         const int32_t b = u->now[u->old->indices[c % 3 == 2 ? c - 2 : c + 1]];
@@ -6228,7 +6255,7 @@ static int tmr_turn_back(tmr_update *u) {
         }
         if (turned == 0) break;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Pin the old vertices farther than the radius, in edges, from every new one and every place that
@@ -6257,7 +6284,7 @@ static void tmr_pin(tmr_update *u) {
 
 /* ---- the update: the whole ---------------------------------------------------------------------- */
 
-static int tmr_update_alloc(tmr_update *u) {
+static txm_status tmr_update_alloc(tmr_update *u) {
     const size_t n = u->old->vertex_count, t = u->old->triangle_count;
     const size_t room = (size_t)u->w.m.vertex_limit;
     txm_arena *arena = &u->first;
@@ -6270,9 +6297,8 @@ static int tmr_update_alloc(tmr_update *u) {
     u->was = (int32_t *)txm_arena_alloc(arena, room, sizeof(int32_t));
     u->level = (int32_t *)txm_arena_zero(arena, room, sizeof(int32_t));
     u->segment = (int32_t *)txm_arena_alloc(arena, 3 * (size_t)u->s.face_count, sizeof(int32_t));
-    if (!u->old_point || !u->place || !u->now || !u->face || !u->way || !u->old_vertex || !u->was ||
-        !u->level || !u->segment)
-        return 0;
+    txm_status status = tmr_check_memory(arena);
+    if (status != TXM_OK) return status;
     for (size_t i = 0; i < n; i++) {
         const float *p = u->old->positions + 3 * i;
         u->old_point[i] =
@@ -6280,8 +6306,10 @@ static int tmr_update_alloc(tmr_update *u) {
     }
     for (size_t c = 0; c < 3 * t; c++) u->old_vertex[c] = (int32_t)u->old->indices[c];
     for (size_t v = 0; v < room; v++) u->was[v] = -1;
-    return tmr_tree_build(&u->tree, u->s.point, u->s.vertex, u->s.face_count, arena) &&
-           tmr_tree_build(&u->old_tree, u->old_point, u->old_vertex, (int32_t)t, arena);
+    status = tmr_tree_build(&u->tree, u->s.point, u->s.vertex, u->s.face_count, arena);
+    if (status == TXM_OK)
+        status = tmr_tree_build(&u->old_tree, u->old_point, u->old_vertex, (int32_t)t, arena);
+    return status;
 }
 
 /* Points that the surface holds at edge length u->t.length. */
@@ -6304,11 +6332,12 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     txm_status status = tmr_surface_build(&desc, env, &u->input, report, &u->s);
     if (status != TXM_OK) return status;
     const double length = u->old->edge_length / u->s.diagonal;
-    if (u->desc.adapt > 0 &&
-        !tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch))
-        return TXM_OUT_OF_MEMORY;
-    if (!tmr_lines_build(&u->s, angle, length, &u->input, &u->scratch, &crease_edges, &u->l))
-        return TXM_OUT_OF_MEMORY;
+    if (u->desc.adapt > 0)
+        status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
+    if (status == TXM_OK)
+        status =
+            tmr_lines_build(&u->s, angle, length, &u->input, &u->scratch, &crease_edges, &u->l);
+    if (status != TXM_OK) return status;
     report->crease_edges = crease_edges;
     u->w.desc = &u->desc;
     u->w.s = &u->s;
@@ -6326,10 +6355,12 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     if (points > TMR_MOST / 4)
         return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
     status = tmr_copy_surface(&u->w, tmr_strewn_room(floor(2 * points)), &u->first);
+    if (status == TXM_OK) status = tmr_strewn_alloc(&u->t, &u->scratch);
+    if (status == TXM_OK) status = tmr_update_alloc(u);
+    if (status == TXM_OK)
+        status =
+            tmr_grid_build(&u->grid, u->t.length, (int32_t)points, u->w.m.vertex_limit, &u->first);
     if (status != TXM_OK) return status;
-    if (!tmr_strewn_alloc(&u->t, &u->scratch) || !tmr_update_alloc(u)) return TXM_OUT_OF_MEMORY;
-    if (!tmr_grid_build(&u->grid, u->t.length, (int32_t)points, u->w.m.vertex_limit, &u->first))
-        return TXM_OUT_OF_MEMORY;
     tmr_map_segments(u);
     tmr_find_old(u);
     return TXM_OK;
@@ -6344,16 +6375,19 @@ static txm_status tmr_update_relax(tmr_update *u) {
         for (int k = 0; k < 2; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
         tmr_flip_valences(w, 3, 0.4);
-        if (round == 4 && u->desc.vertices > 0 &&
-            !tmr_fix_count(w, (int32_t)u->desc.vertices, 2, &u->scratch, &missing))
-            return TXM_OUT_OF_MEMORY;
+        if (round == 4 && u->desc.vertices > 0) {
+            const txm_status status =
+                tmr_fix_count(w, (int32_t)u->desc.vertices, 2, &u->scratch, &missing);
+            if (status != TXM_OK) return status;
+        }
         if (txm_progress(w->env, 0.6f + 0.03f * (float)round, "relax")) return TXM_CANCELLED;
     }
     if (missing != 0)
         return txm_fail(w->env, TXM_TOO_SMALL,
                         "the vertices asked for do not fit into what has changed; ask for 0");
     long faults;
-    if (!tmr_mend_spots(w, &faults, w->env)) return TXM_OUT_OF_MEMORY;
+    const txm_status status = tmr_mend_spots(w, &faults);
+    if (status != TXM_OK) return status;
     if (faults > 0)
         return txm_fail(w->env, TXM_TOO_SMALL, "the changed part is too thin or too fine for "
                         "edges of this length; retile the whole with more vertices");
@@ -6361,14 +6395,14 @@ static txm_status tmr_update_relax(tmr_update *u) {
 }
 
 /* Old positions bit for bit, and the map. */
-static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out, const int32_t **map) {
+static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out) {
     const tmr_mesh *m = &u->w.m;
     trimesh_mesh *mesh = NULL;
     const txm_status status = tmr_write(&u->w, &mesh);
     if (status != TXM_OK) return status;
     int32_t *which = (int32_t *)txm_arena_alloc(&mesh->memory, mesh->vertex_count, sizeof(int32_t));
     if (!which) {
-        trimesh_free(mesh);
+        trimesh_mesh_free(mesh);
         return TXM_OUT_OF_MEMORY;
     }
     size_t k = 0;
@@ -6381,23 +6415,22 @@ static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out, const int3
         k++;
     }
     mesh->edge_length = u->t.length * u->s.diagonal;
-    if (map) *map = which;
+    mesh->old_vertices = which;
     *out = mesh;
     return TXM_OK;
 }
 
-static txm_status tmr_update_run(tmr_update *u, trimesh_report *report, trimesh_mesh **out,
-                                 const int32_t **map) {
+static txm_status tmr_update_run(tmr_update *u, trimesh_report *report, trimesh_mesh **out) {
     txm_status status = tmr_update_begin(u, report);
     if (status != TXM_OK) return status;
     if (txm_progress(u->w.env, 0.2f, "strew")) return TXM_CANCELLED;
     if ((status = tmr_update_strew(u)) != TXM_OK) return status;
     if (txm_progress(u->w.env, 0.4f, "join")) return TXM_CANCELLED;
     if ((status = tmr_take_out(&u->w, u->t.keep, 0.4f)) != TXM_OK) return status;
-    if (!tmr_turn_back(u)) return TXM_OUT_OF_MEMORY;
+    if ((status = tmr_turn_back(u)) != TXM_OK) return status;
     tmr_pin(u);
     if ((status = tmr_update_relax(u)) != TXM_OK) return status;
-    return tmr_update_write(u, out, map);
+    return tmr_update_write(u, out);
 }
 
 static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
@@ -6417,14 +6450,11 @@ static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update
 }
 
 TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
-                                      txm_env *env, trimesh_report *report, trimesh_mesh **out,
-                                      const int32_t **map) {
-    trimesh_report own;
-    if (!report) report = &own;
+                                      txm_env *env, trimesh_mesh **mesh) {
+    trimesh_report own, *report = desc && desc->desc.report ? desc->desc.report : &own;
     memset(report, 0, sizeof *report);
-    if (map) *map = NULL;
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    *out = NULL;
+    if (!mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "mesh is NULL");
+    *mesh = NULL;
     txm_status status = tmr_check_update(old, desc, env);
     if (status != TXM_OK) return status;
     tmr_update *u = (tmr_update *)txm_alloc(env, sizeof *u);
@@ -6438,7 +6468,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
     txm_arena_init(&u->input, env);
     txm_arena_init(&u->first, env);
     txm_arena_init(&u->scratch, env);
-    status = tmr_update_run(u, report, out, map);
+    status = tmr_update_run(u, report, mesh);
     if (status == TXM_OUT_OF_MEMORY) txm_fail(env, status, "no memory to update the mesh");
     if (status == TXM_CANCELLED) txm_fail(env, status, "cancelled while updating the mesh");
     txm_arena_free(&u->input);

@@ -122,7 +122,7 @@ static trimesh_mesh *retile(const surface *s, trimesh_method method, size_t vert
     const size_t held = live_bytes;
     peak_bytes = live_bytes;
     const double start = clock_of(CLOCK_MONOTONIC);
-    if (trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) give_up(s->name, env.message);
+    if (trimesh_retile(&desc, &env, &mesh) != TXM_OK) give_up(s->name, env.message);
     r->seconds = clock_of(CLOCK_MONOTONIC) - start;
     r->peak = peak_bytes - held;
     return mesh;
@@ -162,7 +162,7 @@ static void retiling(int full) {
             for (int i = 0; i < sizes; i++) {
                 result one, all;
                 const size_t n = numbers[i];
-                trimesh_free(retile(&surfaces[s], (trimesh_method)method, n, threads, &all));
+                trimesh_mesh_free(retile(&surfaces[s], (trimesh_method)method, n, threads, &all));
                 trimesh_mesh *m = retile(&surfaces[s], (trimesh_method)method, n, 1, &one);
                 printf("%-10s %9lu %-7s %9lu %8.2f %9.2f %7.2f %7.1f %8.1f %12.0f %7.4f\n",
                        surfaces[s].name, (unsigned long)surfaces[s].view.face_count,
@@ -171,7 +171,7 @@ static void retiling(int full) {
                        1e6 * one.seconds / (double)n, (double)one.peak / 1048576,
                        (double)one.peak / (double)n, mean_quality(m));
                 fflush(stdout);
-                trimesh_free(m);
+                trimesh_mesh_free(m);
             }
         }
     }
@@ -226,7 +226,7 @@ static void scattering(void) {
         }
     }
     free(out);
-    trimesh_free(mesh);
+    trimesh_mesh_free(mesh);
     free_surface(&s);
 }
 

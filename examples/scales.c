@@ -119,7 +119,7 @@ int main(int argc, char **argv) {
     desc.surface.vertex_count = in.vertex_count;
     desc.surface.face_count = in.triangle_count;
     desc.vertices = argc > 3 ? strtoul(argv[3], NULL, 10) : 1000;
-    if (!failed && trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) failed = env.message;
+    if (!failed && trimesh_retile(&desc, &env, &mesh) != TXM_OK) failed = env.message;
 
     /* place: a patch with one thing, in the middle of the triangle, on every triangle */
     const trimesh_point middle = {1 / 3.0f, 1 / 3.0f, 0, 1, {0, 0, 0, 1}, 0};
@@ -145,7 +145,7 @@ int main(int argc, char **argv) {
 
     if (failed) fprintf(stderr, "scales: %s\n", failed);
     else printf("%s: %lu scales\n", argv[2], (unsigned long)count);
-    trimesh_free(mesh);
+    trimesh_mesh_free(mesh);
     free(scales);
     free(rotations);
     free(in.positions);

@@ -24,13 +24,13 @@
          desc.surface.vertex_count = 4;
          desc.surface.face_count = 4;
          desc.vertices = 500;
-         if (trimesh_retile(&desc, &env, NULL, &mesh) != TXM_OK) {
+         if (trimesh_retile(&desc, &env, &mesh) != TXM_OK) {
              fprintf(stderr, "retile: %s\n", env.message);
              return 1;
          }
          printf("%lu vertices, %lu triangles, edges of %.3f\n", (unsigned long)mesh->vertex_count,
                 (unsigned long)mesh->triangle_count, mesh->edge_length);
-         trimesh_free(mesh);
+         trimesh_mesh_free(mesh);
          return 0;
      }
 
@@ -113,7 +113,7 @@ typedef enum trimesh_kind {
     TRIMESH_CORNER = 3  /* where lines meet, end or turn: never moves */
 } trimesh_kind;
 
-/* A finished mesh; read only, released by trimesh_free. Triangles are counter-clockwise seen from
+/* A finished mesh; read only, released by trimesh_mesh_free. Triangles are counter-clockwise seen from
    outside. Every vertex is used. */
 typedef struct trimesh_mesh {
     size_t vertex_count, triangle_count;
@@ -122,6 +122,8 @@ typedef struct trimesh_mesh {
     uint32_t *indices;       /* 3 per triangle                                             */
     txm_mesh_place *sources; /* 1 per vertex: where it lies on the input                    */
     uint8_t *kinds;          /* 1 per vertex: a trimesh_kind                               */
+    int32_t *old_vertices;   /* of trimesh_update: 1 per vertex, which one of the old mesh it was,
+                                -1 = new; else NULL                                        */
     double edge_length;      /* that was aimed at, in units of the input                   */
     txm_arena memory;        /* where all this lies                                        */
 } trimesh_mesh;
@@ -170,72 +172,78 @@ typedef struct trimesh_desc {
                               bounding box, 0..0.01; 0 = only those in equal places             */
     int iterations;        /* TRIMESH_REPEL: at most so many rounds of repulsion, 1..1000; 0 = 40 */
     uint64_t seed;         /* another number, another result                                    */
+    trimesh_report *report; /* out: receives what was found in the input, also after an error;
+                              NULL = not wanted                                                 */
 } trimesh_desc;
 
 /* Retile a surface.
 
    desc    see there
-   report  receives what was found in the input, also after an error; NULL = not wanted
-   out     receives the mesh, or NULL on any error
-   return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range; TXM_BAD_DATA for a surface that
-           cannot be mended (message and report name the first bad edge); TXM_TOO_SMALL if the
-           surface cannot be covered with so few vertices (the message says how many are needed);
-           TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED                                       */
-TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
-                                      trimesh_report *report, trimesh_mesh **out);
+   mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free
+   return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, an index that is not below
+           vertex_count, a position that is not finite; TXM_BAD_DATA for a surface that cannot be
+           mended (message and report name the first bad edge); TXM_TOO_SMALL if the surface cannot
+           be covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
+           TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                      */
+TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh);
 
 /* A result as a mesh of texmath.h, which shows its arrays: for trimesh_cover.h. */
 TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
 
 /* Release a mesh; NULL is allowed. */
-TRIMESH_API void trimesh_free(trimesh_mesh *mesh);
+TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh);
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
 /* A retiling under way, for viewers that show it and programs that have other things to do in
-   between. trimesh_retile is trimesh_begin, trimesh_step until done, trimesh_end. */
+   between. trimesh_retile is trimesh_begin, trimesh_step while there is more, trimesh_get_mesh,
+   trimesh_free. */
 typedef struct trimesh_job trimesh_job;
+
+/* Check the descriptor and mend the surface.
+
+   desc    what it points to must stay as it is until the job is gone, the struct itself and the
+           report need not
+   job     receives the job, or NULL on any error; release it with trimesh_free
+   return  as trimesh_retile                                                                   */
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job);
+
+/* Do the next piece: with TRIMESH_REPEL strew the points, join them, one round of repulsion, ...,
+   finish. Does nothing once the job is done.
+
+   env    for hooks and message of this call; the allocator stays that of trimesh_begin
+   more   receives 0 when nothing is left to do, also after an error; NULL is allowed
+   return TXM_OK; after anything else the job can only be released: every later call returns the
+          same                                                                                 */
+TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more);
 
 /* How far a job is. All pointers are valid until the next call for the job. */
 typedef struct trimesh_state {
     const char *stage;       /* what the last step did: "mend", "strew", "join", "repel", "lattice",
                                 "subdivide", "finish"                                          */
     int round;               /* of repulsion, from 1; 0 before                                 */
-    float fraction;          /* 0..1 of the whole, never falling                               */
-    int done;                /* non-zero: call trimesh_end, there are no more steps            */
     float mean, largest;     /* movement of the points in the last round, in edge lengths      */
-    size_t points;           /* 0 before there are any                                         */
+    size_t points;           /* 0 before there are any, and after an error                     */
     const float *positions;  /* 3 per point, in the caller's units                             */
     size_t triangles;        /* 0 until points are joined                                      */
     const uint32_t *indices; /* 3 per triangle, of points                                      */
 } trimesh_state;
 
-/* Check the descriptor and mend the surface.
+/* What a viewer shows between two steps; makes the arrays.
 
-   desc    what it points to must stay as it is until the job is gone, the struct itself need not
-   report  as in trimesh_retile
-   job     receives the job, or NULL on any error; release it with trimesh_end or trimesh_job_free
-   return  as trimesh_retile                                                                   */
-TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
-                                     trimesh_report *report, trimesh_job **job);
+   return  TXM_OK; TXM_OUT_OF_MEMORY, then the state is all zero and the job can go on          */
+TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state);
 
-/* Do the next piece: with TRIMESH_REPEL strew the points, join them, one round of repulsion, ...,
-   finish. Does nothing once the job is done.
+/* The mesh of a job that is done. Each call makes one.
 
-   env    for hooks and message of this call; the allocator stays that of trimesh_begin
-   state  receives how far the job is, also after an error (then without points); NULL = not wanted,
-          which saves making the arrays
-   return TXM_OK; after anything else the job can only be released: every later call returns the
-          same                                                                                 */
-TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, trimesh_state *state);
+   mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free; it does not
+           need the job any more
+   return  TXM_OK; TXM_BAD_ARGUMENT if the job is not done; TXM_OUT_OF_MEMORY; if a step has failed
+           what that step returned                                                             */
+TRIMESH_API txm_status trimesh_get_mesh(trimesh_job *job, txm_env *env, trimesh_mesh **mesh);
 
-/* Do what is left, hand the mesh over and release the job, also after an error.
-
-   out     receives the mesh, or NULL on any error                                             */
-TRIMESH_API txm_status trimesh_end(trimesh_job *job, txm_env *env, trimesh_mesh **out);
-
-/* Release a job without finishing it; NULL is allowed. */
-TRIMESH_API void trimesh_job_free(trimesh_job *job);
+/* Release a job, done or not; NULL is allowed. */
+TRIMESH_API void trimesh_free(trimesh_job *job);
 
 /* ---- after the surface has changed --------------------------------------------------------- */
 
@@ -265,14 +273,12 @@ typedef struct trimesh_update_desc {
    kind again; none stays so near to a new line that it would crowd the points there.
 
    old     a result for the surface as it was
-   out     receives the mesh, or NULL on any error
-   map     NULL, or receives out->vertex_count numbers: which vertex of old each one was, -1 = new;
-           they are released with the mesh
+   mesh    receives the mesh, or NULL on any error; its old_vertices say which vertex of old each
+           one was
    return  as trimesh_retile, but for desc.vertices = 0
    cost    O((old + surface) log), as retiling with TRIMESH_REPEL without the repulsion          */
 TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
-                                      txm_env *env, trimesh_report *report, trimesh_mesh **out,
-                                      const int32_t **map);
+                                      txm_env *env, trimesh_mesh **mesh);
 
 #ifdef __cplusplus
 }

@@ -54,7 +54,7 @@ txm_status make_membrane(double (*f)(const double[3]), txm_env *env, membrane *m
     desc.crease_angle = 180;
     /* triangles of 45 Angstrom: 877 square Angstrom, two for each vertex */
     desc.vertices = (size_t)(area_of(&desc.surface) / (2 * 877)) + 2;
-    txm_status status = trimesh_retile(&desc, env, NULL, &mesh);
+    txm_status status = trimesh_retile(&desc, env, &mesh);
     if (status != TXM_OK) return status;
     /* There must be points enough for the largest triangle of either leaflet; else TXM_TOO_SMALL. */
     for (int wanted = 24;; wanted = wanted * 5 / 4) {
@@ -69,7 +69,7 @@ txm_status make_membrane(double (*f)(const double[3]), txm_env *env, membrane *m
         if (status != TXM_TOO_SMALL) break;
         status = TXM_OK;
     }
-    trimesh_free(mesh);
+    trimesh_mesh_free(mesh);
     return status;
 }
 

@@ -12,6 +12,13 @@
 #define TRIMESH_ASSERT(x) assert(x)
 #endif
 
+/* ---- memory ------------------------------------------------------------------------------- */
+
+/* Have all requests to the arena been met? Functions ask for all they need, then look once. */
+static txm_status tmr_check_memory(const txm_arena *arena) {
+    return arena->failed ? TXM_OUT_OF_MEMORY : TXM_OK;
+}
+
 /* ---- corners ----------------------------------------------------------------------------- */
 
 /* A mesh is two arrays over corners. Corner c of triangle c / 3 stands for its vertex and for the

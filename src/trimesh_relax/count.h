@@ -36,18 +36,18 @@ static int tmr_claim(tmr_work *w, int32_t c) {
 }
 
 /* Split or collapse where it harms the pattern least, until there are so many vertices; a few
-   rounds of relaxation in between. ok: no memory otherwise. How many vertices are missing (over:
-   negative) at the end goes to *missing. */
-static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
-                         int32_t *missing) {
+   rounds of relaxation in between. How many vertices are missing (over: negative) at the end goes to
+   *missing. */
+static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
+                                int32_t *missing) {
     tmr_mesh *m = &w->m;
     const size_t most = (size_t)m->face_limit * 3 / 2 + 1; /* edges there can ever be */
     txm_pair *pairs, *room;
     *missing = target - m->live;
-    if (*missing == 0) return 1;
+    if (*missing == 0) return TXM_OK;
     pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
-    if (!pairs || !room) return 0;
+    if (!pairs || !room) return TXM_OUT_OF_MEMORY;
     for (int pass = 0; pass < 60 && *missing; pass++) {
         const int sign = *missing > 0 ? 1 : -1;
         size_t count = 0;
@@ -88,13 +88,13 @@ static int tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena
         w->mask = NULL;
         if (done == 0 && pass >= 40) break;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* ---- resampling --------------------------------------------------------------------------- */
 
-/* Bring the copy of the surface to about two vertices per lattice point to come. 0: cancelled. */
-static int tmr_resample(tmr_work *w) {
+/* Bring the copy of the surface to about two vertices per lattice point to come. */
+static txm_status tmr_resample(tmr_work *w) {
     const double aim = sqrt(0.5); /* of edges, relative to w->length */
     /* lines first: what is inside is split to fit them */
     tmr_split_long(w, 1e9, 1.0);
@@ -103,7 +103,7 @@ static int tmr_resample(tmr_work *w) {
     while (limit < 0.72 * aim) {
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
         limit *= 1.5;
-        if (txm_progress(w->env, 0, "resample")) return 0;
+        if (txm_progress(w->env, 0, "resample")) return TXM_CANCELLED;
     }
     for (int round = 0; round < 24; round++) {
         const int32_t split = tmr_split_long(w, 1.4 * aim, 1.4);
@@ -111,19 +111,18 @@ static int tmr_resample(tmr_work *w) {
         const int32_t gone = tmr_collapse_short(w, 0.7 * aim, 0.7, 1.4 * aim, 0);
         tmr_flip_delaunay(w, 2);
         if (round >= 3 && (split + gone) * 200.0 < w->m.live) break;
-        if (txm_progress(w->env, 0, "resample")) return 0;
+        if (txm_progress(w->env, 0, "resample")) return TXM_CANCELLED;
     }
-    return 1;
+    return TXM_OK;
 }
 
-/* Take away what a line has more of edges than fit its length; the rest is spread evenly later.
-   0: no memory. */
-static int tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
+/* Take away what a line has more of edges than fit its length; the rest is spread evenly later. */
+static txm_status tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const tmr_lines *l = w->l;
-    if (l->line_count == 0) return 1;
+    if (l->line_count == 0) return TXM_OK;
     int32_t *over = (int32_t *)txm_arena_alloc(scratch, (size_t)l->line_count, sizeof(int32_t));
-    if (!over) return 0;
+    if (!over) return TXM_OUT_OF_MEMORY;
     for (int32_t i = 0; i < l->line_count; i++) {
         const int32_t fit = (int32_t)(l->length[i] / (w->length * w->line_scale) + 0.5);
         const int32_t least = l->closed[i] ? 3 : 1;
@@ -136,7 +135,7 @@ static int tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
         const int32_t line = m->edge[c] - 1;
         over[line] -= tmr_try_collapse(w, c, 0, 0);
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Spread the vertices of each line evenly along it. */

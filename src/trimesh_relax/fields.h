@@ -107,7 +107,8 @@ static void tmr_transport(txm_dvec3 n0, txm_dvec3 x0, txm_dvec3 n1, txm_dvec3 x1
     out[1] = length > 1e-12 ? im / length : 0;
 }
 
-static int tmr_level_alloc(tmr_level *level, int32_t count, int32_t links, txm_arena *arena) {
+static txm_status tmr_level_alloc(tmr_level *level, int32_t count, int32_t links,
+                                  txm_arena *arena) {
     const size_t n = (size_t)count, k = (size_t)links;
     level->count = count;
     level->links = links;
@@ -124,18 +125,16 @@ static int tmr_level_alloc(tmr_level *level, int32_t count, int32_t links, txm_a
     level->to = (int32_t *)txm_arena_alloc(arena, k + 1, sizeof(int32_t));
     level->weight = (float *)txm_arena_alloc(arena, k + 1, sizeof(float));
     level->turn = (float(*)[2])txm_arena_alloc(arena, k + 1, 2 * sizeof(float));
-    return level->p && level->n && level->x && level->q && level->area && level->scale &&
-           level->z && level->fixed && level->parent && level->first && level->to &&
-           level->weight && level->turn;
+    return tmr_check_memory(arena);
 }
 
 /* Level 0: the vertices. */
-static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
+static txm_status tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
     const tmr_mesh *m = &w->m;
     int32_t count = 0, links = 0;
     f->node = (int32_t *)txm_arena_alloc(arena, (size_t)m->vertex_count, sizeof(int32_t));
     f->vertex = (int32_t *)txm_arena_alloc(arena, (size_t)m->live, sizeof(int32_t));
-    if (!f->node || !f->vertex) return 0;
+    if (!f->node || !f->vertex) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         f->node[v] = -1;
         if (m->corner[v] < 0 || tmr_is_ghost(m, v)) continue;
@@ -144,7 +143,8 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         links += m->valence[v];
     }
     tmr_level *level = &f->level[0];
-    if (!tmr_level_alloc(level, count, links, arena)) return 0;
+    const txm_status status = tmr_level_alloc(level, count, links, arena);
+    if (status != TXM_OK) return status;
     int32_t k = 0;
     for (int32_t i = 0; i < count; i++) {
         const int32_t v = f->vertex[i], first = m->corner[v];
@@ -180,15 +180,16 @@ static int tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
         }
     }
     level->first[count] = level->links = k;
-    return 1;
+    return TXM_OK;
 }
 
 /* The next level: each node joined with the neighbour that is most like it. */
-static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_arena *scratch) {
+static txm_status tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena,
+                               txm_arena *scratch) {
     int32_t count = 0;
     int32_t *child = (int32_t *)txm_arena_alloc(scratch, 2 * (size_t)a->count, sizeof(int32_t));
     int32_t *seen = (int32_t *)txm_arena_alloc(scratch, (size_t)a->count, sizeof(int32_t));
-    if (!child || !seen) return 0;
+    if (!child || !seen) return TXM_OUT_OF_MEMORY;
     for (int32_t i = 0; i < a->count; i++) a->parent[i] = -1;
     for (int32_t i = 0; i < a->count; i++) {
         double best_score = -2;
@@ -210,7 +211,8 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
         child[2 * count + 1] = best;
         count++;
     }
-    if (!tmr_level_alloc(b, count, a->links, arena)) return 0;
+    const txm_status status = tmr_level_alloc(b, count, a->links, arena);
+    if (status != TXM_OK) return status;
     int32_t k = 0;
     for (int32_t i = 0; i < count; i++) seen[i] = -1;
     for (int32_t i = 0; i < count; i++) {
@@ -260,7 +262,7 @@ static int tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena, txm_
         }
     }
     b->first[count] = b->links = k;
-    return 1;
+    return TXM_OK;
 }
 
 static void tmr_level_turns(tmr_level *level) {
@@ -458,18 +460,20 @@ static void tmr_solve_points(tmr_fields *f) {
     }
 }
 
-static int tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
+static txm_status tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
     txm_arena scratch;
-    int ok = tmr_level_zero(w, f, arena);
+    txm_status status = tmr_level_zero(w, f, arena);
     f->count = 1;
-    while (ok && f->count < TMR_MAX_LEVELS && f->level[f->count - 1].count > 8) {
+    while (status == TXM_OK && f->count < TMR_MAX_LEVELS && f->level[f->count - 1].count > 8) {
         txm_arena_init(&scratch, w->env);
-        ok = tmr_level_up(&f->level[f->count - 1], &f->level[f->count], arena, &scratch);
+        status = tmr_level_up(&f->level[f->count - 1], &f->level[f->count], arena, &scratch);
         txm_arena_free(&scratch);
-        if (!ok || f->level[f->count].count * 20.0 > f->level[f->count - 1].count * 19.0) break;
+        if (status != TXM_OK ||
+            f->level[f->count].count * 20.0 > f->level[f->count - 1].count * 19.0)
+            break;
         f->count++;
     }
-    return ok;
+    return status;
 }
 
 /* ---- from the lattice to a mesh ----------------------------------------------------------- */
@@ -506,12 +510,12 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
 
 /* Collapse the edges whose ends share a lattice point, the shortest first. moved[v] holds the
    lattice point of v, and bad[v] how many vertices went into it. */
-static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
+static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const size_t most = (size_t)m->live_faces * 3 / 2 + 1; /* edges of a closed mesh */
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
-    if (!pairs || !room) return 0;
+    if (!pairs || !room) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         w->bad[v] = 1;
         w->moved[v] = f->node[v] >= 0 ? f->level[0].q[f->node[v]] : m->p[v];
@@ -562,7 +566,7 @@ static int tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scr
         w->landed[v] = at.face;
     }
     tmr_settle(w);
-    return 1;
+    return TXM_OK;
 }
 
 #endif /* TRIMESH_RELAX_FIELDS_H */

@@ -90,17 +90,18 @@ static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
 static txm_status tmr_job_mend(trimesh_job *job) {
     size_t crease_edges = 0;
     const float angle = job->desc.crease_angle > 0 ? job->desc.crease_angle : TMR_CREASE_ANGLE;
-    const txm_status status =
+    txm_status status =
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
     if (status != TXM_OK) return status;
     if (tmr_check_least(job, &job->env) != TXM_OK) return TXM_TOO_SMALL;
     tmr_normalize_scale(&job->s);
-    if (job->desc.adapt > 0 &&
-        !tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input, &job->scratch))
-        return TXM_OUT_OF_MEMORY;
-    if (!tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
-                         &crease_edges, &job->l))
-        return TXM_OUT_OF_MEMORY;
+    if (job->desc.adapt > 0)
+        status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
+                                 &job->scratch);
+    if (status == TXM_OK)
+        status = tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
+                                 &crease_edges, &job->l);
+    if (status != TXM_OK) return status;
     job->report.crease_edges = crease_edges;
     job->w.s = &job->s;
     job->w.l = &job->l;
@@ -144,9 +145,9 @@ static txm_status tmr_job_repel(trimesh_job *job) {
     tmr_repel_round(&job->w, tmr_repel_force(job->round, job->rounds), &job->mean, &job->largest);
     job->round++;
     if (job->round < job->rounds && job->mean >= TMR_CALM) return TXM_OK;
-    tmr_improve(&job->w, 10, 2, 0.8, 1); /* more than the lattice needs: it is regular already */
     job->stage = TMR_STAGE_FINISH;
-    return TXM_OK;
+    return tmr_improve(&job->w, 10, 2, 0.8,
+                       1); /* more than the lattice, which is regular already */
 }
 
 static txm_status tmr_job_lattice(trimesh_job *job) {
@@ -173,38 +174,40 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
 static txm_status tmr_job_subdivide(trimesh_job *job) {
     tmr_work *w = &job->w;
     for (int left = job->cut;; left--) {
-        const txm_status status = tmr_rebuild(w, left > 0, &job->second, &job->scratch);
+        txm_status status = tmr_rebuild(w, left > 0, &job->second, &job->scratch);
         if (status != TXM_OK) return status;
         txm_arena_free(&job->first);
         txm_arena_free(&job->scratch);
         job->first = job->second;
         txm_arena_init(&job->second, &job->env);
-        if (left) tmr_improve(w, 2, 2, 1, 1);
+        if (left) status = tmr_improve(w, 2, 2, 1, 1);
+        if (status != TXM_OK) return status;
         if (left <= 1) break;
     }
     job->stage = TMR_STAGE_FINISH;
     return TXM_OK;
 }
 
-/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. -1: no
-   memory. */
-static int tmr_surface_crosses(trimesh_job *job, int rim) {
+/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. */
+static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
     tmr_work w = job->w;
     txm_arena arena;
-    long found = -1;
+    long found = 0;
     txm_arena_init(&arena, &job->env);
-    if (tmr_copy_surface(&w, 0, &arena) == TXM_OK)
-        found = tmr_count_crossings(&w, NULL, rim, &arena);
+    txm_status status = tmr_copy_surface(&w, 0, &arena);
+    if (status == TXM_OK) status = tmr_count_crossings(&w, NULL, rim, &arena, &found);
     txm_arena_free(&arena);
-    return found < 0 ? -1 : found > 0;
+    *crosses = found > 0;
+    return status;
 }
 
 /* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
-   surface bends. 0: nothing is left to try. */
-static int tmr_job_retry(trimesh_job *job, txm_status *status) {
+   surface bends. *retries: 0 if nothing is left to try. */
+static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     const int coarse = job->w.line_scale > 1;
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
-    if (!coarse && !quartered && job->retries == 2) return 0;
+    *retries = coarse || quartered || job->retries < 2;
+    if (!*retries) return TXM_OK;
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
@@ -215,40 +218,39 @@ static int tmr_job_retry(trimesh_job *job, txm_status *status) {
     } else {
         job->s.scale = job->retries ? job->plain_scale : job->s.scale;
         job->plain_scale = job->s.scale;
-        if (!tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input,
-                             &job->scratch)) {
-            *status = TXM_OUT_OF_MEMORY;
-            return 1;
-        }
+        const txm_status status = tmr_adapt_scale(
+            &job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input, &job->scratch);
+        if (status != TXM_OK) return status;
         job->retries++;
     }
     job->stage = TMR_STAGE_LATTICE;
-    *status = TXM_OK;
-    return 1;
+    return TXM_OK;
 }
 
 /* Finish, and see that nothing is turned over or crosses: a result that is not sound never leaves. */
 static txm_status tmr_job_finish(trimesh_job *job) {
-    char text[160];
-    const long target = (long)job->desc.vertices;
-    txm_status status = tmr_polish(&job->w, (int32_t)target, &job->scratch);
+    int again, crosses = 0;
+    txm_status status = tmr_polish(&job->w, (int32_t)job->desc.vertices, &job->scratch);
     if (status != TXM_OK && status != TXM_TOO_SMALL) return status;
     const int exact = status == TXM_OK;
     if (exact) {
         long faults;
         job->stage = TMR_STAGE_DONE;
-        if (!tmr_mend_spots(&job->w, &faults, &job->env)) return TXM_OUT_OF_MEMORY;
-        const int crosses = faults == 0 ? 1 : tmr_surface_crosses(job, 0);
-        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+        status = tmr_mend_spots(&job->w, &faults);
+        if (status != TXM_OK || faults == 0) return status;
+        status = tmr_surface_crosses(job, 0, &crosses);
+        if (status != TXM_OK || crosses) return status;
     }
-    if (tmr_job_retry(job, &status)) return status;
+    status = tmr_job_retry(job, &again);
+    if (status != TXM_OK || again) return status;
     if (exact) { /* as the last resort: sheets that touch edge to edge may be meant to cross */
-        const int crosses = tmr_surface_crosses(job, 1);
-        if (crosses != 0) return crosses < 0 ? TXM_OUT_OF_MEMORY : TXM_OK;
+        status = tmr_surface_crosses(job, 1, &crosses);
+        if (status != TXM_OK || crosses) return status;
     }
-    snprintf(text, sizeof text, "the surface has parts too thin or too fine for %ld vertices without "
-             "crossings; give about %ld", target, 2 * target);
-    return txm_fail(&job->env, TXM_TOO_SMALL, text);
+    return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
+                            "the surface has parts too thin or too fine for # vertices without "
+                            "crossings; give about #",
+                            job->desc.vertices, 2 * (uint64_t)job->desc.vertices);
 }
 
 static const char *tmr_stage_name(int stage) {
@@ -279,7 +281,6 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
-    if (status == TXM_OK && job->w.cancelled) status = TXM_CANCELLED;
     if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its flags are there */
     job->shown = stage;
     job->status = status;
@@ -337,14 +338,11 @@ static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
 
 static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
-    memset(state, 0, sizeof *state);
     state->stage = tmr_stage_name(job->shown);
     state->round = job->round;
-    state->fraction = tmr_job_fraction(job);
-    state->done = job->stage == TMR_STAGE_DONE;
     state->mean = txm_float(job->mean);
     state->largest = txm_float(job->largest);
-    if (job->status != TXM_OK || m->vertex_count == 0) return job->status;
+    if (job->status != TXM_OK || m->vertex_count == 0) return TXM_OK;
     int32_t *number =
         (int32_t *)txm_arena_alloc(&job->view, (size_t)m->vertex_count, sizeof(int32_t));
     if (!number) return TXM_OUT_OF_MEMORY;
@@ -384,9 +382,8 @@ static txm_status tmr_job_leave(const trimesh_job *job, txm_env *env, txm_status
     return status == TXM_OK ? TXM_OK : txm_fail(env, status, job->env.message);
 }
 
-TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
-                                     trimesh_report *report, trimesh_job **job) {
-    if (report) memset(report, 0, sizeof *report);
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job) {
+    if (desc && desc->report) memset(desc->report, 0, sizeof *desc->report);
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     *job = NULL;
     txm_status status = tmr_check_desc(desc, env);
@@ -403,53 +400,51 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env,
     txm_arena_init(&j->scratch, env);
     txm_arena_init(&j->view, env);
     status = tmr_job_advance(j);
-    if (report) *report = j->report;
+    if (desc->report) *desc->report = j->report;
     tmr_job_leave(j, env, status);
-    if (status != TXM_OK) trimesh_job_free(j);
+    if (status != TXM_OK) trimesh_free(j);
     else *job = j;
     return status;
 }
 
-TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, trimesh_state *state) {
-    if (state) memset(state, 0, sizeof *state);
+TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more) {
+    if (more) *more = 0;
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     tmr_job_enter(job, env);
     txm_arena_free(&job->view);
-    txm_status status = tmr_job_advance(job);
-    if (state && status == TXM_OK) {
-        status = tmr_show(job, state);
-        if (status != TXM_OK) { /* the job itself goes on */
-            txm_arena_free(&job->view);
-            state->points = state->triangles = 0;
-            state->positions = NULL;
-            state->indices = NULL;
-            txm_fail(&job->env, status, "no memory for the state; the job can go on");
-        }
-    } else if (state) {
-        tmr_show(job, state);
+    const txm_status status = tmr_job_advance(job);
+    if (more) *more = status == TXM_OK && job->stage != TMR_STAGE_DONE;
+    return tmr_job_leave(job, env, status);
+}
+
+TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state) {
+    if (state) memset(state, 0, sizeof *state);
+    if (!job || !state) return txm_fail(env, TXM_BAD_ARGUMENT, "job or state is NULL");
+    tmr_job_enter(job, env);
+    txm_arena_free(&job->view);
+    const txm_status status = tmr_show(job, state);
+    if (status != TXM_OK) {
+        txm_arena_free(&job->view);
+        memset(state, 0, sizeof *state);
+        txm_fail(&job->env, status, "no memory for the state; the job can go on");
     }
     return tmr_job_leave(job, env, status);
 }
 
-TRIMESH_API txm_status trimesh_end(trimesh_job *job, txm_env *env, trimesh_mesh **out) {
-    if (out) *out = NULL;
-    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
-    txm_status status = TXM_OK;
+TRIMESH_API txm_status trimesh_get_mesh(trimesh_job *job, txm_env *env, trimesh_mesh **mesh) {
+    if (mesh) *mesh = NULL;
+    if (!job || !mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "job or mesh is NULL");
     tmr_job_enter(job, env);
-    if (!out) status = txm_fail(&job->env, TXM_BAD_ARGUMENT, "out is NULL");
-    while (status == TXM_OK && job->stage != TMR_STAGE_DONE) status = tmr_job_advance(job);
-    if (status == TXM_OK) status = job->status;
-    if (status == TXM_OK) {
-        status = tmr_write(&job->w, out);
-        if (status != TXM_OK)
-            txm_fail(&job->env, status, "no memory for the mesh");
-    }
-    tmr_job_leave(job, env, status);
-    trimesh_job_free(job);
-    return status;
+    txm_status status = job->status;
+    if (status != TXM_OK) txm_fail(&job->env, status, "the job has failed before");
+    else if (job->stage != TMR_STAGE_DONE)
+        status = txm_fail(&job->env, TXM_BAD_ARGUMENT, "the job is not done; call trimesh_step");
+    else if ((status = tmr_write(&job->w, mesh)) != TXM_OK)
+        txm_fail(&job->env, status, "no memory for the mesh");
+    return tmr_job_leave(job, env, status);
 }
 
-TRIMESH_API void trimesh_job_free(trimesh_job *job) {
+TRIMESH_API void trimesh_free(trimesh_job *job) {
     if (!job) return;
     const txm_env env = job->env;
     txm_arena_free(&job->input);
@@ -460,13 +455,16 @@ TRIMESH_API void trimesh_job_free(trimesh_job *job) {
     txm_free(&env, job);
 }
 
-TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env,
-                                      trimesh_report *report, trimesh_mesh **out) {
+TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh) {
     trimesh_job *job;
-    if (out) *out = NULL;
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    const txm_status status = trimesh_begin(desc, env, report, &job);
-    return status == TXM_OK ? trimesh_end(job, env, out) : status;
+    int more = 1;
+    if (mesh) *mesh = NULL;
+    if (!mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "mesh is NULL");
+    txm_status status = trimesh_begin(desc, env, &job);
+    while (status == TXM_OK && more) status = trimesh_step(job, env, &more);
+    if (status == TXM_OK) status = trimesh_get_mesh(job, env, mesh);
+    trimesh_free(job);
+    return status;
 }
 
 #endif /* TRIMESH_RELAX_JOB_H */

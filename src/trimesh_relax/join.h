@@ -266,9 +266,9 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
 
 /* Cut a line at places given by their distance from its beginning in wanted edge lengths, rising.
    A vertex of the surface very near to one of them is taken for it. vertices: NULL, or receives the
-   vertex for each place. ok: no room otherwise. */
-static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t count,
-                        int32_t *vertices) {
+   vertex for each place. TXM_TOO_SMALL: there is no room for so many vertices. */
+static txm_status tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t count,
+                               int32_t *vertices) {
     tmr_work *w = t->w;
     const tmr_surface *s = w->s;
     const tmr_lines *l = w->l;
@@ -285,7 +285,7 @@ static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t
             if (u * weight >= near && (1 - u) * weight >= near) {
                 const int32_t c = tmr_find_edge(&w->m, left, b);
                 v = c < 0 ? -1 : tmr_cut_edge(t, tmr_prev(c));
-                if (v < 0) return 0;
+                if (v < 0) return TXM_TOO_SMALL;
                 w->m.flags[v] = l->border[line] ? TRIMESH_BORDER : TRIMESH_CREASE;
                 tmr_put_on_line(
                     w, v, txm_d3_mad(s->point[a], txm_d3_sub(s->point[b], s->point[a]), u), k);
@@ -298,7 +298,7 @@ static int tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t
         way += weight;
     }
     for (; done < count && vertices; done++) vertices[done] = -1;
-    return 1;
+    return TXM_OK;
 }
 
 /* spread the lower ten bits to every third */
@@ -529,7 +529,7 @@ static double tmr_strewn_room(double points) {
     return points + floor(points / 4) + 1000;
 }
 
-static int tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
+static txm_status tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
     const tmr_surface *s = t->w->s;
     const tmr_mesh *m = &t->w->m;
     const size_t n = (size_t)s->component_count;
@@ -546,29 +546,37 @@ static int tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
         if (steps > t->line_room) t->line_room = steps;
     }
     t->ways = (double *)txm_arena_alloc(scratch, (size_t)t->line_room + 1, sizeof(double));
-    if (!t->ways || !t->inside || !t->keep || !t->fixed || !t->wanted || !t->spare || !t->weight ||
-        !t->piece)
-        return 0;
+    const txm_status status = tmr_check_memory(scratch);
+    if (status != TXM_OK) return status;
     for (int32_t f = 0; f < m->face_count; f++) t->inside[f] = f < s->face_count ? f : -1;
     for (int32_t f = 0; f < s->face_count; f++) t->piece[f] = tmr_face_weight(s, f);
-    return 1;
+    return TXM_OK;
 }
 
 /* Corners and the points on lines. */
-static int tmr_strew_lines(tmr_strewn *t) {
+static txm_status tmr_strew_lines(tmr_strewn *t) {
     const tmr_surface *s = t->w->s;
     const tmr_lines *l = t->w->l;
     const tmr_mesh *m = &t->w->m;
+    uint64_t points = 0;
     for (int32_t v = 0; v < s->vertex_count; v++) t->keep[v] = l->kind[v] == TRIMESH_CORNER;
     for (int32_t i = 0; i < l->line_count; i++) {
         const int32_t steps = tmr_line_steps(t, i), first = l->closed[i] ? 0 : 1;
         const double step = tmr_line_weight(s, l, i) / steps;
         for (int32_t k = first; k < steps; k++) t->ways[k - first] = k * step;
-        if (!tmr_cut_line(t, i, t->ways, steps - first, NULL)) return 0;
+        if (tmr_cut_line(t, i, t->ways, steps - first, NULL) != TXM_OK) {
+            for (; i < l->line_count; i++) points += (uint64_t)tmr_line_steps(t, i);
+            return txm_fail_numbers(
+                t->w->env, TXM_TOO_SMALL,
+                "creases and borders alone take # vertices, and # are asked for;"
+                " give more, or a larger line_spacing",
+                points, t->desc->vertices);
+        }
+        points += (uint64_t)steps;
     }
     for (int32_t v = 0; v < m->vertex_count; v++)
         if (t->keep[v]) t->fixed[s->component[tmr_face_of(t->w, v)]]++;
-    return 1;
+    return TXM_OK;
 }
 
 /* Strew desc->vertices points over a mesh that is a copy of the surface, with room as
@@ -581,9 +589,10 @@ static txm_status tmr_strew(tmr_strewn *t, tmr_work *w, const trimesh_desc *desc
     t->desc = desc;
     t->length = w->length =
         tmr_strewn_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
-    if (!tmr_strewn_alloc(t, scratch)) return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_strewn_alloc(t, scratch);
+    if (status != TXM_OK) return status;
     tmr_least_points(t);
-    if (!tmr_strew_lines(t)) return txm_fail(w->env, TXM_TOO_SMALL, "no room for lines");
+    if ((status = tmr_strew_lines(t)) != TXM_OK) return status;
     tmr_share_points(t, total);
     return tmr_strew_faces(t, scratch);
 }
@@ -593,9 +602,7 @@ static txm_status tmr_join_points(tmr_strewn *t, txm_arena *scratch) {
     int32_t missing;
     const txm_status status = tmr_take_out(t->w, t->keep, 0.15f);
     if (status != TXM_OK) return status;
-    return tmr_fix_count(t->w, (int32_t)t->desc->vertices, 1, scratch, &missing)
-               ? TXM_OK
-               : TXM_OUT_OF_MEMORY;
+    return tmr_fix_count(t->w, (int32_t)t->desc->vertices, 1, scratch, &missing);
 }
 
 #endif /* TRIMESH_RELAX_JOIN_H */

@@ -77,11 +77,11 @@ static int tmr_speaks(const tmr_surface *s, int32_t c) {
     return s->opposite[c] < c;
 }
 
-static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends) {
+static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends) {
     const int32_t n = s->vertex_count;
     int32_t total = 0;
     ends->first = (int32_t *)txm_arena_zero(arena, (size_t)n + 2, sizeof(int32_t));
-    if (!ends->first) return 0;
+    if (!ends->first) return TXM_OUT_OF_MEMORY;
     int32_t *count = ends->first + 1;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
@@ -90,7 +90,7 @@ static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends)
         total += 2;
     }
     ends->corner = (int32_t *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(int32_t));
-    if (!ends->corner) return 0;
+    if (!ends->corner) return TXM_OUT_OF_MEMORY;
     int32_t sum = 0; /* first[v + 1] counts up from the place of v's first entry to its end */
     for (int32_t v = 0; v < n; v++) {
         const int32_t k = count[v];
@@ -102,16 +102,16 @@ static int tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends *ends)
         ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
         ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Creases that hang together to less than the given length in all are noise: make them plain. */
-static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
-                                  txm_arena *arena) {
+static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
+                                         txm_arena *arena) {
     const int32_t n = s->vertex_count;
     int32_t *stack = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
     uint8_t *seen = (uint8_t *)txm_arena_zero(arena, (size_t)n, 1);
-    if (!stack || !seen) return 0;
+    if (!stack || !seen) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < n; v++) {
         int32_t size = 0, done = 0;
         double length = 0;
@@ -140,7 +140,7 @@ static int tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double l
             }
         }
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Direction from v along the line that starts with the edge of corner c, over about the distance
@@ -162,11 +162,11 @@ static txm_dvec3 tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, 
 
 /* The kind of every vertex; corners where lines meet, end, or turn by more than 40 degrees over
    the distance reach (the sharpest vertex of each bend only). */
-static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double reach,
-                            txm_arena *arena, uint8_t *kind) {
+static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double reach,
+                                   txm_arena *arena, uint8_t *kind) {
     const int32_t n = s->vertex_count;
     float *turn = (float *)txm_arena_zero(arena, (size_t)n, sizeof(float));
-    if (!turn) return 0;
+    if (!turn) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < n; v++) {
         const int32_t k = ends->first[v], count = ends->first[v + 1] - k;
         kind[v] = TRIMESH_FREE;
@@ -198,7 +198,7 @@ static int tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, double r
         }
         if (sharpest) kind[v] = TRIMESH_CORNER;
     }
-    return 1;
+    return TXM_OK;
 }
 
 enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are near it is no tip */
@@ -241,15 +241,16 @@ static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *
     return sum >= TMR_TIP_DEFECT;
 }
 
-/* Make the tips corners, so that they stay. 0: no memory. */
-static int tmr_find_tips(const tmr_surface *s, double reach, txm_arena *scratch, uint8_t *kind) {
+/* Make the tips corners, so that they stay. */
+static txm_status tmr_find_tips(const tmr_surface *s, double reach, txm_arena *scratch,
+                                uint8_t *kind) {
     float *defect = (float *)txm_arena_alloc(scratch, (size_t)s->vertex_count, sizeof(float));
-    if (!defect) return 0;
+    if (!defect) return TXM_OUT_OF_MEMORY;
     tmr_angle_defects(s, defect);
     for (int32_t v = 0; v < s->vertex_count; v++)
         if (kind[v] == TRIMESH_FREE && defect[v] > 0 && tmr_is_tip(s, defect, kind, v, reach))
             kind[v] = TRIMESH_CORNER;
-    return 1;
+    return TXM_OK;
 }
 
 /* Follow the line from v over the edge of corner c to its end, as one more line. */
@@ -282,16 +283,18 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
 }
 
 /* Find all lines. spacing: the edge length to come, by which short creases and slight bends are
-   told from real ones. 0: no memory. */
-static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
-                           txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
+   told from real ones. */
+static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
+                                  txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
     tmr_ends ends;
     const size_t n = (size_t)s->vertex_count, corners = 3 * (size_t)s->face_count;
+    txm_status status;
     if (tmr_find_creases(s, angle)) {
-        if (!tmr_list_ends(s, scratch, &ends)) return 0;
-        if (!tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch)) return 0;
+        if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
+        status = tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch);
+        if (status != TXM_OK) return status;
     }
-    if (!tmr_list_ends(s, scratch, &ends)) return 0;
+    if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
     /* each edge is listed at both its ends and becomes one segment; no line is without segments */
     const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
     l->line_count = l->segment_count = 0;
@@ -307,11 +310,11 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
     l->edge = (int32_t *)txm_arena_zero(arena, corners, sizeof(int32_t));
     l->kind = (uint8_t *)txm_arena_alloc(arena, n, 1);
     l->segment = (int32_t *)txm_arena_zero(arena, n, sizeof(int32_t));
-    if (!l->first || !l->closed || !l->border || !l->length || !l->a || !l->b || !l->face ||
-        !l->line || !l->start || !l->edge || !l->kind || !l->segment)
-        return 0;
-    if (!tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind)) return 0;
-    if (angle < 180 && !tmr_find_tips(s, 0.75 * spacing, scratch, l->kind)) return 0;
+    if ((status = tmr_check_memory(arena)) != TXM_OK) return status;
+    status = tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind);
+    if (status == TXM_OK && angle < 180)
+        status = tmr_find_tips(s, 0.75 * spacing, scratch, l->kind);
+    if (status != TXM_OK) return status;
     for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
         for (int32_t v = 0; v < s->vertex_count; v++) {
             if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
@@ -322,7 +325,7 @@ static int tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_are
     *crease_edges = 0;
     for (int32_t i = 0; i < l->line_count; i++)
         if (!l->border[i]) *crease_edges += (size_t)(l->first[i + 1] - l->first[i]);
-    return 1;
+    return TXM_OK;
 }
 
 /* the segment behind (step 1) or before (-1) segment k of its line; -1 at the end */
@@ -421,13 +424,13 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
 
 /* Shorten the wanted edge lengths where the surface bends, such that an edge turns by no more than
    TMR_TURN_PER_EDGE, fully or in part (adapt); and let them grow with the distance no faster than by
-   a third of it. 0: no memory. */
-static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
-                           txm_arena *scratch) {
+   a third of it. */
+static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
+                                  txm_arena *scratch) {
     const size_t n = (size_t)s->vertex_count;
     float *curvature = (float *)txm_arena_alloc(scratch, n, sizeof(float));
     float *scale = (float *)txm_arena_alloc(arena, n, sizeof(float));
-    if (!curvature || !scale) return 0;
+    if (!curvature || !scale) return TXM_OUT_OF_MEMORY;
     tmr_curvature(s, curvature);
     for (size_t v = 0; v < n; v++) {
         const double wanted = curvature[v] > 0 ? TMR_TURN_PER_EDGE / curvature[v] / spacing : 1;
@@ -444,7 +447,7 @@ static int tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_are
         }
     }
     s->scale = scale;
-    return 1;
+    return TXM_OK;
 }
 
 #endif /* TRIMESH_RELAX_LINES_H */

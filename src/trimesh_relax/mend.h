@@ -110,8 +110,7 @@ static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scrat
     m->list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
     m->pairs = (txm_pair *)txm_arena_alloc(scratch, 6 * f, sizeof(txm_pair));
     m->table = (int32_t *)txm_arena_alloc(scratch, m->table_size, sizeof(int32_t));
-    if (!m->vertex || !m->opposite || !m->origin || !m->turn || !m->rename || !m->flag ||
-        !m->list || !m->pairs || !m->table)
+    if (arena->failed || scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     m->degree = m->rename + v;
     m->stamp = m->degree + v;

@@ -121,7 +121,7 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
     s->vertex_normal = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->component = (int32_t *)txm_arena_alloc(arena, f, sizeof(int32_t));
     int32_t *list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
-    if (!s->normal || !s->vertex_normal || !s->component || !list)
+    if (arena->failed || scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory for the surface");
     tmr_face_normals(m, s, list, &count);
     if (count == s->face_count || !(s->area > 0))

@@ -357,8 +357,7 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     s->point = (txm_dvec3 *)txm_arena_alloc(arena, v, sizeof(txm_dvec3));
     s->corner = (int32_t *)txm_arena_alloc(arena, v, sizeof(int32_t));
     if (m->desc->scale) s->scale = (float *)txm_arena_alloc(arena, v, sizeof(float));
-    if (!s->point || !s->corner || (m->desc->scale && !s->scale))
-        return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory for the surface");
+    if (arena->failed) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory for the surface");
     memset(s->edge_kind, 0, 3 * f);
     tmr_number_fans(m, s, s->edge_kind);
     for (size_t c = 0; c < 3 * f; c++)

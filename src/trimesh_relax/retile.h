@@ -16,17 +16,18 @@ enum {
 
 /* Rounds of relaxation and flips. A strong pull brings the density into balance, a weak one the
    angles. */
-static void tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, double step) {
+static txm_status tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, double step) {
     w->pull = pull;
     w->step = step;
     for (int round = 0; round < rounds; round++) {
-        if (!w->cancelled) w->cancelled = txm_progress(w->env, 0, "relax") != 0; /* never falls */
-        if (w->cancelled) return;
+        /* the fraction stays at the highest so far: tmr_job_report */
+        if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
         tmr_flip_valences(w, 3, 0.4);
     }
+    return TXM_OK;
 }
 
 /* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
@@ -45,10 +46,11 @@ static void tmr_set_spacing(tmr_work *w, int32_t target) {
         0.982 * tmr_ideal_length(w) * sqrt(faces / (faces + 2.0 * (target - w->m.live)));
 }
 
-/* Directions, lattice points, and the mesh collapsed onto them. 0: no memory. */
-static int tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
+/* Directions, lattice points, and the mesh collapsed onto them. */
+static txm_status tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
     tmr_fields f;
-    if (!tmr_fields_build(w, &f, arena)) return 0;
+    const txm_status status = tmr_fields_build(w, &f, arena);
+    if (status != TXM_OK) return status;
     tmr_solve_directions(&f, seed);
     tmr_solve_points(&f);
     return tmr_collapse_lattice(w, &f, arena);
@@ -58,41 +60,40 @@ static int tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
 static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
-    if (!tmr_resample(w)) return TXM_CANCELLED;
+    txm_status status = tmr_resample(w);
+    if (status != TXM_OK) return status;
     txm_arena_init(&arena, w->env);
-    int ok = tmr_thin_lines(w, &arena);
-    if (ok) {
+    status = tmr_thin_lines(w, &arena);
+    if (status == TXM_OK) {
         tmr_even_lines(w);
         tmr_set_spacing(w, target);
-        ok = tmr_solve_lattice(w, seed, &arena);
+        status = tmr_solve_lattice(w, seed, &arena);
     }
-    for (int round = 0; round < 4 && ok; round++) { /* what the lattice left undone */
+    for (int round = 0; round < 4 && status == TXM_OK; round++) { /* what the lattice left undone */
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, 0.3);
         for (int k = 0; k < 3; k++) tmr_relax(w);
         tmr_split_long(w, 1.5, 1.6);
         tmr_collapse_short(w, 0.55, 0.5, 1.5, 1);
     }
-    ok = ok && tmr_fix_count(w, target, 2, &arena, &missing);
-    if (ok) tmr_improve(w, 6, 3, 1.5, 0.8);
+    if (status == TXM_OK) status = tmr_fix_count(w, target, 2, &arena, &missing);
+    if (status == TXM_OK) status = tmr_improve(w, 6, 3, 1.5, 0.8);
     txm_arena_free(&arena);
-    return ok ? TXM_OK : TXM_OUT_OF_MEMORY;
+    return status;
 }
 
 /* The last part of every method: the exact number, and as much regularity as pays. */
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
-    if (!tmr_fix_count(w, target, 2, scratch, &missing)) return TXM_OUT_OF_MEMORY;
-    tmr_improve(w, 1, 2, 1.5, 0.8);
-    tmr_improve(w, 2, 2, 1.2, 1);
+    txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
+    if (status == TXM_OK) status = tmr_improve(w, 1, 2, 1.5, 0.8);
+    if (status == TXM_OK) status = tmr_improve(w, 2, 2, 1.2, 1);
+    if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
-    if (w->m.live != target) {
-        char text[160];
-        snprintf(text, sizeof text, "reached %ld vertices instead of %ld", (long)w->m.live,
-                 (long)target);
-        return txm_fail(w->env, TXM_TOO_SMALL, text);
-    }
-    if (!tmr_fit_surface(w, 2, scratch)) return TXM_OUT_OF_MEMORY;
+    if (w->m.live != target)
+        return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
+                                (uint64_t)w->m.live, (uint64_t)target);
+    if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
     for (int round = 0; round < 8; round++)
         if (tmr_open_folds(w, 0.06) == 0) break;
     return TXM_OK;
@@ -127,8 +128,7 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         mesh->kinds = (uint8_t *)txm_arena_alloc(&arena, n, 1);
         mesh->indices = (uint32_t *)txm_arena_alloc(&arena, faces, 3 * sizeof(uint32_t));
     }
-    if (!mesh || !number || !mesh->positions || !mesh->normals || !mesh->sources || !mesh->kinds ||
-        !mesh->indices) {
+    if (!mesh || arena.failed || scratch.failed) {
         txm_arena_free(&arena);
         txm_arena_free(&scratch);
         return TXM_OUT_OF_MEMORY;
@@ -173,7 +173,7 @@ TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh) {
     return view;
 }
 
-TRIMESH_API void trimesh_free(trimesh_mesh *mesh) {
+TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh) {
     if (!mesh) return;
     txm_arena arena = mesh->memory; /* the mesh lies in it */
     txm_arena_free(&arena);

@@ -108,15 +108,16 @@ static void tmr_mark_near(const tmr_work *w, uint8_t *near) {
     }
 }
 
-/* The cells of all triangles, or of those near, in order. 0: no memory. */
-static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, txm_arena *arena) {
+/* The cells of all triangles, or of those near, in order. */
+static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g,
+                                 txm_arena *arena) {
     const tmr_mesh *m = &w->m;
     memset(g, 0, sizeof *g);
     g->cell = w->length * 0.65;
     g->limit = (size_t)m->live_faces * 10 + 1000;
     g->entry = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
     g->spare = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
-    if (!g->entry || !g->spare) return 0;
+    if (!g->entry || !g->spare) return TXM_OUT_OF_MEMORY;
     do { /* in coarser cells if there are many large triangles */
         g->cell *= 2;
         g->count = 0;
@@ -128,17 +129,19 @@ static int tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g, 
         }
     } while (g->overflow);
     txm_sort_pairs(g->entry, g->spare, g->count);
-    return 1;
+    return TXM_OK;
 }
 
-/* How many pairs of triangles cross each other, and mark their vertices in w->bad? -1: no memory.
+/* Count the pairs of triangles that cross each other in *found, and mark their vertices in w->bad.
    near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
    Linear in the number of triangles. */
-static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch) {
+static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch,
+                                      long *found) {
     const tmr_mesh *m = &w->m;
     tmr_cells g;
-    long found = 0;
-    if (!tmr_cells_make(w, near, &g, scratch)) return -1;
+    *found = 0;
+    const txm_status status = tmr_cells_make(w, near, &g, scratch);
+    if (status != TXM_OK) return status;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
@@ -154,14 +157,14 @@ static long tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_a
                 if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
                     low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h, rim))
                     continue;
-                found++;
+                ++*found;
                 for (int k = 0; k < 3; k++)
                     w->bad[m->vertex[3 * f + k]] = w->bad[m->vertex[3 * h + k]] = 1;
             }
         }
         i = end;
     }
-    return found;
+    return TXM_OK;
 }
 
 enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one spot */
@@ -317,35 +320,34 @@ static void tmr_improve_spots(tmr_work *w, int rounds) {
 enum { TMR_SPOT_ROUNDS = 16 };
 
 /* Mend the few spots where triangles cross or face against the surface, by smoothing around them,
-   wider and wider; the best state found stays. *faults: how many are left; 0: no memory. */
-static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
+   wider and wider; the best state found stays. *faults: how many are left. */
+static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     const size_t count = (size_t)w->m.vertex_count;
     txm_arena arena;
     long best = -1;
     txm_dvec3 *kept = NULL;
     int32_t *kept_source = NULL;
-    uint8_t *near;
-    txm_arena_init(&arena, env);
-    near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
-    if (!near) goto no_memory;
-    for (int round = 0; round <= TMR_SPOT_ROUNDS; round++) {
+    txm_arena_init(&arena, w->env);
+    uint8_t *near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
+    txm_status status = tmr_check_memory(&arena);
+    for (int round = 0; round <= TMR_SPOT_ROUNDS && status == TXM_OK; round++) {
         txm_arena scratch;
-        long doubtful;
+        long crossings, doubtful;
         if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
         memset(w->bad, 0, count);
-        txm_arena_init(&scratch, env);
-        const long crossings = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch);
+        txm_arena_init(&scratch, w->env);
+        status = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch, &crossings);
         txm_arena_free(&scratch);
-        if (crossings < 0) goto no_memory;
+        if (status != TXM_OK) break;
         const long turned = tmr_count_turned(w, &doubtful);
         const long score = 1000 * (crossings + turned) + doubtful;
         if (best < 0 || score < best) {
-            best = score;
             if (score > 0 && !kept) {
                 kept = (txm_dvec3 *)txm_arena_alloc(&arena, count, sizeof(txm_dvec3));
                 kept_source = (int32_t *)txm_arena_alloc(&arena, count, sizeof(int32_t));
-                if (!kept || !kept_source) goto no_memory;
+                if ((status = tmr_check_memory(&arena)) != TXM_OK) break;
             }
+            best = score;
             if (kept) memcpy(kept, w->m.p, count * sizeof(txm_dvec3));
             if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
         }
@@ -354,16 +356,13 @@ static int tmr_mend_spots(tmr_work *w, long *faults, txm_env *env) {
         for (int k = 0; k < 1 + round / 6; k++) tmr_grow_marks(w);
         tmr_smooth_marked(w, round >= 6);
     }
-    if (best > 0) {
+    if (status == TXM_OK && best > 0) {
         memcpy(w->m.p, kept, count * sizeof(txm_dvec3));
         memcpy(w->m.source, kept_source, count * sizeof(int32_t));
     }
     *faults = best / 1000;
     txm_arena_free(&arena);
-    return 1;
-no_memory:
-    txm_arena_free(&arena);
-    return 0;
+    return status;
 }
 
 #endif /* TRIMESH_RELAX_SOUND_H */

@@ -36,9 +36,9 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
     int32_t *where = (int32_t *)txm_arena_alloc(scratch, (size_t)old.face_count, sizeof(int32_t));
     if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
         return txm_fail(w->env, TXM_TOO_LARGE, "too many triangles");
-    if (!number || !middle || !where ||
-        !tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena))
-        return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_check_memory(scratch);
+    if (status == TXM_OK) status = tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena);
+    if (status != TXM_OK) return status;
     for (int32_t v = 0; v < old.vertex_count; v++) {
         if (old.corner[v] < 0) continue;
         TRIMESH_ASSERT(m->vertex_count < m->vertex_limit);
@@ -225,15 +225,15 @@ static void tmr_height_chunk(void *context, int index) {
         w->height[f] = tmr_is_dead(m, f) || tmr_is_ghost_face(m, f) ? 0 : (float)tmr_height_over(w, f);
 }
 
-static int tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
+static txm_status tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
     w->height = (float *)txm_arena_alloc(scratch, (size_t)w->m.face_count, sizeof(float));
-    if (!w->height) return 0;
+    if (!w->height) return TXM_OUT_OF_MEMORY;
     for (int round = 0; round < rounds; round++) {
         txm_parallel_for(w->env, (w->m.face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_height_chunk, w);
         txm_parallel_for(w->env, (w->m.vertex_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_fit_chunk, w);
         tmr_settle(w);
     }
-    return 1;
+    return TXM_OK;
 }
 
 #endif /* TRIMESH_RELAX_SUBDIVIDE_H */

@@ -28,8 +28,8 @@ static void tmr_grow_box(txm_dvec3 *low, txm_dvec3 *high, txm_dvec3 p) {
     *high = txm_d3(fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z));
 }
 
-static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *vertex, int32_t count,
-                          txm_arena *arena) {
+static txm_status tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *vertex,
+                                 int32_t count, txm_arena *arena) {
     t->point = point;
     t->vertex = vertex;
     t->count = count;
@@ -40,7 +40,8 @@ static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *ve
     txm_pair *room = (txm_pair *)txm_arena_alloc(arena, (size_t)count, sizeof(txm_pair));
     t->low = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
     t->high = (txm_dvec3 *)txm_arena_alloc(arena, nodes, sizeof(txm_dvec3));
-    if (!t->order || !room || !t->low || !t->high) return 0;
+    const txm_status status = tmr_check_memory(arena);
+    if (status != TXM_OK) return status;
     for (int32_t f = 0; f < count; f++) {
         const int32_t *v = vertex + 3 * f;
         t->order[f].value = (uint32_t)f;
@@ -68,7 +69,7 @@ static int tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int32_t *ve
         t->low[i] = low;
         t->high[i] = high;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* squared distance from p to the box of a node */
@@ -129,17 +130,18 @@ static int32_t tmr_grid_slot(const tmr_grid *g, double x, double y, double z) {
     return (int32_t)(h & (uint64_t)g->mask);
 }
 
-static int tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vertices,
-                          txm_arena *arena) {
+static txm_status tmr_grid_build(tmr_grid *g, double cell, int32_t points, int32_t vertices,
+                                 txm_arena *arena) {
     int32_t size = 16;
     while (size < points && size < (1 << 28)) size *= 2;
     g->cell = cell;
     g->mask = size - 1;
     g->head = (int32_t *)txm_arena_alloc(arena, (size_t)size, sizeof(int32_t));
     g->next = (int32_t *)txm_arena_alloc(arena, (size_t)vertices, sizeof(int32_t));
-    if (!g->head || !g->next) return 0;
+    const txm_status status = tmr_check_memory(arena);
+    if (status != TXM_OK) return status;
     for (int32_t i = 0; i < size; i++) g->head[i] = -1;
-    return 1;
+    return TXM_OK;
 }
 
 static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
@@ -311,8 +313,8 @@ static int32_t tmr_fill_gap(tmr_update *u, double from, double to, double spacin
 }
 
 /* Points on a line: old ones that keep their distance, the gaps filled. */
-static int tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, size_t count,
-                           int32_t *olds, int32_t *vertices, int32_t room) {
+static txm_status tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, size_t count,
+                                  int32_t *olds, int32_t *vertices, int32_t room) {
     const double length = tmr_line_weight(&u->s, &u->l, line);
     const double scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double spacing = u->t.length * scale;
@@ -341,7 +343,6 @@ static int tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, s
             olds[n++] = -1;
         }
         n = tmr_fill_gap(u, last, length, steps ? length / steps : spacing, n, room, olds);
-        if (!tmr_cut_line(&u->t, line, u->t.ways, n, vertices)) return 0;
     } else { /* round the end of the ring to the first one; those beyond it come first again */
         n = tmr_fill_gap(u, last, begin + length, spacing, n, room, olds);
         int32_t over = 0;
@@ -353,42 +354,48 @@ static int tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, s
             u->t.ways[0] = way;
             olds[0] = -1;
         }
-        if (!tmr_cut_line(&u->t, line, u->t.ways, n, vertices)) return 0;
     }
+    const txm_status status = tmr_cut_line(&u->t, line, u->t.ways, n, vertices);
+    if (status != TXM_OK) return status;
     for (int32_t k = 0; k < n; k++) {
         if (olds[k] < 0 || vertices[k] < 0 || u->was[vertices[k]] >= 0) continue;
         u->was[vertices[k]] = olds[k];
         u->now[olds[k]] = vertices[k];
     }
-    return 1;
+    return TXM_OK;
 }
 
-static int tmr_update_lines(tmr_update *u) {
+static txm_status tmr_update_lines(tmr_update *u) {
     const size_t n = u->old->vertex_count;
     const int32_t room = 3 * u->t.line_room + 16;
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&u->scratch, 2 * n, sizeof(txm_pair));
     int32_t *olds = (int32_t *)txm_arena_alloc(&u->scratch, 2 * (size_t)room, sizeof(int32_t));
     u->t.ways = (double *)txm_arena_alloc(&u->scratch, (size_t)room, sizeof(double));
-    if (!pairs || !olds || !u->t.ways) return 0;
+    txm_status status = tmr_check_memory(&u->scratch);
+    if (status != TXM_OK) return status;
     for (int32_t v = 0; v < u->s.vertex_count; v++) u->t.keep[v] = u->l.kind[v] == TRIMESH_CORNER;
     const size_t count = tmr_order_on_lines(u, pairs, pairs + n);
     size_t k = 0;
-    for (int32_t line = 0; line < u->l.line_count; line++) {
+    for (int32_t line = 0; line < u->l.line_count && status == TXM_OK; line++) {
         const size_t first = k;
         while (k < count && pairs[k].key == (uint32_t)line) k++;
-        if (!tmr_update_line(u, line, pairs + first, k - first, olds, olds + room, room)) return 0;
+        status = tmr_update_line(u, line, pairs + first, k - first, olds, olds + room, room);
     }
-    return 1;
+    if (status == TXM_TOO_SMALL)
+        txm_fail(u->w.env, status,
+                 "creases and borders take more vertices than there is room for; "
+                 "give more, or a larger line_spacing");
+    return status;
 }
 
 /* ---- the update: points on faces -------------------------------------------------------------- */
 
 /* Put the old vertices on faces into the mesh, face by face, but for those in the way of lines. */
-static int tmr_update_old(tmr_update *u) {
+static txm_status tmr_update_old(tmr_update *u) {
     const size_t n = u->old->vertex_count;
     size_t count = 0;
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&u->scratch, 2 * n, sizeof(txm_pair));
-    if (!pairs) return 0;
+    if (!pairs) return TXM_OUT_OF_MEMORY;
     for (int32_t v = 0; v < u->w.m.vertex_count; v++)
         if (u->t.keep[v]) tmr_grid_add(&u->grid, u->w.m.p[v], v);
     for (size_t i = 0; i < n; i++) {
@@ -409,7 +416,7 @@ static int tmr_update_old(tmr_update *u) {
         u->was[v] = i;
         tmr_grid_add(&u->grid, u->w.m.p[v], v);
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Is a place of the new surface covered by a triangle of the old mesh all of whose corners are
@@ -456,9 +463,10 @@ static txm_status tmr_update_strew(tmr_update *u) {
     static const double distance[] = {0.85, 0.75, 0.65, 0.55};
     const size_t n = (size_t)u->s.face_count;
     const int exact = u->desc.vertices > 0;
-    txm_status status = TXM_OK;
     int32_t live = 0;
-    if (!tmr_update_lines(u) || !tmr_update_old(u)) return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_update_lines(u);
+    if (status == TXM_OK) status = tmr_update_old(u);
+    if (status != TXM_OK) return status;
     txm_pair *order = (txm_pair *)txm_arena_alloc(&u->scratch, 2 * n, sizeof(txm_pair));
     if (!order) return TXM_OUT_OF_MEMORY;
     tmr_order_faces(&u->s, order, order + n);
@@ -485,13 +493,13 @@ static int tmr_has_edge(const uint64_t *table, size_t mask, int32_t a, int32_t b
 }
 
 /* Turn edges between old vertices to what they were. */
-static int tmr_turn_back(tmr_update *u) {
+static txm_status tmr_turn_back(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const size_t n = 3 * u->old->triangle_count;
     size_t size = 16;
     while (size < 2 * n) size *= 2; /* an edge has a triangle or two: at most half of it is used */
     uint64_t *table = (uint64_t *)txm_arena_zero(&u->scratch, size, sizeof(uint64_t));
-    if (!table) return 0;
+    if (!table) return TXM_OUT_OF_MEMORY;
     for (size_t c = 0; c < n; c++) {
         const int32_t a = u->now[u->old->indices[c]];
         const int32_t b = u->now[u->old->indices[c % 3 == 2 ? c - 2 : c + 1]];
@@ -515,7 +523,7 @@ static int tmr_turn_back(tmr_update *u) {
         }
         if (turned == 0) break;
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Pin the old vertices farther than the radius, in edges, from every new one and every place that
@@ -544,7 +552,7 @@ static void tmr_pin(tmr_update *u) {
 
 /* ---- the update: the whole ---------------------------------------------------------------------- */
 
-static int tmr_update_alloc(tmr_update *u) {
+static txm_status tmr_update_alloc(tmr_update *u) {
     const size_t n = u->old->vertex_count, t = u->old->triangle_count;
     const size_t room = (size_t)u->w.m.vertex_limit;
     txm_arena *arena = &u->first;
@@ -557,9 +565,8 @@ static int tmr_update_alloc(tmr_update *u) {
     u->was = (int32_t *)txm_arena_alloc(arena, room, sizeof(int32_t));
     u->level = (int32_t *)txm_arena_zero(arena, room, sizeof(int32_t));
     u->segment = (int32_t *)txm_arena_alloc(arena, 3 * (size_t)u->s.face_count, sizeof(int32_t));
-    if (!u->old_point || !u->place || !u->now || !u->face || !u->way || !u->old_vertex || !u->was ||
-        !u->level || !u->segment)
-        return 0;
+    txm_status status = tmr_check_memory(arena);
+    if (status != TXM_OK) return status;
     for (size_t i = 0; i < n; i++) {
         const float *p = u->old->positions + 3 * i;
         u->old_point[i] =
@@ -567,8 +574,10 @@ static int tmr_update_alloc(tmr_update *u) {
     }
     for (size_t c = 0; c < 3 * t; c++) u->old_vertex[c] = (int32_t)u->old->indices[c];
     for (size_t v = 0; v < room; v++) u->was[v] = -1;
-    return tmr_tree_build(&u->tree, u->s.point, u->s.vertex, u->s.face_count, arena) &&
-           tmr_tree_build(&u->old_tree, u->old_point, u->old_vertex, (int32_t)t, arena);
+    status = tmr_tree_build(&u->tree, u->s.point, u->s.vertex, u->s.face_count, arena);
+    if (status == TXM_OK)
+        status = tmr_tree_build(&u->old_tree, u->old_point, u->old_vertex, (int32_t)t, arena);
+    return status;
 }
 
 /* Points that the surface holds at edge length u->t.length. */
@@ -591,11 +600,12 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     txm_status status = tmr_surface_build(&desc, env, &u->input, report, &u->s);
     if (status != TXM_OK) return status;
     const double length = u->old->edge_length / u->s.diagonal;
-    if (u->desc.adapt > 0 &&
-        !tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch))
-        return TXM_OUT_OF_MEMORY;
-    if (!tmr_lines_build(&u->s, angle, length, &u->input, &u->scratch, &crease_edges, &u->l))
-        return TXM_OUT_OF_MEMORY;
+    if (u->desc.adapt > 0)
+        status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
+    if (status == TXM_OK)
+        status =
+            tmr_lines_build(&u->s, angle, length, &u->input, &u->scratch, &crease_edges, &u->l);
+    if (status != TXM_OK) return status;
     report->crease_edges = crease_edges;
     u->w.desc = &u->desc;
     u->w.s = &u->s;
@@ -613,10 +623,12 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     if (points > TMR_MOST / 4)
         return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
     status = tmr_copy_surface(&u->w, tmr_strewn_room(floor(2 * points)), &u->first);
+    if (status == TXM_OK) status = tmr_strewn_alloc(&u->t, &u->scratch);
+    if (status == TXM_OK) status = tmr_update_alloc(u);
+    if (status == TXM_OK)
+        status =
+            tmr_grid_build(&u->grid, u->t.length, (int32_t)points, u->w.m.vertex_limit, &u->first);
     if (status != TXM_OK) return status;
-    if (!tmr_strewn_alloc(&u->t, &u->scratch) || !tmr_update_alloc(u)) return TXM_OUT_OF_MEMORY;
-    if (!tmr_grid_build(&u->grid, u->t.length, (int32_t)points, u->w.m.vertex_limit, &u->first))
-        return TXM_OUT_OF_MEMORY;
     tmr_map_segments(u);
     tmr_find_old(u);
     return TXM_OK;
@@ -631,16 +643,19 @@ static txm_status tmr_update_relax(tmr_update *u) {
         for (int k = 0; k < 2; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
         tmr_flip_valences(w, 3, 0.4);
-        if (round == 4 && u->desc.vertices > 0 &&
-            !tmr_fix_count(w, (int32_t)u->desc.vertices, 2, &u->scratch, &missing))
-            return TXM_OUT_OF_MEMORY;
+        if (round == 4 && u->desc.vertices > 0) {
+            const txm_status status =
+                tmr_fix_count(w, (int32_t)u->desc.vertices, 2, &u->scratch, &missing);
+            if (status != TXM_OK) return status;
+        }
         if (txm_progress(w->env, 0.6f + 0.03f * (float)round, "relax")) return TXM_CANCELLED;
     }
     if (missing != 0)
         return txm_fail(w->env, TXM_TOO_SMALL,
                         "the vertices asked for do not fit into what has changed; ask for 0");
     long faults;
-    if (!tmr_mend_spots(w, &faults, w->env)) return TXM_OUT_OF_MEMORY;
+    const txm_status status = tmr_mend_spots(w, &faults);
+    if (status != TXM_OK) return status;
     if (faults > 0)
         return txm_fail(w->env, TXM_TOO_SMALL, "the changed part is too thin or too fine for "
                         "edges of this length; retile the whole with more vertices");
@@ -648,14 +663,14 @@ static txm_status tmr_update_relax(tmr_update *u) {
 }
 
 /* Old positions bit for bit, and the map. */
-static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out, const int32_t **map) {
+static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out) {
     const tmr_mesh *m = &u->w.m;
     trimesh_mesh *mesh = NULL;
     const txm_status status = tmr_write(&u->w, &mesh);
     if (status != TXM_OK) return status;
     int32_t *which = (int32_t *)txm_arena_alloc(&mesh->memory, mesh->vertex_count, sizeof(int32_t));
     if (!which) {
-        trimesh_free(mesh);
+        trimesh_mesh_free(mesh);
         return TXM_OUT_OF_MEMORY;
     }
     size_t k = 0;
@@ -668,23 +683,22 @@ static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out, const int3
         k++;
     }
     mesh->edge_length = u->t.length * u->s.diagonal;
-    if (map) *map = which;
+    mesh->old_vertices = which;
     *out = mesh;
     return TXM_OK;
 }
 
-static txm_status tmr_update_run(tmr_update *u, trimesh_report *report, trimesh_mesh **out,
-                                 const int32_t **map) {
+static txm_status tmr_update_run(tmr_update *u, trimesh_report *report, trimesh_mesh **out) {
     txm_status status = tmr_update_begin(u, report);
     if (status != TXM_OK) return status;
     if (txm_progress(u->w.env, 0.2f, "strew")) return TXM_CANCELLED;
     if ((status = tmr_update_strew(u)) != TXM_OK) return status;
     if (txm_progress(u->w.env, 0.4f, "join")) return TXM_CANCELLED;
     if ((status = tmr_take_out(&u->w, u->t.keep, 0.4f)) != TXM_OK) return status;
-    if (!tmr_turn_back(u)) return TXM_OUT_OF_MEMORY;
+    if ((status = tmr_turn_back(u)) != TXM_OK) return status;
     tmr_pin(u);
     if ((status = tmr_update_relax(u)) != TXM_OK) return status;
-    return tmr_update_write(u, out, map);
+    return tmr_update_write(u, out);
 }
 
 static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
@@ -704,14 +718,11 @@ static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update
 }
 
 TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
-                                      txm_env *env, trimesh_report *report, trimesh_mesh **out,
-                                      const int32_t **map) {
-    trimesh_report own;
-    if (!report) report = &own;
+                                      txm_env *env, trimesh_mesh **mesh) {
+    trimesh_report own, *report = desc && desc->desc.report ? desc->desc.report : &own;
     memset(report, 0, sizeof *report);
-    if (map) *map = NULL;
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    *out = NULL;
+    if (!mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "mesh is NULL");
+    *mesh = NULL;
     txm_status status = tmr_check_update(old, desc, env);
     if (status != TXM_OK) return status;
     tmr_update *u = (tmr_update *)txm_alloc(env, sizeof *u);
@@ -725,7 +736,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
     txm_arena_init(&u->input, env);
     txm_arena_init(&u->first, env);
     txm_arena_init(&u->scratch, env);
-    status = tmr_update_run(u, report, out, map);
+    status = tmr_update_run(u, report, mesh);
     if (status == TXM_OUT_OF_MEMORY) txm_fail(env, status, "no memory to update the mesh");
     if (status == TXM_CANCELLED) txm_fail(env, status, "cancelled while updating the mesh");
     txm_arena_free(&u->input);

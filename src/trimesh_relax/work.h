@@ -25,7 +25,6 @@ typedef struct tmr_work {
     float *height;     /* 1 per triangle: room for the height of the surface over it            */
     uint8_t *mask;     /* of relaxation: NULL, or 1 per vertex: may it move?                    */
     uint8_t *mask_room; /* 1 per vertex: room for that                                           */
-    int cancelled;     /* somewhere the caller wanted no more; looked at after each stage       */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
 } tmr_work;
@@ -110,8 +109,8 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
-/* Arrays for so many vertices and triangles; the mesh in them is empty. 0: no memory. */
-static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
+/* Arrays for so many vertices and triangles; the mesh in them is empty. */
+static txm_status tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_arena *arena) {
     tmr_mesh *m = &w->m;
     const size_t nv = (size_t)vertices, nc = 3 * (size_t)faces;
     m->vertex_limit = vertices;
@@ -132,9 +131,7 @@ static int tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, txm_aren
     w->bad = (uint8_t *)txm_arena_zero(arena, nv, 1);
     w->mask_room = (uint8_t *)txm_arena_alloc(arena, nv, 1);
     w->flag = (uint8_t *)txm_arena_alloc(arena, (size_t)faces, 1);
-    return m->p && m->n && m->source && m->corner && m->flags && m->valence && m->vertex &&
-           m->opposite && m->edge && w->size && w->moved && w->landed && w->bad && w->mask_room &&
-           w->flag;
+    return tmr_check_memory(arena);
 }
 
 /* Copy the surface into w->m, its border loops closed by ghosts, with room for `more` vertices.
@@ -155,7 +152,8 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
     memset(m, 0, sizeof *m);
     if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
         return txm_fail(w->env, TXM_TOO_LARGE, "the surface and its borders are too large");
-    if (!tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena)) return TXM_OUT_OF_MEMORY;
+    const txm_status status = tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena);
+    if (status != TXM_OK) return status;
     m->vertex_count = m->live = s->vertex_count;
     m->face_count = m->live_faces = s->face_count;
     const size_t corners = 3 * (size_t)s->face_count;

@@ -181,8 +181,8 @@ static int retile(retile_job *j) {
         j->desc.surface = mesh_view(&j->input);
         j->desc.scale = scale;
         j->desc.seed = j->run.seed;
-        status = check_result(&j->run,
-                              trimesh_retile(&j->desc, &j->run.env, &j->report, &j->result),
+        j->desc.report = &j->report;
+        status = check_result(&j->run, trimesh_retile(&j->desc, &j->run.env, &j->result),
                               j->run.inputs[0]);
     }
     free(scale);
@@ -199,7 +199,7 @@ static void free_job(retile_job *j) {
     for (int i = 0; i < j->prototype_count; i++) mesh_free(&j->prototypes[i]);
     mesh_free(&j->input);
     mesh_free(&j->patch);
-    trimesh_free(j->result);
+    trimesh_mesh_free(j->result);
     free(j->output.colors);
     free(j->output.uvs);
     free(j->output.corner_normals);

@@ -36,12 +36,13 @@ static uint64_t report_hash(const trimesh_report *r, uint64_t hash) {
     return tk_hash(hash, numbers, sizeof numbers);
 }
 
-static uint64_t retile(const trimesh_desc *desc, txm_env *env) {
+static uint64_t retile(trimesh_desc *desc, txm_env *env) {
     trimesh_mesh *mesh = NULL;
     trimesh_report report;
-    golden_need(trimesh_retile(desc, env, &report, &mesh), "retile", env);
+    desc->report = &report;
+    golden_need(trimesh_retile(desc, env, &mesh), "retile", env);
     const uint64_t hash = report_hash(&report, mesh_hash(mesh, 0));
-    trimesh_free(mesh);
+    trimesh_mesh_free(mesh);
     return hash;
 }
 
@@ -82,7 +83,7 @@ static uint64_t creases(txm_env *env) {
     static const int cells[3] = {4, 6, 3};
     memset(&surface, 0, sizeof surface);
     golden_box(&surface, cells, 0, 0, 0);
-    const trimesh_desc desc = describe(300, TRIMESH_LATTICE);
+    trimesh_desc desc = describe(300, TRIMESH_LATTICE);
     return retile(&desc, env);
 }
 
@@ -125,18 +126,18 @@ static uint64_t updated(txm_env *env) {
     trimesh_mesh *old = NULL, *mesh = NULL;
     trimesh_update_desc update;
     trimesh_report report;
-    const int32_t *map = NULL;
     golden_ring(&surface, 0);
     const trimesh_desc desc = describe(400, TRIMESH_LATTICE);
-    golden_need(trimesh_retile(&desc, env, NULL, &old), "retile", env);
+    golden_need(trimesh_retile(&desc, env, &old), "retile", env);
     surface.triangle_count -= 60; /* three rows of cells */
     memset(&update, 0, sizeof update);
     update.desc = describe(0, TRIMESH_LATTICE);
-    golden_need(trimesh_update(old, &update, env, &report, &mesh, &map), "update", env);
+    update.desc.report = &report;
+    golden_need(trimesh_update(old, &update, env, &mesh), "update", env);
     uint64_t hash = report_hash(&report, mesh_hash(mesh, 0));
-    hash = tk_hash(hash, map, mesh->vertex_count * sizeof *map);
-    trimesh_free(mesh);
-    trimesh_free(old);
+    hash = tk_hash(hash, mesh->old_vertices, mesh->vertex_count * sizeof *mesh->old_vertices);
+    trimesh_mesh_free(mesh);
+    trimesh_mesh_free(old);
     return hash;
 }
 
