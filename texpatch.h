@@ -2,11 +2,11 @@
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     From a photograph of a texture it makes as much of the same as is wanted: bricks stay in their
-     courses, tiles and weaves on their lattice, gravel becomes other gravel [1]. Several maps of a
-     material (albedo, normals, height ...) in register; tileable; guided by a painted map (of which
-     texedges.h makes one out of drawn strokes); around pixels that are to be kept; parts made anew;
-     any window of a plane without end.
+     Synthesises texture of any size from a photograph: bricks stay in their courses, tiles and
+     woven patterns on their lattice, gravel becomes other gravel [1]. Several maps of a material
+     (albedo, normals, height ...) are made in register. The result can be tileable, follow a
+     painted guide (texedges.h makes one from drawn strokes), keep given pixels, and have parts of
+     it made again; or it is any window of an endless plane.
 
    QUICK START                                 (tests build and run this very block)
      // Twice as much of a texture. cc -std=c99 quick.c -lm
@@ -43,30 +43,32 @@
    WHICH CALL
      texpatch_make        a picture, or several maps in register, in one call
      texpatch_begin ...   the same in steps with a picture after each of them; texpatch_again makes
-                          a part anew, texpatch_source_at tells where each pixel comes from
+                          a part again, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
-     texpatch_half        coarser levels of a result
-     texsyn.h makes stochastic texture out of a model of a few kB instead of pieces of the
-     photograph; textiles.h cuts sets of tiles that are laid when the picture is drawn.
+     texpatch_half        coarser levels of detail of a result
+     texsyn.h makes stochastic texture from a model of a few kB instead of pieces of the photograph;
+     textiles.h makes sets of tiles that are laid when the picture is drawn.
 
    HOW IT WORKS
-     Not colours but coordinates are synthesised: each pixel of the output names one of the
-     exemplar. First pass [1, 3.4; 3], at the coarsest level of a pyramid: patches of N x N, N / 2
-     apart, in scan order, each the best match of all places, joined along minimum-error cuts.
-     Places off the exemplar's lattice - found in its autocorrelation - cost more, and so do places
-     that were used more than others. Second pass [1, 3.5; 2], coarse to fine: neighbourhoods of 16
-     then 8 pixels look for their best match among what their pixels continue, at random and a
-     lattice step away; each pixel takes of all that cover it the one nearest to their mean, with
-     the adaptive weights w = P |x - z|^(r - 2), r = 0.8, where P is the share of well-matched
-     neighbourhoods among those of high frequency around. Taking one instead of the mean, nothing
-     blurs. Differences are sums of absolute differences of bytes. At the end pieces are bent by up
-     to 4 pixels, so that lines meet at their seams, and small steps of colour there are spread.
-     The output of a torus, a part made anew and a cell of the plane are all the same work with
-     some pixels given.
+     Coordinates are synthesised, not colours [5]: each pixel of the output refers to a pixel of the
+     exemplar. First pass [1, 3.4; 3], at the coarsest level of a pyramid: patches of N x N pixels,
+     N / 2 apart, in scan order, each the best match of all positions, joined along minimum-error
+     cuts. Positions off the exemplar's lattice, which is found in its autocorrelation, cost more,
+     and so do those that were used more often than others. Second pass [1, 3.5; 2], coarse to fine:
+     neighbourhoods of 16, then 8 pixels search their best match among what their pixels already
+     show, at random positions [4] and one lattice step away. Each pixel takes, of the candidates of
+     all neighbourhoods that cover it, the one nearest to their mean with the adaptive weights
+     w = P |x - z|^(r - 2), r = 0.8, where P is the share of well-matched neighbourhoods among those
+     of high frequency nearby. As it takes one candidate and not the mean, nothing is blurred.
+     Differences are sums of absolute differences of bytes. At the end pieces are bent by up to 4
+     pixels so that lines meet at seams, and small steps of colour there are spread.
+     A tileable output, a part made again and a cell of the plane are the same job with some pixels
+     given.
 
-   WEAKNESSES
-     Stones that touch are merged here and there; perspective is not understood; a lattice that is
-     not parallel (pavement waves, fans) is not found. A knot of wood comes again.
+   LIMITS
+     Touching stones are sometimes merged; perspective is not corrected; a lattice whose rows are
+     not parallel (waves, fans) is not found. What is unique in the exemplar, such as a knot in
+     wood, is repeated.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXPATCH_STATIC       every function static to the including file (set it everywhere)
@@ -74,21 +76,21 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     For each pixel of the output some 60 bytes while it is made, RGB; of the exemplar some 6,
-     times the turned and mirrored forms. The plane holds one cell at a time, and 24 bytes for each
-     pixel along the upper and lower sides of a row of cells.
+     RGB: some 60 bytes for each pixel of the output while it is made, some 6 for each pixel of the
+     exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
+     bytes for each pixel along the upper and lower sides of a row of cells.
 
    TIME   (one core of 2023; make bench measures yours)
-     512 x 512 out of 256 x 256 pixels, RGB: 0.3 s; without optimisation (passes = -1) 0.15 s. It
-     grows with the pixels of the output; the exemplar's size counts at the coarsest level alone.
-     The parallel-for hook spreads rows of windows and bands of rows.
+     512 x 512 from 256 x 256 pixels, RGB: 0.3 s; without optimisation (passes = -1) 0.15 s. It is
+     proportional to the pixels of the output; the exemplar's size matters only at the coarsest
+     level. The parallel-for hook runs rows of neighbourhoods and bands of rows.
 
    THREADS
-     No global state. Calls with different env and outputs may overlap; a plane may be drawn by
-     many, a job belongs to one call at a time.
+     No global state. Calls with different env and outputs may overlap; many threads may draw the
+     same plane, a job belongs to one call at a time.
 
    SAME BYTES
-     All choices are made in integers, or in float and double rounded once: the same bytes on any
+     All decisions are made in integers, or in float and double rounded once: the same bytes on any
      number of threads, with and without SIMD and on any compiler that keeps to IEEE 754 (see
      texmath.h), built with -ffp-contract=off. The levels of texpatch_half depend on libm's pow.
 
@@ -136,13 +138,13 @@ enum {
 
 /* How one of the maps is treated; all zero: a picture that follows the others. */
 typedef struct texpatch_map {
-    float weight;  /* 0..16: how much a difference in this map counts when pieces are matched;
-                      0 = it follows the others                                              */
+    float weight;  /* 0..16: of a difference in this map when pieces are matched; 0 = it follows
+                      the others                                                             */
     int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
                       as vectors, kept at unit length, turned with the piece. x to the right,
                       y up (OpenGL); 2 = y down (DirectX)                                     */
-    int is_label;  /* values are names, not amounts: never blended or interpolated           */
-    int is_data;   /* amounts (height, roughness), not colours: averaged as they are         */
+    int is_label;  /* values are labels, not amounts: never blended or interpolated          */
+    int is_data;   /* amounts (height, roughness), not colours: averaged without decoding    */
 } texpatch_map;
 
 /* One exemplar: a photograph, or several maps of one material in register. */
@@ -163,46 +165,46 @@ typedef struct texpatch_desc {
     const texpatch_map *maps; /* map_count of them; NULL = only the first has weight, 1          */
     int width, height;        /* of the output, in pixels, 1 or more                             */
     int tileable;             /* TEXPATCH_TILE_X | TEXPATCH_TILE_Y: opposite sides fit            */
-    int patch;  /* side N of the patches of the first pass, in pixels of the output, which are laid
-                   N / 2 apart; 0 = what suits the exemplar                                      */
+    int patch;  /* side N of the patches of the first pass, in pixels of the output; they are laid
+                   N / 2 apart; 0 = chosen for the exemplar                                      */
     int passes; /* optimisation passes for each size of neighbourhood, 1..16; 0 = 3 (2 at full
-                   size); -1 = none: patches, cuts and blending alone, four times as fast        */
+                   size); -1 = none: patches, cuts and blending alone, in less than half the time */
     int turns;  /* 1, 2 or 4: pieces may be turned by half or quarter turns; 0 = 1               */
     int mirror; /* pieces may be mirrored left to right                                          */
-    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 a piece may not
-                      go on farther than a neighbourhood, which costs detail and likeness        */
-    int lattice;   /* 0 = find out whether the exemplar has a lattice and keep it; 1 = it has this
-                      one; -1 = treat it as having none. It is looked for in a single exemplar
-                      that is neither turned nor mirrored                                        */
+    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 no piece is
+                      larger than a neighbourhood, which costs detail and likeness               */
+    int lattice;   /* 0 = find the lattice of the exemplar, if it has one, and keep it; 1 = it has
+                      the one given below; -1 = treat it as having none. A lattice is searched in
+                      a single exemplar that is neither turned nor mirrored                      */
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
-    txm_image guide;    /* what the exemplars' guides should look like here: width x height,
-                           channels and sample of theirs; pixels NULL: none                      */
-    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide says nothing here;
+    txm_image guide;    /* what the exemplars' guides shall look like here: width x height, with
+                           their channels and sample type; pixels NULL: none                     */
+    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide does not count here;
                            pixels NULL: it counts everywhere                                     */
-    float guide_weight; /* 0..16: of a difference in the guide against one in a map of weight 1;
+    float guide_weight; /* 0..16: of a difference in the guide, relative to a map of weight 1;
                            0 = 2                                                                 */
-    const txm_image *kept; /* map_count pictures of width x height to be kept where keep is
-                           non-zero; NULL: none. They need not come from the exemplar            */
+    const txm_image *kept; /* map_count pictures of width x height, kept where keep is non-zero;
+                           NULL: none. They need not come from the exemplar                      */
     txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
     uint64_t seed;         /* another seed, another texture                                      */
 } texpatch_desc;
 
 /* Make a texture in one call.
 
-   env    NULL, or how to allocate, report and spread the work
+   env    NULL, or how to allocate, report, cancel and run in parallel
    out    map_count pictures of desc->width x desc->height, channels and sample of the maps;
           untouched after an error
-   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps or guides that do not go
-          together or samples that are not finite; TXM_TOO_SMALL for an exemplar under
-          TEXPATCH_MIN_SIDE, or whose mask leaves no piece; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY;
-          TXM_CANCELLED
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps or guides that do not match
+          or samples that are not finite; TXM_TOO_SMALL for an exemplar under TEXPATCH_MIN_SIDE, or
+          whose mask leaves no piece; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   see TIME and MEMORY                                                                 */
 TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
                                       const txm_image *out);
 
 /* ---- step by step ------------------------------------------------------------------------ */
 
-/* A texture in the making. It keeps a copy of the allocator, not of the exemplars' pictures. */
+/* A texture that is made step by step. It keeps a copy of the allocator, but not of the exemplars'
+   pictures. */
 typedef struct texpatch_job texpatch_job;
 
 /* Prepare a job: pyramids, lattice. The same statuses as texpatch_make. */
@@ -215,27 +217,27 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
    more   receives 0 once nothing is left to do; NULL is allowed                              */
 TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
 
-/* Draw a map as it is now. Possible after any step but no step at all: before the first,
-   TXM_BAD_ARGUMENT. A window of the output may be drawn: out's top left pixel is pixel (x, y) of
-   it, and all of out must lie inside. */
+/* Draw a map as it is now, after one step or more (before the first, TXM_BAD_ARGUMENT). out may be
+   a window of the output: its top left pixel is pixel (x, y) of it, and all of out must lie
+   inside. */
 TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
                                       txm_image out);
 
-/* Where a pixel of the output comes from. Anything that lies in register with the exemplars can be
-   looked up later through it. */
+/* Where a pixel of the output comes from. With it anything that is in register with the exemplars
+   can be looked up later. */
 typedef struct texpatch_source {
-    float x, y;    /* pixel of the exemplar, as it is given (turns undone); fractions lie between
-                      pixel centres, which are whole numbers                                    */
+    float x, y;    /* pixel of the exemplar as given (turns undone); pixel centres are whole
+                      numbers, fractions lie between them                                       */
     int exemplar;  /* -1: the pixel was kept                                                    */
-    int turn;      /* quarter turns counter-clockwise that the piece has made, 0..3; + 4: it is
-                      mirrored (before turning)                                                 */
+    int turn;      /* quarter turns of the piece, counter-clockwise, 0..3; + 4: it is mirrored
+                      (before turning)                                                          */
 } texpatch_source;
 TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
 
-/* Make a part anew: where again is non-zero (TXM_U8, 1 channel, the size of the output), after
-   all steps are done (else they are done first). What lies outside is kept and joined to. The
-   following steps do the work, in time proportional to the part's bounding box.
-   guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = as it was */
+/* Make a part again: the pixels where `again` is non-zero (TXM_U8, 1 channel, the size of the
+   output). Steps that are left are done first. All other pixels are kept, and the part is fitted to
+   them. The following steps do the work, in time proportional to the part's bounding box.
+   guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = unchanged */
 TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
                                        const txm_image *guide, const txm_image *guide_mask,
                                        uint64_t seed, txm_env *env);
@@ -249,33 +251,39 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 /* ---- levels of detail -------------------------------------------------------------------- */
 
 /* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
-   pixels, in linear light for 8- and 16-bit colours that are not data; normals are renormalised,
-   labels picked. So all levels agree with each other and with what a renderer makes of level 0.
-   map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT, TXM_TOO_LARGE */
+   pixels, in linear light for 8- and 16-bit colours that are not data; normals are normalised
+   again, of labels one is taken. So all levels agree with each other and with what a renderer makes
+   of level 0. map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT,
+   TXM_TOO_LARGE */
 TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
                                       txm_env *env, const txm_image *half);
 
 /* ---- the unbounded plane ----------------------------------------------------------------- */
 
-/* Any window of an endless texture that has no period. Windows that overlap agree to the byte,
-   whoever makes them, so a large picture can be made tile by tile, on many machines.
+/* An endless texture without a period. Windows of it that overlap agree to the byte, on whatever
+   machines they are made, so a large picture can be made tile by tile.
 
-   The plane is cut into square cells. Pieces at the cells' corners are made first, from the seed
-   and their place alone; then what lies along the edges between two of them; then the insides. */
+   The plane is divided into square cells. Pieces around the cells' corners are made first, from the
+   seed and their position alone; then strips along the sides between two of them; then the
+   insides. */
 typedef struct texpatch_plane texpatch_plane;
 
-/* desc as for a job; width, height, tileable, guide and kept are not looked at. */
+/* desc as for a job; width, height, tileable, guide and kept are ignored. */
 TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
                                             texpatch_plane **out);
 
 /* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
    map_count pictures of one size. sources may be NULL, or width * height of them.
    cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
-          that are multiples of cells waste least                                             */
+          of whole cells waste least                                                          */
 TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
                                             txm_env *env, const txm_image *out,
                                             texpatch_source *sources);
+
+/* The side of a cell, in pixels; 0 if plane is NULL. */
 TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane);
+
+/* Release a plane; NULL is allowed. */
 TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 
 #ifdef __cplusplus
@@ -305,26 +313,26 @@ enum {
     TXP_BLOCK = 24,       /* pixels: patch of the first pass, at the coarsest level              */
     TXP_SMALL_BLOCK = 12, /* the same for exemplars without long order                           */
     TXP_WINDOW = 16,      /* pixels: the larger neighbourhood of the optimisation                */
-    TXP_PAD = 32,         /* columns and rows of a torus that are repeated behind its end        */
-    TXP_STARTS = 6,       /* first passes tried on a small canvas                                */
-    TXP_CELL = 8,         /* pixels a side of a cell of the exemplar in which use is counted     */
-    TXP_LANES = 8,        /* bands worked on at the same time, whatever the number of threads    */
+    TXP_PAD = 32,         /* columns and rows of a torus that are repeated beyond its end        */
+    TXP_STARTS = 6,       /* first passes tried on a small canvas; the best is kept              */
+    TXP_CELL = 8,         /* pixels: side of the cells in which use of the exemplar is counted   */
+    TXP_LANES = 8,        /* bands processed together, whatever the number of threads            */
     TXP_BAND = 32,        /* rows of a band                                                      */
     TXP_MAX_SHEETS = TEXPATCH_MAX_EXEMPLARS * 8
 };
 
-/* A pixel of the stack of sheets; x = -1: none, the canvas pixel is the caller's. */
+/* A pixel of the stack of sheets; x = -1: none, the pixel of the canvas is the caller's. */
 typedef struct txp_place {
     int16_t x, y;
 } txp_place;
 
-/* One exemplar in one orientation: rows first .. first + height - 1 of the stack. What it shows at
-   (x, y) is the exemplar at (xx x + xy y + x0, yx x + yy y + y0). */
+/* One exemplar in one orientation: rows first .. first + height - 1 of the stack. Its pixel (x, y)
+   is the exemplar at (xx x + xy y + x0, yx x + yy y + y0). */
 typedef struct txp_sheet {
     int exemplar, turn;
     int width, height;
     double xx, xy, x0, yx, yy, y0;
-    int plain; /* the map above is that of turn alone: whole pixels onto whole pixels           */
+    int plain; /* it is only turned, not resampled: whole pixels are whole pixels               */
 } txp_sheet;
 
 /* The stack at one resolution: the bytes that are compared, bytes of them per pixel. */
@@ -342,7 +350,7 @@ typedef struct txp_stack {
 /* What all jobs on the same exemplars share. */
 typedef struct txp_source {
     int sheets, levels, bytes, guide_at, guide_bytes;
-    int has_lattice, is_random; /* is_random: no long order at all                              */
+    int has_lattice, is_random; /* is_random: no long-range order at all                        */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
     txp_sheet sheet[TXP_MAX_SHEETS];
     txp_stack stack[TXP_MAX_LEVELS];
@@ -351,12 +359,12 @@ typedef struct txp_source {
 /* Room for a band of rows, per pixel. */
 typedef struct txp_band {
     int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
-    int32_t *nearest;      /* how near the best candidate is to the mean                       */
+    int32_t *nearest;      /* squared distance of the best candidate from the mean             */
     uint8_t *mean;
 } txp_band;
 
-/* The picture in the making at one resolution. pixels has a copy of the first columns and rows
-   behind the end of an axis that wraps. */
+/* The picture at one resolution. Beyond the end of an axis that wraps, pixels repeats the first
+   columns and rows. */
 typedef struct txp_canvas {
     int width, height, wrap; /* wrap: bits as in texpatch_desc.tileable                        */
     size_t pitch;
@@ -364,12 +372,12 @@ typedef struct txp_canvas {
     txp_place *at, *next; /* next: where a pass puts what it chooses                           */
     txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
-    uint8_t *free_guide; /* 1 = the guide says nothing here; NULL: it always does, or is none  */
+    uint8_t *free_guide; /* 1 = the guide does not count here; NULL: it does, or there is none  */
 } txp_canvas;
 
 /* ---- sums of absolute differences -------------------------------------------------------- */
 
-/* Sum of |a - b| over rows of bytes, bytes a multiple of 4; once it exceeds limit, anything above
+/* Sum of |a - b| over rows of bytes, bytes a multiple of 4. Once it exceeds limit, any value above
    limit may be returned. */
 #ifdef TXP_SSE2
 static inline uint32_t txp_sad_sum(__m128i sum) {
@@ -388,7 +396,7 @@ static inline __m128i txp_sad4(const uint8_t *a, const uint8_t *b) {
     return _mm_sad_epu8(_mm_cvtsi32_si128(u), _mm_cvtsi32_si128(v));
 }
 
-/* words: 16-byte pieces of a row, tails: 4-byte pieces behind them; constants where it is called */
+/* words: 16-byte pieces of a row, tails: 4-byte pieces after them; constants at the calls */
 static inline uint32_t txp_sad_fixed(const uint8_t *a, size_t a_pitch, const uint8_t *b,
                                      size_t b_pitch, int words, int tails, int rows,
                                      uint32_t limit) {
@@ -462,9 +470,9 @@ static inline int txp_fits(const txp_source *s, const txp_stack *k, int x, int y
     return 1;
 }
 
-/* Copy the compared bytes of the places into the canvas, rows from..to-1; what is fixed keeps its
-   own, and so does the guide where it binds. */
-static void txp_canvas_show(const txp_source *s, const txp_stack *k, const txp_canvas *c, int from,
+/* Fill rows from..to-1 of the canvas with the compared bytes of their places. Fixed pixels keep
+   their own bytes, and so does the guide where it counts. */
+static void txp_canvas_fill(const txp_source *s, const txp_stack *k, const txp_canvas *c, int from,
                             int to) {
     const size_t n = (size_t)s->bytes, guide = (size_t)s->guide_at;
     for (int y = from; y < to; y++) {
@@ -480,8 +488,8 @@ static void txp_canvas_show(const txp_source *s, const txp_stack *k, const txp_c
     }
 }
 
-/* Repeat the first columns and rows behind the ends of the axes that wrap. */
-static void txp_canvas_close(const txp_source *s, const txp_canvas *c, uint8_t *pixels) {
+/* Repeat the first columns and rows beyond the ends of the axes that wrap. */
+static void txp_canvas_repeat(const txp_source *s, const txp_canvas *c, uint8_t *pixels) {
     const size_t n = (size_t)s->bytes;
     if (c->wrap & TEXPATCH_TILE_X) {
         for (int y = 0; y < c->height; y++) {
@@ -498,7 +506,7 @@ static void txp_canvas_close(const txp_source *s, const txp_canvas *c, uint8_t *
 }
 
 /* May any pixel of the size x size ones at (x, y) be changed? */
-static int txp_is_open(const txp_canvas *c, int x, int y, int size) {
+static int txp_has_free_pixel(const txp_canvas *c, int x, int y, int size) {
     if (!c->fixed) return 1;
     for (int v = 0; v < size; v++) {
         for (int u = 0; u < size; u++) {
@@ -532,7 +540,7 @@ static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
 
 enum { TXP_PEAKS = 40 };
 
-/* The correlation of a picture with itself over all lags 0 <= dy <= reach, |dx| <= reach. */
+/* The autocorrelation of a picture for all lags |dx| <= reach_x, 0 <= dy <= reach_y. */
 typedef struct txp_correlation {
     const int16_t *gray; /* -128..127 */
     int width, height, reach_x, reach_y;
@@ -548,7 +556,7 @@ static inline double txp_correlated(const txp_correlation *k, int dx, int dy) {
     return k->at[dy * (2 * k->reach_x + 1) + dx + k->reach_x];
 }
 
-/* One row of lags: normalised over the pixels that overlap. Sums are exact, in any order. */
+/* One row of lags, normalised over the overlapping pixels. The sums are exact. */
 static void txp_correlate_row(void *context, int dy) {
     const txp_correlation *k = (const txp_correlation *)context;
     for (int dx = -k->reach_x; dx <= k->reach_x; dx++) {
@@ -580,7 +588,7 @@ static void txp_correlate_row(void *context, int dy) {
     }
 }
 
-/* mean correlation at the points of the lattice (a, b) within reach, each the best of 3 x 3 lags */
+/* mean correlation at all points of the lattice (a, b) within reach, each the best of 3 x 3 lags */
 static double txp_lattice_score(const txp_correlation *k, const double a[2], const double b[2]) {
     double sum = 0;
     int count = 0;
@@ -600,7 +608,7 @@ static double txp_lattice_score(const txp_correlation *k, const double a[2], con
     return count ? sum / count : 0;
 }
 
-/* The highest place of the correlation near (x, y), between lags by parabolas. */
+/* The maximum of the correlation near p, with subpixel accuracy by parabolas. */
 static void txp_refine_peak(const txp_correlation *k, double p[2]) {
     int x = (int)floor(p[0] + 0.5), y = (int)floor(p[1] + 0.5), bx = x, by = y;
     for (int d = 0; d < 9; d++) {
@@ -642,7 +650,7 @@ static double txp_det(const double *a, const double *b) {
     return a[0] * b[1] - a[1] * b[0];
 }
 
-/* Find the lattice in a correlation. 1: there is one; *strongest: the highest peak. */
+/* Find the lattice in a correlation. 1: there is one. *strongest: the highest peak. */
 static int txp_lattice_find(const txp_correlation *k, double out[4], double *strongest) {
     int px[TXP_PEAKS] = {0}, py[TXP_PEAKS] = {0}, count = 0;
     double pc[TXP_PEAKS] = {0}, mean = 0;
@@ -704,7 +712,7 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
     const double ca = txp_correlated(k, (int)floor(a[0] + 0.5), (int)floor(a[1] + 0.5));
     const double cb = txp_correlated(k, (int)floor(b[0] + 0.5), (int)floor(b[1] + 0.5));
     if (fmin(ca, cb) < 0.65 * *strongest || fmin(ca, cb) <= 0.3) return 0;
-    /* a farther point of the lattice fixes the steps more exactly */
+    /* farther points of the lattice determine the steps more exactly */
     for (int t = 2; t <= 8; t++) {
         for (int c = 0; c < 2; c++) {
             double *v = c ? b : a, far_peak[2] = {v[0] * t, v[1] * t};
@@ -727,7 +735,7 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
     return 1;
 }
 
-/* Give a level of the stack the lattice, whose steps are in pixels of level 0. */
+/* Set the lattice of a level of the stack; v: its steps, in pixels of level 0. */
 static void txp_lattice_set(txp_stack *k, const double v[4], double scale) {
     for (int i = 0; i < 4; i++) k->lattice[i] = v[i] * scale;
     const double det = k->lattice[0] * k->lattice[3] - k->lattice[1] * k->lattice[2];
@@ -740,7 +748,7 @@ static void txp_lattice_set(txp_stack *k, const double v[4], double scale) {
 /* ---- the stack of sheets ------------------------------------------------------------------ */
 
 /* Sample a map between its pixels: cubic convolution (Keys, a = -1/2), clamped at the border and to
-   the range of the four pixels around, so that no halo appears; exact on whole numbers. */
+   the range of the four nearest pixels, so that it does not overshoot; exact at whole numbers. */
 static void txp_cubic(double t, double w[4]) {
     w[0] = ((-0.5 * t + 1) * t - 0.5) * t;
     w[1] = (1.5 * t - 2.5) * t * t + 1;
@@ -786,13 +794,13 @@ static void txp_sample(const txm_image *im, double x, double y, int is_label, fl
     }
 }
 
-/* Where sheet pixel (x, y), y within the sheet, lies in its exemplar. */
+/* The place in its exemplar of pixel (x, y) of a sheet. */
 static inline void txp_sheet_place(const txp_sheet *s, double x, double y, double *ex, double *ey) {
     *ex = s->xx * x + s->xy * y + s->x0;
     *ey = s->yx * x + s->yy * y + s->y0;
 }
 
-/* A job's view of a description after the checks. */
+/* A description after the checks, defaults filled in. */
 typedef struct txp_setup {
     txm_image maps[TEXPATCH_MAX_EXEMPLARS][TEXPATCH_MAX_MAPS]; /* resolved                     */
     txm_image guides[TEXPATCH_MAX_EXEMPLARS], masks[TEXPATCH_MAX_EXEMPLARS];
@@ -800,14 +808,14 @@ typedef struct txp_setup {
     txm_image kept[TEXPATCH_MAX_MAPS]; /* pixels NULL: nothing is kept                        */
     int exemplar_count, map_count, width, height, tileable, patch, passes, turns, mirror, lattice;
     int is_default; /* passes were not given                                                  */
-    float most_weight; /* of maps and guide: its differences use the whole range of a byte      */
+    float most_weight; /* of maps and guide: the differences of that use all of a byte's range  */
     float novelty, guide_weight, low[TEXPATCH_MAX_MAPS], high[TEXPATCH_MAX_MAPS];
     float guide_low, guide_high;
     double lattice_vectors[4];
     uint64_t seed;
 } txp_setup;
 
-/* The compared bytes of one picture's pixel; returns how many. */
+/* The compared bytes of a pixel of one picture; returns how many. */
 static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label, double low,
                        double high, double weight, uint8_t *out) {
     float v[4];
@@ -856,7 +864,7 @@ static void txp_stack_halve(const txp_source *s, const txp_stack *from, txp_stac
     }
 }
 
-/* Lay out one level: sheets one below the other. */
+/* Room for one level: sheets one below the other. */
 static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *arena, int has_mask,
                                  txm_env *env) {
     int y = 0;
@@ -880,7 +888,7 @@ static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *a
     return TXM_OK;
 }
 
-/* Sums of the unusable pixels, which lie one byte each in width x height. */
+/* The summed-area table of unusable pixels; bad: one byte for each pixel. */
 static void txp_stack_sum(txp_stack *k, const uint8_t *bad) {
     const size_t w = (size_t)k->width + 1;
     for (int y = 0; y < k->height; y++) {
@@ -893,8 +901,8 @@ static void txp_stack_sum(txp_stack *k, const uint8_t *bad) {
     }
 }
 
-/* The turned (then stretched) sheets of all exemplars. stretch: x and y of exemplar pixels per
-   sheet pixel, column by column, or NULL. */
+/* The turned (and stretched) sheets of all exemplars. stretch: the matrix from sheet to exemplar
+   pixels, column by column, or NULL. */
 static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch) {
     static const int turn_x[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
     s->sheets = 0;
@@ -908,8 +916,8 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
                 k->width = t % 2 ? h : w;
                 k->height = t % 2 ? w : h;
                 k->plain = 1;
-                /* Seen on the sheet the exemplar is turned counter-clockwise t times; the way back
-                   turns clockwise, rows running down. */
+                /* The sheet shows the exemplar turned counter-clockwise t times; the inverse, from
+                   sheet to exemplar, turns clockwise. y points down. */
                 k->xx = turn_x[t][0];
                 k->xy = turn_x[t][1];
                 k->yx = -turn_x[t][1];
@@ -921,13 +929,13 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
                     k->xy = -k->xy;
                     k->x0 = w - 1 - k->x0;
                 }
-                if (stretch) { /* one sheet only: (x, y) of the sheet is stretch (x, y) */
+                if (stretch) { /* one sheet: (x, y) is the exemplar at stretch (x, y) */
                     k->plain = 0;
                     k->xx = stretch[0];
                     k->yx = stretch[1];
                     k->xy = stretch[2];
                     k->yy = stretch[3];
-                    /* the largest sheet whose corners stay inside, about the middle */
+                    /* the largest centred sheet whose corners stay inside */
                     const double ax = fabs(k->xx), bx = fabs(k->xy), ay = fabs(k->yx),
                                  by = fabs(k->yy);
                     double sw = w / ax, sh = h / by;
@@ -950,8 +958,8 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
     }
 }
 
-/* How many levels, and how large the sheets are at each. least: the smaller side of the output if
-   it wraps, else large. */
+/* The number of levels, and the sizes of the sheets at each. least: the smaller side of the output
+   that wraps, else large. */
 static void txp_source_sizes(txp_source *s, int least) {
     int side = least;
     for (int n = 0; n < s->sheets; n++) {
@@ -1041,7 +1049,7 @@ static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena
     return status;
 }
 
-/* The contrast of the exemplars, from some thousand pairs of pixels. */
+/* The contrast of the exemplars, from a few thousand random pairs of pixels. */
 static void txp_find_contrast(txp_source *s) {
     const txp_stack *k = &s->stack[0];
     txm_rng rng = txm_rng_make(1, 2);
@@ -1059,7 +1067,7 @@ static void txp_find_contrast(txp_source *s) {
     s->contrast = (double)sum / 4096;
 }
 
-/* Look for a lattice at the coarsest level; sharpen its steps on finer ones. */
+/* Find the lattice at the coarsest level, unless the caller gives it, and set it for all levels. */
 static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
     txm_arena scratch;
     txp_correlation k;
@@ -1105,22 +1113,22 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
     return TXM_OK;
 }
 
-/* The lattice of a torus whose sides are multiples of it: the steps nearest to `lattice` of which
-   whole numbers lead along the sides that wrap. 0: none is within a quarter. */
-static int txp_lattice_close(const double lattice[4], int tileable, double width, double height,
-                             double out[4]) {
+/* Fit a lattice to a torus: the steps nearest to `lattice` of which whole numbers add up to the
+   sides that wrap. 0: there are none within a quarter of its length. */
+static int txp_lattice_fit(const double lattice[4], int tileable, double width, double height,
+                           double out[4]) {
     const double *a = lattice, *b = lattice + 2;
     const double det = txp_det(a, b), sides[2] = {width, height};
     double count[2][2], target[2][2];
     for (int d = 0; d < 2; d++) {
-        /* steps to the end of this axis, rounded */
+        /* whole steps to the end of this axis */
         const double x = d ? 0 : sides[0], y = d ? sides[1] : 0;
         const double u = (x * b[1] - y * b[0]) / det, v = (a[0] * y - a[1] * x) / det;
         count[d][0] = floor(u + 0.5);
         count[d][1] = floor(v + 0.5);
         target[d][0] = x;
         target[d][1] = y;
-        if (!(tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) { /* free: where it is now */
+        if (!(tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) { /* any length will do */
             target[d][0] = count[d][0] * a[0] + count[d][1] * b[0];
             target[d][1] = count[d][0] * a[1] + count[d][1] * b[1];
         }
@@ -1140,9 +1148,9 @@ static int txp_lattice_close(const double lattice[4], int tileable, double width
     return fabs(txp_det(out, out + 2)) > 0.5 * fabs(det);
 }
 
-/* Sheets, stacks and lattice; a torus of a texture with a lattice gets a sheet that is stretched
-   until the sides are multiples of the steps.
-   s       as the checks leave it; scratch
+/* Sheets, stacks and lattice. If the output is a torus and the exemplar has a lattice, its sheet is
+   stretched until whole steps of the lattice fit the sides.
+   s       as the checks leave it; overwritten
    out     receives the source, which lies in memory, an arena that is made here             */
 static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source **out,
                                   txm_arena *memory, txm_env *env) {
@@ -1158,11 +1166,11 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source 
     txm_status status = txp_stacks(u, s, &first, env);
     if (status == TXM_OK) status = txp_lattice_search(u, s, env);
     if (status != TXM_OK || !s->has_lattice || !u->tileable || s->sheets > 1) goto done;
-    if (!txp_lattice_close(v, u->tileable, u->width, u->height, closed)) {
-        s->has_lattice = 0; /* too small a torus for it */
+    if (!txp_lattice_fit(v, u->tileable, u->width, u->height, closed)) {
+        s->has_lattice = 0; /* the torus is too small for it */
         goto done;
     }
-    /* the exemplar at stretch p is what the sheet shows at p: it takes closed to v */
+    /* the sheet shows at p the exemplar at stretch p: stretch maps closed to v */
     det = txp_det(closed, closed + 2);
     stretch[0] = (v[0] * closed[3] - v[2] * closed[1]) / det;
     stretch[1] = (v[1] * closed[3] - v[3] * closed[1]) / det;
@@ -1188,7 +1196,7 @@ done:
 
 /* ---- checks of what the caller gives ---------------------------------------------------- */
 
-static int txp_is_in(float x, float low, float high) {
+static int txp_is_within(float x, float low, float high) {
     return x >= low && x <= high;
 }
 
@@ -1226,7 +1234,7 @@ static txm_status txp_check_mask(const txm_image *im, const char *name, int widt
     return TXM_OK;
 }
 
-/* The exemplars and how they are treated; the output's side is checked by the caller. */
+/* The fields about exemplars and how they are treated. */
 static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
                                       txm_env *env) {
     txm_status status = TXM_OK;
@@ -1241,9 +1249,9 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 8192 pixels");
     if (d->passes < -1 || d->passes > 16)
         return txm_fail(env, TXM_BAD_ARGUMENT, "passes must be 1 to 16, 0 for 3, or -1 for none");
-    if (!txp_is_in(d->novelty, 0, 1))
+    if (!txp_is_within(d->novelty, 0, 1))
         return txm_fail(env, TXM_BAD_ARGUMENT, "novelty must be 0 to 1");
-    if (!txp_is_in(d->guide_weight, 0, 16))
+    if (!txp_is_within(d->guide_weight, 0, 16))
         return txm_fail(env, TXM_BAD_ARGUMENT, "guide_weight must be 0 to 16");
     if (d->lattice < -1 || d->lattice > 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "lattice must be -1, 0 or 1");
@@ -1271,7 +1279,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     for (int m = 0; m < d->map_count; m++) {
         if (d->maps) u->kinds[m] = d->maps[m];
         else u->kinds[m].weight = m ? 0.0f : 1.0f;
-        if (!txp_is_in(u->kinds[m].weight, 0, 16))
+        if (!txp_is_within(u->kinds[m].weight, 0, 16))
             return txm_fail(env, TXM_BAD_ARGUMENT, "the weight of a map must be 0 to 16");
         u->low[m] = 0;
         u->high[m] = 0;
@@ -1352,14 +1360,15 @@ static txm_status txp_check_guide(const txm_image *guide, const txm_image *mask,
     return mask && mask->pixels ? txp_check_mask(mask, "guide_mask", width, height, env) : TXM_OK;
 }
 
-/* The output's side of a description. */
+/* The fields about the output. */
 static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const txp_source *s,
                                    txm_env *env) {
     txm_status status = TXM_OK;
     if (d->width < 1 || d->height < 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
     if (d->height > TEXPATCH_MAX_PIXELS / d->width)
-        return txm_fail(env, TXM_TOO_LARGE, "more than TEXPATCH_MAX_PIXELS pixels; use windows");
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "more than TEXPATCH_MAX_PIXELS pixels; use windows of a plane");
     if (d->tileable < 0 || d->tileable > 3)
         return txm_fail(env, TXM_BAD_ARGUMENT, "tileable must be a sum of TEXPATCH_TILE_X and _Y");
     if ((d->tileable & TEXPATCH_TILE_X && d->width < TXP_PAD) ||
@@ -1392,12 +1401,12 @@ static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const t
 
 /* ---- first pass: patches and cuts -------------------------------------------------------- */
 
-/* How use of the exemplar is counted: pixels of the canvas per cell of the stack. */
+/* How often the exemplar is used: pixels of the canvas that come from each cell of the stack. */
 typedef struct txp_use {
     int columns, rows;
     uint32_t *count;
     uint32_t *sums; /* (columns + 1) x (rows + 1): of all cells above and left                  */
-    /* by the number of cells: 1 / (that number times their mean once the canvas is full) */
+    /* for each number of cells: 1 / (their mean sum once the canvas is full) */
     double share[(4 * TXP_BLOCK / TXP_CELL + 2) * (4 * TXP_BLOCK / TXP_CELL + 2)];
 } txp_use;
 
@@ -1420,7 +1429,7 @@ typedef struct txp_quilt {
     float *near_costs;
 } txp_quilt;
 
-enum { TXP_NEAR = 256 };
+enum { TXP_CANDIDATES = 256 };
 
 /* Sum of |canvas - stack| over the known bytes of a block; span: first and last 16 bytes of each
    row that hold any. */
@@ -1450,7 +1459,7 @@ static uint32_t txp_sad_known(const txp_quilt *q, const uint8_t *a, const uint8_
     return total;
 }
 
-/* Store a pixel and its repetitions behind the ends of a torus. */
+/* Store a pixel, and its copies beyond the ends of a torus. */
 static void txp_quilt_put(txp_quilt *q, int x, int y, txp_place at) {
     const txp_canvas *c = &q->canvas;
     const size_t n = (size_t)q->source->bytes, i = txp_index(c, x, y);
@@ -1476,8 +1485,8 @@ static void txp_use_mean(txp_use *u, double total) {
         u->share[i] = 1 / (mean * (double)i);
 }
 
-/* Bring the sums up to date. */
-static void txp_use_sum(const txp_use *u) {
+/* Update the summed-area table. */
+static void txp_use_integrate(const txp_use *u) {
     const int w = u->columns + 1;
     for (int j = 0; j < u->rows; j++) {
         uint32_t row = 0;
@@ -1488,7 +1497,7 @@ static void txp_use_sum(const txp_use *u) {
     }
 }
 
-/* Mean use of the cells that a piece of size x size pixels at (x, y) covers; 1: as of all. */
+/* Mean use of the cells that a piece of size x size pixels at (x, y) covers; 1 is the average. */
 static inline double txp_use_at(const txp_use *u, int x, int y, int size) {
     const int x0 = x / TXP_CELL, y0 = y / TXP_CELL, w = u->columns + 1;
     const int x1 = (x + size - 1) / TXP_CELL + 1, y1 = (y + size - 1) / TXP_CELL + 1;
@@ -1505,7 +1514,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     const int size = q->block, bytes = size * s->bytes;
     int span[4 * TXP_BLOCK][2], count = 0;
     uint32_t known = 0;
-    txp_use_sum(&q->use);
+    txp_use_integrate(&q->use);
     const uint8_t *a = txp_canvas_at(s, c, bx, by), *m = q->known + (a - c->pixels);
     for (int y = 0; y < size; y++) {
         const uint8_t *row = m + (size_t)y * c->pitch;
@@ -1518,12 +1527,12 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
             span[y][1] = i / 16 * 16 + 16;
         }
     }
-    /* Costs are gray levels summed over known bytes; a block without any compares nothing. */
+    /* costs are gray levels summed over known bytes, of which the first block has none */
     const double unit = known ? (double)known : 1;
     double best = 1e30;
     const double tolerance = 1.02;
     const uint32_t start = txm_rng_next(&q->rng);
-    /* a second turn without the lattice, if no place of the exemplar lies on it */
+    /* once more without the lattice, if no place of the exemplar lies on it */
     for (int n = 0, strict = s->has_lattice; n < s->sheets || (strict && !count); n++) {
         if (n == s->sheets) n = strict = 0;
         const int rows = k->high[n] - size + 1, columns = k->wide[n] - size + 1;
@@ -1558,7 +1567,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                     }
                     count = kept;
                 }
-                if (count < TXP_NEAR) {
+                if (count < TXP_CANDIDATES) {
                     q->near_costs[count] = txm_float(cost);
                     q->near_places[count].x = (int16_t)x;
                     q->near_places[count++].y = (int16_t)y;
@@ -1571,7 +1580,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     return 1;
 }
 
-/* Lay the piece over the block, along minimum-error cuts through what overlaps. */
+/* Copy the piece into the block, along minimum-error cuts through the overlaps. */
 static void txp_quilt_lay(txp_quilt *q, int bx, int by, txp_place at) {
     const txp_source *s = q->source;
     const txp_canvas *c = &q->canvas;
@@ -1639,7 +1648,7 @@ static void txp_quilt_run(txp_quilt *q) {
             int x = wx ? i * c->width / columns : i * step;
             txp_place at;
             if (!wx && x > c->width - size) x = c->width - size;
-            if (!txp_is_open(c, x, y, size)) continue;
+            if (!txp_has_free_pixel(c, x, y, size)) continue;
             if (!txp_quilt_find(q, x, y, &at)) q->failed = 1;
             else txp_quilt_lay(q, x, y, at);
         }
@@ -1653,17 +1662,17 @@ typedef struct txp_pass {
     const txp_source *source;
     const txp_stack *stack;
     const txp_canvas *canvas;
-    int size, step; /* of the neighbourhoods, and from one to the next                     */
+    int size, step; /* of the neighbourhoods; distance from one to the next                */
     int columns, rows;
     int *xs, *ys;
     txp_place *match; /* of each window                                                     */
-    uint32_t *sad;    /* what its match costs, in gray levels; UINT32_MAX: no match          */
-    uint32_t *grain;  /* of each window: sum of differences of neighbours, its high frequencies */
+    uint32_t *sad;    /* of its match, in gray levels; UINT32_MAX: no match                  */
+    uint32_t *grain;  /* sum of differences of neighbouring pixels: its high frequencies     */
     int32_t *weight;  /* of each window in the mean                                         */
     txp_use use;
     double shift_x, shift_y, use_weight, lattice_weight;
     int most_same; /* see txp_search */
-    int skip;      /* pixels from one place to the next where all are tried                       */
+    int skip;      /* pixels from one place to the next in an exhaustive search                   */
     uint64_t seed;
     int exhaustive, first_row;
     int32_t bell[TXP_WINDOW * TXP_WINDOW]; /* 1..256 over a neighbourhood                       */
@@ -1680,12 +1689,12 @@ typedef struct txp_search {
     uint32_t sad;
     txp_place seen[16];
     int seen_count;
-    int most_same; /* of 8 pixels around, as many at most may come from the same piece          */
+    int most_same; /* how many of 8 surrounding pixels may come from the same piece at most     */
     txp_place around[8];
 } txp_search;
 
-/* Which pieces 8 pixels around the window come from: where these would put the window. */
-static void txp_look_around(txp_search *f) {
+/* The pieces of 8 pixels around the window: where the window would lie in each of them. */
+static void txp_find_surroundings(txp_search *f) {
     const txp_canvas *c = f->pass->canvas;
     const int r = f->pass->size / 2 + 2, mid = f->pass->size / 2;
     for (int d = 0, n = 0; d < 9; d++) {
@@ -1704,8 +1713,8 @@ static void txp_look_around(txp_search *f) {
     }
 }
 
-/* Would (x, y) go on with a piece farther than is wanted? */
-static int txp_goes_on(const txp_search *f, int x, int y) {
+/* Would (x, y) continue a piece that surrounds the window too much already? */
+static int txp_continues(const txp_search *f, int x, int y) {
     int same = 0;
     for (int n = 0; n < 8; n++) same += f->around[n].x == x && f->around[n].y == y;
     return same > f->most_same;
@@ -1728,7 +1737,7 @@ static void txp_try(txp_search *f, int x, int y) {
         extra += p->lattice_weight * d;
     }
     extra += p->use_weight * txp_use_at(&p->use, x, y, size);
-    if (f->most_same < 8 && txp_goes_on(f, x, y)) return;
+    if (f->most_same < 8 && txp_continues(f, x, y)) return;
     extra *= size * size;
     if (extra >= f->cost) return;
     const double limit = f->cost - extra;
@@ -1742,7 +1751,7 @@ static void txp_try(txp_search *f, int x, int y) {
     f->best.y = (int16_t)y;
 }
 
-/* A sheet's random place that fits a window, near (x, y) within radius. */
+/* Try a random place of the sheet within radius of the best one so far. */
 static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     const txp_pass *p = f->pass;
     const txp_stack *k = p->stack;
@@ -1754,7 +1763,7 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     if (y1 > k->first[n] + k->high[n] - p->size) y1 = k->first[n] + k->high[n] - p->size;
     int x = txm_rng_range(rng, x0, x1 > x0 ? x1 : x0);
     int y = txm_rng_range(rng, y0, y1 > y0 ? y1 : y0);
-    if (p->source->has_lattice) { /* onto the nearest point of the lattice */
+    if (p->source->has_lattice) { /* snap to the lattice */
         double dx, dy;
         txp_from_lattice(k, x - f->x - p->shift_x, y - f->y - p->shift_y, &dx, &dy);
         x -= (int)floor(dx + 0.5);
@@ -1763,8 +1772,8 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     txp_try(f, x, y);
 }
 
-/* Try the pieces that the window shows now. */
-static void txp_try_shown(txp_search *f) {
+/* Try the pieces that pixels of the window come from now. */
+static void txp_try_current(txp_search *f) {
     const txp_canvas *c = f->pass->canvas;
     const int size = f->pass->size;
     for (int v = 0; v < 5; v++) {
@@ -1793,20 +1802,20 @@ static void txp_match(txp_pass *p, int i, int j) {
     f.best.x = f.best.y = -1;
     f.seen_count = 0;
     f.most_same = p->most_same;
-    if (f.most_same < 8) txp_look_around(&f);
-    if (!txp_is_open(c, f.x, f.y, size)) {
+    if (f.most_same < 8) txp_find_surroundings(&f);
+    if (!txp_has_free_pixel(c, f.x, f.y, size)) {
         p->sad[w] = UINT32_MAX;
         return;
     }
     p->grain[w] = txp_sad(f.target, c->pitch, f.target + s->bytes, c->pitch, size * s->bytes, size,
                           UINT32_MAX);
-    txp_try_shown(&f);
+    txp_try_current(&f);
     if (f.sad == 0) {
         p->match[w] = f.best;
         p->sad[w] = 0;
         return;
     }
-    if (f.best.x < 0 && f.most_same < 8 && !p->exhaustive) { /* near what it shows, but not that */
+    if (f.best.x < 0 && f.most_same < 8 && !p->exhaustive) { /* start near its own piece */
         const txp_place at = c->at[txp_index(c, txp_wrap(f.x + size / 2, c->width),
                                              txp_wrap(f.y + size / 2, c->height))];
         if (at.x >= 0) f.best = at;
@@ -1839,10 +1848,10 @@ static void txp_match(txp_pass *p, int i, int j) {
         }
         if (at.x == f.best.x && at.y == f.best.y) break;
     }
-    if (f.sad == UINT32_MAX) { /* nothing else is near: it goes on */
+    if (f.sad == UINT32_MAX) { /* nothing else is near: continue the piece */
         f.most_same = 8;
         f.seen_count = 0;
-        txp_try_shown(&f);
+        txp_try_current(&f);
     }
     p->match[w] = f.best;
     p->sad[w] = f.sad;
@@ -1870,9 +1879,9 @@ static double txp_power(double x) {
 }
 
 /* The adaptive weights (section 3.5 of [1]): w = P |x - z|^(r - 2), r = 0.8, where |x - z|^2 is the
-   energy of the match; P is the share of well-matched windows among those of high frequency around
+   energy of the match; P is the share of well-matched windows among those of high frequency nearby
    (itself included), so that good structure wins over bad. */
-static void txp_weigh(txp_pass *p) {
+static void txp_set_weights(txp_pass *p) {
     const double floor_sad = p->size * p->size * 1.5;
     double mean = 0, grain = 0;
     size_t count = 0;
@@ -1906,7 +1915,7 @@ static void txp_weigh(txp_pass *p) {
     }
 }
 
-/* A bell over a neighbourhood, 1..256. */
+/* A bell-shaped weight over a neighbourhood, 1..256. */
 static void txp_bell(int size, int32_t *bell) {
     for (int v = 0; v < size; v++) {
         for (int u = 0; u < size; u++) {
@@ -1918,7 +1927,7 @@ static void txp_bell(int size, int32_t *bell) {
     }
 }
 
-/* Sums of a window's match over the rows of a band: of its bytes, and of the weights. */
+/* Add a window's match to the sums of a band: its weighted bytes, and the weights. */
 static void txp_sum_window(const txp_pass *p, int w, int x0, int y0, int top, int bottom,
                            const txp_band *band) {
     const txp_source *s = p->source;
@@ -1970,7 +1979,7 @@ static void txp_sum_window(const txp_pass *p, int w, int x0, int y0, int top, in
     }
 }
 
-/* Which of the candidates of the pixels of a band is nearest to the mean. */
+/* Take a window's match for those pixels of a band where it is the nearest to the mean so far. */
 static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, int bottom,
                             const txp_band *band) {
     const txp_source *s = p->source;
@@ -2001,7 +2010,7 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
                 __m128i low = _mm_unpacklo_epi8(d, zero), high = _mm_unpackhi_epi8(d, zero);
                 low = _mm_madd_epi16(low, low);
                 high = _mm_madd_epi16(high, high);
-                /* pairs of sums, one pair for each pixel */
+                /* two sums for each pixel */
                 const __m128i even = _mm_castps_si128(_mm_shuffle_ps(
                     _mm_castsi128_ps(low), _mm_castsi128_ps(high), _MM_SHUFFLE(2, 0, 2, 0)));
                 const __m128i odd = _mm_castps_si128(_mm_shuffle_ps(
@@ -2079,7 +2088,7 @@ static void txp_count_use(const txp_canvas *c, txp_use *u) {
         total++;
     }
     txp_use_mean(u, (double)(total ? total : 1));
-    txp_use_sum(u);
+    txp_use_integrate(u);
 }
 
 /* ---- single pixels at seams ------------------------------------------------------------- */
@@ -2091,8 +2100,8 @@ typedef struct txp_polish {
     int first_band;
 } txp_polish;
 
-/* For each pixel whose neighbours disagree about the piece it belongs to: of all pieces around, the
-   one whose 5 x 5 pixels fit best (k-coherence with k = 1; pixels inside a piece stay). */
+/* For each pixel whose neighbours belong to other pieces: of all pieces around it, the one whose
+   5 x 5 pixels fit best (k-coherence with k = 1; pixels inside a piece do not change). */
 static void txp_polish_band(void *context, int index) {
     const txp_polish *p = (const txp_polish *)context;
     const txp_canvas *c = p->canvas;
@@ -2126,7 +2135,7 @@ static void txp_polish_band(void *context, int index) {
                 if (!known) tried[count++] = at;
             }
             if (count == 1) continue;
-            /* the 5 x 5 pixels around, moved inwards at borders that do not wrap */
+            /* the 5 x 5 pixels around it, moved inwards at borders that do not wrap */
             int x0 = x - 2, y0 = y - 2;
             if (wx) x0 = x0 < 0 ? x0 + c->width : x0;
             else x0 = txm_clampi(x0, 0, c->width - 5);
@@ -2154,42 +2163,42 @@ static void txp_polish_band(void *context, int index) {
 /* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
 
 enum {
-    TXP_REACH = 4,
-    TXP_PROBE = 8,
-    TXP_ROUNDS = 12,
-    TXP_SEAMS = 64,
-    TXP_TILE = 16,
-    TXP_FADE = 48,
-    TXP_GIVEN = 64
+    TXP_MAX_BEND = 4,    /* pixels by which a piece is bent at most                              */
+    TXP_PROBE = 8,       /* pixels a side that are compared at a seam                            */
+    TXP_SWEEPS = 12,     /* of the relaxation                                                    */
+    TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
+    TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
+    TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
+    TXP_JUMP_UNIT = 64   /* jumps are stored in 1 / 64                                           */
 };
 
-/* A field over the canvas that shall jump by given amounts between neighbours: the minimum of
+/* A field over the canvas with given jumps between neighbouring pixels: the minimum of
 
        sum over neighbours of pull |u(q) - u(p) - jump|^2 + screen |u|^2,
 
-   which jumps at the seams and fades within 1 / sqrt(screen) pixels.                            */
+   which jumps at seams and fades within 1 / sqrt(screen) pixels.                                */
 typedef struct txp_field {
     int width, height, wrap, lanes; /* lanes: values per pixel, 2 or a multiple of 4           */
     float *value;
-    int16_t *given;   /* lanes per pixel: pull times jump, in 1 / TXP_GIVEN                    */
+    int16_t *jump;    /* lanes per pixel: pull times jump, in 1 / TXP_JUMP_UNIT                 */
     uint8_t *pull[2]; /* to the right neighbour, to the lower one, in 1 / 255; 255 inside a piece */
     float scale[4 * 255 + 1]; /* by the sum of the four pulls: 1 / (sum + screen)               */
-    const uint8_t *fixed; /* value stays as it is; NULL: nowhere                               */
-    uint8_t *busy; /* of each tile of TXP_TILE x 8 pixels: is anything asked of it or near it?  */
+    const uint8_t *fixed; /* 1 = value does not change; NULL: it does everywhere               */
+    uint8_t *active; /* of each tile of TXP_TILE x 8 pixels: 2 = it has jumps, 1 = near one    */
     int tiles;     /* in a row                                                                */
-    int colour;    /* of the pixels that are relaxed now, as on a chessboard                  */
+    int colour;    /* of the pixels that are relaxed now, on a checkerboard                   */
 } txp_field;
 
 static inline void txp_field_mark(const txp_field *f, int x, int y) {
-    f->busy[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
+    f->active[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
 }
 
-/* Tiles within reach of those that are marked are busy too. */
+/* Activate the tiles within TXP_FADE of marked ones. */
 static void txp_field_spread(const txp_field *f) {
     const int rows = (f->height + 7) / 8, across = TXP_FADE / TXP_TILE, along = TXP_FADE / 8;
     for (int j = 0; j < rows; j++) {
         for (int i = 0; i < f->tiles; i++) {
-            if (f->busy[j * f->tiles + i] != 2) continue;
+            if (f->active[j * f->tiles + i] != 2) continue;
             for (int v = -along; v <= along; v++) {
                 int y = j + v;
                 if (f->wrap & TEXPATCH_TILE_Y) y = (y + 2 * rows) % rows;
@@ -2198,7 +2207,7 @@ static void txp_field_spread(const txp_field *f) {
                     int x = i + u;
                     if (f->wrap & TEXPATCH_TILE_X) x = (x + 2 * f->tiles) % f->tiles;
                     if (x < 0 || x >= f->tiles) continue;
-                    if (!f->busy[y * f->tiles + x]) f->busy[y * f->tiles + x] = 1;
+                    if (!f->active[y * f->tiles + x]) f->active[y * f->tiles + x] = 1;
                 }
             }
         }
@@ -2208,31 +2217,31 @@ static void txp_field_spread(const txp_field *f) {
 static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *next,
                                    const uint8_t *pull, int lanes) {
     float *own = f->value + i * (size_t)lanes;
-    const int16_t *given = f->given + i * (size_t)lanes;
+    const int16_t *jump = f->jump + i * (size_t)lanes;
     const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
     const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
-    const float unit = 255.0f / (float)TXP_GIVEN;
+    const float unit = 255.0f / (float)TXP_JUMP_UNIT;
     const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
     const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
     for (int k = 0; k < lanes; k++) {
         const float across = txm_float(txm_float(l * a[k]) + txm_float(r * b[k]));
         const float along = txm_float(txm_float(u * c[k]) + txm_float(d * e[k]));
-        const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)given[k]));
+        const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)jump[k]));
         own[k] = txm_float(own[k] + txm_float(1.6f * txm_float(txm_float(all * scale) - own[k])));
     }
 }
 
-/* The pixels of one colour in 8 rows, relaxed beyond their best value. */
+/* The pixels of one colour in 8 rows: successive over-relaxation. */
 static void txp_relax_rows(void *context, int index) {
     const txp_field *f = (const txp_field *)context;
     const int w = f->width, h = f->height, lanes = f->lanes;
     for (int y = 8 * index; y < 8 * index + 8 && y < h; y++) {
         const int up = y > 0 ? y - 1 : f->wrap & TEXPATCH_TILE_Y ? h - 1 : -1;
         const int down = y + 1 < h ? y + 1 : f->wrap & TEXPATCH_TILE_Y ? 0 : -1;
-        const uint8_t *busy = f->busy + (size_t)(y / 8) * (size_t)f->tiles;
+        const uint8_t *active = f->active + (size_t)(y / 8) * (size_t)f->tiles;
         for (int x = (y + f->colour) % 2; x < w; x += 2) {
             const size_t i = (size_t)y * (size_t)w + (size_t)x;
-            if (!busy[x / TXP_TILE]) {
+            if (!active[x / TXP_TILE]) {
                 x += TXP_TILE - 2; /* the next tile */
                 continue;
             }
@@ -2261,13 +2270,13 @@ static void txp_relax_field(txp_field *f, txm_env *env) {
         txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
 }
 
-/* A seam between two pieces, as last measured: its key is how far their offsets are apart. */
+/* A measured seam between two pieces. Its key is the difference of their offsets. */
 typedef struct txp_seam {
     int x, y, dx, dy, found, shift[2];
 } txp_seam;
 
-/* The shift of the second piece that makes it continue the first, within TXP_REACH pixels; both are
-   seen around the same pixel. 0: none is clearly better than staying. */
+/* The shift of the second piece, up to TXP_MAX_BEND pixels, with which it continues the first best
+   around a pixel. 0: none is clearly better than no shift. */
 static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shift[2]) {
     const txp_stack *k = &s->stack[0];
     const int ax = a.x - TXP_PROBE / 2, ay = a.y - TXP_PROBE / 2;
@@ -2282,8 +2291,8 @@ static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shi
     uint32_t best = now / 10 * 7;
     int found = 0;
     if (now < TXP_PROBE * TXP_PROBE * 4) return 0;
-    for (int dy = -TXP_REACH; dy <= TXP_REACH; dy++) {
-        for (int dx = -TXP_REACH; dx <= TXP_REACH; dx++) {
+    for (int dy = -TXP_MAX_BEND; dy <= TXP_MAX_BEND; dy++) {
+        for (int dx = -TXP_MAX_BEND; dx <= TXP_MAX_BEND; dx++) {
             if (!txp_fits(s, k, bx + dx, by + dy, TXP_PROBE, TXP_PROBE)) continue;
             const uint32_t sad = txp_sad(target, k->pitch, txp_stack_at(s, k, bx + dx, by + dy),
                                          k->pitch, TXP_PROBE * s->bytes, TXP_PROBE, best);
@@ -2297,11 +2306,11 @@ static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shi
     return found;
 }
 
-/* The same, remembered for the next pixels of the seam between the same two pieces. */
-static int txp_seam_known(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
-                          txp_place b, int shift[2]) {
+/* The same, from the cache for the next pixels of a seam between the same two pieces. */
+static int txp_seam_cached(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
+                           txp_place b, int shift[2]) {
     const int dx = a.x - b.x, dy = a.y - b.y;
-    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAMS];
+    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAM_CACHE];
     if (m->dx != dx || m->dy != dy || abs(m->x - x) + abs(m->y - y) > 3) {
         m->x = x;
         m->y = y;
@@ -2314,12 +2323,12 @@ static int txp_seam_known(const txp_source *s, txp_seam *seams, int x, int y, tx
     return m->found;
 }
 
-/* Pixel j shall have `much` more than i. */
-static inline void txp_ask(const txp_field *f, size_t i, size_t j, size_t lane, int much) {
-    int16_t *a = f->given + i * (size_t)f->lanes + lane,
-            *b = f->given + j * (size_t)f->lanes + lane;
-    *a = (int16_t)(*a - much);
-    *b = (int16_t)(*b + much);
+/* Pixel j shall be `jump` above i. */
+static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t lane, int jump) {
+    int16_t *a = f->jump + i * (size_t)f->lanes + lane,
+            *b = f->jump + j * (size_t)f->lanes + lane;
+    *a = (int16_t)(*a - jump);
+    *b = (int16_t)(*b + jump);
 }
 
 typedef struct txp_seams {
@@ -2329,9 +2338,10 @@ typedef struct txp_seams {
     int first_band;
 } txp_seams;
 
-/* What the seams right of and below the pixels of a band ask of the two fields: bend (x, y) and
-   tone (compared bytes). A step of colour is what both pieces see of each other in 5 x 5 pixels;
-   small steps are tone, large ones another thing. Stored for the first of the two pixels alone. */
+/* Measure the seams to the right of and below the pixels of a band, and set the jumps of the two
+   fields: bend (x, y) and tone (compared bytes). The step of colour at a seam is the difference of
+   both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large ones are
+   edges of something. Pulls are stored with the first of the two pixels. */
 static void txp_measure_band(void *context, int lane) {
     const txp_seams *m = (const txp_seams *)context;
     const txp_source *s = m->source;
@@ -2339,7 +2349,7 @@ static void txp_measure_band(void *context, int lane) {
     const txp_stack *k = &s->stack[0];
     const int top = (m->first_band + 2 * lane) * TXP_BAND;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
-    txp_seam seams[TXP_SEAMS];
+    txp_seam seams[TXP_SEAM_CACHE];
     memset(seams, 0, sizeof seams);
     for (int y = top; y < bottom; y++) {
         for (int x = 0; x < c->width; x++) {
@@ -2359,7 +2369,7 @@ static void txp_measure_band(void *context, int lane) {
                 a.x = (int16_t)(a.x + !d);
                 a.y = (int16_t)(a.y + d);
                 if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_known(s, seams, x, y, a, q, shift)) *bend = 77; /* fits as it is */
+                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = 77; /* fits already */
                 *tone = 13;
                 const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
                           by = q.y + shift[1] - 2;
@@ -2378,7 +2388,7 @@ static void txp_measure_band(void *context, int lane) {
                         *tone = (uint8_t)(most < 12 * 25 ? 255
                                                          : 13 + 242 * (32 * 25 - most) / (20 * 25));
                 }
-                /* u(q) - u(i) = jump: asked of q, and its negative of i */
+                /* u(q) - u(i) = jump: added to q, subtracted from i */
                 const size_t j = txp_index(c, qx, qy);
                 if (shift[0] || shift[1]) {
                     txp_field_mark(m->bend, x, y);
@@ -2389,16 +2399,16 @@ static void txp_measure_band(void *context, int lane) {
                     txp_field_mark(m->tone, qx, qy);
                 }
                 for (size_t b = 0; b < 2; b++)
-                    txp_ask(m->bend, i, j, b, *bend * shift[b] * TXP_GIVEN / 255);
+                    txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
                 for (size_t b = 0; b < (size_t)s->guide_at && most < 32 * 25; b++)
-                    txp_ask(m->tone, i, j, b, *tone * sum[b] * TXP_GIVEN / (25 * 255));
+                    txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
             }
         }
     }
 }
 
-/* Room for a field; its values are all 0, in memory of their own. If there is none, the arenas'
-   failed tells. */
+/* Allocate a field: its values, all 0, in memory, the rest in scratch. Their failed tells whether
+   that went wrong. */
 static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
                            txm_arena *memory, txm_arena *scratch) {
     const size_t pixels = (size_t)c->width * (size_t)c->height;
@@ -2409,16 +2419,16 @@ static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double 
     f->lanes = lanes;
     for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
     f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
-    f->given = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
+    f->jump = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
     f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
     f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
     f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
-    f->busy = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
+    f->active = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
 }
 
 /* ---- jobs --------------------------------------------------------------------------------- */
 
-/* gray levels per pixel that a squared pixel off the lattice counts */
+/* cost of the squared distance from the lattice, in gray levels per pixel */
 #define TXP_LATTICE 20.0
 
 enum { TXP_MAX_STEPS = 2 * TXP_MAX_LEVELS * 16 + 8 };
@@ -2426,7 +2436,7 @@ typedef enum txp_kind { TXP_STEP_QUILT, TXP_STEP_PASS, TXP_STEP_POLISH, TXP_STEP
 typedef struct txp_step {
     txp_kind kind;
     int level, size, stride, round, rounds;
-    float cost; /* of the whole, about */
+    float cost; /* approximate, relative to other steps */
 } txp_step;
 
 /* Where pixels come from. */
@@ -2438,10 +2448,10 @@ typedef struct txp_origins {
 
 /* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
 typedef struct txp_given {
-    uint8_t *pixels;     /* compared bytes: of what is fixed, and the guide of all               */
-    uint8_t *fixed;      /* 1 = not to be changed                                                */
-    uint8_t *free_guide; /* 1 = the guide says nothing                                           */
-    txp_origins from;    /* of what is fixed                                                     */
+    uint8_t *pixels;     /* compared bytes: of fixed pixels, and the guide of all                */
+    uint8_t *fixed;      /* 1 = it does not change                                               */
+    uint8_t *free_guide; /* 1 = the guide does not count                                         */
+    txp_origins from;    /* of fixed pixels                                                      */
 } txp_given;
 
 struct texpatch_job {
@@ -2461,7 +2471,7 @@ struct texpatch_job {
     float *tone; /* what is added to each compared byte, txp_lanes of them             */
     txp_given given;
     uint64_t seed;
-    /* a part that is being made anew lies at (part_x, part_y) of the canvas */
+    /* a part that is being made again lies at (part_x, part_y) of the canvas */
     texpatch_job *part;
     int part_x, part_y;
 };
@@ -2480,7 +2490,7 @@ static inline txp_origins txp_origins_of(const texpatch_job *job) {
     return from;
 }
 
-/* count pixels from pixel k of `from` on, to pixel i of `to` and on */
+/* Copy count pixels, from pixel k of `from` to pixel i of `to`. */
 static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
                                     size_t k, size_t count, size_t lanes) {
     memcpy(to->at + i, from->at + k, count * sizeof *to->at);
@@ -2536,12 +2546,14 @@ static txm_status txp_report(const texpatch_job *job, txm_env *env, const char *
                : TXM_OK;
 }
 
-static inline int txp_half(int x, int level) {
+/* a size at full resolution, at a level, rounded up */
+static inline int txp_level_size(int x, int level) {
     return (x + (1 << level) - 1) >> level;
 }
 
-/* A place of one level, as seen one level finer: the pixel with this parity of its four. */
-static inline txp_place txp_finer(const txp_source *s, int level, txp_place p, int px, int py) {
+/* A place one level finer: of the four pixels the one with this parity. */
+static inline txp_place txp_refine_place(const txp_source *s, int level, txp_place p, int px,
+                                         int py) {
     const txp_stack *c = &s->stack[level], *f = &s->stack[level - 1];
     const int n = s->sheets > 1 && p.x >= 0 ? c->sheet[p.y] : 0;
     txp_place q = p;
@@ -2558,8 +2570,8 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     const size_t n = (size_t)s->bytes;
     const int side = 1 << level;
     memset(c, 0, sizeof *c);
-    c->width = txp_half(job->width, level);
-    c->height = txp_half(job->height, level);
+    c->width = txp_level_size(job->width, level);
+    c->height = txp_level_size(job->height, level);
     c->wrap = job->setup.tileable;
     c->pitch = (size_t)(c->width + TXP_PAD) * n;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
@@ -2572,7 +2584,7 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
         txp_band *b = &c->bands[i];
         const size_t band = (size_t)c->width * TXP_BAND;
-        if (i * TXP_BAND >= c->height) break; /* there are fewer bands */
+        if (i * TXP_BAND >= c->height) break; /* there are no more bands */
         b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
         b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
         if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
@@ -2620,13 +2632,13 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     return TXM_OK;
 }
 
-/* What the mean use of a place counts in the first pass, in gray levels per pixel: half the
-   contrast. A torus, whose ends must meet besides, can afford less. */
+/* The cost of the average use of a place in the first pass, in gray levels per pixel: half the
+   contrast. It is lower for a torus, whose ends must fit as well. */
 static double txp_use_weight(const texpatch_job *job) {
     return fmin(0.5 * job->source->contrast, job->setup.tileable ? 16 : 32);
 }
 
-/* no use of any cell yet */
+/* The counts of use, all 0. */
 static void txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
     u->columns = (k->width + TXP_CELL - 1) / TXP_CELL;
     u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
@@ -2641,9 +2653,9 @@ static void txp_quilt_one(void *context, int index) {
     txp_quilt_run(q);
 }
 
-/* The side of a patch on the coarsest canvas: as the caller says or suits the exemplar, but such
-   that sheets and canvas hold it; a multiple of 4, 8 or more. */
-static int txp_block(const texpatch_job *job, const txp_canvas *c, int level) {
+/* The side of a patch on the coarsest canvas: the caller's or the default for the exemplar, limited
+   by the sizes of sheets and canvas; a multiple of 4, 8 or more. */
+static int txp_patch_side(const texpatch_job *job, const txp_canvas *c, int level) {
     const txp_source *s = job->source;
     const txp_stack *k = &s->stack[level];
     const int wanted = job->setup.patch ? ((job->setup.patch >> level) + 2) / 4 * 4
@@ -2658,8 +2670,8 @@ static int txp_block(const texpatch_job *job, const txp_canvas *c, int level) {
     return txm_clampi(wanted < most ? wanted : most / 4 * 4, 8, 4 * TXP_BLOCK);
 }
 
-/* The first pass: some tries side by side on a small canvas, of which the one with the cheapest
-   cuts stays. */
+/* The first pass. On a small canvas it is run several times, and the result with the cheapest cuts
+   is kept. */
 static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canvas *out,
                                  txm_env *env) {
     txp_source *s = job->source;
@@ -2674,7 +2686,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
     if (status != TXM_OK) return status;
     const size_t pixels = (size_t)out->width * (size_t)out->height;
     const size_t bytes = out->pitch * ((size_t)(out->height + TXP_PAD) + 1);
-    const int block = txp_block(job, out, level);
+    const int block = txp_patch_side(job, out, level);
     txm_arena_init(&scratch, env);
     if (pixels > 300 * 300 || job->given.from.at) starts = 1;
     for (int i = 0; i < starts; i++) {
@@ -2696,8 +2708,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         t->error = (float *)txm_arena_alloc(&scratch, (size_t)(t->block * t->block), sizeof(float));
         t->scratch =
             (double *)txm_arena_alloc(&scratch, (size_t)(t->block * t->overlap), sizeof(double));
-        t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(txp_place));
-        t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(float));
+        t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_CANDIDATES, sizeof(txp_place));
+        t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_CANDIDATES, sizeof(float));
         txp_use_make(k, &t->use, &scratch);
         if (scratch.failed) {
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the first pass");
@@ -2719,8 +2731,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
                     memset(known + guide, 255, n - guide);
             }
         }
-        txp_canvas_close(s, &t->canvas, t->known);
-        txp_canvas_close(s, &t->canvas, t->canvas.pixels);
+        txp_canvas_repeat(s, &t->canvas, t->known);
+        txp_canvas_repeat(s, &t->canvas, t->canvas.pixels);
     }
     status = txp_report(job, env, "patches");
     if (status != TXM_OK) goto done;
@@ -2735,7 +2747,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         if (best < 0 || q[i].cost < q[best].cost) best = i;
     }
     memcpy(out->at, q[best].canvas.at, pixels * sizeof(txp_place));
-    txp_canvas_show(s, k, out, 0, out->height);
+    txp_canvas_fill(s, k, out, 0, out->height);
 done:
     txm_arena_free(&scratch);
     return status;
@@ -2752,7 +2764,7 @@ static txm_status txp_refine(const texpatch_job *job, const txp_canvas *from, in
             const size_t i = txp_index(c, x, y);
             if (c->fixed && c->fixed[i]) continue;
             txp_place p = from->at[txp_index(from, x / 2, y / 2)];
-            if (p.x < 0) { /* next to kept pixels: from any side */
+            if (p.x < 0) { /* next to kept pixels: take another neighbour */
                 const int tx[4] = {x / 2 + 1, x / 2 - 1, x / 2, x / 2},
                           ty[4] = {y / 2, y / 2, y / 2 + 1, y / 2 - 1};
                 for (int d = 0; d < 4 && p.x < 0; d++) {
@@ -2760,10 +2772,10 @@ static txm_status txp_refine(const texpatch_job *job, const txp_canvas *from, in
                         p = from->at[txp_index(from, tx[d], ty[d])];
                 }
             }
-            c->at[i] = txp_finer(s, level + 1, p, x & 1, y & 1);
+            c->at[i] = txp_refine_place(s, level + 1, p, x & 1, y & 1);
         }
     }
-    txp_canvas_show(s, &s->stack[level], c, 0, c->height);
+    txp_canvas_fill(s, &s->stack[level], c, 0, c->height);
     return TXM_OK;
 }
 
@@ -2778,7 +2790,7 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Room for a pass over c, the bands apart; scratch->failed tells if there is none. */
+/* Allocate what a pass over c needs, except bands; scratch->failed tells whether that failed. */
 static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
@@ -2829,14 +2841,14 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
         goto done;
     }
     txp_count_use(c, &p.use);
-    txp_canvas_close(s, c, c->pixels);
+    txp_canvas_repeat(s, c, c->pixels);
     for (p.first_row = 0; p.first_row < p.rows; p.first_row += 32) {
         status = txp_report(job, env, "optimising");
         if (status != TXM_OK) goto done;
         txm_parallel_for(env, p.rows - p.first_row < 32 ? p.rows - p.first_row : 32, txp_match_row,
                          &p);
     }
-    txp_weigh(&p);
+    txp_set_weights(&p);
     memcpy(c->next, c->at, (size_t)c->width * (size_t)c->height * sizeof *c->next);
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
         status = txp_report(job, env, "optimising");
@@ -2854,7 +2866,7 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
     p.source = job->source;
     p.stack = &job->source->stack[0];
     p.canvas = c;
-    txp_canvas_close(p.source, c, c->pixels);
+    txp_canvas_repeat(p.source, c, c->pixels);
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
         const txm_status status = txp_report(job, env, "polishing");
@@ -2867,14 +2879,14 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
 
 /* ---- beginning, stepping, releasing a job ----------------------------------------------- */
 
-/* Where the lattice begins: anywhere, as the seed has it. */
-static void txp_first_shift(const txp_source *s, uint64_t seed, double *x, double *y) {
+/* A random offset of the lattice. */
+static void txp_lattice_start(const txp_source *s, uint64_t seed, double *x, double *y) {
     txm_rng rng = txm_rng_make(seed, 5);
     *x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
     *y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
 }
 
-/* A job on a source, with nothing given yet. It owns `memory`, in which it lies, on success. */
+/* A job on a source, with nothing given yet, in `memory`, which it owns in the end. */
 static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, int height,
                                   uint64_t seed, txm_arena *memory, txm_env *env) {
     texpatch_job *job = (texpatch_job *)txm_arena_zero(memory, 1, sizeof *job);
@@ -2892,8 +2904,8 @@ static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, 
     return job;
 }
 
-/* Room for what is given of a canvas; what is 0 here is not wanted. If there is none, memory->failed
-   tells. */
+/* Allocate what is given of a canvas; what is 0 here is not needed. memory->failed tells whether
+   that failed. */
 static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
                            int free_guide, int places, txm_arena *memory) {
     g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);
@@ -2907,7 +2919,7 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     }
 }
 
-/* The guide and its mask, on the canvas; the margin has what the border has. */
+/* Copy the guide and its mask to the canvas; the margin repeats the border. */
 static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const txm_image *mask,
                            const txp_given *g) {
     const txp_source *s = job->source;
@@ -2954,7 +2966,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (status != TXM_OK) return status;
 
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
-    const int room = 2 * TXP_WINDOW << (s->levels - 1); /* a canvas must hold some patches */
+    const int room = 2 * TXP_WINDOW << (s->levels - 1); /* for a few patches */
     int width = desc->width + (wx ? 0 : 2 * TXP_MARGIN);
     int height = desc->height + (wy ? 0 : 2 * TXP_MARGIN);
     if (!wx && width < room) width = room;
@@ -2965,7 +2977,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
     job->margin_y = wy ? 0 : TXP_MARGIN;
-    txp_first_shift(s, desc->seed, &job->shift_x, &job->shift_y);
+    txp_lattice_start(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
         txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0, &memory);
         if (memory.failed) goto no_memory;
@@ -2997,7 +3009,7 @@ no_memory:
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
 }
 
-/* The two fields of the finished canvas. */
+/* Compute the two fields of a canvas. */
 static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
                              float **toned, txm_env *env) {
     const txp_source *s = job->source;
@@ -3032,8 +3044,8 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     seams.canvas = c;
     seams.bend = &bend;
     seams.tone = &tone;
-    /* A band asks something of the first row of the next: every second one at a time, the last
-       (whose next may be the first) by itself. */
+    /* A band also writes to the first row of the next one: so every second band at a time, and the
+       last one, which may be followed by the first, alone. */
     for (int turn = 0; turn < 3; turn++) {
         const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
         for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
@@ -3045,7 +3057,7 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     }
     txp_field_spread(&bend);
     txp_field_spread(&tone);
-    for (int i = 0; i < TXP_ROUNDS; i++) {
+    for (int i = 0; i < TXP_SWEEPS; i++) {
         status = txp_report(job, env, "blending");
         if (status != TXM_OK) goto done;
         txp_relax_field(&bend, env);
@@ -3083,7 +3095,7 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
             txp_place *old = canvas.at;
             canvas.at = canvas.next;
             canvas.next = old;
-            txp_canvas_show(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
+            txp_canvas_fill(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
         }
     }
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
@@ -3107,7 +3119,7 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     return TXM_OK;
 }
 
-/* The part that was made anew becomes part of the whole. */
+/* Copy the part that was made again into the whole. */
 static void txp_part_join(texpatch_job *job) {
     texpatch_job *part = job->part;
     const txp_source *s = job->source;
@@ -3146,8 +3158,7 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {
 
 /* ---- what a pixel shows ----------------------------------------------------------------- */
 
-/* A pixel of the output: from sheet `sheet` (-1: it is a kept one), place (x, y) of it; bent: not
-   where its neighbours' places say. */
+/* What a pixel of the output shows: place (x, y) of sheet `sheet`; sheet -1: a kept pixel. */
 typedef struct txp_pixel {
     int sheet, is_whole;
     double x, y;
@@ -3172,7 +3183,7 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     txp_place p = job->canvas.at[i];
     if (p.x < 0) return out;
     for (int l = job->level; l > 0; l--)
-        p = txp_finer(s, l, p, (x >> (l - 1)) & 1, (y >> (l - 1)) & 1);
+        p = txp_refine_place(s, l, p, (x >> (l - 1)) & 1, (y >> (l - 1)) & 1);
     out.sheet = s->sheets > 1 ? s->stack[0].sheet[p.y] : 0;
     out.x = p.x;
     out.y = p.y - s->stack[0].first[out.sheet];
@@ -3206,10 +3217,10 @@ TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, 
 
 /* Turn the vector of a normal map with its piece and give it unit length. */
 static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
-    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* y of the map in rows downwards */
+    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* rows run downwards */
     const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
     double nz = 2 * (double)v[2] - 1;
-    /* The sheet's axes in the exemplar, as orthogonal directions: a turn, perhaps a mirror. */
+    /* the axes of the sheet in the exemplar, orthogonal: a rotation, or a reflection */
     const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
     const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
     double x = (sheet->xx * nx + sheet->yx * ny) / lx;
@@ -3279,7 +3290,7 @@ static void txp_draw_row(void *context, int row) {
     }
 }
 
-/* The checks of an output, and where the tone of a map is found. */
+/* Check an output, and find where the tone of its map is stored. */
 static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_image out,
                                  txp_draw *d) {
     const txm_status status = txm_image_check(&out, "out", TEXPATCH_MAX_PIXELS, env);
@@ -3301,7 +3312,7 @@ static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_
     return TXM_OK;
 }
 
-/* All rows of out, some at a time; from..1 is the progress meanwhile. */
+/* Draw all rows of out, some at a time; progress runs from `from` to 1. */
 static txm_status txp_draw_rows(const txp_draw *d, float from, txm_env *env) {
     txp_draw some = *d;
     for (int y = 0; y < d->out.height; y += 64) {
@@ -3334,7 +3345,7 @@ TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, i
     return txp_draw_rows(&d, 0, env);
 }
 
-/* All steps that are left. */
+/* Run all steps that are left. */
 static txm_status txp_run(texpatch_job *job, txm_env *env) {
     txm_status status = TXM_OK;
     for (int more = 1; more && status == TXM_OK;) status = texpatch_step(job, env, &more);
@@ -3359,7 +3370,7 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
             status = txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must be width x height pixels");
     }
     if (status == TXM_OK) status = txp_run(job, env);
-    /* drawn into pictures of our own, so that out is untouched if the caller cancels */
+    /* drawn into scratch pictures, so that out is untouched if the caller cancels */
     for (int m = 0; m < maps && status == TXM_OK; m++) {
         const size_t row = txm_sample_bytes(out[m].sample) * (size_t)draws[m].out.channels;
         draws[m].out.stride = (ptrdiff_t)((size_t)desc->width * row);
@@ -3382,8 +3393,8 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
 
 /* ---- a part made again ------------------------------------------------------------------ */
 
-/* Does the output's pixel under canvas pixel (x, y) belong to the part? */
-static inline int txp_is_again(const texpatch_job *job, const txm_image *again, int x, int y) {
+/* Is pixel (x, y) of the canvas in the part? The margin is where the border is. */
+static inline int txp_is_in_part(const texpatch_job *job, const txm_image *again, int x, int y) {
     x = txm_clampi(x - job->margin_x, 0, job->setup.width - 1);
     y = txm_clampi(y - job->margin_y, 0, job->setup.height - 1);
     return ((const uint8_t *)txm_image_row_const(again, y))[x] != 0;
@@ -3448,7 +3459,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     low_y = job->height;
     for (int y = 0; y < job->height; y++) {
         for (int x = 0; x < job->width; x++) {
-            if (!txp_is_again(job, &mask, x, y)) continue;
+            if (!txp_is_in_part(job, &mask, x, y)) continue;
             low_x = x < low_x ? x : low_x;
             high_x = x > high_x ? x : high_x;
             low_y = y < low_y ? y : low_y;
@@ -3485,7 +3496,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         part->memory = own;
     }
 
-    /* nothing can fail from here on */
+    /* from here on nothing can fail */
     for (size_t i = 0; i < all && guide; i++) {
         uint8_t *shown = job->canvas.pixels + i / (size_t)job->width * job->canvas.pitch +
                          i % (size_t)job->width * n;
@@ -3512,7 +3523,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         for (int x = 0; x < wide; x++) {
             const size_t i = (size_t)y * (size_t)wide + (size_t)x;
             const size_t k = txp_index(&job->canvas, x0 + x, y0 + y);
-            part->given.fixed[i] = !txp_is_again(job, &mask, x0 + x, y0 + y) ||
+            part->given.fixed[i] = !txp_is_in_part(job, &mask, x0 + x, y0 + y) ||
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
@@ -3530,24 +3541,24 @@ no_memory:
 
 /* ---- the unbounded plane ---------------------------------------------------------------- */
 
-/* An environment for a piece of a call: its progress is that of the whole, which rises piece by
-   piece. */
-typedef struct txp_quiet {
+/* An environment for calls that do one piece of the work each: they report the progress of the
+   whole, in pieces. */
+typedef struct txp_nested {
     txm_env *env;
     float done, total; /* pieces */
-} txp_quiet;
+} txp_nested;
 
-static int txp_quiet_progress(void *user, float fraction, const char *stage) {
-    const txp_quiet *q = (const txp_quiet *)user;
+static int txp_nested_progress(void *user, float fraction, const char *stage) {
+    const txp_nested *q = (const txp_nested *)user;
     (void)fraction;
     return txm_progress(q->env, q->done / q->total, stage);
 }
 
-static txm_env txp_quiet_env(txp_quiet *q) {
+static txm_env txp_nested_env(txp_nested *q) {
     txm_env env;
     memset(&env, 0, sizeof env);
     if (q->env) env = *q->env;
-    env.progress = txp_quiet_progress;
+    env.progress = txp_nested_progress;
     env.progress_user = q;
     return env;
 }
@@ -3558,12 +3569,12 @@ struct texpatch_plane {
     txp_setup setup;
     txp_source *source;
     int cell,
-        half; /* pixels: a cell's side; half the width of what is made first along its sides */
+        half; /* pixels: side of a cell; half the width of the strips along its sides */
     double shift_x, shift_y;
     uint64_t seed;
 };
 
-/* A finished rectangle of the plane. */
+/* A finished rectangle of the plane: a corner or a side of cells. */
 typedef struct txp_piece {
     int width, height; /* 0: not made yet */
     txp_origins from;
@@ -3575,7 +3586,7 @@ static void txp_piece_free(txp_piece *p) {
     p->width = p->height = 0;
 }
 
-/* A job for width x height pixels of the plane from (x, y) on. */
+/* A job for the width x height pixels of the plane at (x, y). */
 static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t y, int width,
                                 int height, uint64_t seed, txm_env *env, texpatch_job **out) {
     txm_arena memory;
@@ -3592,7 +3603,7 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     job->memory = memory;
     job->setup.width = width;
     job->setup.height = height;
-    if (s->has_lattice) { /* whole steps away, near 0 */
+    if (s->has_lattice) { /* less whole steps of the lattice */
         const double *i = s->stack[0].inverse, *l = s->stack[0].lattice;
         const double u = i[0] * sx + i[1] * sy, v = i[2] * sx + i[3] * sy;
         sx = l[0] * (u - floor(u)) + l[2] * (v - floor(v));
@@ -3604,8 +3615,8 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     return TXM_OK;
 }
 
-/* Give a job a piece, its top left pixel at (x, y); what lies outside the canvas is left out. */
-static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) {
+/* Fix a piece on the canvas of a job, its top left pixel at (x, y); it may reach beyond that. */
+static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
     const txp_source *s = job->source;
     const size_t n = (size_t)s->bytes, lanes = (size_t)txp_lanes(s);
     for (int v = 0; v < p->height; v++) {
@@ -3622,9 +3633,9 @@ static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) 
     }
 }
 
-/* Run a job and keep width x height pixels of it from (x, y) on as a piece. Frees the job. */
-static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int height,
-                                 txp_piece *p, txm_env *env) {
+/* Run a job and keep the width x height pixels at (x, y) of it as a piece. Frees the job. */
+static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int height,
+                                txp_piece *p, txm_env *env) {
     const size_t lanes = (size_t)txp_lanes(job->source);
     const size_t pixels = (size_t)width * (size_t)height;
     txm_status status = txp_run(job, env);
@@ -3651,14 +3662,13 @@ static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int
     return TXM_OK;
 }
 
-/* What a window of the plane needs: of each column of cells, for the row that is drawn now, what
-   lies on the corners and sides of the cells. */
+/* The pieces on the corners and sides of a row of cells, of all columns that a window touches. */
 typedef struct txp_cells {
     const texpatch_plane *plane;
     int64_t first; /* column                                                   */
     int columns;
     txp_piece *corner[2], *side[2]; /* columns + 1 corners, columns sides: above, below          */
-    txp_piece *upright;             /* columns + 1 sides between above and below                 */
+    txp_piece *vertical;             /* columns + 1 sides between above and below                 */
 } txp_cells;
 
 static uint64_t txp_plane_seed(const texpatch_plane *plane, int64_t column, int64_t row, int kind) {
@@ -3666,17 +3676,17 @@ static uint64_t txp_plane_seed(const texpatch_plane *plane, int64_t column, int6
                     (uint64_t)row * 0x9e3779b97f4a7c15u);
 }
 
-/* The corner (column, row): made alone, its surroundings thrown away. */
+/* The corner (column, row): made with a margin around it that is discarded. */
 static txm_status txp_plane_corner(const texpatch_plane *plane, int64_t column, int64_t row,
                                    txp_piece *p, txm_env *env) {
     const int h = plane->half, c = plane->cell;
     texpatch_job *job;
     txm_status status = txp_plane_job(plane, column * c - 2 * h, row * c - 2 * h, 4 * h, 4 * h,
                                       txp_plane_seed(plane, column, row, 1), env, &job);
-    return status == TXM_OK ? txp_plane_keep(job, h, h, 2 * h, 2 * h, p, env) : status;
+    return status == TXM_OK ? txp_plane_run(job, h, h, 2 * h, 2 * h, p, env) : status;
 }
 
-/* The side from corner a to corner b, rightwards or downwards. */
+/* The side from corner a to corner b, to the right or down. */
 static txm_status txp_plane_side(const texpatch_plane *plane, int64_t column, int64_t row, int down,
                                  const txp_piece *a, const txp_piece *b, txp_piece *p,
                                  txm_env *env) {
@@ -3687,12 +3697,12 @@ static txm_status txp_plane_side(const texpatch_plane *plane, int64_t column, in
                       down ? 4 * h : c + 2 * h, down ? c + 2 * h : 4 * h,
                       txp_plane_seed(plane, column, row, 2 + down), env, &job);
     if (status != TXM_OK) return status;
-    txp_plane_give(job, a, down ? h : 0, down ? 0 : h);
-    txp_plane_give(job, b, down ? h : c, down ? c : h);
-    return txp_plane_keep(job, h, h, down ? 2 * h : c, down ? c : 2 * h, p, env);
+    txp_plane_fix(job, a, down ? h : 0, down ? 0 : h);
+    txp_plane_fix(job, b, down ? h : c, down ? c : h);
+    return txp_plane_run(job, h, h, down ? 2 * h : c, down ? c : 2 * h, p, env);
 }
 
-/* The job of a cell, done: its pixel (0, 0) lies at (half, half) of the canvas. */
+/* The finished job of a cell: its pixel (0, 0) lies at (half, half) of the canvas. */
 static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t row, txm_env *env,
                                      texpatch_job **out) {
     const texpatch_plane *plane = cells->plane;
@@ -3703,10 +3713,10 @@ static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t
                                       txp_plane_seed(plane, at, row, 4), env, &job);
     if (status != TXM_OK) return status;
     for (int k = 0; k < 2; k++) {
-        txp_plane_give(job, &cells->side[k][column], h, k * c);
-        txp_plane_give(job, &cells->upright[column + k], k * c, h);
+        txp_plane_fix(job, &cells->side[k][column], h, k * c);
+        txp_plane_fix(job, &cells->vertical[column + k], k * c, h);
         for (int d = 0; d < 2; d++)
-            txp_plane_give(job, &cells->corner[k][column + d], d * c, k * c);
+            txp_plane_fix(job, &cells->corner[k][column + d], d * c, k * c);
     }
     status = txp_run(job, env);
     if (status == TXM_OK) *out = job;
@@ -3714,7 +3724,7 @@ static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t
     return status;
 }
 
-/* Corners (below = 0: of the upper ones too) and sides of a row of cells. */
+/* Make the corners and sides of a row of cells that are not there yet. */
 static txm_status txp_plane_row(const txp_cells *cells, int64_t row, txm_env *env) {
     const texpatch_plane *plane = cells->plane;
     txm_status status = TXM_OK;
@@ -3733,14 +3743,14 @@ static txm_status txp_plane_row(const txp_cells *cells, int64_t row, txm_env *en
     }
     for (int i = 0; i <= cells->columns && status == TXM_OK; i++)
         status = txp_plane_side(plane, cells->first + i, row, 1, &cells->corner[0][i],
-                                &cells->corner[1][i], &cells->upright[i], env);
+                                &cells->corner[1][i], &cells->vertical[i], env);
     return status;
 }
 
-/* The cells' row is done: what lay below lies above the next. */
+/* Go to the next row of cells: what is below this row is above that. */
 static void txp_plane_next_row(const txp_cells *cells) {
     for (int i = 0; i <= cells->columns; i++) {
-        txp_piece_free(&cells->upright[i]);
+        txp_piece_free(&cells->vertical[i]);
         txp_piece_free(&cells->corner[0][i]);
         cells->corner[0][i] = cells->corner[1][i];
         memset(&cells->corner[1][i], 0, sizeof(txp_piece));
@@ -3789,7 +3799,7 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
     plane->half = TXP_WINDOW / 2 << (s->levels - 1);
     plane->cell = 16 * plane->half;
     plane->seed = desc->seed;
-    txp_first_shift(s, desc->seed, &plane->shift_x, &plane->shift_y);
+    txp_lattice_start(s, desc->seed, &plane->shift_x, &plane->shift_y);
     plane->memory = memory;
     plane->source_memory = source_memory;
     *out = plane;
@@ -3806,10 +3816,10 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
     txm_arena_free(&plane->memory); /* the plane lies in it */
 }
 
-/* The part of a window that lies on a done cell, its pixel (0, 0) at (cx, cy) of the window. */
-static txm_status txp_plane_show(const texpatch_job *job, int half, int cell, int64_t cx,
-                                 int64_t cy, int width, int height, const txm_image *out,
-                                 texpatch_source *sources, txm_env *env) {
+/* Draw the part of a window on a finished cell, whose pixel (0, 0) is at (cx, cy) of the window. */
+static txm_status txp_plane_draw_cell(const texpatch_job *job, int half, int cell, int64_t cx,
+                                      int64_t cy, int width, int height, const txm_image *out,
+                                      texpatch_source *sources, txm_env *env) {
     const int x0 = cx < 0 ? 0 : (int)cx, y0 = cy < 0 ? 0 : (int)cy;
     const int x1 = cx + cell < width ? (int)(cx + cell) : width;
     const int y1 = cy + cell < height ? (int)(cy + cell) : height;
@@ -3867,29 +3877,29 @@ TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t
         cells.corner[k] = pieces + k * (cells.columns + 1);
         cells.side[k] = pieces + (2 + k) * (cells.columns + 1);
     }
-    cells.upright = pieces + 4 * (cells.columns + 1);
-    txm_env quiet; /* the steps of a piece report as one: their own progress means nothing here */
-    txp_quiet under;
-    under.env = env;
-    under.total = (float)(bottom - top + 1) * (float)cells.columns;
-    under.done = 0;
-    quiet = txp_quiet_env(&under);
+    cells.vertical = pieces + 4 * (cells.columns + 1);
+    txm_env nested; /* reports progress in cells, not in the steps of each */
+    txp_nested cells_done;
+    cells_done.env = env;
+    cells_done.total = (float)(bottom - top + 1) * (float)cells.columns;
+    cells_done.done = 0;
+    nested = txp_nested_env(&cells_done);
     for (int64_t row = top; row <= bottom && status == TXM_OK; row++) {
-        status = txp_plane_row(&cells, row, &quiet);
+        status = txp_plane_row(&cells, row, &nested);
         for (int i = 0; i < cells.columns && status == TXM_OK; i++) {
             texpatch_job *job = NULL;
-            status = txp_plane_cell_job(&cells, i, row, &quiet, &job);
+            status = txp_plane_cell_job(&cells, i, row, &nested, &job);
             if (status == TXM_OK)
-                status = txp_plane_show(job, plane->half, cell, (cells.first + i) * cell - x,
-                                        row * cell - y, width, height, out, sources, &quiet);
+                status = txp_plane_draw_cell(job, plane->half, cell, (cells.first + i) * cell - x,
+                                             row * cell - y, width, height, out, sources, &nested);
             texpatch_free(job);
-            under.done += 1;
+            cells_done.done += 1;
         }
         if (status == TXM_OK) txp_plane_next_row(&cells);
     }
     for (int i = 0; i < 5 * (cells.columns + 1); i++) txp_piece_free(&pieces[i]);
     txm_arena_free(&scratch);
-    if (status != TXM_OK && env) memcpy(env->message, quiet.message, sizeof quiet.message);
+    if (status != TXM_OK && env) memcpy(env->message, nested.message, sizeof nested.message);
     return status;
 }
 
@@ -3898,14 +3908,14 @@ TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t
 typedef struct txp_halving {
     const txm_image *image, *half;
     const texpatch_map *map;
-    const float *linear; /* of 256 bytes; NULL: samples are amounts already                     */
+    const float *linear; /* of the 256 bytes; NULL: samples are linear already                  */
 } txp_halving;
 
 static void txp_half_row(void *context, int y) {
     const txp_halving *h = (const txp_halving *)context;
     const txm_image *im = h->image, *to = h->half;
     const int n = im->channels;
-    const int colours = n == 2 ? 1 : n == 4 ? 3 : n; /* the last of an even count is alpha */
+    const int colours = n == 2 ? 1 : n == 4 ? 3 : n; /* the last of 2 or 4 is alpha */
     for (int x = 0; x < to->width; x++) {
         float out[4] = {0, 0, 0, 0};
         int count = 0;

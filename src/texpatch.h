@@ -2,11 +2,11 @@
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     From a photograph of a texture it makes as much of the same as is wanted: bricks stay in their
-     courses, tiles and weaves on their lattice, gravel becomes other gravel [1]. Several maps of a
-     material (albedo, normals, height ...) in register; tileable; guided by a painted map (of which
-     texedges.h makes one out of drawn strokes); around pixels that are to be kept; parts made anew;
-     any window of a plane without end.
+     Synthesises texture of any size from a photograph: bricks stay in their courses, tiles and
+     woven patterns on their lattice, gravel becomes other gravel [1]. Several maps of a material
+     (albedo, normals, height ...) are made in register. The result can be tileable, follow a
+     painted guide (texedges.h makes one from drawn strokes), keep given pixels, and have parts of
+     it made again; or it is any window of an endless plane.
 
    QUICK START                                 (tests build and run this very block)
      // Twice as much of a texture. cc -std=c99 quick.c -lm
@@ -43,30 +43,32 @@
    WHICH CALL
      texpatch_make        a picture, or several maps in register, in one call
      texpatch_begin ...   the same in steps with a picture after each of them; texpatch_again makes
-                          a part anew, texpatch_source_at tells where each pixel comes from
+                          a part again, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
-     texpatch_half        coarser levels of a result
-     texsyn.h makes stochastic texture out of a model of a few kB instead of pieces of the
-     photograph; textiles.h cuts sets of tiles that are laid when the picture is drawn.
+     texpatch_half        coarser levels of detail of a result
+     texsyn.h makes stochastic texture from a model of a few kB instead of pieces of the photograph;
+     textiles.h makes sets of tiles that are laid when the picture is drawn.
 
    HOW IT WORKS
-     Not colours but coordinates are synthesised: each pixel of the output names one of the
-     exemplar. First pass [1, 3.4; 3], at the coarsest level of a pyramid: patches of N x N, N / 2
-     apart, in scan order, each the best match of all places, joined along minimum-error cuts.
-     Places off the exemplar's lattice - found in its autocorrelation - cost more, and so do places
-     that were used more than others. Second pass [1, 3.5; 2], coarse to fine: neighbourhoods of 16
-     then 8 pixels look for their best match among what their pixels continue, at random and a
-     lattice step away; each pixel takes of all that cover it the one nearest to their mean, with
-     the adaptive weights w = P |x - z|^(r - 2), r = 0.8, where P is the share of well-matched
-     neighbourhoods among those of high frequency around. Taking one instead of the mean, nothing
-     blurs. Differences are sums of absolute differences of bytes. At the end pieces are bent by up
-     to 4 pixels, so that lines meet at their seams, and small steps of colour there are spread.
-     The output of a torus, a part made anew and a cell of the plane are all the same work with
-     some pixels given.
+     Coordinates are synthesised, not colours [5]: each pixel of the output refers to a pixel of the
+     exemplar. First pass [1, 3.4; 3], at the coarsest level of a pyramid: patches of N x N pixels,
+     N / 2 apart, in scan order, each the best match of all positions, joined along minimum-error
+     cuts. Positions off the exemplar's lattice, which is found in its autocorrelation, cost more,
+     and so do those that were used more often than others. Second pass [1, 3.5; 2], coarse to fine:
+     neighbourhoods of 16, then 8 pixels search their best match among what their pixels already
+     show, at random positions [4] and one lattice step away. Each pixel takes, of the candidates of
+     all neighbourhoods that cover it, the one nearest to their mean with the adaptive weights
+     w = P |x - z|^(r - 2), r = 0.8, where P is the share of well-matched neighbourhoods among those
+     of high frequency nearby. As it takes one candidate and not the mean, nothing is blurred.
+     Differences are sums of absolute differences of bytes. At the end pieces are bent by up to 4
+     pixels so that lines meet at seams, and small steps of colour there are spread.
+     A tileable output, a part made again and a cell of the plane are the same job with some pixels
+     given.
 
-   WEAKNESSES
-     Stones that touch are merged here and there; perspective is not understood; a lattice that is
-     not parallel (pavement waves, fans) is not found. A knot of wood comes again.
+   LIMITS
+     Touching stones are sometimes merged; perspective is not corrected; a lattice whose rows are
+     not parallel (waves, fans) is not found. What is unique in the exemplar, such as a knot in
+     wood, is repeated.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXPATCH_STATIC       every function static to the including file (set it everywhere)
@@ -74,21 +76,21 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     For each pixel of the output some 60 bytes while it is made, RGB; of the exemplar some 6,
-     times the turned and mirrored forms. The plane holds one cell at a time, and 24 bytes for each
-     pixel along the upper and lower sides of a row of cells.
+     RGB: some 60 bytes for each pixel of the output while it is made, some 6 for each pixel of the
+     exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
+     bytes for each pixel along the upper and lower sides of a row of cells.
 
    TIME   (one core of 2023; make bench measures yours)
-     512 x 512 out of 256 x 256 pixels, RGB: 0.3 s; without optimisation (passes = -1) 0.15 s. It
-     grows with the pixels of the output; the exemplar's size counts at the coarsest level alone.
-     The parallel-for hook spreads rows of windows and bands of rows.
+     512 x 512 from 256 x 256 pixels, RGB: 0.3 s; without optimisation (passes = -1) 0.15 s. It is
+     proportional to the pixels of the output; the exemplar's size matters only at the coarsest
+     level. The parallel-for hook runs rows of neighbourhoods and bands of rows.
 
    THREADS
-     No global state. Calls with different env and outputs may overlap; a plane may be drawn by
-     many, a job belongs to one call at a time.
+     No global state. Calls with different env and outputs may overlap; many threads may draw the
+     same plane, a job belongs to one call at a time.
 
    SAME BYTES
-     All choices are made in integers, or in float and double rounded once: the same bytes on any
+     All decisions are made in integers, or in float and double rounded once: the same bytes on any
      number of threads, with and without SIMD and on any compiler that keeps to IEEE 754 (see
      texmath.h), built with -ffp-contract=off. The levels of texpatch_half depend on libm's pow.
 
@@ -136,13 +138,13 @@ enum {
 
 /* How one of the maps is treated; all zero: a picture that follows the others. */
 typedef struct texpatch_map {
-    float weight;  /* 0..16: how much a difference in this map counts when pieces are matched;
-                      0 = it follows the others                                              */
+    float weight;  /* 0..16: of a difference in this map when pieces are matched; 0 = it follows
+                      the others                                                             */
     int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
                       as vectors, kept at unit length, turned with the piece. x to the right,
                       y up (OpenGL); 2 = y down (DirectX)                                     */
-    int is_label;  /* values are names, not amounts: never blended or interpolated           */
-    int is_data;   /* amounts (height, roughness), not colours: averaged as they are         */
+    int is_label;  /* values are labels, not amounts: never blended or interpolated          */
+    int is_data;   /* amounts (height, roughness), not colours: averaged without decoding    */
 } texpatch_map;
 
 /* One exemplar: a photograph, or several maps of one material in register. */
@@ -163,46 +165,46 @@ typedef struct texpatch_desc {
     const texpatch_map *maps; /* map_count of them; NULL = only the first has weight, 1          */
     int width, height;        /* of the output, in pixels, 1 or more                             */
     int tileable;             /* TEXPATCH_TILE_X | TEXPATCH_TILE_Y: opposite sides fit            */
-    int patch;  /* side N of the patches of the first pass, in pixels of the output, which are laid
-                   N / 2 apart; 0 = what suits the exemplar                                      */
+    int patch;  /* side N of the patches of the first pass, in pixels of the output; they are laid
+                   N / 2 apart; 0 = chosen for the exemplar                                      */
     int passes; /* optimisation passes for each size of neighbourhood, 1..16; 0 = 3 (2 at full
-                   size); -1 = none: patches, cuts and blending alone, four times as fast        */
+                   size); -1 = none: patches, cuts and blending alone, in less than half the time */
     int turns;  /* 1, 2 or 4: pieces may be turned by half or quarter turns; 0 = 1               */
     int mirror; /* pieces may be mirrored left to right                                          */
-    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 a piece may not
-                      go on farther than a neighbourhood, which costs detail and likeness        */
-    int lattice;   /* 0 = find out whether the exemplar has a lattice and keep it; 1 = it has this
-                      one; -1 = treat it as having none. It is looked for in a single exemplar
-                      that is neither turned nor mirrored                                        */
+    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 no piece is
+                      larger than a neighbourhood, which costs detail and likeness               */
+    int lattice;   /* 0 = find the lattice of the exemplar, if it has one, and keep it; 1 = it has
+                      the one given below; -1 = treat it as having none. A lattice is searched in
+                      a single exemplar that is neither turned nor mirrored                      */
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
-    txm_image guide;    /* what the exemplars' guides should look like here: width x height,
-                           channels and sample of theirs; pixels NULL: none                      */
-    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide says nothing here;
+    txm_image guide;    /* what the exemplars' guides shall look like here: width x height, with
+                           their channels and sample type; pixels NULL: none                     */
+    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide does not count here;
                            pixels NULL: it counts everywhere                                     */
-    float guide_weight; /* 0..16: of a difference in the guide against one in a map of weight 1;
+    float guide_weight; /* 0..16: of a difference in the guide, relative to a map of weight 1;
                            0 = 2                                                                 */
-    const txm_image *kept; /* map_count pictures of width x height to be kept where keep is
-                           non-zero; NULL: none. They need not come from the exemplar            */
+    const txm_image *kept; /* map_count pictures of width x height, kept where keep is non-zero;
+                           NULL: none. They need not come from the exemplar                      */
     txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
     uint64_t seed;         /* another seed, another texture                                      */
 } texpatch_desc;
 
 /* Make a texture in one call.
 
-   env    NULL, or how to allocate, report and spread the work
+   env    NULL, or how to allocate, report, cancel and run in parallel
    out    map_count pictures of desc->width x desc->height, channels and sample of the maps;
           untouched after an error
-   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps or guides that do not go
-          together or samples that are not finite; TXM_TOO_SMALL for an exemplar under
-          TEXPATCH_MIN_SIDE, or whose mask leaves no piece; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY;
-          TXM_CANCELLED
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps or guides that do not match
+          or samples that are not finite; TXM_TOO_SMALL for an exemplar under TEXPATCH_MIN_SIDE, or
+          whose mask leaves no piece; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   see TIME and MEMORY                                                                 */
 TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
                                       const txm_image *out);
 
 /* ---- step by step ------------------------------------------------------------------------ */
 
-/* A texture in the making. It keeps a copy of the allocator, not of the exemplars' pictures. */
+/* A texture that is made step by step. It keeps a copy of the allocator, but not of the exemplars'
+   pictures. */
 typedef struct texpatch_job texpatch_job;
 
 /* Prepare a job: pyramids, lattice. The same statuses as texpatch_make. */
@@ -215,27 +217,27 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
    more   receives 0 once nothing is left to do; NULL is allowed                              */
 TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
 
-/* Draw a map as it is now. Possible after any step but no step at all: before the first,
-   TXM_BAD_ARGUMENT. A window of the output may be drawn: out's top left pixel is pixel (x, y) of
-   it, and all of out must lie inside. */
+/* Draw a map as it is now, after one step or more (before the first, TXM_BAD_ARGUMENT). out may be
+   a window of the output: its top left pixel is pixel (x, y) of it, and all of out must lie
+   inside. */
 TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
                                       txm_image out);
 
-/* Where a pixel of the output comes from. Anything that lies in register with the exemplars can be
-   looked up later through it. */
+/* Where a pixel of the output comes from. With it anything that is in register with the exemplars
+   can be looked up later. */
 typedef struct texpatch_source {
-    float x, y;    /* pixel of the exemplar, as it is given (turns undone); fractions lie between
-                      pixel centres, which are whole numbers                                    */
+    float x, y;    /* pixel of the exemplar as given (turns undone); pixel centres are whole
+                      numbers, fractions lie between them                                       */
     int exemplar;  /* -1: the pixel was kept                                                    */
-    int turn;      /* quarter turns counter-clockwise that the piece has made, 0..3; + 4: it is
-                      mirrored (before turning)                                                 */
+    int turn;      /* quarter turns of the piece, counter-clockwise, 0..3; + 4: it is mirrored
+                      (before turning)                                                          */
 } texpatch_source;
 TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
 
-/* Make a part anew: where again is non-zero (TXM_U8, 1 channel, the size of the output), after
-   all steps are done (else they are done first). What lies outside is kept and joined to. The
-   following steps do the work, in time proportional to the part's bounding box.
-   guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = as it was */
+/* Make a part again: the pixels where `again` is non-zero (TXM_U8, 1 channel, the size of the
+   output). Steps that are left are done first. All other pixels are kept, and the part is fitted to
+   them. The following steps do the work, in time proportional to the part's bounding box.
+   guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = unchanged */
 TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
                                        const txm_image *guide, const txm_image *guide_mask,
                                        uint64_t seed, txm_env *env);
@@ -249,33 +251,39 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 /* ---- levels of detail -------------------------------------------------------------------- */
 
 /* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
-   pixels, in linear light for 8- and 16-bit colours that are not data; normals are renormalised,
-   labels picked. So all levels agree with each other and with what a renderer makes of level 0.
-   map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT, TXM_TOO_LARGE */
+   pixels, in linear light for 8- and 16-bit colours that are not data; normals are normalised
+   again, of labels one is taken. So all levels agree with each other and with what a renderer makes
+   of level 0. map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT,
+   TXM_TOO_LARGE */
 TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
                                       txm_env *env, const txm_image *half);
 
 /* ---- the unbounded plane ----------------------------------------------------------------- */
 
-/* Any window of an endless texture that has no period. Windows that overlap agree to the byte,
-   whoever makes them, so a large picture can be made tile by tile, on many machines.
+/* An endless texture without a period. Windows of it that overlap agree to the byte, on whatever
+   machines they are made, so a large picture can be made tile by tile.
 
-   The plane is cut into square cells. Pieces at the cells' corners are made first, from the seed
-   and their place alone; then what lies along the edges between two of them; then the insides. */
+   The plane is divided into square cells. Pieces around the cells' corners are made first, from the
+   seed and their position alone; then strips along the sides between two of them; then the
+   insides. */
 typedef struct texpatch_plane texpatch_plane;
 
-/* desc as for a job; width, height, tileable, guide and kept are not looked at. */
+/* desc as for a job; width, height, tileable, guide and kept are ignored. */
 TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *env,
                                             texpatch_plane **out);
 
 /* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
    map_count pictures of one size. sources may be NULL, or width * height of them.
    cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
-          that are multiples of cells waste least                                             */
+          of whole cells waste least                                                          */
 TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
                                             txm_env *env, const txm_image *out,
                                             texpatch_source *sources);
+
+/* The side of a cell, in pixels; 0 if plane is NULL. */
 TEXPATCH_API int texpatch_plane_cell(const texpatch_plane *plane);
+
+/* Release a plane; NULL is allowed. */
 TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 
 #ifdef __cplusplus

@@ -5,8 +5,8 @@
 
 /* ---- a part made again ------------------------------------------------------------------ */
 
-/* Does the output's pixel under canvas pixel (x, y) belong to the part? */
-static inline int txp_is_again(const texpatch_job *job, const txm_image *again, int x, int y) {
+/* Is pixel (x, y) of the canvas in the part? The margin is where the border is. */
+static inline int txp_is_in_part(const texpatch_job *job, const txm_image *again, int x, int y) {
     x = txm_clampi(x - job->margin_x, 0, job->setup.width - 1);
     y = txm_clampi(y - job->margin_y, 0, job->setup.height - 1);
     return ((const uint8_t *)txm_image_row_const(again, y))[x] != 0;
@@ -71,7 +71,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     low_y = job->height;
     for (int y = 0; y < job->height; y++) {
         for (int x = 0; x < job->width; x++) {
-            if (!txp_is_again(job, &mask, x, y)) continue;
+            if (!txp_is_in_part(job, &mask, x, y)) continue;
             low_x = x < low_x ? x : low_x;
             high_x = x > high_x ? x : high_x;
             low_y = y < low_y ? y : low_y;
@@ -108,7 +108,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         part->memory = own;
     }
 
-    /* nothing can fail from here on */
+    /* from here on nothing can fail */
     for (size_t i = 0; i < all && guide; i++) {
         uint8_t *shown = job->canvas.pixels + i / (size_t)job->width * job->canvas.pitch +
                          i % (size_t)job->width * n;
@@ -135,7 +135,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         for (int x = 0; x < wide; x++) {
             const size_t i = (size_t)y * (size_t)wide + (size_t)x;
             const size_t k = txp_index(&job->canvas, x0 + x, y0 + y);
-            part->given.fixed[i] = !txp_is_again(job, &mask, x0 + x, y0 + y) ||
+            part->given.fixed[i] = !txp_is_in_part(job, &mask, x0 + x, y0 + y) ||
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];

@@ -7,14 +7,14 @@
 
 /* ---- beginning, stepping, releasing a job ----------------------------------------------- */
 
-/* Where the lattice begins: anywhere, as the seed has it. */
-static void txp_first_shift(const txp_source *s, uint64_t seed, double *x, double *y) {
+/* A random offset of the lattice. */
+static void txp_lattice_start(const txp_source *s, uint64_t seed, double *x, double *y) {
     txm_rng rng = txm_rng_make(seed, 5);
     *x = txm_rng_below(&rng, (uint32_t)s->stack[0].wide[0]);
     *y = txm_rng_below(&rng, (uint32_t)s->stack[0].high[0]);
 }
 
-/* A job on a source, with nothing given yet. It owns `memory`, in which it lies, on success. */
+/* A job on a source, with nothing given yet, in `memory`, which it owns in the end. */
 static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, int height,
                                   uint64_t seed, txm_arena *memory, txm_env *env) {
     texpatch_job *job = (texpatch_job *)txm_arena_zero(memory, 1, sizeof *job);
@@ -32,8 +32,8 @@ static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, 
     return job;
 }
 
-/* Room for what is given of a canvas; what is 0 here is not wanted. If there is none, memory->failed
-   tells. */
+/* Allocate what is given of a canvas; what is 0 here is not needed. memory->failed tells whether
+   that failed. */
 static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
                            int free_guide, int places, txm_arena *memory) {
     g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);
@@ -47,7 +47,7 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     }
 }
 
-/* The guide and its mask, on the canvas; the margin has what the border has. */
+/* Copy the guide and its mask to the canvas; the margin repeats the border. */
 static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const txm_image *mask,
                            const txp_given *g) {
     const txp_source *s = job->source;
@@ -94,7 +94,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (status != TXM_OK) return status;
 
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
-    const int room = 2 * TXP_WINDOW << (s->levels - 1); /* a canvas must hold some patches */
+    const int room = 2 * TXP_WINDOW << (s->levels - 1); /* for a few patches */
     int width = desc->width + (wx ? 0 : 2 * TXP_MARGIN);
     int height = desc->height + (wy ? 0 : 2 * TXP_MARGIN);
     if (!wx && width < room) width = room;
@@ -105,7 +105,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
     job->margin_y = wy ? 0 : TXP_MARGIN;
-    txp_first_shift(s, desc->seed, &job->shift_x, &job->shift_y);
+    txp_lattice_start(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
         txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0, &memory);
         if (memory.failed) goto no_memory;
@@ -137,7 +137,7 @@ no_memory:
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
 }
 
-/* The two fields of the finished canvas. */
+/* Compute the two fields of a canvas. */
 static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
                              float **toned, txm_env *env) {
     const txp_source *s = job->source;
@@ -172,8 +172,8 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     seams.canvas = c;
     seams.bend = &bend;
     seams.tone = &tone;
-    /* A band asks something of the first row of the next: every second one at a time, the last
-       (whose next may be the first) by itself. */
+    /* A band also writes to the first row of the next one: so every second band at a time, and the
+       last one, which may be followed by the first, alone. */
     for (int turn = 0; turn < 3; turn++) {
         const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
         for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
@@ -185,7 +185,7 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     }
     txp_field_spread(&bend);
     txp_field_spread(&tone);
-    for (int i = 0; i < TXP_ROUNDS; i++) {
+    for (int i = 0; i < TXP_SWEEPS; i++) {
         status = txp_report(job, env, "blending");
         if (status != TXM_OK) goto done;
         txp_relax_field(&bend, env);
@@ -223,7 +223,7 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
             txp_place *old = canvas.at;
             canvas.at = canvas.next;
             canvas.next = old;
-            txp_canvas_show(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
+            txp_canvas_fill(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
         }
     }
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
@@ -247,7 +247,7 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     return TXM_OK;
 }
 
-/* The part that was made anew becomes part of the whole. */
+/* Copy the part that was made again into the whole. */
 static void txp_part_join(texpatch_job *job) {
     texpatch_job *part = job->part;
     const txp_source *s = job->source;

@@ -5,7 +5,7 @@
 
 /* ---- sums of absolute differences -------------------------------------------------------- */
 
-/* Sum of |a - b| over rows of bytes, bytes a multiple of 4; once it exceeds limit, anything above
+/* Sum of |a - b| over rows of bytes, bytes a multiple of 4. Once it exceeds limit, any value above
    limit may be returned. */
 #ifdef TXP_SSE2
 static inline uint32_t txp_sad_sum(__m128i sum) {
@@ -24,7 +24,7 @@ static inline __m128i txp_sad4(const uint8_t *a, const uint8_t *b) {
     return _mm_sad_epu8(_mm_cvtsi32_si128(u), _mm_cvtsi32_si128(v));
 }
 
-/* words: 16-byte pieces of a row, tails: 4-byte pieces behind them; constants where it is called */
+/* words: 16-byte pieces of a row, tails: 4-byte pieces after them; constants at the calls */
 static inline uint32_t txp_sad_fixed(const uint8_t *a, size_t a_pitch, const uint8_t *b,
                                      size_t b_pitch, int words, int tails, int rows,
                                      uint32_t limit) {
@@ -98,9 +98,9 @@ static inline int txp_fits(const txp_source *s, const txp_stack *k, int x, int y
     return 1;
 }
 
-/* Copy the compared bytes of the places into the canvas, rows from..to-1; what is fixed keeps its
-   own, and so does the guide where it binds. */
-static void txp_canvas_show(const txp_source *s, const txp_stack *k, const txp_canvas *c, int from,
+/* Fill rows from..to-1 of the canvas with the compared bytes of their places. Fixed pixels keep
+   their own bytes, and so does the guide where it counts. */
+static void txp_canvas_fill(const txp_source *s, const txp_stack *k, const txp_canvas *c, int from,
                             int to) {
     const size_t n = (size_t)s->bytes, guide = (size_t)s->guide_at;
     for (int y = from; y < to; y++) {
@@ -116,8 +116,8 @@ static void txp_canvas_show(const txp_source *s, const txp_stack *k, const txp_c
     }
 }
 
-/* Repeat the first columns and rows behind the ends of the axes that wrap. */
-static void txp_canvas_close(const txp_source *s, const txp_canvas *c, uint8_t *pixels) {
+/* Repeat the first columns and rows beyond the ends of the axes that wrap. */
+static void txp_canvas_repeat(const txp_source *s, const txp_canvas *c, uint8_t *pixels) {
     const size_t n = (size_t)s->bytes;
     if (c->wrap & TEXPATCH_TILE_X) {
         for (int y = 0; y < c->height; y++) {
@@ -134,7 +134,7 @@ static void txp_canvas_close(const txp_source *s, const txp_canvas *c, uint8_t *
 }
 
 /* May any pixel of the size x size ones at (x, y) be changed? */
-static int txp_is_open(const txp_canvas *c, int x, int y, int size) {
+static int txp_has_free_pixel(const txp_canvas *c, int x, int y, int size) {
     if (!c->fixed) return 1;
     for (int v = 0; v < size; v++) {
         for (int u = 0; u < size; u++) {

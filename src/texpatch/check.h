@@ -5,7 +5,7 @@
 
 /* ---- checks of what the caller gives ---------------------------------------------------- */
 
-static int txp_is_in(float x, float low, float high) {
+static int txp_is_within(float x, float low, float high) {
     return x >= low && x <= high;
 }
 
@@ -43,7 +43,7 @@ static txm_status txp_check_mask(const txm_image *im, const char *name, int widt
     return TXM_OK;
 }
 
-/* The exemplars and how they are treated; the output's side is checked by the caller. */
+/* The fields about exemplars and how they are treated. */
 static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
                                       txm_env *env) {
     txm_status status = TXM_OK;
@@ -58,9 +58,9 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 8192 pixels");
     if (d->passes < -1 || d->passes > 16)
         return txm_fail(env, TXM_BAD_ARGUMENT, "passes must be 1 to 16, 0 for 3, or -1 for none");
-    if (!txp_is_in(d->novelty, 0, 1))
+    if (!txp_is_within(d->novelty, 0, 1))
         return txm_fail(env, TXM_BAD_ARGUMENT, "novelty must be 0 to 1");
-    if (!txp_is_in(d->guide_weight, 0, 16))
+    if (!txp_is_within(d->guide_weight, 0, 16))
         return txm_fail(env, TXM_BAD_ARGUMENT, "guide_weight must be 0 to 16");
     if (d->lattice < -1 || d->lattice > 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "lattice must be -1, 0 or 1");
@@ -88,7 +88,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     for (int m = 0; m < d->map_count; m++) {
         if (d->maps) u->kinds[m] = d->maps[m];
         else u->kinds[m].weight = m ? 0.0f : 1.0f;
-        if (!txp_is_in(u->kinds[m].weight, 0, 16))
+        if (!txp_is_within(u->kinds[m].weight, 0, 16))
             return txm_fail(env, TXM_BAD_ARGUMENT, "the weight of a map must be 0 to 16");
         u->low[m] = 0;
         u->high[m] = 0;
@@ -169,14 +169,15 @@ static txm_status txp_check_guide(const txm_image *guide, const txm_image *mask,
     return mask && mask->pixels ? txp_check_mask(mask, "guide_mask", width, height, env) : TXM_OK;
 }
 
-/* The output's side of a description. */
+/* The fields about the output. */
 static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const txp_source *s,
                                    txm_env *env) {
     txm_status status = TXM_OK;
     if (d->width < 1 || d->height < 1)
         return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
     if (d->height > TEXPATCH_MAX_PIXELS / d->width)
-        return txm_fail(env, TXM_TOO_LARGE, "more than TEXPATCH_MAX_PIXELS pixels; use windows");
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "more than TEXPATCH_MAX_PIXELS pixels; use windows of a plane");
     if (d->tileable < 0 || d->tileable > 3)
         return txm_fail(env, TXM_BAD_ARGUMENT, "tileable must be a sum of TEXPATCH_TILE_X and _Y");
     if ((d->tileable & TEXPATCH_TILE_X && d->width < TXP_PAD) ||

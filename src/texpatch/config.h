@@ -22,26 +22,26 @@ enum {
     TXP_BLOCK = 24,       /* pixels: patch of the first pass, at the coarsest level              */
     TXP_SMALL_BLOCK = 12, /* the same for exemplars without long order                           */
     TXP_WINDOW = 16,      /* pixels: the larger neighbourhood of the optimisation                */
-    TXP_PAD = 32,         /* columns and rows of a torus that are repeated behind its end        */
-    TXP_STARTS = 6,       /* first passes tried on a small canvas                                */
-    TXP_CELL = 8,         /* pixels a side of a cell of the exemplar in which use is counted     */
-    TXP_LANES = 8,        /* bands worked on at the same time, whatever the number of threads    */
+    TXP_PAD = 32,         /* columns and rows of a torus that are repeated beyond its end        */
+    TXP_STARTS = 6,       /* first passes tried on a small canvas; the best is kept              */
+    TXP_CELL = 8,         /* pixels: side of the cells in which use of the exemplar is counted   */
+    TXP_LANES = 8,        /* bands processed together, whatever the number of threads            */
     TXP_BAND = 32,        /* rows of a band                                                      */
     TXP_MAX_SHEETS = TEXPATCH_MAX_EXEMPLARS * 8
 };
 
-/* A pixel of the stack of sheets; x = -1: none, the canvas pixel is the caller's. */
+/* A pixel of the stack of sheets; x = -1: none, the pixel of the canvas is the caller's. */
 typedef struct txp_place {
     int16_t x, y;
 } txp_place;
 
-/* One exemplar in one orientation: rows first .. first + height - 1 of the stack. What it shows at
-   (x, y) is the exemplar at (xx x + xy y + x0, yx x + yy y + y0). */
+/* One exemplar in one orientation: rows first .. first + height - 1 of the stack. Its pixel (x, y)
+   is the exemplar at (xx x + xy y + x0, yx x + yy y + y0). */
 typedef struct txp_sheet {
     int exemplar, turn;
     int width, height;
     double xx, xy, x0, yx, yy, y0;
-    int plain; /* the map above is that of turn alone: whole pixels onto whole pixels           */
+    int plain; /* it is only turned, not resampled: whole pixels are whole pixels               */
 } txp_sheet;
 
 /* The stack at one resolution: the bytes that are compared, bytes of them per pixel. */
@@ -59,7 +59,7 @@ typedef struct txp_stack {
 /* What all jobs on the same exemplars share. */
 typedef struct txp_source {
     int sheets, levels, bytes, guide_at, guide_bytes;
-    int has_lattice, is_random; /* is_random: no long order at all                              */
+    int has_lattice, is_random; /* is_random: no long-range order at all                        */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
     txp_sheet sheet[TXP_MAX_SHEETS];
     txp_stack stack[TXP_MAX_LEVELS];
@@ -68,12 +68,12 @@ typedef struct txp_source {
 /* Room for a band of rows, per pixel. */
 typedef struct txp_band {
     int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
-    int32_t *nearest;      /* how near the best candidate is to the mean                       */
+    int32_t *nearest;      /* squared distance of the best candidate from the mean             */
     uint8_t *mean;
 } txp_band;
 
-/* The picture in the making at one resolution. pixels has a copy of the first columns and rows
-   behind the end of an axis that wraps. */
+/* The picture at one resolution. Beyond the end of an axis that wraps, pixels repeats the first
+   columns and rows. */
 typedef struct txp_canvas {
     int width, height, wrap; /* wrap: bits as in texpatch_desc.tileable                        */
     size_t pitch;
@@ -81,7 +81,7 @@ typedef struct txp_canvas {
     txp_place *at, *next; /* next: where a pass puts what it chooses                           */
     txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
-    uint8_t *free_guide; /* 1 = the guide says nothing here; NULL: it always does, or is none  */
+    uint8_t *free_guide; /* 1 = the guide does not count here; NULL: it does, or there is none  */
 } txp_canvas;
 
 #endif /* TEXPATCH_CONFIG_H */

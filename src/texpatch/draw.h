@@ -5,8 +5,7 @@
 
 /* ---- what a pixel shows ----------------------------------------------------------------- */
 
-/* A pixel of the output: from sheet `sheet` (-1: it is a kept one), place (x, y) of it; bent: not
-   where its neighbours' places say. */
+/* What a pixel of the output shows: place (x, y) of sheet `sheet`; sheet -1: a kept pixel. */
 typedef struct txp_pixel {
     int sheet, is_whole;
     double x, y;
@@ -31,7 +30,7 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     txp_place p = job->canvas.at[i];
     if (p.x < 0) return out;
     for (int l = job->level; l > 0; l--)
-        p = txp_finer(s, l, p, (x >> (l - 1)) & 1, (y >> (l - 1)) & 1);
+        p = txp_refine_place(s, l, p, (x >> (l - 1)) & 1, (y >> (l - 1)) & 1);
     out.sheet = s->sheets > 1 ? s->stack[0].sheet[p.y] : 0;
     out.x = p.x;
     out.y = p.y - s->stack[0].first[out.sheet];
@@ -65,10 +64,10 @@ TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, 
 
 /* Turn the vector of a normal map with its piece and give it unit length. */
 static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
-    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* y of the map in rows downwards */
+    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* rows run downwards */
     const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
     double nz = 2 * (double)v[2] - 1;
-    /* The sheet's axes in the exemplar, as orthogonal directions: a turn, perhaps a mirror. */
+    /* the axes of the sheet in the exemplar, orthogonal: a rotation, or a reflection */
     const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
     const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
     double x = (sheet->xx * nx + sheet->yx * ny) / lx;
@@ -138,7 +137,7 @@ static void txp_draw_row(void *context, int row) {
     }
 }
 
-/* The checks of an output, and where the tone of a map is found. */
+/* Check an output, and find where the tone of its map is stored. */
 static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_image out,
                                  txp_draw *d) {
     const txm_status status = txm_image_check(&out, "out", TEXPATCH_MAX_PIXELS, env);
@@ -160,7 +159,7 @@ static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_
     return TXM_OK;
 }
 
-/* All rows of out, some at a time; from..1 is the progress meanwhile. */
+/* Draw all rows of out, some at a time; progress runs from `from` to 1. */
 static txm_status txp_draw_rows(const txp_draw *d, float from, txm_env *env) {
     txp_draw some = *d;
     for (int y = 0; y < d->out.height; y += 64) {
@@ -193,7 +192,7 @@ TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, i
     return txp_draw_rows(&d, 0, env);
 }
 
-/* All steps that are left. */
+/* Run all steps that are left. */
 static txm_status txp_run(texpatch_job *job, txm_env *env) {
     txm_status status = TXM_OK;
     for (int more = 1; more && status == TXM_OK;) status = texpatch_step(job, env, &more);
@@ -218,7 +217,7 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
             status = txm_fail_at(env, TXM_BAD_ARGUMENT, "out", "must be width x height pixels");
     }
     if (status == TXM_OK) status = txp_run(job, env);
-    /* drawn into pictures of our own, so that out is untouched if the caller cancels */
+    /* drawn into scratch pictures, so that out is untouched if the caller cancels */
     for (int m = 0; m < maps && status == TXM_OK; m++) {
         const size_t row = txm_sample_bytes(out[m].sample) * (size_t)draws[m].out.channels;
         draws[m].out.stride = (ptrdiff_t)((size_t)desc->width * row);

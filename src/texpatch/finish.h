@@ -6,42 +6,42 @@
 /* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
 
 enum {
-    TXP_REACH = 4,
-    TXP_PROBE = 8,
-    TXP_ROUNDS = 12,
-    TXP_SEAMS = 64,
-    TXP_TILE = 16,
-    TXP_FADE = 48,
-    TXP_GIVEN = 64
+    TXP_MAX_BEND = 4,    /* pixels by which a piece is bent at most                              */
+    TXP_PROBE = 8,       /* pixels a side that are compared at a seam                            */
+    TXP_SWEEPS = 12,     /* of the relaxation                                                    */
+    TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
+    TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
+    TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
+    TXP_JUMP_UNIT = 64   /* jumps are stored in 1 / 64                                           */
 };
 
-/* A field over the canvas that shall jump by given amounts between neighbours: the minimum of
+/* A field over the canvas with given jumps between neighbouring pixels: the minimum of
 
        sum over neighbours of pull |u(q) - u(p) - jump|^2 + screen |u|^2,
 
-   which jumps at the seams and fades within 1 / sqrt(screen) pixels.                            */
+   which jumps at seams and fades within 1 / sqrt(screen) pixels.                                */
 typedef struct txp_field {
     int width, height, wrap, lanes; /* lanes: values per pixel, 2 or a multiple of 4           */
     float *value;
-    int16_t *given;   /* lanes per pixel: pull times jump, in 1 / TXP_GIVEN                    */
+    int16_t *jump;    /* lanes per pixel: pull times jump, in 1 / TXP_JUMP_UNIT                 */
     uint8_t *pull[2]; /* to the right neighbour, to the lower one, in 1 / 255; 255 inside a piece */
     float scale[4 * 255 + 1]; /* by the sum of the four pulls: 1 / (sum + screen)               */
-    const uint8_t *fixed; /* value stays as it is; NULL: nowhere                               */
-    uint8_t *busy; /* of each tile of TXP_TILE x 8 pixels: is anything asked of it or near it?  */
+    const uint8_t *fixed; /* 1 = value does not change; NULL: it does everywhere               */
+    uint8_t *active; /* of each tile of TXP_TILE x 8 pixels: 2 = it has jumps, 1 = near one    */
     int tiles;     /* in a row                                                                */
-    int colour;    /* of the pixels that are relaxed now, as on a chessboard                  */
+    int colour;    /* of the pixels that are relaxed now, on a checkerboard                   */
 } txp_field;
 
 static inline void txp_field_mark(const txp_field *f, int x, int y) {
-    f->busy[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
+    f->active[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
 }
 
-/* Tiles within reach of those that are marked are busy too. */
+/* Activate the tiles within TXP_FADE of marked ones. */
 static void txp_field_spread(const txp_field *f) {
     const int rows = (f->height + 7) / 8, across = TXP_FADE / TXP_TILE, along = TXP_FADE / 8;
     for (int j = 0; j < rows; j++) {
         for (int i = 0; i < f->tiles; i++) {
-            if (f->busy[j * f->tiles + i] != 2) continue;
+            if (f->active[j * f->tiles + i] != 2) continue;
             for (int v = -along; v <= along; v++) {
                 int y = j + v;
                 if (f->wrap & TEXPATCH_TILE_Y) y = (y + 2 * rows) % rows;
@@ -50,7 +50,7 @@ static void txp_field_spread(const txp_field *f) {
                     int x = i + u;
                     if (f->wrap & TEXPATCH_TILE_X) x = (x + 2 * f->tiles) % f->tiles;
                     if (x < 0 || x >= f->tiles) continue;
-                    if (!f->busy[y * f->tiles + x]) f->busy[y * f->tiles + x] = 1;
+                    if (!f->active[y * f->tiles + x]) f->active[y * f->tiles + x] = 1;
                 }
             }
         }
@@ -60,31 +60,31 @@ static void txp_field_spread(const txp_field *f) {
 static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *next,
                                    const uint8_t *pull, int lanes) {
     float *own = f->value + i * (size_t)lanes;
-    const int16_t *given = f->given + i * (size_t)lanes;
+    const int16_t *jump = f->jump + i * (size_t)lanes;
     const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
     const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
-    const float unit = 255.0f / (float)TXP_GIVEN;
+    const float unit = 255.0f / (float)TXP_JUMP_UNIT;
     const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
     const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
     for (int k = 0; k < lanes; k++) {
         const float across = txm_float(txm_float(l * a[k]) + txm_float(r * b[k]));
         const float along = txm_float(txm_float(u * c[k]) + txm_float(d * e[k]));
-        const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)given[k]));
+        const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)jump[k]));
         own[k] = txm_float(own[k] + txm_float(1.6f * txm_float(txm_float(all * scale) - own[k])));
     }
 }
 
-/* The pixels of one colour in 8 rows, relaxed beyond their best value. */
+/* The pixels of one colour in 8 rows: successive over-relaxation. */
 static void txp_relax_rows(void *context, int index) {
     const txp_field *f = (const txp_field *)context;
     const int w = f->width, h = f->height, lanes = f->lanes;
     for (int y = 8 * index; y < 8 * index + 8 && y < h; y++) {
         const int up = y > 0 ? y - 1 : f->wrap & TEXPATCH_TILE_Y ? h - 1 : -1;
         const int down = y + 1 < h ? y + 1 : f->wrap & TEXPATCH_TILE_Y ? 0 : -1;
-        const uint8_t *busy = f->busy + (size_t)(y / 8) * (size_t)f->tiles;
+        const uint8_t *active = f->active + (size_t)(y / 8) * (size_t)f->tiles;
         for (int x = (y + f->colour) % 2; x < w; x += 2) {
             const size_t i = (size_t)y * (size_t)w + (size_t)x;
-            if (!busy[x / TXP_TILE]) {
+            if (!active[x / TXP_TILE]) {
                 x += TXP_TILE - 2; /* the next tile */
                 continue;
             }
@@ -113,13 +113,13 @@ static void txp_relax_field(txp_field *f, txm_env *env) {
         txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
 }
 
-/* A seam between two pieces, as last measured: its key is how far their offsets are apart. */
+/* A measured seam between two pieces. Its key is the difference of their offsets. */
 typedef struct txp_seam {
     int x, y, dx, dy, found, shift[2];
 } txp_seam;
 
-/* The shift of the second piece that makes it continue the first, within TXP_REACH pixels; both are
-   seen around the same pixel. 0: none is clearly better than staying. */
+/* The shift of the second piece, up to TXP_MAX_BEND pixels, with which it continues the first best
+   around a pixel. 0: none is clearly better than no shift. */
 static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shift[2]) {
     const txp_stack *k = &s->stack[0];
     const int ax = a.x - TXP_PROBE / 2, ay = a.y - TXP_PROBE / 2;
@@ -134,8 +134,8 @@ static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shi
     uint32_t best = now / 10 * 7;
     int found = 0;
     if (now < TXP_PROBE * TXP_PROBE * 4) return 0;
-    for (int dy = -TXP_REACH; dy <= TXP_REACH; dy++) {
-        for (int dx = -TXP_REACH; dx <= TXP_REACH; dx++) {
+    for (int dy = -TXP_MAX_BEND; dy <= TXP_MAX_BEND; dy++) {
+        for (int dx = -TXP_MAX_BEND; dx <= TXP_MAX_BEND; dx++) {
             if (!txp_fits(s, k, bx + dx, by + dy, TXP_PROBE, TXP_PROBE)) continue;
             const uint32_t sad = txp_sad(target, k->pitch, txp_stack_at(s, k, bx + dx, by + dy),
                                          k->pitch, TXP_PROBE * s->bytes, TXP_PROBE, best);
@@ -149,11 +149,11 @@ static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shi
     return found;
 }
 
-/* The same, remembered for the next pixels of the seam between the same two pieces. */
-static int txp_seam_known(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
-                          txp_place b, int shift[2]) {
+/* The same, from the cache for the next pixels of a seam between the same two pieces. */
+static int txp_seam_cached(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
+                           txp_place b, int shift[2]) {
     const int dx = a.x - b.x, dy = a.y - b.y;
-    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAMS];
+    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAM_CACHE];
     if (m->dx != dx || m->dy != dy || abs(m->x - x) + abs(m->y - y) > 3) {
         m->x = x;
         m->y = y;
@@ -166,12 +166,12 @@ static int txp_seam_known(const txp_source *s, txp_seam *seams, int x, int y, tx
     return m->found;
 }
 
-/* Pixel j shall have `much` more than i. */
-static inline void txp_ask(const txp_field *f, size_t i, size_t j, size_t lane, int much) {
-    int16_t *a = f->given + i * (size_t)f->lanes + lane,
-            *b = f->given + j * (size_t)f->lanes + lane;
-    *a = (int16_t)(*a - much);
-    *b = (int16_t)(*b + much);
+/* Pixel j shall be `jump` above i. */
+static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t lane, int jump) {
+    int16_t *a = f->jump + i * (size_t)f->lanes + lane,
+            *b = f->jump + j * (size_t)f->lanes + lane;
+    *a = (int16_t)(*a - jump);
+    *b = (int16_t)(*b + jump);
 }
 
 typedef struct txp_seams {
@@ -181,9 +181,10 @@ typedef struct txp_seams {
     int first_band;
 } txp_seams;
 
-/* What the seams right of and below the pixels of a band ask of the two fields: bend (x, y) and
-   tone (compared bytes). A step of colour is what both pieces see of each other in 5 x 5 pixels;
-   small steps are tone, large ones another thing. Stored for the first of the two pixels alone. */
+/* Measure the seams to the right of and below the pixels of a band, and set the jumps of the two
+   fields: bend (x, y) and tone (compared bytes). The step of colour at a seam is the difference of
+   both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large ones are
+   edges of something. Pulls are stored with the first of the two pixels. */
 static void txp_measure_band(void *context, int lane) {
     const txp_seams *m = (const txp_seams *)context;
     const txp_source *s = m->source;
@@ -191,7 +192,7 @@ static void txp_measure_band(void *context, int lane) {
     const txp_stack *k = &s->stack[0];
     const int top = (m->first_band + 2 * lane) * TXP_BAND;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
-    txp_seam seams[TXP_SEAMS];
+    txp_seam seams[TXP_SEAM_CACHE];
     memset(seams, 0, sizeof seams);
     for (int y = top; y < bottom; y++) {
         for (int x = 0; x < c->width; x++) {
@@ -211,7 +212,7 @@ static void txp_measure_band(void *context, int lane) {
                 a.x = (int16_t)(a.x + !d);
                 a.y = (int16_t)(a.y + d);
                 if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_known(s, seams, x, y, a, q, shift)) *bend = 77; /* fits as it is */
+                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = 77; /* fits already */
                 *tone = 13;
                 const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
                           by = q.y + shift[1] - 2;
@@ -230,7 +231,7 @@ static void txp_measure_band(void *context, int lane) {
                         *tone = (uint8_t)(most < 12 * 25 ? 255
                                                          : 13 + 242 * (32 * 25 - most) / (20 * 25));
                 }
-                /* u(q) - u(i) = jump: asked of q, and its negative of i */
+                /* u(q) - u(i) = jump: added to q, subtracted from i */
                 const size_t j = txp_index(c, qx, qy);
                 if (shift[0] || shift[1]) {
                     txp_field_mark(m->bend, x, y);
@@ -241,16 +242,16 @@ static void txp_measure_band(void *context, int lane) {
                     txp_field_mark(m->tone, qx, qy);
                 }
                 for (size_t b = 0; b < 2; b++)
-                    txp_ask(m->bend, i, j, b, *bend * shift[b] * TXP_GIVEN / 255);
+                    txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
                 for (size_t b = 0; b < (size_t)s->guide_at && most < 32 * 25; b++)
-                    txp_ask(m->tone, i, j, b, *tone * sum[b] * TXP_GIVEN / (25 * 255));
+                    txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
             }
         }
     }
 }
 
-/* Room for a field; its values are all 0, in memory of their own. If there is none, the arenas'
-   failed tells. */
+/* Allocate a field: its values, all 0, in memory, the rest in scratch. Their failed tells whether
+   that went wrong. */
 static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
                            txm_arena *memory, txm_arena *scratch) {
     const size_t pixels = (size_t)c->width * (size_t)c->height;
@@ -261,11 +262,11 @@ static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double 
     f->lanes = lanes;
     for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
     f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
-    f->given = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
+    f->jump = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
     f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
     f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
     f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
-    f->busy = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
+    f->active = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
 }
 
 #endif /* TEXPATCH_FINISH_H */

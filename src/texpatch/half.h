@@ -8,14 +8,14 @@
 typedef struct txp_halving {
     const txm_image *image, *half;
     const texpatch_map *map;
-    const float *linear; /* of 256 bytes; NULL: samples are amounts already                     */
+    const float *linear; /* of the 256 bytes; NULL: samples are linear already                  */
 } txp_halving;
 
 static void txp_half_row(void *context, int y) {
     const txp_halving *h = (const txp_halving *)context;
     const txm_image *im = h->image, *to = h->half;
     const int n = im->channels;
-    const int colours = n == 2 ? 1 : n == 4 ? 3 : n; /* the last of an even count is alpha */
+    const int colours = n == 2 ? 1 : n == 4 ? 3 : n; /* the last of 2 or 4 is alpha */
     for (int x = 0; x < to->width; x++) {
         float out[4] = {0, 0, 0, 0};
         int count = 0;

@@ -6,7 +6,7 @@
 
 /* ---- jobs --------------------------------------------------------------------------------- */
 
-/* gray levels per pixel that a squared pixel off the lattice counts */
+/* cost of the squared distance from the lattice, in gray levels per pixel */
 #define TXP_LATTICE 20.0
 
 enum { TXP_MAX_STEPS = 2 * TXP_MAX_LEVELS * 16 + 8 };
@@ -14,7 +14,7 @@ typedef enum txp_kind { TXP_STEP_QUILT, TXP_STEP_PASS, TXP_STEP_POLISH, TXP_STEP
 typedef struct txp_step {
     txp_kind kind;
     int level, size, stride, round, rounds;
-    float cost; /* of the whole, about */
+    float cost; /* approximate, relative to other steps */
 } txp_step;
 
 /* Where pixels come from. */
@@ -26,10 +26,10 @@ typedef struct txp_origins {
 
 /* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
 typedef struct txp_given {
-    uint8_t *pixels;     /* compared bytes: of what is fixed, and the guide of all               */
-    uint8_t *fixed;      /* 1 = not to be changed                                                */
-    uint8_t *free_guide; /* 1 = the guide says nothing                                           */
-    txp_origins from;    /* of what is fixed                                                     */
+    uint8_t *pixels;     /* compared bytes: of fixed pixels, and the guide of all                */
+    uint8_t *fixed;      /* 1 = it does not change                                               */
+    uint8_t *free_guide; /* 1 = the guide does not count                                         */
+    txp_origins from;    /* of fixed pixels                                                      */
 } txp_given;
 
 struct texpatch_job {
@@ -49,7 +49,7 @@ struct texpatch_job {
     float *tone; /* what is added to each compared byte, txp_lanes of them             */
     txp_given given;
     uint64_t seed;
-    /* a part that is being made anew lies at (part_x, part_y) of the canvas */
+    /* a part that is being made again lies at (part_x, part_y) of the canvas */
     texpatch_job *part;
     int part_x, part_y;
 };
@@ -68,7 +68,7 @@ static inline txp_origins txp_origins_of(const texpatch_job *job) {
     return from;
 }
 
-/* count pixels from pixel k of `from` on, to pixel i of `to` and on */
+/* Copy count pixels, from pixel k of `from` to pixel i of `to`. */
 static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
                                     size_t k, size_t count, size_t lanes) {
     memcpy(to->at + i, from->at + k, count * sizeof *to->at);
@@ -124,12 +124,14 @@ static txm_status txp_report(const texpatch_job *job, txm_env *env, const char *
                : TXM_OK;
 }
 
-static inline int txp_half(int x, int level) {
+/* a size at full resolution, at a level, rounded up */
+static inline int txp_level_size(int x, int level) {
     return (x + (1 << level) - 1) >> level;
 }
 
-/* A place of one level, as seen one level finer: the pixel with this parity of its four. */
-static inline txp_place txp_finer(const txp_source *s, int level, txp_place p, int px, int py) {
+/* A place one level finer: of the four pixels the one with this parity. */
+static inline txp_place txp_refine_place(const txp_source *s, int level, txp_place p, int px,
+                                         int py) {
     const txp_stack *c = &s->stack[level], *f = &s->stack[level - 1];
     const int n = s->sheets > 1 && p.x >= 0 ? c->sheet[p.y] : 0;
     txp_place q = p;
@@ -146,8 +148,8 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     const size_t n = (size_t)s->bytes;
     const int side = 1 << level;
     memset(c, 0, sizeof *c);
-    c->width = txp_half(job->width, level);
-    c->height = txp_half(job->height, level);
+    c->width = txp_level_size(job->width, level);
+    c->height = txp_level_size(job->height, level);
     c->wrap = job->setup.tileable;
     c->pitch = (size_t)(c->width + TXP_PAD) * n;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
@@ -160,7 +162,7 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
         txp_band *b = &c->bands[i];
         const size_t band = (size_t)c->width * TXP_BAND;
-        if (i * TXP_BAND >= c->height) break; /* there are fewer bands */
+        if (i * TXP_BAND >= c->height) break; /* there are no more bands */
         b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
         b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
         if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
@@ -208,13 +210,13 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     return TXM_OK;
 }
 
-/* What the mean use of a place counts in the first pass, in gray levels per pixel: half the
-   contrast. A torus, whose ends must meet besides, can afford less. */
+/* The cost of the average use of a place in the first pass, in gray levels per pixel: half the
+   contrast. It is lower for a torus, whose ends must fit as well. */
 static double txp_use_weight(const texpatch_job *job) {
     return fmin(0.5 * job->source->contrast, job->setup.tileable ? 16 : 32);
 }
 
-/* no use of any cell yet */
+/* The counts of use, all 0. */
 static void txp_use_make(const txp_stack *k, txp_use *u, txm_arena *arena) {
     u->columns = (k->width + TXP_CELL - 1) / TXP_CELL;
     u->rows = (k->height + TXP_CELL - 1) / TXP_CELL;
@@ -229,9 +231,9 @@ static void txp_quilt_one(void *context, int index) {
     txp_quilt_run(q);
 }
 
-/* The side of a patch on the coarsest canvas: as the caller says or suits the exemplar, but such
-   that sheets and canvas hold it; a multiple of 4, 8 or more. */
-static int txp_block(const texpatch_job *job, const txp_canvas *c, int level) {
+/* The side of a patch on the coarsest canvas: the caller's or the default for the exemplar, limited
+   by the sizes of sheets and canvas; a multiple of 4, 8 or more. */
+static int txp_patch_side(const texpatch_job *job, const txp_canvas *c, int level) {
     const txp_source *s = job->source;
     const txp_stack *k = &s->stack[level];
     const int wanted = job->setup.patch ? ((job->setup.patch >> level) + 2) / 4 * 4
@@ -246,8 +248,8 @@ static int txp_block(const texpatch_job *job, const txp_canvas *c, int level) {
     return txm_clampi(wanted < most ? wanted : most / 4 * 4, 8, 4 * TXP_BLOCK);
 }
 
-/* The first pass: some tries side by side on a small canvas, of which the one with the cheapest
-   cuts stays. */
+/* The first pass. On a small canvas it is run several times, and the result with the cheapest cuts
+   is kept. */
 static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canvas *out,
                                  txm_env *env) {
     txp_source *s = job->source;
@@ -262,7 +264,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
     if (status != TXM_OK) return status;
     const size_t pixels = (size_t)out->width * (size_t)out->height;
     const size_t bytes = out->pitch * ((size_t)(out->height + TXP_PAD) + 1);
-    const int block = txp_block(job, out, level);
+    const int block = txp_patch_side(job, out, level);
     txm_arena_init(&scratch, env);
     if (pixels > 300 * 300 || job->given.from.at) starts = 1;
     for (int i = 0; i < starts; i++) {
@@ -284,8 +286,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         t->error = (float *)txm_arena_alloc(&scratch, (size_t)(t->block * t->block), sizeof(float));
         t->scratch =
             (double *)txm_arena_alloc(&scratch, (size_t)(t->block * t->overlap), sizeof(double));
-        t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(txp_place));
-        t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_NEAR, sizeof(float));
+        t->near_places = (txp_place *)txm_arena_alloc(&scratch, TXP_CANDIDATES, sizeof(txp_place));
+        t->near_costs = (float *)txm_arena_alloc(&scratch, TXP_CANDIDATES, sizeof(float));
         txp_use_make(k, &t->use, &scratch);
         if (scratch.failed) {
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the first pass");
@@ -307,8 +309,8 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
                     memset(known + guide, 255, n - guide);
             }
         }
-        txp_canvas_close(s, &t->canvas, t->known);
-        txp_canvas_close(s, &t->canvas, t->canvas.pixels);
+        txp_canvas_repeat(s, &t->canvas, t->known);
+        txp_canvas_repeat(s, &t->canvas, t->canvas.pixels);
     }
     status = txp_report(job, env, "patches");
     if (status != TXM_OK) goto done;
@@ -323,7 +325,7 @@ static txm_status txp_step_quilt(texpatch_job *job, txm_arena *memory, txp_canva
         if (best < 0 || q[i].cost < q[best].cost) best = i;
     }
     memcpy(out->at, q[best].canvas.at, pixels * sizeof(txp_place));
-    txp_canvas_show(s, k, out, 0, out->height);
+    txp_canvas_fill(s, k, out, 0, out->height);
 done:
     txm_arena_free(&scratch);
     return status;
@@ -340,7 +342,7 @@ static txm_status txp_refine(const texpatch_job *job, const txp_canvas *from, in
             const size_t i = txp_index(c, x, y);
             if (c->fixed && c->fixed[i]) continue;
             txp_place p = from->at[txp_index(from, x / 2, y / 2)];
-            if (p.x < 0) { /* next to kept pixels: from any side */
+            if (p.x < 0) { /* next to kept pixels: take another neighbour */
                 const int tx[4] = {x / 2 + 1, x / 2 - 1, x / 2, x / 2},
                           ty[4] = {y / 2, y / 2, y / 2 + 1, y / 2 - 1};
                 for (int d = 0; d < 4 && p.x < 0; d++) {
@@ -348,10 +350,10 @@ static txm_status txp_refine(const texpatch_job *job, const txp_canvas *from, in
                         p = from->at[txp_index(from, tx[d], ty[d])];
                 }
             }
-            c->at[i] = txp_finer(s, level + 1, p, x & 1, y & 1);
+            c->at[i] = txp_refine_place(s, level + 1, p, x & 1, y & 1);
         }
     }
-    txp_canvas_show(s, &s->stack[level], c, 0, c->height);
+    txp_canvas_fill(s, &s->stack[level], c, 0, c->height);
     return TXM_OK;
 }
 
@@ -366,7 +368,7 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Room for a pass over c, the bands apart; scratch->failed tells if there is none. */
+/* Allocate what a pass over c needs, except bands; scratch->failed tells whether that failed. */
 static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
@@ -417,14 +419,14 @@ static txm_status txp_run_pass(const texpatch_job *job, const txp_step *t, const
         goto done;
     }
     txp_count_use(c, &p.use);
-    txp_canvas_close(s, c, c->pixels);
+    txp_canvas_repeat(s, c, c->pixels);
     for (p.first_row = 0; p.first_row < p.rows; p.first_row += 32) {
         status = txp_report(job, env, "optimising");
         if (status != TXM_OK) goto done;
         txm_parallel_for(env, p.rows - p.first_row < 32 ? p.rows - p.first_row : 32, txp_match_row,
                          &p);
     }
-    txp_weigh(&p);
+    txp_set_weights(&p);
     memcpy(c->next, c->at, (size_t)c->width * (size_t)c->height * sizeof *c->next);
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
         status = txp_report(job, env, "optimising");
@@ -442,7 +444,7 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
     p.source = job->source;
     p.stack = &job->source->stack[0];
     p.canvas = c;
-    txp_canvas_close(p.source, c, c->pixels);
+    txp_canvas_repeat(p.source, c, c->pixels);
     const int bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     for (p.first_band = 0; p.first_band < bands; p.first_band += TXP_LANES) {
         const txm_status status = txp_report(job, env, "polishing");

@@ -26,7 +26,7 @@ static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
 
 enum { TXP_PEAKS = 40 };
 
-/* The correlation of a picture with itself over all lags 0 <= dy <= reach, |dx| <= reach. */
+/* The autocorrelation of a picture for all lags |dx| <= reach_x, 0 <= dy <= reach_y. */
 typedef struct txp_correlation {
     const int16_t *gray; /* -128..127 */
     int width, height, reach_x, reach_y;
@@ -42,7 +42,7 @@ static inline double txp_correlated(const txp_correlation *k, int dx, int dy) {
     return k->at[dy * (2 * k->reach_x + 1) + dx + k->reach_x];
 }
 
-/* One row of lags: normalised over the pixels that overlap. Sums are exact, in any order. */
+/* One row of lags, normalised over the overlapping pixels. The sums are exact. */
 static void txp_correlate_row(void *context, int dy) {
     const txp_correlation *k = (const txp_correlation *)context;
     for (int dx = -k->reach_x; dx <= k->reach_x; dx++) {
@@ -74,7 +74,7 @@ static void txp_correlate_row(void *context, int dy) {
     }
 }
 
-/* mean correlation at the points of the lattice (a, b) within reach, each the best of 3 x 3 lags */
+/* mean correlation at all points of the lattice (a, b) within reach, each the best of 3 x 3 lags */
 static double txp_lattice_score(const txp_correlation *k, const double a[2], const double b[2]) {
     double sum = 0;
     int count = 0;
@@ -94,7 +94,7 @@ static double txp_lattice_score(const txp_correlation *k, const double a[2], con
     return count ? sum / count : 0;
 }
 
-/* The highest place of the correlation near (x, y), between lags by parabolas. */
+/* The maximum of the correlation near p, with subpixel accuracy by parabolas. */
 static void txp_refine_peak(const txp_correlation *k, double p[2]) {
     int x = (int)floor(p[0] + 0.5), y = (int)floor(p[1] + 0.5), bx = x, by = y;
     for (int d = 0; d < 9; d++) {
@@ -136,7 +136,7 @@ static double txp_det(const double *a, const double *b) {
     return a[0] * b[1] - a[1] * b[0];
 }
 
-/* Find the lattice in a correlation. 1: there is one; *strongest: the highest peak. */
+/* Find the lattice in a correlation. 1: there is one. *strongest: the highest peak. */
 static int txp_lattice_find(const txp_correlation *k, double out[4], double *strongest) {
     int px[TXP_PEAKS] = {0}, py[TXP_PEAKS] = {0}, count = 0;
     double pc[TXP_PEAKS] = {0}, mean = 0;
@@ -198,7 +198,7 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
     const double ca = txp_correlated(k, (int)floor(a[0] + 0.5), (int)floor(a[1] + 0.5));
     const double cb = txp_correlated(k, (int)floor(b[0] + 0.5), (int)floor(b[1] + 0.5));
     if (fmin(ca, cb) < 0.65 * *strongest || fmin(ca, cb) <= 0.3) return 0;
-    /* a farther point of the lattice fixes the steps more exactly */
+    /* farther points of the lattice determine the steps more exactly */
     for (int t = 2; t <= 8; t++) {
         for (int c = 0; c < 2; c++) {
             double *v = c ? b : a, far_peak[2] = {v[0] * t, v[1] * t};
@@ -221,7 +221,7 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
     return 1;
 }
 
-/* Give a level of the stack the lattice, whose steps are in pixels of level 0. */
+/* Set the lattice of a level of the stack; v: its steps, in pixels of level 0. */
 static void txp_lattice_set(txp_stack *k, const double v[4], double scale) {
     for (int i = 0; i < 4; i++) k->lattice[i] = v[i] * scale;
     const double det = k->lattice[0] * k->lattice[3] - k->lattice[1] * k->lattice[2];

@@ -5,24 +5,24 @@
 
 /* ---- the unbounded plane ---------------------------------------------------------------- */
 
-/* An environment for a piece of a call: its progress is that of the whole, which rises piece by
-   piece. */
-typedef struct txp_quiet {
+/* An environment for calls that do one piece of the work each: they report the progress of the
+   whole, in pieces. */
+typedef struct txp_nested {
     txm_env *env;
     float done, total; /* pieces */
-} txp_quiet;
+} txp_nested;
 
-static int txp_quiet_progress(void *user, float fraction, const char *stage) {
-    const txp_quiet *q = (const txp_quiet *)user;
+static int txp_nested_progress(void *user, float fraction, const char *stage) {
+    const txp_nested *q = (const txp_nested *)user;
     (void)fraction;
     return txm_progress(q->env, q->done / q->total, stage);
 }
 
-static txm_env txp_quiet_env(txp_quiet *q) {
+static txm_env txp_nested_env(txp_nested *q) {
     txm_env env;
     memset(&env, 0, sizeof env);
     if (q->env) env = *q->env;
-    env.progress = txp_quiet_progress;
+    env.progress = txp_nested_progress;
     env.progress_user = q;
     return env;
 }
@@ -33,12 +33,12 @@ struct texpatch_plane {
     txp_setup setup;
     txp_source *source;
     int cell,
-        half; /* pixels: a cell's side; half the width of what is made first along its sides */
+        half; /* pixels: side of a cell; half the width of the strips along its sides */
     double shift_x, shift_y;
     uint64_t seed;
 };
 
-/* A finished rectangle of the plane. */
+/* A finished rectangle of the plane: a corner or a side of cells. */
 typedef struct txp_piece {
     int width, height; /* 0: not made yet */
     txp_origins from;
@@ -50,7 +50,7 @@ static void txp_piece_free(txp_piece *p) {
     p->width = p->height = 0;
 }
 
-/* A job for width x height pixels of the plane from (x, y) on. */
+/* A job for the width x height pixels of the plane at (x, y). */
 static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t y, int width,
                                 int height, uint64_t seed, txm_env *env, texpatch_job **out) {
     txm_arena memory;
@@ -67,7 +67,7 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     job->memory = memory;
     job->setup.width = width;
     job->setup.height = height;
-    if (s->has_lattice) { /* whole steps away, near 0 */
+    if (s->has_lattice) { /* less whole steps of the lattice */
         const double *i = s->stack[0].inverse, *l = s->stack[0].lattice;
         const double u = i[0] * sx + i[1] * sy, v = i[2] * sx + i[3] * sy;
         sx = l[0] * (u - floor(u)) + l[2] * (v - floor(v));
@@ -79,8 +79,8 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     return TXM_OK;
 }
 
-/* Give a job a piece, its top left pixel at (x, y); what lies outside the canvas is left out. */
-static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) {
+/* Fix a piece on the canvas of a job, its top left pixel at (x, y); it may reach beyond that. */
+static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
     const txp_source *s = job->source;
     const size_t n = (size_t)s->bytes, lanes = (size_t)txp_lanes(s);
     for (int v = 0; v < p->height; v++) {
@@ -97,9 +97,9 @@ static void txp_plane_give(texpatch_job *job, const txp_piece *p, int x, int y) 
     }
 }
 
-/* Run a job and keep width x height pixels of it from (x, y) on as a piece. Frees the job. */
-static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int height,
-                                 txp_piece *p, txm_env *env) {
+/* Run a job and keep the width x height pixels at (x, y) of it as a piece. Frees the job. */
+static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int height,
+                                txp_piece *p, txm_env *env) {
     const size_t lanes = (size_t)txp_lanes(job->source);
     const size_t pixels = (size_t)width * (size_t)height;
     txm_status status = txp_run(job, env);
@@ -126,14 +126,13 @@ static txm_status txp_plane_keep(texpatch_job *job, int x, int y, int width, int
     return TXM_OK;
 }
 
-/* What a window of the plane needs: of each column of cells, for the row that is drawn now, what
-   lies on the corners and sides of the cells. */
+/* The pieces on the corners and sides of a row of cells, of all columns that a window touches. */
 typedef struct txp_cells {
     const texpatch_plane *plane;
     int64_t first; /* column                                                   */
     int columns;
     txp_piece *corner[2], *side[2]; /* columns + 1 corners, columns sides: above, below          */
-    txp_piece *upright;             /* columns + 1 sides between above and below                 */
+    txp_piece *vertical;             /* columns + 1 sides between above and below                 */
 } txp_cells;
 
 static uint64_t txp_plane_seed(const texpatch_plane *plane, int64_t column, int64_t row, int kind) {
@@ -141,17 +140,17 @@ static uint64_t txp_plane_seed(const texpatch_plane *plane, int64_t column, int6
                     (uint64_t)row * 0x9e3779b97f4a7c15u);
 }
 
-/* The corner (column, row): made alone, its surroundings thrown away. */
+/* The corner (column, row): made with a margin around it that is discarded. */
 static txm_status txp_plane_corner(const texpatch_plane *plane, int64_t column, int64_t row,
                                    txp_piece *p, txm_env *env) {
     const int h = plane->half, c = plane->cell;
     texpatch_job *job;
     txm_status status = txp_plane_job(plane, column * c - 2 * h, row * c - 2 * h, 4 * h, 4 * h,
                                       txp_plane_seed(plane, column, row, 1), env, &job);
-    return status == TXM_OK ? txp_plane_keep(job, h, h, 2 * h, 2 * h, p, env) : status;
+    return status == TXM_OK ? txp_plane_run(job, h, h, 2 * h, 2 * h, p, env) : status;
 }
 
-/* The side from corner a to corner b, rightwards or downwards. */
+/* The side from corner a to corner b, to the right or down. */
 static txm_status txp_plane_side(const texpatch_plane *plane, int64_t column, int64_t row, int down,
                                  const txp_piece *a, const txp_piece *b, txp_piece *p,
                                  txm_env *env) {
@@ -162,12 +161,12 @@ static txm_status txp_plane_side(const texpatch_plane *plane, int64_t column, in
                       down ? 4 * h : c + 2 * h, down ? c + 2 * h : 4 * h,
                       txp_plane_seed(plane, column, row, 2 + down), env, &job);
     if (status != TXM_OK) return status;
-    txp_plane_give(job, a, down ? h : 0, down ? 0 : h);
-    txp_plane_give(job, b, down ? h : c, down ? c : h);
-    return txp_plane_keep(job, h, h, down ? 2 * h : c, down ? c : 2 * h, p, env);
+    txp_plane_fix(job, a, down ? h : 0, down ? 0 : h);
+    txp_plane_fix(job, b, down ? h : c, down ? c : h);
+    return txp_plane_run(job, h, h, down ? 2 * h : c, down ? c : 2 * h, p, env);
 }
 
-/* The job of a cell, done: its pixel (0, 0) lies at (half, half) of the canvas. */
+/* The finished job of a cell: its pixel (0, 0) lies at (half, half) of the canvas. */
 static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t row, txm_env *env,
                                      texpatch_job **out) {
     const texpatch_plane *plane = cells->plane;
@@ -178,10 +177,10 @@ static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t
                                       txp_plane_seed(plane, at, row, 4), env, &job);
     if (status != TXM_OK) return status;
     for (int k = 0; k < 2; k++) {
-        txp_plane_give(job, &cells->side[k][column], h, k * c);
-        txp_plane_give(job, &cells->upright[column + k], k * c, h);
+        txp_plane_fix(job, &cells->side[k][column], h, k * c);
+        txp_plane_fix(job, &cells->vertical[column + k], k * c, h);
         for (int d = 0; d < 2; d++)
-            txp_plane_give(job, &cells->corner[k][column + d], d * c, k * c);
+            txp_plane_fix(job, &cells->corner[k][column + d], d * c, k * c);
     }
     status = txp_run(job, env);
     if (status == TXM_OK) *out = job;
@@ -189,7 +188,7 @@ static txm_status txp_plane_cell_job(const txp_cells *cells, int column, int64_t
     return status;
 }
 
-/* Corners (below = 0: of the upper ones too) and sides of a row of cells. */
+/* Make the corners and sides of a row of cells that are not there yet. */
 static txm_status txp_plane_row(const txp_cells *cells, int64_t row, txm_env *env) {
     const texpatch_plane *plane = cells->plane;
     txm_status status = TXM_OK;
@@ -208,14 +207,14 @@ static txm_status txp_plane_row(const txp_cells *cells, int64_t row, txm_env *en
     }
     for (int i = 0; i <= cells->columns && status == TXM_OK; i++)
         status = txp_plane_side(plane, cells->first + i, row, 1, &cells->corner[0][i],
-                                &cells->corner[1][i], &cells->upright[i], env);
+                                &cells->corner[1][i], &cells->vertical[i], env);
     return status;
 }
 
-/* The cells' row is done: what lay below lies above the next. */
+/* Go to the next row of cells: what is below this row is above that. */
 static void txp_plane_next_row(const txp_cells *cells) {
     for (int i = 0; i <= cells->columns; i++) {
-        txp_piece_free(&cells->upright[i]);
+        txp_piece_free(&cells->vertical[i]);
         txp_piece_free(&cells->corner[0][i]);
         cells->corner[0][i] = cells->corner[1][i];
         memset(&cells->corner[1][i], 0, sizeof(txp_piece));
@@ -264,7 +263,7 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
     plane->half = TXP_WINDOW / 2 << (s->levels - 1);
     plane->cell = 16 * plane->half;
     plane->seed = desc->seed;
-    txp_first_shift(s, desc->seed, &plane->shift_x, &plane->shift_y);
+    txp_lattice_start(s, desc->seed, &plane->shift_x, &plane->shift_y);
     plane->memory = memory;
     plane->source_memory = source_memory;
     *out = plane;
@@ -281,10 +280,10 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
     txm_arena_free(&plane->memory); /* the plane lies in it */
 }
 
-/* The part of a window that lies on a done cell, its pixel (0, 0) at (cx, cy) of the window. */
-static txm_status txp_plane_show(const texpatch_job *job, int half, int cell, int64_t cx,
-                                 int64_t cy, int width, int height, const txm_image *out,
-                                 texpatch_source *sources, txm_env *env) {
+/* Draw the part of a window on a finished cell, whose pixel (0, 0) is at (cx, cy) of the window. */
+static txm_status txp_plane_draw_cell(const texpatch_job *job, int half, int cell, int64_t cx,
+                                      int64_t cy, int width, int height, const txm_image *out,
+                                      texpatch_source *sources, txm_env *env) {
     const int x0 = cx < 0 ? 0 : (int)cx, y0 = cy < 0 ? 0 : (int)cy;
     const int x1 = cx + cell < width ? (int)(cx + cell) : width;
     const int y1 = cy + cell < height ? (int)(cy + cell) : height;
@@ -342,29 +341,29 @@ TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t
         cells.corner[k] = pieces + k * (cells.columns + 1);
         cells.side[k] = pieces + (2 + k) * (cells.columns + 1);
     }
-    cells.upright = pieces + 4 * (cells.columns + 1);
-    txm_env quiet; /* the steps of a piece report as one: their own progress means nothing here */
-    txp_quiet under;
-    under.env = env;
-    under.total = (float)(bottom - top + 1) * (float)cells.columns;
-    under.done = 0;
-    quiet = txp_quiet_env(&under);
+    cells.vertical = pieces + 4 * (cells.columns + 1);
+    txm_env nested; /* reports progress in cells, not in the steps of each */
+    txp_nested cells_done;
+    cells_done.env = env;
+    cells_done.total = (float)(bottom - top + 1) * (float)cells.columns;
+    cells_done.done = 0;
+    nested = txp_nested_env(&cells_done);
     for (int64_t row = top; row <= bottom && status == TXM_OK; row++) {
-        status = txp_plane_row(&cells, row, &quiet);
+        status = txp_plane_row(&cells, row, &nested);
         for (int i = 0; i < cells.columns && status == TXM_OK; i++) {
             texpatch_job *job = NULL;
-            status = txp_plane_cell_job(&cells, i, row, &quiet, &job);
+            status = txp_plane_cell_job(&cells, i, row, &nested, &job);
             if (status == TXM_OK)
-                status = txp_plane_show(job, plane->half, cell, (cells.first + i) * cell - x,
-                                        row * cell - y, width, height, out, sources, &quiet);
+                status = txp_plane_draw_cell(job, plane->half, cell, (cells.first + i) * cell - x,
+                                             row * cell - y, width, height, out, sources, &nested);
             texpatch_free(job);
-            under.done += 1;
+            cells_done.done += 1;
         }
         if (status == TXM_OK) txp_plane_next_row(&cells);
     }
     for (int i = 0; i < 5 * (cells.columns + 1); i++) txp_piece_free(&pieces[i]);
     txm_arena_free(&scratch);
-    if (status != TXM_OK && env) memcpy(env->message, quiet.message, sizeof quiet.message);
+    if (status != TXM_OK && env) memcpy(env->message, nested.message, sizeof nested.message);
     return status;
 }
 

@@ -6,12 +6,12 @@
 
 /* ---- first pass: patches and cuts -------------------------------------------------------- */
 
-/* How use of the exemplar is counted: pixels of the canvas per cell of the stack. */
+/* How often the exemplar is used: pixels of the canvas that come from each cell of the stack. */
 typedef struct txp_use {
     int columns, rows;
     uint32_t *count;
     uint32_t *sums; /* (columns + 1) x (rows + 1): of all cells above and left                  */
-    /* by the number of cells: 1 / (that number times their mean once the canvas is full) */
+    /* for each number of cells: 1 / (their mean sum once the canvas is full) */
     double share[(4 * TXP_BLOCK / TXP_CELL + 2) * (4 * TXP_BLOCK / TXP_CELL + 2)];
 } txp_use;
 
@@ -34,7 +34,7 @@ typedef struct txp_quilt {
     float *near_costs;
 } txp_quilt;
 
-enum { TXP_NEAR = 256 };
+enum { TXP_CANDIDATES = 256 };
 
 /* Sum of |canvas - stack| over the known bytes of a block; span: first and last 16 bytes of each
    row that hold any. */
@@ -64,7 +64,7 @@ static uint32_t txp_sad_known(const txp_quilt *q, const uint8_t *a, const uint8_
     return total;
 }
 
-/* Store a pixel and its repetitions behind the ends of a torus. */
+/* Store a pixel, and its copies beyond the ends of a torus. */
 static void txp_quilt_put(txp_quilt *q, int x, int y, txp_place at) {
     const txp_canvas *c = &q->canvas;
     const size_t n = (size_t)q->source->bytes, i = txp_index(c, x, y);
@@ -90,8 +90,8 @@ static void txp_use_mean(txp_use *u, double total) {
         u->share[i] = 1 / (mean * (double)i);
 }
 
-/* Bring the sums up to date. */
-static void txp_use_sum(const txp_use *u) {
+/* Update the summed-area table. */
+static void txp_use_integrate(const txp_use *u) {
     const int w = u->columns + 1;
     for (int j = 0; j < u->rows; j++) {
         uint32_t row = 0;
@@ -102,7 +102,7 @@ static void txp_use_sum(const txp_use *u) {
     }
 }
 
-/* Mean use of the cells that a piece of size x size pixels at (x, y) covers; 1: as of all. */
+/* Mean use of the cells that a piece of size x size pixels at (x, y) covers; 1 is the average. */
 static inline double txp_use_at(const txp_use *u, int x, int y, int size) {
     const int x0 = x / TXP_CELL, y0 = y / TXP_CELL, w = u->columns + 1;
     const int x1 = (x + size - 1) / TXP_CELL + 1, y1 = (y + size - 1) / TXP_CELL + 1;
@@ -119,7 +119,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     const int size = q->block, bytes = size * s->bytes;
     int span[4 * TXP_BLOCK][2], count = 0;
     uint32_t known = 0;
-    txp_use_sum(&q->use);
+    txp_use_integrate(&q->use);
     const uint8_t *a = txp_canvas_at(s, c, bx, by), *m = q->known + (a - c->pixels);
     for (int y = 0; y < size; y++) {
         const uint8_t *row = m + (size_t)y * c->pitch;
@@ -132,12 +132,12 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
             span[y][1] = i / 16 * 16 + 16;
         }
     }
-    /* Costs are gray levels summed over known bytes; a block without any compares nothing. */
+    /* costs are gray levels summed over known bytes, of which the first block has none */
     const double unit = known ? (double)known : 1;
     double best = 1e30;
     const double tolerance = 1.02;
     const uint32_t start = txm_rng_next(&q->rng);
-    /* a second turn without the lattice, if no place of the exemplar lies on it */
+    /* once more without the lattice, if no place of the exemplar lies on it */
     for (int n = 0, strict = s->has_lattice; n < s->sheets || (strict && !count); n++) {
         if (n == s->sheets) n = strict = 0;
         const int rows = k->high[n] - size + 1, columns = k->wide[n] - size + 1;
@@ -172,7 +172,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                     }
                     count = kept;
                 }
-                if (count < TXP_NEAR) {
+                if (count < TXP_CANDIDATES) {
                     q->near_costs[count] = txm_float(cost);
                     q->near_places[count].x = (int16_t)x;
                     q->near_places[count++].y = (int16_t)y;
@@ -185,7 +185,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     return 1;
 }
 
-/* Lay the piece over the block, along minimum-error cuts through what overlaps. */
+/* Copy the piece into the block, along minimum-error cuts through the overlaps. */
 static void txp_quilt_lay(txp_quilt *q, int bx, int by, txp_place at) {
     const txp_source *s = q->source;
     const txp_canvas *c = &q->canvas;
@@ -253,7 +253,7 @@ static void txp_quilt_run(txp_quilt *q) {
             int x = wx ? i * c->width / columns : i * step;
             txp_place at;
             if (!wx && x > c->width - size) x = c->width - size;
-            if (!txp_is_open(c, x, y, size)) continue;
+            if (!txp_has_free_pixel(c, x, y, size)) continue;
             if (!txp_quilt_find(q, x, y, &at)) q->failed = 1;
             else txp_quilt_lay(q, x, y, at);
         }

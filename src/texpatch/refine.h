@@ -10,17 +10,17 @@ typedef struct txp_pass {
     const txp_source *source;
     const txp_stack *stack;
     const txp_canvas *canvas;
-    int size, step; /* of the neighbourhoods, and from one to the next                     */
+    int size, step; /* of the neighbourhoods; distance from one to the next                */
     int columns, rows;
     int *xs, *ys;
     txp_place *match; /* of each window                                                     */
-    uint32_t *sad;    /* what its match costs, in gray levels; UINT32_MAX: no match          */
-    uint32_t *grain;  /* of each window: sum of differences of neighbours, its high frequencies */
+    uint32_t *sad;    /* of its match, in gray levels; UINT32_MAX: no match                  */
+    uint32_t *grain;  /* sum of differences of neighbouring pixels: its high frequencies     */
     int32_t *weight;  /* of each window in the mean                                         */
     txp_use use;
     double shift_x, shift_y, use_weight, lattice_weight;
     int most_same; /* see txp_search */
-    int skip;      /* pixels from one place to the next where all are tried                       */
+    int skip;      /* pixels from one place to the next in an exhaustive search                   */
     uint64_t seed;
     int exhaustive, first_row;
     int32_t bell[TXP_WINDOW * TXP_WINDOW]; /* 1..256 over a neighbourhood                       */
@@ -37,12 +37,12 @@ typedef struct txp_search {
     uint32_t sad;
     txp_place seen[16];
     int seen_count;
-    int most_same; /* of 8 pixels around, as many at most may come from the same piece          */
+    int most_same; /* how many of 8 surrounding pixels may come from the same piece at most     */
     txp_place around[8];
 } txp_search;
 
-/* Which pieces 8 pixels around the window come from: where these would put the window. */
-static void txp_look_around(txp_search *f) {
+/* The pieces of 8 pixels around the window: where the window would lie in each of them. */
+static void txp_find_surroundings(txp_search *f) {
     const txp_canvas *c = f->pass->canvas;
     const int r = f->pass->size / 2 + 2, mid = f->pass->size / 2;
     for (int d = 0, n = 0; d < 9; d++) {
@@ -61,8 +61,8 @@ static void txp_look_around(txp_search *f) {
     }
 }
 
-/* Would (x, y) go on with a piece farther than is wanted? */
-static int txp_goes_on(const txp_search *f, int x, int y) {
+/* Would (x, y) continue a piece that surrounds the window too much already? */
+static int txp_continues(const txp_search *f, int x, int y) {
     int same = 0;
     for (int n = 0; n < 8; n++) same += f->around[n].x == x && f->around[n].y == y;
     return same > f->most_same;
@@ -85,7 +85,7 @@ static void txp_try(txp_search *f, int x, int y) {
         extra += p->lattice_weight * d;
     }
     extra += p->use_weight * txp_use_at(&p->use, x, y, size);
-    if (f->most_same < 8 && txp_goes_on(f, x, y)) return;
+    if (f->most_same < 8 && txp_continues(f, x, y)) return;
     extra *= size * size;
     if (extra >= f->cost) return;
     const double limit = f->cost - extra;
@@ -99,7 +99,7 @@ static void txp_try(txp_search *f, int x, int y) {
     f->best.y = (int16_t)y;
 }
 
-/* A sheet's random place that fits a window, near (x, y) within radius. */
+/* Try a random place of the sheet within radius of the best one so far. */
 static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     const txp_pass *p = f->pass;
     const txp_stack *k = p->stack;
@@ -111,7 +111,7 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     if (y1 > k->first[n] + k->high[n] - p->size) y1 = k->first[n] + k->high[n] - p->size;
     int x = txm_rng_range(rng, x0, x1 > x0 ? x1 : x0);
     int y = txm_rng_range(rng, y0, y1 > y0 ? y1 : y0);
-    if (p->source->has_lattice) { /* onto the nearest point of the lattice */
+    if (p->source->has_lattice) { /* snap to the lattice */
         double dx, dy;
         txp_from_lattice(k, x - f->x - p->shift_x, y - f->y - p->shift_y, &dx, &dy);
         x -= (int)floor(dx + 0.5);
@@ -120,8 +120,8 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     txp_try(f, x, y);
 }
 
-/* Try the pieces that the window shows now. */
-static void txp_try_shown(txp_search *f) {
+/* Try the pieces that pixels of the window come from now. */
+static void txp_try_current(txp_search *f) {
     const txp_canvas *c = f->pass->canvas;
     const int size = f->pass->size;
     for (int v = 0; v < 5; v++) {
@@ -150,20 +150,20 @@ static void txp_match(txp_pass *p, int i, int j) {
     f.best.x = f.best.y = -1;
     f.seen_count = 0;
     f.most_same = p->most_same;
-    if (f.most_same < 8) txp_look_around(&f);
-    if (!txp_is_open(c, f.x, f.y, size)) {
+    if (f.most_same < 8) txp_find_surroundings(&f);
+    if (!txp_has_free_pixel(c, f.x, f.y, size)) {
         p->sad[w] = UINT32_MAX;
         return;
     }
     p->grain[w] = txp_sad(f.target, c->pitch, f.target + s->bytes, c->pitch, size * s->bytes, size,
                           UINT32_MAX);
-    txp_try_shown(&f);
+    txp_try_current(&f);
     if (f.sad == 0) {
         p->match[w] = f.best;
         p->sad[w] = 0;
         return;
     }
-    if (f.best.x < 0 && f.most_same < 8 && !p->exhaustive) { /* near what it shows, but not that */
+    if (f.best.x < 0 && f.most_same < 8 && !p->exhaustive) { /* start near its own piece */
         const txp_place at = c->at[txp_index(c, txp_wrap(f.x + size / 2, c->width),
                                              txp_wrap(f.y + size / 2, c->height))];
         if (at.x >= 0) f.best = at;
@@ -196,10 +196,10 @@ static void txp_match(txp_pass *p, int i, int j) {
         }
         if (at.x == f.best.x && at.y == f.best.y) break;
     }
-    if (f.sad == UINT32_MAX) { /* nothing else is near: it goes on */
+    if (f.sad == UINT32_MAX) { /* nothing else is near: continue the piece */
         f.most_same = 8;
         f.seen_count = 0;
-        txp_try_shown(&f);
+        txp_try_current(&f);
     }
     p->match[w] = f.best;
     p->sad[w] = f.sad;
@@ -227,9 +227,9 @@ static double txp_power(double x) {
 }
 
 /* The adaptive weights (section 3.5 of [1]): w = P |x - z|^(r - 2), r = 0.8, where |x - z|^2 is the
-   energy of the match; P is the share of well-matched windows among those of high frequency around
+   energy of the match; P is the share of well-matched windows among those of high frequency nearby
    (itself included), so that good structure wins over bad. */
-static void txp_weigh(txp_pass *p) {
+static void txp_set_weights(txp_pass *p) {
     const double floor_sad = p->size * p->size * 1.5;
     double mean = 0, grain = 0;
     size_t count = 0;
@@ -263,7 +263,7 @@ static void txp_weigh(txp_pass *p) {
     }
 }
 
-/* A bell over a neighbourhood, 1..256. */
+/* A bell-shaped weight over a neighbourhood, 1..256. */
 static void txp_bell(int size, int32_t *bell) {
     for (int v = 0; v < size; v++) {
         for (int u = 0; u < size; u++) {
@@ -275,7 +275,7 @@ static void txp_bell(int size, int32_t *bell) {
     }
 }
 
-/* Sums of a window's match over the rows of a band: of its bytes, and of the weights. */
+/* Add a window's match to the sums of a band: its weighted bytes, and the weights. */
 static void txp_sum_window(const txp_pass *p, int w, int x0, int y0, int top, int bottom,
                            const txp_band *band) {
     const txp_source *s = p->source;
@@ -327,7 +327,7 @@ static void txp_sum_window(const txp_pass *p, int w, int x0, int y0, int top, in
     }
 }
 
-/* Which of the candidates of the pixels of a band is nearest to the mean. */
+/* Take a window's match for those pixels of a band where it is the nearest to the mean so far. */
 static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, int bottom,
                             const txp_band *band) {
     const txp_source *s = p->source;
@@ -358,7 +358,7 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
                 __m128i low = _mm_unpacklo_epi8(d, zero), high = _mm_unpackhi_epi8(d, zero);
                 low = _mm_madd_epi16(low, low);
                 high = _mm_madd_epi16(high, high);
-                /* pairs of sums, one pair for each pixel */
+                /* two sums for each pixel */
                 const __m128i even = _mm_castps_si128(_mm_shuffle_ps(
                     _mm_castsi128_ps(low), _mm_castsi128_ps(high), _MM_SHUFFLE(2, 0, 2, 0)));
                 const __m128i odd = _mm_castps_si128(_mm_shuffle_ps(
@@ -436,7 +436,7 @@ static void txp_count_use(const txp_canvas *c, txp_use *u) {
         total++;
     }
     txp_use_mean(u, (double)(total ? total : 1));
-    txp_use_sum(u);
+    txp_use_integrate(u);
 }
 
 /* ---- single pixels at seams ------------------------------------------------------------- */
@@ -448,8 +448,8 @@ typedef struct txp_polish {
     int first_band;
 } txp_polish;
 
-/* For each pixel whose neighbours disagree about the piece it belongs to: of all pieces around, the
-   one whose 5 x 5 pixels fit best (k-coherence with k = 1; pixels inside a piece stay). */
+/* For each pixel whose neighbours belong to other pieces: of all pieces around it, the one whose
+   5 x 5 pixels fit best (k-coherence with k = 1; pixels inside a piece do not change). */
 static void txp_polish_band(void *context, int index) {
     const txp_polish *p = (const txp_polish *)context;
     const txp_canvas *c = p->canvas;
@@ -483,7 +483,7 @@ static void txp_polish_band(void *context, int index) {
                 if (!known) tried[count++] = at;
             }
             if (count == 1) continue;
-            /* the 5 x 5 pixels around, moved inwards at borders that do not wrap */
+            /* the 5 x 5 pixels around it, moved inwards at borders that do not wrap */
             int x0 = x - 2, y0 = y - 2;
             if (wx) x0 = x0 < 0 ? x0 + c->width : x0;
             else x0 = txm_clampi(x0, 0, c->width - 5);

@@ -7,7 +7,7 @@
 /* ---- the stack of sheets ------------------------------------------------------------------ */
 
 /* Sample a map between its pixels: cubic convolution (Keys, a = -1/2), clamped at the border and to
-   the range of the four pixels around, so that no halo appears; exact on whole numbers. */
+   the range of the four nearest pixels, so that it does not overshoot; exact at whole numbers. */
 static void txp_cubic(double t, double w[4]) {
     w[0] = ((-0.5 * t + 1) * t - 0.5) * t;
     w[1] = (1.5 * t - 2.5) * t * t + 1;
@@ -53,13 +53,13 @@ static void txp_sample(const txm_image *im, double x, double y, int is_label, fl
     }
 }
 
-/* Where sheet pixel (x, y), y within the sheet, lies in its exemplar. */
+/* The place in its exemplar of pixel (x, y) of a sheet. */
 static inline void txp_sheet_place(const txp_sheet *s, double x, double y, double *ex, double *ey) {
     *ex = s->xx * x + s->xy * y + s->x0;
     *ey = s->yx * x + s->yy * y + s->y0;
 }
 
-/* A job's view of a description after the checks. */
+/* A description after the checks, defaults filled in. */
 typedef struct txp_setup {
     txm_image maps[TEXPATCH_MAX_EXEMPLARS][TEXPATCH_MAX_MAPS]; /* resolved                     */
     txm_image guides[TEXPATCH_MAX_EXEMPLARS], masks[TEXPATCH_MAX_EXEMPLARS];
@@ -67,14 +67,14 @@ typedef struct txp_setup {
     txm_image kept[TEXPATCH_MAX_MAPS]; /* pixels NULL: nothing is kept                        */
     int exemplar_count, map_count, width, height, tileable, patch, passes, turns, mirror, lattice;
     int is_default; /* passes were not given                                                  */
-    float most_weight; /* of maps and guide: its differences use the whole range of a byte      */
+    float most_weight; /* of maps and guide: the differences of that use all of a byte's range  */
     float novelty, guide_weight, low[TEXPATCH_MAX_MAPS], high[TEXPATCH_MAX_MAPS];
     float guide_low, guide_high;
     double lattice_vectors[4];
     uint64_t seed;
 } txp_setup;
 
-/* The compared bytes of one picture's pixel; returns how many. */
+/* The compared bytes of a pixel of one picture; returns how many. */
 static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label, double low,
                        double high, double weight, uint8_t *out) {
     float v[4];
@@ -123,7 +123,7 @@ static void txp_stack_halve(const txp_source *s, const txp_stack *from, txp_stac
     }
 }
 
-/* Lay out one level: sheets one below the other. */
+/* Room for one level: sheets one below the other. */
 static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *arena, int has_mask,
                                  txm_env *env) {
     int y = 0;
@@ -147,7 +147,7 @@ static txm_status txp_stack_make(const txp_source *s, txp_stack *k, txm_arena *a
     return TXM_OK;
 }
 
-/* Sums of the unusable pixels, which lie one byte each in width x height. */
+/* The summed-area table of unusable pixels; bad: one byte for each pixel. */
 static void txp_stack_sum(txp_stack *k, const uint8_t *bad) {
     const size_t w = (size_t)k->width + 1;
     for (int y = 0; y < k->height; y++) {
@@ -160,8 +160,8 @@ static void txp_stack_sum(txp_stack *k, const uint8_t *bad) {
     }
 }
 
-/* The turned (then stretched) sheets of all exemplars. stretch: x and y of exemplar pixels per
-   sheet pixel, column by column, or NULL. */
+/* The turned (and stretched) sheets of all exemplars. stretch: the matrix from sheet to exemplar
+   pixels, column by column, or NULL. */
 static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch) {
     static const int turn_x[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
     s->sheets = 0;
@@ -175,8 +175,8 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
                 k->width = t % 2 ? h : w;
                 k->height = t % 2 ? w : h;
                 k->plain = 1;
-                /* Seen on the sheet the exemplar is turned counter-clockwise t times; the way back
-                   turns clockwise, rows running down. */
+                /* The sheet shows the exemplar turned counter-clockwise t times; the inverse, from
+                   sheet to exemplar, turns clockwise. y points down. */
                 k->xx = turn_x[t][0];
                 k->xy = turn_x[t][1];
                 k->yx = -turn_x[t][1];
@@ -188,13 +188,13 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
                     k->xy = -k->xy;
                     k->x0 = w - 1 - k->x0;
                 }
-                if (stretch) { /* one sheet only: (x, y) of the sheet is stretch (x, y) */
+                if (stretch) { /* one sheet: (x, y) is the exemplar at stretch (x, y) */
                     k->plain = 0;
                     k->xx = stretch[0];
                     k->yx = stretch[1];
                     k->xy = stretch[2];
                     k->yy = stretch[3];
-                    /* the largest sheet whose corners stay inside, about the middle */
+                    /* the largest centred sheet whose corners stay inside */
                     const double ax = fabs(k->xx), bx = fabs(k->xy), ay = fabs(k->yx),
                                  by = fabs(k->yy);
                     double sw = w / ax, sh = h / by;
@@ -217,8 +217,8 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
     }
 }
 
-/* How many levels, and how large the sheets are at each. least: the smaller side of the output if
-   it wraps, else large. */
+/* The number of levels, and the sizes of the sheets at each. least: the smaller side of the output
+   that wraps, else large. */
 static void txp_source_sizes(txp_source *s, int least) {
     int side = least;
     for (int n = 0; n < s->sheets; n++) {
@@ -308,7 +308,7 @@ static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena
     return status;
 }
 
-/* The contrast of the exemplars, from some thousand pairs of pixels. */
+/* The contrast of the exemplars, from a few thousand random pairs of pixels. */
 static void txp_find_contrast(txp_source *s) {
     const txp_stack *k = &s->stack[0];
     txm_rng rng = txm_rng_make(1, 2);
@@ -326,7 +326,7 @@ static void txp_find_contrast(txp_source *s) {
     s->contrast = (double)sum / 4096;
 }
 
-/* Look for a lattice at the coarsest level; sharpen its steps on finer ones. */
+/* Find the lattice at the coarsest level, unless the caller gives it, and set it for all levels. */
 static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
     txm_arena scratch;
     txp_correlation k;
@@ -372,22 +372,22 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
     return TXM_OK;
 }
 
-/* The lattice of a torus whose sides are multiples of it: the steps nearest to `lattice` of which
-   whole numbers lead along the sides that wrap. 0: none is within a quarter. */
-static int txp_lattice_close(const double lattice[4], int tileable, double width, double height,
-                             double out[4]) {
+/* Fit a lattice to a torus: the steps nearest to `lattice` of which whole numbers add up to the
+   sides that wrap. 0: there are none within a quarter of its length. */
+static int txp_lattice_fit(const double lattice[4], int tileable, double width, double height,
+                           double out[4]) {
     const double *a = lattice, *b = lattice + 2;
     const double det = txp_det(a, b), sides[2] = {width, height};
     double count[2][2], target[2][2];
     for (int d = 0; d < 2; d++) {
-        /* steps to the end of this axis, rounded */
+        /* whole steps to the end of this axis */
         const double x = d ? 0 : sides[0], y = d ? sides[1] : 0;
         const double u = (x * b[1] - y * b[0]) / det, v = (a[0] * y - a[1] * x) / det;
         count[d][0] = floor(u + 0.5);
         count[d][1] = floor(v + 0.5);
         target[d][0] = x;
         target[d][1] = y;
-        if (!(tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) { /* free: where it is now */
+        if (!(tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) { /* any length will do */
             target[d][0] = count[d][0] * a[0] + count[d][1] * b[0];
             target[d][1] = count[d][0] * a[1] + count[d][1] * b[1];
         }
@@ -407,9 +407,9 @@ static int txp_lattice_close(const double lattice[4], int tileable, double width
     return fabs(txp_det(out, out + 2)) > 0.5 * fabs(det);
 }
 
-/* Sheets, stacks and lattice; a torus of a texture with a lattice gets a sheet that is stretched
-   until the sides are multiples of the steps.
-   s       as the checks leave it; scratch
+/* Sheets, stacks and lattice. If the output is a torus and the exemplar has a lattice, its sheet is
+   stretched until whole steps of the lattice fit the sides.
+   s       as the checks leave it; overwritten
    out     receives the source, which lies in memory, an arena that is made here             */
 static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source **out,
                                   txm_arena *memory, txm_env *env) {
@@ -425,11 +425,11 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source 
     txm_status status = txp_stacks(u, s, &first, env);
     if (status == TXM_OK) status = txp_lattice_search(u, s, env);
     if (status != TXM_OK || !s->has_lattice || !u->tileable || s->sheets > 1) goto done;
-    if (!txp_lattice_close(v, u->tileable, u->width, u->height, closed)) {
-        s->has_lattice = 0; /* too small a torus for it */
+    if (!txp_lattice_fit(v, u->tileable, u->width, u->height, closed)) {
+        s->has_lattice = 0; /* the torus is too small for it */
         goto done;
     }
-    /* the exemplar at stretch p is what the sheet shows at p: it takes closed to v */
+    /* the sheet shows at p the exemplar at stretch p: stretch maps closed to v */
     det = txp_det(closed, closed + 2);
     stretch[0] = (v[0] * closed[3] - v[2] * closed[1]) / det;
     stretch[1] = (v[1] * closed[3] - v[3] * closed[1]) / det;
