@@ -1704,7 +1704,7 @@ done:
 
 enum {
     TXT_RING = 16,         /* ours: faces at an edge that are looked at; keeps soups linear */
-    TXT_PASSES = 32,       /* ours: over the faces to part equal neighbours                 */
+    TXT_PASSES = 32,       /* ours: over the faces to separate equal neighbours             */
     TXT_REPORT_FACES = 1 << 14
 };
 
@@ -1736,7 +1736,7 @@ static int32_t txt_face_entry(const txt_cover *c, uint32_t face) {
     return s->lookup[code];
 }
 
-/* How often faces beside this one show the tile. */
+/* How many neighbours of a face show the tile. */
 static int txt_equal_neighbors(const txt_cover *c, uint32_t face, int32_t tile) {
     int equal = 0;
     for (uint32_t k = 0; k < c->corners; k++) {
@@ -1750,8 +1750,8 @@ static int txt_equal_neighbors(const txt_cover *c, uint32_t face, int32_t tile) 
     return equal;
 }
 
-/* Give a face the tile of its colours, in the variant that the fewest neighbours show; the first of
-   these, from one that is random for the face. Returns how many do. */
+/* Give a face the tile of its colours in the variant that the fewest neighbours show, of equally
+   good ones the first from a random variant on. Returns how many neighbours show it. */
 static int txt_choose_tile(txt_cover *c, uint32_t face) {
     const int variants = c->set->variants;
     const int32_t base = txt_face_entry(c, face) / 4;
@@ -1784,8 +1784,8 @@ static int txt_try_color(txt_cover *c, uint32_t side, uint8_t color, const uint3
     return equal;
 }
 
-/* Give an edge the colour with which the fewest faces there lie beside their like. A colour that is
-   no better is taken for a change now and then, by a bit of coin. */
+/* Give an edge the colour with which its faces have the fewest equal neighbours. If no colour is
+   better, an equally good one is taken when bit 0 of coin is set, to leave local minima. */
 static void txt_recolor(txt_cover *c, uint32_t side, uint32_t coin) {
     const int colors = c->set->colors;
     const uint8_t old = c->color[side];
@@ -1817,12 +1817,12 @@ static void txt_recolor(txt_cover *c, uint32_t side, uint32_t coin) {
         int equal = 0;
         for (int i = 0; i < count; i++) equal += txt_equal_neighbors(c, faces[i], c->tile[faces[i]]);
         if (equal <= least) return;
-        for (int i = 0; i < count; i++) c->tile[faces[i]] = tiles[i]; /* no better: as it was */
+        for (int i = 0; i < count; i++) c->tile[faces[i]] = tiles[i]; /* no better: restore */
     }
 }
 
-/* Choose all tiles, then part those beside their like, by variants and, where edges may be recoloured,
-   by colours. 0 when cancelled. */
+/* Choose all tiles, then separate equal neighbours by other variants and, where edges may be
+   recoloured, by other colours. 0 when cancelled. */
 static int txt_choose_tiles(txt_cover *c, int recolor) {
     for (uint32_t f = 0; f < c->faces; f++) c->tile[f] = -1;
     for (uint32_t f = 0; f < c->faces; f++) {
@@ -1856,15 +1856,15 @@ static int txt_choose_tiles(txt_cover *c, int recolor) {
 
 /* ---- meshes: checks and colours ---------------------------------------------------------- */
 
-/* May two sides of quads lie at one edge? North meets south and east meets west, each running against
-   the other round its face, with one colour. */
+/* May two sides of quads share an edge? North meets south and east meets west, with one colour and
+   in opposite directions. */
 static int txt_sides_match(const txt_cover *c, uint32_t a, uint32_t b) {
     const uint32_t *v = c->mesh.indices;
     return ((a ^ b) & 3) == 2 && v[a] != v[b] && c->color[a] == c->color[b];
 }
 
-/* Do all sides of quads match those at the same edge? Sides from a vertex to itself are left alone:
-   around a pole they are all at the same vertex. */
+/* Do all sides of quads match those at the same edge? Sides from a vertex to itself have no edge:
+   around a pole all faces have one at the same vertex. */
 static txm_status txt_check_sides(const txt_cover *c) {
     for (uint32_t side = 0; side < c->sides; side++) {
         uint32_t other = TXM_NO_SIDE;
@@ -1987,9 +1987,10 @@ TEXTILES_API txm_status textiles_assign_quads(const textiles_set *set, const uin
 
 /* ---- atlas: where tiles lie ----------------------------------------------------------- */
 
-/* The place of the pair (a, b) in a ring of C^2 pairs that chain, (a, b), (b, c), (c, d) ..., each
-   pair once [Wei 2004, section 3.1.1]. The first colours of the pairs are 0 0 1 1 0 2 1 2 2 0 3 1 3 2
-   3 3; the first C^2 of these are a de Bruijn sequence of C colours. */
+/* The position of the pair (a, b) in a ring of all C^2 pairs, each of which begins with the second
+   colour of the one before, (a, b), (b, c), (c, d) ... [6, section 3.1.1]. The first colours of the
+   pairs are 0 0 1 1 0 2 1 2 2 0 3 1 3 2 3 3; the first C^2 of these are a de Bruijn sequence of C
+   colours. */
 static int txt_ring_place(int a, int b) {
     if (a == b) return a ? (a + 1) * (a + 1) - 2 : 0;
     if (b == 0) return (a + 1) * (a + 1) - 1;
@@ -2003,13 +2004,14 @@ static const uint8_t txt_torus_corners[4][4] = {
 
 /* Column and row of a complete set's tile, variant 0, in the torus.
 
-   Wang tiles: the vertical edges of a row run through the ring of pairs (west, east), the horizontal
-   edges of a column through that of pairs (north, south), so that every combination occurs.
+   Wang tiles: the vertical edges of a row run through the ring of pairs (west, east), the
+   horizontal edges of a column through that of pairs (north, south), so that every combination
+   occurs.
 
-   Corner tiles, 3 colours: column k of the corners is the ring, moved up by 0 + 1 + ... + (k - 1). From
-   column to column the shift grows by k, and 0 + 1 + ... + 8 is a multiple of 9, so that the torus
-   closes. The pair (nw, sw) tells the place in the ring of the left side, (ne, se) that of the right,
-   their difference k [Cock 1988]. That needs an odd number of colours. */
+   Corner tiles, 3 colours: column k of the corners is the ring, moved up by 0 + 1 + ... + (k - 1).
+   From column to column the shift grows by k, and 0 + 1 + ... + 8 is a multiple of 9, so that the
+   torus closes. The pair (nw, sw) gives the position of the left side in the ring, (ne, se) that of
+   the right side, their difference k [Cock 1988]. This needs an odd number of colours. */
 static void txt_torus_place(const textiles_layout *l, int code, int *column, int *row) {
     const int c = l->colors, ring = c * c;
     const int e[4] = {code / (c * c * c), code / (c * c) % c, code / c % c, code % c};
@@ -2046,8 +2048,8 @@ static int txt_round_up(int x, int power) {
 
    Triangles: two to a cell, the second upside down, mirrored at the cell's centre. Rows and columns
    of texels behave as above, but across the hypotenuse the four pixels' far corner is further away:
-   with the edge at i + j = N, the block of four begins at i + j <= floor(N + 1) - g, so that its last
-   pixel has i + j <= floor(N + 1) + 3 g - 2, floor() to multiples of g.
+   with the edge at i + j = N, the block of four begins at i + j <= floor(N + 1) - g, so that its
+   last pixel has i + j <= floor(N + 1) + 3 g - 2, floor() to multiples of g.
 
          +--------------x      A owns the pixels with x + y < pitch of its cell, B the others:
          |A . . . . . / |      up to i + j = pitch - 1 - 2 g, and pitch - 2 - 2 g. The latter is
@@ -2087,9 +2089,9 @@ static txm_status txt_lay_out(textiles_layout *l, txm_env *env) {
     return TXM_OK;
 }
 
-/* Is this a layout that textiles_layout_make can have made? Nothing else is trusted with indices. */
+/* Refuse a layout that textiles_layout_make cannot have made: its numbers are used as indices. */
 static txm_status txt_check_layout(const textiles_layout *layout, txm_env *env) {
-    static const char *const bad = "layout is none of textiles_layout_make";
+    static const char *const bad = "layout was not made by textiles_layout_make";
     if (!layout) return txm_fail(env, TXM_BAD_ARGUMENT, "layout is NULL");
     textiles_layout l = *layout;
     if ((int)l.packing < TEXTILES_PACKED || (int)l.packing > TEXTILES_SLICES ||
@@ -2146,8 +2148,8 @@ TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px
 
 /* ---- atlas: what lies around a tile --------------------------------------------------- */
 
-/* The nine tiles of which a square is the middle one; -1: nothing fits. The corners match the tiles
-   above or below and to their side, where the set has such a tile. */
+/* A square and eight tiles around it that match; -1: none does. The diagonal ones match the tiles
+   above or below and beside them, where the set has such a tile. */
 static void txt_around(const textiles_set *s, int tile, int around[3][3]) {
     static const int order[8][2] = {{2, 1}, {0, 1}, {1, 0}, {1, 2}, {2, 0}, {0, 0}, {2, 2}, {0, 2}};
     for (int i = 0; i < 9; i++) around[i / 3][i % 3] = -1;
@@ -2166,8 +2168,8 @@ static void txt_around(const textiles_set *s, int tile, int around[3][3]) {
     }
 }
 
-/* Pixel (x, y) of the plane around a square, less than a tile away. Where nothing fits, the nearest
-   pixel there is. */
+/* Pixel (x, y) of the plane around a square, less than a tile away. Where no tile matches, the
+   nearest pixel of those around. */
 static const uint8_t *txt_square_texel(const textiles_set *s, int map, int around[3][3], int x,
                                        int y) {
     const int n = s->size;
@@ -2195,9 +2197,9 @@ static int txt_across(const textiles_set *s, int tile, int k) {
     return tile * 3 + k;
 }
 
-/* Texel (i, j) of the plane around a triangle: walk there, across the side that it is furthest
-   beyond. With w[k] the barycentric coordinate of corner k, times size, the neighbour across side k
-   has the third corner Q = V(k) + V(k+1) - V(k+2), so that
+/* Texel (i, j) of the plane around a triangle: go from triangle to triangle, each time across the
+   side that the texel lies furthest beyond. With w[k] the barycentric coordinate of corner k, times
+   size, the neighbour across side k has the third corner Q = V(k) + V(k+1) - V(k+2), so that
 
        w(k) V(k) + w(k+1) V(k+1) + w(k+2) V(k+2)
            = (w(k) + w(k+2)) V(k) + (w(k+1) + w(k+2)) V(k+1) - w(k+2) Q,
@@ -2241,7 +2243,7 @@ static void txt_draw_around(const textiles_set *s, int map, int tile, const txm_
     }
 }
 
-/* The same for one tile of an atlas and all that its cell has around it. */
+/* Draw one tile of an atlas and the rest of its cell around it. */
 typedef struct txt_atlas_job {
     const textiles_set *set;
     const textiles_layout *layout;
@@ -2260,7 +2262,7 @@ static void txt_draw_cell(void *context, int tile) {
     txt_draw_around(job->set, job->map, tile, job->out, px, py, step, -l->gutter, high, most);
 }
 
-/* ---- atlas: looking a place up -------------------------------------------------------- */
+/* ---- atlas: the plane, pixel by pixel ------------------------------------------------- */
 
 /* a window of the plane */
 typedef struct txt_view {
@@ -2270,8 +2272,8 @@ typedef struct txt_view {
     double x, y, step;
 } txt_view;
 
-/* A sample between the pixels of a tile's picture: at (x, y), pixel centres at whole numbers. Torus
-   layouts repeat; of others the last pixels go on for ever, of slices those of the slice. */
+/* Bilinear interpolation at (x, y) of the atlas, pixel centres at whole numbers. Torus layouts
+   repeat; others are clamped to the picture, slices to the slice. */
 static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *to) {
     const textiles_layout *l = v->layout;
     const int slices = l->packing == TEXTILES_SLICES;
@@ -2301,7 +2303,7 @@ static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *
     }
 }
 
-/* One row of the window. A tile is asked for again only when the place leaves it. */
+/* One row of the window. The tile is looked up again only when the position leaves it. */
 static void txt_view_row(void *context, int row) {
     const txt_view *v = (const txt_view *)context;
     const textiles_layout *l = v->layout;
@@ -2366,7 +2368,7 @@ TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_p
     return status;
 }
 
-/* what the two calls that draw a set's tiles have in common: is out such a picture? */
+/* the checks of a map's number and of out that both calls that draw tiles have in common */
 static txm_status txt_check_picture(const textiles_set *set, int map, const txm_image *out,
                                     int width, int height, txm_env *env) {
     if (map < 0 || map >= set->map_count)
@@ -2374,7 +2376,7 @@ static txm_status txt_check_picture(const textiles_set *set, int map, const txm_
     const txm_status status = txm_image_check(out, "out", TEXTILES_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (out->width != width || out->height != height)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "out: not as wide and high as it must be");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: width or height is not what the tiles need");
     if (txm_image_resolve(*out).channels != set->maps[map].channels ||
         out->sample != set->maps[map].sample)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out: channels and sample type must be the map's");
@@ -2388,7 +2390,7 @@ TEXTILES_API txm_status textiles_draw_atlas(const textiles_set *set, const texti
     if (status != TXM_OK) return status;
     if (layout->kind != set->kind || layout->size != set->size || layout->count != set->count ||
         layout->colors != set->colors || layout->variants != set->variants)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "layout is of another set");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "layout belongs to another set");
     status = txt_check_picture(set, map, &out, layout->width, layout->height, env);
     if (status != TXM_OK) return status;
 
@@ -2451,12 +2453,12 @@ TEXTILES_API txm_status textiles_draw_plane(const textiles_plane *plane,
     } else if (fits) {
         fits = layout->count == c * c * c * c * layout->variants;
     }
-    if (!fits) return txm_fail(env, TXM_BAD_ARGUMENT, "plane and layout are not of one set");
+    if (!fits) return txm_fail(env, TXM_BAD_ARGUMENT, "plane and layout belong to different sets");
     status = txm_image_check(atlas, "atlas", TEXTILES_MAX_PIXELS, env);
     if (status == TXM_OK) status = txm_image_check(&out, "out", TEXTILES_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (atlas->width != layout->width || atlas->height != layout->height)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "atlas: not as wide and high as the layout says");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "atlas: width or height is not that of the layout");
     if (txm_image_resolve(*atlas).channels != txm_image_resolve(out).channels ||
         atlas->sample != out.sample)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out: channels and sample type must be the atlas's");
@@ -2465,7 +2467,7 @@ TEXTILES_API txm_status textiles_draw_plane(const textiles_plane *plane,
     /* tile numbers must fit an int; of triangles they mix both coordinates */
     const double reach = fabs(x) + fabs(y) + step * out.width + step * out.height;
     if (!(reach / layout->size < 1e9))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "the window lies more than 10^9 tiles away");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "the window lies more than 10^9 tiles from the origin");
 
     txt_view view;
     view.plane = plane;
@@ -2485,7 +2487,7 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
     if (!uv || rotation < 0 || rotation > 2) return 0;
     if (!textiles_place(layout, tile, NULL, NULL, NULL, corner)) return 0;
     const int triangle = layout->kind == TEXTILES_TRIANGLE, corners = triangle ? 3 : 4;
-    for (int k = 0; k < corners; k++) { /* squares go clockwise from nw, faces the other way */
+    for (int k = 0; k < corners; k++) { /* squares are listed clockwise, faces not */
         const int from = triangle ? (k + rotation) % 3 : (4 - k) % 4;
         uv[k][0] = corner[from][0];
         uv[k][1] = corner[from][1];
@@ -2504,9 +2506,9 @@ enum {
     TXT_SURROUNDINGS = 4  /* texels: half width of the box whose brightness is a feature       */
 };
 
-/* these meet floating-point numbers, which C++ does not like of enumerations */
+/* macros, as C++20 deprecates arithmetic of enumerators with floating-point numbers */
 #define TXT_SCALE 16          /* units of a search's cost per gray level                     */
-#define TXT_SURROUND_GAIN 3   /* how strongly surroundings count                             */
+#define TXT_SURROUND_GAIN 3   /* factor by which surroundings count more                     */
 
 /* ---- sheets: the exemplars as texels ------------------------------------------------------- */
 
@@ -2527,8 +2529,8 @@ typedef struct txt_layer {
     int is_frame;    /* belongs to an edge or a corner of the set   */
 } txt_layer;
 
-/* Traits whose means over the set should be those of the exemplars, in gray levels: the channels of the
-   first map, the steps from texel to texel (half of 60 each), and the variance. */
+/* Traits whose means over the set should be those of the exemplars, in gray levels: the channels of
+   the first map, the steps from texel to texel (half of 60 each), and the variance. */
 enum { TXT_STEP = 4, TXT_VARIANCE = 6, TXT_TRAITS = 7 }; /* TXT_STEP + 1: the step down */
 
 typedef struct txt_line {
@@ -2536,8 +2538,9 @@ typedef struct txt_line {
     double mean;   /* over all texels                                                */
 } txt_line;
 
-/* An edge as all tiles with its colour see it. Its frame: from the start vertex along the joint (a),
-   and across it (u): of squares u < 0 is above or left of the joint, of triangles u = 0 lies on it. */
+/* The strip of exemplar at an edge, the same in all tiles with its colour. Coordinates: a along the
+   joint from the start vertex, u across it. Squares: u < 0 is above or left of the joint;
+   triangles: u = 0 lies on it. */
 typedef struct txt_seam_strip {
     int axis; /* 0: runs to the right, 1: down */
     int count;
@@ -2551,7 +2554,7 @@ typedef struct txt_seam_strip {
 /* A place of the exemplars where a piece may come from. */
 typedef struct txt_place {
     int sheet, turn, i, j;
-    uint32_t cost; /* mean difference of a sample in 1 / TXT_SCALE gray levels, and the extra cost */
+    uint32_t cost; /* mean difference of a sample and the extra cost, TXT_SCALE per gray level */
 } txt_place;
 
 typedef struct txt_build {
@@ -2569,28 +2572,28 @@ typedef struct txt_build {
     uint8_t *plane;         /* features * texels: the same, blurred a little, for searches    */
     txt_line cross[2];      /* by axis: differences across a joint there                      */
     txt_line along[2];      /* differences along a line                                       */
-    txt_line salience[2];   /* how much a place catches the eye, along both axes              */
+    txt_line salience[2];   /* how conspicuous a place is, along both axes                    */
     txt_line color[2][4];   /* the first map's channels                                       */
-    uint8_t *salient;       /* the same for a texel                                           */
-    uint16_t *line_cost[2]; /* by axis: what a joint of line_length texels from there costs   */
+    uint8_t *salient;       /* the same of a texel, see txt_fill_salience                     */
+    uint16_t *line_cost[2]; /* by axis: the cost of a joint of line_length texels from there  */
     int line_length[2];
-    double line_step[2];    /* the mean step that was wanted of it                            */
-    uint32_t *use[TEXTILES_MAX_EXEMPLARS];  /* by cell: how much of it insides show            */
+    double line_step[2];    /* the mean step that it should have                              */
+    uint32_t *use[TEXTILES_MAX_EXEMPLARS];  /* by cell: how much of it interiors show          */
     uint32_t *used[TEXTILES_MAX_EXEMPLARS]; /* sums over all cells above and to the left       */
     double *traits[TEXTILES_MAX_EXEMPLARS]; /* the same of TXT_TRAITS traits                   */
     double usual[TXT_TRAITS];               /* their means over the exemplars                  */
-    double surplus[TXT_TRAITS];             /* sum over the tiles so far of what they have more */
+    double surplus[TXT_TRAITS];             /* sum over the tiles so far of what exceeds these  */
     struct {
         int sheet, i, j;
     } corner[TEXTILES_MAX_COLORS];
     int corner_count;
     txt_seam_strip *strips;
     int strip_count;
-    txt_place *inside; /* by tile: where its inside comes from; sheet -1: nowhere as yet */
+    txt_place *inside; /* by tile: where its interior comes from; sheet -1: not made yet */
     int lock_from, lock_count; /* u of a strip's first line, how many                         */
     double step_mean;          /* from texel to texel, both axes                               */
     double wanted_step;        /* of joints, in units of the mean step of the exemplars       */
-    int corners_are_final;     /* so that edges should make up for them                        */
+    int corners_are_final;     /* edges then compensate for the corners                        */
 } txt_build;
 
 static const int txt_turns[6][4] = {{1, 0, 0, 1},   {0, -1, 1, 1}, {-1, -1, 1, 0},
@@ -2634,7 +2637,7 @@ static int txt_difference(const txt_build *b, int32_t s, int32_t t) {
     return 4 * sum / b->features;
 }
 
-/* Keys's cubic convolution over six points, of fourth order: nearly as sharp as the exemplar. */
+/* Cubic convolution over six points, of fourth order [10]: nearly as sharp as the exemplar. */
 static double txt_keys(double x) {
     x = fabs(x);
     if (x < 1) return (4.0 / 3 * x - 7.0 / 3) * x * x + 1;
@@ -2717,8 +2720,8 @@ static txm_status txt_make_sheets(txt_build *b) {
     return TXM_OK;
 }
 
-/* What is compared: all channels of the first map, then those of the others at half weight as long as
-   there is room. Colours count as much as they are opaque. Floats are scaled to their range. */
+/* What is compared: all channels of the first map, then those of the others at half weight as long
+   as there is room. Colours count as much as they are opaque. Floats are scaled to their range. */
 static void txt_list_features(txt_build *b) {
     for (int m = 0; m < b->set->map_count; m++) {
         const int n = b->set->maps[m].channels;
@@ -2732,9 +2735,9 @@ static void txt_list_features(txt_build *b) {
     b->stride = b->features <= 4 ? 4 : 8;
 }
 
-/* The last feature: the brightness of the surroundings, which tells where in an element (a stone, a
-   leaf) a texel lies, so that cuts and searches do not join half of one to half of another just because
-   both are gray inside. */
+/* The last feature: the brightness of the surroundings, which depends on where in an element (a
+   stone, a leaf) a texel lies. So cuts and searches do not join parts of different elements just
+   because they have the same colour. */
 static txm_status txt_fill_surroundings(txt_build *b, int f) {
     for (int e = 0; e < b->sheet_count; e++) {
         const txt_sheet *s = &b->sheets[e];
@@ -2815,8 +2818,8 @@ static txm_status txt_fill_features(txt_build *b) {
     return TXM_OK;
 }
 
-/* Planes of the features, each texel averaged with its neighbours: searches look at a part of the
-   texels only, and should not be fooled by single ones. */
+/* Planes of the features, each texel averaged with its neighbours: searches compare only a part of
+   the texels, and noise in single ones must not decide. */
 static void txt_fill_planes(txt_build *b) {
     for (int e = 0; e < b->sheet_count; e++) {
         const txt_sheet *s = &b->sheets[e];
@@ -2841,7 +2844,7 @@ static void txt_fill_planes(txt_build *b) {
     }
 }
 
-/* Sums of a value along the lines of an axis: value(b, which, sheet, x, y) at storage place (x, y). */
+/* Sums of a value along the lines of an axis: value(b, which, sheet, x, y) at (x, y) as stored. */
 static void txt_sum_lines(txt_build *b, txt_line *line, int axis, int which,
                           int (*value)(const txt_build *b, int which, int sheet, int x, int y)) {
     double total = 0, count = 0;
@@ -2884,7 +2887,7 @@ static double txt_line_mean(const txt_build *b, const txt_line *line, int axis, 
     return (double)(line->sum[first + q] - line->sum[first + p]) / (to - from) / line->mean;
 }
 
-/* The step from texel to texel as joints are judged: the channels of the first map only. */
+/* The difference of two texels as textiles_measure has it: the channels of the first map only. */
 static int txt_step(const txt_build *b, int32_t s, int32_t t) {
     const uint8_t *p = b->texel + (size_t)s * (size_t)b->stride;
     const uint8_t *q = b->texel + (size_t)t * (size_t)b->stride;
@@ -2925,7 +2928,7 @@ static int txt_color_value(const txt_build *b, int channel, int sheet, int x, in
     return b->texel[(size_t)(s->first + y * s->width + x) * (size_t)b->stride + (size_t)channel];
 }
 
-/* loudness: what is beyond twice the usual salience */
+/* salience as far as it exceeds 28, where 16 is the mean */
 static int txt_salience_value(const txt_build *b, int axis, int sheet, int x, int y) {
     (void)axis;
     const txt_sheet *s = &b->sheets[sheet];
@@ -2933,9 +2936,9 @@ static int txt_salience_value(const txt_build *b, int axis, int sheet, int x, in
     return v > 28 ? v - 28 : 0;
 }
 
-/* Salience: the squared deviation from the mean colour in units of the variance, 16 = usual, averaged
-   over a neighbourhood. Rare things far from the mean, a white stone say, stand out where they are
-   repeated. */
+/* Salience: the squared deviation from the mean colour in units of the variance, mean 16, averaged
+   over a neighbourhood. Rare elements far from the mean, a white stone for example, are conspicuous
+   where they repeat. */
 static txm_status txt_fill_salience(txt_build *b) {
     double mean[TXT_MAX_FEATURES] = {0}, variance[TXT_MAX_FEATURES] = {0};
     for (size_t t = 0; t < b->texels; t++) {
@@ -2986,7 +2989,7 @@ static txm_status txt_fill_salience(txt_build *b) {
     return TXM_OK;
 }
 
-/* Traits of one texel; 0 for those that there are none of. */
+/* Traits of one texel; 0 for steps at the border and for channels that the map does not have. */
 static void txt_texel_traits(const txt_build *b, int32_t t, double traits[TXT_TRAITS]) {
     const int e = txt_sheet_of(b->set, t);
     const txt_sheet *s = &b->sheets[e];
@@ -3040,6 +3043,7 @@ static void txt_fill_traits(txt_build *b) {
     }
 }
 
+/* Everything that is computed once from the exemplars. */
 static txm_status txt_prepare(txt_build *b) {
     txt_list_features(b);
     txm_status status = txt_make_sheets(b);
@@ -3088,13 +3092,13 @@ enum {
     TXT_SAMPLES = 2048    /* texels compared at one place of a search, at most                 */
 };
 
-/* A texel that a piece should show: at this distance from the piece's place, turned already. */
+/* A texel that a piece should show, and its offset from the place of the piece, turned already. */
 typedef struct txt_sample {
     int i, j;
     uint8_t value[TXT_MAX_FEATURES]; /* blurred */
 } txt_sample;
 
-/* How to search: samples, and what a place costs besides. */
+/* What to search for: samples to match, and additional costs of a place. */
 typedef struct txt_query {
     txt_sample *samples;
     int count, capacity;
@@ -3150,8 +3154,8 @@ static int txt_row_range(const txt_build *b, const txt_query *q, int sheet, int 
     return high > low;
 }
 
-/* Sums of the differences of samples first..last-1 at TXT_LANES places side by side, added to sum. One
-   group has at most 256 differences, so that 16 bits suffice. */
+/* Sums of the differences of samples first..last-1 at TXT_LANES places side by side, added to sum.
+   One group has at most 256 differences, so that 16 bits suffice. */
 #ifdef TXT_AVX2
 __attribute__((target("avx2"))) static void txt_add_lanes_avx2(const txt_build *b,
                                                                const txt_query *q,
@@ -3216,8 +3220,8 @@ static void txt_add_lanes(const txt_build *b, const txt_query *q, const size_t *
 #endif
 }
 
-/* Costs of the places (from, j) .. (from + n - 1, j). The planes end in TXT_LANES spare bytes, so that
-   whole groups of lanes can be read; what they yield beyond n is not looked at. */
+/* Costs of the places (from, j) .. (from + n - 1, j). The planes end in TXT_LANES spare bytes, so
+   that whole groups of lanes can be read; results beyond n are ignored. */
 static void txt_row_costs(const txt_build *b, const txt_query *q, int sheet, int j, int from, int n,
                           txt_scratch *m) {
     const txt_sheet *s = &b->sheets[sheet];
@@ -3244,8 +3248,8 @@ static void txt_row_costs(const txt_build *b, const txt_query *q, int sheet, int
 }
 
 /* The best places of one sheet, cheapest first, at least q->apart from each other: appended to
-   best[], which keeps the cheapest of most. Looks at every second row or fewer, then next to what it
-   found. */
+   best[], which keeps the cheapest of most. Tries every second row or fewer, then the rows left out
+   next to what it found. */
 static int txt_search(const txt_build *b, const txt_query *q, int sheet, int turn, txt_scratch *m,
                       txt_place *best, int count, int most) {
     const txt_sheet *s = &b->sheets[sheet];
@@ -3332,10 +3336,10 @@ static void txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *
 
 enum {
     TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
-    TXT_NEAR = 4,         /* texels from the vertex: here the corner's piece may end ...       */
-    TXT_FAR = 12,         /* ... and here it must have                                         */
+    TXT_NEAR = 4,         /* texels from the vertex where the piece of a corner may end ...    */
+    TXT_FAR = 12,         /* ... and where it must have ended                                  */
     TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
-    TXT_CORNERS = 160     /* places looked at for the corner                                   */
+    TXT_CORNERS = 160     /* random places that are rated for each corner                      */
 };
 #define TXT_END 8             /* texels of a joint that show the corner, about               */
 
@@ -3362,7 +3366,7 @@ static int32_t txt_strip_shows(const txt_build *b, const txt_seam_strip *s, int 
         si = s->segment[w - 1].i;
         sj = s->segment[w - 1].j;
         txt_along(b, s->axis, a, u, &i, &j);
-    } else { /* a corner's piece lies with its vertex at the end; of triangles only the vertex counts */
+    } else { /* a corner: its vertex lies at the end of the strip */
         const int c = s->corner[w != 0];
         sheet = b->corner[c].sheet;
         si = b->corner[c].i;
@@ -3376,9 +3380,9 @@ static int32_t txt_strip_shows(const txt_build *b, const txt_seam_strip *s, int 
     return txt_number(b, sheet, si + i, sj + j);
 }
 
-/* What a line costs as a joint, in search units: it should be as rough as is usual, across, which is
-   what one would see first, and along; of the usual colour; and nothing on it should catch the eye. The
-   weights, in gray levels, are ours, found by looking and measuring. */
+/* The cost of a line of texels as a joint, in search units. A good joint has typical roughness,
+   across (the most visible) and along, typical colour, and nothing conspicuous on it. The weights,
+   in gray levels, are ours, found by measuring and by eye. */
 static int txt_line_cost(const txt_build *b, int axis, double wanted, int sheet, int x, int y,
                          int n) {
     const double step = txt_line_mean(b, &b->cross[axis], axis, sheet, x, y, n) / wanted;
@@ -3394,7 +3398,7 @@ static int txt_line_cost(const txt_build *b, int axis, double wanted, int sheet,
     return (int)fmin(cost * TXT_SCALE, 65535);
 }
 
-/* The same for lines of length n from every texel on, to be looked up. */
+/* A table of these costs for lines of n texels from every texel on. */
 static void txt_fill_line_costs(txt_build *b, int axis, int n, double wanted) {
     if (b->line_length[axis] == n && fabs(b->line_step[axis] - wanted) < 0.002) return;
     b->line_length[axis] = n;
@@ -3409,7 +3413,7 @@ static void txt_fill_line_costs(txt_build *b, int axis, int n, double wanted) {
     }
 }
 
-/* The extra cost of the places of a row, for a strip's segment that runs over a = from..from + n. */
+/* The extra cost of the places of a row for a segment over a = from to from + length. */
 typedef struct txt_strip_query {
     const txt_build *b;
     const txt_seam_strip *strips; /* those of the same axis so far */
@@ -3443,8 +3447,8 @@ static void txt_strip_extra(const void *context, int sheet, int i, int j, int n,
     }
 }
 
-/* Samples that make the two ends of a strip agree with the corners. before: the segment before (else
-   the corner at the start), over its last texels around a = from; after: match the end's corner. */
+/* Samples at the ends of segment w. at_start: what the segment before shows around a = from, for
+   the first segment the corner; at_end: what the corner at the end of the strip shows. */
 static void txt_end_samples(const txt_build *b, txt_query *q, const txt_seam_strip *s, int w, int from,
                             int at_start, int at_end) {
     const int size = b->set->size, zone = txt_zone_end(b) + 1;
@@ -3471,7 +3475,7 @@ static void txt_end_samples(const txt_build *b, txt_query *q, const txt_seam_str
     }
 }
 
-/* into how many segments a strip is to be divided: a sheet must leave room to choose */
+/* number of segments of a strip, each so short that a sheet has several places for it */
 static int txt_segment_count(const txt_build *b, int axis, int only_sheet) {
     int length = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -3484,8 +3488,8 @@ static int txt_segment_count(const txt_build *b, int axis, int only_sheet) {
     return count > TXT_MAX_SEGMENTS ? TXT_MAX_SEGMENTS : count;
 }
 
-/* Mean step wanted of a strip between its ends, TXT_END texels each, where the corners show: such that
-   that of the whole joint is b->wanted_step. */
+/* The mean step that a strip should have between its ends, TXT_END texels each that show the
+   corners, so that the whole joint has b->wanted_step. */
 static double txt_wanted_step(const txt_build *b, const txt_seam_strip *s) {
     const int size = b->set->size, axis = s->axis;
     double ends = 0;
@@ -3520,7 +3524,7 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
         q->context = &extra;
         q->apart = 1;
         txt_end_samples(b, q, s, g + 1, from, 1, g + 1 == count);
-        for (int k = 0; k < 4; k++) { /* it must reach over its part, and into the next ones */
+        for (int k = 0; k < 4; k++) { /* it must cover its part and overlap the next ones */
             const int first = g ? from - 7 : b->is_triangle ? 0 : TXT_NEAR;
             const int last = g + 1 < count ? to + 7 : b->is_triangle ? size : size - TXT_NEAR;
             txt_along(b, s->axis, k & 1 ? last : first, k & 2 ? TXT_LOCK : -TXT_LOCK,
@@ -3540,8 +3544,8 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
     return total / (uint32_t)count;
 }
 
-/* Where one piece of a strip gives way to the next, line by line across the strip: the cheapest path
-   of [Efros 2001] through a = from..to-1. */
+/* Where piece w of a strip ends and the next begins, line by line across the strip: the minimum
+   error cut [2] through a = from..to-1. */
 static void txt_cut_strip(const txt_build *b, txt_seam_strip *s, int w, int from, int to) {
     enum { LINES = 2 * TXT_ACROSS + 1 };
     float error[LINES * 64];
@@ -3569,6 +3573,7 @@ static void txt_cut_strip(const txt_build *b, txt_seam_strip *s, int w, int from
     }
 }
 
+/* Cut all pieces of a strip, and note which of them each texel shows. */
 static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
     const int size = b->set->size, n = b->lock_count, zone = txt_zone_end(b);
     if (b->is_triangle) {
@@ -3586,7 +3591,7 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
     txt_cut_strip(b, s, s->count, size - zone - 1, size - TXT_NEAR - 1);
 }
 
-/* How far a corner's place is from usual, in roughness and salience around it. */
+/* The cost of a place as a corner: how far it is from typical roughness and salience. */
 static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     const int x = i + (b->is_triangle ? txt_half(j) : 0), r = 10;
     double off = 0, loud = 0;
@@ -3608,7 +3613,7 @@ static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     loud = loud / (2 * r) - 1;
     uint32_t cost = (uint32_t)((30 * off + (loud > 0 ? 8 * loud : 0)) * TXT_SCALE);
     if (b->is_triangle) {
-        /* what surrounds the vertex should look alike turned by any sixth of a circle */
+        /* the surroundings of the vertex should look the same turned by multiples of 60 degrees */
         int sum = 0, n = 0;
         for (int dj = -4; dj <= 4; dj++) {
             for (int di = -4; di <= 4; di++) {
@@ -3632,8 +3637,8 @@ static int txt_edge_sheet(const txt_build *b, int color) {
     return b->desc->edge_exemplars ? b->desc->edge_exemplars[color] : -1;
 }
 
-/* How many strips there are, and which joins what: strip number of an edge. wang, frame: axis 0 then
-   axis 1, by colour; corner: by axis, start's and end's colour; triangle: by colour. */
+/* The number of an edge's strip. wang, frame: axis 0 then axis 1, by colour; corner: by axis,
+   colour at the start and at the end; triangle: by colour. */
 static int txt_strip_index(const txt_build *b, int axis, int color, int end_color) {
     const int c = b->set->colors;
     if (b->set->kind == TEXTILES_CORNER) return (axis * c + color) * c + end_color;
@@ -3684,8 +3689,8 @@ static void txt_random_corner(const txt_build *b, txm_rng *rng, int *sheet, int 
     *i = x - (b->is_triangle ? txt_half(*j) : 0);
 }
 
-/* One corner more: of TXT_CORNERS random places, those most usual are tried out with the strips that
-   they would get. */
+/* Choose one more corner: of TXT_CORNERS random places the most typical ones are compared by the
+   strips that they lead to. */
 static txm_status txt_choose_corner(txt_build *b, txm_rng *rng, txt_query *q, txt_scratch *m) {
     enum { SHORT_LIST = 10 };
     struct {
@@ -3742,8 +3747,9 @@ static txm_status txt_choose_corner(txt_build *b, txm_rng *rng, txt_query *q, tx
     return TXM_OK;
 }
 
-/* Corners first, then for each colour an edge strip: untouched exemplar on both sides of the joint,
-   so that it continues there; chosen to agree with the corners at its ends, and with the others. */
+/* Choose the corners, then for each colour the strip at its edges: unmodified exemplar on both
+   sides of the joint, which agrees with the corners at its ends and lies apart from the other
+   strips. */
 static txm_status txt_make_frames(txt_build *b) {
     const int c = b->set->colors, is_corner = b->set->kind == TEXTILES_CORNER;
     const int corners = is_corner ? c : 1, length = b->set->size + b->is_triangle;
@@ -3789,10 +3795,10 @@ done:
 
 enum {
     TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
-    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
+    TXT_PLACES = 32,      /* found for the interior of a tile                                  */
     TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
     TXT_WINDOW = 12,      /* half width of such a place                                        */
-    TXT_USE = 20,         /* gray levels that a place costs which another inside shows         */
+    TXT_USE = 20,         /* gray levels that a place costs which another interior shows       */
     TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
     TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
 };
@@ -3803,10 +3809,10 @@ typedef struct txt_canvas {
     int tile, side, half; /* half: directions in which neighbours are counted, 2 or 3 */
     int dx[3], dy[3];
     uint8_t *inside, *locked;
-    uint16_t *label, *kept, *start, *best; /* kept, start: labels to go back to */
+    uint16_t *label, *kept, *start, *best; /* kept, start, best: copies to restore */
     uint8_t *border;      /* rows to the nearest joint, at most 255 */
     int32_t *shows;       /* number of the texel shown, -1 beyond the exemplar */
-    int32_t *other;       /* what a layer that is tried would show */
+    int32_t *other;       /* what the layer being tried would show */
     uint16_t *gap;        /* difference of the two */
     txt_layer *layers;
     int layer_capacity;
@@ -3814,18 +3820,18 @@ typedef struct txt_canvas {
     txm_flow flow;
     txt_query query;
     txt_scratch scratch;
-    txt_place places[TXT_PLACES]; /* found for the inside */
+    txt_place places[TXT_PLACES]; /* found for the interior */
     int place_count, tries; /* how many of them are cut */
     int best_place;
 } txt_canvas;
 
-/* What it costs that p shows a and its neighbour q shows c where they should go on: the squared sum
-   of how a and c differ on both sides of the cut. */
+/* The cost of a cut between two neighbours: the squared sum of the differences that the layers on
+   its two sides have at one and at the other texel [8]. */
 static int32_t txt_seam(int at_p, int at_q) {
     return (at_p + at_q) * (at_p + at_q);
 }
 
-/* cost of the cut between neighbouring texels p = (x, y) and q, as they are labelled */
+/* the cost of the cut between neighbouring texels p = (x, y) and q with their present labels */
 static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int dx, int dy) {
     if (c->label[p] == c->label[q]) return 0;
     const txt_layer *a = &c->layers[c->label[p]], *d = &c->layers[c->label[q]];
@@ -3834,14 +3840,15 @@ static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int
     return txt_seam(at_p, at_q);
 }
 
-/* An edge's strip is the same in all tiles with its colour: the less of it shows, the less repeats. */
+/* An edge's strip is the same in all tiles with its colour: the less of it shows, the less repeats.
+   So it costs energy, more the further from the border. */
 static int32_t txt_bias(const txt_canvas *c, int label, int p) {
     if (!c->layers[label].is_frame || c->border[p] < 3) return 0;
     const int far = c->border[p] < 24 ? c->border[p] - 2 : 22;
     return TXT_BIAS * far;
 }
 
-/* Energy of all cuts that touch the rectangle, and of what its texels show. */
+/* Energy of all cuts that touch the rectangle, and of the layers that its texels show. */
 static int64_t txt_energy(const txt_canvas *c, int x0, int y0, int x1, int y1) {
     const int side = c->side;
     int64_t sum = 0;
@@ -3863,8 +3870,8 @@ static int64_t txt_energy(const txt_canvas *c, int x0, int y0, int x1, int y1) {
     return sum;
 }
 
-/* Let layer l take over whatever texels of the rectangle make the energy least: one expansion move of
-   [Boykov 2001]. Returns by how much the energy fell; if it would not, all stays as it was. */
+/* One expansion move [7]: layer l takes those texels of the rectangle that minimise the energy.
+   Returns by how much the energy fell; if it would not fall, nothing changes. */
 static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) {
     const txt_build *b = c->b;
     txm_flow *g = &c->flow;
@@ -3909,7 +3916,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
                 if (!c->inside[q]) continue;
                 const int may_q = TXT_MAY(q, qx, qy), is_q = c->label[q] == l;
                 if (!may_p && !may_q) continue;
-                /* stay, stay; stay, change; change, stay; change, change costs nothing */
+                /* p and q stay; p stays, q changes; p changes, q stays; both change: 0 */
                 int32_t ss, sc, cs;
                 if (c->label[p] == c->label[q]) {
                     ss = 0;
@@ -3924,7 +3931,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
                 }
                 const int other = node + g->step[k];
                 if (may_p && may_q) {
-                    if (ss > sc + cs) ss = sc + cs; /* no arc can reward a seam; checked below */
+                    if (ss > sc + cs) ss = sc + cs; /* no negative arcs; the energy is checked */
                     g->excess[node] += cs - ss;
                     g->excess[other] -= cs;
                     g->arc[k][node] += sc + cs - ss;
@@ -3950,7 +3957,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
                 c->label[p] = (uint16_t)l;
                 const int32_t t = c->shows[p];
                 c->shows[p] = c->other[p];
-                c->other[p] = t; /* to go back */
+                c->other[p] = t; /* to undo it */
             }
         }
     }
@@ -3983,7 +3990,7 @@ static void txt_find_side(const txt_build *b, const textiles_tile *t, int k, txt
     const int size = b->set->size, is_corner = b->set->kind == TEXTILES_CORNER;
     s->turn = s->di = s->dj = 0;
     if (b->is_triangle) {
-        /* side k runs in direction 1, 5, 3 (sixths) from its first corner; the strip in direction 0 */
+        /* side k runs in direction 1, 5, 3 (sixths of a circle), the strip in direction 0 */
         const int run[3] = {1, 5, 3};
         const int corner[3][2] = {{0, 0}, {0, size}, {size, 0}};
         int i, j;
@@ -4003,8 +4010,8 @@ static void txt_find_side(const txt_build *b, const textiles_tile *t, int k, txt
     s->dj = k == 2 ? -size : 0;
 }
 
-/* (a, u) of a texel on a side; u is 0, 1, .. or, from the other side, -1, -2, .. (triangles: 0, -1, ..
-   for + and 0, 1, .. for -) */
+/* (a, u) of a texel on a side; u is 0, 1, .. or, from the other side, -1, -2, .. (triangles: 0, -1,
+   .. for + and 0, 1, .. for -) */
 static void txt_side_place(const txt_build *b, const txt_side *s, int x, int y, int *a, int *u) {
     int i, j;
     txt_turn(s->turn, x, y, &i, &j);
@@ -4053,7 +4060,7 @@ static void txt_add_side_layers(txt_canvas *c, txt_side *s) {
     }
 }
 
-/* Begin a tile: what its edges prescribe is locked, the rest shows what the nearest edge would. */
+/* Start a tile: texels at its edges are fixed, all others show the strip of the nearest edge. */
 static void txt_begin_tile(txt_canvas *c, int tile) {
     const txt_build *b = c->b;
     const int side = c->side, size = b->set->size, sides = b->is_triangle ? 3 : 4;
@@ -4094,7 +4101,7 @@ static void txt_begin_tile(txt_canvas *c, int tile) {
             c->locked[p] = (uint8_t)locks;
             c->label[p] = (uint16_t)list[nearest].layer[w];
             c->shows[p] = txt_shown(b, &c->layers[c->label[p]], x, y);
-            /* a segment or corner that ends before it gets here: take another of the same edge */
+            /* a segment or corner that does not reach here: another segment of the same edge */
             for (int v = 1; v <= s->count && c->shows[p] < 0; v++) {
                 c->label[p] = (uint16_t)list[nearest].layer[v];
                 c->shows[p] = txt_shown(b, &c->layers[c->label[p]], x, y);
@@ -4103,8 +4110,8 @@ static void txt_begin_tile(txt_canvas *c, int tile) {
     }
 }
 
-/* Let every layer expand once more: those of the frame not far from where they are. */
-static void txt_settle(txt_canvas *c) {
+/* One more expansion move for every layer, limited to the surroundings of what it has. */
+static void txt_expand_all(txt_canvas *c) {
     const int reach = 20;
     for (int l = 0; l < c->layer_count; l++) {
         int x0 = INT_MAX, y0 = INT_MAX, x1 = 0, y1 = 0;
@@ -4123,7 +4130,8 @@ static void txt_settle(txt_canvas *c) {
     }
 }
 
-/* What lies deep in the rectangle and still shows the frame changes over to layer l at once. */
+/* Give layer l all texels of the rectangle that show the frame and lie at least `depth` rows from
+   every joint. */
 static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
     for (int y = y0; y < y1; y++) {
         for (int x = x0; x < x1; x++) {
@@ -4137,13 +4145,13 @@ static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int 
     }
 }
 
-/* Search units that a place costs for showing what other insides show already. */
+/* For the extra cost of places that other interiors show already, in search units. */
 typedef struct txt_use_query {
     const txt_build *b;
     int turn, size;
 } txt_use_query;
 
-/* the rectangle of storage texels that a piece laid over the inside shows, about */
+/* approximately the rectangle of a sheet that a piece laid over the interior shows */
 static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, int box[4]) {
     if (!b->is_triangle) {
         box[0] = i;
@@ -4152,7 +4160,7 @@ static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, 
         box[3] = j + size;
         return;
     }
-    int ci, cj; /* a square about the triangle's middle with its area */
+    int ci, cj; /* a square of the triangle's area around its centre */
     txt_turn(turn, size / 3, size / 3, &ci, &cj);
     const int x = i + ci + txt_half(j + cj), y = j + cj, r = size / 3;
     box[0] = x - r;
@@ -4161,7 +4169,7 @@ static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, 
     box[3] = y + r;
 }
 
-/* The cells that a piece shows, about; 0 if there are none. */
+/* Approximately the cells that a piece shows: receives their bounds, returns how many. */
 static int txt_piece_cells(const txt_build *b, int sheet, int turn, int size, int i, int j,
                            int cells[4]) {
     const int across = b->sheets[sheet].width / TXT_CELL + 2;
@@ -4173,7 +4181,7 @@ static int txt_piece_cells(const txt_build *b, int sheet, int turn, int size, in
     return (cells[2] - cells[0]) * (cells[3] - cells[1]);
 }
 
-/* What a piece would have more of the traits than usual. */
+/* By how much the traits of a piece exceed the means of the exemplars. */
 static void txt_piece_traits(const txt_build *b, const txt_place *p, double more[TXT_TRAITS]) {
     int c[4];
     const int across = b->sheets[p->sheet].width / TXT_CELL + 2;
@@ -4204,7 +4212,7 @@ static void txt_use_extra(const void *context, int sheet, int i, int j, int n, u
     }
 }
 
-/* Count what a tile has more of the traits than usual. */
+/* Add to the surplus by how much the traits of a tile exceed the means of the exemplars. */
 static void txt_count_traits(txt_build *b, const txt_canvas *c) {
     double sum[TXT_TRAITS] = {0}, one[TXT_TRAITS];
     int count = 0;
@@ -4217,7 +4225,7 @@ static void txt_count_traits(txt_build *b, const txt_canvas *c) {
     for (int k = 0; k < TXT_TRAITS; k++) b->surplus[k] += sum[k] / count - b->usual[k];
 }
 
-/* Count what a tile's inside shows; units: search cost for a piece that is all used once. */
+/* Count for each cell what the interior of a tile shows of it. */
 static void txt_count_use(txt_build *b, const txt_canvas *c) {
     for (int y = 0; y < c->side; y++) {
         for (int x = 0; x < c->side; x++) {
@@ -4227,14 +4235,14 @@ static void txt_count_use(txt_build *b, const txt_canvas *c) {
             const int e = txt_sheet_of(b->set, t);
             const int w = b->sheets[e].width, at = t - b->sheets[e].first;
             const int across = w / TXT_CELL + 2;
-            const uint32_t weight = 8 + b->salient[t] / 2; /* 16 of usual salience */
+            const uint32_t weight = 8 + b->salient[t] / 2; /* 16 for mean salience */
             b->use[e][at / w / TXT_CELL * across + at % w / TXT_CELL] += weight;
         }
     }
 }
 
-/* Running sums of the use, in search units: a cell that is used once more than the others costs TXT_USE
-   gray levels at first, and less the more all of them are used. */
+/* Summed area table of the use, in search units: a cell that is used once more than the others
+   costs TXT_USE gray levels at first, and less the more all of them are used. */
 static void txt_sum_use(txt_build *b) {
     uint64_t total = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -4257,7 +4265,7 @@ static void txt_sum_use(txt_build *b) {
     }
 }
 
-/* Places of the exemplar that would continue the frame inwards. */
+/* Find places of the exemplars that continue the frame inwards. */
 static void txt_find_insides(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, turns = b->is_triangle ? 6 : 1;
@@ -4286,7 +4294,7 @@ static void txt_find_insides(txt_canvas *c) {
     }
 }
 
-/* The layer of a place: a new one, or the one there is. -1: no room. */
+/* The layer of a place, new or existing; -1: too many layers. */
 static int txt_add_layer(txt_canvas *c, const txt_place *p) {
     const txt_layer layer = {p->sheet, p->turn, p->i, p->j, 0};
     for (int l = 0; l < c->layer_count; l++) {
@@ -4300,7 +4308,8 @@ static int txt_add_layer(txt_canvas *c, const txt_place *p) {
     return c->layer_count++;
 }
 
-/* Where the cuts are worst, look for a piece that fits what surrounds the place, and let it expand. */
+/* At the worst places along the cuts, search for a piece that matches the surroundings, and expand
+   it. */
 static void txt_mend(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, r = TXT_WINDOW;
@@ -4372,7 +4381,7 @@ static void txt_mend(txt_canvas *c) {
     }
 }
 
-/* Show again what the labels say. */
+/* Compute from the labels what the texels show. */
 static void txt_show(txt_canvas *c) {
     for (int y = 0; y < c->side; y++) {
         for (int x = 0; x < c->side; x++) {
@@ -4382,7 +4391,8 @@ static void txt_show(txt_canvas *c) {
     }
 }
 
-/* side of the blocks in which the inside is filled: the tile's, or what the exemplars allow for */
+/* side of the blocks in which the interior is filled: that of the tile, or less if the exemplars
+   are smaller */
 static int txt_block_side(const txt_build *b) {
     int most = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -4395,8 +4405,8 @@ static int txt_block_side(const txt_build *b) {
     return most > 8 ? most : 8;
 }
 
-/* The exemplar is too small to fill the inside at once: block by block, each continuing the frame and
-   the blocks before it. */
+/* Fill the interior block by block, as the exemplar is too small to fill it at once; each block
+   continues the frame and the blocks before it. */
 static void txt_fill_blocks(txt_canvas *c, int forced) {
     const txt_build *b = c->b;
     const int side = c->side, block = txt_block_side(b), reach = 8;
@@ -4421,14 +4431,14 @@ static void txt_fill_blocks(txt_canvas *c, int forced) {
                 txt_sample_add(b, &c->query, x, y, c->shows[p]);
             }
         }
-        if (c->query.count == 0) { /* nothing to continue: anywhere not used so far */
+        if (c->query.count == 0) { /* nothing to continue: any place that is little used so far */
             const int32_t any = b->sheets[0].first;
             for (int k = 0; k < 4; k++)
                 txt_sample_add(b, &c->query, k & 1 ? x0 : x1 - 1, k & 2 ? y0 : y1 - 1, any);
         }
         for (int e = 0; e < b->sheet_count; e++)
             found = txt_search(b, &c->query, e, 0, &c->scratch, place, found, 4);
-        /* not always the best: that is the same for all tiles with these edges */
+        /* not always the best, which is the same for all tiles with these edges */
         txm_rng rng = txm_rng_make(b->desc->seed, (uint64_t)c->tile * 4096 + (uint64_t)n);
         const int l =
             found ? txt_add_layer(c, &place[txm_rng_below(&rng, (uint32_t)found)]) : -1;
@@ -4438,8 +4448,8 @@ static void txt_fill_blocks(txt_canvas *c, int forced) {
     }
 }
 
-/* Where no piece reaches, which takes an exemplar much smaller than the tile, show the texel of the
-   sheet that is nearest to what the label asks for. */
+/* Where no piece reaches (only with an exemplar much smaller than the tile) show the texel of the
+   sheet that is nearest to the one of the label. */
 static void txt_fill_gaps(txt_canvas *c) {
     const txt_build *b = c->b;
     for (int p = 0; p < c->side * c->side; p++) {
@@ -4454,7 +4464,7 @@ static void txt_fill_gaps(txt_canvas *c) {
     }
 }
 
-/* Cut one inside after the other into the frame, keep the best, and mend it. */
+/* Cut one interior after the other into the frame, keep the best, and mend it. */
 static void txt_cut_tile(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, size = b->set->size;
@@ -4464,7 +4474,7 @@ static void txt_cut_tile(txt_canvas *c) {
     c->best_place = -1;
     if (txt_block_side(b) < side || c->place_count == 0) {
         txt_fill_blocks(c, forced);
-        txt_settle(c);
+        txt_expand_all(c);
         txt_mend(c);
         return;
     }
@@ -4476,7 +4486,7 @@ static void txt_cut_tile(txt_canvas *c) {
         txt_add_layer(c, &c->places[k]);
         txt_force(c, c->frame_count, 0, 0, side, side, forced);
         txt_expand(c, c->frame_count, 0, 0, side, side);
-        txt_settle(c);
+        txt_expand_all(c);
         const int64_t energy = txt_energy(c, 0, 0, side, side) +
                                (int64_t)c->places[k].cost * TXT_PLACE_WEIGHT * side;
         if (c->best_place >= 0 && energy >= least) continue;
@@ -4493,7 +4503,7 @@ static void txt_cut_tile(txt_canvas *c) {
 
 /* ---- repair ------------------------------------------------------------------------------ */
 
-/* Memory for txm_poisson out of one block: no allocator is called from the threads. */
+/* Memory for txm_poisson from one block, so that threads do not call the allocator. */
 typedef struct txt_pool {
     uint8_t *block;
     size_t used, size;
@@ -4509,10 +4519,10 @@ static void *txt_pool_take(void *user, size_t bytes) {
 
 static void txt_pool_give(void *user, void *block) {
     (void)user;
-    (void)block; /* all at once, by the next repair */
+    (void)block; /* the next repair frees all at once */
 }
 
-/* bytes of the pool that suffice for any mask of a tile */
+/* bytes that are enough for txm_poisson with any mask of a tile */
 static size_t txt_pool_bytes(size_t texels, size_t side) {
     return texels * (6 * sizeof(double) + 4 * sizeof(int32_t) + 4 * sizeof(float)) +
            side * sizeof(int32_t) + 4096;
@@ -4531,8 +4541,8 @@ typedef struct txt_repair {
     txt_pool pool;
 } txt_repair;
 
-/* Spread the steps at the cuts of a tile over the texels near them [Perez 2003]: differences are those
-   of the exemplar, across a cut the mean of what its two sides would go on with. */
+/* Spread the steps at the cuts of a tile over the texels near them [9]: differences are those of
+   the exemplar, across a cut the mean of those that its two layers have there. */
 static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
     const txt_build *b = c->b;
     textiles_set *set = b->set;
@@ -4609,7 +4619,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
         desc.mask.channels = 1;
         desc.mask.sample = TXM_U8;
         desc.tolerance = 1e-3f;
-        if (txm_poisson(&desc, &env) != TXM_OK) continue; /* cannot be: the pool suffices */
+        if (txm_poisson(&desc, &env) != TXM_OK) continue; /* cannot be: the pool is enough */
         const txm_image out = {txt_texel(set, m, c->tile, 0, 0), side, side, n,
                                set->maps[m].sample, 0};
         for (int p = 0; p < side * side; p++) {
@@ -4622,8 +4632,8 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
 /* ---- all tiles --------------------------------------------------------------------------- */
 
 enum {
-    TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
-    TXT_TRIES = 4         /* inside pieces cut for each tile, of which the best stays          */
+    TXT_BATCH = 8,        /* tiles made at the same time, for any number of threads            */
+    TXT_TRIES = 4         /* interiors cut for each tile, of which the best is kept            */
 };
 #define TXT_BALANCE 0.8       /* weight of use and traits when places are ranked             */
 
@@ -4714,14 +4724,14 @@ static int txt_base(const txt_build *b, int tile) {
     return tile - b->set->tiles[tile].variant;
 }
 
-/* Do two places show nearly the same? */
+/* Are two places closer than `near`? */
 static int txt_places_agree(const txt_place *a, const txt_place *b, int near) {
     return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < near &&
            abs(a->j - b->j) < near;
 }
 
-/* What a place costs, in gray levels, because other tiles show it: variants of one tile must not show
-   the same, and no two tiles quite the same. */
+/* The cost of a place, in gray levels, for being shown by other tiles: variants of one tile must
+   not show the same, and no two tiles exactly the same. */
 static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k,
                                const txt_place *place) {
     const int near = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
@@ -4741,8 +4751,8 @@ static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k
     return cost;
 }
 
-/* In which order the tiles of a batch try the places found for their insides: what another tile shows
-   or tries comes late, and what brings the traits of the set back to those of the exemplars early. */
+/* Sort the places found for the interiors of a batch: those that another tile shows or tries come
+   later, those that bring the traits of the set closer to the means of the exemplars earlier. */
 static void txt_rank_places(const txt_build *b, txt_batch *batch, int count) {
     double surplus[TXT_TRAITS], more[TXT_TRAITS];
     memcpy(surplus, b->surplus, sizeof surplus);
@@ -4757,13 +4767,13 @@ static void txt_rank_places(const txt_build *b, txt_batch *batch, int count) {
             txt_piece_traits(b, &c->places[p], more);
             for (int t = 0; t < TXT_TRAITS; t++) cost += fabs(surplus[t] + more[t]);
             for (int t = TXT_STEP; t < TXT_STEP + 2; t++) {
-                /* joints are as rough as is usual; beside a smooth inside they would show */
+                /* joints have typical roughness and would be visible beside a smooth interior */
                 const double rough = b->usual[t] > 0 ? 1 + more[t] / b->usual[t] : 1;
                 if (rough < 0.9) cost += 600 * (0.9 - rough);
             }
             c->places[p].cost += (uint32_t)(cost * TXT_SCALE * TXT_BALANCE);
         }
-        for (int p = 1; p < c->place_count; p++) { /* sort again, equal ones as they were */
+        for (int p = 1; p < c->place_count; p++) { /* a stable sort */
             const txt_place place = c->places[p];
             int at = p;
             for (; at > 0 && c->places[at - 1].cost > place.cost; at--)
@@ -4872,7 +4882,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     txm_status status = txt_check_kind(desc, env);
     if (status == TXM_OK) status = txt_check_exemplars(desc, maps, env);
     if (status == TXM_OK && txm_progress(env, 0, "exemplars"))
-        status = txm_fail(env, TXM_CANCELLED, "cancelled before the work began");
+        status = txt_cancelled(env);
     if (status == TXM_OK)
         status = txt_set_make(desc, maps, desc->exemplars[0].map_count, 1, env, &b.set);
     if (status != TXM_OK) return status;
@@ -4885,7 +4895,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     if (status == TXM_OK) status = txt_make_frames(&b);
     if (status == TXM_OK) status = txt_make_tiles(&b);
     if (status == TXM_OK && txm_progress(env, 1, "tiles"))
-        status = txm_fail(env, TXM_CANCELLED, "cancelled at the very end");
+        status = txt_cancelled(env);
     txm_arena_free(&b.arena);
     if (status != TXM_OK) textiles_set_free(b.set);
     else *out = b.set;
@@ -4902,8 +4912,8 @@ static double txt_texel_step(const txt_map *m, const uint8_t *p, const uint8_t *
     return sum;
 }
 
-/* Mean step inside a tile: across (axis 0: from row to row, 1: from column to column); of triangles
-   over all three directions. */
+/* The mean difference of neighbours inside a tile: axis 0 from row to row, 1 from column to column;
+   of triangles in all three directions. */
 static double txt_inside_step(const textiles_set *s, int map, int tile, int axis) {
     const int side = s->side;
     const int dx[3] = {1, 0, -1}, dy[3] = {0, 1, 1};
@@ -4940,8 +4950,8 @@ static void txt_side_texel(const textiles_set *s, int k, int a, int r, int *x, i
     }
 }
 
-/* Mean step from the texels on side k of triangle a to the row beside it in triangle b, whose side m
-   lies there and runs the other way. */
+/* The mean difference between the texels on side k of triangle a and the row beside it in triangle
+   b, whose side m is at the same edge in the opposite direction. */
 static double txt_row_step(const textiles_set *s, int map, int a, int k, int b, int m) {
     double sum = 0;
     for (int i = 0; i < s->size; i++) {
@@ -4962,7 +4972,7 @@ typedef struct txt_tally {
 } txt_tally;
 
 static void txt_count_joint(txt_tally *t, double step, double inside) {
-    /* a flat place: no step is a perfect joint, any other a bad one */
+    /* flat interiors: without a step the joint is perfect, else bad */
     const double ratio = inside > 0 ? step / inside : step > 0 ? 1e9 : 1;
     textiles_joints *j = t->joints;
     if (j->pairs == 0 || ratio > j->worst) j->worst = ratio;

@@ -5,9 +5,10 @@
 
 /* ---- atlas: where tiles lie ----------------------------------------------------------- */
 
-/* The place of the pair (a, b) in a ring of C^2 pairs that chain, (a, b), (b, c), (c, d) ..., each
-   pair once [Wei 2004, section 3.1.1]. The first colours of the pairs are 0 0 1 1 0 2 1 2 2 0 3 1 3 2
-   3 3; the first C^2 of these are a de Bruijn sequence of C colours. */
+/* The position of the pair (a, b) in a ring of all C^2 pairs, each of which begins with the second
+   colour of the one before, (a, b), (b, c), (c, d) ... [6, section 3.1.1]. The first colours of the
+   pairs are 0 0 1 1 0 2 1 2 2 0 3 1 3 2 3 3; the first C^2 of these are a de Bruijn sequence of C
+   colours. */
 static int txt_ring_place(int a, int b) {
     if (a == b) return a ? (a + 1) * (a + 1) - 2 : 0;
     if (b == 0) return (a + 1) * (a + 1) - 1;
@@ -21,13 +22,14 @@ static const uint8_t txt_torus_corners[4][4] = {
 
 /* Column and row of a complete set's tile, variant 0, in the torus.
 
-   Wang tiles: the vertical edges of a row run through the ring of pairs (west, east), the horizontal
-   edges of a column through that of pairs (north, south), so that every combination occurs.
+   Wang tiles: the vertical edges of a row run through the ring of pairs (west, east), the
+   horizontal edges of a column through that of pairs (north, south), so that every combination
+   occurs.
 
-   Corner tiles, 3 colours: column k of the corners is the ring, moved up by 0 + 1 + ... + (k - 1). From
-   column to column the shift grows by k, and 0 + 1 + ... + 8 is a multiple of 9, so that the torus
-   closes. The pair (nw, sw) tells the place in the ring of the left side, (ne, se) that of the right,
-   their difference k [Cock 1988]. That needs an odd number of colours. */
+   Corner tiles, 3 colours: column k of the corners is the ring, moved up by 0 + 1 + ... + (k - 1).
+   From column to column the shift grows by k, and 0 + 1 + ... + 8 is a multiple of 9, so that the
+   torus closes. The pair (nw, sw) gives the position of the left side in the ring, (ne, se) that of
+   the right side, their difference k [Cock 1988]. This needs an odd number of colours. */
 static void txt_torus_place(const textiles_layout *l, int code, int *column, int *row) {
     const int c = l->colors, ring = c * c;
     const int e[4] = {code / (c * c * c), code / (c * c) % c, code / c % c, code % c};
@@ -64,8 +66,8 @@ static int txt_round_up(int x, int power) {
 
    Triangles: two to a cell, the second upside down, mirrored at the cell's centre. Rows and columns
    of texels behave as above, but across the hypotenuse the four pixels' far corner is further away:
-   with the edge at i + j = N, the block of four begins at i + j <= floor(N + 1) - g, so that its last
-   pixel has i + j <= floor(N + 1) + 3 g - 2, floor() to multiples of g.
+   with the edge at i + j = N, the block of four begins at i + j <= floor(N + 1) - g, so that its
+   last pixel has i + j <= floor(N + 1) + 3 g - 2, floor() to multiples of g.
 
          +--------------x      A owns the pixels with x + y < pitch of its cell, B the others:
          |A . . . . . / |      up to i + j = pitch - 1 - 2 g, and pitch - 2 - 2 g. The latter is
@@ -105,9 +107,9 @@ static txm_status txt_lay_out(textiles_layout *l, txm_env *env) {
     return TXM_OK;
 }
 
-/* Is this a layout that textiles_layout_make can have made? Nothing else is trusted with indices. */
+/* Refuse a layout that textiles_layout_make cannot have made: its numbers are used as indices. */
 static txm_status txt_check_layout(const textiles_layout *layout, txm_env *env) {
-    static const char *const bad = "layout is none of textiles_layout_make";
+    static const char *const bad = "layout was not made by textiles_layout_make";
     if (!layout) return txm_fail(env, TXM_BAD_ARGUMENT, "layout is NULL");
     textiles_layout l = *layout;
     if ((int)l.packing < TEXTILES_PACKED || (int)l.packing > TEXTILES_SLICES ||
@@ -164,8 +166,8 @@ TEXTILES_API int textiles_place(const textiles_layout *layout, int tile, int *px
 
 /* ---- atlas: what lies around a tile --------------------------------------------------- */
 
-/* The nine tiles of which a square is the middle one; -1: nothing fits. The corners match the tiles
-   above or below and to their side, where the set has such a tile. */
+/* A square and eight tiles around it that match; -1: none does. The diagonal ones match the tiles
+   above or below and beside them, where the set has such a tile. */
 static void txt_around(const textiles_set *s, int tile, int around[3][3]) {
     static const int order[8][2] = {{2, 1}, {0, 1}, {1, 0}, {1, 2}, {2, 0}, {0, 0}, {2, 2}, {0, 2}};
     for (int i = 0; i < 9; i++) around[i / 3][i % 3] = -1;
@@ -184,8 +186,8 @@ static void txt_around(const textiles_set *s, int tile, int around[3][3]) {
     }
 }
 
-/* Pixel (x, y) of the plane around a square, less than a tile away. Where nothing fits, the nearest
-   pixel there is. */
+/* Pixel (x, y) of the plane around a square, less than a tile away. Where no tile matches, the
+   nearest pixel of those around. */
 static const uint8_t *txt_square_texel(const textiles_set *s, int map, int around[3][3], int x,
                                        int y) {
     const int n = s->size;
@@ -213,9 +215,9 @@ static int txt_across(const textiles_set *s, int tile, int k) {
     return tile * 3 + k;
 }
 
-/* Texel (i, j) of the plane around a triangle: walk there, across the side that it is furthest
-   beyond. With w[k] the barycentric coordinate of corner k, times size, the neighbour across side k
-   has the third corner Q = V(k) + V(k+1) - V(k+2), so that
+/* Texel (i, j) of the plane around a triangle: go from triangle to triangle, each time across the
+   side that the texel lies furthest beyond. With w[k] the barycentric coordinate of corner k, times
+   size, the neighbour across side k has the third corner Q = V(k) + V(k+1) - V(k+2), so that
 
        w(k) V(k) + w(k+1) V(k+1) + w(k+2) V(k+2)
            = (w(k) + w(k+2)) V(k) + (w(k+1) + w(k+2)) V(k+1) - w(k+2) Q,
@@ -259,7 +261,7 @@ static void txt_draw_around(const textiles_set *s, int map, int tile, const txm_
     }
 }
 
-/* The same for one tile of an atlas and all that its cell has around it. */
+/* Draw one tile of an atlas and the rest of its cell around it. */
 typedef struct txt_atlas_job {
     const textiles_set *set;
     const textiles_layout *layout;
@@ -278,7 +280,7 @@ static void txt_draw_cell(void *context, int tile) {
     txt_draw_around(job->set, job->map, tile, job->out, px, py, step, -l->gutter, high, most);
 }
 
-/* ---- atlas: looking a place up -------------------------------------------------------- */
+/* ---- atlas: the plane, pixel by pixel ------------------------------------------------- */
 
 /* a window of the plane */
 typedef struct txt_view {
@@ -288,8 +290,8 @@ typedef struct txt_view {
     double x, y, step;
 } txt_view;
 
-/* A sample between the pixels of a tile's picture: at (x, y), pixel centres at whole numbers. Torus
-   layouts repeat; of others the last pixels go on for ever, of slices those of the slice. */
+/* Bilinear interpolation at (x, y) of the atlas, pixel centres at whole numbers. Torus layouts
+   repeat; others are clamped to the picture, slices to the slice. */
 static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *to) {
     const textiles_layout *l = v->layout;
     const int slices = l->packing == TEXTILES_SLICES;
@@ -319,7 +321,7 @@ static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *
     }
 }
 
-/* One row of the window. A tile is asked for again only when the place leaves it. */
+/* One row of the window. The tile is looked up again only when the position leaves it. */
 static void txt_view_row(void *context, int row) {
     const txt_view *v = (const txt_view *)context;
     const textiles_layout *l = v->layout;
@@ -384,7 +386,7 @@ TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_p
     return status;
 }
 
-/* what the two calls that draw a set's tiles have in common: is out such a picture? */
+/* the checks of a map's number and of out that both calls that draw tiles have in common */
 static txm_status txt_check_picture(const textiles_set *set, int map, const txm_image *out,
                                     int width, int height, txm_env *env) {
     if (map < 0 || map >= set->map_count)
@@ -392,7 +394,7 @@ static txm_status txt_check_picture(const textiles_set *set, int map, const txm_
     const txm_status status = txm_image_check(out, "out", TEXTILES_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (out->width != width || out->height != height)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "out: not as wide and high as it must be");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: width or height is not what the tiles need");
     if (txm_image_resolve(*out).channels != set->maps[map].channels ||
         out->sample != set->maps[map].sample)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out: channels and sample type must be the map's");
@@ -406,7 +408,7 @@ TEXTILES_API txm_status textiles_draw_atlas(const textiles_set *set, const texti
     if (status != TXM_OK) return status;
     if (layout->kind != set->kind || layout->size != set->size || layout->count != set->count ||
         layout->colors != set->colors || layout->variants != set->variants)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "layout is of another set");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "layout belongs to another set");
     status = txt_check_picture(set, map, &out, layout->width, layout->height, env);
     if (status != TXM_OK) return status;
 
@@ -469,12 +471,12 @@ TEXTILES_API txm_status textiles_draw_plane(const textiles_plane *plane,
     } else if (fits) {
         fits = layout->count == c * c * c * c * layout->variants;
     }
-    if (!fits) return txm_fail(env, TXM_BAD_ARGUMENT, "plane and layout are not of one set");
+    if (!fits) return txm_fail(env, TXM_BAD_ARGUMENT, "plane and layout belong to different sets");
     status = txm_image_check(atlas, "atlas", TEXTILES_MAX_PIXELS, env);
     if (status == TXM_OK) status = txm_image_check(&out, "out", TEXTILES_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (atlas->width != layout->width || atlas->height != layout->height)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "atlas: not as wide and high as the layout says");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "atlas: width or height is not that of the layout");
     if (txm_image_resolve(*atlas).channels != txm_image_resolve(out).channels ||
         atlas->sample != out.sample)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out: channels and sample type must be the atlas's");
@@ -483,7 +485,7 @@ TEXTILES_API txm_status textiles_draw_plane(const textiles_plane *plane,
     /* tile numbers must fit an int; of triangles they mix both coordinates */
     const double reach = fabs(x) + fabs(y) + step * out.width + step * out.height;
     if (!(reach / layout->size < 1e9))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "the window lies more than 10^9 tiles away");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "the window lies more than 10^9 tiles from the origin");
 
     txt_view view;
     view.plane = plane;
@@ -503,7 +505,7 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
     if (!uv || rotation < 0 || rotation > 2) return 0;
     if (!textiles_place(layout, tile, NULL, NULL, NULL, corner)) return 0;
     const int triangle = layout->kind == TEXTILES_TRIANGLE, corners = triangle ? 3 : 4;
-    for (int k = 0; k < corners; k++) { /* squares go clockwise from nw, faces the other way */
+    for (int k = 0; k < corners; k++) { /* squares are listed clockwise, faces not */
         const int from = triangle ? (k + rotation) % 3 : (4 - k) % 4;
         uv[k][0] = corner[from][0];
         uv[k][1] = corner[from][1];

@@ -7,10 +7,10 @@
 
 enum {
     TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
-    TXT_PLACES = 32,      /* found for the inside of a tile                                    */
+    TXT_PLACES = 32,      /* found for the interior of a tile                                  */
     TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
     TXT_WINDOW = 12,      /* half width of such a place                                        */
-    TXT_USE = 20,         /* gray levels that a place costs which another inside shows         */
+    TXT_USE = 20,         /* gray levels that a place costs which another interior shows       */
     TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
     TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
 };
@@ -21,10 +21,10 @@ typedef struct txt_canvas {
     int tile, side, half; /* half: directions in which neighbours are counted, 2 or 3 */
     int dx[3], dy[3];
     uint8_t *inside, *locked;
-    uint16_t *label, *kept, *start, *best; /* kept, start: labels to go back to */
+    uint16_t *label, *kept, *start, *best; /* kept, start, best: copies to restore */
     uint8_t *border;      /* rows to the nearest joint, at most 255 */
     int32_t *shows;       /* number of the texel shown, -1 beyond the exemplar */
-    int32_t *other;       /* what a layer that is tried would show */
+    int32_t *other;       /* what the layer being tried would show */
     uint16_t *gap;        /* difference of the two */
     txt_layer *layers;
     int layer_capacity;
@@ -32,18 +32,18 @@ typedef struct txt_canvas {
     txm_flow flow;
     txt_query query;
     txt_scratch scratch;
-    txt_place places[TXT_PLACES]; /* found for the inside */
+    txt_place places[TXT_PLACES]; /* found for the interior */
     int place_count, tries; /* how many of them are cut */
     int best_place;
 } txt_canvas;
 
-/* What it costs that p shows a and its neighbour q shows c where they should go on: the squared sum
-   of how a and c differ on both sides of the cut. */
+/* The cost of a cut between two neighbours: the squared sum of the differences that the layers on
+   its two sides have at one and at the other texel [8]. */
 static int32_t txt_seam(int at_p, int at_q) {
     return (at_p + at_q) * (at_p + at_q);
 }
 
-/* cost of the cut between neighbouring texels p = (x, y) and q, as they are labelled */
+/* the cost of the cut between neighbouring texels p = (x, y) and q with their present labels */
 static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int dx, int dy) {
     if (c->label[p] == c->label[q]) return 0;
     const txt_layer *a = &c->layers[c->label[p]], *d = &c->layers[c->label[q]];
@@ -52,14 +52,15 @@ static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int
     return txt_seam(at_p, at_q);
 }
 
-/* An edge's strip is the same in all tiles with its colour: the less of it shows, the less repeats. */
+/* An edge's strip is the same in all tiles with its colour: the less of it shows, the less repeats.
+   So it costs energy, more the further from the border. */
 static int32_t txt_bias(const txt_canvas *c, int label, int p) {
     if (!c->layers[label].is_frame || c->border[p] < 3) return 0;
     const int far = c->border[p] < 24 ? c->border[p] - 2 : 22;
     return TXT_BIAS * far;
 }
 
-/* Energy of all cuts that touch the rectangle, and of what its texels show. */
+/* Energy of all cuts that touch the rectangle, and of the layers that its texels show. */
 static int64_t txt_energy(const txt_canvas *c, int x0, int y0, int x1, int y1) {
     const int side = c->side;
     int64_t sum = 0;
@@ -81,8 +82,8 @@ static int64_t txt_energy(const txt_canvas *c, int x0, int y0, int x1, int y1) {
     return sum;
 }
 
-/* Let layer l take over whatever texels of the rectangle make the energy least: one expansion move of
-   [Boykov 2001]. Returns by how much the energy fell; if it would not, all stays as it was. */
+/* One expansion move [7]: layer l takes those texels of the rectangle that minimise the energy.
+   Returns by how much the energy fell; if it would not fall, nothing changes. */
 static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) {
     const txt_build *b = c->b;
     txm_flow *g = &c->flow;
@@ -127,7 +128,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
                 if (!c->inside[q]) continue;
                 const int may_q = TXT_MAY(q, qx, qy), is_q = c->label[q] == l;
                 if (!may_p && !may_q) continue;
-                /* stay, stay; stay, change; change, stay; change, change costs nothing */
+                /* p and q stay; p stays, q changes; p changes, q stays; both change: 0 */
                 int32_t ss, sc, cs;
                 if (c->label[p] == c->label[q]) {
                     ss = 0;
@@ -142,7 +143,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
                 }
                 const int other = node + g->step[k];
                 if (may_p && may_q) {
-                    if (ss > sc + cs) ss = sc + cs; /* no arc can reward a seam; checked below */
+                    if (ss > sc + cs) ss = sc + cs; /* no negative arcs; the energy is checked */
                     g->excess[node] += cs - ss;
                     g->excess[other] -= cs;
                     g->arc[k][node] += sc + cs - ss;
@@ -168,7 +169,7 @@ static int64_t txt_expand(txt_canvas *c, int l, int x0, int y0, int x1, int y1) 
                 c->label[p] = (uint16_t)l;
                 const int32_t t = c->shows[p];
                 c->shows[p] = c->other[p];
-                c->other[p] = t; /* to go back */
+                c->other[p] = t; /* to undo it */
             }
         }
     }
@@ -201,7 +202,7 @@ static void txt_find_side(const txt_build *b, const textiles_tile *t, int k, txt
     const int size = b->set->size, is_corner = b->set->kind == TEXTILES_CORNER;
     s->turn = s->di = s->dj = 0;
     if (b->is_triangle) {
-        /* side k runs in direction 1, 5, 3 (sixths) from its first corner; the strip in direction 0 */
+        /* side k runs in direction 1, 5, 3 (sixths of a circle), the strip in direction 0 */
         const int run[3] = {1, 5, 3};
         const int corner[3][2] = {{0, 0}, {0, size}, {size, 0}};
         int i, j;
@@ -221,8 +222,8 @@ static void txt_find_side(const txt_build *b, const textiles_tile *t, int k, txt
     s->dj = k == 2 ? -size : 0;
 }
 
-/* (a, u) of a texel on a side; u is 0, 1, .. or, from the other side, -1, -2, .. (triangles: 0, -1, ..
-   for + and 0, 1, .. for -) */
+/* (a, u) of a texel on a side; u is 0, 1, .. or, from the other side, -1, -2, .. (triangles: 0, -1,
+   .. for + and 0, 1, .. for -) */
 static void txt_side_place(const txt_build *b, const txt_side *s, int x, int y, int *a, int *u) {
     int i, j;
     txt_turn(s->turn, x, y, &i, &j);
@@ -271,7 +272,7 @@ static void txt_add_side_layers(txt_canvas *c, txt_side *s) {
     }
 }
 
-/* Begin a tile: what its edges prescribe is locked, the rest shows what the nearest edge would. */
+/* Start a tile: texels at its edges are fixed, all others show the strip of the nearest edge. */
 static void txt_begin_tile(txt_canvas *c, int tile) {
     const txt_build *b = c->b;
     const int side = c->side, size = b->set->size, sides = b->is_triangle ? 3 : 4;
@@ -312,7 +313,7 @@ static void txt_begin_tile(txt_canvas *c, int tile) {
             c->locked[p] = (uint8_t)locks;
             c->label[p] = (uint16_t)list[nearest].layer[w];
             c->shows[p] = txt_shown(b, &c->layers[c->label[p]], x, y);
-            /* a segment or corner that ends before it gets here: take another of the same edge */
+            /* a segment or corner that does not reach here: another segment of the same edge */
             for (int v = 1; v <= s->count && c->shows[p] < 0; v++) {
                 c->label[p] = (uint16_t)list[nearest].layer[v];
                 c->shows[p] = txt_shown(b, &c->layers[c->label[p]], x, y);
@@ -321,8 +322,8 @@ static void txt_begin_tile(txt_canvas *c, int tile) {
     }
 }
 
-/* Let every layer expand once more: those of the frame not far from where they are. */
-static void txt_settle(txt_canvas *c) {
+/* One more expansion move for every layer, limited to the surroundings of what it has. */
+static void txt_expand_all(txt_canvas *c) {
     const int reach = 20;
     for (int l = 0; l < c->layer_count; l++) {
         int x0 = INT_MAX, y0 = INT_MAX, x1 = 0, y1 = 0;
@@ -341,7 +342,8 @@ static void txt_settle(txt_canvas *c) {
     }
 }
 
-/* What lies deep in the rectangle and still shows the frame changes over to layer l at once. */
+/* Give layer l all texels of the rectangle that show the frame and lie at least `depth` rows from
+   every joint. */
 static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
     for (int y = y0; y < y1; y++) {
         for (int x = x0; x < x1; x++) {
@@ -355,13 +357,13 @@ static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int 
     }
 }
 
-/* Search units that a place costs for showing what other insides show already. */
+/* For the extra cost of places that other interiors show already, in search units. */
 typedef struct txt_use_query {
     const txt_build *b;
     int turn, size;
 } txt_use_query;
 
-/* the rectangle of storage texels that a piece laid over the inside shows, about */
+/* approximately the rectangle of a sheet that a piece laid over the interior shows */
 static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, int box[4]) {
     if (!b->is_triangle) {
         box[0] = i;
@@ -370,7 +372,7 @@ static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, 
         box[3] = j + size;
         return;
     }
-    int ci, cj; /* a square about the triangle's middle with its area */
+    int ci, cj; /* a square of the triangle's area around its centre */
     txt_turn(turn, size / 3, size / 3, &ci, &cj);
     const int x = i + ci + txt_half(j + cj), y = j + cj, r = size / 3;
     box[0] = x - r;
@@ -379,7 +381,7 @@ static void txt_piece_box(const txt_build *b, int turn, int size, int i, int j, 
     box[3] = y + r;
 }
 
-/* The cells that a piece shows, about; 0 if there are none. */
+/* Approximately the cells that a piece shows: receives their bounds, returns how many. */
 static int txt_piece_cells(const txt_build *b, int sheet, int turn, int size, int i, int j,
                            int cells[4]) {
     const int across = b->sheets[sheet].width / TXT_CELL + 2;
@@ -391,7 +393,7 @@ static int txt_piece_cells(const txt_build *b, int sheet, int turn, int size, in
     return (cells[2] - cells[0]) * (cells[3] - cells[1]);
 }
 
-/* What a piece would have more of the traits than usual. */
+/* By how much the traits of a piece exceed the means of the exemplars. */
 static void txt_piece_traits(const txt_build *b, const txt_place *p, double more[TXT_TRAITS]) {
     int c[4];
     const int across = b->sheets[p->sheet].width / TXT_CELL + 2;
@@ -422,7 +424,7 @@ static void txt_use_extra(const void *context, int sheet, int i, int j, int n, u
     }
 }
 
-/* Count what a tile has more of the traits than usual. */
+/* Add to the surplus by how much the traits of a tile exceed the means of the exemplars. */
 static void txt_count_traits(txt_build *b, const txt_canvas *c) {
     double sum[TXT_TRAITS] = {0}, one[TXT_TRAITS];
     int count = 0;
@@ -435,7 +437,7 @@ static void txt_count_traits(txt_build *b, const txt_canvas *c) {
     for (int k = 0; k < TXT_TRAITS; k++) b->surplus[k] += sum[k] / count - b->usual[k];
 }
 
-/* Count what a tile's inside shows; units: search cost for a piece that is all used once. */
+/* Count for each cell what the interior of a tile shows of it. */
 static void txt_count_use(txt_build *b, const txt_canvas *c) {
     for (int y = 0; y < c->side; y++) {
         for (int x = 0; x < c->side; x++) {
@@ -445,14 +447,14 @@ static void txt_count_use(txt_build *b, const txt_canvas *c) {
             const int e = txt_sheet_of(b->set, t);
             const int w = b->sheets[e].width, at = t - b->sheets[e].first;
             const int across = w / TXT_CELL + 2;
-            const uint32_t weight = 8 + b->salient[t] / 2; /* 16 of usual salience */
+            const uint32_t weight = 8 + b->salient[t] / 2; /* 16 for mean salience */
             b->use[e][at / w / TXT_CELL * across + at % w / TXT_CELL] += weight;
         }
     }
 }
 
-/* Running sums of the use, in search units: a cell that is used once more than the others costs TXT_USE
-   gray levels at first, and less the more all of them are used. */
+/* Summed area table of the use, in search units: a cell that is used once more than the others
+   costs TXT_USE gray levels at first, and less the more all of them are used. */
 static void txt_sum_use(txt_build *b) {
     uint64_t total = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -475,7 +477,7 @@ static void txt_sum_use(txt_build *b) {
     }
 }
 
-/* Places of the exemplar that would continue the frame inwards. */
+/* Find places of the exemplars that continue the frame inwards. */
 static void txt_find_insides(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, turns = b->is_triangle ? 6 : 1;
@@ -504,7 +506,7 @@ static void txt_find_insides(txt_canvas *c) {
     }
 }
 
-/* The layer of a place: a new one, or the one there is. -1: no room. */
+/* The layer of a place, new or existing; -1: too many layers. */
 static int txt_add_layer(txt_canvas *c, const txt_place *p) {
     const txt_layer layer = {p->sheet, p->turn, p->i, p->j, 0};
     for (int l = 0; l < c->layer_count; l++) {
@@ -518,7 +520,8 @@ static int txt_add_layer(txt_canvas *c, const txt_place *p) {
     return c->layer_count++;
 }
 
-/* Where the cuts are worst, look for a piece that fits what surrounds the place, and let it expand. */
+/* At the worst places along the cuts, search for a piece that matches the surroundings, and expand
+   it. */
 static void txt_mend(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, r = TXT_WINDOW;
@@ -590,7 +593,7 @@ static void txt_mend(txt_canvas *c) {
     }
 }
 
-/* Show again what the labels say. */
+/* Compute from the labels what the texels show. */
 static void txt_show(txt_canvas *c) {
     for (int y = 0; y < c->side; y++) {
         for (int x = 0; x < c->side; x++) {
@@ -600,7 +603,8 @@ static void txt_show(txt_canvas *c) {
     }
 }
 
-/* side of the blocks in which the inside is filled: the tile's, or what the exemplars allow for */
+/* side of the blocks in which the interior is filled: that of the tile, or less if the exemplars
+   are smaller */
 static int txt_block_side(const txt_build *b) {
     int most = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -613,8 +617,8 @@ static int txt_block_side(const txt_build *b) {
     return most > 8 ? most : 8;
 }
 
-/* The exemplar is too small to fill the inside at once: block by block, each continuing the frame and
-   the blocks before it. */
+/* Fill the interior block by block, as the exemplar is too small to fill it at once; each block
+   continues the frame and the blocks before it. */
 static void txt_fill_blocks(txt_canvas *c, int forced) {
     const txt_build *b = c->b;
     const int side = c->side, block = txt_block_side(b), reach = 8;
@@ -639,14 +643,14 @@ static void txt_fill_blocks(txt_canvas *c, int forced) {
                 txt_sample_add(b, &c->query, x, y, c->shows[p]);
             }
         }
-        if (c->query.count == 0) { /* nothing to continue: anywhere not used so far */
+        if (c->query.count == 0) { /* nothing to continue: any place that is little used so far */
             const int32_t any = b->sheets[0].first;
             for (int k = 0; k < 4; k++)
                 txt_sample_add(b, &c->query, k & 1 ? x0 : x1 - 1, k & 2 ? y0 : y1 - 1, any);
         }
         for (int e = 0; e < b->sheet_count; e++)
             found = txt_search(b, &c->query, e, 0, &c->scratch, place, found, 4);
-        /* not always the best: that is the same for all tiles with these edges */
+        /* not always the best, which is the same for all tiles with these edges */
         txm_rng rng = txm_rng_make(b->desc->seed, (uint64_t)c->tile * 4096 + (uint64_t)n);
         const int l =
             found ? txt_add_layer(c, &place[txm_rng_below(&rng, (uint32_t)found)]) : -1;
@@ -656,8 +660,8 @@ static void txt_fill_blocks(txt_canvas *c, int forced) {
     }
 }
 
-/* Where no piece reaches, which takes an exemplar much smaller than the tile, show the texel of the
-   sheet that is nearest to what the label asks for. */
+/* Where no piece reaches (only with an exemplar much smaller than the tile) show the texel of the
+   sheet that is nearest to the one of the label. */
 static void txt_fill_gaps(txt_canvas *c) {
     const txt_build *b = c->b;
     for (int p = 0; p < c->side * c->side; p++) {
@@ -672,7 +676,7 @@ static void txt_fill_gaps(txt_canvas *c) {
     }
 }
 
-/* Cut one inside after the other into the frame, keep the best, and mend it. */
+/* Cut one interior after the other into the frame, keep the best, and mend it. */
 static void txt_cut_tile(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, size = b->set->size;
@@ -682,7 +686,7 @@ static void txt_cut_tile(txt_canvas *c) {
     c->best_place = -1;
     if (txt_block_side(b) < side || c->place_count == 0) {
         txt_fill_blocks(c, forced);
-        txt_settle(c);
+        txt_expand_all(c);
         txt_mend(c);
         return;
     }
@@ -694,7 +698,7 @@ static void txt_cut_tile(txt_canvas *c) {
         txt_add_layer(c, &c->places[k]);
         txt_force(c, c->frame_count, 0, 0, side, side, forced);
         txt_expand(c, c->frame_count, 0, 0, side, side);
-        txt_settle(c);
+        txt_expand_all(c);
         const int64_t energy = txt_energy(c, 0, 0, side, side) +
                                (int64_t)c->places[k].cost * TXT_PLACE_WEIGHT * side;
         if (c->best_place >= 0 && energy >= least) continue;

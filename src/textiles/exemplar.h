@@ -14,9 +14,9 @@ enum {
     TXT_SURROUNDINGS = 4  /* texels: half width of the box whose brightness is a feature       */
 };
 
-/* these meet floating-point numbers, which C++ does not like of enumerations */
+/* macros, as C++20 deprecates arithmetic of enumerators with floating-point numbers */
 #define TXT_SCALE 16          /* units of a search's cost per gray level                     */
-#define TXT_SURROUND_GAIN 3   /* how strongly surroundings count                             */
+#define TXT_SURROUND_GAIN 3   /* factor by which surroundings count more                     */
 
 /* ---- sheets: the exemplars as texels ------------------------------------------------------- */
 
@@ -37,8 +37,8 @@ typedef struct txt_layer {
     int is_frame;    /* belongs to an edge or a corner of the set   */
 } txt_layer;
 
-/* Traits whose means over the set should be those of the exemplars, in gray levels: the channels of the
-   first map, the steps from texel to texel (half of 60 each), and the variance. */
+/* Traits whose means over the set should be those of the exemplars, in gray levels: the channels of
+   the first map, the steps from texel to texel (half of 60 each), and the variance. */
 enum { TXT_STEP = 4, TXT_VARIANCE = 6, TXT_TRAITS = 7 }; /* TXT_STEP + 1: the step down */
 
 typedef struct txt_line {
@@ -46,8 +46,9 @@ typedef struct txt_line {
     double mean;   /* over all texels                                                */
 } txt_line;
 
-/* An edge as all tiles with its colour see it. Its frame: from the start vertex along the joint (a),
-   and across it (u): of squares u < 0 is above or left of the joint, of triangles u = 0 lies on it. */
+/* The strip of exemplar at an edge, the same in all tiles with its colour. Coordinates: a along the
+   joint from the start vertex, u across it. Squares: u < 0 is above or left of the joint;
+   triangles: u = 0 lies on it. */
 typedef struct txt_seam_strip {
     int axis; /* 0: runs to the right, 1: down */
     int count;
@@ -61,7 +62,7 @@ typedef struct txt_seam_strip {
 /* A place of the exemplars where a piece may come from. */
 typedef struct txt_place {
     int sheet, turn, i, j;
-    uint32_t cost; /* mean difference of a sample in 1 / TXT_SCALE gray levels, and the extra cost */
+    uint32_t cost; /* mean difference of a sample and the extra cost, TXT_SCALE per gray level */
 } txt_place;
 
 typedef struct txt_build {
@@ -79,28 +80,28 @@ typedef struct txt_build {
     uint8_t *plane;         /* features * texels: the same, blurred a little, for searches    */
     txt_line cross[2];      /* by axis: differences across a joint there                      */
     txt_line along[2];      /* differences along a line                                       */
-    txt_line salience[2];   /* how much a place catches the eye, along both axes              */
+    txt_line salience[2];   /* how conspicuous a place is, along both axes                    */
     txt_line color[2][4];   /* the first map's channels                                       */
-    uint8_t *salient;       /* the same for a texel                                           */
-    uint16_t *line_cost[2]; /* by axis: what a joint of line_length texels from there costs   */
+    uint8_t *salient;       /* the same of a texel, see txt_fill_salience                     */
+    uint16_t *line_cost[2]; /* by axis: the cost of a joint of line_length texels from there  */
     int line_length[2];
-    double line_step[2];    /* the mean step that was wanted of it                            */
-    uint32_t *use[TEXTILES_MAX_EXEMPLARS];  /* by cell: how much of it insides show            */
+    double line_step[2];    /* the mean step that it should have                              */
+    uint32_t *use[TEXTILES_MAX_EXEMPLARS];  /* by cell: how much of it interiors show          */
     uint32_t *used[TEXTILES_MAX_EXEMPLARS]; /* sums over all cells above and to the left       */
     double *traits[TEXTILES_MAX_EXEMPLARS]; /* the same of TXT_TRAITS traits                   */
     double usual[TXT_TRAITS];               /* their means over the exemplars                  */
-    double surplus[TXT_TRAITS];             /* sum over the tiles so far of what they have more */
+    double surplus[TXT_TRAITS];             /* sum over the tiles so far of what exceeds these  */
     struct {
         int sheet, i, j;
     } corner[TEXTILES_MAX_COLORS];
     int corner_count;
     txt_seam_strip *strips;
     int strip_count;
-    txt_place *inside; /* by tile: where its inside comes from; sheet -1: nowhere as yet */
+    txt_place *inside; /* by tile: where its interior comes from; sheet -1: not made yet */
     int lock_from, lock_count; /* u of a strip's first line, how many                         */
     double step_mean;          /* from texel to texel, both axes                               */
     double wanted_step;        /* of joints, in units of the mean step of the exemplars       */
-    int corners_are_final;     /* so that edges should make up for them                        */
+    int corners_are_final;     /* edges then compensate for the corners                        */
 } txt_build;
 
 static const int txt_turns[6][4] = {{1, 0, 0, 1},   {0, -1, 1, 1}, {-1, -1, 1, 0},
@@ -144,7 +145,7 @@ static int txt_difference(const txt_build *b, int32_t s, int32_t t) {
     return 4 * sum / b->features;
 }
 
-/* Keys's cubic convolution over six points, of fourth order: nearly as sharp as the exemplar. */
+/* Cubic convolution over six points, of fourth order [10]: nearly as sharp as the exemplar. */
 static double txt_keys(double x) {
     x = fabs(x);
     if (x < 1) return (4.0 / 3 * x - 7.0 / 3) * x * x + 1;
@@ -227,8 +228,8 @@ static txm_status txt_make_sheets(txt_build *b) {
     return TXM_OK;
 }
 
-/* What is compared: all channels of the first map, then those of the others at half weight as long as
-   there is room. Colours count as much as they are opaque. Floats are scaled to their range. */
+/* What is compared: all channels of the first map, then those of the others at half weight as long
+   as there is room. Colours count as much as they are opaque. Floats are scaled to their range. */
 static void txt_list_features(txt_build *b) {
     for (int m = 0; m < b->set->map_count; m++) {
         const int n = b->set->maps[m].channels;
@@ -242,9 +243,9 @@ static void txt_list_features(txt_build *b) {
     b->stride = b->features <= 4 ? 4 : 8;
 }
 
-/* The last feature: the brightness of the surroundings, which tells where in an element (a stone, a
-   leaf) a texel lies, so that cuts and searches do not join half of one to half of another just because
-   both are gray inside. */
+/* The last feature: the brightness of the surroundings, which depends on where in an element (a
+   stone, a leaf) a texel lies. So cuts and searches do not join parts of different elements just
+   because they have the same colour. */
 static txm_status txt_fill_surroundings(txt_build *b, int f) {
     for (int e = 0; e < b->sheet_count; e++) {
         const txt_sheet *s = &b->sheets[e];
@@ -325,8 +326,8 @@ static txm_status txt_fill_features(txt_build *b) {
     return TXM_OK;
 }
 
-/* Planes of the features, each texel averaged with its neighbours: searches look at a part of the
-   texels only, and should not be fooled by single ones. */
+/* Planes of the features, each texel averaged with its neighbours: searches compare only a part of
+   the texels, and noise in single ones must not decide. */
 static void txt_fill_planes(txt_build *b) {
     for (int e = 0; e < b->sheet_count; e++) {
         const txt_sheet *s = &b->sheets[e];
@@ -351,7 +352,7 @@ static void txt_fill_planes(txt_build *b) {
     }
 }
 
-/* Sums of a value along the lines of an axis: value(b, which, sheet, x, y) at storage place (x, y). */
+/* Sums of a value along the lines of an axis: value(b, which, sheet, x, y) at (x, y) as stored. */
 static void txt_sum_lines(txt_build *b, txt_line *line, int axis, int which,
                           int (*value)(const txt_build *b, int which, int sheet, int x, int y)) {
     double total = 0, count = 0;
@@ -394,7 +395,7 @@ static double txt_line_mean(const txt_build *b, const txt_line *line, int axis, 
     return (double)(line->sum[first + q] - line->sum[first + p]) / (to - from) / line->mean;
 }
 
-/* The step from texel to texel as joints are judged: the channels of the first map only. */
+/* The difference of two texels as textiles_measure has it: the channels of the first map only. */
 static int txt_step(const txt_build *b, int32_t s, int32_t t) {
     const uint8_t *p = b->texel + (size_t)s * (size_t)b->stride;
     const uint8_t *q = b->texel + (size_t)t * (size_t)b->stride;
@@ -435,7 +436,7 @@ static int txt_color_value(const txt_build *b, int channel, int sheet, int x, in
     return b->texel[(size_t)(s->first + y * s->width + x) * (size_t)b->stride + (size_t)channel];
 }
 
-/* loudness: what is beyond twice the usual salience */
+/* salience as far as it exceeds 28, where 16 is the mean */
 static int txt_salience_value(const txt_build *b, int axis, int sheet, int x, int y) {
     (void)axis;
     const txt_sheet *s = &b->sheets[sheet];
@@ -443,9 +444,9 @@ static int txt_salience_value(const txt_build *b, int axis, int sheet, int x, in
     return v > 28 ? v - 28 : 0;
 }
 
-/* Salience: the squared deviation from the mean colour in units of the variance, 16 = usual, averaged
-   over a neighbourhood. Rare things far from the mean, a white stone say, stand out where they are
-   repeated. */
+/* Salience: the squared deviation from the mean colour in units of the variance, mean 16, averaged
+   over a neighbourhood. Rare elements far from the mean, a white stone for example, are conspicuous
+   where they repeat. */
 static txm_status txt_fill_salience(txt_build *b) {
     double mean[TXT_MAX_FEATURES] = {0}, variance[TXT_MAX_FEATURES] = {0};
     for (size_t t = 0; t < b->texels; t++) {
@@ -496,7 +497,7 @@ static txm_status txt_fill_salience(txt_build *b) {
     return TXM_OK;
 }
 
-/* Traits of one texel; 0 for those that there are none of. */
+/* Traits of one texel; 0 for steps at the border and for channels that the map does not have. */
 static void txt_texel_traits(const txt_build *b, int32_t t, double traits[TXT_TRAITS]) {
     const int e = txt_sheet_of(b->set, t);
     const txt_sheet *s = &b->sheets[e];
@@ -550,6 +551,7 @@ static void txt_fill_traits(txt_build *b) {
     }
 }
 
+/* Everything that is computed once from the exemplars. */
 static txm_status txt_prepare(txt_build *b) {
     txt_list_features(b);
     txm_status status = txt_make_sheets(b);

@@ -7,10 +7,10 @@
 
 enum {
     TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
-    TXT_NEAR = 4,         /* texels from the vertex: here the corner's piece may end ...       */
-    TXT_FAR = 12,         /* ... and here it must have                                         */
+    TXT_NEAR = 4,         /* texels from the vertex where the piece of a corner may end ...    */
+    TXT_FAR = 12,         /* ... and where it must have ended                                  */
     TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
-    TXT_CORNERS = 160     /* places looked at for the corner                                   */
+    TXT_CORNERS = 160     /* random places that are rated for each corner                      */
 };
 #define TXT_END 8             /* texels of a joint that show the corner, about               */
 
@@ -37,7 +37,7 @@ static int32_t txt_strip_shows(const txt_build *b, const txt_seam_strip *s, int 
         si = s->segment[w - 1].i;
         sj = s->segment[w - 1].j;
         txt_along(b, s->axis, a, u, &i, &j);
-    } else { /* a corner's piece lies with its vertex at the end; of triangles only the vertex counts */
+    } else { /* a corner: its vertex lies at the end of the strip */
         const int c = s->corner[w != 0];
         sheet = b->corner[c].sheet;
         si = b->corner[c].i;
@@ -51,9 +51,9 @@ static int32_t txt_strip_shows(const txt_build *b, const txt_seam_strip *s, int 
     return txt_number(b, sheet, si + i, sj + j);
 }
 
-/* What a line costs as a joint, in search units: it should be as rough as is usual, across, which is
-   what one would see first, and along; of the usual colour; and nothing on it should catch the eye. The
-   weights, in gray levels, are ours, found by looking and measuring. */
+/* The cost of a line of texels as a joint, in search units. A good joint has typical roughness,
+   across (the most visible) and along, typical colour, and nothing conspicuous on it. The weights,
+   in gray levels, are ours, found by measuring and by eye. */
 static int txt_line_cost(const txt_build *b, int axis, double wanted, int sheet, int x, int y,
                          int n) {
     const double step = txt_line_mean(b, &b->cross[axis], axis, sheet, x, y, n) / wanted;
@@ -69,7 +69,7 @@ static int txt_line_cost(const txt_build *b, int axis, double wanted, int sheet,
     return (int)fmin(cost * TXT_SCALE, 65535);
 }
 
-/* The same for lines of length n from every texel on, to be looked up. */
+/* A table of these costs for lines of n texels from every texel on. */
 static void txt_fill_line_costs(txt_build *b, int axis, int n, double wanted) {
     if (b->line_length[axis] == n && fabs(b->line_step[axis] - wanted) < 0.002) return;
     b->line_length[axis] = n;
@@ -84,7 +84,7 @@ static void txt_fill_line_costs(txt_build *b, int axis, int n, double wanted) {
     }
 }
 
-/* The extra cost of the places of a row, for a strip's segment that runs over a = from..from + n. */
+/* The extra cost of the places of a row for a segment over a = from to from + length. */
 typedef struct txt_strip_query {
     const txt_build *b;
     const txt_seam_strip *strips; /* those of the same axis so far */
@@ -118,8 +118,8 @@ static void txt_strip_extra(const void *context, int sheet, int i, int j, int n,
     }
 }
 
-/* Samples that make the two ends of a strip agree with the corners. before: the segment before (else
-   the corner at the start), over its last texels around a = from; after: match the end's corner. */
+/* Samples at the ends of segment w. at_start: what the segment before shows around a = from, for
+   the first segment the corner; at_end: what the corner at the end of the strip shows. */
 static void txt_end_samples(const txt_build *b, txt_query *q, const txt_seam_strip *s, int w, int from,
                             int at_start, int at_end) {
     const int size = b->set->size, zone = txt_zone_end(b) + 1;
@@ -146,7 +146,7 @@ static void txt_end_samples(const txt_build *b, txt_query *q, const txt_seam_str
     }
 }
 
-/* into how many segments a strip is to be divided: a sheet must leave room to choose */
+/* number of segments of a strip, each so short that a sheet has several places for it */
 static int txt_segment_count(const txt_build *b, int axis, int only_sheet) {
     int length = 0;
     for (int e = 0; e < b->sheet_count; e++) {
@@ -159,8 +159,8 @@ static int txt_segment_count(const txt_build *b, int axis, int only_sheet) {
     return count > TXT_MAX_SEGMENTS ? TXT_MAX_SEGMENTS : count;
 }
 
-/* Mean step wanted of a strip between its ends, TXT_END texels each, where the corners show: such that
-   that of the whole joint is b->wanted_step. */
+/* The mean step that a strip should have between its ends, TXT_END texels each that show the
+   corners, so that the whole joint has b->wanted_step. */
 static double txt_wanted_step(const txt_build *b, const txt_seam_strip *s) {
     const int size = b->set->size, axis = s->axis;
     double ends = 0;
@@ -195,7 +195,7 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
         q->context = &extra;
         q->apart = 1;
         txt_end_samples(b, q, s, g + 1, from, 1, g + 1 == count);
-        for (int k = 0; k < 4; k++) { /* it must reach over its part, and into the next ones */
+        for (int k = 0; k < 4; k++) { /* it must cover its part and overlap the next ones */
             const int first = g ? from - 7 : b->is_triangle ? 0 : TXT_NEAR;
             const int last = g + 1 < count ? to + 7 : b->is_triangle ? size : size - TXT_NEAR;
             txt_along(b, s->axis, k & 1 ? last : first, k & 2 ? TXT_LOCK : -TXT_LOCK,
@@ -215,8 +215,8 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
     return total / (uint32_t)count;
 }
 
-/* Where one piece of a strip gives way to the next, line by line across the strip: the cheapest path
-   of [Efros 2001] through a = from..to-1. */
+/* Where piece w of a strip ends and the next begins, line by line across the strip: the minimum
+   error cut [2] through a = from..to-1. */
 static void txt_cut_strip(const txt_build *b, txt_seam_strip *s, int w, int from, int to) {
     enum { LINES = 2 * TXT_ACROSS + 1 };
     float error[LINES * 64];
@@ -244,6 +244,7 @@ static void txt_cut_strip(const txt_build *b, txt_seam_strip *s, int w, int from
     }
 }
 
+/* Cut all pieces of a strip, and note which of them each texel shows. */
 static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
     const int size = b->set->size, n = b->lock_count, zone = txt_zone_end(b);
     if (b->is_triangle) {
@@ -261,7 +262,7 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
     txt_cut_strip(b, s, s->count, size - zone - 1, size - TXT_NEAR - 1);
 }
 
-/* How far a corner's place is from usual, in roughness and salience around it. */
+/* The cost of a place as a corner: how far it is from typical roughness and salience. */
 static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     const int x = i + (b->is_triangle ? txt_half(j) : 0), r = 10;
     double off = 0, loud = 0;
@@ -283,7 +284,7 @@ static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     loud = loud / (2 * r) - 1;
     uint32_t cost = (uint32_t)((30 * off + (loud > 0 ? 8 * loud : 0)) * TXT_SCALE);
     if (b->is_triangle) {
-        /* what surrounds the vertex should look alike turned by any sixth of a circle */
+        /* the surroundings of the vertex should look the same turned by multiples of 60 degrees */
         int sum = 0, n = 0;
         for (int dj = -4; dj <= 4; dj++) {
             for (int di = -4; di <= 4; di++) {
@@ -307,8 +308,8 @@ static int txt_edge_sheet(const txt_build *b, int color) {
     return b->desc->edge_exemplars ? b->desc->edge_exemplars[color] : -1;
 }
 
-/* How many strips there are, and which joins what: strip number of an edge. wang, frame: axis 0 then
-   axis 1, by colour; corner: by axis, start's and end's colour; triangle: by colour. */
+/* The number of an edge's strip. wang, frame: axis 0 then axis 1, by colour; corner: by axis,
+   colour at the start and at the end; triangle: by colour. */
 static int txt_strip_index(const txt_build *b, int axis, int color, int end_color) {
     const int c = b->set->colors;
     if (b->set->kind == TEXTILES_CORNER) return (axis * c + color) * c + end_color;
@@ -359,8 +360,8 @@ static void txt_random_corner(const txt_build *b, txm_rng *rng, int *sheet, int 
     *i = x - (b->is_triangle ? txt_half(*j) : 0);
 }
 
-/* One corner more: of TXT_CORNERS random places, those most usual are tried out with the strips that
-   they would get. */
+/* Choose one more corner: of TXT_CORNERS random places the most typical ones are compared by the
+   strips that they lead to. */
 static txm_status txt_choose_corner(txt_build *b, txm_rng *rng, txt_query *q, txt_scratch *m) {
     enum { SHORT_LIST = 10 };
     struct {
@@ -417,8 +418,9 @@ static txm_status txt_choose_corner(txt_build *b, txm_rng *rng, txt_query *q, tx
     return TXM_OK;
 }
 
-/* Corners first, then for each colour an edge strip: untouched exemplar on both sides of the joint,
-   so that it continues there; chosen to agree with the corners at its ends, and with the others. */
+/* Choose the corners, then for each colour the strip at its edges: unmodified exemplar on both
+   sides of the joint, which agrees with the corners at its ends and lies apart from the other
+   strips. */
 static txm_status txt_make_frames(txt_build *b) {
     const int c = b->set->colors, is_corner = b->set->kind == TEXTILES_CORNER;
     const int corners = is_corner ? c : 1, length = b->set->size + b->is_triangle;

@@ -6,8 +6,8 @@
 /* ---- all tiles --------------------------------------------------------------------------- */
 
 enum {
-    TXT_BATCH = 8,        /* tiles made at the same time, whatever the number of threads       */
-    TXT_TRIES = 4         /* inside pieces cut for each tile, of which the best stays          */
+    TXT_BATCH = 8,        /* tiles made at the same time, for any number of threads            */
+    TXT_TRIES = 4         /* interiors cut for each tile, of which the best is kept            */
 };
 #define TXT_BALANCE 0.8       /* weight of use and traits when places are ranked             */
 
@@ -98,14 +98,14 @@ static int txt_base(const txt_build *b, int tile) {
     return tile - b->set->tiles[tile].variant;
 }
 
-/* Do two places show nearly the same? */
+/* Are two places closer than `near`? */
 static int txt_places_agree(const txt_place *a, const txt_place *b, int near) {
     return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < near &&
            abs(a->j - b->j) < near;
 }
 
-/* What a place costs, in gray levels, because other tiles show it: variants of one tile must not show
-   the same, and no two tiles quite the same. */
+/* The cost of a place, in gray levels, for being shown by other tiles: variants of one tile must
+   not show the same, and no two tiles exactly the same. */
 static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k,
                                const txt_place *place) {
     const int near = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
@@ -125,8 +125,8 @@ static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k
     return cost;
 }
 
-/* In which order the tiles of a batch try the places found for their insides: what another tile shows
-   or tries comes late, and what brings the traits of the set back to those of the exemplars early. */
+/* Sort the places found for the interiors of a batch: those that another tile shows or tries come
+   later, those that bring the traits of the set closer to the means of the exemplars earlier. */
 static void txt_rank_places(const txt_build *b, txt_batch *batch, int count) {
     double surplus[TXT_TRAITS], more[TXT_TRAITS];
     memcpy(surplus, b->surplus, sizeof surplus);
@@ -141,13 +141,13 @@ static void txt_rank_places(const txt_build *b, txt_batch *batch, int count) {
             txt_piece_traits(b, &c->places[p], more);
             for (int t = 0; t < TXT_TRAITS; t++) cost += fabs(surplus[t] + more[t]);
             for (int t = TXT_STEP; t < TXT_STEP + 2; t++) {
-                /* joints are as rough as is usual; beside a smooth inside they would show */
+                /* joints have typical roughness and would be visible beside a smooth interior */
                 const double rough = b->usual[t] > 0 ? 1 + more[t] / b->usual[t] : 1;
                 if (rough < 0.9) cost += 600 * (0.9 - rough);
             }
             c->places[p].cost += (uint32_t)(cost * TXT_SCALE * TXT_BALANCE);
         }
-        for (int p = 1; p < c->place_count; p++) { /* sort again, equal ones as they were */
+        for (int p = 1; p < c->place_count; p++) { /* a stable sort */
             const txt_place place = c->places[p];
             int at = p;
             for (; at > 0 && c->places[at - 1].cost > place.cost; at--)
@@ -256,7 +256,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     txm_status status = txt_check_kind(desc, env);
     if (status == TXM_OK) status = txt_check_exemplars(desc, maps, env);
     if (status == TXM_OK && txm_progress(env, 0, "exemplars"))
-        status = txm_fail(env, TXM_CANCELLED, "cancelled before the work began");
+        status = txt_cancelled(env);
     if (status == TXM_OK)
         status = txt_set_make(desc, maps, desc->exemplars[0].map_count, 1, env, &b.set);
     if (status != TXM_OK) return status;
@@ -269,7 +269,7 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
     if (status == TXM_OK) status = txt_make_frames(&b);
     if (status == TXM_OK) status = txt_make_tiles(&b);
     if (status == TXM_OK && txm_progress(env, 1, "tiles"))
-        status = txm_fail(env, TXM_CANCELLED, "cancelled at the very end");
+        status = txt_cancelled(env);
     txm_arena_free(&b.arena);
     if (status != TXM_OK) textiles_set_free(b.set);
     else *out = b.set;

@@ -13,8 +13,8 @@ static double txt_texel_step(const txt_map *m, const uint8_t *p, const uint8_t *
     return sum;
 }
 
-/* Mean step inside a tile: across (axis 0: from row to row, 1: from column to column); of triangles
-   over all three directions. */
+/* The mean difference of neighbours inside a tile: axis 0 from row to row, 1 from column to column;
+   of triangles in all three directions. */
 static double txt_inside_step(const textiles_set *s, int map, int tile, int axis) {
     const int side = s->side;
     const int dx[3] = {1, 0, -1}, dy[3] = {0, 1, 1};
@@ -51,8 +51,8 @@ static void txt_side_texel(const textiles_set *s, int k, int a, int r, int *x, i
     }
 }
 
-/* Mean step from the texels on side k of triangle a to the row beside it in triangle b, whose side m
-   lies there and runs the other way. */
+/* The mean difference between the texels on side k of triangle a and the row beside it in triangle
+   b, whose side m is at the same edge in the opposite direction. */
 static double txt_row_step(const textiles_set *s, int map, int a, int k, int b, int m) {
     double sum = 0;
     for (int i = 0; i < s->size; i++) {
@@ -73,7 +73,7 @@ typedef struct txt_tally {
 } txt_tally;
 
 static void txt_count_joint(txt_tally *t, double step, double inside) {
-    /* a flat place: no step is a perfect joint, any other a bad one */
+    /* flat interiors: without a step the joint is perfect, else bad */
     const double ratio = inside > 0 ? step / inside : step > 0 ? 1e9 : 1;
     textiles_joints *j = t->joints;
     if (j->pairs == 0 || ratio > j->worst) j->worst = ratio;

@@ -7,7 +7,7 @@
 
 enum {
     TXT_RING = 16,         /* ours: faces at an edge that are looked at; keeps soups linear */
-    TXT_PASSES = 32,       /* ours: over the faces to part equal neighbours                 */
+    TXT_PASSES = 32,       /* ours: over the faces to separate equal neighbours             */
     TXT_REPORT_FACES = 1 << 14
 };
 
@@ -39,7 +39,7 @@ static int32_t txt_face_entry(const txt_cover *c, uint32_t face) {
     return s->lookup[code];
 }
 
-/* How often faces beside this one show the tile. */
+/* How many neighbours of a face show the tile. */
 static int txt_equal_neighbors(const txt_cover *c, uint32_t face, int32_t tile) {
     int equal = 0;
     for (uint32_t k = 0; k < c->corners; k++) {
@@ -53,8 +53,8 @@ static int txt_equal_neighbors(const txt_cover *c, uint32_t face, int32_t tile) 
     return equal;
 }
 
-/* Give a face the tile of its colours, in the variant that the fewest neighbours show; the first of
-   these, from one that is random for the face. Returns how many do. */
+/* Give a face the tile of its colours in the variant that the fewest neighbours show, of equally
+   good ones the first from a random variant on. Returns how many neighbours show it. */
 static int txt_choose_tile(txt_cover *c, uint32_t face) {
     const int variants = c->set->variants;
     const int32_t base = txt_face_entry(c, face) / 4;
@@ -87,8 +87,8 @@ static int txt_try_color(txt_cover *c, uint32_t side, uint8_t color, const uint3
     return equal;
 }
 
-/* Give an edge the colour with which the fewest faces there lie beside their like. A colour that is
-   no better is taken for a change now and then, by a bit of coin. */
+/* Give an edge the colour with which its faces have the fewest equal neighbours. If no colour is
+   better, an equally good one is taken when bit 0 of coin is set, to leave local minima. */
 static void txt_recolor(txt_cover *c, uint32_t side, uint32_t coin) {
     const int colors = c->set->colors;
     const uint8_t old = c->color[side];
@@ -120,12 +120,12 @@ static void txt_recolor(txt_cover *c, uint32_t side, uint32_t coin) {
         int equal = 0;
         for (int i = 0; i < count; i++) equal += txt_equal_neighbors(c, faces[i], c->tile[faces[i]]);
         if (equal <= least) return;
-        for (int i = 0; i < count; i++) c->tile[faces[i]] = tiles[i]; /* no better: as it was */
+        for (int i = 0; i < count; i++) c->tile[faces[i]] = tiles[i]; /* no better: restore */
     }
 }
 
-/* Choose all tiles, then part those beside their like, by variants and, where edges may be recoloured,
-   by colours. 0 when cancelled. */
+/* Choose all tiles, then separate equal neighbours by other variants and, where edges may be
+   recoloured, by other colours. 0 when cancelled. */
 static int txt_choose_tiles(txt_cover *c, int recolor) {
     for (uint32_t f = 0; f < c->faces; f++) c->tile[f] = -1;
     for (uint32_t f = 0; f < c->faces; f++) {
@@ -159,15 +159,15 @@ static int txt_choose_tiles(txt_cover *c, int recolor) {
 
 /* ---- meshes: checks and colours ---------------------------------------------------------- */
 
-/* May two sides of quads lie at one edge? North meets south and east meets west, each running against
-   the other round its face, with one colour. */
+/* May two sides of quads share an edge? North meets south and east meets west, with one colour and
+   in opposite directions. */
 static int txt_sides_match(const txt_cover *c, uint32_t a, uint32_t b) {
     const uint32_t *v = c->mesh.indices;
     return ((a ^ b) & 3) == 2 && v[a] != v[b] && c->color[a] == c->color[b];
 }
 
-/* Do all sides of quads match those at the same edge? Sides from a vertex to itself are left alone:
-   around a pole they are all at the same vertex. */
+/* Do all sides of quads match those at the same edge? Sides from a vertex to itself have no edge:
+   around a pole all faces have one at the same vertex. */
 static txm_status txt_check_sides(const txt_cover *c) {
     for (uint32_t side = 0; side < c->sides; side++) {
         uint32_t other = TXM_NO_SIDE;

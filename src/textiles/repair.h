@@ -5,7 +5,7 @@
 
 /* ---- repair ------------------------------------------------------------------------------ */
 
-/* Memory for txm_poisson out of one block: no allocator is called from the threads. */
+/* Memory for txm_poisson from one block, so that threads do not call the allocator. */
 typedef struct txt_pool {
     uint8_t *block;
     size_t used, size;
@@ -21,10 +21,10 @@ static void *txt_pool_take(void *user, size_t bytes) {
 
 static void txt_pool_give(void *user, void *block) {
     (void)user;
-    (void)block; /* all at once, by the next repair */
+    (void)block; /* the next repair frees all at once */
 }
 
-/* bytes of the pool that suffice for any mask of a tile */
+/* bytes that are enough for txm_poisson with any mask of a tile */
 static size_t txt_pool_bytes(size_t texels, size_t side) {
     return texels * (6 * sizeof(double) + 4 * sizeof(int32_t) + 4 * sizeof(float)) +
            side * sizeof(int32_t) + 4096;
@@ -43,8 +43,8 @@ typedef struct txt_repair {
     txt_pool pool;
 } txt_repair;
 
-/* Spread the steps at the cuts of a tile over the texels near them [Perez 2003]: differences are those
-   of the exemplar, across a cut the mean of what its two sides would go on with. */
+/* Spread the steps at the cuts of a tile over the texels near them [9]: differences are those of
+   the exemplar, across a cut the mean of those that its two layers have there. */
 static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
     const txt_build *b = c->b;
     textiles_set *set = b->set;
@@ -121,7 +121,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
         desc.mask.channels = 1;
         desc.mask.sample = TXM_U8;
         desc.tolerance = 1e-3f;
-        if (txm_poisson(&desc, &env) != TXM_OK) continue; /* cannot be: the pool suffices */
+        if (txm_poisson(&desc, &env) != TXM_OK) continue; /* cannot be: the pool is enough */
         const txm_image out = {txt_texel(set, m, c->tile, 0, 0), side, side, n,
                                set->maps[m].sample, 0};
         for (int p = 0; p < side * side; p++) {

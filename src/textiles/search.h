@@ -11,13 +11,13 @@ enum {
     TXT_SAMPLES = 2048    /* texels compared at one place of a search, at most                 */
 };
 
-/* A texel that a piece should show: at this distance from the piece's place, turned already. */
+/* A texel that a piece should show, and its offset from the place of the piece, turned already. */
 typedef struct txt_sample {
     int i, j;
     uint8_t value[TXT_MAX_FEATURES]; /* blurred */
 } txt_sample;
 
-/* How to search: samples, and what a place costs besides. */
+/* What to search for: samples to match, and additional costs of a place. */
 typedef struct txt_query {
     txt_sample *samples;
     int count, capacity;
@@ -73,8 +73,8 @@ static int txt_row_range(const txt_build *b, const txt_query *q, int sheet, int 
     return high > low;
 }
 
-/* Sums of the differences of samples first..last-1 at TXT_LANES places side by side, added to sum. One
-   group has at most 256 differences, so that 16 bits suffice. */
+/* Sums of the differences of samples first..last-1 at TXT_LANES places side by side, added to sum.
+   One group has at most 256 differences, so that 16 bits suffice. */
 #ifdef TXT_AVX2
 __attribute__((target("avx2"))) static void txt_add_lanes_avx2(const txt_build *b,
                                                                const txt_query *q,
@@ -139,8 +139,8 @@ static void txt_add_lanes(const txt_build *b, const txt_query *q, const size_t *
 #endif
 }
 
-/* Costs of the places (from, j) .. (from + n - 1, j). The planes end in TXT_LANES spare bytes, so that
-   whole groups of lanes can be read; what they yield beyond n is not looked at. */
+/* Costs of the places (from, j) .. (from + n - 1, j). The planes end in TXT_LANES spare bytes, so
+   that whole groups of lanes can be read; results beyond n are ignored. */
 static void txt_row_costs(const txt_build *b, const txt_query *q, int sheet, int j, int from, int n,
                           txt_scratch *m) {
     const txt_sheet *s = &b->sheets[sheet];
@@ -167,8 +167,8 @@ static void txt_row_costs(const txt_build *b, const txt_query *q, int sheet, int
 }
 
 /* The best places of one sheet, cheapest first, at least q->apart from each other: appended to
-   best[], which keeps the cheapest of most. Looks at every second row or fewer, then next to what it
-   found. */
+   best[], which keeps the cheapest of most. Tries every second row or fewer, then the rows left out
+   next to what it found. */
 static int txt_search(const txt_build *b, const txt_query *q, int sheet, int turn, txt_scratch *m,
                       txt_place *best, int count, int most) {
     const txt_sheet *s = &b->sheets[sheet];
