@@ -19,6 +19,7 @@ SOURCES := $(wildcard src/*.h src/*/*.h)
 HEADERS := $(notdir $(wildcard src/*.h))
 TEXKIT   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/*.c tools/commands/*.c tools/files/*.c))
 IMAGES   = $(BUILD)/files/image_io.o $(BUILD)/files/stb.o
+TIMED    = $(BUILD)/env.o $(IMAGES)
 MESHES   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/files/mesh*.c))
 # examples/brush opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
 # window if it can. Where that is not installed they are left out
@@ -112,15 +113,15 @@ $(BUILD)/examples/forest_gl: CPPFLAGS += $(if $(SDL),-DFOREST_WINDOW) \
 bench: $(BENCHES) $(PLAIN) samples
 	@for b in $(BENCHES); do $$b $$(ls -r $(BUILD)/samples/*.png) || exit 1; done
 
-$(BUILD)/bench/%: bench/%.c bench/bench.h $(IMAGES) $(SOURCES)
+$(BUILD)/bench/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $< $(IMAGES) -o $@ -lm
+	$(COMPILE) $< $(TIMED) -o $@ -lm
 
 # the same without SIMD, for comparison
-$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(IMAGES) $(SOURCES)
+$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD \
-	    $< $(IMAGES) -o $@ -lm
+	    $< $(TIMED) -o $@ -lm
 
 # ---- demo, tests, lint
 

@@ -27,8 +27,8 @@ static double wall_start, cpu_start;
 static size_t held;
 
 static void start(void) {
-    held = live_bytes;
-    peak_bytes = live_bytes;
+    held = memory.live_bytes;
+    memory.peak_bytes = memory.live_bytes;
     wall_start = clock_of(CLOCK_MONOTONIC);
     cpu_start = clock_of(CLOCK_PROCESS_CPUTIME_ID);
 }
@@ -36,7 +36,7 @@ static void start(void) {
 static void stop(result *r) {
     r->seconds = clock_of(CLOCK_MONOTONIC) - wall_start;
     r->cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID) - cpu_start;
-    r->peak = peak_bytes - held;
+    r->peak = memory.peak_bytes - held;
 }
 
 static txm_image new_image(int width, int height, int channels) {
@@ -129,7 +129,7 @@ static void print_row(const char *what, int width, int height, const result *one
 }
 
 static void make_row(const char *what, const texpatch_desc *desc, int is_long) {
-    const int threads = all_threads();
+    const int threads = env_cores();
     result one, all;
     if (!is_long) time_make(desc, 1, &one);
     time_make(desc, threads, &all);
@@ -156,7 +156,7 @@ static void derive_maps(const txm_image *picture, txm_image maps[MAPS]) {
 }
 
 static void everything(const char *path, const txm_image *picture) {
-    const int threads = all_threads();
+    const int threads = env_cores();
     char head[16];
     txm_image maps[MAPS];
     texpatch_exemplar exemplar;
@@ -277,7 +277,7 @@ int main(int argc, char **argv) {
     const char *why;
     const int is_once = argc == 3 && !strcmp(argv[1], "--once");
     if (argc < 2) give_up("usage", "bench_texpatch [--once] EXEMPLAR...");
-    wait_asleep(argv);
+    env_let_threads_sleep(argv);
     for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the first table */
         const char *path = argv[i ? i : 1];
         txm_image picture;

@@ -33,8 +33,8 @@ typedef struct stopwatch {
 } stopwatch;
 
 static stopwatch start(void) {
-    stopwatch w = {clock_of(CLOCK_MONOTONIC), clock_of(CLOCK_PROCESS_CPUTIME_ID), live_bytes};
-    peak_bytes = live_bytes;
+    stopwatch w = {clock_of(CLOCK_MONOTONIC), clock_of(CLOCK_PROCESS_CPUTIME_ID), memory.live_bytes};
+    memory.peak_bytes = memory.live_bytes;
     return w;
 }
 
@@ -43,7 +43,7 @@ static void stop(const stopwatch *w, result *r) {
     double cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID) - w->cpu;
     if (wall < r->seconds) r->seconds = wall;
     if (cpu < r->cpu) r->cpu = cpu;
-    r->peak = peak_bytes - w->held;
+    r->peak = memory.peak_bytes - w->held;
 }
 
 static texsyn_model *learn(txm_image exemplar, int threads, result *r) {
@@ -198,7 +198,7 @@ int main(int argc, char **argv) {
     void *pixels = malloc((size_t)MAX_OUT * MAX_OUT * 4);
     if (argc < 2) give_up("usage", "bench_texsyn [--once] EXEMPLAR...");
     if (!pixels) give_up("output", "out of memory");
-    wait_asleep(argv);
+    env_let_threads_sleep(argv);
     for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the sweep */
         const char *path = argv[i ? i : 1];
         txm_image picture;

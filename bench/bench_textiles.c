@@ -42,13 +42,13 @@ static textiles_set *make(const txm_image *picture, textiles_kind kind, int colo
     desc.exemplar_count = 1;
     desc.size = size;
     desc.colors = colors;
-    const size_t held = live_bytes;
-    peak_bytes = live_bytes;
+    const size_t held = memory.live_bytes;
+    memory.peak_bytes = memory.live_bytes;
     const double wall = clock_of(CLOCK_MONOTONIC), cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID);
     if (textiles_make(&desc, &env, &set) != TXM_OK) give_up(kind_names[kind], env.message);
     r->seconds = clock_of(CLOCK_MONOTONIC) - wall;
     r->cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID) - cpu;
-    r->peak = peak_bytes - held;
+    r->peak = memory.peak_bytes - held;
     return set;
 }
 
@@ -65,7 +65,7 @@ static const char *file_name(const char *path) {
 }
 
 static void kinds(const char *path, const txm_image *picture) {
-    const int threads = all_threads();
+    const int threads = env_cores();
     char head[16];
     snprintf(head, sizeof head, "%d threads", threads);
     printf("tiles of 128 x 128 out of %s, %d x %d, %d channels: seconds on 1 and on %d threads\n\n",
@@ -223,7 +223,7 @@ int main(int argc, char **argv) {
     const char *why;
     const int is_once = argc == 3 && !strcmp(argv[1], "--once");
     if (argc < 2) give_up("usage", "bench_textiles [--once] EXEMPLAR...");
-    wait_asleep(argv);
+    env_let_threads_sleep(argv);
     for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the first table */
         const char *path = argv[i ? i : 1];
         txm_image picture;

@@ -119,12 +119,12 @@ static trimesh_mesh *retile(const surface *s, trimesh_method method, size_t vert
     desc.surface = s->view;
     desc.vertices = vertices;
     desc.method = method;
-    const size_t held = live_bytes;
-    peak_bytes = live_bytes;
+    const size_t held = memory.live_bytes;
+    memory.peak_bytes = memory.live_bytes;
     const double start = clock_of(CLOCK_MONOTONIC);
     if (trimesh_retile(&desc, &env, &mesh) != TXM_OK) give_up(s->name, env.message);
     r->seconds = clock_of(CLOCK_MONOTONIC) - start;
-    r->peak = peak_bytes - held;
+    r->peak = memory.peak_bytes - held;
     return mesh;
 }
 
@@ -148,7 +148,7 @@ static double mean_quality(const trimesh_mesh *m) {
 
 static void retiling(int full) {
     static const size_t numbers[] = {5000, 50000, 200000, 500000};
-    const int threads = all_threads();
+    const int threads = env_cores();
     surface surfaces[2];
     surfaces[0] = make_torus(240, 110);
     surfaces[1] = make_ball(120);
@@ -188,7 +188,7 @@ static void scattering(void) {
     trimesh_scatter_desc d;
     result r;
     surface s = make_torus(240, 110);
-    trimesh_mesh *mesh = retile(&s, TRIMESH_LATTICE, 10000, all_threads(), &r);
+    trimesh_mesh *mesh = retile(&s, TRIMESH_LATTICE, 10000, env_cores(), &r);
     trimesh_instance *out = (trimesh_instance *)malloc(ROOM * sizeof *out);
     if (!out) give_up("scatter", "out of memory");
     memset(&spread, 0, sizeof spread);
@@ -205,14 +205,14 @@ static void scattering(void) {
     printf("\nthings on %lu triangles, fastest of 3\n\nhow              threads   things seconds "
            "ns each peak MiB\n", (unsigned long)mesh->triangle_count);
     for (int curved = 0; curved < 2; curved++) {
-        for (int threads = 1; threads <= all_threads(); threads *= 2) {
+        for (int threads = 1; threads <= env_cores(); threads *= 2) {
             int used = threads;
             txm_env env = make_env(&used);
             size_t count = 0;
             double best = 1e30;
             d.curve = (float)curved;
-            const size_t held = live_bytes;
-            peak_bytes = live_bytes;
+            const size_t held = memory.live_bytes;
+            memory.peak_bytes = memory.live_bytes;
             for (int run = 0; run < 3; run++) {
                 const double start = clock_of(CLOCK_MONOTONIC);
                 if (trimesh_scatter(&d, &env, out, ROOM, &count) != TXM_OK)
@@ -221,7 +221,7 @@ static void scattering(void) {
             }
             printf("%-16s %7d %8lu %7.3f %7.0f %8.1f\n", curved ? "on the curve" : "on triangles",
                    threads, (unsigned long)count, best, 1e9 * best / (double)count,
-                   (double)(peak_bytes - held) / 1048576);
+                   (double)(memory.peak_bytes - held) / 1048576);
             fflush(stdout);
         }
     }
@@ -231,7 +231,7 @@ static void scattering(void) {
 }
 
 int main(int argc, char **argv) {
-    wait_asleep(argv);
+    env_let_threads_sleep(argv);
     retiling(argc > 1 && !strcmp(argv[1], "--full"));
     scattering();
     return 0;

@@ -14,9 +14,6 @@
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 enum { MAX_THREADS = 256, BAR_WIDTH = 30 };
 
@@ -147,48 +144,6 @@ static void print_manual(const cli_manual *m, const cli_option *own, const cli_o
 
 /* ---- the environment -------------------------------------------------------------------- */
 
-/* The allocator counts what the library holds: each block is preceded by its size. */
-typedef union block_head {
-    size_t bytes;
-    long double align_1;
-    void *align_2;
-} block_head;
-
-static void *allocate(void *user, size_t bytes) {
-    cli *run = (cli *)user;
-    if (bytes > SIZE_MAX - sizeof(block_head)) return NULL;
-    block_head *head = (block_head *)malloc(sizeof *head + bytes);
-    if (!head) return NULL;
-    head->bytes = bytes;
-#ifdef _OPENMP
-#pragma omp critical(memory)
-#endif
-    {
-        run->live_bytes += bytes;
-        if (run->live_bytes > run->peak_bytes) run->peak_bytes = run->live_bytes;
-    }
-    return head + 1;
-}
-
-static void release(void *user, void *block) {
-    cli *run = (cli *)user;
-    block_head *head = (block_head *)block - 1;
-#ifdef _OPENMP
-#pragma omp critical(memory)
-#endif
-    run->live_bytes -= head->bytes;
-    free(head);
-}
-
-#ifdef _OPENMP
-static void parallel_for(void *user, int count, void (*body)(void *context, int index),
-                         void *context) {
-    const cli *run = (const cli *)user;
-#pragma omp parallel for schedule(dynamic) num_threads(run->threads)
-    for (int i = 0; i < count; i++) body(context, i);
-}
-#endif
-
 static volatile sig_atomic_t interrupted;
 
 static void on_signal(int signal_number) {
@@ -213,15 +168,6 @@ static int progress(void *user, float fraction, const char *stage) {
     return 0;
 }
 
-static int core_count(void) {
-#ifdef _OPENMP
-    int n = omp_get_num_procs();
-    return n > MAX_THREADS ? MAX_THREADS : n;
-#else
-    return 1;
-#endif
-}
-
 static void make_env(cli *run) {
     struct sigaction action;
     memset(&action, 0, sizeof action);
@@ -230,17 +176,9 @@ static void make_env(cli *run) {
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
 
-    run->env.allocate = allocate;
-    run->env.release = release;
-    run->env.memory_user = run;
+    env_fill(&run->env, &run->memory, &run->threads);
     run->env.progress = progress;
     run->env.progress_user = run;
-#ifdef _OPENMP
-    if (run->threads > 1) {
-        run->env.parallel_for = parallel_for;
-        run->env.parallel_user = run;
-    }
-#endif
 }
 
 /* ---- the files of a run ------------------------------------------------------------------- */
@@ -457,7 +395,7 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
     memset(run, 0, sizeof *run);
     run->manual = manual;
     run->seed = 1;
-    run->threads = core_count();
+    run->threads = env_cores() < MAX_THREADS ? env_cores() : MAX_THREADS;
     run->started = run->stage_started = now();
     const cli_option common[] = {
         {CLI_TEXT, "-o", "PATH", "where to write the result", &run->output, 0, 0},
@@ -556,7 +494,7 @@ static size_t format_stats(const cli *run, char *text, size_t capacity) {
     for (int i = 0; i < run->stage_count; i++)
         ADD("    \"%s\": %.6f,\n", run->stages[i].name, run->stages[i].seconds);
     ADD("    \"total\": %.6f\n  },\n  \"peak_bytes\": %zu,\n  \"result\": {\n", cli_seconds(run),
-        run->peak_bytes);
+        run->memory.peak_bytes);
     for (int i = 0; i < run->figure_count; i++) {
         const int count = run->figures[i].count;
         ADD("    \"%s\": %s%.15g", run->figures[i].name, count ? "[" : "",

@@ -9,7 +9,7 @@
 #ifndef CLI_H
 #define CLI_H
 
-#include "texmath.h"
+#include "env.h"
 
 #define TEXKIT_VERSION "0.1.0"
 
@@ -85,7 +85,7 @@ typedef struct cli {
         int count; /* 0: a single number; else a list of so many */
     } figures[CLI_MAX_FIGURES];
     int stage_count, figure_count, bar_is_on;
-    size_t live_bytes, peak_bytes;
+    env_memory memory;
 } cli;
 
 /* Read the command line after the command's name. 0: go on; otherwise *status is the exit status

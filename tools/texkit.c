@@ -4,7 +4,6 @@
    The table below lists the commands; each is in a file of commands/. What they share is in
    command.c and cli.c; files/ reads and writes pictures and meshes. Begin with commands/clique.c:
    run_learn shows all there is to embedding a header.                                          */
-#define _XOPEN_SOURCE 700 /* POSIX: setenv, execv */
 #include "command.h"
 
 #include "texedges.h"
@@ -16,7 +15,6 @@
 #include "trimesh_relax.h"
 
 #include <stdio.h>
-#include <unistd.h>
 
 const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
@@ -41,20 +39,8 @@ static int print_overview(void) {
     return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
 }
 
-/* OpenMP's threads spin for milliseconds while they wait, which stands still when something else
-   wants the cores. Let them spin for some microseconds only (GNU's library knows the second word)
-   and then sleep. How they wait is read before main begins, so say it and begin again. */
-static void wait_politely(char **argv) {
-#ifdef _OPENMP
-    if (!getenv("OMP_WAIT_POLICY") && setenv("OMP_WAIT_POLICY", "passive", 0) == 0 &&
-        setenv("GOMP_SPINCOUNT", "20000", 0) == 0)
-        execv("/proc/self/exe", argv); /* where that fails, work goes on as it is */
-#endif
-    (void)argv;
-}
-
 int main(int argc, char **argv) {
-    wait_politely(argv);
+    env_let_threads_sleep(argv);
     if (argc < 2) {
         fprintf(stderr, "texkit: no command given; see 'texkit --help'\n");
         return CLI_USAGE;
