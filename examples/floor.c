@@ -53,8 +53,8 @@ static txm_vec3 sample_floor(const floor_texture *t, double x, double y, double 
     const int fine = (int)lod, coarse = fine + 1 < LEVELS ? fine + 1 : fine;
     const double a = 1.0 / (1 << fine), b = 1.0 / (1 << coarse);
     return txm_vec3_lerp(sample_level(&t->level[fine], u * a - 0.5, v * a - 0.5),
-                     sample_level(&t->level[coarse], u * b - 0.5, v * b - 0.5),
-                     (float)(lod - fine));
+                         sample_level(&t->level[coarse], u * b - 0.5, v * b - 0.5),
+                         (float)(lod - fine));
 }
 
 /* The atlas of a set in linear light, and its mipmaps. Returns NULL, or what went wrong. */
@@ -126,7 +126,7 @@ int main(int argc, char **argv) {
     photo.pixels = stbi_load(argv[1], &photo.width, &photo.height, NULL, 3);
     if (!photo.pixels) failed = stbi_failure_reason();
 
-    /* two edge colours: 16 tiles, each in two variants with different insides; zeros are the defaults */
+    /* two edge colours: 16 tiles, each in two variants with different interiors; zeros = defaults */
     const textiles_exemplar exemplar = {&photo, 1};
     textiles_desc desc = {0};
     desc.exemplars = &exemplar;
