@@ -4,7 +4,7 @@
    The first table sweeps the size of the exemplar and of the output for the first picture, so that
    the growth is visible; the second has a line for each picture; the third compares this build with
    one for TEXSYN_NO_SIMD, which lies in plain/ beside it. What is compared is run in turn, and of
-   several runs the fastest counts, so that other work on the machine spoils little.
+   several runs the fastest counts, so that other work on the machine has little effect.
 
    bench_texsyn --once EXEMPLAR does one picture once and prints the CPU seconds of both stages. */
 #define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
@@ -33,7 +33,8 @@ typedef struct stopwatch {
 } stopwatch;
 
 static stopwatch start(void) {
-    stopwatch w = {clock_of(CLOCK_MONOTONIC), clock_of(CLOCK_PROCESS_CPUTIME_ID), memory.live_bytes};
+    stopwatch w = {clock_of(CLOCK_MONOTONIC), clock_of(CLOCK_PROCESS_CPUTIME_ID),
+                   memory.live_bytes};
     memory.peak_bytes = memory.live_bytes;
     return w;
 }

@@ -15,22 +15,12 @@
 
 #include "texedges.h"
 
+#include "images.h"
 #include "testkit.h"
 
 /* ---- helpers ---------------------------------------------------------------------------- */
 
 enum { SIDE = 256, FILL = 0x5c };
-
-static inline txm_image view(void *pixels, int width, int height, int channels, txm_sample sample) {
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.pixels = pixels;
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    im.sample = sample;
-    return im;
-}
 
 static inline txm_image gray(uint8_t *pixels, int width, int height) {
     return view(pixels, width, height, 1, TXM_U8);

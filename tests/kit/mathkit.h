@@ -12,6 +12,7 @@
 
 #include <cmocka.h>
 
+#include "images.h"
 #include "testkit.h"
 
 static inline void assert_near(double a, double b, double tolerance) {
@@ -47,17 +48,6 @@ static inline void assert_vec3(txm_vec3 a, txm_vec3 b, double tolerance) {
 
 static inline void assert_floats(const float *a, const float *b, int count, double tolerance) {
     for (int i = 0; i < count; i++) assert_near(a[i], b[i], tolerance);
-}
-
-static inline txm_image view(void *pixels, int width, int height, int channels, txm_sample sample) {
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.pixels = pixels;
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    im.sample = sample;
-    return im;
 }
 
 #endif /* MATHKIT_H */

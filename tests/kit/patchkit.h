@@ -17,6 +17,7 @@
 
 #include "texpatch.h"
 
+#include "images.h"
 #include "testkit.h"
 
 /* ---- helpers ---------------------------------------------------------------------------- */
@@ -48,17 +49,6 @@ static inline int release_all(void **state) {
 static inline void assert_between(const char *what, double x, double low, double high) {
     show(what, x);
     if (!(x >= low && x <= high)) fail_msg("%s: %.9g is not in %g..%g", what, x, low, high);
-}
-
-static inline txm_image view(void *pixels, int width, int height, int channels, txm_sample sample) {
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.pixels = pixels;
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    im.sample = sample;
-    return im;
 }
 
 static inline size_t bytes_of(const txm_image *im) {

@@ -14,6 +14,7 @@
 
 #include "texsyn.h"
 
+#include "images.h"
 #include "testkit.h"
 
 enum { FILL = 0x5c }; /* what output pixels hold before a call */
@@ -26,32 +27,22 @@ static inline void assert_between(double x, double low, double high) {
     if (!(x >= low && x <= high)) fail_msg("%.9g is not between %g and %g", x, low, high);
 }
 
-static inline txm_image view(void *pixels, int width, int height, int channels) {
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.pixels = pixels;
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    return im;
+static inline txm_image view_bytes(void *pixels, int width, int height, int channels) {
+    return view(pixels, width, height, channels, TXM_U8);
 }
 
 static inline txm_image view_float(float *pixels, int width, int height, int channels) {
-    txm_image im = view(pixels, width, height, channels);
-    im.sample = TXM_F32;
-    return im;
+    return view(pixels, width, height, channels, TXM_F32);
 }
 
 static inline txm_image view_words(uint16_t *pixels, int width, int height, int channels) {
-    txm_image im = view(pixels, width, height, channels);
-    im.sample = TXM_U16;
-    return im;
+    return view(pixels, width, height, channels, TXM_U16);
 }
 
 /* Patches of one value: a pixel is the one to its left, the one above, or new, of `values` values
    that are `step` apart. The channels repeat each other in part; alpha is one of two values. */
-static inline void draw_patches(uint8_t *p, int width, int height, int channels, int values, int step,
-                         uint64_t seed) {
+static inline void draw_patches(uint8_t *p, int width, int height, int channels, int values,
+                                int step, uint64_t seed) {
     txm_rng rng = txm_rng_make(seed, 0);
     for (int y = 0; y < height; y++) {
         for (int x = 0; x < width; x++, p += channels) {
@@ -107,7 +98,7 @@ static inline texsyn_model *learn(const texsyn_learn_desc *desc) {
 static inline texsyn_model *small_model(int channels, int levels) {
     static uint8_t pixels[48 * 48 * 4];
     draw_patches(pixels, 48, 48, channels, 8, 30, 3);
-    texsyn_learn_desc d = learn_desc(view(pixels, 48, 48, channels), 3);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, 48, 48, channels), 3);
     d.levels = levels;
     return learn(&d);
 }

@@ -15,6 +15,7 @@
 
 #include "textiles.h"
 
+#include "images.h"
 #include "testkit.h"
 
 /* ---- helpers ---------------------------------------------------------------------------- */
@@ -31,17 +32,6 @@ static inline void *need(size_t bytes) {
     void *p = calloc(1, bytes);
     if (!p) abort();
     return p;
-}
-
-static inline txm_image view(void *pixels, int width, int height, int channels, txm_sample sample) {
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.pixels = pixels;
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    im.sample = sample;
-    return im;
 }
 
 static inline txm_image new_image(int width, int height, int channels, txm_sample sample) {

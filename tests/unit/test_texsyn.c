@@ -22,14 +22,14 @@ static void test_synth_sizes(void **state) {
                 d.tileable = tileable;
                 d.quality = -2;
                 memset(out, FILL, sizeof out);
-                synthesize(&d, view(out, width, height, 3));
+                synthesize(&d, view_bytes(out, width, height, 3));
                 for (size_t k = bytes; k < bytes + 64; k++) assert_int_equal(out[k], FILL);
             }
         }
         for (int quality = -2; quality <= 2; quality++) {
             texsyn_synth_desc d = synth_desc(model, 20, 20);
             d.quality = quality;
-            synthesize(&d, view(out, 20, 20, 3));
+            synthesize(&d, view_bytes(out, 20, 20, 3));
         }
         texsyn_model_free(model);
     }
@@ -60,7 +60,7 @@ static void test_synth_tileable(void **state) {
     assert_true(border[0] > 1.5 * inside[0] && border[1] > 1.5 * inside[1]);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const int width = cases[i].width, height = cases[i].height;
-        texsyn_learn_desc d = learn_desc(view(pixels, 128, 128, 1), 5);
+        texsyn_learn_desc d = learn_desc(view_bytes(pixels, 128, 128, 1), 5);
         d.levels = cases[i].levels;
         texsyn_model *model = learn(&d);
         memset(border, 0, sizeof border);
@@ -69,7 +69,7 @@ static void test_synth_tileable(void **state) {
             texsyn_synth_desc s = synth_desc(model, width, height);
             s.tileable = 1;
             s.seed = seed;
-            synthesize(&s, view(out, width, height, 1));
+            synthesize(&s, view_bytes(out, width, height, 1));
             add_wrap(out, width, height, border, inside);
         }
         for (int k = 0; k < 2; k++) assert_between(border[k] / inside[k], 0.8, 1.2);
@@ -81,13 +81,13 @@ static void test_synth_tileable(void **state) {
 static void run_with(txm_env *env, saved *s, uint8_t *out) {
     static uint8_t pixels[64 * 64 * 3];
     draw_patches(pixels, 64, 64, 3, 20, 12, 8);
-    texsyn_learn_desc d = learn_desc(view(pixels, 64, 64, 3), 4);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, 64, 64, 3), 4);
     texsyn_model *model = NULL;
     d.levels = 2;
     assert_int_equal(texsyn_learn(&d, env, &model), TXM_OK);
     save(model, s);
     const texsyn_synth_desc t = synth_desc(model, 90, 200);
-    assert_int_equal(texsyn_synthesize(&t, env, view(out, 90, 200, 3)), TXM_OK);
+    assert_int_equal(texsyn_synthesize(&t, env, view_bytes(out, 90, 200, 3)), TXM_OK);
     texsyn_model_free(model);
 }
 
@@ -116,13 +116,13 @@ static void test_synth_seeds(void **state) {
     static const uint64_t seeds[] = {1, 2, 1u << 31, (uint64_t)1 << 32, UINT64_MAX};
     texsyn_model *model = small_model(1, 1);
     texsyn_synth_desc d = synth_desc(model, 64, 64);
-    synthesize(&d, view(a, 64, 64, 1));
-    synthesize(&d, view(b, 64, 64, 1));
+    synthesize(&d, view_bytes(a, 64, 64, 1));
+    synthesize(&d, view_bytes(b, 64, 64, 1));
     assert_memory_equal(a, b, sizeof a);
     for (size_t i = 0; i < sizeof seeds / sizeof *seeds; i++) {
         int differ = 0;
         d.seed = seeds[i];
-        synthesize(&d, view(b, 64, 64, 1));
+        synthesize(&d, view_bytes(b, 64, 64, 1));
         for (int k = 0; k < 64 * 64; k++) differ += a[k] != b[k];
         assert_true(differ > 64 * 64 / 2);
     }
@@ -135,7 +135,7 @@ static void test_synth_steps(void **state) {
     for (int levels = 1; levels <= 3; levels++) {
         texsyn_model *model = small_model(3, levels);
         texsyn_synth_desc d = synth_desc(model, 70, 50);
-        synthesize(&d, view(whole, 70, 50, 3));
+        synthesize(&d, view_bytes(whole, 70, 50, 3));
         texsyn_job *job = NULL;
         tk_progress progress = {0};
         txm_env env = tk_env(NULL, &progress);
@@ -143,7 +143,7 @@ static void test_synth_steps(void **state) {
         int steps = 0;
         assert_int_equal(texsyn_begin(&d, NULL, &job), TXM_OK);
         memset(&d, 0xff, sizeof d); /* the job has its own copy */
-        assert_int_equal(texsyn_draw(job, NULL, view(last, 70, 50, 3)), TXM_OK);
+        assert_int_equal(texsyn_draw(job, NULL, view_bytes(last, 70, 50, 3)), TXM_OK);
         for (int more = 7; more;) {
             assert_int_equal(texsyn_step(job, &env, &more), TXM_OK);
             assert_true(more == 0 || more == 1);
@@ -151,7 +151,7 @@ static void test_synth_steps(void **state) {
             assert_int_equal(progress.errors, 0); /* one bar over all steps that never falls */
             before = progress.last;
             steps++;
-            assert_int_equal(texsyn_draw(job, NULL, view(out, 70, 50, 3)), TXM_OK);
+            assert_int_equal(texsyn_draw(job, NULL, view_bytes(out, 70, 50, 3)), TXM_OK);
             assert_true(memcmp(out, last, sizeof out) != 0);
             memcpy(last, out, sizeof out);
         }
@@ -166,7 +166,7 @@ static void test_synth_steps(void **state) {
         assert_int_equal(texsyn_step(job, &env, NULL), TXM_OK);
         assert_int_equal(more, 0);
         assert_int_equal(progress.calls, calls);
-        assert_int_equal(texsyn_draw(job, NULL, view(out, 70, 50, 3)), TXM_OK);
+        assert_int_equal(texsyn_draw(job, NULL, view_bytes(out, 70, 50, 3)), TXM_OK);
         assert_memory_equal(out, whole, sizeof whole);
         texsyn_free(job);
         texsyn_model_free(model);
@@ -177,7 +177,7 @@ static void test_synth_steps(void **state) {
     assert_int_equal(more, 7);
     memset(out, FILL, sizeof out);
     memset(last, FILL, sizeof last);
-    assert_int_equal(texsyn_draw(NULL, NULL, view(out, 70, 50, 3)), TXM_BAD_ARGUMENT);
+    assert_int_equal(texsyn_draw(NULL, NULL, view_bytes(out, 70, 50, 3)), TXM_BAD_ARGUMENT);
     assert_memory_equal(out, last, sizeof out);
 }
 
@@ -215,7 +215,8 @@ static void test_synth_bad_arguments(void **state) {
         assert_true(env.message[0] != 0);
         env.message[0] = 0;
         memset(out, FILL, sizeof out);
-        assert_int_equal(texsyn_synthesize(&d, &env, view(out, d.width, d.height, 3)), expected);
+        const txm_image small = view_bytes(out, d.width, d.height, 3);
+        assert_int_equal(texsyn_synthesize(&d, &env, small), expected);
         assert_true(env.message[0] != 0);
         for (size_t k = 0; k < sizeof out; k++) assert_int_equal(out[k], FILL);
         assert_int_equal(memory.calls, 0);
@@ -224,11 +225,11 @@ static void test_synth_bad_arguments(void **state) {
     assert_int_equal(texsyn_begin(NULL, NULL, &job), TXM_BAD_ARGUMENT);
     assert_null(job);
     assert_int_equal(texsyn_begin(&good, NULL, NULL), TXM_BAD_ARGUMENT);
-    assert_int_equal(texsyn_synthesize(NULL, NULL, view(out, 10, 10, 3)), TXM_BAD_ARGUMENT);
+    assert_int_equal(texsyn_synthesize(NULL, NULL, view_bytes(out, 10, 10, 3)), TXM_BAD_ARGUMENT);
 
     /* the picture does not fit: refused before any work, and when looking at a job */
     txm_image wrong[10];
-    for (int i = 0; i < 10; i++) wrong[i] = view(out, 10, 10, 3);
+    for (int i = 0; i < 10; i++) wrong[i] = view_bytes(out, 10, 10, 3);
     wrong[0].pixels = NULL;
     wrong[1].width = 9;
     wrong[2].height = 11;
@@ -268,13 +269,13 @@ static void test_synth_formats(void **state) {
         if (channels == 2) continue;
         texsyn_model *model = small_model(channels, 1);
         const texsyn_synth_desc d = synth_desc(model, W, H);
-        synthesize(&d, view(plain, W, H, channels));
+        synthesize(&d, view_bytes(plain, W, H, channels));
         if (channels == 1) { /* 0 means 1 */
-            synthesize(&d, view(out, W, H, 0));
+            synthesize(&d, view_bytes(out, W, H, 0));
             assert_memory_equal(out, plain, W * H);
         }
         for (int wider = channels < 3 ? 3 : channels; wider <= 4; wider++) {
-            synthesize(&d, view(out, W, H, wider));
+            synthesize(&d, view_bytes(out, W, H, wider));
             for (int i = 0; i < W * H; i++) {
                 for (int c = 0; c < wider; c++) {
                     const int opaque = c == 3 && channels < 4;
@@ -304,8 +305,8 @@ static txm_status try_learn(void *context, txm_env *env) {
     return status;
 }
 
-/* Learning reports some 1500 times: every 12th report is passed on, so that a sweep over all of them
-   stays short. */
+/* Learning reports some 1500 times: every 12th report is passed on, so that a sweep over all of
+   them stays short. */
 typedef struct thinned {
     txm_env *env;
     long calls;
@@ -344,12 +345,12 @@ static txm_status try_synthesize(void *context, txm_env *env) {
     static uint8_t out[33 * 40 * 3];
     memset(out, FILL, sizeof out);
     const txm_status status =
-        texsyn_synthesize((const texsyn_synth_desc *)context, env, view(out, 33, 40, 3));
+        texsyn_synthesize((const texsyn_synth_desc *)context, env, view_bytes(out, 33, 40, 3));
     for (size_t i = 0; i < sizeof out && status != TXM_OK; i++) assert_int_equal(out[i], FILL);
     return status;
 }
 
-/* A job that is looked at between the steps, and goes on after a failed one. */
+/* A job that is drawn between the steps, and continues after a failed one. */
 static txm_status try_steps(void *context, txm_env *env) {
     static uint8_t out[33 * 40 * 3];
     texsyn_job *job = (texsyn_job *)env;
@@ -362,7 +363,7 @@ static txm_status try_steps(void *context, txm_env *env) {
     while (more) {
         more = 7;
         const txm_status status = texsyn_step(job, env, &more);
-        assert_int_equal(texsyn_draw(job, env, view(out, 33, 40, 3)), TXM_OK);
+        assert_int_equal(texsyn_draw(job, env, view_bytes(out, 33, 40, 3)), TXM_OK);
         if (status == TXM_OK) continue;
         assert_int_equal(more, 7); /* untouched */
         if (first != TXM_OK || status == TXM_CANCELLED) {
@@ -371,9 +372,9 @@ static txm_status try_steps(void *context, txm_env *env) {
         }
         first = status;
     }
-    if (!more) { /* the failure left no trace */
+    if (!more) { /* the failure had no effect */
         static uint8_t whole[33 * 40 * 3];
-        synthesize((const texsyn_synth_desc *)context, view(whole, 33, 40, 3));
+        synthesize((const texsyn_synth_desc *)context, view_bytes(whole, 33, 40, 3));
         assert_memory_equal(out, whole, sizeof whole);
     }
     texsyn_free(job);
@@ -385,8 +386,8 @@ static void test_learn_failing(void **state) {
     static uint8_t pixels[32 * 32], mask[32 * 32];
     draw_patches(pixels, 32, 32, 1, 8, 30, 4);
     memset(mask, 1, sizeof mask);
-    texsyn_learn_desc d = learn_desc(view(pixels, 32, 32, 1), 1);
-    d.mask = view(mask, 32, 32, 1);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, 32, 32, 1), 1);
+    d.mask = view_bytes(mask, 32, 32, 1);
     d.levels = 2;
     assert_true(tk_sweep(try_learn, &d, TK_ALLOCATION) > 10);
     assert_true(tk_sweep(try_learn, &d, TK_ONWARD) > 10);
@@ -427,7 +428,7 @@ static void test_synth_peak_memory(void **state) {
     texsyn_model *model = small_model(3, 2);
     texsyn_synth_desc d = synth_desc(model, 512, 512);
     d.quality = -2;
-    assert_int_equal(texsyn_synthesize(&d, &env, view(out, 512, 512, 3)), TXM_OK);
+    assert_int_equal(texsyn_synthesize(&d, &env, view_bytes(out, 512, 512, 3)), TXM_OK);
     assert_int_equal(tk_leaks(&memory), 0);
     assert_true(memory.peak_bytes <= 64u * 512 * 512 + (4u << 20));
     texsyn_model_free(model);
@@ -440,7 +441,7 @@ static void test_env_goes_first(void **state) {
     tk_memory memory = {0}, other = {0};
     txm_env env = tk_env(&memory, NULL);
     draw_patches(pixels, 16, 16, 1, 8, 30, 4);
-    const texsyn_learn_desc d = learn_desc(view(pixels, 16, 16, 1), 1);
+    const texsyn_learn_desc d = learn_desc(view_bytes(pixels, 16, 16, 1), 1);
     texsyn_model *model = NULL;
     texsyn_job *job = NULL;
     int more = 1;
@@ -450,7 +451,7 @@ static void test_env_goes_first(void **state) {
     memset(&env, 0xff, sizeof env);
     txm_env another = tk_env(&other, NULL);
     while (more) assert_int_equal(texsyn_step(job, &another, &more), TXM_OK);
-    assert_int_equal(texsyn_draw(job, &another, view(out, 20, 20, 1)), TXM_OK);
+    assert_int_equal(texsyn_draw(job, &another, view_bytes(out, 20, 20, 1)), TXM_OK);
     assert_int_equal(other.calls, 0);
     texsyn_free(job);
     texsyn_model_free(model);

@@ -31,7 +31,7 @@ static void refuses_learn(const texsyn_learn_desc *desc, txm_status expected, co
 static void test_learn_bad_arguments(void **state) {
     (void)state;
     static uint8_t pixels[32 * 32 * 4], mask[32 * 32];
-    texsyn_learn_desc good = learn_desc(view(pixels, 32, 32, 3), 1);
+    texsyn_learn_desc good = learn_desc(view_bytes(pixels, 32, 32, 3), 1);
     txm_env env;
     memset(&env, 0, sizeof env);
     memset(mask, 255, sizeof mask);
@@ -68,7 +68,7 @@ static void test_learn_bad_arguments(void **state) {
     REFUSES(threshold, (float)NAN, TXM_BAD_ARGUMENT);
     REFUSES(threshold, (float)INFINITY, TXM_BAD_ARGUMENT);
 
-    good.mask = view(mask, 32, 32, 1);
+    good.mask = view_bytes(mask, 32, 32, 1);
     REFUSES(mask.width, 31, TXM_BAD_ARGUMENT);
     REFUSES(mask.width, 0, TXM_BAD_ARGUMENT);
     REFUSES(mask.height, 33, TXM_BAD_ARGUMENT);
@@ -111,15 +111,15 @@ static void test_learn_masks(void **state) {
     (void)state;
     static uint8_t pixels[32 * 32], mask[32 * 32], out[24 * 24];
     draw_patches(pixels, 32, 32, 1, 8, 30, 1);
-    texsyn_learn_desc d = learn_desc(view(pixels, 32, 32, 1), 2);
-    d.mask = view(mask, 32, 32, 0);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, 32, 32, 1), 2);
+    d.mask = view_bytes(mask, 32, 32, 0);
     refuses_learn(&d, TXM_TOO_SMALL, "an empty mask");
     memset(mask, 1, 255);
     refuses_learn(&d, TXM_TOO_SMALL, "a mask of 255 pixels");
     mask[255] = 1;
     texsyn_model_free(learn(&d));
 
-    /* ragged: no two neighbours, then no two pixels within 2, then lone columns */
+    /* irregular: no two neighbours, then no two pixels within 2, then lone columns */
     for (int kind = 0; kind < 3; kind++) {
         for (int i = 0; i < 32 * 32; i++) {
             const int x = i % 32, y = i / 32;
@@ -136,13 +136,13 @@ static void test_learn_masks(void **state) {
                     assert_int_equal((clique.dx + clique.dy) % 2, 0);
             }
             const texsyn_synth_desc s = synth_desc(model, 24, 24);
-            synthesize(&s, view(out, 24, 24, 1));
+            synthesize(&s, view_bytes(out, 24, 24, 1));
             texsyn_model_free(model);
         }
     }
 }
 
-/* What lies outside the mask has no say; what is learned looks like the inside. */
+/* What lies outside the mask does not matter; what is learned looks like the inside. */
 static void test_learn_half(void **state) {
     (void)state;
     enum { W = 128, H = 64 };
@@ -159,12 +159,12 @@ static void test_learn_half(void **state) {
             histogram[pixels[y * W + x]] += 1 / (W / 2.0 * H);
         }
     }
-    texsyn_learn_desc d = learn_desc(view(pixels, W, H, 1), 6);
-    d.mask = view(mask, W, H, 1);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, W, H, 1), 6);
+    d.mask = view_bytes(mask, W, H, 1);
     for (d.levels = 1; d.levels <= 2; d.levels++) {
         texsyn_model *model = learn(&d);
         const texsyn_synth_desc s = synth_desc(model, 96, 96);
-        synthesize(&s, view(out, 96, 96, 1));
+        synthesize(&s, view_bytes(out, 96, 96, 1));
         mean_out = 0;
         memset(histogram_out, 0, sizeof histogram_out);
         for (int i = 0; i < 96 * 96; i++) {
@@ -200,13 +200,13 @@ static void test_learn_kinds(void **state) {
             words[i] = (uint16_t)(257 * pixels[i]);
             floats[i] = (float)pixels[i] / 255.0f;
         }
-        texsyn_learn_desc d = learn_desc(view(pixels, 40, 32, channels), 4);
+        texsyn_learn_desc d = learn_desc(view_bytes(pixels, 40, 32, channels), 4);
         texsyn_model *model = learn(&d);
         assert_int_equal(texsyn_channels(model), channels);
         assert_int_equal(texsyn_level_count(model), 1);
         assert_between(texsyn_band_count(model), channels > 1 ? 2 : 1, channels);
         const texsyn_synth_desc s = synth_desc(model, 50, 40);
-        synthesize(&s, view(out, 50, 40, channels));
+        synthesize(&s, view_bytes(out, 50, 40, channels));
 
         /* means of the channels */
         for (int c = 0; c < channels; c++) {
@@ -218,7 +218,8 @@ static void test_learn_kinds(void **state) {
 
         /* the same samples as floats or with 16 bits: the same model */
         for (int i = 0; i < 2; i++) {
-            d.example = i ? view_words(words, 40, 32, channels) : view_float(floats, 40, 32, channels);
+            d.example =
+                i ? view_words(words, 40, 32, channels) : view_float(floats, 40, 32, channels);
             texsyn_model *other = learn(&d);
             assert_same_saved(model, other);
             texsyn_model_free(other);
@@ -242,10 +243,10 @@ static void test_learn_flat(void **state) {
         for (int channels = 1; channels <= 4; channels++) {
             if (channels == 2) continue;
             for (int i = 0; i < 24 * 20 * channels; i++) pixels[i] = colours[k][i % channels];
-            const texsyn_learn_desc d = learn_desc(view(pixels, 24, 20, channels), 2);
+            const texsyn_learn_desc d = learn_desc(view_bytes(pixels, 24, 20, channels), 2);
             texsyn_model *model = learn(&d);
             const texsyn_synth_desc s = synth_desc(model, 33, 17);
-            synthesize(&s, view(out, 33, 17, channels));
+            synthesize(&s, view_bytes(out, 33, 17, channels));
             for (int i = 0; i < 33 * 17 * channels; i++)
                 assert_int_equal(out[i], colours[k][i % channels]);
             texsyn_model_free(model);
@@ -257,13 +258,13 @@ static void test_learn_two_values(void **state) {
     (void)state;
     static uint8_t pixels[64 * 64], out[100 * 80];
     draw_patches(pixels, 64, 64, 1, 2, 255, 4);
-    const texsyn_learn_desc d = learn_desc(view(pixels, 64, 64, 1), 6);
+    const texsyn_learn_desc d = learn_desc(view_bytes(pixels, 64, 64, 1), 6);
     texsyn_model *model = learn(&d);
     for (int tileable = 0; tileable < 2; tileable++) {
         texsyn_synth_desc s = synth_desc(model, 100, 80);
         double white = 0;
         s.tileable = tileable;
-        synthesize(&s, view(out, 100, 80, 1));
+        synthesize(&s, view_bytes(out, 100, 80, 1));
         for (int i = 0; i < 100 * 80; i++) {
             if (out[i] != 0 && out[i] != 255) fail_msg("pixel %d is %d", i, out[i]);
             white += out[i] / (255.0 * 100 * 80);
@@ -278,11 +279,11 @@ static void test_learn_constant_alpha(void **state) {
     static uint8_t pixels[32 * 32 * 4], out[40 * 40 * 4];
     draw_patches(pixels, 32, 32, 4, 8, 30, 4);
     for (int i = 0; i < 32 * 32; i++) pixels[4 * i + 3] = 200;
-    const texsyn_learn_desc d = learn_desc(view(pixels, 32, 32, 4), 2);
+    const texsyn_learn_desc d = learn_desc(view_bytes(pixels, 32, 32, 4), 2);
     texsyn_model *model = learn(&d);
     assert_between(texsyn_band_count(model), 1, 3); /* alpha needs none */
     const texsyn_synth_desc s = synth_desc(model, 40, 40);
-    synthesize(&s, view(out, 40, 40, 4));
+    synthesize(&s, view_bytes(out, 40, 40, 4));
     for (int i = 0; i < 40 * 40; i++) assert_int_equal(out[4 * i + 3], 200);
     texsyn_model_free(model);
 }
@@ -291,9 +292,9 @@ static void test_learn_strides(void **state) {
     (void)state;
     static uint8_t packed[40 * 32 * 3], padded[140 * 32], mask[40 * 32], mask_padded[50 * 32];
     draw_patches(packed, 40, 32, 3, 8, 30, 6);
-    texsyn_learn_desc d = learn_desc(view(packed, 40, 32, 3), 2);
+    texsyn_learn_desc d = learn_desc(view_bytes(packed, 40, 32, 3), 2);
     for (int i = 0; i < 40 * 32; i++) mask[i] = i % 40 < 30;
-    d.mask = view(mask, 40, 32, 1);
+    d.mask = view_bytes(mask, 40, 32, 1);
     texsyn_model *model = learn(&d);
     for (int flip = 0; flip < 2; flip++) {
         memset(padded, 99, sizeof padded);
@@ -315,9 +316,9 @@ static void test_learn_strides(void **state) {
     /* and on the way out: the bytes between the rows stay as they are */
     static uint8_t plain[21 * 10 * 3], out[80 * 10];
     const texsyn_synth_desc s = synth_desc(model, 21, 10);
-    synthesize(&s, view(plain, 21, 10, 3));
+    synthesize(&s, view_bytes(plain, 21, 10, 3));
     for (int flip = 0; flip < 2; flip++) {
-        txm_image im = view(out + (flip ? 80 * 9 : 0), 21, 10, 3);
+        txm_image im = view_bytes(out + (flip ? 80 * 9 : 0), 21, 10, 3);
         im.stride = flip ? -80 : 80;
         memset(out, FILL, sizeof out);
         synthesize(&s, im);
@@ -370,7 +371,7 @@ static void test_learn_options(void **state) {
         int distance, types, levels;
     } cases[] = {{2, 3, 1}, {4, 7, 2}, {16, 1, 3}, {5, 12, 2}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        texsyn_learn_desc d = learn_desc(view(pixels, 64, 64, 3), cases[i].types);
+        texsyn_learn_desc d = learn_desc(view_bytes(pixels, 64, 64, 3), cases[i].types);
         d.max_distance = cases[i].distance;
         d.levels = cases[i].levels;
         texsyn_model *model = learn(&d);
@@ -391,7 +392,7 @@ static void test_learn_options(void **state) {
     }
 
     /* as many levels as the example has room for; a threshold that nothing passes */
-    texsyn_learn_desc d = learn_desc(view(pixels, 32, 32, 1), 5);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, 32, 32, 1), 5);
     d.levels = 6;
     d.threshold = 2;
     texsyn_model *model = learn(&d);
@@ -406,13 +407,13 @@ static void test_learn_options(void **state) {
     /* the default number of levels leaves the short side at 64 or more */
     static uint8_t large[256 * 128];
     draw_smooth(large, 256, 128, 1);
-    d = learn_desc(view(large, 256, 128, 1), 1);
+    d = learn_desc(view_bytes(large, 256, 128, 1), 1);
     model = learn(&d);
     assert_int_equal(texsyn_level_count(model), 2);
     texsyn_model_free(model);
 
     /* the seed counts, and only the seed */
-    d = learn_desc(view(large, 64, 64, 1), 2);
+    d = learn_desc(view_bytes(large, 64, 64, 1), 2);
     d.example.stride = 256;
     texsyn_model *a = learn(&d), *b = learn(&d);
     static saved s, t;
@@ -466,7 +467,7 @@ static void test_statistics(void **state) {
     static uint8_t pixels[SIDE * SIDE], out[OUT * OUT];
     static const int displacements[][2] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}, {2, 0}, {0, 2}};
     draw_patches(pixels, SIDE, SIDE, 1, 32, 8, 12); /* quantised as it is: 32 values, 8 apart */
-    texsyn_learn_desc d = learn_desc(view(pixels, SIDE, SIDE, 1), 12);
+    texsyn_learn_desc d = learn_desc(view_bytes(pixels, SIDE, SIDE, 1), 12);
     d.levels = 1;
     texsyn_model *model = learn(&d);
 
@@ -509,7 +510,7 @@ static void test_statistics(void **state) {
 
     /* so are the synthesised image's; a shuffled one has the same pixels and fails by far */
     const texsyn_synth_desc s = synth_desc(model, OUT, OUT);
-    synthesize(&s, view(out, OUT, OUT, 1));
+    synthesize(&s, view_bytes(out, OUT, OUT, 1));
     double example[63], made[63];
     for (size_t i = 0; i < sizeof displacements / sizeof *displacements; i++) {
         const int *v = displacements[i];
