@@ -1234,11 +1234,13 @@ static txm_status txp_check_mask(const txm_image *im, const char *name, int widt
     return TXM_OK;
 }
 
-/* The fields about exemplars and how they are treated. */
+/* The fields about exemplars and how they are treated; u and s are set. */
 static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
                                       txm_env *env) {
     txm_status status = TXM_OK;
     int bytes = 0, rows = 0;
+    memset(u, 0, sizeof *u);
+    memset(s, 0, sizeof *s);
     if (!d->exemplars || d->exemplar_count < 1 || d->exemplar_count > TEXPATCH_MAX_EXEMPLARS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "exemplar_count must be 1 to 8, exemplars not NULL");
     if (d->map_count < 1 || d->map_count > TEXPATCH_MAX_MAPS)
@@ -2957,8 +2959,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
-    memset(&setup, 0, sizeof setup);
-    memset(&source, 0, sizeof source);
     txm_status status = txp_check_exemplars(desc, &setup, &source, env);
     if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
     if (status != TXM_OK) return status;
@@ -3773,8 +3773,6 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
-    memset(&setup, 0, sizeof setup);
-    memset(&source, 0, sizeof source);
     texpatch_desc plain = *desc;
     texpatch_exemplar exemplars[TEXPATCH_MAX_EXEMPLARS];
     if (desc->exemplars && desc->exemplar_count > 0 &&

@@ -85,8 +85,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
-    memset(&setup, 0, sizeof setup);
-    memset(&source, 0, sizeof source);
     txm_status status = txp_check_exemplars(desc, &setup, &source, env);
     if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
     if (status != TXM_OK) return status;

@@ -43,11 +43,13 @@ static txm_status txp_check_mask(const txm_image *im, const char *name, int widt
     return TXM_OK;
 }
 
-/* The fields about exemplars and how they are treated. */
+/* The fields about exemplars and how they are treated; u and s are set. */
 static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
                                       txm_env *env) {
     txm_status status = TXM_OK;
     int bytes = 0, rows = 0;
+    memset(u, 0, sizeof *u);
+    memset(s, 0, sizeof *s);
     if (!d->exemplars || d->exemplar_count < 1 || d->exemplar_count > TEXPATCH_MAX_EXEMPLARS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "exemplar_count must be 1 to 8, exemplars not NULL");
     if (d->map_count < 1 || d->map_count > TEXPATCH_MAX_MAPS)

@@ -237,8 +237,6 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
-    memset(&setup, 0, sizeof setup);
-    memset(&source, 0, sizeof source);
     texpatch_desc plain = *desc;
     texpatch_exemplar exemplars[TEXPATCH_MAX_EXEMPLARS];
     if (desc->exemplars && desc->exemplar_count > 0 &&
