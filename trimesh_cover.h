@@ -397,7 +397,9 @@ enum {
 #define TMC_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
 #define TMC_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
 
-static txm_status tmc_no_memory(txm_env *env) {
+/* Have all requests to the arena been met? Functions ask for all they need, then look once. */
+static txm_status tmc_check_memory(const txm_arena *arena, txm_env *env) {
+    if (!arena->failed) return TXM_OK;
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the work on the mesh");
 }
 
@@ -476,9 +478,7 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
     if (tmc_report(env, 0, "normals") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     double *sum = (double *)txm_arena_zero(&arena, mesh->vertex_count, 3 * sizeof(double));
-    if (!sum) {
-        status = tmc_no_memory(env);
-    } else {
+    if ((status = tmc_check_memory(&arena, env)) == TXM_OK) {
         tmc_sum_normals(mesh, sum);
         for (size_t v = 0; v < mesh->vertex_count; v++) {
             const txm_dvec3 n = txm_d3_unit(txm_d3(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
@@ -493,23 +493,24 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
 
 /* ---- which sides share an edge -------------------------------------------------------------- */
 
-/* The sides of a mesh in the order of their edges. NULL without memory; they lie in the arena, and as
-   much scratch. */
-static uint32_t *tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
-    uint32_t *sorted =
-        (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
-    if (sorted) txm_mesh_sort_sides(mesh, sorted);
-    return sorted;
+/* The sides of a mesh in the order of their edges; they lie in the arena, and as much scratch. */
+static txm_status tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena, txm_env *env,
+                                 uint32_t **sorted) {
+    *sorted = (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
+    const txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) txm_mesh_sort_sides(mesh, *sorted);
+    return status;
 }
 
-/* The ring of the sides of each edge, as txm_mesh_link has it. 0 without memory. */
-static int tmc_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
+/* The ring of the sides of each edge, as txm_mesh_link has it. */
+static txm_status tmc_link(const txm_mesh *mesh, txm_env *env, uint32_t *next) {
     txm_arena scratch;
+    uint32_t *sorted;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
-    if (sorted) txm_mesh_link(mesh, sorted, 0, next);
+    const txm_status status = tmc_sort_sides(mesh, &scratch, env, &sorted);
+    if (status == TXM_OK) txm_mesh_link(mesh, sorted, 0, next);
     txm_arena_free(&scratch);
-    return sorted != NULL;
+    return status;
 }
 
 /* ---- attributes ------------------------------------------------------------------------------ */
@@ -678,15 +679,15 @@ static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) 
     p->next = (uint32_t *)txm_arena_alloc(arena, sides, sizeof(uint32_t));
     p->seam = (uint8_t *)txm_arena_alloc(arena, sides, 1);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
-    txm_status status = TXM_OK;
-    if (!p->welded || !p->vertex || !p->next || !p->seam || !pairs) status = tmc_no_memory(env);
+    txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
     if (status == TXM_OK) tmc_weld(&p->input, pairs, p->welded);
     txm_arena_free(&scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->vertex[i] = p->welded[p->input.indices[i]];
     txm_mesh whole = p->input;
     whole.indices = p->vertex;
-    if (!tmc_link(&whole, p->next, env)) return tmc_no_memory(env);
+    if ((status = tmc_link(&whole, env, p->next)) != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->seam[i] = tmc_seam(p, i);
     return TXM_OK;
 }
@@ -898,10 +899,7 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
     txm_arena_init(&arena, env);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&arena, n, 2 * sizeof(txm_pair));
     size_t made = 0;
-    if (n && !pairs) {
-        status = tmc_no_memory(env);
-        goto done;
-    }
+    if ((status = tmc_check_memory(&arena, env)) != TXM_OK) goto done;
     tmc_sort_corners(mesh, values, width, pairs);
     /* Equal corners now follow each other, but for the rare ones whose hashes are equal by chance: a
        new vertex more then, which does no harm. */
@@ -1039,11 +1037,9 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     uint32_t *order = (uint32_t *)txm_arena_alloc(&arena, count, sizeof(uint32_t));
     int *choice = (int *)txm_arena_alloc(&arena, count, sizeof(int));
     uint8_t *seen = (uint8_t *)txm_arena_zero(&arena, count, 1);
-    if (!next || !order || !choice || !seen || !tmc_link(mesh, next, env)) {
-        status = tmc_no_memory(env);
-    } else {
-        status = tmc_report(env, 0.5, "patches");
-    }
+    status = tmc_check_memory(&arena, env);
+    if (status == TXM_OK) status = tmc_link(mesh, env, next);
+    if (status == TXM_OK) status = tmc_report(env, 0.5, "patches");
     if (status == TXM_OK) {
         tmc_spread_order(next, count, seen, order);
         tmc_choose(next, order, count, n, n * turns, desc->seed, choice);
@@ -1121,16 +1117,18 @@ typedef struct tmc_graph {
     uint32_t *bucket; /* where the vertices of each degree begin                          */
 } tmc_graph;
 
-static int tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
-                           const txm_env *env) {
+static txm_status tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
+                                  txm_env *env) {
     const size_t n = mesh->vertex_count, sides = 3 * mesh->face_count;
     txm_arena scratch;
+    uint32_t *sorted;
     txm_arena_init(&scratch, env);
     g->count = n;
     g->first = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
     g->ends = (uint32_t *)txm_arena_alloc(arena, sides, 2 * sizeof(uint32_t));
-    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
-    const int good = g->first && g->ends && sorted;
+    txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) status = tmc_sort_sides(mesh, &scratch, env, &sorted);
+    const int good = status == TXM_OK;
     for (int pass = 0; pass < 2 && good; pass++) {
         for (size_t i = 0; i < sides; i = txm_mesh_edge_end(mesh, sorted, i)) {
             const uint32_t low = txm_mesh_low(mesh, sorted[i]), high = txm_mesh_high(mesh, sorted[i]);
@@ -1146,18 +1144,19 @@ static int tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
         for (size_t v = 2; !pass && v < n + 2; v++) g->first[v] += g->first[v - 1];
     }
     txm_arena_free(&scratch);
-    return good;
+    return status;
 }
 
 /* Take away the vertex with the fewest neighbours left, over and over; order receives them. Vertices
    lie sorted by degree; one that loses a neighbour changes places with the first of its degree. */
-static int tmc_smallest_first(tmc_graph *g, txm_arena *arena) {
+static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *env) {
     const size_t n = g->count;
     g->degree = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->order = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->place = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->bucket = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
-    if (!g->degree || !g->order || !g->place || !g->bucket) return 0;
+    const txm_status status = tmc_check_memory(arena, env);
+    if (status != TXM_OK) return status;
     for (size_t v = 0; v < n; v++) {
         g->degree[v] = g->first[v + 1] - g->first[v];
         g->bucket[g->degree[v] + 1]++;
@@ -1182,7 +1181,7 @@ static int tmc_smallest_first(tmc_graph *g, txm_arena *arena) {
             g->degree[u] = d - 1;
         }
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Color in the opposite order; taken[c] = v + 1: a neighbour of v has colour c. */
@@ -1218,9 +1217,10 @@ TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env
     if (tmc_report(env, 0, "edges") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     uint32_t *taken = (uint32_t *)txm_arena_zero(&arena, n + 1, sizeof(uint32_t));
-    if (!taken || !tmc_graph_build(&g, mesh, &arena, env) || !tmc_smallest_first(&g, &arena))
-        status = tmc_no_memory(env);
-    else status = tmc_report(env, 0.7, "colors");
+    status = tmc_check_memory(&arena, env);
+    if (status == TXM_OK) status = tmc_graph_build(&g, mesh, &arena, env);
+    if (status == TXM_OK) status = tmc_smallest_first(&g, &arena, env);
+    if (status == TXM_OK) status = tmc_report(env, 0.7, "colors");
     if (status == TXM_OK) {
         const int most = tmc_color_back(&g, taken, colors);
         if (count) *count = most;
@@ -1328,7 +1328,8 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
     tmc_item *items = (tmc_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
     uint32_t *rim = (uint32_t *)txm_arena_alloc(arena, total + 1, sizeof *rim);
     tmc_kit *kits = (tmc_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
-    if (!items || !rim || !kits) return tmc_no_memory(env);
+    const txm_status status = tmc_check_memory(arena, env);
+    if (status != TXM_OK) return status;
     s->kits = kits;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         tmc_kit *kit = &kits[p];
@@ -1350,14 +1351,15 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
 }
 
 /* Give every side and every corner to the first triangle that has it. */
-static int tmc_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
+static txm_status tmc_own(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
     const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
+    uint32_t *sorted;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     uint8_t *given = (uint8_t *)txm_arena_zero(&scratch, mesh->vertex_count, 1);
-    const int good = sorted && given;
+    const txm_status status = tmc_sort_sides(mesh, &scratch, env, &sorted);
+    const int good = status == TXM_OK;
     for (size_t i = 0; i < sides && good; i = txm_mesh_edge_end(mesh, sorted, i))
         owned[sorted[i] / 3] |= (uint8_t)(1 << sorted[i] % 3);
     for (size_t i = 0; i < sides && good; i++) {
@@ -1365,7 +1367,7 @@ static int tmc_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
         given[vertex[i]] = 1;
     }
     txm_arena_free(&scratch);
-    return good;
+    return status;
 }
 
 /* The patch of a triangle and how it is turned. */
@@ -1670,7 +1672,8 @@ static txm_status tmc_plan_density(tmc_scatter *s, txm_arena *arena, txm_env *en
     s->take = (uint32_t *)txm_arena_alloc(arena, triangles, sizeof(uint32_t));
     s->area = (double *)txm_arena_alloc(&scratch, triangles, sizeof(double));
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, triangles, 2 * sizeof(txm_pair));
-    txm_status status = s->take && s->area && pairs ? TXM_OK : tmc_no_memory(env);
+    txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
     if (status == TXM_OK) status = tmc_spread(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
     if (status == TXM_OK) {
         tmc_morton(&s->desc->mesh, pairs);
@@ -1695,24 +1698,28 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
         memset(&quiet, 0, sizeof quiet);
         if (env) quiet = *env;
         quiet.progress = NULL; /* its bar is not the call's */
-        if (!n || trimesh_normals(&d->mesh, &quiet, n) != TXM_OK) return tmc_no_memory(env);
+        if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
+        if ((status = trimesh_normals(&d->mesh, &quiet, n)) != TXM_OK)
+            return txm_fail(env, status, quiet.message);
         s->normals = n;
     }
     if (d->mix) {
         double *mix = (double *)txm_arena_alloc(arena, (size_t)d->mix_count, sizeof(double));
-        if (!mix) return tmc_no_memory(env);
+        if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
         for (int i = 0; i < d->mix_count; i++) mix[i] = d->mix[i] + (i ? mix[i - 1] : 0);
         s->mix = mix;
     }
     if (rims) {
         uint8_t *owned = (uint8_t *)txm_arena_zero(arena, triangles, 1);
-        if (!owned || !tmc_own(&d->mesh, env, owned)) return tmc_no_memory(env);
+        if ((status = tmc_check_memory(arena, env)) == TXM_OK)
+            status = tmc_own(&d->mesh, env, owned);
+        if (status != TXM_OK) return status;
         s->owned = owned;
     }
     if (d->density > 0) status = tmc_plan_density(s, arena, env);
     if (status != TXM_OK) return status;
     s->offset = (size_t *)txm_arena_alloc(arena, triangles, sizeof(size_t));
-    if (!s->offset) return tmc_no_memory(env);
+    if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
     status = tmc_spread(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
     uint64_t sum = 0;
     for (size_t t = 0; t < triangles && status == TXM_OK; t++) {
@@ -1820,6 +1827,7 @@ static void tmc_order(trimesh_point *points, size_t count, double *gap) {
 }
 
 TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env) {
+    txm_arena arena;
     if (count > 16384) return txm_fail(env, TXM_TOO_LARGE, "more than 16384 points to order");
     if (count == 0) return TXM_OK;
     if (!points) return txm_fail(env, TXM_BAD_ARGUMENT, "points is NULL");
@@ -1828,11 +1836,12 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
         if (status != TXM_OK) return status;
     }
     if (tmc_report(env, 0, "order") != TXM_OK) return TXM_CANCELLED;
-    double *gap = (double *)txm_alloc(env, count * sizeof(double));
-    if (!gap) return tmc_no_memory(env);
-    tmc_order(points, count, gap);
-    txm_free(env, gap);
-    return TXM_OK;
+    txm_arena_init(&arena, env);
+    double *gap = (double *)txm_arena_alloc(&arena, count, sizeof(double));
+    const txm_status status = tmc_check_memory(&arena, env);
+    if (status == TXM_OK) tmc_order(points, count, gap);
+    txm_arena_free(&arena);
+    return status;
 }
 
 /* Repulsion inside a triangle: `fixed` points on its sides, the others move. */
@@ -1967,8 +1976,7 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
     s.next = (int *)txm_arena_alloc(&arena, *count, 4 * sizeof(int));
     s.head = (int *)txm_arena_alloc(&arena, (size_t)s.cells * (size_t)s.cells, sizeof(int));
     double *gap = (double *)txm_arena_alloc(&arena, *count, sizeof(double));
-    txm_status status = TXM_OK;
-    if (!s.at || !s.to || !s.next || !s.head || !gap) status = tmc_no_memory(env);
+    txm_status status = tmc_check_memory(&arena, env);
     if (status == TXM_OK) {
         tmc_swarm_start(&s, steps, desc->hexagonal, desc->seed);
         status = tmc_swarm_run(&s, desc->hexagonal ? 0 : rounds, env);

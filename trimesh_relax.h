@@ -62,9 +62,10 @@
               takes 60 bytes per vertex. After an error nothing stays allocated, *out is NULL.
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
-   SAME BYTES The same result for any number of threads. Sums are taken in double in a fixed order
-              and no libm function but sqrt takes part in decisions, except that normals are
-              weighted by angles (atan2).
+   SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
+              Of libm's functions that differ between C libraries two take part in decisions: cos
+              for the limits of angles (creases, corners of lines), and atan2 for the angles that
+              weight normals, order sheets around an edge and find tips.
 
    LIMITS
      Uniform triangles cannot show what is finer than they are: ears thinner than an edge are
@@ -317,7 +318,7 @@ static int32_t tmr_prev(int32_t c) {
 
 /* ---- the input, mended ------------------------------------------------------------------- */
 
-enum { TMR_PLAIN = 0, TMR_CREASE = 1, TMR_BORDER = 2 }; /* kinds of edges */
+enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
 
 /* An oriented manifold, perhaps with borders; does not change while points move on it. Scaled so
    that the bounding box has its centre at 0 and a diagonal of 1. */
@@ -339,7 +340,7 @@ typedef struct tmr_surface {
                                caller's corner (k + turn) % 3, or (turn - k + 3) % 3 with turn
                                - 4 for turn >= 4 (winding reversed)                             */
     float *scale;           /* 1 per vertex: wanted edge length, relative; NULL = uniform       */
-    uint8_t *edge_kind;     /* 1 per corner: TMR_PLAIN, ...; found later (see features)         */
+    uint8_t *edge_kind;     /* 1 per corner: kind of the opposite edge; creases are found later */
     txm_dvec3 centre;       /* in the caller's units; caller's = point * diagonal + centre      */
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */
@@ -1246,7 +1247,7 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     memset(s->edge_kind, 0, 3 * f);
     tmr_number_fans(m, s, s->edge_kind);
     for (size_t c = 0; c < 3 * f; c++)
-        s->edge_kind[c] = (uint8_t)(s->opposite[c] < 0 ? TMR_BORDER : TMR_PLAIN);
+        s->edge_kind[c] = (uint8_t)(s->opposite[c] < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE);
     for (size_t i = 0; i < f; i++) m->report.turned += (s->turn[i] & 4) != 0;
     m->report.vertices = v;
     m->report.triangles = f;
@@ -1463,8 +1464,6 @@ typedef struct tmr_lines {
     uint8_t *kind;    /* 1 per vertex of the surface: trimesh_kind                              */
     int32_t *segment; /* 1 per vertex of the surface: on a line one of its segments             */
 } tmr_lines;
-
-enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
 
 /* the edge opposite to corner c, seen from its vertex v: the other end */
 static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
@@ -1910,7 +1909,7 @@ enum { TMR_VALENCE = 60 }; /* no operation makes a vertex of more neighbours    
 
                         ghost
                        /  |  \          ghost triangles, which stay out of all geometry
-                 -----a---b---c-----    the border, edges of kind TMR_BORDER                    */
+                 -----a---b---c-----    the border, each with the number of its line            */
 typedef struct tmr_mesh {
     int32_t vertex_count, face_count; /* slots in use, dead ones too                            */
     int32_t vertex_limit, face_limit; /* slots there are                                        */
@@ -5104,40 +5103,64 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
 
 #define TMR_CREASE_ANGLE 50 /* ours: degrees, see docs/choices.md#creases */
 
+/* All numbers here are ours, see docs/choices.md#tuning. Lengths are in wanted edge lengths. */
 enum {
-    TMR_CUT_FROM = 20000 /* ours: from so many vertices on at a quarter of them, then cut in four */
+    TMR_CUT_FROM = 20000,   /* from so many vertices on at a quarter of them, then cut in four    */
+    TMR_SPACING_ROUNDS = 3, /* of relaxation before the lattice spacing is set                   */
+    TMR_CLEAN_ROUNDS = 4,   /* of splits and collapses after the lattice                          */
+    TMR_FOLD_ROUNDS = 8     /* of opening folds, at most                                          */
 };
+#define TMR_LATTICE_SPACING 0.982 /* lattice spacing over edge length: see tmr_set_spacing       */
+#define TMR_LONG 1.5              /* cleaning splits edges longer than this,                     */
+#define TMR_LONG_ON_LINES 1.6     /* on creases and borders                                      */
+#define TMR_SHORT 0.55            /* and collapses those shorter than this,                      */
+#define TMR_SHORT_ON_LINES 0.5    /* on creases and borders,                                     */
+#define TMR_LONGEST 1.5           /* if no edge around gets longer than this                     */
+#define TMR_FAIR_FLIP 0.4         /* flips for the valences leave triangles of this quality,     */
+#define TMR_FAIR_FLIP_CLEAN 0.3   /* while cleaning of this, or better ones than before          */
+#define TMR_FOLD_STEP 0.06        /* how far the edge of a fold moves in a round                 */
+
+/* How much tmr_improve does. */
+typedef struct tmr_effort {
+    int rounds, relaxations; /* in each round */
+    double pull, step;       /* as in tmr_work */
+} tmr_effort;
+static const tmr_effort tmr_after_lattice = {6, 3, 1.5, 0.8};
+static const tmr_effort tmr_after_repulsion = {10, 2, 0.8, 1}; /* which is less regular          */
+static const tmr_effort tmr_after_cut = {2, 2, 1, 1};
+static const tmr_effort tmr_polish_density = {1, 2, 1.5, 0.8};
+static const tmr_effort tmr_polish_angles = {2, 2, 1.2, 1};
 
 /* Rounds of relaxation and flips. A strong pull brings the density into balance, a weak one the
    angles. */
-static txm_status tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, double step) {
-    w->pull = pull;
-    w->step = step;
-    for (int round = 0; round < rounds; round++) {
+static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
+    w->pull = effort->pull;
+    w->step = effort->step;
+    for (int round = 0; round < effort->rounds; round++) {
         /* the fraction stays at the highest so far: tmr_job_report */
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
-        for (int k = 0; k < relaxations; k++) tmr_relax(w);
+        for (int k = 0; k < effort->relaxations; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
-        tmr_flip_valences(w, 3, 0.4);
+        tmr_flip_valences(w, 3, TMR_FAIR_FLIP);
     }
     return TXM_OK;
 }
 
 /* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
-   many equilateral triangles on the area there is, somewhat less (ours, measured), since taking
-   vertices away mends the pattern later, and putting more in harms it. */
+   many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has a
+   few vertices too many: taking vertices away mends the pattern, adding some harms it. */
 static void tmr_set_spacing(tmr_work *w, int32_t target) {
     const double faces = w->m.live_faces;
     w->pull = 0.5;
     w->step = 1;
     w->length = tmr_ideal_length(w);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < TMR_SPACING_ROUNDS; k++) {
         tmr_relax(w);
         tmr_flip_delaunay(w, 2);
     }
-    w->length =
-        0.982 * tmr_ideal_length(w) * sqrt(faces / (faces + 2.0 * (target - w->m.live)));
+    w->length = TMR_LATTICE_SPACING * tmr_ideal_length(w) *
+                sqrt(faces / (faces + 2.0 * (target - w->m.live)));
 }
 
 /* Directions, lattice points, and the mesh collapsed onto them. */
@@ -5163,15 +5186,15 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
         tmr_set_spacing(w, target);
         status = tmr_solve_lattice(w, seed, &arena);
     }
-    for (int round = 0; round < 4 && status == TXM_OK; round++) { /* what the lattice left undone */
+    for (int round = 0; round < TMR_CLEAN_ROUNDS && status == TXM_OK; round++) {
         tmr_flip_delaunay(w, 4);
-        tmr_flip_valences(w, 4, 0.3);
+        tmr_flip_valences(w, 4, TMR_FAIR_FLIP_CLEAN);
         for (int k = 0; k < 3; k++) tmr_relax(w);
-        tmr_split_long(w, 1.5, 1.6);
-        tmr_collapse_short(w, 0.55, 0.5, 1.5, 1);
+        tmr_split_long(w, TMR_LONG, TMR_LONG_ON_LINES);
+        tmr_collapse_short(w, TMR_SHORT, TMR_SHORT_ON_LINES, TMR_LONGEST, 1);
     }
     if (status == TXM_OK) status = tmr_fix_count(w, target, 2, &arena, &missing);
-    if (status == TXM_OK) status = tmr_improve(w, 6, 3, 1.5, 0.8);
+    if (status == TXM_OK) status = tmr_improve(w, &tmr_after_lattice);
     txm_arena_free(&arena);
     return status;
 }
@@ -5180,16 +5203,16 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
     txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
-    if (status == TXM_OK) status = tmr_improve(w, 1, 2, 1.5, 0.8);
-    if (status == TXM_OK) status = tmr_improve(w, 2, 2, 1.2, 1);
+    if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_density);
+    if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_angles);
     if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
     if (w->m.live != target)
         return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
                                 (uint64_t)w->m.live, (uint64_t)target);
     if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
-    for (int round = 0; round < 8; round++)
-        if (tmr_open_folds(w, 0.06) == 0) break;
+    for (int round = 0; round < TMR_FOLD_ROUNDS; round++)
+        if (tmr_open_folds(w, TMR_FOLD_STEP) == 0) break;
     return TXM_OK;
 }
 
@@ -5414,8 +5437,7 @@ static txm_status tmr_job_repel(trimesh_job *job) {
     job->round++;
     if (job->round < job->rounds && job->mean >= TMR_CALM) return TXM_OK;
     job->stage = TMR_STAGE_FINISH;
-    return tmr_improve(&job->w, 10, 2, 0.8,
-                       1); /* more than the lattice, which is regular already */
+    return tmr_improve(&job->w, &tmr_after_repulsion);
 }
 
 static txm_status tmr_job_lattice(trimesh_job *job) {
@@ -5448,7 +5470,7 @@ static txm_status tmr_job_subdivide(trimesh_job *job) {
         txm_arena_free(&job->scratch);
         job->first = job->second;
         txm_arena_init(&job->second, &job->env);
-        if (left) status = tmr_improve(w, 2, 2, 1, 1);
+        if (left) status = tmr_improve(w, &tmr_after_cut);
         if (status != TXM_OK) return status;
         if (left <= 1) break;
     }
@@ -6442,9 +6464,10 @@ static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update
         return txm_fail(env, TXM_BAD_ARGUMENT, "radius must be 1 to 1000, or 0");
     if (!(desc->tolerance >= 0 && desc->tolerance <= 0.5f))
         return txm_fail(env, TXM_BAD_ARGUMENT, "tolerance must be 0 to 0.5");
-    if (old->vertex_count < 3 || old->triangle_count < 1 || !(old->edge_length > 0) ||
-        old->vertex_count > TMR_MOST || old->triangle_count > TMR_MOST || !old->positions ||
-        !old->normals || !old->indices || !old->kinds)
+    const txm_mesh view = trimesh_as_view(old);
+    const txm_status status = txm_mesh_check(&view, "old", 3, 1, TMR_MOST, env);
+    if (status != TXM_OK) return status;
+    if (old->triangle_count == 0 || !(old->edge_length > 0) || !old->normals || !old->kinds)
         return txm_fail(env, TXM_BAD_ARGUMENT, "old is no result of trimesh_retile");
     return tmr_check_desc(&check, env);
 }

@@ -62,9 +62,10 @@
               takes 60 bytes per vertex. After an error nothing stays allocated, *out is NULL.
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
-   SAME BYTES The same result for any number of threads. Sums are taken in double in a fixed order
-              and no libm function but sqrt takes part in decisions, except that normals are
-              weighted by angles (atan2).
+   SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
+              Of libm's functions that differ between C libraries two take part in decisions: cos
+              for the limits of angles (creases, corners of lines), and atan2 for the angles that
+              weight normals, order sheets around an edge and find tips.
 
    LIMITS
      Uniform triangles cannot show what is finer than they are: ears thinner than an edge are

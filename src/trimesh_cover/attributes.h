@@ -169,15 +169,15 @@ static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) 
     p->next = (uint32_t *)txm_arena_alloc(arena, sides, sizeof(uint32_t));
     p->seam = (uint8_t *)txm_arena_alloc(arena, sides, 1);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
-    txm_status status = TXM_OK;
-    if (!p->welded || !p->vertex || !p->next || !p->seam || !pairs) status = tmc_no_memory(env);
+    txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
     if (status == TXM_OK) tmc_weld(&p->input, pairs, p->welded);
     txm_arena_free(&scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->vertex[i] = p->welded[p->input.indices[i]];
     txm_mesh whole = p->input;
     whole.indices = p->vertex;
-    if (!tmc_link(&whole, p->next, env)) return tmc_no_memory(env);
+    if ((status = tmc_link(&whole, env, p->next)) != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->seam[i] = tmc_seam(p, i);
     return TXM_OK;
 }
@@ -389,10 +389,7 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
     txm_arena_init(&arena, env);
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&arena, n, 2 * sizeof(txm_pair));
     size_t made = 0;
-    if (n && !pairs) {
-        status = tmc_no_memory(env);
-        goto done;
-    }
+    if ((status = tmc_check_memory(&arena, env)) != TXM_OK) goto done;
     tmc_sort_corners(mesh, values, width, pairs);
     /* Equal corners now follow each other, but for the rare ones whose hashes are equal by chance: a
        new vertex more then, which does no harm. */

@@ -13,7 +13,9 @@ enum {
 #define TMC_SNAP 1e-6  /* of an edge: points of a patch nearer to a side lie on it             */
 #define TMC_H 0.86602540378443864676 /* height of the reference triangle, sqrt(3) / 2          */
 
-static txm_status tmc_no_memory(txm_env *env) {
+/* Have all requests to the arena been met? Functions ask for all they need, then look once. */
+static txm_status tmc_check_memory(const txm_arena *arena, txm_env *env) {
+    if (!arena->failed) return TXM_OK;
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the work on the mesh");
 }
 
@@ -92,9 +94,7 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
     if (tmc_report(env, 0, "normals") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     double *sum = (double *)txm_arena_zero(&arena, mesh->vertex_count, 3 * sizeof(double));
-    if (!sum) {
-        status = tmc_no_memory(env);
-    } else {
+    if ((status = tmc_check_memory(&arena, env)) == TXM_OK) {
         tmc_sum_normals(mesh, sum);
         for (size_t v = 0; v < mesh->vertex_count; v++) {
             const txm_dvec3 n = txm_d3_unit(txm_d3(sum[3 * v], sum[3 * v + 1], sum[3 * v + 2]));
@@ -109,23 +109,24 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
 
 /* ---- which sides share an edge -------------------------------------------------------------- */
 
-/* The sides of a mesh in the order of their edges. NULL without memory; they lie in the arena, and as
-   much scratch. */
-static uint32_t *tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena) {
-    uint32_t *sorted =
-        (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
-    if (sorted) txm_mesh_sort_sides(mesh, sorted);
-    return sorted;
+/* The sides of a mesh in the order of their edges; they lie in the arena, and as much scratch. */
+static txm_status tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena, txm_env *env,
+                                 uint32_t **sorted) {
+    *sorted = (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
+    const txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) txm_mesh_sort_sides(mesh, *sorted);
+    return status;
 }
 
-/* The ring of the sides of each edge, as txm_mesh_link has it. 0 without memory. */
-static int tmc_link(const txm_mesh *mesh, uint32_t *next, const txm_env *env) {
+/* The ring of the sides of each edge, as txm_mesh_link has it. */
+static txm_status tmc_link(const txm_mesh *mesh, txm_env *env, uint32_t *next) {
     txm_arena scratch;
+    uint32_t *sorted;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
-    if (sorted) txm_mesh_link(mesh, sorted, 0, next);
+    const txm_status status = tmc_sort_sides(mesh, &scratch, env, &sorted);
+    if (status == TXM_OK) txm_mesh_link(mesh, sorted, 0, next);
     txm_arena_free(&scratch);
-    return sorted != NULL;
+    return status;
 }
 
 #endif /* TRIMESH_COVER_CHECK_H */

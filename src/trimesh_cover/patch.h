@@ -59,6 +59,7 @@ static void tmc_order(trimesh_point *points, size_t count, double *gap) {
 }
 
 TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env) {
+    txm_arena arena;
     if (count > 16384) return txm_fail(env, TXM_TOO_LARGE, "more than 16384 points to order");
     if (count == 0) return TXM_OK;
     if (!points) return txm_fail(env, TXM_BAD_ARGUMENT, "points is NULL");
@@ -67,11 +68,12 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
         if (status != TXM_OK) return status;
     }
     if (tmc_report(env, 0, "order") != TXM_OK) return TXM_CANCELLED;
-    double *gap = (double *)txm_alloc(env, count * sizeof(double));
-    if (!gap) return tmc_no_memory(env);
-    tmc_order(points, count, gap);
-    txm_free(env, gap);
-    return TXM_OK;
+    txm_arena_init(&arena, env);
+    double *gap = (double *)txm_arena_alloc(&arena, count, sizeof(double));
+    const txm_status status = tmc_check_memory(&arena, env);
+    if (status == TXM_OK) tmc_order(points, count, gap);
+    txm_arena_free(&arena);
+    return status;
 }
 
 /* Repulsion inside a triangle: `fixed` points on its sides, the others move. */
@@ -206,8 +208,7 @@ TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *d
     s.next = (int *)txm_arena_alloc(&arena, *count, 4 * sizeof(int));
     s.head = (int *)txm_arena_alloc(&arena, (size_t)s.cells * (size_t)s.cells, sizeof(int));
     double *gap = (double *)txm_arena_alloc(&arena, *count, sizeof(double));
-    txm_status status = TXM_OK;
-    if (!s.at || !s.to || !s.next || !s.head || !gap) status = tmc_no_memory(env);
+    txm_status status = tmc_check_memory(&arena, env);
     if (status == TXM_OK) {
         tmc_swarm_start(&s, steps, desc->hexagonal, desc->seed);
         status = tmc_swarm_run(&s, desc->hexagonal ? 0 : rounds, env);

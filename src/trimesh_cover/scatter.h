@@ -102,7 +102,8 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
     tmc_item *items = (tmc_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
     uint32_t *rim = (uint32_t *)txm_arena_alloc(arena, total + 1, sizeof *rim);
     tmc_kit *kits = (tmc_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
-    if (!items || !rim || !kits) return tmc_no_memory(env);
+    const txm_status status = tmc_check_memory(arena, env);
+    if (status != TXM_OK) return status;
     s->kits = kits;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         tmc_kit *kit = &kits[p];
@@ -124,14 +125,15 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
 }
 
 /* Give every side and every corner to the first triangle that has it. */
-static int tmc_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
+static txm_status tmc_own(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
     const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
+    uint32_t *sorted;
     txm_arena_init(&scratch, env);
-    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
     uint8_t *given = (uint8_t *)txm_arena_zero(&scratch, mesh->vertex_count, 1);
-    const int good = sorted && given;
+    const txm_status status = tmc_sort_sides(mesh, &scratch, env, &sorted);
+    const int good = status == TXM_OK;
     for (size_t i = 0; i < sides && good; i = txm_mesh_edge_end(mesh, sorted, i))
         owned[sorted[i] / 3] |= (uint8_t)(1 << sorted[i] % 3);
     for (size_t i = 0; i < sides && good; i++) {
@@ -139,7 +141,7 @@ static int tmc_own(const txm_mesh *mesh, const txm_env *env, uint8_t *owned) {
         given[vertex[i]] = 1;
     }
     txm_arena_free(&scratch);
-    return good;
+    return status;
 }
 
 /* The patch of a triangle and how it is turned. */
@@ -444,7 +446,8 @@ static txm_status tmc_plan_density(tmc_scatter *s, txm_arena *arena, txm_env *en
     s->take = (uint32_t *)txm_arena_alloc(arena, triangles, sizeof(uint32_t));
     s->area = (double *)txm_arena_alloc(&scratch, triangles, sizeof(double));
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, triangles, 2 * sizeof(txm_pair));
-    txm_status status = s->take && s->area && pairs ? TXM_OK : tmc_no_memory(env);
+    txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
     if (status == TXM_OK) status = tmc_spread(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
     if (status == TXM_OK) {
         tmc_morton(&s->desc->mesh, pairs);
@@ -469,24 +472,28 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
         memset(&quiet, 0, sizeof quiet);
         if (env) quiet = *env;
         quiet.progress = NULL; /* its bar is not the call's */
-        if (!n || trimesh_normals(&d->mesh, &quiet, n) != TXM_OK) return tmc_no_memory(env);
+        if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
+        if ((status = trimesh_normals(&d->mesh, &quiet, n)) != TXM_OK)
+            return txm_fail(env, status, quiet.message);
         s->normals = n;
     }
     if (d->mix) {
         double *mix = (double *)txm_arena_alloc(arena, (size_t)d->mix_count, sizeof(double));
-        if (!mix) return tmc_no_memory(env);
+        if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
         for (int i = 0; i < d->mix_count; i++) mix[i] = d->mix[i] + (i ? mix[i - 1] : 0);
         s->mix = mix;
     }
     if (rims) {
         uint8_t *owned = (uint8_t *)txm_arena_zero(arena, triangles, 1);
-        if (!owned || !tmc_own(&d->mesh, env, owned)) return tmc_no_memory(env);
+        if ((status = tmc_check_memory(arena, env)) == TXM_OK)
+            status = tmc_own(&d->mesh, env, owned);
+        if (status != TXM_OK) return status;
         s->owned = owned;
     }
     if (d->density > 0) status = tmc_plan_density(s, arena, env);
     if (status != TXM_OK) return status;
     s->offset = (size_t *)txm_arena_alloc(arena, triangles, sizeof(size_t));
-    if (!s->offset) return tmc_no_memory(env);
+    if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
     status = tmc_spread(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
     uint64_t sum = 0;
     for (size_t t = 0; t < triangles && status == TXM_OK; t++) {

@@ -123,11 +123,9 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     uint32_t *order = (uint32_t *)txm_arena_alloc(&arena, count, sizeof(uint32_t));
     int *choice = (int *)txm_arena_alloc(&arena, count, sizeof(int));
     uint8_t *seen = (uint8_t *)txm_arena_zero(&arena, count, 1);
-    if (!next || !order || !choice || !seen || !tmc_link(mesh, next, env)) {
-        status = tmc_no_memory(env);
-    } else {
-        status = tmc_report(env, 0.5, "patches");
-    }
+    status = tmc_check_memory(&arena, env);
+    if (status == TXM_OK) status = tmc_link(mesh, env, next);
+    if (status == TXM_OK) status = tmc_report(env, 0.5, "patches");
     if (status == TXM_OK) {
         tmc_spread_order(next, count, seen, order);
         tmc_choose(next, order, count, n, n * turns, desc->seed, choice);
@@ -205,16 +203,18 @@ typedef struct tmc_graph {
     uint32_t *bucket; /* where the vertices of each degree begin                          */
 } tmc_graph;
 
-static int tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
-                           const txm_env *env) {
+static txm_status tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
+                                  txm_env *env) {
     const size_t n = mesh->vertex_count, sides = 3 * mesh->face_count;
     txm_arena scratch;
+    uint32_t *sorted;
     txm_arena_init(&scratch, env);
     g->count = n;
     g->first = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
     g->ends = (uint32_t *)txm_arena_alloc(arena, sides, 2 * sizeof(uint32_t));
-    const uint32_t *sorted = tmc_sort_sides(mesh, &scratch);
-    const int good = g->first && g->ends && sorted;
+    txm_status status = tmc_check_memory(arena, env);
+    if (status == TXM_OK) status = tmc_sort_sides(mesh, &scratch, env, &sorted);
+    const int good = status == TXM_OK;
     for (int pass = 0; pass < 2 && good; pass++) {
         for (size_t i = 0; i < sides; i = txm_mesh_edge_end(mesh, sorted, i)) {
             const uint32_t low = txm_mesh_low(mesh, sorted[i]), high = txm_mesh_high(mesh, sorted[i]);
@@ -230,18 +230,19 @@ static int tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena *arena,
         for (size_t v = 2; !pass && v < n + 2; v++) g->first[v] += g->first[v - 1];
     }
     txm_arena_free(&scratch);
-    return good;
+    return status;
 }
 
 /* Take away the vertex with the fewest neighbours left, over and over; order receives them. Vertices
    lie sorted by degree; one that loses a neighbour changes places with the first of its degree. */
-static int tmc_smallest_first(tmc_graph *g, txm_arena *arena) {
+static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *env) {
     const size_t n = g->count;
     g->degree = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->order = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->place = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     g->bucket = (uint32_t *)txm_arena_zero(arena, n + 2, sizeof(uint32_t));
-    if (!g->degree || !g->order || !g->place || !g->bucket) return 0;
+    const txm_status status = tmc_check_memory(arena, env);
+    if (status != TXM_OK) return status;
     for (size_t v = 0; v < n; v++) {
         g->degree[v] = g->first[v + 1] - g->first[v];
         g->bucket[g->degree[v] + 1]++;
@@ -266,7 +267,7 @@ static int tmc_smallest_first(tmc_graph *g, txm_arena *arena) {
             g->degree[u] = d - 1;
         }
     }
-    return 1;
+    return TXM_OK;
 }
 
 /* Color in the opposite order; taken[c] = v + 1: a neighbour of v has colour c. */
@@ -302,9 +303,10 @@ TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env
     if (tmc_report(env, 0, "edges") != TXM_OK) return TXM_CANCELLED;
     txm_arena_init(&arena, env);
     uint32_t *taken = (uint32_t *)txm_arena_zero(&arena, n + 1, sizeof(uint32_t));
-    if (!taken || !tmc_graph_build(&g, mesh, &arena, env) || !tmc_smallest_first(&g, &arena))
-        status = tmc_no_memory(env);
-    else status = tmc_report(env, 0.7, "colors");
+    status = tmc_check_memory(&arena, env);
+    if (status == TXM_OK) status = tmc_graph_build(&g, mesh, &arena, env);
+    if (status == TXM_OK) status = tmc_smallest_first(&g, &arena, env);
+    if (status == TXM_OK) status = tmc_report(env, 0.7, "colors");
     if (status == TXM_OK) {
         const int most = tmc_color_back(&g, taken, colors);
         if (count) *count = most;

@@ -146,8 +146,7 @@ static txm_status tmr_job_repel(trimesh_job *job) {
     job->round++;
     if (job->round < job->rounds && job->mean >= TMR_CALM) return TXM_OK;
     job->stage = TMR_STAGE_FINISH;
-    return tmr_improve(&job->w, 10, 2, 0.8,
-                       1); /* more than the lattice, which is regular already */
+    return tmr_improve(&job->w, &tmr_after_repulsion);
 }
 
 static txm_status tmr_job_lattice(trimesh_job *job) {
@@ -180,7 +179,7 @@ static txm_status tmr_job_subdivide(trimesh_job *job) {
         txm_arena_free(&job->scratch);
         job->first = job->second;
         txm_arena_init(&job->second, &job->env);
-        if (left) status = tmr_improve(w, 2, 2, 1, 1);
+        if (left) status = tmr_improve(w, &tmr_after_cut);
         if (status != TXM_OK) return status;
         if (left <= 1) break;
     }

@@ -22,8 +22,6 @@ typedef struct tmr_lines {
     int32_t *segment; /* 1 per vertex of the surface: on a line one of its segments             */
 } tmr_lines;
 
-enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
-
 /* the edge opposite to corner c, seen from its vertex v: the other end */
 static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
     const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];

@@ -361,7 +361,7 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     memset(s->edge_kind, 0, 3 * f);
     tmr_number_fans(m, s, s->edge_kind);
     for (size_t c = 0; c < 3 * f; c++)
-        s->edge_kind[c] = (uint8_t)(s->opposite[c] < 0 ? TMR_BORDER : TMR_PLAIN);
+        s->edge_kind[c] = (uint8_t)(s->opposite[c] < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE);
     for (size_t i = 0; i < f; i++) m->report.turned += (s->turn[i] & 4) != 0;
     m->report.vertices = v;
     m->report.triangles = f;

@@ -21,7 +21,7 @@ enum { TMR_VALENCE = 60 }; /* no operation makes a vertex of more neighbours    
 
                         ghost
                        /  |  \          ghost triangles, which stay out of all geometry
-                 -----a---b---c-----    the border, edges of kind TMR_BORDER                    */
+                 -----a---b---c-----    the border, each with the number of its line            */
 typedef struct tmr_mesh {
     int32_t vertex_count, face_count; /* slots in use, dead ones too                            */
     int32_t vertex_limit, face_limit; /* slots there are                                        */

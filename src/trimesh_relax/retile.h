@@ -10,40 +10,64 @@
 
 #define TMR_CREASE_ANGLE 50 /* ours: degrees, see docs/choices.md#creases */
 
+/* All numbers here are ours, see docs/choices.md#tuning. Lengths are in wanted edge lengths. */
 enum {
-    TMR_CUT_FROM = 20000 /* ours: from so many vertices on at a quarter of them, then cut in four */
+    TMR_CUT_FROM = 20000,   /* from so many vertices on at a quarter of them, then cut in four    */
+    TMR_SPACING_ROUNDS = 3, /* of relaxation before the lattice spacing is set                   */
+    TMR_CLEAN_ROUNDS = 4,   /* of splits and collapses after the lattice                          */
+    TMR_FOLD_ROUNDS = 8     /* of opening folds, at most                                          */
 };
+#define TMR_LATTICE_SPACING 0.982 /* lattice spacing over edge length: see tmr_set_spacing       */
+#define TMR_LONG 1.5              /* cleaning splits edges longer than this,                     */
+#define TMR_LONG_ON_LINES 1.6     /* on creases and borders                                      */
+#define TMR_SHORT 0.55            /* and collapses those shorter than this,                      */
+#define TMR_SHORT_ON_LINES 0.5    /* on creases and borders,                                     */
+#define TMR_LONGEST 1.5           /* if no edge around gets longer than this                     */
+#define TMR_FAIR_FLIP 0.4         /* flips for the valences leave triangles of this quality,     */
+#define TMR_FAIR_FLIP_CLEAN 0.3   /* while cleaning of this, or better ones than before          */
+#define TMR_FOLD_STEP 0.06        /* how far the edge of a fold moves in a round                 */
+
+/* How much tmr_improve does. */
+typedef struct tmr_effort {
+    int rounds, relaxations; /* in each round */
+    double pull, step;       /* as in tmr_work */
+} tmr_effort;
+static const tmr_effort tmr_after_lattice = {6, 3, 1.5, 0.8};
+static const tmr_effort tmr_after_repulsion = {10, 2, 0.8, 1}; /* which is less regular          */
+static const tmr_effort tmr_after_cut = {2, 2, 1, 1};
+static const tmr_effort tmr_polish_density = {1, 2, 1.5, 0.8};
+static const tmr_effort tmr_polish_angles = {2, 2, 1.2, 1};
 
 /* Rounds of relaxation and flips. A strong pull brings the density into balance, a weak one the
    angles. */
-static txm_status tmr_improve(tmr_work *w, int rounds, int relaxations, double pull, double step) {
-    w->pull = pull;
-    w->step = step;
-    for (int round = 0; round < rounds; round++) {
+static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
+    w->pull = effort->pull;
+    w->step = effort->step;
+    for (int round = 0; round < effort->rounds; round++) {
         /* the fraction stays at the highest so far: tmr_job_report */
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
-        for (int k = 0; k < relaxations; k++) tmr_relax(w);
+        for (int k = 0; k < effort->relaxations; k++) tmr_relax(w);
         tmr_flip_delaunay(w, 3);
-        tmr_flip_valences(w, 3, 0.4);
+        tmr_flip_valences(w, 3, TMR_FAIR_FLIP);
     }
     return TXM_OK;
 }
 
 /* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
-   many equilateral triangles on the area there is, somewhat less (ours, measured), since taking
-   vertices away mends the pattern later, and putting more in harms it. */
+   many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has a
+   few vertices too many: taking vertices away mends the pattern, adding some harms it. */
 static void tmr_set_spacing(tmr_work *w, int32_t target) {
     const double faces = w->m.live_faces;
     w->pull = 0.5;
     w->step = 1;
     w->length = tmr_ideal_length(w);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < TMR_SPACING_ROUNDS; k++) {
         tmr_relax(w);
         tmr_flip_delaunay(w, 2);
     }
-    w->length =
-        0.982 * tmr_ideal_length(w) * sqrt(faces / (faces + 2.0 * (target - w->m.live)));
+    w->length = TMR_LATTICE_SPACING * tmr_ideal_length(w) *
+                sqrt(faces / (faces + 2.0 * (target - w->m.live)));
 }
 
 /* Directions, lattice points, and the mesh collapsed onto them. */
@@ -69,15 +93,15 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
         tmr_set_spacing(w, target);
         status = tmr_solve_lattice(w, seed, &arena);
     }
-    for (int round = 0; round < 4 && status == TXM_OK; round++) { /* what the lattice left undone */
+    for (int round = 0; round < TMR_CLEAN_ROUNDS && status == TXM_OK; round++) {
         tmr_flip_delaunay(w, 4);
-        tmr_flip_valences(w, 4, 0.3);
+        tmr_flip_valences(w, 4, TMR_FAIR_FLIP_CLEAN);
         for (int k = 0; k < 3; k++) tmr_relax(w);
-        tmr_split_long(w, 1.5, 1.6);
-        tmr_collapse_short(w, 0.55, 0.5, 1.5, 1);
+        tmr_split_long(w, TMR_LONG, TMR_LONG_ON_LINES);
+        tmr_collapse_short(w, TMR_SHORT, TMR_SHORT_ON_LINES, TMR_LONGEST, 1);
     }
     if (status == TXM_OK) status = tmr_fix_count(w, target, 2, &arena, &missing);
-    if (status == TXM_OK) status = tmr_improve(w, 6, 3, 1.5, 0.8);
+    if (status == TXM_OK) status = tmr_improve(w, &tmr_after_lattice);
     txm_arena_free(&arena);
     return status;
 }
@@ -86,16 +110,16 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
     txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
-    if (status == TXM_OK) status = tmr_improve(w, 1, 2, 1.5, 0.8);
-    if (status == TXM_OK) status = tmr_improve(w, 2, 2, 1.2, 1);
+    if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_density);
+    if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_angles);
     if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
     if (w->m.live != target)
         return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
                                 (uint64_t)w->m.live, (uint64_t)target);
     if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
-    for (int round = 0; round < 8; round++)
-        if (tmr_open_folds(w, 0.06) == 0) break;
+    for (int round = 0; round < TMR_FOLD_ROUNDS; round++)
+        if (tmr_open_folds(w, TMR_FOLD_STEP) == 0) break;
     return TXM_OK;
 }
 

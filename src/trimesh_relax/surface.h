@@ -5,7 +5,7 @@
 
 /* ---- the input, mended ------------------------------------------------------------------- */
 
-enum { TMR_PLAIN = 0, TMR_CREASE = 1, TMR_BORDER = 2 }; /* kinds of edges */
+enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
 
 /* An oriented manifold, perhaps with borders; does not change while points move on it. Scaled so
    that the bounding box has its centre at 0 and a diagonal of 1. */
@@ -27,7 +27,7 @@ typedef struct tmr_surface {
                                caller's corner (k + turn) % 3, or (turn - k + 3) % 3 with turn
                                - 4 for turn >= 4 (winding reversed)                             */
     float *scale;           /* 1 per vertex: wanted edge length, relative; NULL = uniform       */
-    uint8_t *edge_kind;     /* 1 per corner: TMR_PLAIN, ...; found later (see features)         */
+    uint8_t *edge_kind;     /* 1 per corner: kind of the opposite edge; creases are found later */
     txm_dvec3 centre;       /* in the caller's units; caller's = point * diagonal + centre      */
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */

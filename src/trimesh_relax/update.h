@@ -710,9 +710,10 @@ static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update
         return txm_fail(env, TXM_BAD_ARGUMENT, "radius must be 1 to 1000, or 0");
     if (!(desc->tolerance >= 0 && desc->tolerance <= 0.5f))
         return txm_fail(env, TXM_BAD_ARGUMENT, "tolerance must be 0 to 0.5");
-    if (old->vertex_count < 3 || old->triangle_count < 1 || !(old->edge_length > 0) ||
-        old->vertex_count > TMR_MOST || old->triangle_count > TMR_MOST || !old->positions ||
-        !old->normals || !old->indices || !old->kinds)
+    const txm_mesh view = trimesh_as_view(old);
+    const txm_status status = txm_mesh_check(&view, "old", 3, 1, TMR_MOST, env);
+    if (status != TXM_OK) return status;
+    if (old->triangle_count == 0 || !(old->edge_length > 0) || !old->normals || !old->kinds)
         return txm_fail(env, TXM_BAD_ARGUMENT, "old is no result of trimesh_retile");
     return tmr_check_desc(&check, env);
 }

@@ -71,7 +71,7 @@ static void check_corners(const tmr_surface *s) {
         const int32_t o = s->opposite[c];
         assert_in_range(s->vertex[c], 0, s->vertex_count - 1);
         assert_int_not_equal(s->vertex[c], s->vertex[tmr_next(c)]);
-        assert_int_equal(s->edge_kind[c], o < 0 ? TMR_BORDER : TMR_PLAIN);
+        assert_int_equal(s->edge_kind[c], o < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE);
         if (o < 0) continue;
         assert_int_equal(s->opposite[o], c);
         assert_int_equal(s->vertex[tmr_next(o)], s->vertex[tmr_prev(c)]);
