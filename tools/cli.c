@@ -36,7 +36,7 @@ int cli_fail(cli *run, int status, const char *format, ...) {
     va_start(arguments, format);
     vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
-    /* a file name may hold anything; the message stays one line that no terminal acts upon */
+    /* a file name may hold control characters; the message must stay one harmless line */
     for (char *c = line; *c; c++) {
         if (iscntrl((unsigned char)*c)) *c = '?';
     }
@@ -183,7 +183,7 @@ static void make_env(cli *run) {
 
 /* ---- the files of a run ------------------------------------------------------------------- */
 
-/* An output on its way: written whole to a temporary file beside its place, then renamed. */
+/* An output: written to a temporary file in its folder, then renamed. */
 typedef struct output {
     const char *path;
     const void *bytes;
@@ -221,8 +221,8 @@ static int check_output(cli *run, const char *path) {
     if (slash) snprintf(folder, sizeof folder, "%.*s/", (int)(slash - o.place), o.place);
     if (access(folder, W_OK | X_OK) == 0) return CLI_DONE;
     return cli_fail(run, CLI_FAILED,
-                    "cannot write '%s': %s; choose a folder that exists and is yours", path,
-                    strerror(errno));
+                    "cannot write '%s': %s; choose a folder that exists and that you may write to",
+                    path, strerror(errno));
 }
 
 /* The same for a folder: is it there and writable, or can it be made? */
@@ -233,26 +233,26 @@ static int check_folder(cli *run, const char *path) {
     if (stat(path, &info) == 0) {
         if (!S_ISDIR(info.st_mode)) errno = ENOTDIR;
         else if (access(path, W_OK | X_OK) == 0) return CLI_DONE;
-        return cli_fail(run, CLI_FAILED, "cannot write into '%s': %s; name a folder of yours", path,
+        return cli_fail(run, CLI_FAILED, "cannot write into '%s': %s; name another folder", path,
                         strerror(errno));
     }
     if (n > PATH_MAX) return cli_fail(run, CLI_FAILED, "the path is too long");
     memcpy(place, path, n + 1);
-    while (n > 1 && place[n - 1] == '/') place[--n] = 0; /* "new/" would be looked for in itself */
+    while (n > 1 && place[n - 1] == '/') place[--n] = 0; /* else "new/" is in "new" */
     return check_output(run, place);
 }
 
-/* A file that has been announced. Paths lead to the same file if device, inode and name are equal. */
+/* An announced file. Paths lead to the same file if device, inode and name are equal. */
 typedef struct announced {
     char *path;
     int is_output;
-    int is_file;      /* or will be; a pipe or a folder holds nothing that writing destroys */
+    int is_file;      /* exists or will; not a pipe or folder, which writing cannot destroy  */
     dev_t device;
-    ino_t inode;      /* of the file if it is there, else of the folder that it will be in  */
-    const char *name; /* in that folder; empty if the file is there                         */
+    ino_t inode;      /* of the file if it exists, else of the folder that it will be in     */
+    const char *name; /* in that folder; empty if the file exists                            */
 } announced;
 
-/* Those of the one command that the program runs; they last as long as it does. */
+/* A program runs one command: the list lasts until it exits. */
 static announced *known;
 static size_t known_count;
 
@@ -299,10 +299,11 @@ static int announce(cli *run, const char *path, int is_output) {
     for (const announced *b = known; b < a; b++) {
         if (!(a->is_output || b->is_output) || !is_same_file(a, b)) continue;
         if (a->is_output && b->is_output)
-            return cli_fail(run, CLI_USAGE, "'%s' and '%s' are the same file, which would be written "
+            return cli_fail(run, CLI_USAGE, "'%s' and '%s' are the same file and would be written "
                             "twice; give them different names", b->path, path);
         return cli_fail(run, CLI_USAGE, "writing '%s' would destroy '%s', which is read; give the "
-                        "output another name", is_output ? path : b->path, is_output ? b->path : path);
+                        "output another name", is_output ? path : b->path,
+                        is_output ? b->path : path);
     }
     return CLI_DONE;
 }
@@ -340,7 +341,7 @@ int cli_take_name(const char **list, const char *separators, char name[CLI_MAX_P
     return 1;
 }
 
-/* The files that the value of an option names. */
+/* Announce the files that the value of an option names. */
 static int announce_option(cli *run, const cli_option *o) {
     static const char *const tiles[] = {"tiles.json", "atlas.png"}; /* what of a set is read */
     char path[CLI_MAX_PATH];
@@ -353,8 +354,10 @@ static int announce_option(cli *run, const cli_option *o) {
         if (!status) status = cli_reads(run, path);
     }
     for (const char *at = value; at && !status && o->kind != CLI_TILES;) {
-        if (cli_take_name(&at, o->kind == CLI_GROUPS ? ",;" : ",", path)) status = cli_reads(run, path);
-        else status = cli_fail(run, CLI_USAGE, "%s '%s': a name is empty or too long", o->name, value);
+        status = cli_take_name(&at, o->kind == CLI_GROUPS ? ",;" : ",", path)
+                     ? cli_reads(run, path)
+                     : cli_fail(run, CLI_USAGE, "%s '%s': a name is empty or too long", o->name,
+                                value);
     }
     return status;
 }
@@ -368,7 +371,7 @@ static int announce_options(cli *run, const cli_option *table) {
     return status;
 }
 
-/* All that the command line names. */
+/* Announce the files that the command line names. */
 static int announce_files(cli *run, const cli_option *own, const cli_option *common) {
     int status = CLI_DONE;
     for (int i = 0; i < run->manual->inputs && !status; i++) status = cli_reads(run, run->inputs[i]);
@@ -399,7 +402,8 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
     run->started = run->stage_started = now();
     const cli_option common[] = {
         {CLI_TEXT, "-o", "PATH", "where to write the result", &run->output, 0, 0},
-        {CLI_SEED, "--seed", "N", "another seed, another result; default 1", &run->seed, 0, 0},
+        {CLI_SEED, "--seed", "N", "a different seed gives a different result; default 1",
+         &run->seed, 0, 0},
         {CLI_INT, "--threads", "N", "default: all cores; the result does not depend on it",
          &run->threads, 1, MAX_THREADS},
         {CLI_OUTPUT, "--stats", "FILE", "write seconds, memory and figures of the result as JSON",
@@ -525,7 +529,7 @@ static int write_all(const char *path, const output *o, int flags) {
     return error == 0;
 }
 
-/* Write all outputs, and the statistics behind them, or none. There must be room for one more. */
+/* Write all outputs and the statistics, or none. outputs must have room for one more. */
 static int finish(cli *run, output *outputs, int count) {
     char text[4096];
     int i, written = 0, status = CLI_DONE;

@@ -1,11 +1,11 @@
-/* cli.h - what every texkit command shares: options, messages, progress, timing, output files
+/* cli.h - what every texkit command shares: options, messages, progress, timing, files
    SPDX-License-Identifier: MIT OR Unlicense
 
-   A command of texkit.c is one function. It declares the options it knows as a table, lets
-   cli_begin read the command line into variables of its own, does its work with cli.env as the
-   environment of the library, and hands the bytes of its output to cli_finish. Everything that the
-   commands must do alike - exit status, one-line messages, --stats, --threads, leaving no file
-   behind after a failure - is here and only here.                                              */
+   Each command in commands/ is one function. It declares its options as a table, lets cli_begin
+   read the command line into variables of its own, does its work with cli.env as the environment
+   of the library, and passes the bytes of its output to one of the cli_finish functions.
+   Everything that all commands must do alike - exit status, one-line messages, --stats, --threads,
+   no input written over, no file left behind after a failure - is here and only here.          */
 #ifndef CLI_H
 #define CLI_H
 
@@ -16,7 +16,7 @@
 /* "0.1.0 (texmath 0.1.0, ...)" for --version; defined by texkit.c, which includes the headers. */
 extern const char cli_versions[];
 
-/* Exit status of the program, as the manual promises. */
+/* Exit status of the program. */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
 enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8, CLI_MAX_PATH = 4096 };
@@ -40,7 +40,7 @@ typedef enum cli_kind {
 typedef struct cli_option {
     cli_kind kind;
     const char *name;  /* "--size"                                          */
-    const char *value; /* what stands for its value in the help, or NULL    */
+    const char *value; /* the name of its value in the help, or NULL        */
     const char *help;  /* one line                                          */
     void *target;      /* written only if the option is given               */
     int min, max;
@@ -51,7 +51,7 @@ typedef struct cli_manual {
     const char *name;    /* "synth"                                         */
     const char *usage;   /* "EXEMPLAR|MODEL.txs -o OUT --size WxH"          */
     const char *summary; /* one line, also in the list of commands          */
-    const char *details; /* lines of at most 78 characters, each ending \n  */
+    const char *details; /* lines of at most 100 columns, each ending in \n   */
     const char *example; /* the same                                        */
     int inputs;          /* how many input files it takes                   */
     const char *input;   /* what the first is called in messages            */
@@ -88,19 +88,19 @@ typedef struct cli {
     env_memory memory;
 } cli;
 
-/* Read the command line after the command's name. 0: go on; otherwise *status is the exit status
-   and all that there was to say has been said. */
+/* Read the arguments after the command's name and announce the files that they name. 0: continue;
+   otherwise *status is the exit status, and any message or help has been printed. */
 int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int argc, char **argv,
               int *status);
 
-/* Say in one line on stderr what failed and how to mend it; returns status. */
+/* Say in one line on stderr what failed and how to correct it; returns status. */
 int cli_fail(cli *run, int status, const char *format, ...)
 #ifdef __GNUC__
     __attribute__((format(printf, 3, 4)))
 #endif
     ;
 
-/* From here on the clock runs for this stage (a string literal). */
+/* Time from here on counts for this stage (a string literal). */
 void cli_stage(cli *run, const char *name);
 
 /* A figure of the result for --stats (name: a string literal). */
@@ -114,22 +114,22 @@ double cli_seconds(const cli *run);
 
 /* ---- the files of a run --------------------------------------------------------------------
 
-   No file that is read may be written over, and no two outputs may be one file, whatever links lead
-   to it. So every file is announced before any work. cli_begin does that for the inputs, -o, --stats
-   and options of the kinds above; a command does it for the names that it derives from them.
-   Writing takes announced outputs only.                                                         */
+   No input may be written over, and no two outputs may be the same file, through whatever links.
+   So every file is announced before any work. cli_begin does this for the inputs, -o, --stats and
+   the options of kinds CLI_INPUT to CLI_OUTPUT; a command does it for the names that it derives
+   from these. cli_finish and its like accept only outputs that were announced.                 */
 
 /* This file will be read. An exit status. */
 int cli_reads(cli *run, const char *path);
 
-/* This file will be written: is it none of the others, and can it be written? An exit status. */
+/* This file will be written; fails if it is one of the others or cannot be written. */
 int cli_writes(cli *run, const char *path);
 
-/* The same for a file of that name in the output folder, which need not be there yet. */
+/* The same for a file in the output folder, which need not exist yet. */
 int cli_writes_inside(cli *run, const char *name);
 
-/* Take the first name off a list; *list is what comes behind it, or NULL. 0: the name is empty or too
-   long. */
+/* Copy the first name of a list and move *list to the next one, or to NULL after the last. 0: the
+   name is empty or too long. */
 int cli_take_name(const char **list, const char *separators, char name[CLI_MAX_PATH]);
 
 /* Write the output and the statistics, both or neither; returns the exit status. */
@@ -137,13 +137,13 @@ int cli_finish(cli *run, const void *bytes, size_t size);
 
 /* The same for several files: all or none. */
 typedef struct cli_file {
-    const char *name; /* its path; for cli_finish_folder, within the output folder */
+    const char *name; /* its path; for cli_finish_folder, its name in the output folder */
     const void *bytes;
     size_t size;
 } cli_file;
 int cli_finish_files(cli *run, const cli_file *files, int count);
 
-/* The same for files in the output folder, which is made if it is not there. */
+/* The same for files in the output folder, which is made if it does not exist. */
 int cli_finish_folder(cli *run, const cli_file *files, int count);
 
 #endif /* CLI_H */

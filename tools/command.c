@@ -8,7 +8,7 @@
 #include <errno.h>
 #include <stdio.h>
 
-/* ---- what can fail ------------------------------------------------------------------------ */
+/* ---- failures ----------------------------------------------------------------------------- */
 
 int fail_memory(cli *run) {
     return cli_fail(run, CLI_FAILED, "out of memory; %s", run->manual->smaller);
@@ -52,7 +52,7 @@ int encode_picture(cli *run, const char *path, const txm_image *image, unsigned 
 
 /* ---- values of options -------------------------------------------------------------------- */
 
-/* What strtod takes besides numbers - blanks, 0x1p3, nan, infinity - is none. */
+/* Refuses what strtod accepts beyond decimal numbers: blanks, 0x1p3, nan, infinity. */
 static int read_number(const char *text, char **end, double low, double high, double *value) {
     if (!isdigit((unsigned char)text[text[0] == '-'])) return 0;
     *value = strtod(text, end);
@@ -75,8 +75,9 @@ int parse_numbers(cli *run, const char *option, const char *text, int most, doub
     if (most == 1)
         cli_fail(run, CLI_USAGE, "%s '%s': give a number from %g to %g", option, text, low, high);
     else
-        cli_fail(run, CLI_USAGE, "%s '%s': give at most %d numbers from %g to %g, commas between",
-                 option, text, most, low, high);
+        cli_fail(run, CLI_USAGE,
+                 "%s '%s': give at most %d numbers from %g to %g, separated by commas", option,
+                 text, most, low, high);
     return 0;
 }
 

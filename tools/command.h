@@ -1,7 +1,7 @@
-/* command.h - what the commands of texkit share with the table in texkit.c, and with each other
+/* command.h - what the commands of texkit share beyond cli.h
    SPDX-License-Identifier: MIT OR Unlicense
 
-   A command is a manual and a function; how it reads its command line is in cli.h.             */
+   A command is a manual and a function; cli.h tells how it reads its command line.             */
 #ifndef COMMAND_H
 #define COMMAND_H
 
@@ -9,7 +9,7 @@
 
 typedef struct command {
     const cli_manual *manual;
-    int (*run)(int argc, char **argv); /* the arguments behind the command's name; exit status */
+    int (*run)(int argc, char **argv); /* the arguments after the command's name; exit status */
 } command;
 
 /* commands/ */
@@ -20,11 +20,11 @@ extern const command tiles_command;                /* tiles.c  */
 extern const command retile_command;               /* retile.c */
 extern const command tree_command, forest_command; /* tree.c   */
 
-/* ---- what can fail: these say what did, and return an exit status ------------------------- */
+/* ---- failures: each prints a message and returns an exit status --------------------------- */
 
 int fail_memory(cli *run);
 
-/* A call into a library; what: the file that it was about. */
+/* The result of a library call; what: the file that it was about. Prints nothing for TXM_OK. */
 int check_result(cli *run, txm_status result, const char *what);
 
 /* ---- memory and pictures ------------------------------------------------------------------ */
@@ -32,14 +32,14 @@ int check_result(cli *run, txm_status result, const char *what);
 /* count items, all bytes 0, for free(); NULL only without memory. */
 void *new_array(size_t count, size_t size);
 
-/* A picture of zeros; image_free releases it, as those below. An exit status. */
+/* A picture of zeros; release it with image_free. An exit status. */
 int new_picture(cli *run, int width, int height, int channels, txm_sample sample, txm_image *image);
 
-/* Read a picture; channels 0 keeps what it has, TXM_U16 keeps 16 bits a sample if it has them. An
-   exit status. */
+/* Read a picture. channels: 0 keeps those of the file. most: TXM_U16 keeps 16 bits per sample if
+   the file has them. An exit status. */
 int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image);
 
-/* The picture as a file with the extension of that path, for free(). An exit status. */
+/* Encode a picture in the format of the path's extension; *bytes is for free(). An exit status. */
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size);
 
@@ -54,19 +54,20 @@ int parse_numbers(cli *run, const char *option, const char *text, int most, doub
 int parse_number(cli *run, const char *option, const char *text, double low, double high,
                  double *value);
 
-/* The index of a name in a list that ends in NULL; -1 after a message that tells the names. */
+/* The index of a name in a list that ends in NULL; -1 after a message that lists the names. */
 int find_name(cli *run, const char *option, const char *name, const char *const *names);
 
 /* ---- outputs ------------------------------------------------------------------------------ */
 
-/* Refuse, before any work, an output path that cannot hold such a picture. 0: not known yet. */
+/* Refuse, before any work, an output path whose format cannot hold such a picture. 0: size or
+   channels not known yet. */
 int check_picture_path(cli *run, const char *path, int width, int height, int channels);
 
 /* Encode the picture for the output's extension and write it. */
 int finish_with_picture(cli *run, const txm_image *image);
 
-/* The output's path with another ending than its extension, for a file that will be written beside
-   it. An exit status. */
+/* The output's path with another ending in place of its extension, announced as an output. An exit
+   status. */
 enum { MAX_PATH = CLI_MAX_PATH };
 int path_beside(cli *run, const char *ending, char path[MAX_PATH]);
 
@@ -79,7 +80,7 @@ const char *name_in(const char *path);
 struct cJSON;
 int read_tiles_json(cli *run, const char *folder, struct cJSON **json);
 
-/* A whole number low..high of that name, or the item itself if name is NULL. 0: it is none. */
+/* The whole number low..high of that name, or the item itself if name is NULL. 0: there is none. */
 int json_int(const struct cJSON *from, const char *name, int low, int high, int *value);
 
 #endif /* COMMAND_H */

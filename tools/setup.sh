@@ -20,7 +20,7 @@ has_command() { command -v "$1" >/dev/null 2>&1; }
 # a module of Debian's own python3, another python3 may come first in the path
 has_python() { has_command /usr/bin/python3 && has_file "/usr/lib/python3*/*-packages/$1"; }
 
-# need TEST NAME PACKAGE: unless the test finds the name, the Debian package is to be installed
+# need TEST NAME PACKAGE: unless the test finds the name, the Debian package is missing
 need() { "$1" "$2" || missing="$missing $3"; }
 
 need has_header stb/stb_image.h libstb-dev
@@ -30,7 +30,7 @@ case $profile in test | ci)
     need has_header cmocka.h libcmocka-dev
     need has_cxx_header OpenImageIO/imagebuf.h libopenimageio-dev
     need has_python jsonschema python3-jsonschema
-    # a screen that nobody sees, for examples/brush; jobs of examples/plane.sh
+    # a virtual screen, for examples/brush; jobs of examples/plane.sh
     need has_command xvfb-run xvfb
     need has_command xauth xauth
     need has_command parallel parallel

@@ -1,9 +1,9 @@
 /* texkit.c - the texkit headers on the command line
    SPDX-License-Identifier: MIT OR Unlicense
 
-   The table below lists the commands; each is in a file of commands/. What they share is in
-   command.c and cli.c; files/ reads and writes pictures and meshes. Begin with commands/clique.c:
-   run_learn shows all there is to embedding a header.                                          */
+   The table below lists the commands, which are in commands/. What they share is in cli.c and
+   command.c; files/ reads and writes pictures and meshes. To see how a header is embedded, start
+   with run_learn in commands/clique.c.                                                         */
 #include "command.h"
 
 #include "texedges.h"

@@ -354,16 +354,16 @@ bad_strokes '"smooth"' '{"smooth": -1, "strokes": []}'
 bad_strokes '"least"' '{"least": "x", "strokes": []}'
 bad_strokes '"background"' '{"levels": 3, "background": 3, "strokes": []}'
 bad_strokes '"disturb"' '{"disturb": 5, "strokes": []}'
-bad_strokes 'stroke 0: it is to be an object' '{"strokes": [7]}'
+bad_strokes 'stroke 0: it must be an object' '{"strokes": [7]}'
 bad_strokes 'stroke 1: "points"' '{"strokes": [{"points": [[1,2],[3,4]]}, {}]}'
 bad_strokes 'stroke 0: "points"' '{"strokes": [{"points": [[1,2]]}]}'
 bad_strokes 'stroke 0: "points"' '{"strokes": [{"points": [[1,2],[1,2]]}]}'
 bad_strokes '3 or more' '{"strokes": [{"closed": true, "points": [[1,2],[3,4]]}]}'
-bad_strokes 'point 1 is to be' '{"strokes": [{"points": [[1,2],[3]]}]}'
-bad_strokes 'point 1 is to be' '{"strokes": [{"points": [[1,2],[3,4,5]]}]}'
-bad_strokes 'point 0 is to be' '{"strokes": [{"points": [[1,"x"],[3,4]]}]}'
-bad_strokes 'point 0 is to be' '{"strokes": [{"points": [[1,1e9],[3,4]]}]}'
-bad_strokes 'point 0 is to be' '{"strokes": [{"points": {"a": 1}}]}'
+bad_strokes 'point 1 must be' '{"strokes": [{"points": [[1,2],[3]]}]}'
+bad_strokes 'point 1 must be' '{"strokes": [{"points": [[1,2],[3,4,5]]}]}'
+bad_strokes 'point 0 must be' '{"strokes": [{"points": [[1,"x"],[3,4]]}]}'
+bad_strokes 'point 0 must be' '{"strokes": [{"points": [[1,1e9],[3,4]]}]}'
+bad_strokes 'point 0 must be' '{"strokes": [{"points": {"a": 1}}]}'
 bad_strokes '"layer"' '{"strokes": [{"layer": 4, "points": [[1,2],[3,4]]}]}'
 bad_strokes '"width"' '{"strokes": [{"width": 1, "points": [[1,2],[3,4]]}]}'
 bad_strokes '"closed"' '{"strokes": [{"closed": 1, "points": [[1,2],[3,4]]}]}'
@@ -433,7 +433,7 @@ for bad in 0.5,0.5 0.5,0.4 -1 2 x 0.1,,0.2; do
 done
 refuses 2 "has 3 thresholds" cells.png -o n.png --levels 4 --thresholds 0.2,0.5
 refuses 2 "black, picture, layers" cells.png -o n.png --over white
-refuses 2 "lines alone" cells.png -o n.svg --over picture
+refuses 2 "only lines" cells.png -o n.svg --over picture
 for name in n.gif n.txs n; do refuses 2 "end the name" cells.png -o $name; done
 refuses 2 "end the name" cells.png -o n.png --layers n.svg
 refuses 2 "written twice" cells.png -o n.png --layers n.png

@@ -28,9 +28,9 @@ static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
 static const cli_manual learn_manual = {
     "learn", "EXEMPLAR -o MODEL.txs [options]", "learn a small model of a texture from a picture",
     "EXEMPLAR is a PNG, JPEG, BMP, TGA or binary PNM picture of the texture, at least\n"
-    "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is taken as RGBA). About\n"
-    "256 x 256 pixels that show the largest element some dozens of times are enough. The\n"
-    "model holds statistics, no pixels; 'texkit synth' makes new texture from it.\n",
+    "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is read as RGBA). About 256 x 256\n"
+    "pixels that show the largest element a few dozen times are enough. The model holds\n"
+    "statistics, no pixels; 'texkit synth' makes new texture from it.\n",
     "  texkit learn gravel.jpg -o gravel.txs\n"
     "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
     1, "exemplar", 0, "take a smaller exemplar"};
@@ -44,9 +44,9 @@ static int run_learn(int argc, char **argv) {
          &desc.max_distance, 2, 60},
         {CLI_INT, "--types", "N", "clique types added per level, 1 to 60; default 24, gray 36",
          &desc.max_types, 1, 60},
-        {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: by the size",
+        {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: chosen by the size",
          &desc.levels, 1, 6},
-        {CLI_INPUT, "--mask", "M", "learn only where this picture, of the same size, is not black",
+        {CLI_INPUT, "--mask", "M", "learn only where this picture of the same size is not black",
          &mask_path, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
@@ -67,7 +67,7 @@ static int run_learn(int argc, char **argv) {
     if (!status && mask_path) status = read_picture(&run, mask_path, 1, TXM_U8, &desc.mask);
     if (!status && mask_path &&
         (desc.mask.width != desc.example.width || desc.mask.height != desc.example.height))
-        status = cli_fail(&run, CLI_FAILED, "the mask '%s' is %d x %d; make it %d x %d as '%s'",
+        status = cli_fail(&run, CLI_FAILED, "the mask '%s' is %d x %d; make it %d x %d like '%s'",
                           mask_path, desc.mask.width, desc.mask.height, desc.example.width,
                           desc.example.height, run.inputs[0]);
     if (status) goto done;
@@ -101,11 +101,11 @@ done:
 static const cli_manual synth_manual = {
     "synth", "EXEMPLAR|MODEL.txs -o OUT --size WxH [options]",
     "make new texture from a model or a picture",
-    "The input is a model of 'texkit learn', or a picture to learn from first (the file's\n"
-    "content decides, not its name). OUT ends in .png, .tga, .bmp or .jpg; it has the\n"
-    "channels of the exemplar. JPEG and BMP hold gray as RGB; JPEG takes no alpha. A\n"
-    "higher --quality sweeps over the picture more often: statistics closer to the\n"
-    "exemplar's, and more time.\n",
+    "The input is a model of 'texkit learn' or a picture, from which a model is learned\n"
+    "first (the file's content decides, not its name). OUT ends in .png, .tga, .bmp or\n"
+    ".jpg; it has the channels of the exemplar. JPEG and BMP store gray as RGB; JPEG has no alpha. A\n"
+    "higher --quality makes more sweeps over the picture: its statistics get closer to the\n"
+    "exemplar's, and it takes longer.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
     1, "exemplar or model", 0, "take a smaller size"};
@@ -151,7 +151,8 @@ static int run_synth(int argc, char **argv) {
          MAX_SIDE},
         {CLI_FLAG, "--tileable", NULL, "the result continues across its own borders", &tileable, 0,
          0},
-        {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0", &quality, -2, 2},
+        {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0",
+         &quality, -2, 2},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     texsyn_model *model = NULL;

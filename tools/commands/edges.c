@@ -12,17 +12,18 @@
 static const cli_manual edges_manual = {
     "edges", "EXEMPLAR -o OUT [options]",
     "find the boundaries between the gray layers of a picture",
-    "The grays of EXEMPLAR are divided into layers of about the same area; layer 0 is the\n"
-    "darkest. Strokes of 'texkit patch --control' name these layers. OUT ends in\n"
+    "The grays of EXEMPLAR are divided into layers of about equal area; layer 0 is the\n"
+    "darkest. The strokes of 'texkit patch --control' refer to these layers. OUT ends in\n"
     ".png, .tga, .bmp or .jpg  the boundaries of every layer on its own side, one pixel wide,\n"
     "                          darker for darker layers;\n"
     ".svg   one path for each layer, filled with its gray: the layers as shapes;\n"
     ".json  {\"width\", \"height\", \"levels\", \"thresholds\": [...],\n"
     "        \"lines\": [{\"layer\": 0, \"hole\": false, \"points\": [[x,y], ...]}, ...]}\n"
-    "Lines run between pixels, closed, the layer to their right; [0,0] is the top left corner\n"
-    "of the picture. Points are where a line turns. A hole is a line that the layer lies\n"
-    "outside of. A threshold is the least gray, 0 to 1, of the layer above it.\n"
-    "Of --stats, 'length' is that of all lines in pixels; each edge counts on both sides.\n",
+    "Lines are closed and run between pixels, with their layer on the right; [0,0] is the top\n"
+    "left corner of the picture. Points are where a line turns. A hole is a line around\n"
+    "something that is not in the layer. A threshold, 0 to 1, is the lowest gray of the next\n"
+    "layer. 'length' of --stats is that of all lines in pixels; each edge counts twice, once\n"
+    "on each side.\n",
     "  texkit edges bricks.jpg -o bricks-edges.png --levels 3 --smooth 1.5 --least 40\n"
     "  texkit edges bricks.jpg -o bricks.svg --layers bricks-layers.png\n",
     1, "exemplar", 0, "take a smaller picture"};
@@ -36,7 +37,7 @@ enum { OVER_BLACK, OVER_PICTURE, OVER_LAYERS };
 
 /* ---- lines as text ----------------------------------------------------------------------- */
 
-/* Point i of a line, counted around. */
+/* Point i of a line; i may run past its end. */
 static txm_vec2 point_of(const texedges_set *e, const texedges_polyline *line, size_t i) {
     return e->points[line->first + i % line->count];
 }
@@ -45,7 +46,7 @@ static int sign_of(float x) {
     return (x > 0) - (x < 0);
 }
 
-/* Does the line turn at its point i? Its steps are along the axes. */
+/* Does the line turn at its point i? Every step is along an axis. */
 static int turns_at(const texedges_set *e, const texedges_polyline *line, size_t i) {
     const txm_vec2 p = point_of(e, line, i + line->count - 1), q = point_of(e, line, i);
     const txm_vec2 r = point_of(e, line, i + 1);
@@ -103,7 +104,7 @@ static void print_svg(FILE *to, const texedges_set *e, int layer) {
     fprintf(to, "</svg>\n");
 }
 
-/* The text for a free(); NULL if memory ran out. */
+/* The text, for free(); NULL if memory ran out. */
 static char *lines_as_text(const texedges_set *e, int layer, int is_svg, size_t *size) {
     char *text = NULL;
     FILE *to = open_memstream(&text, size);
@@ -140,7 +141,7 @@ static int is_text(const char *extension) {
     return !strcmp(extension, ".svg") || !strcmp(extension, ".json");
 }
 
-/* Refuse, before any work, what does not go together. */
+/* Refuse, before any work, options that do not go together. */
 static int check_options(cli *run, const options *o, texedges_desc *d, int *over,
                          float thresholds[TEXEDGES_MAX_LEVELS]) {
     static const char *const overs[] = {"black", "picture", "layers", NULL};
@@ -178,12 +179,12 @@ static int check_options(cli *run, const options *o, texedges_desc *d, int *over
     *over = find_name(run, "--over", o->over, overs);
     if (*over < 0) return CLI_USAGE;
     if (*over != OVER_BLACK && is_text(extension))
-        return cli_fail(run, CLI_USAGE, "--over is for pictures; '%s' holds lines alone",
+        return cli_fail(run, CLI_USAGE, "--over is for pictures; '%s' holds only lines",
                         run->output);
     return CLI_DONE;
 }
 
-/* What was found, for --stats; returns how many lines OUT has. */
+/* Figures for --stats; returns the number of lines in OUT. */
 static size_t set_figures(cli *run, const texedges_set *e, int layer) {
     int per_layer[TEXEDGES_MAX_LEVELS] = {0};
     size_t count = 0;
@@ -244,17 +245,17 @@ static int run_edges(int argc, char **argv) {
     const cli_option table[] = {
         {CLI_INT, "--levels", "N", "layers, 2 to 16; default 4", &desc.levels, 2,
          TEXEDGES_MAX_LEVELS},
-        {CLI_TEXT, "--thresholds", "T1,...", "grays 0 to 1 at which layers 1, 2, ... begin",
+        {CLI_TEXT, "--thresholds", "T1,...", "gray levels, 0 to 1, where layers 1, 2, ... begin",
          &o.thresholds, 0, 0},
-        {CLI_TEXT, "--smooth", "R", "blur by so many pixels beforehand, 0 to 16; default 0",
+        {CLI_TEXT, "--smooth", "R", "blur first, by so many pixels, 0 to 16; default 0",
          &o.smooth, 0, 0},
-        {CLI_INT, "--least", "N", "leave out regions whose boundary is shorter; default 0",
+        {CLI_INT, "--least", "N", "leave out regions with a shorter boundary, in pixels; default 0",
          &desc.least, 0, 1 << 30},
         {CLI_INT, "--layer", "K", "only the lines of this layer", &o.layer, 0,
          TEXEDGES_MAX_LEVELS - 1},
         {CLI_TEXT, "--over", "WHAT", "draw over black (default), the picture or its layers",
          &o.over, 0, 0},
-        {CLI_OUTPUT, "--layers", "FILE", "also write the layers as grays", &o.layers, 0, 0},
+        {CLI_OUTPUT, "--layers", "FILE", "also write a picture of the layers, in grays", &o.layers, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
 

@@ -1,4 +1,4 @@
-/* mesh_figures.c - how even the triangles of a mesh are
+/* mesh_figures.c - figures about a mesh for --stats: topology, valences, shapes of triangles
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "retile.h"
 
@@ -7,7 +7,7 @@ static int compare_keys(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Which set an item is in: the root of its tree. Paths are halved on the way. */
+/* The root of an item's set; paths are halved on the way. */
 static uint32_t find_root(uint32_t *parent, uint32_t i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
@@ -24,7 +24,8 @@ typedef struct figures {
     double inner, six; /* vertices inside, and those of valence 6 */
 } figures;
 
-/* Count what belongs to edges. Sorted, an edge inside is there twice, on the border once. */
+/* Count edges, components, border loops and valences. Sorted by its vertices, an inner edge occurs
+   twice, a border edge once. */
 static int count_edges(const trimesh_mesh *m, figures *f) {
     const size_t sides = 3 * m->triangle_count, n = m->vertex_count;
     uint64_t *keys = (uint64_t *)new_array(sides, sizeof *keys);
@@ -54,7 +55,7 @@ static int count_edges(const trimesh_mesh *m, figures *f) {
         valence[a] += valence[a] < 1u << 30;
         valence[b] += valence[b] < 1u << 30;
         if (c + 1 < sides && keys[c] == keys[c + 1]) continue;
-        /* a border edge: a loop for every rim that closes */
+        /* a border edge: one more loop if it closes a chain */
         f->loops += 1 - join(rims, a, b);
         valence[a] |= 1u << 31;
         valence[b] |= 1u << 31;

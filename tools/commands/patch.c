@@ -1,8 +1,8 @@
 /* patch.c - texkit patch: a photograph and its maps in, more of the same out
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Read, follow strokes if there are any, synthesise (a job, or a window of the endless plane),
-   draw, write: run_job at the end tells the story.                                             */
+   run_job at the end shows the steps: read, turn strokes into guides, synthesise (a job, or a
+   window of the endless plane), draw, write.                                                   */
 #include "patch.h"
 #include "files/image_io.h"
 
@@ -11,36 +11,36 @@
 
 #include <stdio.h>
 
-enum { MAX_LEVELS = 28 }; /* no picture has more coarser ones */
+enum { MAX_LEVELS = 28 }; /* more than any picture has */
 
 static const cli_manual patch_manual = {
     "patch", "EXEMPLAR -o OUT --size WxH [options]",
     "make new texture out of pieces of a picture, in register for all maps",
-    "For textures with a structure that has to go on: bricks, weaves, cobbles, planks, stones.\n"
+    "For textures whose structure must continue: bricks, weaves, cobbles, planks, stones.\n"
     "EXEMPLAR is a picture of 32 x 32 pixels or more; a lattice in it is found and kept. OUT\n"
-    "ends in .png, .tga, .bmp or .jpg and has the channels of EXEMPLAR, as .png its 16 bits too.\n"
+    "ends in .png, .tga, .bmp or .jpg and has the channels of EXEMPLAR; .png keeps 16 bits.\n"
     "--maps M1,M2 are pictures in register with EXEMPLAR. Each is made in register with OUT\n"
-    "  and named by what its name has and EXEMPLAR's has not: bricks-normal.png becomes\n"
+    "  and named after the part of its name that EXEMPLAR's lacks: bricks-normal.png becomes\n"
     "  OUT-normal.png. Options count maps from 0, which is EXEMPLAR.\n"
-    "--exemplars E2,E3 are more pictures of the same material, of any size. Their maps go\n"
-    "  behind semicolons: --maps 'M1,M2;E2-M1,E2-M2;E3-M1,E3-M2'.\n"
-    "--guide and --target say what goes where: each pixel of OUT comes from where the guide\n"
-    "  of EXEMPLAR looks as the target does there.\n"
+    "--exemplars E2,E3 are more pictures of the same material, of any size. Their maps follow\n"
+    "  after semicolons: --maps 'M1,M2;E2-M1,E2-M2;E3-M1,E3-M2'.\n"
+    "--guide and --target say what goes where: each pixel of OUT comes from a place where the\n"
+    "  guide of EXEMPLAR looks like the target.\n"
     "--control STROKES is a JSON file of lines that become edges of the texture:\n"
     "  {\"levels\": 4, \"smooth\": 0, \"least\": 0, \"background\": -1, \"disturb\": 1,\n"
     "   \"strokes\": [{\"layer\": 0, \"closed\": false, \"width\": 8,\n"
     "     \"points\": [[20,20], [200,90]]}]}\n"
-    "  Only points must be given, the rest is what you see here by default. 'texkit edges'\n"
-    "  shows the layers of the same levels, smooth and least; 0 is the darkest. A closed stroke\n"
+    "  Only points are required; the other values here are the defaults. 'texkit edges' shows\n"
+    "  the layers for the same levels, smooth and least; 0 is the darkest. A closed stroke\n"
     "  is filled with its layer, an open one is as wide as width says. background is the layer\n"
     "  elsewhere, -1 leaves it free; disturb, 0 to 4, is how much of the roughness of EXEMPLAR's\n"
     "  edges the strokes take on.\n"
-    "--window X,Y,W,H is a part of a plane without end; all windows show the same plane.\n"
+    "--window X,Y,W,H is a part of an endless plane; all windows show the same plane.\n"
     "--lod K writes K coarser levels, each half as wide: OUT-1.png, OUT-2.png ...\n"
     "--sources FILE.pfm says where each pixel comes from, in three floats: x and y in the\n"
     "  exemplar; and 8 times the exemplar's number (EXEMPLAR is 0), plus 4 if it is mirrored,\n"
-    "  plus its quarter turns counter-clockwise, or -1 if the pixel was kept.\n"
-    "'continuous' of --stats is the share of neighbours in OUT that are so in EXEMPLAR.\n",
+    "  plus the number of counter-clockwise quarter turns, or -1 if the pixel was kept.\n"
+    "'continuous' of --stats is the share of neighbours in OUT that are neighbours in EXEMPLAR.\n",
     "  texkit patch bricks.jpg -o wall.png --size 2048x1024 --tileable --lod 4\n"
     "  texkit patch bricks.png -o wall.png --size 512x512 --normal 1 --data 2 \\\n"
     "      --maps bricks-normal.png,bricks-height.png --weights 1,0,0.3\n",
@@ -128,9 +128,9 @@ static int run_job(patch_job *j, int argc, char **argv) {
          &j->window, 0, 0},
         {CLI_FLAG, "--tileable", NULL, "the result continues across its own borders", &j->tileable,
          0, 0},
-        {CLI_FLAG, "--tileable-x", NULL, "only from the right one to the left one", &j->tileable_x,
+        {CLI_FLAG, "--tileable-x", NULL, "only across the left and right borders", &j->tileable_x,
          0, 0},
-        {CLI_FLAG, "--tileable-y", NULL, "only from the lower one to the upper one", &j->tileable_y,
+        {CLI_FLAG, "--tileable-y", NULL, "only across the upper and lower borders", &j->tileable_y,
          0, 0},
         {CLI_GROUPS, "--maps", "M1,M2,...", "pictures in register with EXEMPLAR, made in register",
          &j->map_list, 0, 0},
@@ -140,15 +140,15 @@ static int run_job(patch_job *j, int argc, char **argv) {
         {CLI_TEXT, "--normal", "I,J,...", "these maps are normal maps", &j->normals, 0, 0},
         {CLI_FLAG, "--directx", NULL, "y of normals points down; default: up, as in OpenGL",
          &j->directx, 0, 0},
-        {CLI_TEXT, "--label", "I,J,...", "these maps hold names, which are not to be mixed",
+        {CLI_TEXT, "--label", "I,J,...", "these maps hold labels, which must not be mixed",
          &j->labels, 0, 0},
-        {CLI_TEXT, "--data", "I,J,...", "these maps hold amounts (height, roughness), not colors",
+        {CLI_TEXT, "--data", "I,J,...", "these maps hold quantities (height, roughness), not colors",
          &j->data, 0, 0},
         {CLI_INPUTS, "--exemplars", "E2,...", "more exemplars, up to 8 in all", &j->more, 0, 0},
         {CLI_INPUTS, "--mask", "M", "use EXEMPLAR only where this picture is not black; one for each",
          &j->masks, 0, 0},
         {CLI_INT, "--patch", "N",
-         "side of the first patches in pixels; default: what suits EXEMPLAR", &d->patch, 8,
+         "side of the first patches in pixels; default: chosen for EXEMPLAR", &d->patch, 8,
          TEXPATCH_MAX_SIDE},
         {CLI_INT, "--passes", "P", "of optimisation, 1 to 16; 0 = none; default 3, at full size 2",
          &j->passes, 0, 16},
@@ -157,19 +157,19 @@ static int run_job(patch_job *j, int argc, char **argv) {
         {CLI_INT, "--turns", "N", "pieces may be turned: 2 = by half turns, 4 = by quarter turns",
          &d->turns, 1, 4},
         {CLI_FLAG, "--mirror", NULL, "pieces may be mirrored", &d->mirror, 0, 0},
-        {CLI_TEXT, "--novelty", "V", "0 to 1: avoid long pieces that are as in EXEMPLAR; default 0",
+        {CLI_TEXT, "--novelty", "V", "0 to 1: avoid copying large pieces of EXEMPLAR; default 0",
          &j->novelty, 0, 0},
         {CLI_INPUTS, "--guide", "G", "a picture in register with EXEMPLAR; one for each exemplar",
          &j->guides, 0, 0},
         {CLI_INPUT, "--target", "T", "what the guide should look like in OUT", &j->target, 0, 0},
-        {CLI_INPUT, "--target-mask", "M", "where this picture is black, the target says nothing",
+        {CLI_INPUT, "--target-mask", "M", "where this picture is black, the target does not count",
          &j->target_mask, 0, 0},
-        {CLI_TEXT, "--guide-weight", "V", "against a map of weight 1; above 0, up to 16; default 2",
+        {CLI_TEXT, "--guide-weight", "V", "relative to a map of weight 1; above 0, up to 16; default 2",
          &j->guide_weight, 0, 0},
         {CLI_INPUT, "--control", "STROKES", "lines that become edges of the texture", &j->control, 0,
          0},
         {CLI_INPUTS, "--keep", "K0,K1,...",
-         "pictures of OUT's size, for each map, to be kept in part", &j->kept_list, 0, 0},
+         "pictures of OUT's size, one for each map, to keep parts of", &j->kept_list, 0, 0},
         {CLI_INPUT, "--keep-mask", "M", "they are kept where this picture is not black", &j->keep, 0,
          0},
         {CLI_INT, "--lod", "K", "coarser levels to write, each half as wide", &j->lod, 0,

@@ -1,8 +1,8 @@
 /* patch.h - what the files of 'texkit patch' share
    SPDX-License-Identifier: MIT OR Unlicense
 
-   patch.c holds the command, patch_options.c refuses what does not go together, patch_files.c reads
-   and writes, strokes.c makes guides of strokes.                                                */
+   patch.c holds the command, patch_options.c checks the options, patch_files.c reads and writes,
+   strokes.c turns strokes into guides.                                                          */
 #ifndef PATCH_H
 #define PATCH_H
 
@@ -14,7 +14,7 @@ enum {
                                                            : TEXPATCH_MAX_EXEMPLARS
 };
 
-/* Names out of a list; they lie in storage. */
+/* The names of a list; storage holds the text. */
 typedef struct names {
     char *storage;
     const char *at[MAX_NAMES];
@@ -31,7 +31,7 @@ typedef struct patch_job {
     const char *sources, *control;
     int extent[2], passes, directx, tileable, tileable_x, tileable_y, lod;
 
-    texpatch_desc desc; /* of the library, filled in as options are read and files are */
+    texpatch_desc desc; /* filled in while options and files are read */
     texpatch_exemplar exemplars[TEXPATCH_MAX_EXEMPLARS];
     texpatch_map maps[TEXPATCH_MAX_MAPS];
     names exemplar_names, map_names[TEXPATCH_MAX_EXEMPLARS];
@@ -42,34 +42,34 @@ typedef struct patch_job {
     char (*paths)[MAX_PATH]; /* map 0 and its levels, map 1 and its levels, ... */
     int path_count;
     txm_image out[TEXPATCH_MAX_MAPS];
-    texpatch_source *from; /* of all pixels; NULL: nobody asks */
+    texpatch_source *from; /* of all pixels; NULL: not needed */
 } patch_job;
 
 /* ---- patch_options.c ---- */
 
-/* Take a list apart at its separators; most names, none empty. */
+/* Split a list at its separators into at most so many names, none of them empty. */
 int patch_split(patch_job *j, const char *option, const char *list, char separator, int most,
                 names *n);
 
-/* Refuse, before any work, what does not go together. */
+/* Refuse, before any work, options that do not go together. */
 int patch_check_options(patch_job *j);
 
 /* ---- patch_files.c ---- */
 
-/* All paths that will be written. */
+/* Name and announce all outputs. */
 int patch_name_outputs(patch_job *j);
 
-/* All pictures; then it is known what OUT has to hold. */
+/* Read all pictures, and check that OUT's format can hold the result. */
 int patch_read_all(patch_job *j);
 
-/* The share of neighbours that are neighbours in the exemplar. */
+/* The share of neighbours in OUT that are neighbours in the exemplar. */
 double patch_continuous(const patch_job *j);
 
 int patch_write_outputs(patch_job *j);
 
 /* ---- strokes.c ---- */
 
-/* The strokes of --control become guides. */
+/* Read the strokes of --control and turn them into guides. */
 int patch_take_strokes(patch_job *j);
 
 #endif /* PATCH_H */

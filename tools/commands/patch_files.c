@@ -11,7 +11,7 @@ static int is_separator(char c) {
     return c == '-' || c == '_' || c == '.' || c == ' ';
 }
 
-/* The length of a file's name without its extension; *name is behind the last slash. */
+/* The length of a file's name without its extension; *name begins after the last slash. */
 static size_t stem_of(const char *path, const char **name) {
     const char *slash = strrchr(path, '/'), *dot;
     *name = slash ? slash + 1 : path;
@@ -19,8 +19,8 @@ static size_t stem_of(const char *path, const char **name) {
     return dot && dot > *name ? (size_t)(dot - *name) : strlen(*name);
 }
 
-/* What tells a map from its exemplar: "normal" of bricks_normal.png beside bricks.png or
-   bricks_albedo.png. The whole stem if that leaves nothing. */
+/* What distinguishes a map's name from its exemplar's: "normal" for bricks_normal.png beside
+   bricks.png or bricks_albedo.png. The whole stem if that leaves nothing. */
 static size_t own_name(const char *path, const char *exemplar, const char **name) {
     const char *other;
     const size_t n = stem_of(path, name), m = stem_of(exemplar, &other);
@@ -49,7 +49,6 @@ static int name_output(patch_job *j, int map, int level, char path[MAX_PATH]) {
     return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->run.output);
 }
 
-/* All paths that will be written. */
 int patch_name_outputs(patch_job *j) {
     const int levels = 1 + j->lod, count = j->desc.map_count * levels;
     int status = CLI_DONE;
@@ -73,7 +72,7 @@ int patch_name_outputs(patch_job *j) {
 
 /* ---- reading ------------------------------------------------------------------------------- */
 
-/* 8 bits as 16. */
+/* Convert 8 bits to 16. */
 static int widen(patch_job *j, txm_image *image) {
     txm_image wide;
     const int status =
@@ -98,7 +97,7 @@ static int read_as(patch_job *j, const char *path, int channels, txm_sample samp
 static int check_extent(patch_job *j, const char *what, const char *path, const txm_image *image,
                         int width, int height, const char *like) {
     if (image->width == width && image->height == height) return CLI_DONE;
-    return cli_fail(&j->run, CLI_FAILED, "%s '%s' is %d x %d; make it %d x %d as %s", what, path,
+    return cli_fail(&j->run, CLI_FAILED, "%s '%s' is %d x %d; make it %d x %d like %s", what, path,
                     image->width, image->height, width, height, like);
 }
 
@@ -145,7 +144,7 @@ static int read_sized(patch_job *j, const char *what, const char *path, int chan
                       txm_sample sample, txm_image *image) {
     const int status = read_as(j, path, channels, sample, image);
     if (status) return status;
-    return check_extent(j, what, path, image, j->desc.width, j->desc.height, "--size says");
+    return check_extent(j, what, path, image, j->desc.width, j->desc.height, "--size");
 }
 
 static int read_kept(patch_job *j) {
@@ -164,7 +163,6 @@ static int read_kept(patch_job *j) {
     return status;
 }
 
-/* All pictures; then it is known what OUT has to hold. */
 int patch_read_all(patch_job *j) {
     texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
@@ -190,9 +188,9 @@ int patch_read_all(patch_job *j) {
 
 /* ---- where pixels come from ---------------------------------------------------------------- */
 
-/* Does q follow p in the exemplar as it does in the output, one step to the right or down? */
+/* In the output q is one step to the right of p, or below it: is it so in the exemplar too? */
 static int goes_on(const texpatch_source *p, const texpatch_source *q, int is_down) {
-    /* what becomes of a step to the right by so many quarter turns back; y points down */
+    /* a step to the right, turned back by so many quarter turns; y points down */
     static const int turned[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     if (p->exemplar < 0 || p->exemplar != q->exemplar || p->turn != q->turn) return 0;
     const int *step = turned[(p->turn + is_down) & 3];
@@ -201,7 +199,6 @@ static int goes_on(const texpatch_source *p, const texpatch_source *q, int is_do
     return dx > -0.25f && dx < 0.25f && dy > -0.25f && dy < 0.25f;
 }
 
-/* The share of neighbours that are neighbours in the exemplar. */
 double patch_continuous(const patch_job *j) {
     const size_t w = (size_t)j->desc.width, h = (size_t)j->desc.height;
     double pairs = 0, good = 0;
@@ -252,7 +249,7 @@ static int encode(patch_job *j, const txm_image *image, int index, cli_file *fil
     return status;
 }
 
-/* A map and its coarser levels; the finer one is given up as soon as the next is made. */
+/* Encode a map and its coarser levels; each level is released once the next one is made. */
 static int encode_levels(patch_job *j, int map, cli_file *files, unsigned char **bytes) {
     const int first = map * (1 + j->lod);
     txm_image *image = &j->out[map];

@@ -1,4 +1,4 @@
-/* patch_options.c - what the options of 'texkit patch' say, and what of it goes together
+/* patch_options.c - the options of 'texkit patch', parsed and checked
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "patch.h"
 #include "files/image_io.h"
@@ -10,7 +10,6 @@ static const int64_t MAX_PLACE = (int64_t)1 << 40;
 
 /* ---- lists ------------------------------------------------------------------------------- */
 
-/* Take a list apart at its separators; most names, none empty. */
 int patch_split(patch_job *j, const char *option, const char *list, char separator, int most,
                 names *n) {
     const size_t size = strlen(list) + 1;
@@ -47,7 +46,7 @@ static int mark_maps(patch_job *j, const char *option, const char *list, int mar
     return CLI_DONE;
 }
 
-/* ---- what goes together ------------------------------------------------------------------- */
+/* ---- options ------------------------------------------------------------------------------ */
 
 /* The maps of all exemplars, and how each is treated. */
 static int parse_maps(patch_job *j) {
@@ -107,7 +106,7 @@ static int parse_maps(patch_job *j) {
         sum += weights[m];
     }
     if (!(sum > 0))
-        return cli_fail(&j->run, CLI_USAGE, "--weights '%s': one at least must be above 0",
+        return cli_fail(&j->run, CLI_USAGE, "--weights '%s': at least one must be above 0",
                         j->weights);
     if (j->directx && !j->normals)
         return cli_fail(&j->run, CLI_USAGE, "--directx goes with --normal");
@@ -116,7 +115,7 @@ static int parse_maps(patch_job *j) {
     return CLI_DONE;
 }
 
-/* A whole number of the window, with a comma behind it or as the last. */
+/* A whole number of the window, followed by a comma or by the end. */
 static int parse_place(const char **text, int64_t low, int64_t high, char behind, int64_t *value) {
     const char *c = *text + (**text == '-');
     char *end;
@@ -144,7 +143,7 @@ static int parse_window(patch_job *j) {
     return CLI_DONE;
 }
 
-/* What the endless plane has not. */
+/* Refuse options that the endless plane does not have. */
 static int check_window(patch_job *j) {
     const struct {
         const char *name;
@@ -181,7 +180,6 @@ static int parse_lattice(patch_job *j) {
     return CLI_DONE;
 }
 
-/* Refuse, before any work, what does not go together. */
 int patch_check_options(patch_job *j) {
     cli *run = &j->run;
     texpatch_desc *d = &j->desc;

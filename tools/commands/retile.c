@@ -1,8 +1,8 @@
 /* retile.c - texkit retile: a triangle mesh in, one of near-equilateral triangles out
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Read, retile, dress (texture coordinates, colors, instances), measure, write: run_retile at the
-   end tells the story.                                                                         */
+   run_job at the end shows the steps: read, retile, dress (colors, texture coordinates, instances),
+   measure, write.                                                                              */
 #include "retile.h"
 #include "files/image_io.h"
 
@@ -16,30 +16,31 @@
 static const cli_manual retile_manual = {
     "retile", "MESH -o OUT --vertices N [options]",
     "cover a surface with near-equilateral triangles",
-    "MESH is an OBJ or PLY file; small faults are mended (equal vertices welded, triangles\n"
-    "turned to agree, fins cut off). OUT ends in .obj, .ply or .glb; it has exactly N\n"
-    "vertices, before those along texture seams are doubled. Texture coordinates and\n"
-    "colors of MESH are carried over. Instead of them,\n"
-    "--tiles DIR takes a set of 'texkit tiles --kind triangle' and gives every triangle\n"
-    "  the tile whose edges match its neighbours';\n"
-    "--patches PICTURE takes a row of equilateral triangles, side by side with a gutter\n"
-    "  around each, and gives every triangle one of them at random.\n"
-    "The picture is written beside OUT, as OUT-atlas.png, and is inside of a .glb.\n"
-    "--instances PATCH.ply puts things on every triangle. PATCH lies on the triangle\n"
-    "  (0,0), (1,0), (1/2,sqrt(3)/2), z upwards. Points, with nx ny nz or qx qy qz qw if\n"
-    "  they are to be tilted, become small spheres of their color; a mesh is put on every\n"
-    "  triangle as it is. A .glb holds the surface and refers to the things\n"
-    "  (EXT_mesh_gpu_instancing); .ply and .obj hold the things or points alone.\n"
-    "Of --stats, 'mended' counts: vertices welded, vertices unused, triangles degenerate,\n"
-    "duplicate, fins, turned, vertices split. 'quality' is twice the inscribed circle's\n"
-    "radius over the circumscribed one's: 1 for an equilateral triangle.\n",
+    "MESH is an OBJ or PLY file; small faults are repaired (equal vertices welded, triangles\n"
+    "turned to agree, fins removed). OUT ends in .obj, .ply or .glb; it has exactly N\n"
+    "vertices, not counting copies along texture seams. Texture coordinates and colors of\n"
+    "MESH are carried over, unless\n"
+    "--tiles DIR names a set of 'texkit tiles --kind triangle': every triangle gets a tile\n"
+    "  whose edges match those of its neighbours;\n"
+    "--patches PICTURE shows a row of equilateral triangles, each with a gutter around it:\n"
+    "  every triangle gets one of them at random.\n"
+    "The picture is written beside OUT as OUT-atlas.png (that of --texture: OUT-texture.png),\n"
+    "for an .obj with a material OUT.mtl; a .glb contains it too.\n"
+    "--instances PATCH.ply puts objects on every triangle. PATCH lies on the triangle\n"
+    "  (0,0), (1,0), (1/2,sqrt(3)/2), with z upwards. Its points become small spheres of\n"
+    "  their color, tilted by nx ny nz or qx qy qz qw; a mesh is put on every triangle as it\n"
+    "  is. A .glb holds the surface and instances (EXT_mesh_gpu_instancing); .ply and .obj\n"
+    "  hold only the meshes or points.\n"
+    "'mended' of --stats counts vertices welded and unused, triangles degenerate, duplicate,\n"
+    "fins and turned, and vertices split. 'quality' is twice the radius of the inscribed\n"
+    "circle over that of the circumscribed one: 1 for an equilateral triangle.\n",
     "  texkit retile bunny.obj -o bunny.glb --vertices 5000 --tiles gravel-triangles\n"
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
     1, "mesh", 0, "take fewer vertices"};
 
 /* ---- the command line ---------------------------------------------------------------------- */
 
-/* Refuse, before any work, what does not go together. */
+/* Refuse, before any work, options that do not go together; name and announce the outputs. */
 static int check_options(retile_job *j, const char *method) {
     static const char *const methods[] = {"lattice", "repel", NULL};
     const char *why;
@@ -77,8 +78,8 @@ static int read_mesh(retile_job *j, const char *path, int points_too, mesh_data 
     return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
 }
 
-/* Wanted edge lengths from a picture on the input's texture coordinates: where it is white a
-   quarter of what they are where it is black. *scale is for free(). */
+/* Scales of edge lengths from a picture on the input's texture coordinates: 1 where it is black,
+   1/4 where it is white. *scale is for free(). */
 static int read_density(retile_job *j, float **scale) {
     const mesh_data *m = &j->input;
     txm_image map;
@@ -102,13 +103,13 @@ static int read_density(retile_job *j, float **scale) {
 
 /* ---- writing -------------------------------------------------------------------------------- */
 
-/* Things baked into one mesh; spheres shrink to points, with the point's normal and color. */
+/* All instances as one mesh; spheres become points with a normal and a color. */
 static int bake(retile_job *j, mesh_data *baked) {
     static float zero[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     mesh_data points[MAX_PROTOTYPES];
     mesh_instances list[MAX_PROTOTYPES];
     const char *why;
-    const int has_points = j->patch.positions != NULL; /* a mesh has been taken out of it */
+    const int has_points = j->patch.positions != NULL; /* take_mesh leaves none */
     for (int p = 0; p < j->prototype_count; p++) {
         list[p] = j->instanced[p];
         if (!has_points) continue;
@@ -217,23 +218,25 @@ static int run_job(retile_job *j, int argc, char **argv) {
          TRIMESH_MAX_VERTICES},
         {CLI_TEXT, "--method", "HOW", "lattice (default, most regular) or repel (as published)",
          &method, 0, 0},
-        {CLI_INT, "--crease", "DEGREES", "keep sharp edges that bend by so much, 1 to 180; default 50",
+        {CLI_INT, "--crease", "DEGREES", "keep edges sharp that bend by at least so much, 1 to 180; default 50",
          &crease, 1, 180},
         {CLI_INT, "--adapt", "PERCENT", "shorter edges where the surface bends, 0 to 100", &adapt,
          0, 100},
         {CLI_INT, "--spacing", "PERCENT",
-         "edges along creases and borders, 25 to 400 of the others", &spacing, 25, 400},
+         "length of edges along creases and borders, 25 to 400 % of the others", &spacing, 25, 400},
         {CLI_INPUT, "--density", "MAP",
          "picture on MESH's texture: shorter edges where it is lighter", &j->density, 0, 0},
         {CLI_TILES, "--tiles", "DIR", "texture: a triangle set of 'texkit tiles'", &j->tiles, 0, 0},
-        {CLI_INPUT, "--patches", "PICTURE", "texture: patches at random", &j->patches, 0, 0},
+        {CLI_INPUT, "--patches", "PICTURE", "texture: triangles of this picture, chosen at random",
+         &j->patches, 0, 0},
         {CLI_INT, "--patch-count", "N", "patches in PICTURE; default 4", &j->patch_count, 1, 256},
         {CLI_INT, "--gutter", "G", "pixels around each patch; default 8, or none", &j->gutter, 0,
          8192},
-        {CLI_INPUT, "--texture", "PICTURE", "texture: that of MESH", &j->texture, 0, 0},
+        {CLI_INPUT, "--texture", "PICTURE", "texture: the one that MESH's coordinates are for",
+         &j->texture, 0, 0},
         {CLI_INPUT, "--instances", "PATCH.ply", "points or a small mesh for every triangle",
          &j->instances, 0, 0},
-        {CLI_INT, "--dot", "PERCENT", "radius of points in edge lengths; default: they touch",
+        {CLI_INT, "--dot", "PERCENT", "radius of points, in % of an edge length; default: they touch",
          &j->dot, 1, 1000},
         {CLI_FLAG, "--curved", NULL, "instances stand on the smooth surface, not on flat triangles",
          &j->curved, 0, 0},

@@ -1,8 +1,8 @@
 /* retile.h - what the files of 'texkit retile' share
    SPDX-License-Identifier: MIT OR Unlicense
 
-   retile.c holds the command, retile_dress.c what the result has on it, retile_instances.c what stands
-   on it, mesh_figures.c measures it.                                                            */
+   retile.c holds the command; retile_dress.c gives the result colors and textures,
+   retile_instances.c puts objects on it, mesh_figures.c measures it.                            */
 #ifndef RETILE_H
 #define RETILE_H
 
@@ -29,12 +29,12 @@ typedef struct retile_job {
     /* the output: positions, normals and indices are the result's, the rest our own */
     mesh_data output;
 
-    /* its picture; name: behind the last '/' */
+    /* its picture */
     unsigned char *png;
     size_t png_size;
     char png_path[MAX_PATH], mtl_path[MAX_PATH];
 
-    /* what stands on it */
+    /* the objects on it */
     mesh_data prototypes[MAX_PROTOTYPES];
     mesh_instances instanced[MAX_PROTOTYPES];
     int prototype_count;
@@ -49,7 +49,7 @@ int retile_dress(retile_job *j);
 
 /* ---- retile_instances.c ---- */
 
-/* What --instances says, on every triangle. */
+/* The objects of --instances on every triangle. */
 int retile_place_instances(retile_job *j);
 
 /* ---- mesh_figures.c ---- */

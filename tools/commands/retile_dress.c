@@ -1,4 +1,4 @@
-/* retile_dress.c - what the result of 'texkit retile' has on it: colors, tiles, patches
+/* retile_dress.c - colors and textures for the result of 'texkit retile'
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "retile.h"
 #include "files/image_io.h"
@@ -30,7 +30,7 @@ static int read_png(retile_job *j, const char *path, txm_image *image) {
     return encode_picture(&j->run, j->png_path, image, &j->png, &j->png_size);
 }
 
-/* ---- what the input has on it --------------------------------------------------------------- */
+/* ---- carried over from the input ------------------------------------------------------------ */
 
 static int carry_colors(retile_job *j) {
     const size_t from = 4 * j->input.vertex_count, count = j->result->vertex_count;
@@ -83,7 +83,7 @@ static int carry_uvs(retile_job *j) {
 
 /* ---- tiles ---------------------------------------------------------------------------------- */
 
-/* A triangle set as its tiles.json tells it. */
+/* A triangle set as tiles.json describes it. */
 typedef struct tile_file {
     textiles_desc desc;
     textiles_tile *tiles;
@@ -133,7 +133,7 @@ static int parse_tiles(const cJSON *json, tile_file *f, const char **why) {
     const int whole = (8 * c * c * c + 4 * c) / 3 * d->variants;
     f->count = cJSON_GetArraySize(tiles);
     if (f->count != reduced && f->count != whole)
-        return *why = "not the number of tiles that such a set has; make it again", 0;
+        return *why = "the number of tiles is wrong for such a set; make it again", 0;
     d->reduced = f->count == reduced;
     f->tiles = (textiles_tile *)new_array((size_t)f->count, sizeof *f->tiles);
     f->uv = (float *)new_array((size_t)f->count, 6 * sizeof(float));
@@ -146,7 +146,7 @@ static int parse_tiles(const cJSON *json, tile_file *f, const char **why) {
     return 1;
 }
 
-/* A set in which only the colors matter: all its tiles share one small gray picture. */
+/* A set for assigning only: all its tiles share one small gray picture. */
 static txm_status import_tiles(retile_job *j, tile_file *f, textiles_set **set) {
     static unsigned char gray[(TEXTILES_MIN_SIZE + 1) * (TEXTILES_MIN_SIZE + 1)];
     txm_image *images = (txm_image *)calloc((size_t)f->count, sizeof *images);
@@ -163,7 +163,7 @@ static txm_status import_tiles(retile_job *j, tile_file *f, textiles_set **set) 
     return result;
 }
 
-/* Are the file's tiles those of the set, in its order? */
+/* Does the file have the tiles of the set, in the same order? */
 static int same_tiles(const textiles_set *set, const tile_file *f) {
     for (int i = 0; i < f->count; i++) {
         textiles_tile t;
@@ -192,7 +192,7 @@ static int read_tiles(retile_job *j, tile_file *f, textiles_set **set) {
     status = check_result(&j->run, result, path);
     if (status) return status;
     if (!same_tiles(*set, f))
-        return cli_fail(&j->run, CLI_FAILED, "'%s': its tiles are not in their order; make the set "
+        return cli_fail(&j->run, CLI_FAILED, "'%s': its tiles are not in the right order; make the set "
                         "again", path);
     snprintf(path, sizeof path, "%s/atlas.png", j->tiles);
     status = read_png(j, path, &atlas);
@@ -200,7 +200,7 @@ static int read_tiles(retile_job *j, tile_file *f, textiles_set **set) {
     return status;
 }
 
-/* Texture coordinates from the tiles chosen for all triangles. */
+/* Texture coordinates from the tile chosen for each triangle. */
 static int place_tiles(retile_job *j, const int *tiles, const int *rotations, const float *uv,
                        int count) {
     const size_t triangles = j->result->triangle_count;
@@ -233,8 +233,8 @@ static int dress_with_tiles(retile_job *j) {
 
 /* ---- patches -------------------------------------------------------------------------------- */
 
-/* The layout of a picture of patches: with the gutter, or if there is none, without; a row of pixels
-   more or less, which rounding makes, does not matter. */
+/* The layout of a picture of patches, with the default gutter or, failing that, without one. Its
+   height may be off by one pixel, through rounding. */
 static int find_layout(retile_job *j, const txm_image *picture, trimesh_atlas *atlas) {
     const int pitch = picture->width / j->patch_count;
     const int gutters[2] = {j->gutter < 0 ? 8 : j->gutter, j->gutter < 0 ? 0 : j->gutter};

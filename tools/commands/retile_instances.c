@@ -1,4 +1,4 @@
-/* retile_instances.c - things on the triangles of 'texkit retile'
+/* retile_instances.c - objects on the triangles of 'texkit retile'
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "retile.h"
 
@@ -18,7 +18,7 @@ static int sphere_of(retile_job *j, const unsigned char color[4]) {
     return j->prototype_count - 1;
 }
 
-/* The quaternion that turns z to a direction the shortest way. */
+/* The quaternion of the shortest rotation from z to a direction, times any positive factor. */
 static void turn_z_to(const float *n, float q[4]) {
     const txm_vec3 d = txm_vec3_normalize(txm_v3(n[0], n[1], n[2]));
     q[0] = -d.y;
@@ -26,7 +26,7 @@ static void turn_z_to(const float *n, float q[4]) {
     q[2] = 0;
     q[3] = 1 + d.z;
     if (q[3] > 1e-6f) return;
-    q[0] = 1; /* straight down: half round about x */
+    q[0] = 1; /* straight down: half a turn about x */
     q[1] = q[3] = 0;
 }
 
@@ -59,7 +59,7 @@ static int take_points(retile_job *j, trimesh_point *points) {
                             j->instances, MAX_PROTOTYPES);
         if (!take_point(m, i, (float)radius, &points[i]))
             return cli_fail(&j->run, CLI_FAILED,
-                            "'%s': point %lu lies outside of the triangle (0,0), "
+                            "'%s': point %lu lies outside the triangle (0,0), "
                             "(1,0), (1/2,sqrt(3)/2)",
                             j->instances, (unsigned long)i);
         points[i].prototype = (uint32_t)sphere;
@@ -67,7 +67,7 @@ static int take_points(retile_job *j, trimesh_point *points) {
     return CLI_DONE;
 }
 
-/* A mesh is one thing, held in the middle of the triangle. */
+/* A mesh becomes one instance, attached at the middle of the triangle. */
 static void take_mesh(retile_job *j, trimesh_point *point) {
     mesh_data *m = &j->prototypes[j->prototype_count++];
     *m = j->patch;
@@ -80,7 +80,7 @@ static void take_mesh(retile_job *j, trimesh_point *point) {
     point->u = point->v = (float)(1.0 / 3);
 }
 
-/* Instances sorted by prototype into the arrays that a writer takes. */
+/* Sort the instances by prototype into the arrays that a writer takes. */
 static int sort_instances(retile_job *j, const trimesh_instance *list, size_t count) {
     size_t at[MAX_PROTOTYPES + 1] = {0};
     j->placements = (float *)new_array(count, 10 * sizeof(float));

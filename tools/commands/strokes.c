@@ -1,4 +1,4 @@
-/* strokes.c - the strokes of 'texkit patch --control' become guides
+/* strokes.c - turns the strokes of 'texkit patch --control' into guides
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "patch.h"
 #include "files/image_io.h"
@@ -23,7 +23,7 @@ static int is_in(const cJSON *item, double low, double high) {
     return cJSON_IsNumber(item) && item->valuedouble >= low && item->valuedouble <= high;
 }
 
-/* A number low..high of that name; *value stays if there is none. */
+/* The number low..high of that name; *value stays if there is none. */
 static int get_number(strokes *s, const cJSON *from, const char *name, double low, double high,
                       int is_whole, double *value) {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(from, name);
@@ -33,12 +33,12 @@ static int get_number(strokes *s, const cJSON *from, const char *name, double lo
         *value = item->valuedouble;
         return 1;
     }
-    snprintf(s->why, sizeof s->why, "\"%s\" is to be a %snumber from %g to %g", name,
+    snprintf(s->why, sizeof s->why, "\"%s\" must be a %snumber from %g to %g", name,
              is_whole ? "whole " : "", low, high);
     return 0;
 }
 
-/* Has the object only fields of these names? A misspelt one would do nothing, and nobody knew. */
+/* Has the object only fields of these names? A misspelt one must not be ignored silently. */
 static int knows_fields(strokes *s, const cJSON *object, const char *const *fields) {
     const cJSON *item;
     cJSON_ArrayForEach(item, object) {
@@ -51,14 +51,14 @@ static int knows_fields(strokes *s, const cJSON *object, const char *const *fiel
     return 1;
 }
 
-/* One stroke; its points go behind those of the ones before. */
+/* Parse one stroke; its points go to `points`. */
 static int parse_stroke(strokes *s, const cJSON *json, texedges_stroke *to, txm_vec2 *points) {
     static const char *const fields[] = {"layer", "closed", "width", "points", NULL};
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(json, "points"), *point;
     const cJSON *closed = cJSON_GetObjectItemCaseSensitive(json, "closed");
     double layer = 0, width = 0;
     if (!cJSON_IsObject(json)) {
-        snprintf(s->why, sizeof s->why, "it is to be an object");
+        snprintf(s->why, sizeof s->why, "it must be an object");
         return 0;
     }
     if (!knows_fields(s, json, fields) ||
@@ -66,7 +66,7 @@ static int parse_stroke(strokes *s, const cJSON *json, texedges_stroke *to, txm_
         !get_number(s, json, "width", 2, 256, 0, &width))
         return 0;
     if (closed && !cJSON_IsBool(closed)) {
-        snprintf(s->why, sizeof s->why, "\"closed\" is to be true or false");
+        snprintf(s->why, sizeof s->why, "\"closed\" must be true or false");
         return 0;
     }
     to->is_closed = cJSON_IsTrue(closed);
@@ -78,20 +78,20 @@ static int parse_stroke(strokes *s, const cJSON *json, texedges_stroke *to, txm_
         if (!cJSON_IsArray(point) || cJSON_GetArraySize(point) != 2 ||
             !is_in(x, -MAX_COORDINATE, MAX_COORDINATE) ||
             !is_in(y, -MAX_COORDINATE, MAX_COORDINATE)) {
-            snprintf(s->why, sizeof s->why, "point %d is to be [x,y] within -%d to %d", to->count,
+            snprintf(s->why, sizeof s->why, "point %d must be [x,y] within -%d to %d", to->count,
                      MAX_COORDINATE, MAX_COORDINATE);
             return 0;
         }
         points[to->count].x = (float)x->valuedouble;
         points[to->count++].y = (float)y->valuedouble;
     }
-    int moves = 0; /* strokes that stay where they begin have no way */
+    int moves = 0; /* a stroke whose points are all the same has no length */
     for (int i = 1; i < to->count; i++)
         moves |= points[i].x < points[0].x || points[i].x > points[0].x ||
                  points[i].y < points[0].y || points[i].y > points[0].y;
     if (cJSON_IsArray(list) && to->count >= 2 + to->is_closed && moves) return 1;
     snprintf(s->why, sizeof s->why,
-             "\"points\" is to be a list of %d or more [x,y], not all the same", 2 + to->is_closed);
+             "\"points\" must be a list of %d or more [x,y], not all the same", 2 + to->is_closed);
     return 0;
 }
 
@@ -157,7 +157,7 @@ static int read_strokes(patch_job *j, strokes *s) {
     return cli_fail(&j->run, CLI_FAILED, "'%s': %s", j->control, s->why);
 }
 
-/* Layers of the exemplars as their guides, the disturbed strokes as the guide of the output. */
+/* The layers of the exemplars become their guides, the disturbed strokes that of the output. */
 static int follow_strokes(patch_job *j, strokes *s) {
     texpatch_desc *d = &j->desc;
     texedges_set *edges = NULL, *disturbed = NULL;

@@ -10,8 +10,8 @@
 #include <stdio.h>
 
 enum {
-    PREVIEW_TILES = 8,     /* a side of the preview, as long as it stays ...    */
-    PREVIEW_PIXELS = 2048, /* ... below so many pixels, and two tiles at least  */
+    PREVIEW_TILES = 8,     /* along a side of the preview; fewer, but at least 2, ... */
+    PREVIEW_PIXELS = 2048, /* ... so that it has no more pixels than this            */
     MAX_PHOTOS = TEXTILES_MAX_EXEMPLARS
 };
 
@@ -25,11 +25,11 @@ static const cli_manual tiles_manual = {
     "KIND is wang (squares with colors on their edges), corner (squares with colors on\n"
     "their corners), triangle (equilateral triangles with directed colors on their edges)\n"
     "or frame (squares of a few classes with fixed edges). DIR, which is made if it is\n"
-    "not there, receives atlas.png, tiles.json (docs/tiles.md tells what it says) and\n"
-    "preview.png. The edges of a tile are untouched pixels of EXEMPLAR on both sides of\n"
-    "the joint. EXEMPLAR should be larger than a tile, three times a side or more.\n"
+    "not there, receives atlas.png, tiles.json (see docs/tiles.md) and preview.png. The\n"
+    "edges of a tile are unchanged pixels of EXEMPLAR on both sides of the joint. A side of\n"
+    "EXEMPLAR should be at least three times that of a tile.\n"
     "Maps of the same material (normals, roughness) are cut in register with --maps:\n"
-    "atlas-2.png is of the first of them, and so on.\n",
+    "atlas-2.png holds the first of them, and so on.\n",
     "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
     1, "exemplar", 1, "make smaller tiles"};
@@ -40,7 +40,7 @@ static void name_atlas(int map, char name[24]) {
     snprintf(name, 24, map ? "atlas-%d.png" : "atlas.png", map + 1);
 }
 
-/* All that will be written for an exemplar with the maps of that list. */
+/* Announce all that will be written for an exemplar with the maps of that list. */
 static int announce_set(cli *run, const char *maps) {
     int status = cli_writes_inside(run, "preview.png"), count = 1;
     if (!status) status = cli_writes_inside(run, "tiles.json");
@@ -61,7 +61,7 @@ static void print_ints(FILE *to, const char *name, const int *values, int count)
     fprintf(to, "]");
 }
 
-/* One tile; x, y: the top left pixel of the square that it lies in, gutter left out. */
+/* One tile; x, y: the top left pixel of its square, without the gutter. */
 static void print_tile(FILE *to, const textiles_set *set, const textiles_layout *layout, int index) {
     textiles_tile tile;
     int x, y, step;
@@ -106,7 +106,7 @@ static void print_document(FILE *to, const textiles_set *set, const textiles_lay
 
 /* ---- pictures --------------------------------------------------------------------------- */
 
-/* Some of the plane that the set covers; what has no plane is laid in scan-line order. */
+/* A part of the plane that the set covers; without a plane, tiles in scan-line order. */
 static txm_status draw_preview(cli *run, const textiles_set *set, const textiles_layout *layout,
                                const txm_image *atlas, const txm_image *out) {
     textiles_plane plane;
@@ -115,7 +115,7 @@ static txm_status draw_preview(cli *run, const textiles_set *set, const textiles
         return textiles_draw_plane(&plane, layout, atlas, 0, 0, 1, &run->env, *out);
     int tiles[PREVIEW_TILES * PREVIEW_TILES];
     txm_status status = textiles_scanline(set, columns, rows, run->seed, &run->env, tiles);
-    if (status == TXM_BAD_ARGUMENT) /* a frame set whose classes do not go on everywhere: side by side */
+    if (status == TXM_BAD_ARGUMENT) /* frames whose classes do not all fit: put them side by side */
         for (int i = 0; i < columns * rows; i++) tiles[i] = i % textiles_count(set);
     else if (status != TXM_OK) return status;
     const size_t texel = (size_t)out->channels, row = (size_t)out->width * texel;
@@ -131,7 +131,7 @@ static txm_status draw_preview(cli *run, const textiles_set *set, const textiles
     return TXM_OK;
 }
 
-/* Atlases, preview and tiles.json, all in memory, then all into the folder. */
+/* Make atlases, preview and tiles.json in memory, then write all of them into the folder. */
 static int write_set(cli *run, const textiles_set *set, const textiles_layout *layout) {
     const int maps = textiles_map_count(set);
     txm_image atlas[TEXTILES_MAX_MAPS], preview = {0};
@@ -187,7 +187,7 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
 
 /* ---- the command ------------------------------------------------------------------------- */
 
-/* "0,0,0,0;0,1,0,0" as classes. Returns how many, or 0 if it is nothing of the kind. */
+/* Parse classes such as "0,0,0,0;0,1,0,0". Returns how many, or 0 if the list is malformed. */
 static int parse_classes(const char *list, int classes[TEXTILES_MAX_CLASSES][4]) {
     int count = 0;
     for (const char *c = list;; c++) {
@@ -210,7 +210,7 @@ typedef struct photos {
     int count;
 } photos;
 
-/* Read the pictures that a list names, separated by commas, one after the other by the given function. */
+/* Call `take` for each name of a list. */
 static int read_list(cli *run, const char *list, const char *option, int most, photos *p,
                      int (*take)(cli *run, photos *p, const char *path)) {
     char path[MAX_PATH];
@@ -231,7 +231,7 @@ static int take_map(cli *run, photos *p, const char *path) {
     x->map_count++;
     if (image->width == p->images[0][0].width && image->height == p->images[0][0].height)
         return CLI_DONE;
-    return cli_fail(run, CLI_FAILED, "the map '%s' is %d x %d; make it %d x %d as '%s'", path,
+    return cli_fail(run, CLI_FAILED, "the map '%s' is %d x %d; make it %d x %d like '%s'", path,
                     image->width, image->height, p->images[0][0].width, p->images[0][0].height,
                     run->inputs[0]);
 }
@@ -264,8 +264,8 @@ static int check_options(cli *run, const textiles_desc *d, textiles_packing pack
     for (int k = 0; k < d->class_count; k++) {
         for (int i = 0; i < k; i++) {
             if (!memcmp(d->classes[i], d->classes[k], sizeof d->classes[k]))
-                return cli_fail(run, CLI_USAGE, "--classes: class %d is class %d again; add "
-                                "--variants instead", k, i);
+                return cli_fail(run, CLI_USAGE, "--classes: class %d is the same as class %d; "
+                                "use --variants instead", k, i);
         }
         for (int i = 0; i < 4; i++) {
             if (d->classes[k][i] >= colors)
@@ -307,25 +307,27 @@ static int run_tiles(int argc, char **argv) {
     int gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
     const cli_option options[] = {
         {CLI_TEXT, "--kind", "KIND", "wang, corner, triangle or frame", &kind, 0, 0},
-        {CLI_INT, "--colors", "C", "per axis, of corners, or of triangle edges, 2 to 4; default 2",
+        {CLI_INT, "--colors", "C", "colors per axis, of corners or of triangle edges, 2 to 4; default 2",
          &desc.colors, 1, TEXTILES_MAX_COLORS},
         {CLI_INT, "--variants", "V", "tiles with the same colors, 1 to 16; default 1",
          &desc.variants, 1, TEXTILES_MAX_VARIANTS},
-        {CLI_INT, "--size", "S", "pixels a side, 32 to 1024; default 128", &desc.size,
+        {CLI_INT, "--size", "S", "side of a tile in pixels, 32 to 1024; default 128", &desc.size,
          TEXTILES_MIN_SIZE, TEXTILES_MAX_SIZE},
-        {CLI_FLAG, "--reduced", NULL, "wang: 2 C C tiles for scan-line tiling; triangle: for meshes",
-         &desc.reduced, 0, 0},
-        {CLI_TEXT, "--classes", "LIST", "frame: edge colors n,e,s,w of each class, ';' between them",
+        {CLI_FLAG, "--reduced", NULL,
+         "wang: only 2 C C tiles, for scan-line tiling; triangle: fewer, for meshes", &desc.reduced, 0,
+         0},
+        {CLI_TEXT, "--classes", "LIST", "frame: edge colors n,e,s,w of each class, separated by ';'",
          &classes, 0, 0},
         {CLI_INPUTS, "--maps", "M1,M2,...", "more maps of the exemplar, cut in register", &maps, 0, 0},
         {CLI_INPUTS, "--more", "E2,E3,...", "more exemplars of the same texture", &more, 0, 0},
-        {CLI_INPUTS, "--edges", "P0,P1,...", "pictures to cut the edges of each color from", &edges, 0,
-         0},
+        {CLI_INPUTS, "--edges", "P0,P1,...", "pictures to cut the edges from, one for each color",
+         &edges, 0, 0},
         {CLI_TEXT, "--packing", "HOW", "packed (with gutters), torus (Wei's layout) or slices",
          &packing, 0, 0},
-        {CLI_INT, "--gutter", "G", "pixels around each tile; 2^n for n mip levels; default 8",
+        {CLI_INT, "--gutter", "G", "pixels around each tile, 2^n for n mip levels; default 8",
          &gutter, 0, TEXTILES_MAX_SIZE / 2},
-        {CLI_TEXT, "--repair", "HOW", "steps inside tiles: poisson (default) or none", &repair, 0, 0},
+        {CLI_TEXT, "--repair", "HOW", "smooth the seams inside tiles: poisson (default) or none",
+         &repair, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     photos p;

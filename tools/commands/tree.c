@@ -1,8 +1,8 @@
 /* tree.c - texkit tree and texkit forest: a species in, trees out
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Read the species, grow, pose, dress (bark, leaves), build, write: grow_trees and run_job at the
-   end tell the story. What is built is a baked mesh, a mesh with a skeleton, or copies.          */
+   run_job and grow_trees at the end show the steps: read the species, grow, pose, dress (bark,
+   leaves), build, write. What is built is a baked mesh, a mesh with a skeleton, or instances.    */
 #include "tree.h"
 #include "files/image_io.h"
 
@@ -14,31 +14,32 @@ enum { MAX_LEVEL = 16, BAKED_LOOKS = 8 };
 static const cli_manual tree_manual = {
     "tree", "-o OUT [options]", "grow a tree from interlocking pieces",
     "OUT ends in\n"
-    "  .glb  one mesh on a skeleton, a joint for every piece, and with --wind a clip of it\n"
-    "        swaying that goes round without a step\n"
+    "  .glb  one mesh on a skeleton with a joint for every piece, and with --wind an\n"
+    "        animation of its swaying that loops seamlessly\n"
     "  .obj  a mesh with its pictures beside it; the bark is one closed surface\n"
     "  .ply  the same mesh with colors, without pictures\n"
-    "  .txt  the species itself, to be changed and given to --species (docs/trees.md)\n"
+    "  .txt  the species itself, to edit and pass to --species (see docs/trees.md)\n"
     "Species: oak, beech, maple, birch, poplar, willow, almond, pine, spruce, dead.\n"
-    "Another --seed, another tree. --bones leaves thin twigs without joints of their own,\n"
-    "for games that take few. --pose bends every joint a little at random: the skeleton\n"
-    "of a .glb, the mesh of the others. --wind bends the mesh of the others as it is at\n"
-    "one moment. Where no --tiles and --leaf are given, bark and leaves are drawn.\n",
+    "Each --seed gives a different tree. --bones gives the thinnest twigs no joints of their\n"
+    "own, for engines that allow few. --pose bends every joint a little at random: the\n"
+    "skeleton of a .glb, the mesh of the others. --wind also bends the mesh of the others,\n"
+    "as at one moment. Without --tiles and --leaf, bark and leaves are drawn.\n",
     "  texkit tree -o oak.glb --species oak --wind 8\n"
     "  texkit tree -o mine.txt --species birch\n"
     "  texkit tree -o mine.obj --species mine.txt --tiles bark-tiles --level 3\n",
     0, NULL, 0, "take fewer --pieces"};
 
 static const cli_manual forest_manual = {
-    "forest", "--count N -o OUT [options]", "grow many trees, no two alike, from the same pieces",
+    "forest", "--count N -o OUT [options]", "grow many different trees from the same pieces",
     "OUT ends in\n"
-    "  .glb  copies of some pieces and leaf clouds (EXT_mesh_gpu_instancing): 10 nodes at\n"
-    "        most, one more for each species with leaves beyond three, however many trees\n"
+    "  .glb  instances of some pieces and leaf clouds (EXT_mesh_gpu_instancing): at most 10\n"
+    "        nodes, plus one for each species with leaves after the third, for any number\n"
+    "        of trees\n"
     "  .obj  every tree as a mesh, with the pictures beside it\n"
     "  .ply  the same with colors, without pictures\n"
-    "glTF does not let copies have skeletons: those of a .glb are rigid, and where a branch\n"
-    "bends its pieces overlap a little. 'texkit tree' writes one tree that can move. All\n"
-    "copies of a piece show the same tiles of bark.\n",
+    "In glTF instances cannot have skeletons: the pieces in a .glb are rigid and overlap a\n"
+    "little where a branch bends. 'texkit tree' writes one tree that can move. All\n"
+    "instances of a piece show the same bark tiles.\n",
     "  texkit forest --count 1000 -o forest.glb --species oak,birch,spruce\n"
     "  texkit forest --count 20 -o grove.obj --species poplar --spacing 6 --pieces 200\n",
     0, NULL, 0, "take fewer --pieces or trees"};
@@ -64,7 +65,7 @@ static void *more(void *block, size_t count, size_t size) {
     return txm_mul(count, size, 1, &bytes) ? realloc(block, bytes ? bytes : 1) : NULL;
 }
 
-/* Room at the end for so many vertices and triangles; 0: no memory. */
+/* Make room for so many more vertices and triangles; 0: no memory. */
 static int extend(mesh_data *m, size_t vertices, size_t triangles, int with_uvs, int with_colors) {
     const size_t v = m->vertex_count + vertices, t = m->triangle_count + triangles;
     void *block;
@@ -82,7 +83,7 @@ static int extend(mesh_data *m, size_t vertices, size_t triangles, int with_uvs,
     return 1;
 }
 
-/* Add a tree's bark or leaves to what is to be written. color: sRGB, in place of uvs. */
+/* Append a tree's bark or leaves to a mesh. color: sRGB, instead of uvs. */
 static int append(tree_job *j, const treepieces_mesh *from, const float *color, mesh_data *to) {
     const size_t base = to->vertex_count, first = 3 * to->triangle_count;
     if (!extend(to, from->vertex_count, from->triangle_count, !color, color != NULL))
@@ -108,7 +109,7 @@ static int append(tree_job *j, const treepieces_mesh *from, const float *color, 
 static int bake_tree(tree_job *j, int tree, const float *bones, treepieces_mesh **bark,
                      treepieces_mesh **leaves) {
     const treepieces_tree *t = &j->forest->trees[tree];
-    treepieces_lod lod = {{0, 0, 0}, 0, 1e30f, 0}; /* levels that do not halve within sight */
+    treepieces_lod lod = {{0, 0, 0}, 0, 1e30f, 0}; /* so far that the level never drops */
     treepieces_bake_desc desc;
     memset(&desc, 0, sizeof desc);
     lod.max_level = (float)j->level;
@@ -161,7 +162,7 @@ static void add_part(built *b, const mesh_data *mesh, const mesh_material *mater
     b->parts[b->scene.part_count++].material = material;
 }
 
-/* All trees as they are to be seen; a .ply has all in one mesh. */
+/* All trees in their final pose; for a .ply all in one mesh. */
 static int build_baked(tree_job *j, built *b) {
     const int is_ply = !strcmp(j->extension, ".ply");
     int status = CLI_DONE;
@@ -185,7 +186,7 @@ static int build_baked(tree_job *j, built *b) {
     return status;
 }
 
-/* A mesh of the library as one to be written; the arrays stay its own. */
+/* A view of a library mesh for the writer, which shares its arrays. */
 static int rigged_view(tree_job *j, const tree_rig *rig, const treepieces_mesh *from,
                        mesh_data *to) {
     to->vertex_count = from->vertex_count;
@@ -218,7 +219,7 @@ static int build_copies(tree_job *j, const float tint[3], built *b) {
     return status;
 }
 
-/* What a program that reads a .glb may want to know. */
+/* The extras of a .glb: species, seed, numbers of trees and pieces. */
 static int make_extras(tree_job *j, built *b) {
     const treepieces_forest *f = j->forest;
     char seed[24];
@@ -227,7 +228,7 @@ static int make_extras(tree_job *j, built *b) {
     for (int s = 0; s < j->species_count; s++)
         cJSON_AddItemToArray(names, cJSON_CreateString(j->species[s].name));
     snprintf(seed, sizeof seed, "%llu", (unsigned long long)j->run.seed);
-    cJSON_AddRawToObject(json, "seed", seed); /* a double has not room for all of them */
+    cJSON_AddRawToObject(json, "seed", seed); /* a double cannot hold all of them */
     cJSON_AddNumberToObject(json, "trees", f->tree_count);
     cJSON_AddNumberToObject(json, "pieces", f->node_count);
     b->extras = cJSON_PrintUnformatted(json);
@@ -326,7 +327,7 @@ static int grow_trees(tree_job *j, built *b) {
     return status;
 }
 
-/* What goes beside an .obj. */
+/* Name and announce the files beside an .obj. */
 static int name_files(tree_job *j) {
     char ending[32];
     if (strcmp(j->extension, ".obj") != 0) return CLI_DONE;
@@ -388,13 +389,13 @@ static int run_tree(int argc, char **argv) {
         {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
          &j->sheet, 128, 8192},
         {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
-        {CLI_INT, "--pieces", "N", "at most so many, 8 to 65535; default 600", &j->pieces, 8, 65535},
-        {CLI_INT, "--level", "N", "divide each side of the quads, 1 to 16; default 1", &j->level, 1,
+        {CLI_INT, "--pieces", "N", "at most so many pieces, 8 to 65535; default 600", &j->pieces, 8, 65535},
+        {CLI_INT, "--level", "N", "divide each side of the quads by N, 1 to 16; default 1", &j->level, 1,
          MAX_LEVEL},
         {CLI_FLAG, "--capped", NULL, "close the foot of the trunk as well", &j->capped, 0, 0},
-        {CLI_TEXT, "--wind", "SPEED", "metres a second, up to 50; default 0", &wind, 0, 0},
-        {CLI_TEXT, "--seconds", "S", "length of the clip, 1 to 60; default 4", &seconds, 0, 0},
-        {CLI_INT, "--rate", "FPS", "keys a second, 1 to 60; default 12", &j->rate, 1, 60},
+        {CLI_TEXT, "--wind", "SPEED", "metres per second, up to 50; default 0", &wind, 0, 0},
+        {CLI_TEXT, "--seconds", "S", "length of the animation, 1 to 60; default 4", &seconds, 0, 0},
+        {CLI_INT, "--rate", "FPS", "keys per second, 1 to 60; default 12", &j->rate, 1, 60},
         {CLI_TEXT, "--pose", "AMOUNT",
          "bend the joints at random by up to so many radians, 0 to 1", &bend, 0, 0},
         {CLI_INT, "--bones", "N", "at most so many joints; default: one per piece", &j->bones, 1,
@@ -427,18 +428,18 @@ static int run_forest(int argc, char **argv) {
          &j->species_list, 0, 0},
         {CLI_TEXT, "--spacing", "M", "metres between trees, 0.1 to 1000; default: by their height",
          &spacing, 0, 0},
-        {CLI_INT, "--pieces", "N", "at most so many a tree, 8 to 65535; default 600", &j->pieces, 8,
+        {CLI_INT, "--pieces", "N", "at most so many per tree, 8 to 65535; default 600", &j->pieces, 8,
          65535},
         {CLI_TILES, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
         {CLI_INPUT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
         {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
          &j->sheet, 128, 8192},
         {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
-        {CLI_INT, "--level", "N", ".obj, .ply: divide each side of the quads, 1 to 16; default 1",
+        {CLI_INT, "--level", "N", ".obj, .ply: divide each side of the quads by N, 1 to 16; default 1",
          &j->level, 1, MAX_LEVEL},
         {CLI_FLAG, "--capped", NULL, ".obj, .ply: close the feet of the trunks as well", &j->capped,
          0, 0},
-        {CLI_TEXT, "--wind", "SPEED", "bent as by wind, metres a second, up to 50; default 0", &wind,
+        {CLI_TEXT, "--wind", "SPEED", "bend as in wind of so many metres per second, up to 50; default 0", &wind,
          0, 0},
         {CLI_TEXT, "--pose", "AMOUNT", "bend the joints at random by up to so many radians, 0 to 1",
          &bend, 0, 0},

@@ -1,9 +1,9 @@
 /* tree.h - what the files of 'texkit tree' and 'texkit forest' share
    SPDX-License-Identifier: MIT OR Unlicense
 
-   tree_job.c reads the species, grows and poses. On it stand tree_looks.c, the pictures of bark and
-   leaves; tree_rig.c, the skeleton and its animation; tree_copies.c, the instances of a forest. On
-   these stands tree.c, which bakes, writes and holds the commands. Calls run only downward.     */
+   tree_job.c reads the species, grows and poses. Above it are tree_looks.c, the pictures of bark
+   and leaves; tree_rig.c, the skeleton and its animation; and tree_copies.c, the instances of a
+   forest. At the top tree.c bakes, writes and holds the commands. Calls only run downward.      */
 #ifndef TREE_H
 #define TREE_H
 
@@ -14,8 +14,8 @@
 enum {
     MAX_SPECIES = 8, /* of a forest                                                         */
     CLOUDS = 3,      /* different leaf clouds of a forest of one species                    */
-    BARK_TILES = 8,  /* that are drawn where the user has none                              */
-    WARM_UP = 300    /* tenths of a second: then the sway has forgotten that all stood still */
+    BARK_TILES = 8,  /* drawn if the user gives none                                        */
+    WARM_UP = 300    /* tenths of a second until the swaying no longer depends on its start */
 };
 
 /* A picture that goes with the mesh, as PNG. */
@@ -41,7 +41,7 @@ typedef struct tree_job {
     int species_count;
     treepieces_kit *kit;
     treepieces_forest *forest;
-    float *rest, *posed; /* bones; posed: by --pose, and if baked by --wind */
+    float *rest, *posed; /* bones; posed: by --pose and, if baked, by --wind */
 
     char mtl_path[MAX_PATH]; /* beside an .obj */
 
@@ -58,10 +58,10 @@ void free_tree_job(tree_job *j);
 
 int tree_is_glb(const tree_job *j);
 
-/* All species of --species. */
+/* Read all species of --species. */
 int tree_read_species(tree_job *j);
 
-/* The trees, and their bones. */
+/* Grow the trees and compute their bones. */
 int tree_grow(tree_job *j);
 
 /* The steady and the gusty part of --wind. */
@@ -95,12 +95,12 @@ typedef struct tree_rig {
 int tree_make_rig(tree_job *j, tree_rig *rig);
 void tree_free_rig(tree_rig *rig);
 
-/* Joints and weights of a baked mesh in the rig's numbers. */
+/* Joints and weights of a baked mesh, with the joint numbers of the rig. */
 int tree_bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to);
 
 /* ---- tree_copies.c ---- */
 
-/* A forest as copies of pieces and of leaf clouds. */
+/* A forest as instances of pieces and leaf clouds. */
 typedef struct tree_copies {
     mesh_instances list[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS];
     mesh_data meshes[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS];

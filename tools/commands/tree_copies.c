@@ -1,10 +1,10 @@
-/* tree_copies.c - 'texkit forest' as instances: copies of few pieces and leaf clouds
+/* tree_copies.c - a forest as instances of a few pieces and leaf clouds
    SPDX-License-Identifier: MIT OR Unlicense
 
-   A copy is placed by translation, rotation and scale, so pieces are rigid: all of a kind have one
-   shape, the mean of them, and where a branch bends more or less than in the mean, the rim of a
-   piece and that of the next one differ. Every piece therefore begins a little before its root rim,
-   inside of the piece below.                                                                     */
+   An instance is placed by translation, rotation and scale, so pieces are rigid: all of one type
+   have the mean shape, and where a branch bends more or less than the mean, the rims of adjacent
+   pieces do not meet. Every piece therefore begins a little before its root rim, inside the piece
+   below.                                                                                         */
 #include "tree.h"
 
 #include <stdio.h>
@@ -67,15 +67,15 @@ static void place_copy(const mesh_instances *t, size_t i, const float place[3], 
 
 /* ---- pieces -------------------------------------------------------------------------------- */
 
-/* A corner of a triangle with its place in the sheet. */
+/* Add a corner of a triangle with its texture coordinates. */
 static void put_corner(mesh_data *m, size_t *corner, uint32_t vertex, const float uv[2]) {
     m->indices[*corner] = vertex;
     memcpy(m->uvs + 2 * *corner, uv, 2 * sizeof(float));
     ++*corner;
 }
 
-/* The mean shape of a kind of piece: how its instances look in their own frame, thick ones counting
-   more. What the branches on it are like is in the mean, so that their rims about fit. */
+/* The mean shape of a type of piece in its own frame, weighted by thickness. It includes the mean
+   direction of its branches, so that their rims fit approximately. */
 static void mean_shape(const tree_job *j, int type, int vertices, mesh_data *m) {
     const treepieces_batch *b = &j->forest->batches[type];
     const uint32_t step = b->count / SAMPLED + 1;
@@ -96,7 +96,7 @@ static void mean_shape(const tree_job *j, int type, int vertices, mesh_data *m) 
                 facing += axis * (double)normals[first + r];
             }
             place[v] += weight * along / square;
-            normal[v] += facing; /* as much as the piece is large */
+            normal[v] += facing; /* weighted by the size of the piece */
         }
         weights += weight;
     }
@@ -110,7 +110,7 @@ static void mean_shape(const tree_job *j, int type, int vertices, mesh_data *m) 
     }
 }
 
-/* A kind of piece with the tiles of one of its instances, and the sleeve below its root rim. */
+/* A type of piece with the tiles of one of its instances, and the sleeve below its root rim. */
 static int make_piece(tree_job *j, int type, mesh_data *m) {
     static const int order[6] = {0, 1, 2, 0, 2, 3};
     const treepieces_piece *p = treepieces_kit_piece(j->kit, type);
@@ -149,7 +149,7 @@ static int make_piece(tree_job *j, int type, mesh_data *m) {
     return CLI_DONE;
 }
 
-/* Per node of the forest the species of its tree; NULL without memory. */
+/* The species of each node of the forest; NULL without memory. */
 static unsigned char *list_species(const tree_job *j) {
     const treepieces_forest *f = j->forest;
     unsigned char *species = (unsigned char *)new_array(f->node_count, 1);
@@ -158,7 +158,7 @@ static unsigned char *list_species(const tree_job *j) {
     return species;
 }
 
-/* What the picture's color is to be multiplied by to give the species' bark. */
+/* The factor from the picture's color to the species' bark. */
 static void bark_factor(const treepieces_species *species, const float tint[3],
                         unsigned char factor[4]) {
     for (int k = 0; k < 3; k++) {
@@ -222,8 +222,8 @@ static int make_cloud(tree_job *j, const treepieces_species *species, uint32_t l
     return status;
 }
 
-/* A cloud lies as treepieces_bake_leaves has it, but turned about y by one of eight turns: there are
-   fewer of them here. */
+/* A cloud is placed as in treepieces_bake_leaves, and turned about y by one of eight turns, since
+   there are fewer different clouds here. */
 static void place_cloud(const tree_job *j, const treepieces_cluster *c, const mesh_instances *t,
                         size_t i) {
     static const double eighths[8] = {0, 0.38268343236508977, 0.70710678118654752, 0.92387953251128676,

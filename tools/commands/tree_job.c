@@ -1,4 +1,4 @@
-/* tree_job.c - what 'texkit tree' and 'texkit forest' begin with: species, grown trees, their bones
+/* tree_job.c - species, grown trees and their bones for 'texkit tree' and 'texkit forest'
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "tree.h"
 #include "files/image_io.h"
@@ -44,7 +44,7 @@ int tree_is_glb(const tree_job *j) {
 
 /* ---- species ------------------------------------------------------------------------------- */
 
-/* A built-in species, or one from a file: names with a dot or a slash are files. */
+/* A built-in species, or one from a file: a name with a dot or a slash is a file. */
 static int read_species(tree_job *j, const char *name, treepieces_species *species) {
     size_t size;
     if (!strpbrk(name, "./"))
@@ -100,8 +100,8 @@ static int grow(tree_job *j) {
                         j->species[0].name);
 }
 
-/* Bones as the trees are to be seen: posed, and in the wind unless that is a clip of a rig, which needs
-   those at rest too. */
+/* The bones in their final pose, with the wind unless that is an animation of a rig, which needs the
+   bones at rest too. */
 static int pose(tree_job *j) {
     const treepieces_pose bent = {j->run.seed, (float)j->pose, NULL};
     const size_t nodes = j->forest->node_count;
@@ -136,7 +136,6 @@ static void grown_figures(tree_job *j) {
     cli_figure(&j->run, "bytes_per_tree", (double)f->bytes / f->tree_count);
 }
 
-/* The trees, and their bones. */
 int tree_grow(tree_job *j) {
     cli_stage(&j->run, "grow");
     int status =
@@ -150,7 +149,7 @@ int tree_grow(tree_job *j) {
 
 /* ---- bones --------------------------------------------------------------------------------- */
 
-/* The columns X, Y, Z of a bone are at right angles; made unit vectors they are a rotation. */
+/* The columns X, Y, Z of a bone are at right angles; as unit vectors they are a rotation. */
 txm_quat tree_bone_rotation(const float *bone) {
     txm_dvec3 axis[3];
     for (int c = 0; c < 3; c++) axis[c] = txm_d3_unit(txm_d3(bone[c], bone[4 + c], bone[8 + c]));

@@ -1,4 +1,4 @@
-/* tree_looks.c - the pictures of 'texkit tree': bark out of tiles, leaves
+/* tree_looks.c - the pictures of 'texkit tree': bark from tiles, leaves
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "tree.h"
 #include "files/image_io.h"
@@ -18,7 +18,7 @@ static int encode(tree_job *j, const txm_image *image, const char *kind, int s, 
     return CLI_DONE;
 }
 
-/* So many square pictures in one block, for free(), or NULL. */
+/* So many square pictures in one block, for free(); NULL after a message. */
 static unsigned char *new_tiles(tree_job *j, txm_image *tiles, int count, int side, int channels) {
     const size_t size = (size_t)side * (size_t)side * (size_t)channels;
     unsigned char *block = (unsigned char *)new_array((size_t)count, size);
@@ -38,7 +38,7 @@ typedef struct tile_list {
     int x[MAX_TILES], y[MAX_TILES], count, size;
 } tile_list;
 
-/* All tiles with the edges of the first. 0 with *why if these are none for bark. */
+/* All tiles with the edges of the first. 0 with *why if the set is not one for bark. */
 static int list_tiles(const cJSON *json, const txm_image *atlas, tile_list *t, const char **why) {
     const cJSON *kind = cJSON_GetObjectItemCaseSensitive(json, "kind");
     const cJSON *tiles = cJSON_GetObjectItemCaseSensitive(json, "tiles"), *tile;
@@ -63,11 +63,11 @@ static int list_tiles(const cJSON *json, const txm_image *atlas, tile_list *t, c
     }
     if (t->count == 0) return 0;
     if (first[0] != first[2] || first[1] != first[3])
-        return *why = "the first tile does not go on in itself; make the set without --classes", 0;
+        return *why = "the first tile does not continue across its own edges; make the set without --classes", 0;
     return 1;
 }
 
-/* A square of the atlas, made smaller by averages. */
+/* A square of the atlas, reduced by averaging. */
 static void reduce_tile(const txm_image *atlas, int x0, int y0, int size, const txm_image *out) {
     const int channels = out->channels;
     const double step = (double)size / out->width;
@@ -124,7 +124,7 @@ static int read_tiles(tree_job *j, int side, txm_image *tiles, int *count, unsig
     return status;
 }
 
-/* Tiles that are drawn, in *block for free(). */
+/* Draw tiles, in *block for free(). */
 static int draw_tiles(tree_job *j, const treepieces_species *species, int side, txm_image *tiles,
                       unsigned char **block) {
     *block = new_tiles(j, tiles, BARK_TILES, side, 3);
@@ -184,7 +184,7 @@ static int make_leaves(tree_job *j, int s) {
 
 /* ---- all species ----------------------------------------------------------------------------- */
 
-/* Of all species the brightest bark in each channel: what copies darken each to its own. */
+/* The brightest bark of all species in each channel; instances darken it to their own color. */
 static void brightest_bark(const tree_job *j, float color[3]) {
     memcpy(color, j->species[0].bark_color, 3 * sizeof(float));
     for (int s = 1; s < j->species_count; s++)
@@ -196,7 +196,6 @@ int tree_has_one_bark(const tree_job *j) {
     return j->tiles || tree_is_glb(j);
 }
 
-/* Is a picture made of the bark of species s? */
 int tree_has_bark(const tree_job *j, int s) {
     return s == 0 || !tree_has_one_bark(j);
 }
@@ -211,7 +210,6 @@ static void set_material(const tree_job *j, const picture *p, int is_cut_out, me
     m->png_size = p->size;
 }
 
-/* Bark and leaves, but for a .ply, which shows none. */
 int tree_dress(tree_job *j, float tint[3]) {
     int status = CLI_DONE;
     brightest_bark(j, tint);

@@ -1,9 +1,9 @@
 /* tree_rig.c - the skeleton of 'texkit tree' and its animation by the wind
    SPDX-License-Identifier: MIT OR Unlicense
 
-   A joint is a piece without its stretch: position and rotation of its bone. Joints of thin pieces
-   can be left out; their pieces move with the nearest joint below. As a piece is left out only with
-   all that grows on it, no joint moves against its parent, it only turns.                        */
+   A joint is the position and rotation of a piece's bone, without its stretch. Joints of thin pieces
+   can be left out; their pieces move with the nearest joint below. Since a piece is left out only
+   together with all that grows on it, joints only rotate relative to their parents.              */
 #include "tree.h"
 
 #include <stdio.h>
@@ -36,7 +36,7 @@ static void store_place(float *to, txm_dvec3 v) {
 /* ---- joints -------------------------------------------------------------------------------- */
 
 typedef struct ranked {
-    float radius; /* the least on the way down to the ground */
+    float radius; /* the smallest of this piece and all below it */
     uint32_t node;
 } ranked;
 
@@ -46,8 +46,8 @@ static int compare_ranked(const void *a, const void *b) {
     return x->node > y->node ? 1 : -1;
 }
 
-/* joint_of for the `most` thickest pieces, and for the others that of the piece they stand on. As
-   no piece ranks before its parent, what is kept hangs together. */
+/* joint_of for the `most` thickest pieces; the others get that of the piece they stand on. No piece
+   ranks before its parent, so the kept pieces are connected. */
 static int choose_joints(tree_job *j, tree_rig *rig, uint32_t most) {
     const treepieces_node *nodes = j->forest->nodes;
     const uint32_t count = j->forest->node_count;
@@ -75,7 +75,7 @@ static int choose_joints(tree_job *j, tree_rig *rig, uint32_t most) {
     return CLI_DONE;
 }
 
-/* Is the node the one that its joint was made for? */
+/* Was a joint made for this node? */
 static int is_joint(const tree_job *j, const tree_rig *rig, uint32_t node) {
     const int32_t parent = j->forest->nodes[node].parent;
     return parent < 0 || rig->joint_of[node] != rig->joint_of[parent];
@@ -101,7 +101,7 @@ static void make_joint(const tree_job *j, const tree_rig *rig, uint32_t node, me
     }
     store_rotation(joint->rotation, local, 1);
 
-    /* from the mesh, which is at rest, into the joint: turned back about its place */
+    /* from the mesh at rest into the joint: the inverse of its position and rotation */
     const txm_quat back = txm_quat_conjugate(tree_bone_rotation(rest));
     memset(joint->bind, 0, sizeof joint->bind);
     for (int c = 0; c < 3; c++)
@@ -112,8 +112,8 @@ static void make_joint(const tree_job *j, const tree_rig *rig, uint32_t node, me
 
 /* ---- the wind ------------------------------------------------------------------------------ */
 
-/* The joints' rotations of one moment into place `key` of lists of `stride` rotations each, of the
-   sign that is next to `before`, or to the joint's own if that is NULL. */
+/* Store the joints' rotations of one moment as key `key` of lists of `stride` rotations each. Signs
+   are chosen nearest to `before`, or to the joint's own rotation if that is NULL. */
 static void store_turns(const tree_job *j, const tree_rig *rig, const float *bones, float *turns,
                         size_t stride, size_t key, const float *before, size_t before_stride) {
     for (uint32_t i = 0; i < j->forest->node_count; i++) {
@@ -131,7 +131,7 @@ static void store_turns(const tree_job *j, const tree_rig *rig, const float *bon
     }
 }
 
-/* The last keys turn into what was before the first, so that the clip goes on without a step:
+/* Blend the last keys into those before the first, so that the animation loops seamlessly:
 
        key K - blend + i  =  mix(itself, lead i, i / blend),  lead `blend` = key 0             */
 static void close_loop(const tree_rig *rig, const float *lead, int blend) {
@@ -153,14 +153,14 @@ static void close_loop(const tree_rig *rig, const float *lead, int blend) {
     }
 }
 
-/* Let it sway: first until it has forgotten its beginning, then `blend` keys ahead, then the clip. */
+/* Simulate: first until the start no longer matters, then `blend` keys ahead, then the animation. */
 static int record(tree_job *j, tree_rig *rig, float *state, float *bones, float *lead, int blend) {
     const treepieces_wind wind = tree_wind(j);
     const treepieces_pose pose = {j->run.seed, (float)j->pose, NULL};
     const int keys = rig->skeleton.key_count;
     const double step = 1.0 / j->rate, start = -(blend + 1) * step + 0.1;
     txm_status result = TXM_OK;
-    size_t key = 0; /* of all, those ahead included */
+    size_t key = 0; /* counted from the first of those ahead */
     for (int i = WARM_UP; i > 0 && result == TXM_OK; i--)
         result = treepieces_sway(j->forest, &wind, start - 0.1 * i, 0.1, &pose, &j->run.env, state,
                                  bones);

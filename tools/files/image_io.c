@@ -52,9 +52,9 @@ unsigned char *file_read(const char *path, size_t *size) {
 
 /* ---- reading ---------------------------------------------------------------------------- */
 
-/* stb_image puts zeros where a JPEG, BMP, TGA or PNM ends too early, and calls it a picture. Fed
-   through this reader, a decoder that asks for more than there is gives itself away. Only its
-   look-ahead buffer, which it fills first of all, may well get less than it has room for. */
+/* Where a JPEG, BMP, TGA or PNM ends too early, stb_image fills in zeros without an error. This
+   reader notices when a decoder asks for more bytes than there are. Only the look-ahead buffer,
+   which is filled first, may get fewer than it has room for. */
 typedef struct reader {
     const unsigned char *bytes;
     size_t size, at;
@@ -242,7 +242,7 @@ static void sink_write(void *user, void *data, int size) {
     s->size += n;
 }
 
-/* PNG's numbers have their high byte first. */
+/* Numbers in PNG are big-endian. */
 static void put_number(unsigned char *to, uint32_t value) {
     for (int i = 0; i < 4; i++) to[i] = (unsigned char)(value >> (24 - 8 * i) & 255);
 }
@@ -265,7 +265,7 @@ static void put_chunk(sink *s, const char *name, unsigned char *data, int size) 
     sink_write(s, tail, 4);
 }
 
-/* what PNG's filter 4 expects of a byte from those to the left, above, and above to the left */
+/* PNG's filter 4 (Paeth): predicts a byte from those to the left, above, and above left */
 static int paeth(int a, int b, int c) {
     const int pa = abs(b - c), pb = abs(a - c), pc = abs(a + b - 2 * c);
     return pa <= pb && pa <= pc ? a : pb <= pc ? b : c;
@@ -290,7 +290,7 @@ static int write_png16(sink *s, const txm_image *image) {
             *to++ = (unsigned char)(from[i] & 255);
         }
     }
-    for (int y = image->height - 1; y >= 0; y--) { /* from the end: filters look at bytes before */
+    for (int y = image->height - 1; y >= 0; y--) { /* backwards: filters use the bytes before */
         unsigned char *p = data + (size_t)y * row;
         const unsigned char *up = y ? p - row : p;
         for (size_t x = row - 1; x > 0; x--) {

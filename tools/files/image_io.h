@@ -3,7 +3,7 @@
 
    Reads PNG, JPEG, BMP, TGA and binary PNM with 1, 3 or 4 channels; gray with alpha becomes RGBA,
    16 bits become 8 unless a function says otherwise. Writes PNG, TGA, BMP and JPEG. Where a
-   function fails, *why is set to an English phrase that fits behind "cannot read 'x.png': ".    */
+   function fails, *why is set to an English phrase that fits after "cannot read 'x.png': ".     */
 #ifndef IMAGE_IO_H
 #define IMAGE_IO_H
 
@@ -26,7 +26,7 @@ int image_decode(const unsigned char *bytes, size_t size, int channels, txm_imag
 /* The same from a path. */
 int image_read(const char *path, int channels, txm_image *image, const char **why);
 
-/* Both keeping the depth: TXM_U16 if the file has 16 bits a sample, TXM_U8 otherwise. */
+/* The same, but keeping the depth: TXM_U16 if the file has 16 bits per sample, else TXM_U8. */
 int image_decode_deep(const unsigned char *bytes, size_t size, int channels, txm_image *image,
                       const char **why);
 int image_read_deep(const char *path, int channels, txm_image *image, const char **why);
@@ -36,8 +36,8 @@ int image_new(int width, int height, int channels, txm_sample sample, txm_image 
 
 void image_free(txm_image *image);
 
-/* Can a path that ends in this extension (".png") take a width x height picture with so many
-   channels? 0 for one or all of them: not known yet. */
+/* Can the format of this extension (".png") hold a width x height picture with so many channels?
+   Each may be 0: not known yet. */
 int image_can_write(const char *extension, int width, int height, int channels, const char **why);
 
 /* Encode for that extension into a block for free(). Samples are TXM_U8, for ".png" also TXM_U16,

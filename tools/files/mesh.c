@@ -54,12 +54,10 @@ void mesh_free(mesh_data *mesh) {
 
 /* ---- what a scene holds ------------------------------------------------------------------ */
 
-/* The surface is a part as well, the first. */
 int scene_part_count(const mesh_scene *scene) {
     return scene->part_count + (scene->surface != NULL);
 }
 
-/* Its material, if it is the surface, is made in *own. */
 mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own) {
     mesh_part part;
     if (!scene->surface) return scene->parts[i];

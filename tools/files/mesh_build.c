@@ -5,7 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-enum { MAX_EARS = 1000 }; /* corners; longer polygons are taken for convex: ears take n^2 steps */
+enum { MAX_EARS = 1000 }; /* corners; longer polygons are treated as convex: ears take n^2 steps */
 
 /* ---- what a reader has gathered ---------------------------------------------------------- */
 
@@ -120,7 +120,7 @@ static int add_triangle(builder *b, corner x, corner y, corner z) {
     return 1;
 }
 
-/* Convex polygons become fans; of the others ears are cut off as long as there are any. */
+/* Convex polygons become fans; from others ears are cut off while there are any. */
 static int triangulate(builder *b, const corner *p, size_t n) {
     if (n == 3) return add_triangle(b, p[0], p[1], p[2]);
     size_t left = n, *around = NULL;
@@ -155,7 +155,6 @@ static int triangulate(builder *b, const corner *p, size_t n) {
     return 1;
 }
 
-/* Check what the polygons refer to, now that all of the file is known, and make triangles. */
 int builder_triangulate(builder *b) {
     const polygon *polygons = (const polygon *)b->polygons.items;
     const corner *corners = (const corner *)b->corners.items;
@@ -184,7 +183,6 @@ static void *take(list *l) {
     return items;
 }
 
-/* The lists as a mesh. */
 int builder_finish(builder *b) {
     mesh_data *mesh = b->mesh;
     const size_t count = b->triangles.count;

@@ -28,14 +28,14 @@ static uint64_t hash_corner(const mesh_data *m, size_t c, int by) {
         memcpy(bits, m->uvs + 2 * c, sizeof bits);
         key = txm_hash(key ^ ((uint64_t)bits[0] << 32 | bits[1]));
     }
-    if (by & BY_NORMAL) { /* two of three will do */
+    if (by & BY_NORMAL) { /* two of the three suffice */
         memcpy(bits, m->corner_normals + 3 * c, sizeof bits);
         key = txm_hash(key ^ ((uint64_t)bits[0] << 32 | bits[1]));
     }
     return key;
 }
 
-/* A table twice as large as the number of corners, places tried one after the other. */
+/* A hash table with at least two places per corner and linear probing. */
 int split_corners(const mesh_data *m, int by, split *s) {
     const size_t corners = 3 * m->triangle_count;
     size_t size = 16, bytes;

@@ -10,7 +10,7 @@
 
 static const uint32_t NO_UV = 0xffffffffu;
 
-/* Rows of pictures run down, v in OBJ and PLY files runs up: from either to the other. */
+/* In memory v runs downwards, in OBJ and PLY files upwards; converts either way. */
 static inline float turn_v(float v) {
     return 1 - v;
 }
@@ -112,7 +112,7 @@ typedef struct sink {
 sink sink_new(void);
 void sink_put(sink *s, const void *bytes, size_t n);
 
-/* Text; formatted numbers and our own words, at most 200 characters. */
+/* Formatted text of at most 255 characters; more is cut off. */
 void sink_print(sink *s, const char *format, ...)
 #ifdef __GNUC__
     __attribute__((format(printf, 2, 3)))
@@ -132,11 +132,11 @@ int sink_finish(sink *s, unsigned char **bytes, size_t *size, const char **why);
 /* What makes corners differ. */
 enum { BY_VERTEX = 1, BY_UV = 2, BY_NORMAL = 4 };
 
-/* Of each corner, which of the distinct ones it is; and of each distinct one a corner that has it. */
+/* The distinct corners of a mesh. */
 typedef struct split {
-    uint32_t *index; /* 1 per corner            */
-    uint32_t *first; /* 1 per distinct corner   */
-    size_t count;    /* of distinct corners     */
+    uint32_t *index; /* per corner: the distinct corner that it equals */
+    uint32_t *first; /* per distinct corner: a corner that equals it   */
+    size_t count;    /* of distinct corners                            */
 } split;
 
 void split_free(split *s);
@@ -144,8 +144,8 @@ void split_free(split *s);
 /* 0: no memory */
 int split_corners(const mesh_data *m, int by, split *s);
 
-/* A mesh as PLY and GLB have it: all is per vertex. Where nothing is per corner it is the mesh itself;
-   else vertices are doubled as need be, and unused ones left out. */
+/* A mesh as in PLY and GLB, with all attributes per vertex. If the mesh has none per corner it is
+   unchanged; else vertices are duplicated where needed, and unused ones are left out. */
 typedef struct flat_mesh {
     const mesh_data *mesh;
     split split;
@@ -159,10 +159,10 @@ uint32_t flat_index(const flat_mesh *f, size_t corner_index);
 
 /* ---- what a scene holds: mesh.c ---------------------------------------------------------- */
 
-/* The surface is a part as well, the first. */
+/* The number of parts. The surface, if there is one, is the first. */
 int scene_part_count(const mesh_scene *scene);
 
-/* Its material, if it is the surface, is made in *own. */
+/* Part i; if it is the surface, its material is made in *own. */
 mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own);
 
 /* ---- the formats ------------------------------------------------------------------------- */

@@ -52,7 +52,7 @@ static int glb_accessor(glb *g, size_t start, int target, int component, size_t 
     return g->accessor_count++;
 }
 
-/* Its number among the materials of the document; past the last there is room for no more. */
+/* Its number among the materials of the document; the last one if there is no room for more. */
 static int glb_material(glb *g, const mesh_material *material) {
     int i = 0;
     while (i < g->material_count && g->materials[i] != material) i++;
@@ -61,7 +61,7 @@ static int glb_material(glb *g, const mesh_material *material) {
     return i;
 }
 
-/* glTF wants unit normals, and finds fault with zero. */
+/* glTF requires unit normals, so zero becomes another one. */
 static void put_normal(sink *s, const float *n) {
     const double x = (double)n[0], y = (double)n[1], z = (double)n[2];
     const double length = sqrt(x * x + y * y + z * z);
@@ -74,7 +74,7 @@ static void put_normal(sink *s, const float *n) {
     sink_floats(s, unit, 3);
 }
 
-/* sRGB to linear, in 16 bits lest dark colors run together. */
+/* sRGB to linear, in 16 bits so that dark colors stay distinct. */
 static void put_color(sink *s, const unsigned char *c) {
     for (int k = 0; k < 3; k++) {
         const float linear = txm_srgb_to_linear((float)c[k] / 255.0f);
@@ -83,8 +83,8 @@ static void put_color(sink *s, const unsigned char *c) {
     sink_u16(s, (uint32_t)c[3] * 257);
 }
 
-/* Joints and weights. The rounded weights of a vertex need not sum up to 1: the largest takes up the
-   rest. A joint without weight is joint 0, lest validators warn. */
+/* Joints and weights. Rounded weights may not sum up to 1: the largest takes the difference. A joint
+   without weight is written as joint 0, as validators require. */
 static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
     sink *bin = &g->binary, *s = &g->meshes;
     size_t start = bin->bytes.count;
@@ -201,7 +201,7 @@ static int glb_instances(glb *g, const mesh_instances *t) {
         sink_print(s, "%s\"%s\":%d", written++ ? "," : "", lists[k].name,
                    glb_accessor(g, start, 0, GL_FLOAT, t->count, lists[k].type, NULL));
     }
-    if (t->colors) { /* three floats: what viewers that know it at all can read */
+    if (t->colors) { /* three floats, which all viewers that support it can read */
         const size_t start = bin->bytes.count;
         for (size_t i = 0; i < t->count; i++) {
             float linear[3];
@@ -286,8 +286,8 @@ static void print_uri(sink *s, const char *name) {
     }
 }
 
-/* A PNG with nothing but its pixels: glTF ignores what it says of color spaces and pixel shapes, and
-   a validator warns of that. What is no whole PNG stays as it is. */
+/* A PNG without ancillary chunks: glTF ignores color spaces and pixel shapes in it, and validators
+   warn about them. What is not a complete PNG stays as it is. */
 static void put_png(sink *s, const unsigned char *png, size_t size) {
     static const char *const kept[] = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"};
     size_t at = 8;

@@ -3,19 +3,19 @@
 
    Reads OBJ and PLY (ascii and binary); writes OBJ with its material, PLY and GLB (glTF 2.0). Where
    a function fails it returns 0, nothing stays allocated, and *why is set to an English phrase that
-   fits behind "cannot read 'x.obj': "; the phrase may lie in the mesh's own message.
+   fits after "cannot read 'x.obj': "; it may point to the mesh's own message.
 
    Texture coordinates: in memory v runs downwards, as rows of pictures do, and as glTF and
-   textiles.h have it. In OBJ and PLY files v runs upwards. One function in mesh_file.h, turn_v,
-   stands between the two, and nothing else converts.
+   textiles.h have it. In OBJ and PLY files v runs upwards. Only turn_v in mesh_file.h converts
+   between the two.
 
-   Colors: 8 bits as in pictures, that is sRGB; GLB, which has them linear, gets them so.         */
+   Colors: 8 bits in sRGB, as in pictures; a GLB gets them linear, as glTF requires.              */
 #ifndef MESH_IO_H
 #define MESH_IO_H
 
 #include "texmath.h"
 
-/* A triangle mesh, or a list of points. What reads one fills it whole; mesh_free releases it. */
+/* A triangle mesh, or a list of points. Readers fill in all fields; mesh_free releases it. */
 typedef struct mesh_data {
     size_t vertex_count, triangle_count; /* no triangles: a list of points                    */
     float *positions;                    /* 3 per vertex, finite                              */
@@ -46,7 +46,7 @@ typedef struct mesh_material {
     const char *texture; /* as that of mesh_scene, and the next two as well         */
     const unsigned char *png;
     size_t png_size;
-    int repeats;    /* from left to right the picture goes on in itself                             */
+    int repeats;    /* the picture's left and right borders fit together                            */
     int is_cut_out; /* where the picture's alpha is below 1/2 there is nothing; both sides are seen */
 } mesh_material;
 
@@ -68,7 +68,7 @@ typedef struct mesh_part {
     const mesh_material *material;
 } mesh_part;
 
-/* A joint of a skeleton, moved and turned against its parent. */
+/* A joint of a skeleton, placed relative to its parent. */
 typedef struct mesh_joint {
     char name[24];
     int parent; /* number of an earlier joint; the first: -1 */

@@ -81,7 +81,7 @@ static int read_obj_face(builder *b, text *in) {
             if (in->at < in->end && *in->at != '/' && !text_at_word_end(in->at, in->end))
                 ok = read_obj_index(in, b->uvs.count, &uv);
             if (ok && in->at < in->end && *in->at == '/') {
-                in->at++; /* how many normals there are nobody counts */
+                in->at++; /* normals are not read, so any index will do */
                 if (!text_at_word_end(in->at, in->end)) ok = read_obj_index(in, SIZE_MAX, &normal);
             }
         }

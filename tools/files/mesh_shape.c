@@ -68,7 +68,7 @@ int mesh_crease(mesh_data *m, float degrees) {
     return 1;
 }
 
-/* An octahedron, its eighths divided and blown up. */
+/* An octahedron whose eight faces are subdivided and projected onto the sphere. */
 int mesh_sphere(int steps, mesh_data *m) {
     const int n = steps, corners = (n + 1) * (n + 2) / 2;
     const size_t side = (size_t)steps;

@@ -48,7 +48,7 @@ int text_at_word_end(const char *p, const char *end) {
     return p == end || is_blank(*p) || *p == '\n' || *p == '\\';
 }
 
-/* What read_number cannot do exactly by itself. */
+/* For numbers that text_number cannot convert exactly itself. */
 static int read_number_slowly(text *in, double *value) {
     char word[512], *stop;
     size_t n = 0;
@@ -100,6 +100,6 @@ int text_number(text *in, double *value) {
 
 /* The same for a number that must be finite as a float. */
 int text_to_float(double value, float *to) {
-    *to = (float)value; /* beyond the largest: infinite, IEEE has no traps here */
+    *to = (float)value; /* too large: infinite, as in IEEE 754 */
     return txm_is_finite((double)*to);
 }

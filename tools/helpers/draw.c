@@ -1,4 +1,4 @@
-/* draw.c - draw an exemplar where no photograph is at hand: draw KIND OUT.png [SIDE [CHANNELS]]
+/* draw.c - draw an exemplar if there is no photograph: draw KIND OUT.png [SIDE [CHANNELS]]
    SPDX-License-Identifier: MIT OR Unlicense
 
    The pictures are the project's own, drawn with integers only, so they are the same everywhere.

@@ -1,8 +1,8 @@
 /* render.c - draws meshes to look at; render.h tells how it is used
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Everything is brought into the picture's plane once; then bands of rows, each by itself, take all
-   triangles that touch them. A band is all that is held in samples.                             */
+   All vertices are projected once; then each band of rows draws the triangles that touch it. Only
+   the samples of the bands being drawn are held in memory.                                      */
 #include "render.h"
 
 enum {
@@ -119,7 +119,7 @@ typedef struct picture {
     txm_image *out;
     unsigned char *shades; /* SHADES from linear light */
     float linear[256];
-    int failed; /* a band had no memory */
+    int failed; /* a band ran out of memory */
 } picture;
 
 static void set_axes(picture *p) {
@@ -458,7 +458,7 @@ static void draw_band(picture *p, int index) {
 
 /* ---- all of it ---------------------------------------------------------------------------- */
 
-/* The middle of the box around everything. */
+/* The centre of the bounding box. */
 static txm_vec3 centre_of(const picture *p) {
     double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
     int first = 1;

@@ -1,9 +1,9 @@
 /* render.h - draws meshes to look at: a small software rasteriser
    SPDX-License-Identifier: MIT OR Unlicense
 
-   The whole scene is framed by itself; depth is tested per sample, several samples make a pixel, all
-   sums are of linear light. Both sides of a triangle are shown alike. The picture is the same
-   whatever the number of threads.                                                              */
+   The camera is placed so that the whole scene is in the picture; depth is tested per sample, a pixel
+   has several samples, and sums are of linear light. Both sides of a triangle look the same. The
+   picture does not depend on the number of threads.                                                              */
 #ifndef RENDER_H
 #define RENDER_H
 

@@ -1,4 +1,4 @@
-/* shape.c - make a mesh where none is at hand: shape KIND OUT.obj [STEPS]; shape list
+/* shape.c - make a mesh for demo and tests: shape KIND OUT.obj [STEPS]; shape list
    SPDX-License-Identifier: MIT OR Unlicense
 
    The meshes are uneven on purpose, as meshes from modellers are: sphere and blob are grids of

@@ -42,7 +42,7 @@ static int read_float(const char *text, float *value) {
     return end != text && *end == 0 && txm_is_finite((double)*value);
 }
 
-/* Options with a number behind them. 1 if it is one. */
+/* Options that take a number. 1 if it is one. */
 static int number_option(options *o, const char *name, float **target) {
     if (!strcmp(name, "--azimuth")) *target = &o->desc.azimuth;
     else if (!strcmp(name, "--elevation")) *target = &o->desc.elevation;
@@ -212,7 +212,7 @@ static int write_picture(const char *path, const txm_image *picture) {
     return ok ? 0 : fail(path, "cannot write");
 }
 
-/* Read all that there is, and draw it. */
+/* Read everything and draw it. */
 static int draw(options *o, mesh_data *mesh, mesh_data *points, mesh_data *spheres,
                 txm_image *texture, txm_image *picture) {
     static const float nowhere[3] = {0, 0, 0};
