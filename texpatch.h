@@ -1095,8 +1095,8 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         for (int y = 0; y < k.height; y++) {
             for (int x = 0; x < k.width; x++) {
                 const uint8_t *p = txp_stack_at(s, t, x, y);
-                int sum = 0, n = 0;
-                for (int b = 0; b < s->guide_at && b < 3; b++, n++) sum += p[b];
+                int sum = p[0], n = 1; /* one map at least has a weight */
+                for (; n < s->guide_at && n < 3; n++) sum += p[n];
                 gray[y * k.width + x] = (int16_t)(sum / n - 128);
             }
         }
