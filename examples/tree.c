@@ -133,7 +133,7 @@ int main(int argc, char **argv) {
         return 2;
     }
     txm_env env = {0}; /* malloc, silent, one thread */
-    treepieces_species species;
+    treepieces_species species = {0};
     treepieces_kit *kit = NULL;
     treepieces_forest *tree = NULL;
     treepieces_forest_desc desc = {0}; /* zeros mean the defaults */
