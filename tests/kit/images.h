@@ -19,4 +19,10 @@ static inline txm_image view(void *pixels, int width, int height, int channels, 
     return im;
 }
 
+/* a byte that depends on the pixel and on which picture it is */
+static inline int at_random(int x, int y, int which) {
+    const uint64_t place = (uint64_t)(uint32_t)x << 32 | (uint32_t)y;
+    return (int)(txm_hash(place + 0x9e3779b97f4a7c15u * (uint64_t)(uint32_t)(which + 1)) >> 56);
+}
+
 #endif /* IMAGES_H */

@@ -75,7 +75,8 @@ static inline txm_image flipped(const txm_image *from) {
 }
 
 /* the same values in another sample type, times scale plus shift */
-static inline txm_image converted(const txm_image *from, txm_sample sample, float scale, float shift) {
+static inline txm_image converted(const txm_image *from, txm_sample sample, float scale,
+                                  float shift) {
     txm_image to = new_image(from->width, from->height, from->channels, sample);
     for (int y = 0; y < to.height; y++) {
         for (int x = 0; x < to.width; x++) {
@@ -143,11 +144,6 @@ static inline double mean_of(const txm_image *im, int c) {
 
 /* ---- exemplars -------------------------------------------------------------------------- */
 
-static inline int at_random(int x, int y, int which) {
-    const uint64_t place = (uint64_t)(uint32_t)x << 32 | (uint32_t)y;
-    return (int)(txm_hash(place + 0x9e3779b97f4a7c15u * (uint64_t)(uint32_t)(which + 1)) >> 56);
-}
-
 /* smooth noise 0..1 with features of size pixels */
 static inline double smooth(double x, double y, double size, int which) {
     const int ix = (int)floor(x / size), iy = (int)floor(y / size);
@@ -186,8 +182,9 @@ static inline txm_image draw_gravel(int width, int height, int channels, int whi
     return im;
 }
 
-/* Noise without any raster: random values seen through a disk, stretched, around a level. */
-static inline txm_image draw_noise(int width, int height, int channels, int which, int radius, int level) {
+/* Noise without a lattice: random values averaged over a disk, stretched, around a level. */
+static inline txm_image draw_noise(int width, int height, int channels, int which, int radius,
+                                   int level) {
     const txm_image im = new_image(width, height, channels, TXM_U8);
     uint8_t *to = (uint8_t *)im.pixels;
     for (int y = 0; y < height; y++) {
@@ -229,7 +226,7 @@ static inline txm_image draw_bricks(int width, int height, int step_x, int step_
     return im;
 }
 
-/* 16 bit: the number of each pixel, told once and no more */
+/* 16 bit: each pixel its own number */
 static inline txm_image draw_numbers(int width, int height) {
     const txm_image im = new_image(width, height, 1, TXM_U16);
     for (int i = 0; i < width * height; i++) ((uint16_t *)im.pixels)[i] = (uint16_t)(i + 1);
@@ -301,7 +298,7 @@ static inline texpatch_job *begin(const texpatch_desc *desc) {
     return job;
 }
 
-/* all steps that are left; how many there were */
+/* all steps that are left; returns how many */
 static inline int run(texpatch_job *job) {
     int steps = 0;
     for (int more = 1; more; steps++) {

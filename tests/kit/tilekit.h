@@ -41,11 +41,6 @@ static inline txm_image new_image(int width, int height, int channels, txm_sampl
 
 /* ---- exemplars ---------------------------------------------------------------------------- */
 
-static inline int at_random(int x, int y, int which) {
-    const uint64_t place = (uint64_t)(uint32_t)x << 32 | (uint32_t)y;
-    return (int)(txm_hash(place + 0x9e3779b97f4a7c15u * (uint64_t)(uint32_t)(which + 1)) >> 56);
-}
-
 /* Round blobs: random values seen through a disk, stretched. */
 static inline int draw_blobs(int x, int y, int c) {
     int sum = 0, n = 0;

@@ -199,7 +199,7 @@ static void test_control_refuses(void **state) {
     refuse_control(&c, 64, 64, TXM_TOO_LARGE);
     s = good_stroke;
 
-    /* edges that nobody found */
+    /* edges that were not found */
     odd = *e;
     odd.beside[0] = 9;
     c.edges = &odd;
@@ -295,7 +295,7 @@ static void test_misfortune(void **state) {
     texedges_set_free(t.blobs);
 }
 
-/* What is held while it works, per pixel, is what the header promises. */
+/* The memory in use, per pixel, is what the header says. */
 static void test_memory(void **state) {
     (void)state;
     task t;

@@ -48,7 +48,7 @@ static int count_crossings(const txm_vec2 *p, size_t n) {
     return found;
 }
 
-/* The exemplar that the strokes below take after, 4 layers. */
+/* The exemplar whose roughness the strokes below take on, 4 layers. */
 static texedges_set *find_blobs(uint64_t seed, double rough) {
     static uint8_t pixels[SIDE * SIDE];
     draw_blobs(pixels, SIDE, seed, rough);
@@ -88,10 +88,10 @@ static void test_disturb(void **state) {
                                          ((double)q.y - p[j].y) * ((double)q.y - p[j].y));
                 if (step > longest) longest = step;
             }
-            assert_true(longest < 3); /* closed as well: the last step is no longer than others */
+            assert_true(longest < 3); /* also from the last point to the first */
             assert_int_equal(count_crossings(p, line->count), 0);
         }
-        assert_true(strays / points > 0.3); /* and it does stray */
+        assert_true(strays / points > 0.3); /* and it is disturbed */
 
         /* the guide's edge is where the strokes are: on both sides of 90 % of their length */
         guide_of(&c, lines, guide, mask);
@@ -196,7 +196,7 @@ static void test_disturb_seeds(void **state) {
     assert_memory_equal(a->points, b->points, a->lines[0].count * sizeof *a->points);
     texedges_set_free(b);
 
-    /* more and less of it */
+    /* more and less disturbance */
     double stray[3];
     for (int k = 0; k < 3; k++) {
         c.disturb = k == 0 ? 0.25f : k == 1 ? 1.0f : 4.0f;
@@ -257,7 +257,7 @@ static void test_disturb_none(void **state) {
 
 enum { BINS = 16 };
 
-/* blur by weights radius + 1 - |d|; open lines near their ends by less */
+/* blur with weights radius + 1 - |d|; with a smaller radius near the ends of open lines */
 static void blur(const double *from, double *to, int n, int is_closed, int radius) {
     for (int i = 0; i < n; i++) {
         double sum = 0, weights = 0;
@@ -286,7 +286,7 @@ static void count_directions(double *x, double *y, int n, int is_closed, double 
         length += hypot(u[i % n] - u[i - 1], v[i % n] - v[i - 1]);
     const int m = (int)(length + 0.5);
     if (m < 64) return;
-    for (int k = 0, j = 0; k < m; k++) { /* a point each pixel; x and y have done their duty */
+    for (int k = 0, j = 0; k < m; k++) { /* a point each pixel, into x and y */
         const double at = length * k / m;
         double span = hypot(u[(j + 1) % n] - u[j], v[(j + 1) % n] - v[j]);
         while (at > from + span && j + 1 < n) {
@@ -355,8 +355,8 @@ static double chi_square(const double *a, const double *b) {
     return sum;
 }
 
-/* The directions along disturbed strokes are those along the exemplar's edges: not much farther from
-   them than its left half is from its right half. Both of the lines themselves and of the edges that
+/* The directions along disturbed strokes are those along the exemplar's edges: not much farther
+   from them than its left half is from its right half. Both of the lines and of the edges that
    are found in the guide. */
 static void test_statistics(void **state) {
     (void)state;
@@ -531,7 +531,7 @@ static void test_guide_free(void **state) {
     }
     texedges_set_free(lines);
 
-    c.stroke_count = 0; /* nothing drawn, nothing said */
+    c.stroke_count = 0; /* no strokes: the guide counts nowhere */
     lines = disturb(&c, W, H);
     guide_of(&c, lines, guide, mask);
     for (int p = 0; p < W * H; p++) assert_int_equal(mask[p], 0);

@@ -1,13 +1,13 @@
-/* test_texpatch_again.c - a part of a finished texture made anew
+/* test_texpatch_again.c - a part of a finished texture made again
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_again && build/tests/unit/test_texpatch_again */
 #define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
-/* ---- a part anew ------------------------------------------------------------------------ */
+/* ---- a part made again ------------------------------------------------------------------ */
 
-/* Draw after each step: outside of the part nothing changes, inside all is the exemplar's. */
+/* Draw after each step: outside the part nothing changes, inside all pixels are the exemplar's. */
 static void run_part(texpatch_job *job, const txm_image maps[2], const txm_image *again,
                      const txm_image before[2]) {
     const int w = again->width, h = again->height;
@@ -33,7 +33,7 @@ static void run_part(texpatch_job *job, const txm_image maps[2], const txm_image
         }
     }
     assert_true(steps > 1);
-    assert_int_equal(run(job), 1); /* and then nothing is left to do */
+    assert_int_equal(run(job), 1); /* nothing is left to do */
 }
 
 static double changed(const txm_image *a, const txm_image *b, const txm_image *mask) {
@@ -66,7 +66,7 @@ static void test_again(void **state) {
         txm_image mask = new_mask(W, H, 0);
         d.tileable = tileable;
         fill_box(&mask, 40, 30, 90, 70, 1);
-        if (tileable) { /* over all borders */
+        if (tileable) { /* across all borders */
             fill_box(&mask, 0, 0, 30, 25, 9);
             fill_box(&mask, W - 20, 0, W, 25, 9);
             fill_box(&mask, 0, H - 20, 30, H, 9);
@@ -83,7 +83,7 @@ static void test_again(void **state) {
             run_part(job, maps, &mask, before);
             after[k] = drawn(job, 0, &maps[0], W, H);
             assert_between("pixels changed", changed(&after[k], &before[0], &mask), 0.6, 1);
-            if (k == 0) { /* the same once more: it starts from another picture but ends alike */
+            if (k == 0) { /* the same again: another picture before, but the same result */
                 assert_int_equal(texpatch_again(job, &mask, NULL, NULL, 1, NULL), TXM_OK);
                 run(job);
                 after[3] = drawn(job, 0, &maps[0], W, H);
@@ -113,7 +113,7 @@ static void test_again(void **state) {
             assert_between("across the border", sum[2] / count[2] / (sum[0] / count[0]), 0.5, 1.5);
     }
 
-    /* nothing to make anew; two parts without steps in between are two parts */
+    /* an empty part; two parts without steps in between are two parts */
     const txm_image nothing = new_mask(W, H, 0), one = new_mask(W, H, 0), two = new_mask(W, H, 0);
     int more = 1;
     d.tileable = 0;
@@ -147,7 +147,7 @@ static void test_again(void **state) {
     after[0] = drawn(job, 0, &maps[0], W, H);
     assert_between("pixels changed", changed(&after[0], &before[0], &all), 0.9, 1);
 
-    /* what was kept stays */
+    /* kept pixels stay */
     texpatch_free(job);
     txm_image kept[2];
     kept[0] = before[0];
@@ -185,7 +185,7 @@ static void test_again_guide(void **state) {
     run(job);
     const txm_image before = drawn(job, 0, &maps[0], SIDE, SIDE);
     for (int k = 0; k < 3; k++) {
-        /* given; as it was given; given back. The caller's own is not looked at later */
+        /* a new guide; unchanged; the first again. The caller's picture is not read later */
         const txm_image mine = new_mask(SIDE, SIDE, 0);
         if (k == 0) memcpy(mine.pixels, guide.pixels, SIDE * SIDE);
         assert_int_equal(texpatch_again(job, &mask, k == 1 ? NULL : &mine, NULL, 3, NULL), TXM_OK);

@@ -41,7 +41,7 @@ static void test_guide(void **state) {
         texpatch_free(job);
     }
 
-    /* where the mask is 0 it does not matter what the guide says */
+    /* where the mask is 0 the guide does not matter */
     d.width = d.height = 64;
     d.guide_mask = new_mask(64, 64, 0);
     txm_image out[2];
@@ -51,7 +51,7 @@ static void test_guide(void **state) {
     }
     assert_true(is_same(&out[0], &out[1]));
 
-    /* half of it: the other half is free to be anything, this one is not */
+    /* half of it: only this half has to follow the guide */
     fill_box(&d.guide_mask, 0, 0, 32, 64, 255);
     for (int k = 0; k < 2; k++) {
         d.guide = new_mask(64, 64, 255 * k);
@@ -79,7 +79,7 @@ static void test_keep(void **state) {
     texpatch_desc d = desc_of(&e, 1, 2, SIDE, SIDE);
     d.maps = labels;
     kept[0] = new_image(SIDE, SIDE, 3, TXM_U8);  /* of the exemplar, so that something can fit */
-    kept[1] = new_image(SIDE, SIDE, 1, TXM_U16); /* values that it has nowhere */
+    kept[1] = new_image(SIDE, SIDE, 1, TXM_U16); /* values that the exemplar does not have */
     for (int i = 0; i < SIDE * SIDE; i++)
         memcpy((uint8_t *)kept[0].pixels + 3 * i,
                (uint8_t *)maps[0].pixels + 3 * ((i / SIDE + 9) * 128 + i % SIDE + 9), 3);
@@ -95,7 +95,7 @@ static void test_keep(void **state) {
         d.tileable = which ? 3 : 0;
         texpatch_job *job = begin(&d);
         int more = 1;
-        while (more) { /* what is kept is there from the start, and never taken away */
+        while (more) { /* kept pixels are there from the first step to the last */
             assert_int_equal(texpatch_step(job, NULL, &more), TXM_OK);
             for (int m = 0; m < 2; m++) {
                 const txm_image out = drawn(job, m, &maps[m], SIDE, SIDE);
@@ -103,7 +103,7 @@ static void test_keep(void **state) {
                     const int x = i % SIDE, y = i / SIDE;
                     const texpatch_source s = texpatch_source_at(job, x, y);
                     if (mask_at(&d.keep, x, y)) {
-                        /* coarse pictures round the border of what is kept to their pixels */
+                        /* coarse levels round the border of the kept area to their pixels */
                         if (!more) assert_int_equal(s.exemplar, -1);
                         if (!more || s.exemplar < 0)
                             assert_true(is_pixel(&out, x, y, &kept[m], x, y));
@@ -194,7 +194,7 @@ static void test_masks(void **state) {
                     assert_true(mask_at(mask, (int)s.x, (int)s.y));
                     continue;
                 }
-                int near = 9; /* an unmasked pixel is so near, in whole pixels */
+                int near = 9; /* distance to the nearest unmasked pixel */
                 for (int r = 0; r <= 5 && near == 9; r++) {
                     for (int k = 0; k < (2 * r + 1) * (2 * r + 1); k++) {
                         const int x = (int)floorf(s.x + 0.5f) + k % (2 * r + 1) - r;
@@ -211,7 +211,7 @@ static void test_masks(void **state) {
         assert_true(far_away < 120 * 96 / 20);
         texpatch_free(job);
 
-        /* one is masked altogether: the other makes it all */
+        /* one is masked completely: all comes from the other */
         memset(e[0].mask.pixels, 0, (size_t)(w * h));
         job = begin(&d);
         run(job);

@@ -38,7 +38,7 @@ static void test_half(void **state) {
                 v[1] = 0.5f + 0.5f * n.y;
                 v[2] = 0.5f + 0.5f * n.z;
             }
-            for (int c = 0; c < channels; c++) /* floats beyond 0..1 are means like others */
+            for (int c = 0; c < channels; c++) /* floats may lie beyond 0..1 */
                 txm_image_set(&from, p % size[0], p / size[0], c,
                               sample == TXM_F32 && kind != NORMAL ? 3 * v[c] - 1 : v[c]);
         }

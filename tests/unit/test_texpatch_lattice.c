@@ -49,7 +49,7 @@ static void test_lattice(void **state) {
         texpatch_desc d = desc_of(&e, 1, 1, 96, 96);
         texpatch_job *job = begin(&d);
         assert_int_equal(texpatch_lattice(job, v), 1);
-        /* a basis of the same lattice: as much area, and both known steps are of it */
+        /* a basis of the same lattice: the same area, and both known steps belong to it */
         const double det = fabs((double)v[0] * (double)v[3] - (double)v[1] * (double)v[2]);
         assert_between("area of a cell", det / (dx * dy), 0.98, 1.02);
         assert_between("a row's step is one", off_lattice(v, dx, 0), 0, 0.02);
@@ -84,7 +84,7 @@ static void test_lattice(void **state) {
     assert_int_equal(texpatch_lattice(NULL, v), 0);
 }
 
-/* A torus of bricks: the steps are adapted to its sides, and the joints run on across them. */
+/* A torus of bricks: the steps are adapted to its sides, and the joints continue across them. */
 static void test_lattice_torus(void **state) {
     (void)state;
     const txm_image bricks = draw_bricks(112, 96, 24, 16);
@@ -100,7 +100,7 @@ static void test_lattice_torus(void **state) {
         assert_between("steps along the height", off_lattice(v, 0, d.height), 0, 0.001);
         run(job);
         const txm_image out = drawn(job, 0, &bricks, d.width, d.height);
-        /* what lies whole steps apart is alike, also across the border */
+        /* pixels whole steps apart look alike, also across the border */
         int alike[2] = {0, 0}, count[2] = {0, 0};
         for (int y = 0; y < d.height; y++) {
             for (int x = 0; x < d.width; x++) {

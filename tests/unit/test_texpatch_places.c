@@ -40,7 +40,7 @@ static void test_turns(void **state) {
     enum { W = 80, H = 72 };
     const txm_image gravel = draw_gravel(40, 36, 3, 0);
     const texpatch_exemplar e = exemplar_of(&gravel);
-    /* where one pixel to the right leads in the exemplar after so many turns counter-clockwise */
+    /* one pixel to the right, in the exemplar, after so many turns counter-clockwise */
     static const int right[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     static const int down[4][2] = {{0, 1}, {-1, 0}, {0, -1}, {1, 0}};
     for (int which = 0; which < 4; which++) {
@@ -121,7 +121,7 @@ static void test_samples(void **state) {
                 assert_between("mean against the exemplar's",
                                (mean_of(&out, c) - mean_of(&forms[f], c)) / unit, -0.1, 0.1);
             }
-            /* it is no gray mush: as much contrast between neighbours as the exemplar has */
+            /* nothing is blurred: neighbours have as much contrast as in the exemplar */
             double own = 0, theirs = 0;
             for (int i = 0; i < 96 * 64; i++)
                 if (i % 96) own += step(&out, i % 96, i / 96, i % 96 - 1, i / 96);
@@ -133,7 +133,7 @@ static void test_samples(void **state) {
     }
 }
 
-/* Sizes and strides that are out of the ordinary. */
+/* Unusual sizes and strides. */
 static void test_sizes(void **state) {
     (void)state;
     static const int sizes[6][2] = {{1, 1}, {1, 300}, {300, 1}, {33, 97}, {2, 2}, {131, 67}};
@@ -148,7 +148,7 @@ static void test_sizes(void **state) {
         check_places(job, &d, 0);
         texpatch_free(job);
 
-        /* bottom-up, with room between the rows */
+        /* bottom-up, with gaps between the rows */
         const int row = d.width * 3 + 5;
         uint8_t *pixels = (uint8_t *)need((size_t)(row * d.height));
         memset(pixels, FILL, (size_t)(row * d.height));
@@ -189,7 +189,7 @@ static void test_seeds_and_threads(void **state) {
 
 /* ---- maps in register ------------------------------------------------------------------- */
 
-/* The exemplar of four maps: gravel, normals, hills, numbers as names. */
+/* The exemplar of four maps: gravel, normals, hills, numbers as labels. */
 static texpatch_map kinds[4];
 static void draw_maps(int width, int height, int sense, txm_image maps[4]) {
     maps[0] = draw_gravel(width, height, 3, 0);
@@ -256,7 +256,7 @@ static void test_register(void **state) {
         assert_between("normals compared", compared / (double)(side * side), 0.3, 1);
         for (int t = 0; t < (which ? 8 : 1); t++) assert_true(of_turn[t] > 10);
 
-        /* bent and blended: names stay names, and everything still shows one place */
+        /* bent and blended: labels stay labels, and all maps still show the same place */
         int more = 1;
         assert_int_equal(texpatch_step(job, NULL, &more), TXM_OK);
         const txm_image late = drawn(job, 1, &maps[1], side, side);
@@ -268,7 +268,7 @@ static void test_register(void **state) {
             const texpatch_source p = texpatch_source_at(job, i % side, i / side);
             const int name = ((const uint16_t *)names.pixels)[i] - 1;
             assert_true(name >= 0 && name < w * h);
-            /* a place just between two pixels may go either way */
+            /* a place halfway between two pixels may be rounded either way */
             assert_true(fabsf((float)(name % w) - p.x) <= 0.501f);
             assert_true(fabsf((float)(name / w) - p.y) <= 0.501f);
             bent += !is_whole(p);
@@ -337,7 +337,7 @@ static void test_passes(void **state) {
         texpatch_job *job = begin(&d);
         const int n = run(job);
         assert_true(n > steps);
-        assert_int_equal(run(job), 1); /* and then nothing is left to do */
+        assert_int_equal(run(job), 1); /* nothing is left to do */
         steps = n;
         texpatch_free(job);
         job = begin(&d);
@@ -362,10 +362,10 @@ static void test_passes(void **state) {
         d.tileable = 3;
         d.width = 32;
         d.height = 33;
-        made(&d, NULL); /* patches become as small as the torus demands */
+        made(&d, NULL); /* patches become as small as the torus requires */
     }
 
-    /* a patch larger than the canvas is made as large as that */
+    /* a patch larger than the canvas is reduced to its size */
     const txm_image small = draw_gravel(64, 64, 1, 0);
     const texpatch_exemplar only = exemplar_of(&small);
     texpatch_desc tiny = desc_of(&only, 1, 1, 1, 1);

@@ -1,4 +1,4 @@
-/* test_texpatch_plane.c - the unbounded plane: windows that agree, looks, misfortune
+/* test_texpatch_plane.c - the unbounded plane: windows that agree, statistics, failing memory
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_plane && build/tests/unit/test_texpatch_plane */
@@ -28,7 +28,7 @@ static void test_plane_windows(void **state) {
     memset(labels, 0, sizeof labels);
     labels[0].weight = 1;
     labels[1].is_label = 1;
-    texpatch_desc d = desc_of(&e, 1, 2, 0, 0); /* the size is not looked at */
+    texpatch_desc d = desc_of(&e, 1, 2, 0, 0); /* the size is ignored */
     d.maps = labels;
     d.passes = -1;
     d.patch = 20; /* large ones are fast */
@@ -89,7 +89,7 @@ static void test_plane_windows(void **state) {
     }
     assert_true(pairs >= 200);
 
-    /* no farther than that */
+    /* the limits of x and y */
     const txm_image out[2] = {new_image(4, 4, 1, TXM_U8), new_image(4, 4, 1, TXM_U16)};
     for (int i = 0; i < 4; i++) {
         txm_env env = {0};
@@ -112,7 +112,7 @@ static void test_plane_windows(void **state) {
     assert_int_equal(texpatch_plane_cell(NULL), 0);
 }
 
-/* It looks like its exemplar, joins of the cells included, and is nowhere the same. */
+/* It looks like its exemplar, seams of the cells included, and does not repeat. */
 static void test_plane_looks(void **state) {
     (void)state;
     for (int which = 0; which < 2; which++) {
@@ -153,7 +153,7 @@ static void test_plane_looks(void **state) {
             same +=
                 is_pixel(&out, i % far_side, i / far_side, &far_off, i % far_side, i / far_side);
         assert_between("step", (sum[0] / count[0]) / (own[0] / n[0]), 0.8, 1.2);
-        for (int k = 1; k < 5 && !which; k++) /* joints of a wall of bricks lie where they lie */
+        for (int k = 1; k < 5 && !which; k++) /* in a wall joints of bricks may lie there */
             assert_between("step at a joint", (sum[k] / count[k]) / (sum[0] / count[0]), 0.6,
                            k == 4 ? 1.8 : 1.5);
         assert_between("the same elsewhere", same / (double)(far_side * far_side), 0, 0.2);
@@ -161,7 +161,7 @@ static void test_plane_looks(void **state) {
     }
 }
 
-/* ---- misfortune -------------------------------------------------------------------------- */
+/* ---- failing memory, cancelling --------------------------------------------------------- */
 
 typedef struct window {
     const texpatch_desc *desc;

@@ -42,7 +42,7 @@ static void make_whole(whole *t) {
     fill_box(&t->desc.keep, 10, 10, 20, 18, 1);
 }
 
-/* both: the plane refuses it too; otherwise it does not look there */
+/* both: the plane refuses it too, else it ignores it */
 static void refuse(whole *t, txm_status expected, int both) {
     txm_env env = {0};
     texpatch_job *job = (texpatch_job *)t;
@@ -61,7 +61,7 @@ static void refuse(whole *t, txm_status expected, int both) {
     texpatch_plane_free(plane);
 }
 
-/* Each of values in a field of the description, then as it was. */
+/* Refuse each of some values of a field, and restore it. */
 #define REFUSE_EACH(field, type, expected, both, ...)                 \
     do {                                                              \
         type values[] = {__VA_ARGS__};                                \
@@ -92,7 +92,7 @@ static void test_refuses(void **state) {
     REFUSE_EACH(desc.guide_weight, float, TXM_BAD_ARGUMENT, 1, -1, 16.5f, NAN, INFINITY);
     REFUSE_EACH(desc.lattice, int, TXM_BAD_ARGUMENT, 1, -2, 2, INT_MAX);
     t.desc.lattice = 1;
-    refuse(&t, TXM_BAD_ARGUMENT, 1); /* steps of no length */
+    refuse(&t, TXM_BAD_ARGUMENT, 1); /* steps of length 0 */
     t.desc.lattice_vectors[0] = 10;
     t.desc.lattice_vectors[3] = 10;
     REFUSE_EACH(desc.lattice_vectors[2], float, TXM_BAD_ARGUMENT, 1, NAN, INFINITY, 1e6f);
@@ -101,7 +101,7 @@ static void test_refuses(void **state) {
     REFUSE_EACH(kinds[0].weight, float, TXM_BAD_ARGUMENT, 1, 0, -1, 16.5f, NAN, INFINITY);
     REFUSE_EACH(kinds[1].weight, float, TXM_BAD_ARGUMENT, 1, -1, 17, NAN);
 
-    /* pictures that do not go together, or are none */
+    /* pictures that do not match, or are invalid */
     for (int i = 0; i < 2; i++) {
         REFUSE_EACH(exemplars[i].maps, const txm_image *, TXM_BAD_ARGUMENT, 1, NULL);
         for (int m = 0; m < 2; m++) {
@@ -258,7 +258,7 @@ static void test_job_refuses(void **state) {
     texpatch_free(NULL);
 }
 
-/* ---- misfortune -------------------------------------------------------------------------- */
+/* ---- failing memory, cancelling --------------------------------------------------------- */
 
 static txm_status make_it(void *context, txm_env *env) {
     const whole *t = (const whole *)context;
@@ -277,7 +277,7 @@ static void test_make_misfortune(void **state) {
         assert_true(tk_sweep_outputs(make_it, &t, (tk_kind)kind, outputs, 2) > 10);
 }
 
-/* A call on a job that fails in every possible way before it succeeds. what: 0 step, 1 again */
+/* A step of a job, or with `again` texpatch_again, that fails in many ways before it succeeds. */
 static int stumble(texpatch_job *job, tk_memory *memory, int failing, const txm_image *again,
                    const txm_image *guide) {
     for (long k = 1;; k = tk_places(k, LONG_MAX)) {
@@ -301,7 +301,7 @@ static int stumble(texpatch_job *job, tk_memory *memory, int failing, const txm_
     }
 }
 
-/* The same for single steps, and for a part anew: the bytes are those of a job without trouble. */
+/* The same for single steps, and for a part made again: the result is as without faults. */
 static void test_step_misfortune(void **state) {
     (void)state;
     whole t;
@@ -335,7 +335,7 @@ static void test_step_misfortune(void **state) {
             }
             memory.fail_at = 0;
             if (!job) assert_int_equal(texpatch_begin(&d, &env, &job), TXM_OK);
-            int done = 1; /* steps: one that fails counts as if it had not been tried */
+            int done = 1; /* steps: one that fails does not count */
             while (stumble(job, &memory, failing, NULL, NULL)) done++;
             assert_int_equal(done, steps);
             stumble(job, &memory, failing, &mask, new_guide);
