@@ -1,43 +1,19 @@
 /* bench_texpatch.c - seconds and memory of texpatch.h: bench_texpatch EXEMPLAR...
    SPDX-License-Identifier: MIT OR Unlicense
 
-   The first table makes all kinds of things of the first picture, on one thread and on all; where
+   The first table makes textures of many kinds from the first picture, on one thread and on all; where
    one thread alone would take long, on all only. The second has a line for each picture. The third
    compares this build with one for TEXPATCH_NO_SIMD, which lies in plain/ beside it. Seconds are of
-   the clock, of one run.
+   the clock, of one run; of both builds the fastest run counts.
 
    bench_texpatch --once EXEMPLAR makes 512 x 512 once and prints the CPU seconds. */
-#define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
+#define _XOPEN_SOURCE 700 /* clock_gettime, popen */
 #define TEXPATCH_IMPLEMENTATION
-#include "files/image_io.h"
 #include "texpatch.h"
 
 #include "bench.h"
 
-#include <stdio.h>
-
-enum { COMPARED = 2, MAPS = 3, STROKE_WIDTH = 64, STROKE_LENGTH = 256 };
-
-typedef struct result {
-    double seconds, cpu; /* processor time of all threads                       */
-    size_t peak;         /* bytes that the library held at most, the job included */
-} result;
-
-static double wall_start, cpu_start;
-static size_t held;
-
-static void start(void) {
-    held = memory.live_bytes;
-    memory.peak_bytes = memory.live_bytes;
-    wall_start = clock_of(CLOCK_MONOTONIC);
-    cpu_start = clock_of(CLOCK_PROCESS_CPUTIME_ID);
-}
-
-static void stop(result *r) {
-    r->seconds = clock_of(CLOCK_MONOTONIC) - wall_start;
-    r->cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID) - cpu_start;
-    r->peak = memory.peak_bytes - held;
-}
+enum { MAPS = 3, STROKE_WIDTH = 64, STROKE_LENGTH = 256 };
 
 static txm_image new_image(int width, int height, int channels) {
     txm_image image = {NULL, width, height, channels, TXM_U8, 0};
@@ -70,9 +46,10 @@ static void time_make(const texpatch_desc *desc, int threads, result *r) {
     memset(out, 0, sizeof out);
     for (int m = 0; m < desc->map_count; m++)
         out[m] = new_image(desc->width, desc->height, desc->exemplars[0].maps[m].channels);
-    start();
+    *r = no_result;
+    const watch w = start();
     if (texpatch_make(desc, &env, out) != TXM_OK) give_up("texpatch_make", env.message);
-    stop(r);
+    stop(&w, r);
     for (int m = 0; m < MAPS; m++) free(out[m].pixels);
 }
 
@@ -87,11 +64,12 @@ static void time_again(const texpatch_desc *desc, int threads, result *r) {
                255, STROKE_LENGTH);
     if (texpatch_begin(desc, &env, &job) != TXM_OK) give_up("texpatch_begin", env.message);
     finish(job, &env);
-    start();
+    *r = no_result;
+    const watch w = start();
     if (texpatch_again(job, &again, NULL, NULL, 2, &env) != TXM_OK)
         give_up("texpatch_again", env.message);
     finish(job, &env);
-    stop(r);
+    stop(&w, r);
     texpatch_free(job);
     free(again.pixels);
 }
@@ -103,10 +81,11 @@ static int time_cell(const texpatch_desc *desc, int threads, result *r) {
     if (texpatch_plane_make(desc, &env, &plane) != TXM_OK) give_up("plane_make", env.message);
     const int side = texpatch_plane_cell(plane);
     txm_image out = new_image(side, side, desc->exemplars[0].maps[0].channels);
-    start();
+    *r = no_result;
+    const watch w = start();
     if (texpatch_plane_draw(plane, 0, 0, &env, &out, NULL) != TXM_OK)
         give_up("plane_draw", env.message);
-    stop(r);
+    stop(&w, r);
     texpatch_plane_free(plane);
     free(out.pixels);
     return side;
@@ -124,7 +103,7 @@ static void print_row(const char *what, int width, int height, const result *one
     printf(" %10.2f", all->seconds);
     if (one) printf(" %8.2f", one->seconds / all->seconds);
     else printf("        -");
-    printf(" %8.2f %8.1f\n", 1e6 * all->cpu / width / height, (double)all->peak / 1048576);
+    printf(" %8.2f %8.1f\n", 1e6 * all->cpu / width / height, mebibytes(all->peak));
     fflush(stdout);
 }
 
@@ -134,11 +113,6 @@ static void make_row(const char *what, const texpatch_desc *desc, int is_long) {
     if (!is_long) time_make(desc, 1, &one);
     time_make(desc, threads, &all);
     print_row(what, desc->width, desc->height, is_long ? NULL : &one, &all);
-}
-
-static const char *file_name(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
 }
 
 /* Heights and roughness as one might derive them, in register with the picture. */
@@ -227,72 +201,36 @@ static void one_line(const char *path, const txm_image *picture) {
     time_make(&desc, 1, &full);
     desc.passes = -1;
     time_make(&desc, 1, &fast);
-    printf("%-16s %4d x %-4d %d %10.2f %10.2f", file_name(path), picture->width, picture->height,
-           picture->channels, full.cpu, fast.cpu);
+    print_picture(path, picture);
+    printf(" %10.2f %10.2f", full.cpu, fast.cpu);
     if (has_lattice)
         printf("  %.1f,%.1f %.1f,%.1f\n", (double)v[0], (double)v[1], (double)v[2], (double)v[3]);
     else printf("  none\n");
-    fflush(stdout);
 }
 
 /* ---- this build against the one without SIMD --------------------------------------------- */
 
-static void once(const char *program, const char *path, double *best) {
-    char command[4096];
-    double got = 0;
-    snprintf(command, sizeof command, "'%s' --once '%s'", program, path);
-    FILE *pipe = popen(command, "r");
-    int ok = pipe && fscanf(pipe, "%lf", &got) == 1;
-    if (pipe && pclose(pipe) != 0) ok = 0;
-    if (!ok) give_up(program, "failed");
-    if (*best <= 0 || got < *best) *best = got;
-}
-
-static void compare(const char *program, const char *path) {
-    char plain[2048];
-    double simd = 0, scalar = 0;
-    snprintf(plain, sizeof plain, "%.*s/plain/%s", (int)(file_name(program) - program - 1), program,
-             file_name(program));
-    if (access(plain, X_OK) != 0) return;
-    for (int i = 0; i < COMPARED; i++) {
-        once(program, path, &simd);
-        once(plain, path, &scalar);
-    }
-    printf("\none thread, 512 x 512 out of %s\n\n", file_name(path));
-    printf("                               SIMD  TEXPATCH_NO_SIMD  ratio\n");
-    printf("making it, CPU seconds     %8.2f %17.2f %6.1f\n", simd, scalar, scalar / simd);
-}
-
-static void do_once(const txm_image *picture) {
+static void once(const txm_image *picture, double seconds[STAGES]) {
     texpatch_exemplar exemplar;
     result r;
     memset(&exemplar, 0, sizeof exemplar);
     exemplar.maps = picture;
     const texpatch_desc desc = make_desc(&exemplar, 1, 512);
     time_make(&desc, 1, &r);
-    printf("%f\n", r.cpu);
+    seconds[0] = r.cpu;
 }
 
 int main(int argc, char **argv) {
-    const char *why;
-    const int is_once = argc == 3 && !strcmp(argv[1], "--once");
-    if (argc < 2) give_up("usage", "bench_texpatch [--once] EXEMPLAR...");
-    env_let_threads_sleep(argv);
-    for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the first table */
-        const char *path = argv[i ? i : 1];
-        txm_image picture;
-        if (!image_read(path, 0, &picture, &why)) give_up(path, why);
-        if (is_once) {
-            do_once(&picture);
-        } else if (i == 0) {
-            everything(path, &picture);
-            printf("\none thread, 512 x 512\n\n"
-                   "exemplar         size        ch defaults s passes -1 s  lattice\n");
-        } else {
-            one_line(path, &picture);
-        }
-        image_free(&picture);
-    }
-    if (!is_once) compare(argv[0], argv[1]);
-    return 0;
+    static const tables t = {
+        "bench_texpatch",
+        everything,
+        "one thread, 512 x 512\n\n"
+        "exemplar         size        ch defaults s passes -1 s  lattice\n",
+        one_line,
+        once,
+        2,
+        "one thread, CPU, 512 x 512 out of",
+        {"making it", NULL},
+        "TEXPATCH_NO_SIMD"};
+    return run_tables(&t, argc, argv);
 }

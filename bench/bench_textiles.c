@@ -2,31 +2,23 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    The first table cuts sets of all kinds out of the first picture, on one thread and on all; the
-   second looks tiles of the plane up; the third has a line for each picture; the fourth compares this
+   second looks up tiles of the plane; the third has a line for each picture; the fourth compares this
    build with one for TEXTILES_NO_SIMD, which lies in plain/ beside it. Seconds are of the clock, of
-   one run; what is repeated counts with its fastest run.
+   one run; of lookups, and of both builds, the fastest run counts.
 
-   bench_textiles --once EXEMPLAR cuts one set and fills one window of the plane, and prints the CPU
-   seconds and the million tiles per second. */
-#define _XOPEN_SOURCE 700 /* clock_gettime, popen, setenv */
+   bench_textiles --once EXEMPLAR cuts one set and fills a window of the plane, and prints the seconds
+   of both. */
+#define _XOPEN_SOURCE 700 /* clock_gettime, popen */
 #define TEXTILES_IMPLEMENTATION
-#include "files/image_io.h"
 #include "textiles.h"
 
 #include "bench.h"
 
-#include <stdio.h>
-
-enum { COMPARED = 2, LOOKUPS = 3, WINDOW = 1024 };
+enum { LOOKUPS = 3, WINDOW = 1024 };
 
 static const char *const kind_names[] = {"wang", "corner", "triangle", "frame"};
 
 /* ---- making sets -------------------------------------------------------------------------- */
-
-typedef struct result {
-    double seconds, cpu; /* processor time of all threads                       */
-    size_t peak;         /* bytes that the library held at most, the set included */
-} result;
 
 static textiles_set *make(const txm_image *picture, textiles_kind kind, int colors, int size,
                           int threads, result *r) {
@@ -42,13 +34,10 @@ static textiles_set *make(const txm_image *picture, textiles_kind kind, int colo
     desc.exemplar_count = 1;
     desc.size = size;
     desc.colors = colors;
-    const size_t held = memory.live_bytes;
-    memory.peak_bytes = memory.live_bytes;
-    const double wall = clock_of(CLOCK_MONOTONIC), cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID);
+    *r = no_result;
+    const watch w = start();
     if (textiles_make(&desc, &env, &set) != TXM_OK) give_up(kind_names[kind], env.message);
-    r->seconds = clock_of(CLOCK_MONOTONIC) - wall;
-    r->cpu = clock_of(CLOCK_PROCESS_CPUTIME_ID) - cpu;
-    r->peak = memory.peak_bytes - held;
+    stop(&w, r);
     return set;
 }
 
@@ -57,11 +46,6 @@ static double mean_joint(const textiles_set *set) {
     memset(&joints, 0, sizeof joints);
     if (textiles_measure(set, 0, NULL, &joints) != TXM_OK) give_up("measure", "failed");
     return joints.mean;
-}
-
-static const char *file_name(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
 }
 
 static void kinds(const char *path, const txm_image *picture) {
@@ -78,7 +62,7 @@ static void kinds(const char *path, const txm_image *picture) {
             textiles_set *set = make(picture, (textiles_kind)kind, colors, 128, threads, &all);
             printf("%-8s %6d %5d %8.2f %10.2f %8.2f %7.3f %8.1f %6.3f\n", kind_names[kind], colors,
                    textiles_count(set), one.seconds, all.seconds, one.seconds / all.seconds,
-                   one.seconds / textiles_count(set), (double)all.peak / 1048576, mean_joint(set));
+                   one.seconds / textiles_count(set), mebibytes(all.peak), mean_joint(set));
             fflush(stdout);
             textiles_set_free(set);
         }
@@ -89,10 +73,8 @@ static void one_line(const char *path, const txm_image *picture) {
     result wang, triangle;
     textiles_set *w = make(picture, TEXTILES_WANG, 2, 64, 1, &wang);
     textiles_set *t = make(picture, TEXTILES_TRIANGLE, 2, 64, 1, &triangle);
-    printf("%-16s %4d x %-4d %d %10.2f %8.3f %14.2f %8.3f\n", file_name(path), picture->width,
-           picture->height, picture->channels, wang.cpu, mean_joint(w), triangle.cpu,
-           mean_joint(t));
-    fflush(stdout);
+    print_picture(path, picture);
+    printf(" %10.2f %8.3f %14.2f %8.3f\n", wang.cpu, mean_joint(w), triangle.cpu, mean_joint(t));
     textiles_set_free(w);
     textiles_set_free(t);
 }
@@ -127,12 +109,12 @@ static void make_plane(textiles_kind kind, int colors, int variants, textiles_se
     free(tiles);
 }
 
-/* Million tiles per second, of WINDOW x WINDOW tiles; by plane_fill if there is room for them. */
-static double lookup_rate(const textiles_plane *plane, int *tiles, unsigned *sum) {
-    double best = 1e30;
+/* Seconds for a window of WINDOW x WINDOW tiles; by plane_fill if there is room for them. */
+static double lookup_seconds(const textiles_plane *plane, int *tiles, unsigned *sum) {
+    result best = no_result;
     for (int run = 0; run < LOOKUPS; run++) {
         const int from = run * WINDOW;
-        const double start = clock_of(CLOCK_MONOTONIC);
+        const watch w = start();
         if (tiles) {
             textiles_plane_fill(plane, from, 0, WINDOW, WINDOW, tiles);
             *sum += (unsigned)tiles[run];
@@ -146,17 +128,21 @@ static double lookup_rate(const textiles_plane *plane, int *tiles, unsigned *sum
                                        : textiles_plane_tile(plane, from + x, y));
             }
         }
-        const double seconds = clock_of(CLOCK_MONOTONIC) - start;
-        if (seconds < best) best = seconds;
+        stop(&w, &best);
     }
-    return 1e-6 * WINDOW * WINDOW / best;
+    return best.seconds;
+}
+
+/* million tiles per second */
+static double lookup_rate(const textiles_plane *plane, int *tiles, unsigned *sum) {
+    return 1e-6 * WINDOW * WINDOW / lookup_seconds(plane, tiles, sum);
 }
 
 static void lookups(void) {
     int *tiles = (int *)malloc((size_t)WINDOW * WINDOW * sizeof *tiles);
     unsigned sum = 0;
     if (!tiles) give_up("tiles", "out of memory");
-    printf("\nlooking tiles of the plane up, one thread: million tiles per second\n\n"
+    printf("\nlookups of tiles of the plane, one thread: million tiles per second\n\n"
            "kind     colors variants one by one   window\n");
     for (int kind = TEXTILES_WANG; kind <= TEXTILES_TRIANGLE; kind++) {
         for (int i = 0; i < 4; i++) {
@@ -177,69 +163,35 @@ static void lookups(void) {
 
 /* ---- this build against the one without SIMD --------------------------------------------- */
 
-static void once(const char *program, const char *path, double best[2]) {
-    char command[4096];
-    double got[2] = {0, 0};
-    snprintf(command, sizeof command, "'%s' --once '%s'", program, path);
-    FILE *pipe = popen(command, "r");
-    int ok = pipe && fscanf(pipe, "%lf %lf", &got[0], &got[1]) == 2;
-    if (pipe && pclose(pipe) != 0) ok = 0;
-    if (!ok) give_up(program, "failed");
-    if (best[0] <= 0 || got[0] < best[0]) best[0] = got[0];
-    if (got[1] > best[1]) best[1] = got[1];
-}
-
-static void compare(const char *program, const char *path) {
-    char plain[2048];
-    double simd[2] = {0, 0}, scalar[2] = {0, 0};
-    snprintf(plain, sizeof plain, "%.*s/plain/%s", (int)(file_name(program) - program - 1), program,
-             file_name(program));
-    if (access(plain, X_OK) != 0) return;
-    for (int i = 0; i < COMPARED; i++) {
-        once(program, path, simd);
-        once(plain, path, scalar);
-    }
-    printf("\none thread, 16 wang tiles of 128 x 128 out of %s\n\n", file_name(path));
-    printf("                               SIMD  TEXTILES_NO_SIMD  ratio\n");
-    printf("making them, CPU seconds   %8.2f %17.2f %6.1f\n", simd[0], scalar[0],
-           scalar[0] / simd[0]);
-    printf("windows, million tiles/s   %8.1f %17.1f %6.1f\n", simd[1], scalar[1],
-           simd[1] / scalar[1]);
-}
-
-static void do_once(const txm_image *picture) {
+static void once(const txm_image *picture, double seconds[STAGES]) {
     int *tiles = (int *)malloc((size_t)WINDOW * WINDOW * sizeof *tiles);
     unsigned sum = 0;
     textiles_plane plane;
     result r;
     textiles_set *set = make(picture, TEXTILES_WANG, 2, 128, 1, &r);
     if (!tiles || textiles_plane_make(set, 1, NULL, &plane) != TXM_OK) give_up("plane", "no memory");
-    printf("%f %f\n", r.cpu, lookup_rate(&plane, tiles, &sum));
+    seconds[0] = r.cpu;
+    seconds[1] = lookup_seconds(&plane, tiles, &sum);
     textiles_set_free(set);
     free(tiles);
 }
 
+static void first(const char *path, const txm_image *picture) {
+    kinds(path, picture);
+    lookups();
+}
+
 int main(int argc, char **argv) {
-    const char *why;
-    const int is_once = argc == 3 && !strcmp(argv[1], "--once");
-    if (argc < 2) give_up("usage", "bench_textiles [--once] EXEMPLAR...");
-    env_let_threads_sleep(argv);
-    for (int i = is_once ? 2 : 0; i < argc; i++) { /* picture 1 twice: as 0 for the first table */
-        const char *path = argv[i ? i : 1];
-        txm_image picture;
-        if (!image_read(path, 0, &picture, &why)) give_up(path, why);
-        if (is_once) {
-            do_once(&picture);
-        } else if (i == 0) {
-            kinds(path, &picture);
-            lookups();
-            printf("\none thread, 16 wang tiles and 24 triangles of 64 pixels\n\n"
-                   "exemplar         size        ch wang CPU s    joint triangle CPU s    joint\n");
-        } else {
-            one_line(path, &picture);
-        }
-        image_free(&picture);
-    }
-    if (!is_once) compare(argv[0], argv[1]);
-    return 0;
+    static const tables t = {
+        "bench_textiles",
+        first,
+        "one thread, 16 wang tiles and 24 triangles of 64 pixels\n\n"
+        "exemplar         size        ch wang CPU s    joint triangle CPU s    joint\n",
+        one_line,
+        once,
+        2,
+        "one thread, 16 wang tiles of 128 x 128 out of",
+        {"making them", "a window of 1,048,576 tiles"},
+        "TEXTILES_NO_SIMD"};
+    return run_tables(&t, argc, argv);
 }

@@ -6,15 +6,11 @@
    the best of several runs. "grown": in memory that was used before, as by a program that keeps a
    pool; "fresh": in memory new from the system, where first access takes most of the time. Names of
    pictures, which `make bench` gives to every benchmark, are ignored.                            */
-#define _XOPEN_SOURCE 700 /* clock_gettime, setenv */
-#include <stdlib.h>
-#include <string.h>
+#define _XOPEN_SOURCE 700 /* clock_gettime, popen */
 #define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
 
 #include "bench.h"
-
-#include <stdio.h>
 
 enum { TREES = 1000, RUNS = 7, FEW = 154 };
 
@@ -38,30 +34,29 @@ static void pool_release(void *user, void *block) {
 
 /* ---- one species ------------------------------------------------------------------------------- */
 
-static treepieces_forest *grow(const treepieces_forest_desc *desc, txm_env *env, double *best) {
+static treepieces_forest *grow(const treepieces_forest_desc *desc, txm_env *env, double *seconds) {
     treepieces_forest *forest = NULL;
-    *best = 1e9;
+    result best = no_result;
     for (int i = 0; i < RUNS; i++) {
         treepieces_forest_free(forest);
         pool_used = 0;
-        const double start = clock_of(CLOCK_MONOTONIC);
+        const watch w = start();
         if (treepieces_forest_make(desc, env, &forest) != TXM_OK) give_up("forest", env->message);
-        const double taken = clock_of(CLOCK_MONOTONIC) - start;
-        if (taken < *best) *best = taken;
+        stop(&w, &best);
     }
+    *seconds = best.seconds;
     return forest;
 }
 
 static double sway(const treepieces_forest *forest, float *state, float *bones) {
     const treepieces_wind wind = {0.3f, 8, 0.6f, 1};
-    double best = 1e9;
+    result best = no_result;
     for (int i = 0; i < RUNS; i++) {
-        const double start = clock_of(CLOCK_MONOTONIC);
+        const watch w = start();
         treepieces_sway(forest, &wind, i / 60.0, 1 / 60.0, NULL, NULL, state, bones);
-        const double taken = clock_of(CLOCK_MONOTONIC) - start;
-        if (taken < best) best = taken;
+        stop(&w, &best);
     }
-    return best;
+    return best.seconds;
 }
 
 static void measure(const treepieces_kit *kit, const treepieces_species *species, int pieces) {
@@ -93,13 +88,14 @@ static void measure(const treepieces_kit *kit, const treepieces_species *species
     const double frame = sway(forest, state, bones);
     bake.forest = forest;
     bake.bones = bones;
-    const double start = clock_of(CLOCK_MONOTONIC);
+    result baked = no_result;
+    const watch w = start();
     if (treepieces_bake(&bake, &plain, &mesh) != TXM_OK) give_up("bake", plain.message);
-    const double baked = clock_of(CLOCK_MONOTONIC) - start;
+    stop(&w, &baked);
     const double kilobytes = ((double)forest->bytes + forest->node_count * 64.0) / 1024 / TREES;
     printf("%-8s %8.0f %9.0f %8.1f %8.1f %8.1f %8.1f %8.2f\n", species->name,
            (double)forest->node_count / TREES, (double)triangles / TREES, 1e3 * grown, 1e3 * fresh,
-           1e3 * frame, kilobytes, 1e3 * baked);
+           1e3 * frame, kilobytes, 1e3 * baked.seconds);
     treepieces_mesh_free(mesh);
     treepieces_forest_free(forest);
     free(bones);

@@ -5,17 +5,13 @@
    not looked at. The first table retiles a torus and a bumpy ball, the second puts a million
    instances on a mesh. --full adds 500,000 vertices, and 200,000 that repel each other, which take
    half a minute. Seconds are of the clock, of one run.                                           */
-#define _XOPEN_SOURCE 700 /* clock_gettime, setenv */
-#include <stdlib.h>
-#include <string.h>
+#define _XOPEN_SOURCE 700 /* clock_gettime, popen */
 #define TRIMESH_COVER_IMPLEMENTATION
 #include "trimesh_cover.h"
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 
 #include "bench.h"
-
-#include <stdio.h>
 
 /* ---- surfaces ------------------------------------------------------------------------------ */
 
@@ -105,11 +101,6 @@ static void free_surface(surface *s) {
 
 /* ---- tables -------------------------------------------------------------------------------- */
 
-typedef struct result {
-    double seconds;
-    size_t peak; /* bytes that the library held at most, the mesh included */
-} result;
-
 static trimesh_mesh *retile(const surface *s, trimesh_method method, size_t vertices, int threads,
                             result *r) {
     trimesh_mesh *mesh;
@@ -119,12 +110,10 @@ static trimesh_mesh *retile(const surface *s, trimesh_method method, size_t vert
     desc.surface = s->view;
     desc.vertices = vertices;
     desc.method = method;
-    const size_t held = memory.live_bytes;
-    memory.peak_bytes = memory.live_bytes;
-    const double start = clock_of(CLOCK_MONOTONIC);
+    *r = no_result;
+    const watch w = start();
     if (trimesh_retile(&desc, &env, &mesh) != TXM_OK) give_up(s->name, env.message);
-    r->seconds = clock_of(CLOCK_MONOTONIC) - start;
-    r->peak = memory.peak_bytes - held;
+    stop(&w, r);
     return mesh;
 }
 
@@ -168,7 +157,7 @@ static void retiling(int full) {
                        surfaces[s].name, (unsigned long)surfaces[s].view.face_count,
                        method == TRIMESH_LATTICE ? "lattice" : "repel", (unsigned long)n,
                        one.seconds, all.seconds, one.seconds / all.seconds,
-                       1e6 * one.seconds / (double)n, (double)one.peak / 1048576,
+                       1e6 * one.seconds / (double)n, mebibytes(one.peak),
                        (double)one.peak / (double)n, mean_quality(m));
                 fflush(stdout);
                 trimesh_mesh_free(m);
@@ -209,19 +198,17 @@ static void scattering(void) {
             int used = threads;
             txm_env env = make_env(&used);
             size_t count = 0;
-            double best = 1e30;
+            result best = no_result;
             d.curve = (float)curved;
-            const size_t held = memory.live_bytes;
-            memory.peak_bytes = memory.live_bytes;
             for (int run = 0; run < 3; run++) {
-                const double start = clock_of(CLOCK_MONOTONIC);
+                const watch w = start();
                 if (trimesh_scatter(&d, &env, out, ROOM, &count) != TXM_OK)
                     give_up("scatter", env.message);
-                best = fmin(best, clock_of(CLOCK_MONOTONIC) - start);
+                stop(&w, &best);
             }
             printf("%-16s %7d %8lu %7.3f %7.0f %8.1f\n", curved ? "on the curve" : "on triangles",
-                   threads, (unsigned long)count, best, 1e9 * best / (double)count,
-                   (double)(memory.peak_bytes - held) / 1048576);
+                   threads, (unsigned long)count, best.seconds, 1e9 * best.seconds / (double)count,
+                   mebibytes(best.peak));
             fflush(stdout);
         }
     }
