@@ -17,7 +17,8 @@ LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 SOURCES := $(wildcard src/*.h src/*/*.h)
 HEADERS := $(notdir $(wildcard src/*.h))
-TEXKIT   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/*.c tools/commands/*.c tools/files/*.c))
+TEXKIT   = $(patsubst tools/%.c,$(BUILD)/%.o,\
+             $(wildcard tools/*.c tools/modules/*.c tools/commands/*.c tools/files/*.c))
 IMAGES   = $(BUILD)/files/image_io.o $(BUILD)/files/stb.o
 TIMED    = $(BUILD)/env.o $(IMAGES)
 MESHES   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/files/mesh*.c))
@@ -65,7 +66,7 @@ setup:
 $(BUILD)/%.o: tools/%.c Makefile | setup
 	@mkdir -p $(@D)
 	$(COMPILE) -MMD -MP -c $< -o $@
--include $(wildcard $(BUILD)/*.d $(BUILD)/commands/*.d $(BUILD)/files/*.d $(BUILD)/helpers/*.d)
+-include $(wildcard $(BUILD)/*.d $(addprefix $(BUILD)/,modules/*.d commands/*.d files/*.d helpers/*.d))
 
 # stb shifts into the sign bit on purpose; that is not what our sanitizer runs look for
 $(BUILD)/files/stb.o: COMPILE += -fno-sanitize=undefined

@@ -2,8 +2,8 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    The table below lists the commands, which are in commands/. What they share is in cli.c and
-   command.c; files/ reads and writes pictures and meshes. To see how a header is embedded, start
-   with run_learn in commands/clique.c.                                                         */
+   command.c; files/ reads and writes pictures and meshes; modules/ compiles the implementations.
+   To see how a header is embedded, start with run_learn in commands/clique.c.                  */
 #include "command.h"
 
 #include "texedges.h"

@@ -2,8 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "command.h"
 #include "files/image_io.h"
-
-#define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
 #include <errno.h>

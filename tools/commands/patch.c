@@ -6,9 +6,6 @@
 #include "patch.h"
 #include "files/image_io.h"
 
-#define TEXPATCH_IMPLEMENTATION
-#include "texpatch.h"
-
 #include <stdio.h>
 
 enum { MAX_LEVELS = 28 }; /* more than any picture has */

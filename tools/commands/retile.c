@@ -6,11 +6,6 @@
 #include "retile.h"
 #include "files/image_io.h"
 
-#define TRIMESH_COVER_IMPLEMENTATION
-#define TRIMESH_RELAX_IMPLEMENTATION
-#include "trimesh_cover.h"
-#include "trimesh_relax.h"
-
 #include <stdio.h>
 
 static const cli_manual retile_manual = {

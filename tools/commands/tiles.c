@@ -3,8 +3,6 @@
 #define _XOPEN_SOURCE 700 /* POSIX: open_memstream */
 #include "command.h"
 #include "files/image_io.h"
-
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include <stdio.h>

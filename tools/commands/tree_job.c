@@ -3,9 +3,6 @@
 #include "tree.h"
 #include "files/image_io.h"
 
-#define TREEPIECES_IMPLEMENTATION
-#include "treepieces.h"
-
 #include <errno.h>
 #include <stdio.h>
 
