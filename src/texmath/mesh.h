@@ -91,11 +91,6 @@ static inline size_t txm_mesh_next(const txm_mesh *mesh, size_t i) {
     if (mesh->corners == 4) return i % 4 == 3 ? i - 3 : i + 1;
     return i % 3 == 2 ? i - 2 : i + 1;
 }
-/* the corner before corner i of its face */
-static inline size_t txm_mesh_previous(const txm_mesh *mesh, size_t i) {
-    if (mesh->corners == 4) return i % 4 == 0 ? i + 3 : i - 1;
-    return i % 3 == 0 ? i + 2 : i - 1;
-}
 /* the lower and the higher vertex of side i: its edge */
 static inline uint32_t txm_mesh_low(const txm_mesh *mesh, size_t i) {
     const uint32_t a = mesh->indices[i], b = mesh->indices[txm_mesh_next(mesh, i)];
@@ -122,6 +117,51 @@ static inline int txm_mesh_edge_color(const txm_mesh *mesh, size_t i, uint64_t s
     return (int)(hash * (uint64_t)colors >> 32);
 }
 
+/* the order of sides: by the lower, then by the higher vertex of the edge, then by number */
+static inline int txm_mesh_before(const txm_mesh *mesh, uint32_t a, uint32_t b) {
+    const uint32_t a_low = txm_mesh_low(mesh, a), b_low = txm_mesh_low(mesh, b);
+    const uint32_t a_high = txm_mesh_high(mesh, a), b_high = txm_mesh_high(mesh, b);
+    if (a_low != b_low) return a_low < b_low;
+    return a_high != b_high ? a_high < b_high : a < b;
+}
+
+/* Restore the heap from root down. */
+static inline void txm_mesh_sift(const txm_mesh *mesh, uint32_t *heap, size_t root, size_t count) {
+    for (size_t child = 2 * root + 1; child < count; root = child, child = 2 * root + 1) {
+        if (child + 1 < count && txm_mesh_before(mesh, heap[child], heap[child + 1])) child++;
+        if (txm_mesh_before(mesh, heap[child], heap[root])) return;
+        const uint32_t side = heap[root];
+        heap[root] = heap[child];
+        heap[child] = side;
+    }
+}
+
+/* Sort the sides of one bin. The usual bin, a few sides with one lower vertex, by insertion of keys
+   that hold the rest; others, which meshes of odd numbering have, as a heap. */
+static inline void txm_mesh_sort_bin(const txm_mesh *mesh, uint32_t *sides, size_t count,
+                                     int is_vertex) {
+    enum { FEW = 48 };
+    uint64_t key[FEW];
+    if (count < 2) return;
+    if (!is_vertex || count > FEW) {
+        for (size_t i = count / 2; i-- > 0;) txm_mesh_sift(mesh, sides, i, count);
+        for (size_t end = count - 1; end > 0; end--) {
+            const uint32_t side = sides[0];
+            sides[0] = sides[end];
+            sides[end] = side;
+            txm_mesh_sift(mesh, sides, 0, end);
+        }
+        return;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const uint64_t k = (uint64_t)txm_mesh_high(mesh, sides[i]) << 32 | sides[i];
+        size_t at = i;
+        for (; at > 0 && key[at - 1] > k; at--) key[at] = key[at - 1];
+        key[at] = k;
+    }
+    for (size_t i = 0; i < count; i++) sides[i] = (uint32_t)key[i];
+}
+
 /* Which sides share an edge, that is, have the same two vertices: sort the sides by the lower, then
    by the higher vertex of their edge. Those of one edge lie together, the lowest number first.
 
@@ -130,41 +170,39 @@ static inline int txm_mesh_edge_color(const txm_mesh *mesh, size_t i, uint64_t s
            ...  sorted[i] to sorted[end - 1] are the sides of one edge
        }
 
+   The sides are counted into bins by the lower vertex, or if that is over the number of sides, by
+   ranges of it, and each bin is sorted.
    sorted  receives the numbers of the sides; room for 2 for each, the upper half is scratch
-   cost    O(faces); the mesh must have passed txm_mesh_check                              */
+   cost    O(faces), with a factor of the logarithm of the largest bin; the mesh must have passed
+           txm_mesh_check                                                                  */
 static inline void txm_mesh_sort_sides(const txm_mesh *mesh, uint32_t *sorted) {
     const size_t sides = txm_mesh_sides(mesh);
-    uint32_t *from = sorted, *to = sorted + sides;
-    size_t next[8][256]; /* a radix sort by the 4 bytes of the higher vertex, then of the lower */
-    memset(next, 0, sizeof next);
+    uint32_t *next = sorted + sides, sum = 0, begin = 0;
+    uint64_t span = 0; /* above all lower vertices */
     for (size_t i = 0; i < sides; i++) {
-        const uint32_t high = txm_mesh_high(mesh, i), low = txm_mesh_low(mesh, i);
-        sorted[i] = (uint32_t)i;
-        for (int b = 0; b < 4; b++) {
-            next[b][(high >> (8 * b)) & 255]++;
-            next[4 + b][(low >> (8 * b)) & 255]++;
-        }
+        const uint64_t low = txm_mesh_low(mesh, i);
+        if (low >= span) span = low + 1;
     }
-    for (int b = 0; b < 8; b++) {
-        const int shift = b % 4 * 8;
-        size_t sum = 0, most = 0;
-        for (int d = 0; d < 256; d++) { /* from how many to where the first goes */
-            const size_t n = next[b][d];
-            if (n > most) most = n;
-            next[b][d] = sum;
-            sum += n;
-        }
-        if (most == sides) continue; /* all the same in this byte */
-        for (size_t i = 0; i < sides; i++) {
-            const uint32_t side = from[i];
-            const uint32_t v = b < 4 ? txm_mesh_high(mesh, side) : txm_mesh_low(mesh, side);
-            to[next[b][(v >> shift) & 255]++] = side;
-        }
-        uint32_t *t = from;
-        from = to;
-        to = t;
+    const int is_vertex = span <= sides;
+    const size_t bins = is_vertex ? (size_t)span : sides;
+    memset(next, 0, bins * sizeof *next);
+    for (size_t i = 0; i < sides; i++) {
+        const uint64_t low = txm_mesh_low(mesh, i);
+        next[is_vertex ? low : low * sides / span]++;
     }
-    if (from != sorted) memcpy(sorted, from, sides * sizeof *sorted);
+    for (size_t b = 0; b < bins; b++) { /* from how many to where the first goes */
+        const uint32_t n = next[b];
+        next[b] = sum;
+        sum += n;
+    }
+    for (size_t i = 0; i < sides; i++) {
+        const uint64_t low = txm_mesh_low(mesh, i);
+        sorted[next[is_vertex ? low : low * sides / span]++] = (uint32_t)i;
+    }
+    for (size_t b = 0; b < bins; b++) {
+        txm_mesh_sort_bin(mesh, sorted + begin, next[b] - begin, is_vertex);
+        begin = next[b];
+    }
 }
 
 /* one past the last of the sorted sides that share the edge of sorted[i] */
