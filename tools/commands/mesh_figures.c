@@ -2,11 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "retile.h"
 
-static int compare_keys(const void *a, const void *b) {
-    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* The root of an item's set; paths are halved on the way. */
 static uint32_t find_root(uint32_t *parent, uint32_t i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
@@ -24,14 +19,15 @@ typedef struct figures {
     double inner, six; /* vertices inside, and those of valence 6 */
 } figures;
 
-/* Count edges, components, border loops and valences. Sorted by its vertices, an inner edge occurs
-   twice, a border edge once. */
+/* Count edges, components, border loops and valences. An inner edge has two sides, a border edge
+   one. */
 static int count_edges(const trimesh_mesh *m, figures *f) {
-    const size_t sides = 3 * m->triangle_count, n = m->vertex_count;
-    uint64_t *keys = (uint64_t *)new_array(sides, sizeof *keys);
+    const txm_mesh mesh = trimesh_as_view(m);
+    const size_t sides = txm_mesh_sides(&mesh), n = m->vertex_count;
+    uint32_t *sorted = (uint32_t *)new_array(sides, 2 * sizeof *sorted);
     uint32_t *pieces = (uint32_t *)new_array(n, 3 * sizeof *pieces);
-    if (!keys || !pieces) {
-        free(keys);
+    if (!sorted || !pieces) {
+        free(sorted);
         free(pieces);
         return 0;
     }
@@ -42,19 +38,15 @@ static int count_edges(const trimesh_mesh *m, figures *f) {
         valence[i] = 0;
     }
     f->components = n;
-    for (size_t c = 0; c < sides; c++) {
-        const uint32_t a = m->indices[c], b = m->indices[c % 3 == 2 ? c - 2 : c + 1];
-        keys[c] = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
-        f->components -= join(pieces, a, b);
-    }
-    qsort(keys, sides, sizeof *keys, compare_keys);
-    for (size_t c = 0; c < sides; c++) {
-        const uint32_t a = (uint32_t)(keys[c] >> 32), b = (uint32_t)(keys[c] & 0xffffffffu);
-        if (c > 0 && keys[c] == keys[c - 1]) continue;
+    txm_mesh_sort_sides(&mesh, sorted);
+    for (size_t i = 0, end; i < sides; i = end) {
+        const uint32_t a = txm_mesh_low(&mesh, sorted[i]), b = txm_mesh_high(&mesh, sorted[i]);
+        end = txm_mesh_edge_end(&mesh, sorted, i);
         f->edges++;
+        f->components -= join(pieces, a, b);
         valence[a] += valence[a] < 1u << 30;
         valence[b] += valence[b] < 1u << 30;
-        if (c + 1 < sides && keys[c] == keys[c + 1]) continue;
+        if (end - i > 1) continue;
         /* a border edge: one more loop if it closes a chain */
         f->loops += 1 - join(rims, a, b);
         valence[a] |= 1u << 31;
@@ -65,7 +57,7 @@ static int count_edges(const trimesh_mesh *m, figures *f) {
         f->inner++;
         f->six += valence[i] == 6;
     }
-    free(keys);
+    free(sorted);
     free(pieces);
     return 1;
 }
