@@ -35,7 +35,7 @@ typedef struct tmr_mend {
     uint8_t *twin;     /* 1 per face: there was one of opposite winding                   */
     int single;        /* non-zero: there are faces of which that is not so               */
     int32_t *list;     /* 1 per face, of the step at hand                                 */
-    txm_pair *pairs, *spare; /* 1 per corner: edges in order                              */
+    uint32_t *sides;   /* 1 per corner: the sides in the order of their edges; as much scratch */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
     txm_dvec3 centre;
@@ -108,14 +108,13 @@ static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scrat
     m->rename = (int32_t *)txm_arena_alloc(scratch, 3 * v, sizeof(int32_t));
     m->flag = (uint8_t *)txm_arena_zero(scratch, 2 * f, 1);
     m->list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
-    m->pairs = (txm_pair *)txm_arena_alloc(scratch, 6 * f, sizeof(txm_pair));
+    m->sides = (uint32_t *)txm_arena_alloc(scratch, 6 * f, sizeof(uint32_t));
     m->table = (int32_t *)txm_arena_alloc(scratch, m->table_size, sizeof(int32_t));
     if (arena->failed || scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     m->degree = m->rename + v;
     m->stamp = m->degree + v;
     m->twin = m->flag + f;
-    m->spare = m->pairs + 3 * f;
     return TXM_OK;
 }
 
@@ -271,74 +270,41 @@ static void tmr_mend_duplicates(tmr_mend *m) {
 
 /* ---- mending: edges ----------------------------------------------------------------------- */
 
-static int32_t tmr_edge_low(const tmr_mend *m, int32_t c) {
-    const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-    return a < b ? a : b;
-}
-static int32_t tmr_edge_high(const tmr_mend *m, int32_t c) {
-    const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-    return a < b ? b : a;
-}
-
-/* Sort pairs by key, few of them mostly; equal keys keep their order. */
-static void tmr_sort_few(txm_pair *pairs, txm_pair *spare, int32_t count) {
-    if (count > 32) {
-        txm_sort_pairs(pairs, spare, (size_t)count);
-        return;
-    }
-    for (int32_t i = 1; i < count; i++) {
-        const txm_pair p = pairs[i];
-        int32_t k = i;
-        for (; k > 0 && pairs[k - 1].key > p.key; k--) pairs[k] = pairs[k - 1];
-        pairs[k] = p;
-    }
+/* The faces as they are now. */
+static txm_mesh tmr_mend_mesh(const tmr_mend *m) {
+    txm_mesh mesh;
+    memset(&mesh, 0, sizeof mesh);
+    mesh.indices = (const uint32_t *)m->vertex;
+    mesh.vertex_count = (size_t)m->vertex_count;
+    mesh.face_count = (size_t)m->face_count;
+    return mesh;
 }
 
-/* Put the corners of equal edges side by side: counted into bins by the lower vertex, within a bin
-   sorted by the higher one, the key. */
-static void tmr_mend_sort(tmr_mend *m) {
-    const int32_t corners = 3 * m->face_count;
-    int32_t *bin = m->degree, sum = 0, begin = 0;
-    memset(bin, 0, (size_t)m->vertex_count * sizeof *bin);
-    for (int32_t c = 0; c < corners; c++) bin[tmr_edge_low(m, c)]++;
-    for (int32_t i = 0; i < m->vertex_count; i++) { /* from how many to where the first goes */
-        const int32_t n = bin[i];
-        bin[i] = sum;
-        sum += n;
-    }
-    for (int32_t c = 0; c < corners; c++) {
-        txm_pair *p = m->pairs + bin[tmr_edge_low(m, c)]++;
-        p->key = (uint32_t)tmr_edge_high(m, c);
-        p->value = (uint32_t)c;
-    }
-    for (int32_t i = 0; i < m->vertex_count; i++) {
-        tmr_sort_few(m->pairs + begin, m->spare, bin[i] - begin);
-        begin = bin[i];
-    }
+/* the corner opposite to the side that is the i-th in the order of the edges */
+static int32_t tmr_opposite_corner(const tmr_mend *m, int32_t i) {
+    return tmr_prev((int32_t)m->sides[i]);
 }
 
-/* The end of the run of equal edges that begins at i. */
+/* The end of the run of sides of one edge that begins at i. */
 static int32_t tmr_run_end(const tmr_mend *m, int32_t i) {
-    const int32_t corners = 3 * m->face_count, first = (int32_t)m->pairs[i].value;
-    int32_t j = i + 1;
-    while (j < corners && m->pairs[j].key == m->pairs[i].key &&
-           tmr_edge_low(m, (int32_t)m->pairs[j].value) == tmr_edge_low(m, first)) j++;
-    return j;
+    const txm_mesh mesh = tmr_mend_mesh(m);
+    return (int32_t)txm_mesh_edge_end(&mesh, m->sides, (size_t)i);
 }
 
 /* Find the opposites; the number of edges with more than two faces. */
 static int32_t tmr_mend_link(tmr_mend *m) {
+    const txm_mesh mesh = tmr_mend_mesh(m);
     int32_t overfull = 0;
-    tmr_mend_sort(m);
+    txm_mesh_sort_sides(&mesh, m->sides);
     for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
-        const int32_t c = (int32_t)m->pairs[i].value;
+        const int32_t c = tmr_opposite_corner(m, i);
         end = tmr_run_end(m, i);
         if (end == i + 1) m->opposite[c] = -1;
         else if (end == i + 2) {
-            m->opposite[c] = (int32_t)m->pairs[i + 1].value;
+            m->opposite[c] = tmr_opposite_corner(m, i + 1);
             m->opposite[m->opposite[c]] = c;
         } else {
-            for (int32_t k = i; k < end; k++) m->opposite[m->pairs[k].value] = TMR_OVERFULL;
+            for (int32_t k = i; k < end; k++) m->opposite[tmr_opposite_corner(m, k)] = TMR_OVERFULL;
             overfull++;
         }
     }
@@ -374,10 +340,10 @@ static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
     for (int thin_only = 0; thin_only < 2; thin_only++) {
         int32_t fins = 0;
         for (int32_t k = begin; k < end; k++)
-            fins += tmr_is_fin(m, (int32_t)m->pairs[k].value, thin_only);
+            fins += tmr_is_fin(m, tmr_opposite_corner(m, k), thin_only);
         if (fins == 0 || end - begin - fins < 2) continue;
         for (int32_t k = begin; k < end; k++) {
-            const int32_t c = (int32_t)m->pairs[k].value;
+            const int32_t c = tmr_opposite_corner(m, k);
             if (tmr_is_fin(m, c, thin_only)) m->flag[c / 3] = 1;
         }
         return 1;
@@ -390,11 +356,11 @@ static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
    (If all faces were double, they are the outside.) */
 static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     int32_t twins = 0, top = 0;
-    for (int32_t k = begin; k < end; k++) twins += m->twin[m->pairs[k].value / 3];
+    for (int32_t k = begin; k < end; k++) twins += m->twin[m->sides[k] / 3];
     const int32_t others = end - begin - twins;
     if (twins == 0 || !(others == 2 || (others == 0 && m->single))) return 0;
     for (int32_t k = begin; k < end; k++) {
-        const int32_t f = (int32_t)m->pairs[k].value / 3;
+        const int32_t f = (int32_t)m->sides[k] / 3;
         if (!m->twin[f] || m->flag[f]) continue;
         m->flag[f] = 1;
         m->list[top++] = f;
@@ -422,15 +388,16 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
                solid                                                                            */
 static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
     enum { MOST = 16 };
-    const int32_t count = end - begin, low = tmr_edge_low(m, (int32_t)m->pairs[begin].value);
-    const int32_t high = tmr_edge_high(m, (int32_t)m->pairs[begin].value);
+    const txm_mesh mesh = tmr_mend_mesh(m);
+    const int32_t count = end - begin, low = (int32_t)txm_mesh_low(&mesh, m->sides[begin]);
+    const int32_t high = (int32_t)txm_mesh_high(&mesh, m->sides[begin]);
     const txm_dvec3 e = txm_d3_unit(txm_d3_sub(m->point[high], m->point[low]));
     txm_dvec3 u = e, w = e;
     double angle[MOST];
     int32_t corner[MOST];
     if (count > MOST || count % 2) return 0;
     for (int32_t k = 0; k < count; k++) {
-        const int32_t c = (int32_t)m->pairs[begin + k].value;
+        const int32_t c = tmr_opposite_corner(m, begin + k);
         txm_dvec3 d = txm_d3_sub(m->point[m->vertex[c]], m->point[low]);
         d = txm_d3_mad(d, e, -txm_d3_dot(d, e));
         if (tmr_face_is_thin(m, c / 3)) return 0;
@@ -473,7 +440,7 @@ static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, i
         if (end - i < 3) continue;
         if (mend(m, i, end)) mended++;
         else if (*bad < 0) {
-            *bad = (int32_t)m->pairs[i].value;
+            *bad = tmr_opposite_corner(m, i);
             *bad_count = (int)(end - i);
         }
     }
