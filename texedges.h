@@ -567,10 +567,10 @@ static int txe_choose_thresholds(const float *gray, size_t count, int levels, fl
             const uint64_t area = 4 * (uint64_t)levels * below[cut];
             const uint64_t held = bins[cut - 1] + bins[cut];
             const uint64_t off = area > target ? area - target : target - area;
-            const int near = off <= quarter, best_near = best && best_off <= quarter;
+            const int is_near = off <= quarter, best_near = best && best_off <= quarter;
             int better = !best || off < best_off;
-            if (near || best_near)
-                better = near && (!best_near || held < best_held || (held == best_held && better));
+            if (is_near || best_near)
+                better = is_near && (!best_near || held < best_held || (held == best_held && better));
             if (!better) continue;
             best = cut;
             best_off = off;

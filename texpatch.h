@@ -318,6 +318,7 @@ enum {
     TXP_CELL = 8,         /* pixels: side of the cells in which use of the exemplar is counted   */
     TXP_LANES = 8,        /* bands processed together, whatever the number of threads            */
     TXP_BAND = 32,        /* rows of a band                                                      */
+    TXP_OFF_LATTICE = 9,  /* square of the distance, in pixels, that counts as off the lattice   */
     TXP_MAX_SHEETS = TEXPATCH_MAX_EXEMPLARS * 8
 };
 
@@ -538,7 +539,14 @@ static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
 
 /* ---- finding the lattice of an exemplar ------------------------------------------------- */
 
-enum { TXP_PEAKS = 40 };
+/* ours, see docs/choices.md; correlations lie in -1..1 */
+enum { TXP_PEAKS = 40 };         /* highest peaks of the correlation that are looked at         */
+#define TXP_LATTICE_CLEAR 0.25   /* least mean correlation at the points of a lattice           */
+#define TXP_LATTICE_ALIKE 0.85   /* of the best lattice's: of those above this the smallest     */
+#define TXP_STEP_CLEAR 0.3       /* least correlation at its two steps                          */
+#define TXP_STEP_ALIKE 0.65      /* the same, of the strongest peak                             */
+#define TXP_FAR_ALIKE 0.7        /* of the steps': least correlation at whole multiples of them */
+#define TXP_RANDOM 0.26          /* strongest peak below which there is no long-range order     */
 
 /* The autocorrelation of a picture for all lags |dx| <= reach_x, 0 <= dy <= reach_y. */
 typedef struct txp_correlation {
@@ -698,20 +706,20 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
         for (int j = i + 1; j < count; j++) {
             double a[2] = {(double)px[i], (double)py[i]}, b[2] = {(double)px[j], (double)py[j]};
             const double size = fabs(txp_det(a, b));
-            if (scores[i][j] < 0.85 * best || size >= area) continue;
+            if (scores[i][j] < TXP_LATTICE_ALIKE * best || size >= area) continue;
             area = size;
             bi = i;
             bj = j;
         }
     }
-    if (bi < 0 || best <= 0.25 || best <= 2 * mean) return 0;
+    if (bi < 0 || best <= TXP_LATTICE_CLEAR || best <= 2 * mean) return 0;
     double a[2] = {(double)px[bi], (double)py[bi]}, b[2] = {(double)px[bj], (double)py[bj]};
     txp_reduce_basis(a, b);
     txp_refine_peak(k, a);
     txp_refine_peak(k, b);
     const double ca = txp_correlated(k, (int)floor(a[0] + 0.5), (int)floor(a[1] + 0.5));
     const double cb = txp_correlated(k, (int)floor(b[0] + 0.5), (int)floor(b[1] + 0.5));
-    if (fmin(ca, cb) < 0.65 * *strongest || fmin(ca, cb) <= 0.3) return 0;
+    if (fmin(ca, cb) < TXP_STEP_ALIKE * *strongest || fmin(ca, cb) <= TXP_STEP_CLEAR) return 0;
     /* farther points of the lattice determine the steps more exactly */
     for (int t = 2; t <= 8; t++) {
         for (int c = 0; c < 2; c++) {
@@ -722,7 +730,7 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
             const double ex = far_peak[0] - x, ey = far_peak[1] - y;
             if (ex * ex + ey * ey > 1.5 * 1.5) continue;
             if (txp_correlated(k, (int)floor(far_peak[0] + 0.5), (int)floor(far_peak[1] + 0.5)) <
-                0.7 * fmin(ca, cb))
+                TXP_FAR_ALIKE * fmin(ca, cb))
                 continue;
             v[0] = far_peak[0] / t;
             v[1] = far_peak[1] / t;
@@ -1104,7 +1112,7 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         txm_parallel_for(env, k.reach_y + 1, txp_correlate_row, &k);
         const int found = txp_lattice_find(&k, v, &strongest);
         s->has_lattice = found && u->lattice != -1;
-        s->is_random = !found && strongest < 0.26;
+        s->is_random = !found && strongest < TXP_RANDOM;
         for (int i = 0; i < 4; i++) v[i] *= 1 << top;
         txm_arena_free(&scratch);
     }
@@ -1532,7 +1540,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     /* costs are gray levels summed over known bytes, of which the first block has none */
     const double unit = known ? (double)known : 1;
     double best = 1e30;
-    const double tolerance = 1.02;
+    const double tolerance = 1.02; /* ours: candidates of costs this near the least are as good */
     const uint32_t start = txm_rng_next(&q->rng);
     /* once more without the lattice, if no place of the exemplar lies on it */
     for (int n = 0, strict = s->has_lattice; n < s->sheets || (strict && !count); n++) {
@@ -1544,8 +1552,8 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 double extra = 0;
                 if (s->has_lattice) {
                     const double d = txp_off_lattice(k, x - bx - q->shift_x, y - by - q->shift_y);
-                    if (d > 9 && strict) continue;
-                    extra += q->lattice_weight * fmin(d, 9);
+                    if (d > TXP_OFF_LATTICE && strict) continue;
+                    extra += q->lattice_weight * fmin(d, TXP_OFF_LATTICE);
                 }
                 if (k->bad && !txp_fits(s, k, x, y, size, size)) continue;
                 if (!known)
@@ -1734,9 +1742,8 @@ static void txp_try(txp_search *f, int x, int y) {
     f->seen[f->seen_count++ % 16].y = (int16_t)y;
     double extra = 0;
     if (s->has_lattice) {
-        double d = txp_off_lattice(p->stack, x - f->x - p->shift_x, y - f->y - p->shift_y);
-        if (d > 9) d = 9;
-        extra += p->lattice_weight * d;
+        const double d = txp_off_lattice(p->stack, x - f->x - p->shift_x, y - f->y - p->shift_y);
+        extra += p->lattice_weight * fmin(d, TXP_OFF_LATTICE);
     }
     extra += p->use_weight * txp_use_at(&p->use, x, y, size);
     if (f->most_same < 8 && txp_continues(f, x, y)) return;
@@ -2171,8 +2178,15 @@ enum {
     TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
     TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
     TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
-    TXP_JUMP_UNIT = 64   /* jumps are stored in 1 / 64                                           */
+    TXP_JUMP_UNIT = 64,  /* jumps are stored in 1 / 64                                           */
+
+    TXP_PULL_SEAM = 13,  /* of 255: pull between two pieces                                      */
+    TXP_PULL_FITS = 77,  /* the same if no shift would make them fit better                      */
+    TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
+    TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
 };
+#define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
+#define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
 
 /* A field over the canvas with given jumps between neighbouring pixels: the minimum of
 
@@ -2351,6 +2365,8 @@ static void txp_measure_band(void *context, int lane) {
     const txp_stack *k = &s->stack[0];
     const int top = (m->first_band + 2 * lane) * TXP_BAND;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
+    /* summed over 5 x 5 pixels */
+    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25;
     txp_seam seams[TXP_SEAM_CACHE];
     memset(seams, 0, sizeof seams);
     for (int y = top; y < bottom; y++) {
@@ -2365,14 +2381,14 @@ static void txp_measure_band(void *context, int lane) {
                 txp_place a = c->at[i];
                 const txp_place q = c->at[txp_index(c, qx, qy)];
                 if (a.x < 0 || q.x < 0) {
-                    *bend = *tone = 13;
+                    *bend = *tone = TXP_PULL_SEAM;
                     continue;
                 }
                 a.x = (int16_t)(a.x + !d);
                 a.y = (int16_t)(a.y + d);
                 if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = 77; /* fits already */
-                *tone = 13;
+                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
+                *tone = TXP_PULL_SEAM;
                 const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
                           by = q.y + shift[1] - 2;
                 int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
@@ -2386,9 +2402,10 @@ static void txp_measure_band(void *context, int lane) {
                     }
                     for (int b = 0; b < s->guide_at; b++)
                         most = abs(sum[b]) > most ? abs(sum[b]) : most;
-                    if (most < 32 * 25)
-                        *tone = (uint8_t)(most < 12 * 25 ? 255
-                                                         : 13 + 242 * (32 * 25 - most) / (20 * 25));
+                    if (most < low) *tone = 255;
+                    else if (most < high)
+                        *tone = (uint8_t)(TXP_PULL_SEAM +
+                                          (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
                 }
                 /* u(q) - u(i) = jump: added to q, subtracted from i */
                 const size_t j = txp_index(c, qx, qy);
@@ -2396,13 +2413,13 @@ static void txp_measure_band(void *context, int lane) {
                     txp_field_mark(m->bend, x, y);
                     txp_field_mark(m->bend, qx, qy);
                 }
-                if (most > 0 && most < 32 * 25) {
+                if (most > 0 && most < high) {
                     txp_field_mark(m->tone, x, y);
                     txp_field_mark(m->tone, qx, qy);
                 }
                 for (size_t b = 0; b < 2; b++)
                     txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
-                for (size_t b = 0; b < (size_t)s->guide_at && most < 32 * 25; b++)
+                for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
                     txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
             }
         }
@@ -3023,8 +3040,8 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     memset(&bend, 0, sizeof bend);
     memset(&tone, 0, sizeof tone);
     txm_arena_init(&scratch, env);
-    txp_field_make(&bend, c, 2, 0.02, memory, &scratch);
-    txp_field_make(&tone, c, lanes, 0.004, memory, &scratch);
+    txp_field_make(&bend, c, 2, TXP_BEND_SCREEN, memory, &scratch);
+    txp_field_make(&tone, c, lanes, TXP_TONE_SCREEN, memory, &scratch);
     if (memory->failed || scratch.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
         goto done;

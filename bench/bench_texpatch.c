@@ -53,7 +53,7 @@ static void time_make(const texpatch_desc *desc, int threads, result *r) {
     for (int m = 0; m < MAPS; m++) free(out[m].pixels);
 }
 
-/* A finished job, of which a band in the middle is made anew. */
+/* A finished job, of which a band in the middle is made again. */
 static void time_again(const texpatch_desc *desc, int threads, result *r) {
     txm_image again = new_image(desc->width, desc->height, 1);
     txm_env env = make_env(&threads);

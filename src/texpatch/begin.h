@@ -149,8 +149,8 @@ static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory
     memset(&bend, 0, sizeof bend);
     memset(&tone, 0, sizeof tone);
     txm_arena_init(&scratch, env);
-    txp_field_make(&bend, c, 2, 0.02, memory, &scratch);
-    txp_field_make(&tone, c, lanes, 0.004, memory, &scratch);
+    txp_field_make(&bend, c, 2, TXP_BEND_SCREEN, memory, &scratch);
+    txp_field_make(&tone, c, lanes, TXP_TONE_SCREEN, memory, &scratch);
     if (memory->failed || scratch.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
         goto done;

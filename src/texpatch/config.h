@@ -27,6 +27,7 @@ enum {
     TXP_CELL = 8,         /* pixels: side of the cells in which use of the exemplar is counted   */
     TXP_LANES = 8,        /* bands processed together, whatever the number of threads            */
     TXP_BAND = 32,        /* rows of a band                                                      */
+    TXP_OFF_LATTICE = 9,  /* square of the distance, in pixels, that counts as off the lattice   */
     TXP_MAX_SHEETS = TEXPATCH_MAX_EXEMPLARS * 8
 };
 

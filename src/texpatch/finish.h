@@ -12,8 +12,15 @@ enum {
     TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
     TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
     TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
-    TXP_JUMP_UNIT = 64   /* jumps are stored in 1 / 64                                           */
+    TXP_JUMP_UNIT = 64,  /* jumps are stored in 1 / 64                                           */
+
+    TXP_PULL_SEAM = 13,  /* of 255: pull between two pieces                                      */
+    TXP_PULL_FITS = 77,  /* the same if no shift would make them fit better                      */
+    TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
+    TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
 };
+#define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
+#define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
 
 /* A field over the canvas with given jumps between neighbouring pixels: the minimum of
 
@@ -192,6 +199,8 @@ static void txp_measure_band(void *context, int lane) {
     const txp_stack *k = &s->stack[0];
     const int top = (m->first_band + 2 * lane) * TXP_BAND;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
+    /* summed over 5 x 5 pixels */
+    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25;
     txp_seam seams[TXP_SEAM_CACHE];
     memset(seams, 0, sizeof seams);
     for (int y = top; y < bottom; y++) {
@@ -206,14 +215,14 @@ static void txp_measure_band(void *context, int lane) {
                 txp_place a = c->at[i];
                 const txp_place q = c->at[txp_index(c, qx, qy)];
                 if (a.x < 0 || q.x < 0) {
-                    *bend = *tone = 13;
+                    *bend = *tone = TXP_PULL_SEAM;
                     continue;
                 }
                 a.x = (int16_t)(a.x + !d);
                 a.y = (int16_t)(a.y + d);
                 if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = 77; /* fits already */
-                *tone = 13;
+                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
+                *tone = TXP_PULL_SEAM;
                 const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
                           by = q.y + shift[1] - 2;
                 int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
@@ -227,9 +236,10 @@ static void txp_measure_band(void *context, int lane) {
                     }
                     for (int b = 0; b < s->guide_at; b++)
                         most = abs(sum[b]) > most ? abs(sum[b]) : most;
-                    if (most < 32 * 25)
-                        *tone = (uint8_t)(most < 12 * 25 ? 255
-                                                         : 13 + 242 * (32 * 25 - most) / (20 * 25));
+                    if (most < low) *tone = 255;
+                    else if (most < high)
+                        *tone = (uint8_t)(TXP_PULL_SEAM +
+                                          (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
                 }
                 /* u(q) - u(i) = jump: added to q, subtracted from i */
                 const size_t j = txp_index(c, qx, qy);
@@ -237,13 +247,13 @@ static void txp_measure_band(void *context, int lane) {
                     txp_field_mark(m->bend, x, y);
                     txp_field_mark(m->bend, qx, qy);
                 }
-                if (most > 0 && most < 32 * 25) {
+                if (most > 0 && most < high) {
                     txp_field_mark(m->tone, x, y);
                     txp_field_mark(m->tone, qx, qy);
                 }
                 for (size_t b = 0; b < 2; b++)
                     txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
-                for (size_t b = 0; b < (size_t)s->guide_at && most < 32 * 25; b++)
+                for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
                     txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
             }
         }

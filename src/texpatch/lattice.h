@@ -24,7 +24,14 @@ static inline double txp_off_lattice(const txp_stack *k, double x, double y) {
 
 /* ---- finding the lattice of an exemplar ------------------------------------------------- */
 
-enum { TXP_PEAKS = 40 };
+/* ours, see docs/choices.md; correlations lie in -1..1 */
+enum { TXP_PEAKS = 40 };         /* highest peaks of the correlation that are looked at         */
+#define TXP_LATTICE_CLEAR 0.25   /* least mean correlation at the points of a lattice           */
+#define TXP_LATTICE_ALIKE 0.85   /* of the best lattice's: of those above this the smallest     */
+#define TXP_STEP_CLEAR 0.3       /* least correlation at its two steps                          */
+#define TXP_STEP_ALIKE 0.65      /* the same, of the strongest peak                             */
+#define TXP_FAR_ALIKE 0.7        /* of the steps': least correlation at whole multiples of them */
+#define TXP_RANDOM 0.26          /* strongest peak below which there is no long-range order     */
 
 /* The autocorrelation of a picture for all lags |dx| <= reach_x, 0 <= dy <= reach_y. */
 typedef struct txp_correlation {
@@ -184,20 +191,20 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
         for (int j = i + 1; j < count; j++) {
             double a[2] = {(double)px[i], (double)py[i]}, b[2] = {(double)px[j], (double)py[j]};
             const double size = fabs(txp_det(a, b));
-            if (scores[i][j] < 0.85 * best || size >= area) continue;
+            if (scores[i][j] < TXP_LATTICE_ALIKE * best || size >= area) continue;
             area = size;
             bi = i;
             bj = j;
         }
     }
-    if (bi < 0 || best <= 0.25 || best <= 2 * mean) return 0;
+    if (bi < 0 || best <= TXP_LATTICE_CLEAR || best <= 2 * mean) return 0;
     double a[2] = {(double)px[bi], (double)py[bi]}, b[2] = {(double)px[bj], (double)py[bj]};
     txp_reduce_basis(a, b);
     txp_refine_peak(k, a);
     txp_refine_peak(k, b);
     const double ca = txp_correlated(k, (int)floor(a[0] + 0.5), (int)floor(a[1] + 0.5));
     const double cb = txp_correlated(k, (int)floor(b[0] + 0.5), (int)floor(b[1] + 0.5));
-    if (fmin(ca, cb) < 0.65 * *strongest || fmin(ca, cb) <= 0.3) return 0;
+    if (fmin(ca, cb) < TXP_STEP_ALIKE * *strongest || fmin(ca, cb) <= TXP_STEP_CLEAR) return 0;
     /* farther points of the lattice determine the steps more exactly */
     for (int t = 2; t <= 8; t++) {
         for (int c = 0; c < 2; c++) {
@@ -208,7 +215,7 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
             const double ex = far_peak[0] - x, ey = far_peak[1] - y;
             if (ex * ex + ey * ey > 1.5 * 1.5) continue;
             if (txp_correlated(k, (int)floor(far_peak[0] + 0.5), (int)floor(far_peak[1] + 0.5)) <
-                0.7 * fmin(ca, cb))
+                TXP_FAR_ALIKE * fmin(ca, cb))
                 continue;
             v[0] = far_peak[0] / t;
             v[1] = far_peak[1] / t;

@@ -135,7 +135,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     /* costs are gray levels summed over known bytes, of which the first block has none */
     const double unit = known ? (double)known : 1;
     double best = 1e30;
-    const double tolerance = 1.02;
+    const double tolerance = 1.02; /* ours: candidates of costs this near the least are as good */
     const uint32_t start = txm_rng_next(&q->rng);
     /* once more without the lattice, if no place of the exemplar lies on it */
     for (int n = 0, strict = s->has_lattice; n < s->sheets || (strict && !count); n++) {
@@ -147,8 +147,8 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 double extra = 0;
                 if (s->has_lattice) {
                     const double d = txp_off_lattice(k, x - bx - q->shift_x, y - by - q->shift_y);
-                    if (d > 9 && strict) continue;
-                    extra += q->lattice_weight * fmin(d, 9);
+                    if (d > TXP_OFF_LATTICE && strict) continue;
+                    extra += q->lattice_weight * fmin(d, TXP_OFF_LATTICE);
                 }
                 if (k->bad && !txp_fits(s, k, x, y, size, size)) continue;
                 if (!known)

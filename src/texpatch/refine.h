@@ -80,9 +80,8 @@ static void txp_try(txp_search *f, int x, int y) {
     f->seen[f->seen_count++ % 16].y = (int16_t)y;
     double extra = 0;
     if (s->has_lattice) {
-        double d = txp_off_lattice(p->stack, x - f->x - p->shift_x, y - f->y - p->shift_y);
-        if (d > 9) d = 9;
-        extra += p->lattice_weight * d;
+        const double d = txp_off_lattice(p->stack, x - f->x - p->shift_x, y - f->y - p->shift_y);
+        extra += p->lattice_weight * fmin(d, TXP_OFF_LATTICE);
     }
     extra += p->use_weight * txp_use_at(&p->use, x, y, size);
     if (f->most_same < 8 && txp_continues(f, x, y)) return;

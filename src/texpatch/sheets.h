@@ -363,7 +363,7 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         txm_parallel_for(env, k.reach_y + 1, txp_correlate_row, &k);
         const int found = txp_lattice_find(&k, v, &strongest);
         s->has_lattice = found && u->lattice != -1;
-        s->is_random = !found && strongest < 0.26;
+        s->is_random = !found && strongest < TXP_RANDOM;
         for (int i = 0; i < 4; i++) v[i] *= 1 << top;
         txm_arena_free(&scratch);
     }
