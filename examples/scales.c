@@ -3,9 +3,9 @@
 
    scales MESH.obj OUT.obj [VERTICES]
 
-   How trimesh_relax.h and trimesh_cover.h work together. The first makes of a mesh of any triangles
-   one of nearly equilateral and equal triangles, the second places a scale on each of them, its tip
-   towards the lowest corner. As the triangles are alike, so are the scales, and they overlap evenly.        */
+   How trimesh_relax.h and trimesh_cover.h work together. The first turns any mesh into one of nearly
+   equilateral and equal triangles; the second places a scale on each of them, its tip towards the
+   lowest corner. As the triangles are alike, so are the scales, and they overlap evenly.        */
 #define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 #define TRIMESH_COVER_IMPLEMENTATION

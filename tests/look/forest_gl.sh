@@ -1,7 +1,7 @@
 #!/bin/sh
-# shaders/treepieces.glsl does what treepieces.h does: tests/look/gl_treepieces.c explains how that is
-# known. examples/forest_gl draws pictures without a window, and refuses what it cannot. Mesa's
-# software driver is enough for both.
+# shaders/treepieces.glsl computes what treepieces.h does; tests/look/gl_treepieces.c explains how this
+# is compared. examples/forest_gl draws pictures without a window, and reports errors. Mesa's software
+# driver is enough for both.
 . tests/kit/tap.sh
 
 gl=$OUT/gl_treepieces forest=$PWD/build/examples/forest_gl
@@ -16,16 +16,16 @@ fi
 check "forest_gl builds" make -s "${forest#"$PWD/"}" || exit 1
 cd "$tmp" || exit 1
 
-# draw ARGUMENTS...: small pictures, quick to draw
+# draw ARGUMENTS...: small pictures, so that it is quick
 draw() { "$forest" --size 96x80 --smooth 1 --pieces 60 "$@" >out.log 2>err.log; }
-# value NAME: of the last drawing
+# value NAME: a number that the last drawing printed
 value() { sed -n "s/^$1 //p" out.log; }
-# refuses TEXT ARGUMENTS...: a message of one line on stderr, and no picture
+# refuses TEXT ARGUMENTS...: it fails, TEXT is on stderr, and there is no picture
 refuses() {
     text=$1
     shift
     rm -f no.png
-    draw --headless no.png "$@" && { echo "it takes $*"; return 1; }
+    draw --headless no.png "$@" && { echo "it accepts $*"; return 1; }
     [ ! -e no.png ] || { echo "there is a picture"; return 1; }
     grep -q -- "$text" err.log || { echo "the message lacks '$text':"; cat err.log; return 1; }
 }
@@ -36,7 +36,7 @@ pictures() {
     draw --species oak,pine,willow --count 5 --headless b.png && cmp a.png b.png || return 1
     draw --species oak,pine,willow --count 5 --seed 2 --headless b.png && ! cmp -s a.png b.png
 }
-check "forest_gl draws a forest, the same again, and another one for another seed" pictures
+check "forest_gl draws a forest, the same one again, and another one for another seed" pictures
 
 calls() {
     draw --count 1 --headless a.png && one=$(value draws) || return 1
@@ -60,9 +60,9 @@ frames() {
     draw --headless f%02d.png --frames 3 --wind 9 || { cat err.log; return 1; }
     [ -s f00.png ] && [ -s f02.png ] && [ ! -e f03.png ] && ! cmp -s f00.png f02.png
 }
-check "forest_gl: frames of the wind" frames
+check "forest_gl: frames of an animation" frames
 
-# on a screen that nobody sees; SDL takes the signal for a click on the window's close button
+# on a virtual screen; SDL treats the signal like a click on the close button of the window
 window() {
     xvfb-run -a -s "-screen 0 640x480x24" sh -c '"$0" --size 160x120 --pieces 8 >out.log 2>err.log &
         sleep 6; kill $!; wait $!' "$forest" || { cat err.log; return 1; }
@@ -79,4 +79,4 @@ bad() {
         refuses usage --frames 2 && refuses usage --nonsense && refuses usage --count &&
         refuses "cannot find" --shaders . && refuses usage --wind wet
 }
-check "forest_gl refuses what it cannot, with a message" bad
+check "forest_gl reports errors with a message" bad
