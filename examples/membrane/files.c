@@ -30,13 +30,6 @@ const char *write_xyz(const membrane *m, const char *path) {
     return fclose(file) != 0 || failed ? "cannot write the file" : NULL;
 }
 
-static const char *write_bytes(const char *path, const unsigned char *bytes, size_t size) {
-    FILE *file = fopen(path, "wb");
-    if (!file) return "cannot open the file";
-    const int failed = fwrite(bytes, 1, size, file) != size;
-    return fclose(file) != 0 || failed ? "cannot write the file" : NULL;
-}
-
 /* Each kind of lipid as one mesh with many instances: a GLB, or a picture. */
 const char *write_scene(const membrane *m, const char *extension, const char *path) {
     mesh_data meshes[KINDS];
@@ -76,7 +69,7 @@ const char *write_scene(const membrane *m, const char *extension, const char *pa
     } else if (!why) {
         mesh_encode(extension, &scene, &bytes, &size, &why);
     }
-    if (bytes) why = write_bytes(path, bytes, size);
+    if (bytes && !file_write(path, bytes, size)) why = "cannot write the file";
     for (int k = 0; k < KINDS; k++) mesh_free(&meshes[k]);
     free(bytes);
     free(at);

@@ -50,6 +50,13 @@ unsigned char *file_read(const char *path, size_t *size) {
     return bytes;
 }
 
+int file_write(const char *path, const unsigned char *bytes, size_t size) {
+    FILE *file = fopen(path, "wb");
+    if (!file) return 0;
+    const int ok = fwrite(bytes, 1, size, file) == size;
+    return fclose(file) == 0 && ok;
+}
+
 /* ---- reading ---------------------------------------------------------------------------- */
 
 /* Where a JPEG, BMP, TGA or PNM ends too early, stb_image fills in zeros without an error. This
@@ -344,4 +351,15 @@ int image_encode(const char *extension, const txm_image *image, unsigned char **
     *bytes = s.bytes;
     *size = s.size;
     return 1;
+}
+
+int image_write(const char *path, const txm_image *image, const char **why) {
+    char extension[8];
+    unsigned char *bytes;
+    size_t size;
+    file_extension(path, extension);
+    if (!image_encode(extension, image, &bytes, &size, why)) return 0;
+    const int ok = file_write(path, bytes, size);
+    free(bytes);
+    return ok ? 1 : (*why = "cannot write the file", 0);
 }

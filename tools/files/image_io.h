@@ -12,6 +12,9 @@
 /* The whole file in a block for free(), or NULL with errno set. */
 unsigned char *file_read(const char *path, size_t *size);
 
+/* Write a whole file; commands use cli_finish instead. 0: it cannot be written. */
+int file_write(const char *path, const unsigned char *bytes, size_t size);
+
 /* ".png" of "a/b.PNG": in lower case, at most 7 characters; "" if there is none */
 void file_extension(const char *path, char extension[8]);
 
@@ -44,5 +47,8 @@ int image_can_write(const char *extension, int width, int height, int channels, 
    which makes a PNG of 16 bits. 1 if all went well. */
 int image_encode(const char *extension, const txm_image *image, unsigned char **bytes, size_t *size,
                  const char **why);
+
+/* The same, written to the path, whose extension says how. */
+int image_write(const char *path, const txm_image *image, const char **why);
 
 #endif /* IMAGE_IO_H */

@@ -15,8 +15,6 @@ static int fail(const char *path, const char *why) {
 int main(int argc, char **argv) {
     txm_image in, out = {0};
     const char *why = NULL;
-    unsigned char *bytes;
-    size_t size;
     if (argc < 3) return fail("", "usage: crop IN OUT.png [SIDE [SHRINK]]");
     int side = argc > 3 ? atoi(argv[3]) : 256, shrink = argc > 4 ? atoi(argv[4]) : 1;
     if (side < 1 || shrink < 1 || shrink > 64) return fail(argv[2], "bad size");
@@ -47,12 +45,8 @@ int main(int argc, char **argv) {
         }
     }
 
-    if (!image_encode(".png", &out, &bytes, &size, &why)) return fail(argv[2], why);
-    FILE *file = fopen(argv[2], "wb");
-    int ok = file && fwrite(bytes, 1, size, file) == size;
-    if (file && fclose(file) != 0) ok = 0;
-    free(bytes);
+    const int ok = image_write(argv[2], &out, &why);
     free(out.pixels);
     image_free(&in);
-    return ok ? 0 : fail(argv[2], "cannot write");
+    return ok ? 0 : fail(argv[2], why);
 }

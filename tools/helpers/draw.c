@@ -153,8 +153,7 @@ static int fail(const char *path, const char *why) {
 int main(int argc, char **argv) {
     txm_image out = {0};
     const char *why = NULL;
-    unsigned char *bytes;
-    size_t size, kind = 0, count = sizeof kinds / sizeof kinds[0];
+    size_t kind = 0, count = sizeof kinds / sizeof kinds[0];
     if (argc == 2 && !strcmp(argv[1], "list")) {
         for (kind = 0; kind < count; kind++) printf("%s\n", kinds[kind].name);
         return 0;
@@ -182,11 +181,7 @@ int main(int argc, char **argv) {
         }
     }
 
-    if (!image_encode(".png", &out, &bytes, &size, &why)) return fail(argv[2], why);
-    FILE *file = fopen(argv[2], "wb");
-    int ok = file && fwrite(bytes, 1, size, file) == size;
-    if (file && fclose(file) != 0) ok = 0;
-    free(bytes);
+    const int ok = image_write(argv[2], &out, &why);
     free(out.pixels);
-    return ok ? 0 : fail(argv[2], "cannot write");
+    return ok ? 0 : fail(argv[2], why);
 }

@@ -199,17 +199,8 @@ static int make_spheres(const mesh_data *points, float radius, mesh_data *sphere
 /* ---- main ------------------------------------------------------------------------------------ */
 
 static int write_picture(const char *path, const txm_image *picture) {
-    const char *why = "cannot write";
-    char extension[8];
-    unsigned char *bytes;
-    size_t size;
-    file_extension(path, extension);
-    if (!image_encode(extension, picture, &bytes, &size, &why)) return fail(path, why);
-    FILE *file = fopen(path, "wb");
-    int ok = file && fwrite(bytes, 1, size, file) == size;
-    if (file && fclose(file) != 0) ok = 0;
-    free(bytes);
-    return ok ? 0 : fail(path, "cannot write");
+    const char *why;
+    return image_write(path, picture, &why) ? 0 : fail(path, why);
 }
 
 /* Read everything and draw it. */
