@@ -67,8 +67,9 @@
      Sort, cut, eigenvectors and the sides of a mesh are the same also where there are ties.
 
    LIMITS
-     An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
-     that return no status expect arguments in the range stated and do not check them.
+     An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns; a mesh may have
+     up to 2^32 - 2 sides. Functions that return no status expect arguments in the range stated and
+     do not check them.
 
    REFERENCES
      [1] M. O'Neill. PCG: a family of simple fast space-efficient statistically good algorithms for
@@ -1626,8 +1627,8 @@ static inline void txm_mesh_sift(const txm_mesh *mesh, uint32_t *heap, size_t ro
     }
 }
 
-/* Sort the sides of one bin. The usual bin, a few sides with one lower vertex, by insertion of keys
-   that hold the rest; others, which meshes of odd numbering have, as a heap. */
+/* Sort the sides of one bin: a few with the same lower vertex, as most bins are, by insertion, their
+   keys being the higher vertex and the number; others as a heap. */
 static inline void txm_mesh_sort_bin(const txm_mesh *mesh, uint32_t *sides, size_t count,
                                      int is_vertex) {
     enum { FEW = 48 };
@@ -1660,11 +1661,10 @@ static inline void txm_mesh_sort_bin(const txm_mesh *mesh, uint32_t *sides, size
            ...  sorted[i] to sorted[end - 1] are the sides of one edge
        }
 
-   The sides are counted into bins by the lower vertex, or if that is over the number of sides, by
-   ranges of it, and each bin is sorted.
+   The sides are counted into bins by the lower vertex, or by ranges of it if vertex numbers are
+   larger than the number of sides, and each bin is sorted. The mesh must have passed txm_mesh_check.
    sorted  receives the numbers of the sides; room for 2 for each, the upper half is scratch
-   cost    O(faces), with a factor of the logarithm of the largest bin; the mesh must have passed
-           txm_mesh_check                                                                  */
+   cost    O(n log m) for n sides, of which at most m are in one bin: mostly about 6       */
 static inline void txm_mesh_sort_sides(const txm_mesh *mesh, uint32_t *sorted) {
     const size_t sides = txm_mesh_sides(mesh);
     uint32_t *next = sorted + sides, sum = 0, begin = 0;

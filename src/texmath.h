@@ -67,8 +67,9 @@
      Sort, cut, eigenvectors and the sides of a mesh are the same also where there are ties.
 
    LIMITS
-     An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns. Functions
-     that return no status expect arguments in the range stated and do not check them.
+     An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns; a mesh may have
+     up to 2^32 - 2 sides. Functions that return no status expect arguments in the range stated and
+     do not check them.
 
    REFERENCES
      [1] M. O'Neill. PCG: a family of simple fast space-efficient statistically good algorithms for
