@@ -12,6 +12,14 @@ enum {
     TPC_MAX_BRANCH = 60    /* percent: largest radius of a side branch over that of its stem */
 };
 
+/* Ours, see docs/choices.md#choices-in-treepiecesh; how many tiles lie across a quad, how thin twigs
+   get, where shade is counted, and where hanging axes end. */
+static const float tpc_tile_width = 0.1f;     /* wanted, in base radii of the trunk             */
+static const float tpc_halving_width = 0.58f; /* of that: narrower tiles are halved in number   */
+static const float tpc_twig_radius = 0.033f;  /* the least, in base radii of the trunk          */
+static const float tpc_grid_width = 1.6f;     /* of the shade grid, in trunk lengths            */
+static const float tpc_clearance = 0.04f;     /* above the ground, in trunk lengths             */
+
 /* An open rim. */
 typedef struct tpc_bud {
     int32_t next;                 /* in its bucket                                              */
@@ -109,9 +117,9 @@ static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     return x * x + z * z > r * r;
 }
 
-/* the shade cell of a position; returns the side of a cell. The grid is 1.6 trunk lengths wide */
+/* the shade cell of a position; returns the side of a cell */
 static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
-    const float side = 1.6f * g->trunk / (float)TPC_GRID;
+    const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
     for (int k = 0; k < 3; k++) {
         const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
         const float at = (position[k] - g->place.position[k]) / side + middle;
@@ -149,7 +157,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
         tpc_is_shaded(g, bud))
         return TREEPIECES_TIP;
     /* a hanging axis ends before it reaches the ground */
-    if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < 0.04f * g->trunk)
+    if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < tpc_clearance * g->trunk)
         return TREEPIECES_TIP;
     if (g->desc->rule == TREEPIECES_ALTERNATE) return bud->depth & 1 ? TREEPIECES_Y : TREEPIECES_I;
     if (g->desc->rule == TREEPIECES_RANDOM)
@@ -169,7 +177,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
 
 /* The smallest radius of twigs, so that texels are not much smaller on them than on the trunk. */
 static float tpc_thinnest(const tpc_growth *g) {
-    return 0.033f * g->foot;
+    return tpc_twig_radius * g->foot;
 }
 
 /* The length of the next piece, limited to a range of radii so that its type keeps its proportions. */
@@ -294,13 +302,12 @@ static void tpc_joint(const float rim[4], int turn, const float heading[3], floa
     }
 }
 
-/* Word 3 of a record: log2 of the number of tiles along and across the quads of each band. A tile
-   should be a tenth of the trunk's base radius wide; where it would be narrower than 0.58 of that,
-   the number across is halved. across: receives the log2 at each leaf rim. */
+/* Word 3 of a record: log2 of the number of tiles along and across the quads of each band. Where tiles
+   would be too narrow, the number across is halved. across: receives its log2 at each leaf rim. */
 static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
                           int across[TREEPIECES_MAX_LEAVES]) {
     static const uint8_t halvable[TREEPIECES_BUILTIN] = {3, 1, 1, 1, 1, 0, 2};
-    const float tile = 0.1f * g->foot;
+    const float tile = tpc_tile_width * g->foot;
     const tpc_band *band = g->kit->bands[c->type];
     const int may = c->type < TREEPIECES_BUILTIN ? halvable[c->type] : 0;
     const int leaves = g->kit->pieces[c->type].leaf_count;
@@ -311,8 +318,9 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
         const float part = c->type == TREEPIECES_I && b == 0 ? 0.5f : 1;
         const float radius = bud->radius * (1 + (c->ratios[0] - 1) * part);
         int halve = 0;
-        if (b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE) { /* as band 0 */
-        } else if ((may >> b & 1) && now > 0 && radius < 0.58f * tile * (float)(1 << now)) {
+        const int is_as_before = b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE;
+        const float least = tpc_halving_width * tile * (float)(1 << now);
+        if (!is_as_before && (may >> b & 1) && now > 0 && radius < least) {
             halve = 1;
             now--;
         }

@@ -53,9 +53,9 @@ static int tpc_side_vertex(const tpc_pattern *p, int side, int i) {
 
 /* Vertex i of 0..inner - 2 on the border of the inner grid along a side, in the side's direction. */
 static int tpc_inner_vertex(const tpc_pattern *p, int side, int i) {
-    const int n = p->inner - 1, far = n - 1 - i;
-    const int u = side == 0 ? 0 : side == 1 ? i : side == 2 ? n - 1 : far;
-    const int v = side == 0 ? i : side == 1 ? n - 1 : side == 2 ? far : 0;
+    const int n = p->inner - 1, back = n - 1 - i;
+    const int u = side == 0 ? 0 : side == 1 ? i : side == 2 ? n - 1 : back;
+    const int v = side == 0 ? i : side == 1 ? n - 1 : side == 2 ? back : 0;
     return p->outer_count + u * n + v;
 }
 
