@@ -15,8 +15,8 @@ typedef struct txm_mesh {
     int corners; /* of a face: 3 or 4; 0 = 3 */
 } txm_mesh;
 
-/* A place on a mesh of triangles: (1 - u - v) a + u b + v c of the corners a, b, c of a triangle, in
-   the order of its indices. */
+/* A place on a mesh of triangles: (1 - u - v) a + u b + v c of the corners a, b, c of a triangle,
+   in the order of its indices. */
 typedef struct txm_mesh_place {
     uint32_t triangle;
     float u, v; /* each 0..1, u + v at most 1 */
@@ -136,8 +136,8 @@ static inline void txm_mesh_sift(const txm_mesh *mesh, uint32_t *heap, size_t ro
     }
 }
 
-/* Sort the sides of one bin: a few with the same lower vertex, as most bins are, by insertion, their
-   keys being the higher vertex and the number; others as a heap. */
+/* Sort the sides of one bin: a few with the same lower vertex, as most bins are, by insertion,
+   their keys being the higher vertex and the number; others as a heap. */
 static inline void txm_mesh_sort_bin(const txm_mesh *mesh, uint32_t *sides, size_t count,
                                      int is_vertex) {
     enum { FEW = 48 };
@@ -171,9 +171,10 @@ static inline void txm_mesh_sort_bin(const txm_mesh *mesh, uint32_t *sides, size
        }
 
    The sides are counted into bins by the lower vertex, or by ranges of it if vertex numbers are
-   larger than the number of sides, and each bin is sorted. The mesh must have passed txm_mesh_check.
+   larger than the number of sides, and each bin is sorted. The mesh must have passed
+   txm_mesh_check.
    sorted  receives the numbers of the sides; room for 2 for each, the upper half is scratch
-   cost    O(n log m) for n sides, of which at most m are in one bin: mostly about 6       */
+   cost    O(n log m) for n sides, of which at most m are in one bin; m is usually about 6 */
 static inline void txm_mesh_sort_sides(const txm_mesh *mesh, uint32_t *sorted) {
     const size_t sides = txm_mesh_sides(mesh);
     uint32_t *next = sorted + sides, sum = 0, begin = 0;
