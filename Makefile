@@ -35,7 +35,7 @@ EXAMPLES = $(addprefix $(BUILD)/examples/,$(filter-out $(LEFT_OUT), \
 BENCHES  = $(patsubst bench/%.c,$(BUILD)/bench/%,$(wildcard bench/*.c))
 PLAIN    = $(patsubst bench/%.c,$(BUILD)/bench/plain/%,$(wildcard bench/*.c))
 
-.PHONY: all help headers demo test golden examples bench lint install uninstall clean setup samples helpers
+.PHONY: all help headers demo test check test-run check-run test-list check-list golden examples bench lint install uninstall clean setup samples helpers
 .DELETE_ON_ERROR:
 
 all: $(BUILD)/texkit
@@ -44,7 +44,8 @@ help:
 	@echo "make            build $(BUILD)/texkit, the command line tool"
 	@echo "make headers    paste the headers at the root together from src/"
 	@echo "make demo       texture, tiles, meshes, trees from sample photographs, write out/index.html"
-	@echo "make test       run all tests, with the sanitizers on"
+	@echo "make test       the tests, with the sanitizers on: minutes, less where little has changed"
+	@echo "make check      all tests: compilers, the tool under sanitizers, pictures, OpenGL, fuzzing"
 	@echo "make examples   build the programs of examples/ into $(BUILD)/examples/"
 	@echo "make bench      print a table of timings"
 	@echo "make lint       cppcheck and clang-tidy"
@@ -135,20 +136,12 @@ demo:
 	@$(MAKE) --no-print-directory all samples examples
 	@BUILD=$(BUILD) tools/demo.sh
 
-test:
+# a few minutes, or less than one where little has changed; and all that is worth trying
+test check:
 	@CC="$(CC)" tools/setup.sh test
-	@CC="$(CC)" CXX="$(CXX)" tests/run.sh
+	@CC="$(CC)" CXX="$(CXX)" BUILD="$(BUILD)" tests/run.sh $@
 
-# the hashes that every build must give, written anew: only where output bytes change on purpose
-GOLDEN = $(addprefix $(BUILD)/golden/golden_,texmath texsyn texpatch texedges textiles trimesh_relax \
-             trimesh_cover treepieces)
-
-golden: $(GOLDEN)
-	tests/wide/golden/compare.sh --write $(GOLDEN)
-
-$(BUILD)/golden/%: tests/wide/golden/%.c tests/wide/golden/golden.h tests/kit/testkit.h $(SOURCES)
-	@mkdir -p $(@D)
-	$(CC) -std=gnu99 -O2 -ffp-contract=off -Isrc -I. -Itests/kit -Itests/wide/golden $< -o $@ -lpthread -lm
+include tests/build.mk
 
 # clang-tidy 14 finds uninitialised va_lists that are none once it reads several files in one run
 lint:

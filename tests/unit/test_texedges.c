@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texedges && build/tests/unit/test_texedges */
-#define TEXEDGES_IMPLEMENTATION
 #include "edgekit.h"
 
 /* ---- what must hold --------------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texedges_refuse && build/tests/unit/test_texedges_refuse */
-#define TEXEDGES_IMPLEMENTATION
 #include "edgekit.h"
 
 /* ---- bad input -------------------------------------------------------------------------- */

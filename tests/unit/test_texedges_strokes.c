@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texedges_strokes && build/tests/unit/test_texedges_strokes */
-#define TEXEDGES_IMPLEMENTATION
 #include "edgekit.h"
 
 /* ---- strokes ---------------------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_again && build/tests/unit/test_texpatch_again */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- a part made again ------------------------------------------------------------------ */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_given && build/tests/unit/test_texpatch_given */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- guide, keep, several exemplars, masks ---------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_half && build/tests/unit/test_texpatch_half */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- levels of detail ------------------------------------------------------------------- */

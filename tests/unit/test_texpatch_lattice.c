@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_lattice && build/tests/unit/test_texpatch_lattice */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- tileable --------------------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_places && build/tests/unit/test_texpatch_places */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- where pixels come from ------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_plane && build/tests/unit/test_texpatch_plane */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- the plane -------------------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texpatch_refuse && build/tests/unit/test_texpatch_refuse */
-#define TEXPATCH_IMPLEMENTATION
 #include "patchkit.h"
 
 /* ---- bad input -------------------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texsyn && build/tests/unit/test_texsyn */
-#define TEXSYN_IMPLEMENTATION
 #include "synkit.h"
 
 /* ---- synthesis ---------------------------------------------------------------------------- */

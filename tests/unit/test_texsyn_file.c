@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texsyn_file && build/tests/unit/test_texsyn_file */
-#define TEXSYN_IMPLEMENTATION
 #include "synkit.h"
 
 /* ---- models as bytes ---------------------------------------------------------------------- */

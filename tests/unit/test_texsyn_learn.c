@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texsyn_learn && build/tests/unit/test_texsyn_learn */
-#define TEXSYN_IMPLEMENTATION
 #include "synkit.h"
 
 /* ---- learning: arguments ---------------------------------------------------------------- */

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_textiles_assign && build/tests/unit/test_textiles_assign */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "gridkit.h"

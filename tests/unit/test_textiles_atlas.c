@@ -13,7 +13,6 @@
 #include <cmocka.h>
 
 #define TEXTILES_MAX_PIXELS (1 << 22) /* so that sets that are too large are quickly made */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "testkit.h"

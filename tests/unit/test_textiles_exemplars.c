@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_textiles_exemplars && build/tests/unit/test_textiles_exemplars */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "tilecheck.h"

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_textiles_make && build/tests/unit/test_textiles_make */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "tilecheck.h"

@@ -2,7 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_textiles_measure && build/tests/unit/test_textiles_measure */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "tilekit.h"

@@ -8,7 +8,6 @@
 
 #include <cmocka.h>
 
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 #include "testkit.h"
 

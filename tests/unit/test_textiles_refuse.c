@@ -3,7 +3,6 @@
 
    make build/tests/unit/test_textiles_refuse && build/tests/unit/test_textiles_refuse */
 #define TEXTILES_MAX_PIXELS (1 << 22) /* so that too large ones are near */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "tilekit.h"

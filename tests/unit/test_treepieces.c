@@ -1,6 +1,5 @@
 /* test_treepieces.c - trees: growing, records, poses, wind and skinning
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
-#define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
 
 #include "growkit.h"

@@ -1,6 +1,5 @@
 /* test_treepieces_looks.c - trees: leaf clouds, drawn leaves, impostors, baked cards and bark
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
-#define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
 
 #include "growkit.h"

@@ -1,6 +1,5 @@
 /* test_treepieces_mesh.c - trees: levels of detail, the tessellator, baked meshes and their bark
    SPDX-License-Identifier: MIT OR Unlicense                                                    */
-#define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
 
 #include "growkit.h"

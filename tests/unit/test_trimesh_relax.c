@@ -10,7 +10,6 @@
 
 #include <cmocka.h>
 
-#define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 #include "retilekit.h"
 

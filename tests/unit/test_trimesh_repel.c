@@ -6,7 +6,6 @@
 
 #include <cmocka.h>
 
-#define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 #include "testkit.h"
 

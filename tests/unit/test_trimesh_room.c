@@ -9,7 +9,6 @@
 
 #include <cmocka.h>
 
-#define TRIMESH_RELAX_IMPLEMENTATION
 #include "trimesh_relax.h"
 #include "surfaces.h"
 #include "testkit.h"

@@ -2,7 +2,11 @@
 # What the headers, the README and the change log say of themselves holds: the QUICK START block of
 # each head comment builds and runs in a folder with nothing but the header and texmath.h, and
 # versions agree everywhere.
+#
+#   manual.sh [HEADER.h...]   of these headers alone; with FULL=1 with every compiler
 . tests/kit/tap.sh
+
+warn="-Wall -Wextra -Wpedantic -Werror"
 
 # The lines between QUICK START and the next heading, without their common indentation.
 quick_start() {
@@ -18,7 +22,13 @@ quick_start() {
         END { for (i = 1; i <= n; i++) print substr(line[i], least + 1) }' "$1"
 }
 
-for header in *.h; do
+everything=
+[ $# -gt 0 ] || { everything=yes; set -- *.h; }
+compilers=$(compilers)
+[ "$FULL" = 1 ] || compilers=${compilers%%
+*}
+
+for header in "$@"; do
     name=$(basename "$header" .h)
     macro=$(echo "$name" | tr '[:lower:]' '[:upper:]')
     folder=$tmp/$name
@@ -27,9 +37,13 @@ for header in *.h; do
     [ "$header" = texmath.h ] || cp "$header" "$folder"
     quick_start "$header" >"$folder/main.c"
     check "$header has a QUICK START" test -s "$folder/main.c"
-    for cc in $(compilers); do
+    cp "$folder/main.c" "$folder/main.cpp"
+    for cc in $compilers; do
+        case $cc in gcc) cxx=g++ ;; clang) cxx=clang++ ;; *) cxx=$CXX ;; esac
         check "QUICK START of $header builds and runs, $cc" sh -c "
-            cd '$folder' && $cc -std=c99 -O1 -Wall -Wextra -Werror main.c -o main -lm && ./main"
+            cd '$folder' && $cc -std=c99 $warn main.c -o main -lm && ./main"
+        check "QUICK START of $header builds and runs as C++, $cxx" sh -c "
+            cd '$folder' && $cxx -std=c++11 $warn main.cpp -o main -lm && ./main"
     done
 
     version=$(sed -n "s/^#define ${macro}_VERSION \"\([0-9.]*\)\".*/\1/p" "$header")
@@ -42,9 +56,11 @@ for header in *.h; do
     check "README.md lists $header" grep -qF "\`$header\`" README.md
 done
 
+[ -n "$everything" ] || exit 0
+
 # the C code of the README builds as it stands there
 awk '/^```c$/ { inside = 1; next } /^```$/ { inside = 0 } inside' README.md >"$tmp/readme.c"
-for cc in $(compilers); do
+for cc in $compilers; do
     check "the C code of README.md builds, $cc" \
         $cc -std=c99 -Wall -Wextra -Werror -I. -c "$tmp/readme.c" -o "$tmp/readme.o"
 done

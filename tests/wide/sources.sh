@@ -5,6 +5,37 @@
 
 check "root headers equal what make headers writes" tools/headers.sh --check
 
+# a part includes its siblings and, at the bottom, its own module; a module texmath.h and libc alone
+foreign_includes() {
+    awk '
+        FNR == 1 {
+            part = FILENAME
+            sub(/^src\//, "", part)
+            module = part
+            sub(/(\.h|\/.*)$/, "", module)
+        }
+        /^# *include "/ {
+            split($0, word, "\"")
+            name = word[2]
+            if (part ~ /\//) good = name == "../" module ".h" || name == "texmath.h" || name !~ /\//
+            else good = index(name, module "/") == 1 || (name == "texmath.h" && module != "texmath")
+            if (!good) { print FILENAME ":" FNR ": " $0; bad = 1 }
+        }
+        END { exit bad }' src/*.h src/*/*.h
+}
+check "no part includes another module, no module another but texmath.h" foreign_includes
+# more than 1,000 lines are two ideas
+not_too_long() {
+    find src tools tests examples bench -name '*.[ch]' -o -name '*.cpp' -o -name '*.sh' -o -name '*.py' \
+        -o -name '*.js' -o -name '*.mk' -o -name '*.awk' | xargs wc -l |
+        awk '$2 != "total" && $1 > 1000 { print; bad = 1 } END { exit bad || NR < 100 }'
+}
+check "no file has more than 1,000 lines" not_too_long
+vague() { ! find src -name '*.h' | grep -E '/(utils?|common|misc|helpers?)[.h_]'; }
+check "no part is named utils, common or misc" vague
+astray() { ! ls tests/*.[ch] tests/test_* 2>/dev/null; }
+check "every test stands in a room of tests/" astray
+
 # says_where HEADER LINE: the place it names holds this line of the header
 says_where() {
     place=$(tools/headers.sh --where "$1:$2") || return 1

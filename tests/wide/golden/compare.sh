@@ -5,6 +5,7 @@
 # of its module must be there and be equal; of those that are not, the message names module and case.
 #
 #   compare.sh --write PROGRAM...    writes golden.txt anew, on purpose: the commit says why
+#   compare.sh --tap CASES...        with a line "ok - " or "not ok - " for each
 set -u
 golden=$(dirname "$0")/golden.txt
 
@@ -14,12 +15,14 @@ if [ "${1:-}" = --write ]; then
     exit
 fi
 
-status=0
+status=0 tap=
+[ "${1:-}" = --tap ] && tap=yes && shift
 for run in "$@"; do
+    same=yes
     # shellcheck disable=SC2086 # program and arguments
-    lines=$($run) || { echo "$run failed"; status=1; }
+    lines=$($run) || { echo "$run failed"; same=no; }
     module=$(echo "$lines" | sed -n '1s/ .*//p')
-    [ -n "$module" ] && grep -q "^$module " "$golden" || { echo "$run: no such module"; status=1; }
+    [ -n "$module" ] && grep -q "^$module " "$golden" || { echo "$run: no such module"; same=no; }
     {
         grep "^$module " "$golden"
         echo "$lines"
@@ -34,6 +37,11 @@ for run in "$@"; do
                 if (n[c] != 2 || different[c]) bad = 1
             }
             exit bad
-        }' || status=1
+        }' || same=no
+    case $tap$same in
+    yesyes) echo "ok - the golden bytes of $module, ${run##*/}" ;;
+    yesno) echo "not ok - the golden bytes of $module, ${run##*/}" ;;
+    esac
+    [ $same = yes ] || status=1
 done
 exit $status

@@ -1,0 +1,120 @@
+# build.mk - how tests are built and run; the Makefile includes it, tests/run.sh counts what came out
+#
+# Each module is compiled once with the sanitizers; the unit tests link that object. A test that has
+# passed leaves build/tests/MODE/NAME.done and is not run again until something that it depends on
+# has changed. MODE is test or check, as in `make test` and `make check`.
+
+TESTS    := $(BUILD)/tests
+MODULES  := $(filter-out texmath,$(basename $(HEADERS)))
+# -Og: in gcc half the time of -O1 to compile, about the same to run
+SANITIZE  = -Og -g1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+UNITS    := $(basename $(notdir $(wildcard tests/unit/test_*.c)))
+GOLDEN    = texmath texsyn texpatch texedges textiles trimesh_relax trimesh_cover treepieces
+TEST_C    = $(CC) -std=gnu99 -ffp-contract=off -Wall -Wextra -Isrc -Itests/kit -Itools -MMD -MP
+
+# ---- what is tested: modules, tool and their unit tests, with the sanitizers
+
+# too large sets of tiles are then quickly made
+$(TESTS)/modules/textiles.o: DEFINES = -DTEXTILES_MAX_PIXELS=4194304
+
+$(TESTS)/modules/%.o: src/%.h
+	@mkdir -p $(@D)
+	printf '#define %s_IMPLEMENTATION\n#include "%s.h"\n' $$(echo $* | tr a-z A-Z) $* >$(@:.o=.c)
+	$(TEST_C) $(SANITIZE) $(DEFINES) -MT $@ -c $(@:.o=.c) -o $@
+
+$(TESTS)/asan/%.o: tools/%.c | setup
+	@mkdir -p $(@D)
+	$(COMPILE) $(SANITIZE) -MMD -MP -c $< -o $@
+
+# stb shifts into the sign bit on purpose
+$(TESTS)/asan/files/stb.o: COMPILE += -fno-sanitize=undefined
+
+$(TESTS)/asan/texkit: $(TEXKIT:$(BUILD)/%=$(TESTS)/asan/%)
+	$(LINK) $(SANITIZE) $^ -o $@ -lcjson -lm
+
+$(TESTS)/unit/%.o: tests/unit/%.c
+	@mkdir -p $(@D)
+	$(TEST_C) $(SANITIZE) -c $< -o $@
+
+$(TESTS)/unit/%: $(TESTS)/unit/%.o
+	$(CC) $(SANITIZE) $^ -o $@ -lcmocka -lpthread -lm
+
+# links.mk says which objects a unit test is linked with: those of the headers that it includes,
+# itself or by way of the kit, but for modules whose implementation it holds to see what is private
+$(TESTS)/links.mk: $(wildcard tests/unit/*.c tests/kit/*.h) tests/kit/links.awk
+	@mkdir -p $(@D)
+	@awk -v modules="$(MODULES)" -v root="$(TESTS)" \
+	    -v files="$(patsubst tools/%.c,$(TESTS)/asan/%.o,$(wildcard tools/files/*.c))" \
+	    -f tests/kit/links.awk $(wildcard tests/kit/*.h tests/unit/*.c) >$@
+
+# ---- golden programs
+
+$(BUILD)/golden/%: tests/wide/golden/%.c
+	@mkdir -p $(@D)
+	$(TEST_C) -O2 -Itests/wide/golden $< -o $@ -lpthread -lm
+
+# the hashes that every build must give, written anew: only where output bytes change on purpose
+golden: $(GOLDEN:%=$(BUILD)/golden/golden_%)
+	tests/wide/golden/compare.sh --write $^
+
+# ---- running: NAME.done is made by a test that has passed, NAME.log holds what it printed
+
+KIT      := $(wildcard tests/kit/*)
+HELPERS   = $(addprefix $(BUILD)/,texkit crop draw shape view)
+TOOL_RUNS = $(patsubst tests/tool/%.sh,tool_%,$(wildcard tests/tool/*.sh))
+LOOK_RUNS = $(patsubst tests/look/%.sh,look_%,$(wildcard tests/look/*.sh))
+WIDE_RUNS = $(patsubst tests/wide/%.sh,wide_%,$(wildcard tests/wide/*.sh))
+
+# SWEEPING, of links.mk: the unit tests that try more in `make check`. What both modes try alike is
+# run once
+unit_runs = $(foreach u,$(UNITS),$(if $(filter $(u),$(SWEEPING)),$(1),test)/$(u))
+TEST_RUN  = wide_sources $(GOLDEN:%=golden_%) tool_quick $(MODULES:%=quick_%) quick_texmath
+CHECK_RUN = $(GOLDEN:%=golden_%) wide_sources
+
+# the longest first, so that none is left to run alone
+ALL_test  = $(patsubst %,$(TESTS)/%,$(call unit_runs,test) $(TEST_RUN:%=test/%))
+ALL_check = $(patsubst %,$(TESTS)/%,$(addprefix check/,$(WIDE_RUNS) $(TOOL_RUNS) $(LOOK_RUNS)) \
+              $(call unit_runs,check) $(CHECK_RUN:%=test/%))
+
+test-run: $(ALL_test:=.done)
+check-run: $(ALL_check:=.done)
+test-list check-list: # what run.sh counts
+	@printf '%s\n' $(ALL_$(@:-list=))
+
+# mode_rules MODE FULL
+define mode_rules
+$(TESTS)/$(1)/test_%.done: $(TESTS)/unit/test_%
+	@FULL=$(2) tests/run.sh --one $$@ $$<
+
+$(TESTS)/$(1)/tool_%.done: tests/tool/%.sh $(wildcard tests/tool/*) $(KIT) $(HELPERS)
+	@FULL=$(2) tests/run.sh --one $$@ sh $$<
+
+$(TESTS)/$(1)/look_%.done: tests/look/%.sh $(wildcard tests/look/* shaders/*) $(KIT) $(HELPERS)
+	@FULL=$(2) tests/run.sh --one $$@ sh $$<
+
+$(TESTS)/$(1)/wide_%.done: tests/wide/%.sh $(wildcard tests/wide/*/*) $(KIT) $(HELPERS) $(SOURCES) \
+        $(wildcard *.h *.md) tools/headers.sh
+	@FULL=$(2) tests/run.sh --one $$@ sh $$<
+endef
+$(eval $(call mode_rules,test,0))
+$(eval $(call mode_rules,check,1))
+
+# these also run the tool with the sanitizers; and an example
+$(TOOL_RUNS:%=$(TESTS)/check/%.done): $(TESTS)/asan/texkit
+$(TESTS)/check/tool_plane.done: $(BUILD)/examples/join examples/plane.sh
+$(TESTS)/check/look_brush.done: $(filter %/brush,$(EXAMPLES))
+$(TESTS)/check/look_forest_gl.done: $(filter %/forest_gl,$(EXAMPLES))
+
+$(TESTS)/test/golden_%.done: $(BUILD)/golden/golden_% tests/wide/golden/compare.sh \
+        tests/wide/golden/golden.txt
+	@tests/run.sh --one $@ tests/wide/golden/compare.sh --tap "$< 1" "$< 3"
+
+$(TESTS)/test/quick_%.done: tests/wide/manual.sh $(KIT) texmath.h %.h README.md CHANGELOG.md
+	@FULL=0 tests/run.sh --one $@ sh $< $*.h
+
+.SECONDARY:
+
+ifneq ($(filter test-% check-% $(BUILD)/%,$(MAKECMDGOALS)),)
+include $(TESTS)/links.mk
+endif
+-include $(wildcard $(BUILD)/golden/*.d $(TESTS)/*/*.d $(TESTS)/asan/*/*.d)

@@ -1,0 +1,62 @@
+#!/bin/sh
+# Every command of the tool once as users call it, with a look at what it made, and one refusal: what
+# `make test` tries of the command line. The other scripts here try everything.
+. tests/kit/tap.sh
+. tests/kit/texkit.sh
+
+root=$(pwd)
+texkit=$root/build/texkit
+python=/usr/bin/python3
+check_tool() { # NAME ARGUMENTS...: tests/tool/check_NAME.py
+    name=$1
+    shift
+    $python "$root/tests/tool/check_$name.py" "$@"
+}
+cd "$tmp" || exit 1
+figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
+
+"$root/build/draw" sand sand.png 48
+"$root/build/draw" cells cells.png 64
+check_tool patch draw .
+commands=$("$texkit" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p')
+
+check "learn" run 0 learn sand.png -o sand.txs --types 8
+check "makes a model" test -s sand.txs
+refuses 1 "No such file" learn missing.png -o n.txs
+
+check "synth" run 0 synth sand.txs -o synth.png --size 40x30 --tileable
+check "has the size and channels" check_tool patch is synth.png 40 30 3 8
+refuses 2 "such as 512x512" synth sand.txs -o n.png --size 0x5
+
+check "patch" run 0 patch bricks.png -o patch.png --size 64x64 --passes 1
+check "has the size and channels" check_tool patch is patch.png 64 64 3 8
+refuses 1 "No such file" patch missing.png -o n.png --size 64x64
+
+check "edges" run 0 edges cells.png -o edges.png --levels 3
+check "has the size of the exemplar" check_tool patch is edges.png 64 64 3 8
+refuses 2 "--levels" edges cells.png -o n.png --levels 1
+
+check "tiles" run 0 tiles cells.png -o wang --kind wang --size 32 --reduced
+check "the set is whole and true" check_tool tiles wang --reduced
+refuses 2 "--kind" tiles cells.png -o n --kind round
+
+"$root/build/shape" torus torus.obj 16
+check "retile" run 0 retile torus.obj -o torus.glb --vertices 200
+check "has so many places" check_tool glb torus.glb places=200
+refuses 1 "No such file" retile missing.obj -o n.obj --vertices 100
+
+check "tree" run 0 tree -o tree.glb --species oak --pieces 60 --sheet 128 --wind 5 --seconds 1 \
+    --rate 4 --stats stats.json
+check "is whole, closed and moves" check_tool tree skin tree.glb keys=5 seconds=1 \
+    joints="$(figure joints)" pieces="$(figure pieces)"
+refuses 1 "there are" tree -o n.glb --species none
+
+check "forest" run 0 forest -o forest.glb --count 5 --species oak,birch --pieces 50 --sheet 128
+check "is copies in ten nodes" check_tool tree forest forest.glb most_nodes=10 trees=5
+refuses 2 "--count" forest -o n.glb
+
+for command in $commands; do
+    check "$command is tried here" grep -q "^check \"$command\" run 0 $command " "$root/tests/tool/quick.sh"
+    check "$command --help" run 0 "$command" --help
+done
+refuses 2 "unknown command" frobnicate sand.png
