@@ -5,6 +5,7 @@
 # has changed. MODE is test or check, as in `make test` and `make check`.
 
 TESTS    := $(BUILD)/tests
+FULL     ?= 0
 MODULES  := $(filter-out texmath,$(basename $(HEADERS)))
 # -Og: in gcc half the time of -O1 to compile, about the same to run
 SANITIZE  = -Og -g1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
@@ -81,20 +82,24 @@ check-run: $(ALL_check:=.done)
 test-list check-list: # what run.sh counts
 	@printf '%s\n' $(ALL_$(@:-list=))
 
+# `make check` goes through everything in these and in the unit tests; `make check FULL=1` in all
+FULL_RUNS = wide_headers wide_same_bytes wide_fuzz wide_examples wide_manual wide_parts look_picture
+full      = $(if $(filter check,$(1)),$(if $(filter $(2),$(FULL_RUNS)),1,$(FULL)),0)
+
 # mode_rules MODE FULL
 define mode_rules
 $(TESTS)/$(1)/test_%.done: $(TESTS)/unit/test_%
 	@FULL=$(2) tests/run.sh --one $$@ $$<
 
 $(TESTS)/$(1)/tool_%.done: tests/tool/%.sh $(wildcard tests/tool/*) $(KIT) $(HELPERS)
-	@FULL=$(2) tests/run.sh --one $$@ sh $$<
+	@FULL=$$(call full,$(1),tool_$$*) tests/run.sh --one $$@ sh $$<
 
 $(TESTS)/$(1)/look_%.done: tests/look/%.sh $(wildcard tests/look/* shaders/*) $(KIT) $(HELPERS)
-	@FULL=$(2) tests/run.sh --one $$@ sh $$<
+	@FULL=$$(call full,$(1),look_$$*) tests/run.sh --one $$@ sh $$<
 
 $(TESTS)/$(1)/wide_%.done: tests/wide/%.sh $(wildcard tests/wide/*/*) $(KIT) $(HELPERS) $(SOURCES) \
-        $(wildcard *.h *.md) tools/headers.sh
-	@FULL=$(2) tests/run.sh --one $$@ sh $$<
+        $(wildcard *.h *.md examples/*)
+	@FULL=$$(call full,$(1),wide_$$*) tests/run.sh --one $$@ sh $$<
 endef
 $(eval $(call mode_rules,test,0))
 $(eval $(call mode_rules,check,1))
@@ -102,6 +107,7 @@ $(eval $(call mode_rules,check,1))
 # these also run the tool with the sanitizers; and an example
 $(TOOL_RUNS:%=$(TESTS)/check/%.done): $(TESTS)/asan/texkit
 $(TESTS)/check/tool_plane.done: $(BUILD)/examples/join examples/plane.sh
+$(TESTS)/check/wide_examples.done: $(BUILD)/files/stb.o
 $(TESTS)/check/look_brush.done: $(filter %/brush,$(EXAMPLES))
 $(TESTS)/check/look_forest_gl.done: $(filter %/forest_gl,$(EXAMPLES))
 
@@ -112,7 +118,12 @@ $(TESTS)/test/golden_%.done: $(BUILD)/golden/golden_% tests/wide/golden/compare.
 $(TESTS)/test/quick_%.done: tests/wide/manual.sh $(KIT) texmath.h %.h README.md CHANGELOG.md
 	@FULL=0 tests/run.sh --one $@ sh $< $*.h
 
-.SECONDARY:
+# the first and cheapest needs no tool
+$(TESTS)/test/wide_sources.done: tests/wide/sources.sh $(KIT) $(SOURCES) $(HEADERS) tools/headers.sh \
+        $(wildcard tests/*/* tests/wide/*/* tools/* tools/*/* examples/* examples/*/* bench/*)
+	@tests/run.sh --one $@ sh $<
+
+.PRECIOUS: $(TESTS)/unit/%.o $(TESTS)/unit/% $(TESTS)/modules/%.o $(TESTS)/asan/%.o $(BUILD)/golden/%
 
 ifneq ($(filter test-% check-% $(BUILD)/%,$(MAKECMDGOALS)),)
 include $(TESTS)/links.mk

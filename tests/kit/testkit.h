@@ -4,7 +4,7 @@
    WHAT IT DOES
      Environments that misbehave on purpose: an allocator that counts, poisons and fails at a
      chosen call, a progress callback that cancels at a chosen call, parallel-for hooks that run
-     the indices backwards or on real threads. And the test that builds and runs a quick start.
+     the indices backwards or on real threads.
 
    HOW TO USE IT
      #include the four headers cmocka wants, cmocka.h, then this file. Everything is static inline.
@@ -344,46 +344,6 @@ static inline uint64_t tk_hash(uint64_t start, const void *bytes, size_t count) 
     uint64_t h = start ? start : 14695981039346656037u;
     for (size_t i = 0; i < count; i++) h = (h ^ p[i]) * 1099511628211u;
     return h;
-}
-
-/* ---- the quick start of a header -------------------------------------------------------- */
-
-/* Copy the QUICK START block of a head comment into a file. The block runs from the line after
-   the heading to the next heading, a line with a capital letter after three spaces or fewer.
-   0 if there was one. */
-static inline int tk_extract_quick_start(const char *header, const char *source) {
-    char line[512];
-    int inside = 0, lines = 0;
-    FILE *in = fopen(header, "rb");
-    FILE *out = in ? fopen(source, "wb") : NULL;
-    while (out && fgets(line, sizeof line, in)) {
-        size_t indent = strspn(line, " ");
-        int heading = indent <= 3 && line[indent] >= 'A' && line[indent] <= 'Z';
-        if (heading && inside) break;
-        if (inside) lines += fputs(line, out) >= 0;
-        if (heading && strncmp(line + indent, "QUICK START", 11) == 0) inside = 1;
-    }
-    if (in) fclose(in);
-    if (out && fclose(out) != 0) lines = 0;
-    return lines ? 0 : -1;
-}
-
-/* Build the quick start of e.g. ("texmath.h", "texmath") in build/tests and run it; the compiler is
-   $CC or cc, the headers are found in the current folder. 0 if it built without a warning and its
-   main returned 0. The program's output is left in build/tests/NAME_quick.txt. */
-static inline int tk_quick_start(const char *header, const char *name) {
-    char source[256], command[1024];
-    const char *cc = getenv("CC");
-    if (!cc || !cc[0]) cc = "cc";
-    if (strlen(name) > 64 || strlen(cc) > 128) return -1;
-    if (system("mkdir -p build/tests") != 0) return -1;
-    snprintf(source, sizeof source, "build/tests/%s_quick.c", name);
-    if (tk_extract_quick_start(header, source) != 0) return -1;
-    snprintf(command, sizeof command,
-             "cd build/tests && %s -std=c99 -Wall -Wextra -Wpedantic -Werror -I../.. "
-             "%s_quick.c -o %s_quick -lm && ./%s_quick > %s_quick.txt",
-             cc, name, name, name, name);
-    return system(command);
 }
 
 #endif /* TESTKIT_H */

@@ -1,4 +1,4 @@
-/* test_texmath.c - statuses, sizes, memory, numbers, random numbers, sorting, the quick start
+/* test_texmath.c - statuses, sizes, memory, numbers, random numbers, sorting
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texmath && build/tests/unit/test_texmath */
@@ -402,20 +402,6 @@ static void test_sort(void **state) {
         assert_true(txm_sort_key(rising[i - 1]) < txm_sort_key(rising[i]));
 }
 
-/* ---- quick start ------------------------------------------------------------------------- */
-
-static void test_quick_start(void **state) {
-    (void)state;
-    char line[80] = "";
-    assert_int_equal(tk_quick_start("texmath.h", "texmath"), 0);
-    FILE *file = fopen("build/tests/texmath_quick.txt", "r");
-    assert_non_null(file);
-    const char *got = fgets(line, sizeof line, file);
-    fclose(file);
-    assert_non_null(got);
-    assert_string_equal(line, "centre of the ramp: 0.5079\n");
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_status_text),
@@ -435,7 +421,6 @@ int main(void) {
         cmocka_unit_test(test_rng_ranges),
         cmocka_unit_test(test_shuffle),
         cmocka_unit_test(test_sort),
-        cmocka_unit_test(test_quick_start),
     };
     return cmocka_run_group_tests_name("texmath", tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* test_texsyn.c - synthesis, failing memory, cancelling, the quick start
+/* test_texsyn.c - synthesis, failing memory, cancelling
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texsyn && build/tests/unit/test_texsyn */
@@ -457,23 +457,6 @@ static void test_env_goes_first(void **state) {
     assert_int_equal(tk_leaks(&memory), 0);
 }
 
-/* ---- quick start ------------------------------------------------------------------------- */
-
-static void test_quick_start(void **state) {
-    (void)state;
-    char line[80] = "";
-    int types = 0, value = -1;
-    assert_int_equal(tk_quick_start("texsyn.h", "texsyn"), 0);
-    FILE *file = fopen("build/tests/texsyn_quick.txt", "r");
-    assert_non_null(file);
-    const char *got = fgets(line, sizeof line, file);
-    fclose(file);
-    assert_non_null(got);
-    assert_int_equal(sscanf(line, "%d clique types, pixel (5, 7) is %d", &types, &value), 2);
-    assert_between(types, 3, 60);
-    assert_between(value, 0, 255);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_synth_sizes),
@@ -488,7 +471,6 @@ int main(void) {
         cmocka_unit_test(test_synth_failing),
         cmocka_unit_test(test_synth_peak_memory),
         cmocka_unit_test(test_env_goes_first),
-        cmocka_unit_test(test_quick_start),
     };
     return cmocka_run_group_tests_name("texsyn", tests, NULL, NULL);
 }

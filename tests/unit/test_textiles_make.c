@@ -254,25 +254,6 @@ static void test_same_bytes(void **state) {
     }
 }
 
-/* ---- tests: the quick start ----------------------------------------------------------------------- */
-
-static void test_quick_start(void **state) {
-    (void)state;
-    char line[120] = "";
-    int tiles = 0, width = 0, height = 0, tile = -1;
-    assert_int_equal(tk_quick_start("textiles.h", "textiles"), 0);
-    FILE *file = fopen("build/tests/textiles_quick.txt", "r");
-    assert_non_null(file);
-    const char *got = fgets(line, sizeof line, file);
-    fclose(file);
-    assert_non_null(got);
-    assert_int_equal(sscanf(line, "%d tiles, atlas %d x %d, tile %d at (5, 7)", &tiles, &width,
-                            &height, &tile), 4);
-    assert_int_equal(tiles, 16);
-    assert_true(width * height >= 16 * 48 * 48);
-    assert_between(tile, 0, 15);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_borders),
@@ -283,7 +264,6 @@ int main(void) {
         cmocka_unit_test(test_register),
         cmocka_unit_test(test_triangle_values),
         cmocka_unit_test(test_same_bytes),
-        cmocka_unit_test(test_quick_start),
     };
     return cmocka_run_group_tests_name("textiles_make", tests, make_common, free_common);
 }

@@ -567,12 +567,6 @@ static void test_memory(void **state) {
     treepieces_forest_free(f);
 }
 
-/* The quick start of the head comment, built and run. */
-static void test_quick_start(void **state) {
-    (void)state;
-    assert_int_equal(tk_quick_start("treepieces.h", "treepieces"), 0);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rims),      cmocka_unit_test(test_rims_in_wind),
@@ -582,7 +576,7 @@ int main(void) {
         cmocka_unit_test(test_bones),     cmocka_unit_test(test_wind),
         cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
         cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
-        cmocka_unit_test(test_memory),    cmocka_unit_test(test_quick_start),
+        cmocka_unit_test(test_memory),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -9,7 +9,6 @@
 
 #include <cmocka.h>
 
-#define TREEPIECES_IMPLEMENTATION
 #include "treepieces.h"
 
 #include "testkit.h"

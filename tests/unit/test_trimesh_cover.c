@@ -10,7 +10,6 @@
 
 #define TRIMESH_COVER_IMPLEMENTATION
 #include "trimesh_cover.h"
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 #include "coverkit.h"
 
@@ -521,11 +520,6 @@ static void test_same_bytes_and_failures(void **state) {
     shape_free(&input);
 }
 
-static void test_quick_start(void **state) {
-    (void)state;
-    assert_int_equal(tk_quick_start("trimesh_cover.h", "trimesh_cover"), 0);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_normals),
@@ -538,7 +532,6 @@ int main(void) {
         cmocka_unit_test(test_colors),
         cmocka_unit_test(test_tiles),
         cmocka_unit_test(test_same_bytes_and_failures),
-        cmocka_unit_test(test_quick_start),
     };
     return cmocka_run_group_tests_name("trimesh_cover", tests, NULL, NULL);
 }

@@ -8,7 +8,6 @@
 
 #include <cmocka.h>
 
-#define TRIMESH_COVER_IMPLEMENTATION
 #include "trimesh_cover.h"
 #include "coverkit.h"
 

@@ -768,11 +768,6 @@ static void test_steps(void **state) {
     trimesh_free(NULL);
 }
 
-static void test_quick_start(void **state) {
-    (void)state;
-    assert_int_equal(tk_quick_start("trimesh_relax.h", "trimesh_relax"), 0);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_numbers),     cmocka_unit_test(test_ball),
@@ -785,7 +780,7 @@ int main(void) {
         cmocka_unit_test(test_soup),        cmocka_unit_test(test_dirt),
         cmocka_unit_test(test_too_small),   cmocka_unit_test(test_bad_arguments),
         cmocka_unit_test(test_faults),      cmocka_unit_test(test_same_bytes),
-        cmocka_unit_test(test_steps),       cmocka_unit_test(test_quick_start),
+        cmocka_unit_test(test_steps),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

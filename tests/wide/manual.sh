@@ -22,6 +22,18 @@ quick_start() {
         END { for (i = 1; i <= n; i++) print substr(line[i], least + 1) }' "$1"
 }
 
+# said HEADER FILE: what the quick start of this header printed
+said() {
+    case $1 in
+    texmath.h) grep -qx 'centre of the ramp: 0.5079' "$2" ;;
+    texsyn.h) awk '/^[0-9]+ clique types, pixel \(5, 7\) is [0-9]+$/ {
+        good = $1 >= 3 && $1 <= 60 && $NF <= 255 } END { exit !good }' "$2" ;;
+    textiles.h) awk '/^16 tiles, atlas [0-9]+ x [0-9]+, tile [0-9]+ at \(5, 7\)/ {
+        good = $4 * $6 >= 16 * 48 * 48 && $8 <= 15 } END { exit !good }' "$2" ;;
+    *) test -s "$2" ;;
+    esac
+}
+
 everything=
 [ $# -gt 0 ] || { everything=yes; set -- *.h; }
 compilers=$(compilers)
@@ -41,9 +53,10 @@ for header in "$@"; do
     for cc in $compilers; do
         case $cc in gcc) cxx=g++ ;; clang) cxx=clang++ ;; *) cxx=$CXX ;; esac
         check "QUICK START of $header builds and runs, $cc" sh -c "
-            cd '$folder' && $cc -std=c99 $warn main.c -o main -lm && ./main"
-        check "QUICK START of $header builds and runs as C++, $cxx" sh -c "
-            cd '$folder' && $cxx -std=c++11 $warn main.cpp -o main -lm && ./main"
+            cd '$folder' && $cc -std=c99 $warn main.c -o main -lm && ./main >said"
+        check "it says what it should" said "$header" "$folder/said"
+        check "QUICK START of $header builds and runs as C++, and says the same, $cxx" sh -c "
+            cd '$folder' && $cxx -std=c++11 $warn main.cpp -o main -lm && ./main >said++ && cmp said said++"
     done
 
     version=$(sed -n "s/^#define ${macro}_VERSION \"\([0-9.]*\)\".*/\1/p" "$header")
