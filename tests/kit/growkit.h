@@ -1,7 +1,7 @@
 /* growkit.h - what the unit tests of treepieces.h share: a kit of pieces, forests and their bones
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Includes cmocka.h, treepieces.h and testkit.h.                                                */
+   Includes cmocka.h, treepieces.h, images.h and testkit.h.                                      */
 #ifndef GROWKIT_H
 #define GROWKIT_H
 
@@ -14,6 +14,7 @@
 
 #include "treepieces.h"
 
+#include "images.h"
 #include "testkit.h"
 
 /* What all tests of a program use; made by set_up. */

@@ -7,15 +7,9 @@
 enum { SHAPES = TREEPIECES_LEAF_BLOSSOM + 1, SIDE = 96, VIEW = 72, MOST_CARDS = 256 };
 
 static txm_image make_image(int width, int height, int channels, txm_sample sample) {
-    txm_image image;
-    memset(&image, 0, sizeof image);
     const size_t pixel = (size_t)channels * txm_sample_bytes(sample);
-    image.pixels = room((size_t)width * (size_t)height, pixel);
-    image.width = width;
-    image.height = height;
-    image.channels = channels;
-    image.sample = sample;
-    return image;
+    void *pixels = room((size_t)width * (size_t)height, pixel);
+    return view(pixels, width, height, channels, sample);
 }
 
 static size_t image_bytes(const txm_image *i) {
