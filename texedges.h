@@ -1,4 +1,4 @@
-/* texedges.h - v0.1.0 - the gray layers of a picture, their boundaries, and strokes drawn like them
+/* texedges.h - v0.2.0 - the gray layers of a picture, their boundaries, and strokes drawn like them
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -106,7 +106,7 @@
 
 #include "texmath.h"
 
-#define TEXEDGES_VERSION "0.1.0"
+#define TEXEDGES_VERSION "0.2.0"
 
 #ifndef TEXEDGES_MAX_PIXELS
 #define TEXEDGES_MAX_PIXELS (1 << 28) /* larger pictures are refused */

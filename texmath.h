@@ -1,4 +1,4 @@
-/* texmath.h - v0.1.0 - the common ground of the texkit headers
+/* texmath.h - v0.2.0 - the common ground of the texkit headers
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -96,7 +96,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TEXMATH_VERSION "0.1.0"
+#define TEXMATH_VERSION "0.2.0"
 
 #define TXM_PI 3.14159265358979323846
 

@@ -1,4 +1,4 @@
-/* texsyn.h - v0.1.0 - learn a texture as a small table of statistics, synthesise any amount of it
+/* texsyn.h - v0.2.0 - learn a texture as a small table of statistics, synthesise any amount of it
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -107,7 +107,7 @@
 
 #include "texmath.h"
 
-#define TEXSYN_VERSION "0.1.0"
+#define TEXSYN_VERSION "0.2.0"
 
 #ifndef TEXSYN_MAX_PIXELS
 #define TEXSYN_MAX_PIXELS (1 << 28) /* larger images are refused */

@@ -1,4 +1,4 @@
-/* texmath.h - v0.1.0 - the common ground of the texkit headers
+/* texmath.h - v0.2.0 - the common ground of the texkit headers
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES

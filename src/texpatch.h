@@ -1,4 +1,4 @@
-/* texpatch.h - v0.1.0 - more of a photographed texture, its layout kept, in a fraction of a second
+/* texpatch.h - v0.2.0 - more of a photographed texture, its layout kept, in a fraction of a second
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -107,7 +107,7 @@
 
 #include "texmath.h"
 
-#define TEXPATCH_VERSION "0.1.0"
+#define TEXPATCH_VERSION "0.2.0"
 
 #ifndef TEXPATCH_MAX_PIXELS
 #define TEXPATCH_MAX_PIXELS (1 << 28) /* larger exemplars and outputs are refused */

@@ -1,4 +1,4 @@
-/* textiles.h - v0.1.0 - cut tiles that join without seams out of photographs, and lay them
+/* textiles.h - v0.2.0 - cut tiles that join without seams out of photographs, and lay them
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -144,7 +144,7 @@
 
 #include <float.h>
 
-#define TEXTILES_VERSION "0.1.0"
+#define TEXTILES_VERSION "0.2.0"
 
 #ifndef TEXTILES_MAX_PIXELS
 #define TEXTILES_MAX_PIXELS (1 << 28) /* larger exemplars, sets and pictures are refused */

@@ -1,4 +1,4 @@
-/* treepieces.h - v0.1.0 - animated trees made of interlocking pieces
+/* treepieces.h - v0.2.0 - animated trees made of interlocking pieces
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -121,7 +121,7 @@
 
 #include <stdio.h>
 
-#define TREEPIECES_VERSION "0.1.0"
+#define TREEPIECES_VERSION "0.2.0"
 
 #if defined(TREEPIECES_STATIC) && defined(__GNUC__)
 #define TREEPIECES_API __attribute__((unused)) static

@@ -1,4 +1,4 @@
-/* trimesh_cover.h - v0.1.0 - textures, attributes and things on the triangles of a mesh
+/* trimesh_cover.h - v0.2.0 - textures, attributes and things on the triangles of a mesh
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -78,7 +78,7 @@
 
 #include "texmath.h"
 
-#define TRIMESH_COVER_VERSION "0.1.0"
+#define TRIMESH_COVER_VERSION "0.2.0"
 
 #ifdef TRIMESH_COVER_STATIC
 #define TRIMESH_COVER_API static

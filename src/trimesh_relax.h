@@ -1,4 +1,4 @@
-/* trimesh_relax.h - v0.1.0 - any surface as near-equilateral triangles
+/* trimesh_relax.h - v0.2.0 - any surface as near-equilateral triangles
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -87,7 +87,7 @@
 
 #include "texmath.h"
 
-#define TRIMESH_RELAX_VERSION "0.1.0"
+#define TRIMESH_RELAX_VERSION "0.2.0"
 
 #ifdef TRIMESH_RELAX_STATIC
 #define TRIMESH_API static

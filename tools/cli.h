@@ -11,9 +11,9 @@
 
 #include "env.h"
 
-#define TEXKIT_VERSION "0.1.0"
+#define TEXKIT_VERSION "0.2.0"
 
-/* "0.1.0 (texmath 0.1.0, ...)" for --version; defined by texkit.c, which includes the headers. */
+/* "0.2.0 (texmath 0.2.0, ...)" for --version; defined by texkit.c, which includes the headers. */
 extern const char cli_versions[];
 
 /* Exit status of the program. */

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TEXMATH_VERSION "0.1.0"
+#define TEXMATH_VERSION "0.2.0"
 
 #define TXM_PI 3.14159265358979323846
 
