@@ -364,6 +364,21 @@ static inline float txm_lerpf(float a, float b, float t) {
     return txm_float((double)a - (double)a * t + (double)b * t);
 }
 
+/* the number of the lowest bit of x that is set, 0..63; x must not be 0 */
+static inline int txm_lowest_bit(uint64_t x) {
+#if defined(__GNUC__)
+    return __builtin_ctzll(x);
+#else
+    int n = 0;
+    for (int step = 32; step; step /= 2) {
+        if (x & (((uint64_t)1 << step) - 1)) continue;
+        x >>= step;
+        n += step;
+    }
+    return n;
+#endif
+}
+
 /* Sine and cosine of an angle of at most some thousand turns, to 1e-10: reduced to -pi/4..pi/4,
    then Taylor. Sums, products and quotients only, so that the bits are the same everywhere, which
    those of the C library are not. */

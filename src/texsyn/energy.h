@@ -59,16 +59,6 @@ static int txs_pick_plain(const uint8_t *const *rows, int count, const int16_t *
 }
 
 #else
-static int txs_lowest_bit(unsigned x) {
-#if defined(__GNUC__)
-    return __builtin_ctz(x);
-#else
-    int i = 0;
-    while (!(x >> i & 1)) i++;
-    return i;
-#endif
-}
-
 static __m128i txs_load(const void *p) {
     return _mm_loadu_si128((const __m128i *)p);
 }
@@ -102,7 +92,7 @@ static int txs_pick_sse2(const uint8_t *const *rows, int count, const int16_t *s
     __m128i m = txs_least(_mm_min_epi16(_mm_min_epi16(e0, e1), _mm_min_epi16(e2, e3)));
     int first = _mm_movemask_epi8(_mm_packs_epi16(_mm_cmpeq_epi16(e0, m), _mm_cmpeq_epi16(e1, m)));
     int last = _mm_movemask_epi8(_mm_packs_epi16(_mm_cmpeq_epi16(e2, m), _mm_cmpeq_epi16(e3, m)));
-    return txs_slot_value(txs_lowest_bit((unsigned)first | (unsigned)last << 16));
+    return txs_slot_value(txm_lowest_bit((unsigned)first | (unsigned)last << 16));
 }
 #endif
 

@@ -220,22 +220,11 @@ static int txt_bit_count(uint64_t bits) {
     return n;
 }
 
-/* number of the lowest bit that is set */
-static int txt_lowest_bit(uint64_t bits) {
-    int n = 0;
-    for (int step = 32; step; step /= 2) {
-        if (bits & (((uint64_t)1 << step) - 1)) continue;
-        bits >>= step;
-        n += step;
-    }
-    return n;
-}
-
 /* one of the bits that are set, at random */
 static int txt_random_bit(uint64_t bits, txm_rng *rng) {
     uint32_t left = txm_rng_below(rng, (uint32_t)txt_bit_count(bits));
     for (; left; left--) bits &= bits - 1;
-    return txt_lowest_bit(bits);
+    return txm_lowest_bit(bits);
 }
 
 static uint64_t txt_domain(const txt_solver *s, const uint32_t slot[4]) {
@@ -248,7 +237,7 @@ static uint64_t txt_domain(const txt_solver *s, const uint32_t slot[4]) {
 static int txt_decided_base(const txt_solver *s, uint32_t cell) {
     uint32_t slot[4];
     txt_cell_slots(s, cell, slot);
-    return txt_lowest_bit(txt_domain(s, slot));
+    return txm_lowest_bit(txt_domain(s, slot));
 }
 
 static void txt_enqueue(txt_solver *s, uint32_t cell) {
@@ -469,7 +458,7 @@ static txm_status txt_draw_tiles(txt_solver *s, txm_rng *rng) {
             for (int k = 0; k < 4; k++) {
                 const int set = s->colors[slot[k]]; /* one colour or all */
                 color[k] = set == all ? (int)txm_rng_below(rng, (uint32_t)n)
-                                      : txt_lowest_bit((uint64_t)set);
+                                      : txm_lowest_bit((uint64_t)set);
                 for (int j = 0; j < k; j++) /* in a period of 1 a slot has two sides */
                     if (slot[j] == slot[k]) color[k] = color[j];
                 code = code * n + color[k];

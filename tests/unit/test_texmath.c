@@ -282,6 +282,16 @@ static void test_exp2(void **state) {
     }
 }
 
+static void test_lowest_bit(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(7, 7);
+    for (int i = 0; i < 64; i++) {
+        assert_int_equal(txm_lowest_bit((uint64_t)1 << i), i);
+        const uint64_t above = (uint64_t)txm_rng_next(&rng) << 32 | txm_rng_next(&rng);
+        assert_int_equal(txm_lowest_bit((above | 1) << i), i);
+    }
+}
+
 static void test_numbers(void **state) {
     (void)state;
     assert_true(txm_is_finite(0) && txm_is_finite(-1e300) && txm_is_finite(1e-310));
@@ -416,6 +426,7 @@ int main(void) {
         cmocka_unit_test(test_arena_failed),
         cmocka_unit_test(test_sincos),
         cmocka_unit_test(test_exp2),
+        cmocka_unit_test(test_lowest_bit),
         cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_rng_known),
         cmocka_unit_test(test_rng_ranges),
