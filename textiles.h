@@ -3785,11 +3785,7 @@ done:
 enum {
     TXT_FRAME_LAYERS = 4 * (TXT_MAX_SEGMENTS + 2), /* pieces at the frame of a tile              */
     TXT_PLACES = 32,      /* found for the interior of a tile                                  */
-    TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
-    TXT_WINDOW = 12,      /* half width of such a place                                        */
-    TXT_USE = 20,         /* gray levels that a place costs which another interior shows       */
-    TXT_BIAS = 400,       /* energy of a texel of the frame, per row away from the joint       */
-    TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
+    TXT_BIAS = 400        /* energy of a texel of the frame, per row away from the joint       */
 };
 
 /* A tile being made. Every texel has the number of the layer that it shows. */
@@ -4119,20 +4115,14 @@ static void txt_expand_all(txt_canvas *c) {
     }
 }
 
-/* Give layer l all texels of the rectangle that show the frame and lie at least `depth` rows from
-   every joint. */
-static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
-    for (int y = y0; y < y1; y++) {
-        for (int x = x0; x < x1; x++) {
-            const int p = y * c->side + x;
-            if (!c->inside[p] || c->border[p] < depth || !c->layers[c->label[p]].is_frame) continue;
-            const int32_t t = txt_shown(c->b, &c->layers[l], x, y);
-            if (t < 0) continue;
-            c->label[p] = (uint16_t)l;
-            c->shows[p] = t;
-        }
-    }
-}
+/* ---- interiors: what the tiles so far show ----------------------------------------------- */
+
+enum {
+    TXT_MENDS = 12,       /* bad places of a tile for which another piece is sought            */
+    TXT_WINDOW = 12,      /* half width of such a place                                        */
+    TXT_USE = 20,         /* gray levels that a place costs which another interior shows       */
+    TXT_PLACE_WEIGHT = 60 /* energy per search unit of a place and texel of a tile's side      */
+};
 
 /* For the extra cost of places that other interiors show already, in search units. */
 typedef struct txt_use_query {
@@ -4250,6 +4240,23 @@ static void txt_sum_use(txt_build *b) {
                                   (TXT_CELL * TXT_CELL * (one + total)));
                 b->used[e][y * across + x] = b->used[e][(y - 1) * across + x] + row;
             }
+        }
+    }
+}
+
+/* ---- interiors: finding and cutting them ------------------------------------------------- */
+
+/* Give layer l all texels of the rectangle that show the frame and lie at least `depth` rows from
+   every joint. */
+static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            const int p = y * c->side + x;
+            if (!c->inside[p] || c->border[p] < depth || !c->layers[c->label[p]].is_frame) continue;
+            const int32_t t = txt_shown(c->b, &c->layers[l], x, y);
+            if (t < 0) continue;
+            c->label[p] = (uint16_t)l;
+            c->shows[p] = t;
         }
     }
 }

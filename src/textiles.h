@@ -487,6 +487,7 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
 #include "textiles/search.h"
 #include "textiles/frame.h"
 #include "textiles/cut.h"
+#include "textiles/interior.h"
 #include "textiles/repair.h"
 #include "textiles/make.h"
 #include "textiles/measure.h"

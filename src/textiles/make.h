@@ -1,6 +1,7 @@
 #ifndef TEXTILES_MAKE_H
 #define TEXTILES_MAKE_H
 
+#include "interior.h"
 #include "repair.h"
 
 /* ---- all tiles --------------------------------------------------------------------------- */
