@@ -3377,9 +3377,9 @@ static int txt_line_cost(const txt_build *b, int axis, double wanted, int sheet,
     const double step = txt_line_mean(b, &b->cross[axis], axis, sheet, x, y, n) / wanted;
     const double salience = txt_line_mean(b, &b->salience[axis], axis, sheet, x, y, n);
     const double along = txt_line_mean(b, &b->along[axis], axis, sheet, x, y, n);
-    const double off = fabs(step - 1), loud = salience - 1;
+    const double off = fabs(step - 1), excess = salience - 1;
     double cost = 100 * off + (off > 0.05 ? 200 * (off - 0.05) : 0) + 20 * fabs(along - 1);
-    if (loud > 0) cost += 6 * loud;
+    if (excess > 0) cost += 6 * excess;
     for (int c = 0; c < b->set->maps[0].channels; c++) {
         const double color = txt_line_mean(b, &b->color[axis][c], axis, sheet, x, y, n);
         cost += 0.7 * b->color[axis][c].mean * fabs(color - 1) / b->set->maps[0].channels;
@@ -3583,14 +3583,14 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
 /* The cost of a place as a corner: how far it is from typical roughness and salience. */
 static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     const int x = i + (b->is_triangle ? txt_half(j) : 0), r = 10;
-    double off = 0, loud = 0;
+    double off = 0, excess = 0;
     const int axes = b->is_triangle ? 1 : 2;
     for (int axis = 0; axis < axes; axis++) {
         double step = 0;
         for (int k = -r; k < r; k++) {
             const int px = axis ? x + k : x - r, py = axis ? j - r : j + k;
             step += txt_line_mean(b, &b->cross[axis], axis, sheet, px, py, 2 * r);
-            loud += txt_line_mean(b, &b->salience[axis], axis, sheet, px, py, 2 * r) / axes;
+            excess += txt_line_mean(b, &b->salience[axis], axis, sheet, px, py, 2 * r) / axes;
         }
         step /= 2 * r;
         off += fabs(step - 1);
@@ -3599,8 +3599,8 @@ static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
                              2 * r);
         off += 0.5 * fabs(step - 1);
     }
-    loud = loud / (2 * r) - 1;
-    uint32_t cost = (uint32_t)((30 * off + (loud > 0 ? 8 * loud : 0)) * TXT_SCALE);
+    excess = excess / (2 * r) - 1;
+    uint32_t cost = (uint32_t)((30 * off + (excess > 0 ? 8 * excess : 0)) * TXT_SCALE);
     if (b->is_triangle) {
         /* the surroundings of the vertex should look the same turned by multiples of 60 degrees */
         int sum = 0, n = 0;
@@ -4248,7 +4248,7 @@ static void txt_sum_use(txt_build *b) {
 
 /* Give layer l all texels of the rectangle that show the frame and lie at least `depth` rows from
    every joint. */
-static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
+static void txt_fill_interior(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
     for (int y = y0; y < y1; y++) {
         for (int x = x0; x < x1; x++) {
             const int p = y * c->side + x;
@@ -4262,7 +4262,7 @@ static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int 
 }
 
 /* Find places of the exemplars that continue the frame inwards. */
-static void txt_find_insides(txt_canvas *c) {
+static void txt_find_interiors(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, turns = b->is_triangle ? 6 : 1;
     txt_use_query use = {b, 0, b->set->size};
@@ -4439,7 +4439,7 @@ static void txt_fill_blocks(txt_canvas *c, int forced) {
         const int l =
             found ? txt_add_layer(c, &place[txm_rng_below(&rng, (uint32_t)found)]) : -1;
         if (l < 0) continue;
-        txt_force(c, l, x0, y0, x1, y1, forced);
+        txt_fill_interior(c, l, x0, y0, x1, y1, forced);
         txt_expand(c, l, x0, y0, x1, y1);
     }
 }
@@ -4480,7 +4480,7 @@ static void txt_cut_tile(txt_canvas *c) {
         memcpy(c->label, c->start, bytes);
         txt_show(c);
         txt_add_layer(c, &c->places[k]);
-        txt_force(c, c->frame_count, 0, 0, side, side, forced);
+        txt_fill_interior(c, c->frame_count, 0, 0, side, side, forced);
         txt_expand(c, c->frame_count, 0, 0, side, side);
         txt_expand_all(c);
         const int64_t energy = txt_energy(c, 0, 0, side, side) +
@@ -4661,7 +4661,7 @@ typedef struct txt_batch {
 static void txt_batch_begin(void *context, int k) {
     txt_canvas *c = &((txt_batch *)context)->canvas[k];
     txt_begin_tile(c, c->tile);
-    if (txt_block_side(c->b) >= c->side) txt_find_insides(c);
+    if (txt_block_side(c->b) >= c->side) txt_find_interiors(c);
     else c->place_count = 0;
 }
 

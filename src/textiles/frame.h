@@ -59,9 +59,9 @@ static int txt_line_cost(const txt_build *b, int axis, double wanted, int sheet,
     const double step = txt_line_mean(b, &b->cross[axis], axis, sheet, x, y, n) / wanted;
     const double salience = txt_line_mean(b, &b->salience[axis], axis, sheet, x, y, n);
     const double along = txt_line_mean(b, &b->along[axis], axis, sheet, x, y, n);
-    const double off = fabs(step - 1), loud = salience - 1;
+    const double off = fabs(step - 1), excess = salience - 1;
     double cost = 100 * off + (off > 0.05 ? 200 * (off - 0.05) : 0) + 20 * fabs(along - 1);
-    if (loud > 0) cost += 6 * loud;
+    if (excess > 0) cost += 6 * excess;
     for (int c = 0; c < b->set->maps[0].channels; c++) {
         const double color = txt_line_mean(b, &b->color[axis][c], axis, sheet, x, y, n);
         cost += 0.7 * b->color[axis][c].mean * fabs(color - 1) / b->set->maps[0].channels;
@@ -265,14 +265,14 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
 /* The cost of a place as a corner: how far it is from typical roughness and salience. */
 static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
     const int x = i + (b->is_triangle ? txt_half(j) : 0), r = 10;
-    double off = 0, loud = 0;
+    double off = 0, excess = 0;
     const int axes = b->is_triangle ? 1 : 2;
     for (int axis = 0; axis < axes; axis++) {
         double step = 0;
         for (int k = -r; k < r; k++) {
             const int px = axis ? x + k : x - r, py = axis ? j - r : j + k;
             step += txt_line_mean(b, &b->cross[axis], axis, sheet, px, py, 2 * r);
-            loud += txt_line_mean(b, &b->salience[axis], axis, sheet, px, py, 2 * r) / axes;
+            excess += txt_line_mean(b, &b->salience[axis], axis, sheet, px, py, 2 * r) / axes;
         }
         step /= 2 * r;
         off += fabs(step - 1);
@@ -281,8 +281,8 @@ static uint32_t txt_corner_cost(const txt_build *b, int sheet, int i, int j) {
                              2 * r);
         off += 0.5 * fabs(step - 1);
     }
-    loud = loud / (2 * r) - 1;
-    uint32_t cost = (uint32_t)((30 * off + (loud > 0 ? 8 * loud : 0)) * TXT_SCALE);
+    excess = excess / (2 * r) - 1;
+    uint32_t cost = (uint32_t)((30 * off + (excess > 0 ? 8 * excess : 0)) * TXT_SCALE);
     if (b->is_triangle) {
         /* the surroundings of the vertex should look the same turned by multiples of 60 degrees */
         int sum = 0, n = 0;

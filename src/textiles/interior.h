@@ -136,7 +136,7 @@ static void txt_sum_use(txt_build *b) {
 
 /* Give layer l all texels of the rectangle that show the frame and lie at least `depth` rows from
    every joint. */
-static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
+static void txt_fill_interior(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int depth) {
     for (int y = y0; y < y1; y++) {
         for (int x = x0; x < x1; x++) {
             const int p = y * c->side + x;
@@ -150,7 +150,7 @@ static void txt_force(txt_canvas *c, int l, int x0, int y0, int x1, int y1, int 
 }
 
 /* Find places of the exemplars that continue the frame inwards. */
-static void txt_find_insides(txt_canvas *c) {
+static void txt_find_interiors(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, turns = b->is_triangle ? 6 : 1;
     txt_use_query use = {b, 0, b->set->size};
@@ -327,7 +327,7 @@ static void txt_fill_blocks(txt_canvas *c, int forced) {
         const int l =
             found ? txt_add_layer(c, &place[txm_rng_below(&rng, (uint32_t)found)]) : -1;
         if (l < 0) continue;
-        txt_force(c, l, x0, y0, x1, y1, forced);
+        txt_fill_interior(c, l, x0, y0, x1, y1, forced);
         txt_expand(c, l, x0, y0, x1, y1);
     }
 }
@@ -368,7 +368,7 @@ static void txt_cut_tile(txt_canvas *c) {
         memcpy(c->label, c->start, bytes);
         txt_show(c);
         txt_add_layer(c, &c->places[k]);
-        txt_force(c, c->frame_count, 0, 0, side, side, forced);
+        txt_fill_interior(c, c->frame_count, 0, 0, side, side, forced);
         txt_expand(c, c->frame_count, 0, 0, side, side);
         txt_expand_all(c);
         const int64_t energy = txt_energy(c, 0, 0, side, side) +

@@ -40,7 +40,7 @@ typedef struct txt_batch {
 static void txt_batch_begin(void *context, int k) {
     txt_canvas *c = &((txt_batch *)context)->canvas[k];
     txt_begin_tile(c, c->tile);
-    if (txt_block_side(c->b) >= c->side) txt_find_insides(c);
+    if (txt_block_side(c->b) >= c->side) txt_find_interiors(c);
     else c->place_count = 0;
 }
 
