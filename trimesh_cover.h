@@ -97,14 +97,14 @@ extern "C" {
 
 /* ---- meshes ------------------------------------------------------------------------------- */
 
-/* All functions take any mesh of triangles, a result of trimesh_retile or your own: borders,
-   several pieces, edges with more than two triangles and unequal winding are allowed, holes in the
-   numbering too; two triangles are neighbours if they share two vertex numbers. Outputs are arrays
-   of the caller's, of the size stated, untouched after an error unless said otherwise. Every call
-   returns TXM_OK; TXM_BAD_ARGUMENT for a NULL, a field outside its range, an index that is not below
+/* All functions take any mesh of triangles, a result of trimesh_retile or your own. Borders, several
+   pieces, edges with more than two triangles, inconsistent orientation and unused vertices are
+   allowed; two triangles are neighbours if they share two vertex numbers. Outputs are arrays of the
+   caller's, of the size stated, untouched after an error unless said otherwise. Every call returns
+   TXM_OK; TXM_BAD_ARGUMENT for a NULL, a field outside its range, an index that is not below
    vertex_count, a position that is not finite; TXM_TOO_LARGE above TRIMESH_MAX_VERTICES vertices
-   or triangles; TXM_OUT_OF_MEMORY; TXM_CANCELLED; what else, it says. A mesh without triangles is
-   allowed and gives nothing. Same arguments, same bytes, whatever the threads. */
+   or triangles; TXM_OUT_OF_MEMORY; TXM_CANCELLED; further statuses are listed with the call. A mesh
+   without triangles is allowed and gives no output. */
 
 /* Smooth unit normals of a mesh that has none, 3 floats per vertex; 0 0 0 at a vertex without
    triangles of an area above 0. Each triangle counts by sin(angle at the vertex) / (product of the
@@ -125,27 +125,26 @@ typedef struct trimesh_values {
 } trimesh_values;
 
 /* Values at points of the input: a + u (b - a) + v (c - a) of the three corners' values a, b, c.
-   Right for what is continuous, colours and weights; for texture coordinates with seams there is
-   the next function.
+   For what is continuous: colours, weights; for texture coordinates with seams use the next function.
 
-   input    as it was given to trimesh_retile (positions are not looked at)
+   input    the mesh that trimesh_retile was given (positions are not used)
    sources  count of them, a result's: mesh->sources and mesh->vertex_count
    out      channels floats per source
    cost     O(count)                                                                           */
 TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
-                                        const txm_mesh_place *sources, size_t count, txm_env *env,
-                                        float *out);
+                                              const txm_mesh_place *sources, size_t count,
+                                              txm_env *env, float *out);
 
 /* Values with seams (charts of texture coordinates) at the corners of a result's triangles, so that
-   no triangle spans two charts. A seam is an edge of the input whose two triangles have other
-   values there, or that has no or several triangles on its other side; vertices in equal places are
-   one, so that meshes cut along their seams (glTF) do as well.
+   no triangle spans two charts. A seam is an edge of the input whose two triangles have different
+   values there, or that has no or several triangles on its other side. Vertices in equal places
+   count as one, so that meshes cut along their seams (glTF) work as well.
 
-   Each triangle takes the chart of the input at its middle: from the source of its corner 0 a path
-   leads there, over seams, in the plane through both that stands upright on the triangle. From the
-   middle another such path leads to each corner, and ends where it meets a seam: a corner beyond
-   takes the value at that place. So along a seam charts end up to a triangle early or late, as the
-   triangles lie; nothing is ever interpolated across.
+   Each triangle takes the chart of the input at its middle: a path leads there from the source of its
+   corner 0, across seams, in the plane through both places that is perpendicular to the triangle.
+   From the middle another such path leads to each corner, and ends where it meets a seam: a corner
+   beyond the seam takes the value at that place. So along a seam charts end up to a triangle early or
+   late, depending on the triangles; values are never interpolated across a seam.
 
                chart 1    s   chart 2
                +----------s------+          m middle, in chart 1; s the seam
@@ -153,37 +152,39 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
                  \        s    /            where the path meets s
                   \       s   /
 
-   input    as it was given to trimesh_retile, sound enough: degenerate triangles only end paths
-   mesh     the result (its indices; positions are not looked at)
+   input    the mesh that trimesh_retile was given; degenerate triangles only end paths
+   mesh     the result (its indices; positions are not used)
    sources  1 per vertex of mesh
    out      channels floats per corner, 3 corners per triangle, in the order of mesh->indices
    cost     O(input) for the neighbours, then for each triangle of mesh as many steps as input
             triangles lie on its paths; 75 bytes per triangle of the input, 20 per vertex       */
-TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
-                                                const txm_mesh *mesh, const txm_mesh_place *sources,
-                                                txm_env *env, float *out);
+TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input,
+                                                      const trimesh_values *values,
+                                                      const txm_mesh *mesh,
+                                                      const txm_mesh_place *sources, txm_env *env,
+                                                      float *out);
 
 /* From values at corners to the vertex arrays of a renderer: a vertex whose corners differ is
    doubled, one copy for each different value (bits are compared, -0 equals 0). New vertices are in
    the order of the old ones; old ones without triangles are left out.
 
-   mesh         indices and counts; positions are not looked at and may be NULL
+   mesh         indices and counts; positions are not used and may be NULL
    values       channels floats per corner
    new_indices  receives 3 per triangle, or NULL: count only
-   corners      receives for each new vertex one of its corners, or NULL; room for 3 * triangle_count
-                is always enough, *count of a first call exactly. With c = corners[i], new vertex i is
-                a copy of vertex mesh->indices[c] with the value at values + channels * c.
+   corners      receives for each new vertex one of its corners, or NULL; 3 * face_count entries are
+                always enough, *count of a first call exactly. With c = corners[i], new vertex i
+                is a copy of vertex mesh->indices[c] with the value at values + channels * c.
    count        receives the number of new vertices
    cost         O(triangles), 60 bytes each                                                     */
 TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
-                                             int channels, txm_env *env, uint32_t *new_indices,
-                                             uint32_t *corners, size_t *count);
+                                                   int channels, txm_env *env, uint32_t *new_indices,
+                                                   uint32_t *corners, size_t *count);
 
 /* ---- texturing [1, section 3.4] ------------------------------------------------------------ */
 
-/* The thesis's atlas: equilateral triangles side by side in one picture, each in a cell with a gutter
-   around. With h = size sqrt(3) / 2, in pixels from the top left corner of the picture, corners
-   0, 1, 2 of patch p lie at
+/* The thesis's atlas: equilateral triangles side by side in one picture, each in a cell with a
+   gutter around it. With h = size sqrt(3) / 2, in pixels from the top left corner of the picture,
+   corners 0, 1, 2 of patch p lie at
 
        x = p pitch + gutter + (0, size, size / 2),   y = height - gutter - (0, 0, h)
 
@@ -199,17 +200,17 @@ typedef struct trimesh_atlas {
 /* Lay out an atlas. count 1..256, 0 = 4; size (pixels a side) 2..16384, 0 = 256; gutter (pixels)
    0..size, -1 = 8. */
 TRIMESH_COVER_API txm_status trimesh_atlas_make(int count, int size, int gutter, txm_env *env,
-                                          trimesh_atlas *atlas);
+                                                trimesh_atlas *atlas);
 
 /* Texture coordinates u v of the corners 0, 1, 2 of one patch, or, with patch -1, of all: 6 floats
-   each, what trimesh_place_tiles takes. 0 for a bad number. */
+   each, as trimesh_place_tiles takes them. Returns 0 for a bad patch number. */
 TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, float *uv);
 
 typedef struct trimesh_choose_desc {
     int patches;   /* how many there are to choose from, 1..65536; 0 = 4                          */
-    int rotations; /* 1: corner k always shows corner k; 3: also turned; 0 = 3                    */
-    int repeat;    /* 0: neighbours differ in patch where they can, else in rotation; non-zero: all
-                      at random, as in [1]                                                        */
+    int rotations; /* 1: corner k always shows corner k; 3: all three rotations; 0 = 3            */
+    int repeat;    /* 0: neighbours have different patches where possible, else different rotations;
+                      non-zero: all at random, as in [1]                                          */
     uint64_t seed; /* another number, another choice                                              */
 } trimesh_choose_desc;
 
@@ -222,7 +223,7 @@ typedef struct trimesh_choose_desc {
               may be NULL
    cost       O(triangles), 60 bytes each; with repeat: none                                     */
 TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
-                                      txm_env *env, int *patches, int *rotations);
+                                            txm_env *env, int *patches, int *rotations);
 
 /* Texture coordinates of all corners from the tile and rotation of each triangle.
 
@@ -230,13 +231,13 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
                      NULL = all 0
    tile_uv           6 floats per tile, its corners 0, 1, 2: of trimesh_atlas_uv, or the first three
                      of textiles_place; tile_count tiles
-   uv                receives 6 floats per triangle: corner k gets corner (k + rotation) mod 3 of the
-                     tile. Double vertices by trimesh_split_corners with 2 channels.           */
+   uv                receives 6 floats per triangle: corner k gets corner (k + rotation) mod 3 of
+                     the tile. trimesh_split_corners with 2 channels makes vertices of them     */
 TRIMESH_COVER_API txm_status trimesh_place_tiles(size_t triangle_count, const int *tiles,
-                                           const int *rotations, const float *tile_uv,
-                                           size_t tile_count, txm_env *env, float *uv);
+                                                 const int *rotations, const float *tile_uv,
+                                                 size_t tile_count, txm_env *env, float *uv);
 
-/* For edge-matching tiles of any make: a colour for every edge, by hash of its two vertices and the
+/* For any edge-matching tiles: a colour for every edge, by hash of its two vertices and the
    seed, and a direction, from its lower to its higher vertex number. Side k of a triangle runs from
    corner k to corner (k + 1) mod 3. The same hash as textiles_assign_triangles begins with (which
    then recolours edges so that equal tiles do not meet).
@@ -244,23 +245,23 @@ TRIMESH_COVER_API txm_status trimesh_place_tiles(size_t triangle_count, const in
    colors       how many, 1..65536
    edge_colors  receives 3 per triangle: 0..colors - 1, equal on both sides of an edge
    directions   receives 3 per triangle: +1 if the side runs along the edge's direction, -1 against
-                it; may be NULL. The three of a triangle never run one way round.               */
+                it; may be NULL. Those of a triangle are never all +1 or all -1                 */
 TRIMESH_COVER_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
-                                           txm_env *env, int *edge_colors, int *directions);
+                                                 txm_env *env, int *edge_colors, int *directions);
 
 /* A random colour 0..count - 1 for every vertex, as in [1] (with 3). count 1..65536; 0 = 3. */
 TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int count, uint64_t seed,
-                                             txm_env *env, int *colors);
+                                                   txm_env *env, int *colors);
 
-/* A colour for every vertex so that the ends of every edge differ. Greedy, in smallest-last order [5]:
-   the vertex with the fewest neighbours left is taken away, over and over, and the last one taken is
-   coloured first. At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
+/* A colour for every vertex so that the ends of every edge differ. Greedy, in smallest-last order
+   [5]:    the vertex with the fewest neighbours left is removed, over and over, and the last one
+   removed is coloured first. At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
 
    colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
    count   receives how many colours were used; may be NULL
    cost    O(triangles), 60 bytes each and 16 per vertex                                        */
 TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
-                                             int *count);
+                                                   int *count);
 
 /* ---- geometry on triangles ----------------------------------------------------------------- */
 
@@ -270,25 +271,25 @@ typedef struct trimesh_point {
     float u, v;         /* 0 or more, u + v at most 1; exactly 0 or 1 on the sides              */
     float height;       /* over the surface, in edge lengths, -1000..1000                       */
     float scale;        /* size, in edge lengths, 0..1000; 0 = 1                                */
-    float rotation[4];  /* quaternion x, y, z, w that turns the thing in the frame x, y, z of the
-                           reference triangle, of any length; 0 0 0 0 = as it is                */
-    uint32_t prototype; /* which thing, handed through                                          */
+    float rotation[4];  /* quaternion x, y, z, w that rotates the thing in the frame x, y, z of the
+                           reference triangle, of any length; 0 0 0 0 = none                    */
+    uint32_t prototype; /* which thing; copied to the instances                                 */
 } trimesh_point;
 
-/* What is put on a triangle. Where desc->density thins it, points are taken from the front of the
-   list, so put them in an order in which every beginning is spread well (trimesh_order_patch).
+/* What is put on a triangle. With desc->density only some points are used, from the front of the
+   list, so order them such that the first n are well spread for every n (trimesh_order_patch).
 
-   Points on the sides (within 10^-6 of an edge) belong to one triangle only: an edge to the first
-   (lowest) of its triangles, a vertex to the first of its. So that edges have neither gaps nor
-   doubles, have the same points on all three sides, at t and 1 - t alike, and all corners or none,
-   in all patches of a call; then every edge and vertex of the mesh shows them once, whatever patches
-   and rotations meet there. */
+   Points on the sides (within 10^-6 of an edge) are placed once: those on an edge by the first
+   (lowest) of its triangles, those on a vertex by the first of its triangles. To avoid gaps and
+   doubles at edges, give all patches of a call the same points on all three sides, symmetric under
+   t to 1 - t, and all corners or none; then every edge and vertex of the mesh shows them once,
+   whatever patches and rotations meet there. */
 typedef struct trimesh_patch {
     const trimesh_point *points;
     size_t count; /* 0..2^20 */
 } trimesh_patch;
 
-/* A thing in space: place it by scaling, then turning, then moving. */
+/* A thing in space: scaled, then rotated, then moved. */
 typedef struct trimesh_instance {
     float position[3];
     float rotation[4];  /* unit quaternion x, y, z, w: glTF's order; w >= 0                     */
@@ -305,77 +306,77 @@ typedef struct trimesh_scatter_desc {
     const int *choices;           /* 1 per triangle: its patch; NULL = at random                  */
     const int *rotations;         /* 1 per triangle, 0..2: corner k of the triangle is corner
                                      (k + rotation) mod 3 of the patch; NULL = at random          */
-    float unit;   /* length of an edge, for heights and scales: above 0, in units of the mesh; 0 =
-                     each triangle's own, that of the equilateral triangle of its area            */
+    float unit;   /* edge length for heights and scales: above 0, in units of the mesh; 0 = that of
+                     the equilateral triangle of each triangle's area                             */
     float height; /* added to the height of every point, in edge lengths, -1000..1000             */
-    int inside;   /* non-zero: the other side. Heights count against the normals, and things are
-                     turned half round about their x axis, z against the normal                   */
-    float curve;  /* 0..1: 0 = things stand on the flat triangles, 1 = on the curved surface that the
-                     normals tell of (Phong tessellation [4] with half its weight, which is what a sphere
-                     needs); clamped to 1 edge                                                    */
-    float density; /* things per unit of area at height `height` (on side `inside`): patches are
-                     thinned for it, see below; 0 = all points of the patches on every triangle   */
-    int spin;      /* non-zero: every thing is turned by a random angle about its own z axis      */
+    int inside;   /* non-zero: the other side. Heights are measured against the normals, and things
+                     are rotated by 180 degrees about their x axis, z against the normal          */
+    float curve;  /* 0..1: 0 = things stand on the flat triangles, 1 = on the curved surface that
+                     the normals describe (Phong tessellation [4] with half its weight, which is
+                     right for a sphere); the shift is at most 1 edge                             */
+    float density; /* things per unit of area at height `height` (on side `inside`): then patches
+                     are used in part, see below; 0 = all points of the patches on every triangle */
+    int spin;      /* non-zero: every thing is rotated by a random angle about its own z axis     */
     const float *mix; /* shares, mix_count of them, 0 or more: prototypes 0..mix_count - 1 are drawn
                      at random in these proportions; NULL = the points' own                       */
     int mix_count;    /* 0..256                                                                   */
     uint64_t seed;    /* another number, other choices                                            */
 } trimesh_scatter_desc;
 
-/* Put a patch on every triangle of a mesh, and list what stands where.
+/* Put a patch on every triangle of a mesh, and list the instances.
 
    Position: the point (u, v) of the triangle (moved by curve), plus height times the unit normal
    interpolated there. Orientation: z along that normal, x along the direction of the patch's x axis
-   on the triangle: of the affine map from the reference triangle the rotation nearest to it, made
-   perpendicular to z. So frames go on smoothly across edges, up to the turn by a multiple of
+   on the triangle (by the rotation nearest to the affine map from the reference triangle), made
+   perpendicular to z. So frames are continuous across edges, up to a rotation by a multiple of
    60 degrees. Scale: the point's times the edge length.
 
-   With density, triangle t of area A(t) (its corners moved along their normals to the height) gets
-   the beginning of its patch that comes nearest to density A(t) + e things, where e is the error
-   left by the triangle before, in the order of a space-filling (Morton) curve; a point on a side
-   counts 1/2, on a corner 1/6, as so many triangles share it. So counts are right in any region, to
-   a thing or so per side of it. The patches need enough points for the largest triangle: a third
-   more than for the mean do for meshes of trimesh_retile.
+   With density, triangle t of area A(t) (its corners moved along their normals to the height) gets as
+   many points from the front of its patch as come nearest to density A(t) + e things, where e is the
+   error left by the previous triangle along a space-filling (Morton) curve; a point on a side counts
+   1/2, on a corner 1/6, since that many triangles share it. So the count in any region is right to
+   about one thing per side of the region. The patches need enough points for the largest triangle: for
+   meshes of trimesh_retile a third more than for the mean are enough.
 
    out       receives *count instances, triangle by triangle in the patch's order; NULL: count only.
              After TXM_CANCELLED it may be filled in part
    capacity  how many instances out has room for
-   count     receives how many there are, also after TXM_TOO_LARGE for want of room
+   count     receives how many there are, also after TXM_TOO_LARGE because of capacity
    return    also TXM_TOO_SMALL: the patches have too few points for this density, the message says
              how many the largest triangle needs; TXM_TOO_LARGE: more than capacity or 2^31
    cost      O(triangles + instances), 0.1 to 0.2 us per instance; 36 bytes per triangle, 36 per
-             vertex without normals; with points on the sides 50 more per triangle. The parallel-for
-             hook spreads the triangles                                                         */
+             vertex without normals; with points on the sides 50 more per triangle               */
 TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
-                                       trimesh_instance *out, size_t capacity, size_t *count);
+                                             trimesh_instance *out, size_t capacity, size_t *count);
 
-/* position + scale (point turned): where a point of the thing comes to lie. out may be point. */
+/* position + scale (rotated point): where a point of the thing is in space. out may be point. */
 TRIMESH_COVER_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
-                                        float out[3]);
+                                              float out[3]);
 
 typedef struct trimesh_patch_desc {
     int points;      /* how many per triangle of a mesh, on average, 1..4096; 0 = 32              */
-    int hexagonal;   /* non-zero: the triangular lattice with m steps along a side, m^2 / 2 points per
-                        triangle, m = the nearest to sqrt(2 points); then rotations do not show   */
+    int hexagonal;   /* non-zero: the triangular lattice with m steps along a side, m^2 / 2 points
+                        per triangle, m = the nearest to sqrt(2 points); rotations do not show    */
     int iterations;  /* rounds of repulsion, 1..1000; 0 = 100                                     */
-    uint64_t seed;   /* another number, another patch; all with the same `points` go together     */
+    uint64_t seed;   /* another number, another patch; all with the same `points` fit together    */
 } trimesh_patch_desc;
 
-/* Make a patch of evenly spread points, in an order for thinning. m + 1 points lie on each side, the
-   corners included, at equal steps, m as above, so that all patches of the same `points` join
-   without gaps in all rotations; those inside repel each other and these, with a force falling to
-   zero at the radius of influence [1, equation 3.1]. Heights are 0, scales 1, prototypes 0.
+/* Make a patch of evenly spread points, ordered for use in part. m + 1 points lie on each side,
+   including the corners, at equal steps, m as above, so that all patches of the same `points` join
+   without gaps in all rotations. Those inside repel each other and are repelled by those on sides,
+   with a force that falls to zero at the radius of influence [1, equation 3.1]. Heights are 0,
+   scales 1, prototypes 0.
 
-   points    receives *count points; NULL: count only. points + 2 m + 2 is always room enough
+   points    receives *count points; NULL: count only. points + 2 m + 2 are always enough
    capacity  how many points it has room for
-   return    also TXM_TOO_LARGE for want of room; count is right then
+   return    also TXM_TOO_LARGE if capacity is too small; count is right then
    cost      O(count^2 + iterations count), 0.1 s for 1000                                       */
 TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
-                                               trimesh_point *points, size_t capacity,
-                                               size_t *count);
+                                                     trimesh_point *points, size_t capacity,
+                                                     size_t *count);
 
-/* Put the points of a patch of your own in an order for thinning: each next point the one furthest
-   from those before, neighbouring triangles taken for mirror images. O(count^2); count up to 16384.
+/* Order the points of a patch of your own for use in part: each next point is the one furthest from
+   those before, with neighbouring triangles treated as mirror images. O(count^2); count up to 16384;
    8 bytes each. */
 TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env);
 
@@ -415,7 +416,7 @@ static int tmc_are_finite(const float *values, size_t count) {
     return 1;
 }
 
-/* A loop over count things, of which each block writes its own: what a thread is given. */
+/* A loop over count things; each block of them writes only its own results. */
 typedef struct tmc_loop {
     void (*body)(const void *job, size_t first, size_t end);
     const void *job;
@@ -430,9 +431,9 @@ static void tmc_block(void *context, int index) {
 }
 
 /* body(job, first, end) for all of count, spread over threads; progress goes from..to. */
-static txm_status tmc_spread(void (*body)(const void *, size_t, size_t), const void *job,
-                             size_t count, double from, double to, const char *stage,
-                             txm_env *env) {
+static txm_status tmc_run_blocks(void (*body)(const void *, size_t, size_t), const void *job,
+                                 size_t count, double from, double to, const char *stage,
+                                 txm_env *env) {
     tmc_loop l;
     const size_t blocks = (count + TMC_BLOCK - 1) / TMC_BLOCK;
     l.body = body;
@@ -493,7 +494,7 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
 
 /* ---- which sides share an edge -------------------------------------------------------------- */
 
-/* The sides of a mesh in the order of their edges; they lie in the arena, and as much scratch. */
+/* The sides of a mesh in the order of their edges, allocated in the arena, with as much scratch. */
 static txm_status tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena, txm_env *env,
                                  uint32_t **sorted) {
     *sorted = (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
@@ -502,7 +503,7 @@ static txm_status tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena, txm_env
     return status;
 }
 
-/* The ring of the sides of each edge, as txm_mesh_link has it. */
+/* Link the sides of each edge into a ring, as txm_mesh_link does. */
 static txm_status tmc_link(const txm_mesh *mesh, txm_env *env, uint32_t *next) {
     txm_arena scratch;
     uint32_t *sorted;
@@ -601,12 +602,12 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     j.sources = sources;
     j.out = out;
-    return tmc_spread(tmc_transfer_block, &j, count, 0, 1, "values", env);
+    return tmc_run_blocks(tmc_transfer_block, &j, count, 0, 1, "values", env);
 }
 
 /* ---- attributes: paths on the input ---------------------------------------------------------- */
 
-/* The input as paths see it. */
+/* The input, prepared for paths. */
 typedef struct tmc_paths {
     txm_mesh input;
     tmc_values values;
@@ -631,12 +632,12 @@ static txm_dvec3 tmc_point(const txm_mesh *input, tmc_place at) {
     return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
-/* Number vertices in equal places alike. pairs: room for 2 per vertex. */
+/* Give vertices in equal places the same number. pairs: room for 2 per vertex. */
 static void tmc_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
     const size_t n = input->vertex_count;
     for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
     for (size_t axis = 3; axis-- > 0;) {
-        for (size_t i = 0; i < n; i++) /* + 0: there is one zero */
+        for (size_t i = 0; i < n; i++) /* + 0: -0 becomes 0      */
             pairs[i].key = txm_sort_key(input->positions[3 * (size_t)pairs[i].value + axis] + 0.0f);
         txm_sort_pairs(pairs, pairs + n, n);
     }
@@ -661,7 +662,7 @@ static int tmc_equal_values(const tmc_values *x, size_t corner, size_t other) {
 static uint8_t tmc_seam(const tmc_paths *p, size_t side) {
     const size_t other = p->next[side];
     if (other == side || p->next[other] != side) return 2;
-    size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, whichever way round */
+    size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, in either order     */
     if (p->vertex[a] != p->vertex[side]) {
         a = b;
         b = other;
@@ -700,8 +701,8 @@ typedef struct tmc_path {
     int through;                  /* cross seams                                              */
 } tmc_path;
 
-/* Where the plane meets a side, as a share of it. The values on both sides of the plane are computed
-   from the vertex alone, so that all triangles there agree. */
+/* Where the plane meets a side, as a fraction of it. The values on both sides of the plane are
+   computed from the vertex alone, so that all triangles there give the same result. */
 static double tmc_cut(const tmc_path *w, const txm_dvec3 c[3], size_t k) {
     const double f = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across);
     const double g = txm_d3_dot(txm_d3_sub(c[(k + 1) % 3], w->start), w->across);
@@ -722,8 +723,8 @@ static double tmc_along(const tmc_path *w, txm_dvec3 x) {
     return txm_d3_dot(txm_d3_sub(x, w->start), w->ahead);
 }
 
-/* The side by which the path leaves a triangle: the one that the plane meets, other than the side
-   `from` (0..2, or 3: at the start, then the one further ahead). 3 if there is none. */
+/* The side by which the path leaves a triangle: a side that the plane meets, not the side `from`
+   (0..2); at the start from is 3, then the one further ahead. Returns 3 if there is none. */
 static size_t tmc_exit(const tmc_path *w, const txm_dvec3 c[3], size_t from) {
     int above[3];
     size_t best = 3;
@@ -742,8 +743,8 @@ static size_t tmc_exit(const tmc_path *w, const txm_dvec3 c[3], size_t from) {
     return best;
 }
 
-/* Follow a path. *at is its start and receives its end: where it meets a seam, or what lies at the
-   end's distance. 1 if it came to the goal triangle. */
+/* Follow a path. *at is its start and receives its end: where it meets a seam, or the place at the
+   distance of the end. Returns 1 if it came to the goal triangle. */
 static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
     size_t triangle = at->triangle, from = 3;
     int reached = 0;
@@ -758,7 +759,7 @@ static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
         const double along = tmc_along(w, x), least = -0.5 * w->reach;
         const tmc_place out = tmc_on_side(triangle, k, s);
         if (!reached && along >= w->reach) {
-            /* between the way in and the way out; the end may yet lie in a triangle nearby */
+            /* between the entry and the exit; the end may also lie in a triangle nearby */
             tmc_place in = *at;
             if (from < 3) in = tmc_on_side(triangle, from, tmc_cut(w, c, from));
             const double before = tmc_along(w, tmc_point(&p->input, in));
@@ -782,8 +783,8 @@ static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
     return 0;
 }
 
-/* A path from a place, which is first moved a little into its triangle: so the plane certainly cuts
-   two sides of it, and a start in a corner needs no search of the fan. */
+/* A path from a place, which is first moved a little into its triangle: so the plane surely cuts
+   two sides of it, and a start in a corner needs no search around the corner. */
 static tmc_path tmc_path_make(const tmc_paths *p, tmc_place *at, txm_dvec3 end, txm_dvec3 up,
                               size_t goal, int through) {
     tmc_path w;
@@ -847,14 +848,14 @@ TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, con
     txm_arena_init(&arena, env);
     status = tmc_paths_build(&p, &arena, env);
     if (status == TXM_OK)
-        status = tmc_spread(tmc_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
+        status = tmc_run_blocks(tmc_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
     txm_arena_free(&arena);
     return status;
 }
 
 /* ---- attributes: doubled vertices ------------------------------------------------------------ */
 
-/* the bits of a float, one pattern for both zeros */
+/* the bits of a float, the same for 0 and -0 */
 static uint32_t tmc_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
@@ -901,8 +902,8 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
     size_t made = 0;
     if ((status = tmc_check_memory(&arena, env)) != TXM_OK) goto done;
     tmc_sort_corners(mesh, values, width, pairs);
-    /* Equal corners now follow each other, but for the rare ones whose hashes are equal by chance: a
-       new vertex more then, which does no harm. */
+    /* Equal corners now follow each other, except where different values have the same hash, which
+       is rare: then there is an extra vertex, which does no harm. */
     for (size_t i = 0; i < n; i++) {
         const size_t c = pairs[i].value, before = pairs[i ? i - 1 : 0].value;
         const int fresh = i == 0 || mesh->indices[c] != mesh->indices[before] ||
@@ -950,9 +951,9 @@ TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, fl
     return 1;
 }
 
-/* All triangles, each after the one that it was reached from: breadth first. */
-static void tmc_spread_order(const uint32_t *next, size_t triangles, uint8_t *seen,
-                             uint32_t *order) {
+/* All triangles in breadth-first order. */
+static void tmc_breadth_first(const uint32_t *next, size_t triangles, uint8_t *seen,
+                              uint32_t *order) {
     size_t end = 0;
     for (size_t first = 0, at = 0; first < triangles; first++) {
         if (seen[first]) continue;
@@ -970,11 +971,11 @@ static void tmc_spread_order(const uint32_t *next, size_t triangles, uint8_t *se
     }
 }
 
-/* How badly a choice goes with the neighbours' so far: 0 = none has this patch. */
+/* The cost of a choice beside the neighbours' choices so far: 0 = none of them has this patch. */
 static int tmc_clashes(const uint32_t *next, const int *choice, int patches, size_t t, int chosen) {
     int sum = 0;
     for (size_t side = 3 * t; side < 3 * t + 3; side++) {
-        int looked = 0; /* edges of very many triangles are not worth it */
+        int looked = 0; /* not for edges of very many triangles          */
         for (size_t s = next[side]; s != side && looked < 8; s = next[s], looked++) {
             const int other = choice[s / 3];
             if (other >= 0 && other % patches == chosen % patches) sum += other == chosen ? 8 : 1;
@@ -983,9 +984,9 @@ static int tmc_clashes(const uint32_t *next, const int *choice, int patches, siz
     return sum;
 }
 
-/* Choose backwards in that order: then every triangle but the last of its piece still has a neighbour
-   without a choice, so that two neighbours at most stand in its way. choice = patch + patches *
-   rotation. */
+/* Choose in the reverse of that order: then every triangle but the last of its piece still has a
+   neighbour without a choice, so that at most two neighbours constrain it. choice = patch + patches
+   * rotation. */
 static void tmc_choose(const uint32_t *next, const uint32_t *order, size_t triangles, int patches,
                        int total, uint64_t seed, int *choice) {
     for (size_t t = 0; t < triangles; t++) choice[t] = -1;
@@ -1041,7 +1042,7 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     if (status == TXM_OK) status = tmc_link(mesh, env, next);
     if (status == TXM_OK) status = tmc_report(env, 0.5, "patches");
     if (status == TXM_OK) {
-        tmc_spread_order(next, count, seen, order);
+        tmc_breadth_first(next, count, seen, order);
         tmc_choose(next, order, count, n, n * turns, desc->seed, choice);
         for (size_t t = 0; t < count; t++) tmc_put_choice(choice[t], n, t, patches, rotations);
     }
@@ -1112,7 +1113,7 @@ typedef struct tmc_graph {
     size_t count;
     uint32_t *first, *ends;
     uint32_t *degree; /* neighbours left                                                  */
-    uint32_t *order;  /* all vertices by degree; taken away from the front               */
+    uint32_t *order;  /* all vertices by degree; removed from the front                  */
     uint32_t *place;  /* where a vertex lies in order                                     */
     uint32_t *bucket; /* where the vertices of each degree begin                          */
 } tmc_graph;
@@ -1137,7 +1138,7 @@ static txm_status tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena 
                 g->ends[g->first[low + 1]] = high;
                 g->ends[g->first[high + 1]] = low;
             }
-            /* counted two places further on, then filled one further on, they end in place */
+            /* count at + 2, then fill from + 1: afterwards first[v] is right */
             g->first[low + (pass ? 1 : 2)]++;
             g->first[high + (pass ? 1 : 2)]++;
         }
@@ -1147,8 +1148,8 @@ static txm_status tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena 
     return status;
 }
 
-/* Take away the vertex with the fewest neighbours left, over and over; order receives them. Vertices
-   lie sorted by degree; one that loses a neighbour changes places with the first of its degree. */
+/* Remove the vertex with the fewest neighbours left, over and over; order receives them. Vertices
+   are sorted by degree; one that loses a neighbour is swapped with the first of its degree. */
 static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *env) {
     const size_t n = g->count;
     g->degree = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
@@ -1172,7 +1173,7 @@ static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *en
         const uint32_t v = g->order[i];
         for (uint32_t e = g->first[v]; e < g->first[v + 1]; e++) {
             const uint32_t u = g->ends[e], d = g->degree[u];
-            if (g->place[u] <= i || d <= g->degree[v]) continue; /* gone, or next anyway */
+            if (g->place[u] <= i || d <= g->degree[v]) continue; /* removed, or next anyway */
             const uint32_t to = g->bucket[d]++, w = g->order[to], from = g->place[u];
             g->order[from] = w;
             g->place[w] = from;
@@ -1184,7 +1185,7 @@ static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *en
     return TXM_OK;
 }
 
-/* Color in the opposite order; taken[c] = v + 1: a neighbour of v has colour c. */
+/* Colour in the reverse order; taken[c] = v + 1: a neighbour of v has colour c. */
 static int tmc_color_back(const tmc_graph *g, uint32_t *taken, int *colors) {
     int most = 0;
     for (size_t i = g->count; i-- > 0;) {
@@ -1243,24 +1244,24 @@ typedef struct tmc_item {
     txm_quat turn;  /* of length 1                                                        */
     uint32_t prototype;
     uint32_t before;      /* sixths of the points before this one                         */
-    uint8_t side, corner; /* on which it lies; TMC_NONE = inside. Of a corner both     */
+    uint8_t side, corner; /* on which it lies; TMC_NONE = inside; both for a corner    */
 } tmc_item;
 
-typedef struct tmc_kit {
+typedef struct tmc_prepared {
     const tmc_item *items;
     const uint32_t *rim; /* numbers of the items on sides and corners, rising             */
     uint32_t count, rim_count;
     uint32_t sixths; /* of all points                                                     */
-} tmc_kit;
+} tmc_prepared;
 
 typedef struct tmc_scatter {
     const trimesh_scatter_desc *desc;
     const float *normals;
-    const tmc_kit *kits;
+    const tmc_prepared *kits;
     const uint8_t *owned; /* 1 per triangle: bit k = its side k, bit 3 + k = its corner k; NULL =
                              no patch has points there                                    */
     double *area;         /* 1 per triangle, at the height                                */
-    uint32_t *take;       /* 1 per triangle: length of the beginning that is used; NULL = all */
+    uint32_t *take;       /* 1 per triangle: how many points are used; NULL = all             */
     size_t *offset;       /* 1 per triangle: number of its first instance                 */
     const double *mix;    /* sums of the shares                                           */
     uint64_t key;         /* of the seed                                                  */
@@ -1281,7 +1282,7 @@ static txm_status tmc_check_point(const trimesh_point *p, size_t patch, size_t i
     return why ? txm_fail_numbers(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
 }
 
-static void tmc_ready_point(const trimesh_point *p, tmc_item *item) {
+static void tmc_prepare_point(const trimesh_point *p, tmc_item *item) {
     const txm_quat turn = {p->rotation[0], p->rotation[1], p->rotation[2], p->rotation[3]};
     double sum = 0;
     int zeros = 0;
@@ -1310,9 +1311,9 @@ static uint32_t tmc_sixths(const tmc_item *item) {
     return item->corner != TMC_NONE ? 1 : item->side != TMC_NONE ? 3 : TMC_WHOLE;
 }
 
-/* Check all patches and make them ready; *rims: has one points on its sides? */
-static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
-                            tmc_scatter *s, int *rims) {
+/* Check and prepare all patches; *rims: has one of them points on its sides? */
+static txm_status tmc_prepare(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
+                              tmc_scatter *s, int *rims) {
     size_t total = 0;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         const trimesh_patch *patch = &desc->patches[p];
@@ -1327,18 +1328,19 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
     }
     tmc_item *items = (tmc_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
     uint32_t *rim = (uint32_t *)txm_arena_alloc(arena, total + 1, sizeof *rim);
-    tmc_kit *kits = (tmc_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
+    tmc_prepared *kits =
+        (tmc_prepared *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
     const txm_status status = tmc_check_memory(arena, env);
     if (status != TXM_OK) return status;
     s->kits = kits;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
-        tmc_kit *kit = &kits[p];
+        tmc_prepared *kit = &kits[p];
         kit->items = items;
         kit->rim = rim;
         kit->count = (uint32_t)desc->patches[p].count;
         kit->rim_count = kit->sixths = 0;
         for (uint32_t i = 0; i < kit->count; i++) {
-            tmc_ready_point(&desc->patches[p].points[i], &items[i]);
+            tmc_prepare_point(&desc->patches[p].points[i], &items[i]);
             items[i].before = kit->sixths;
             kit->sixths += tmc_sixths(&items[i]);
             if (items[i].side != TMC_NONE) rim[kit->rim_count++] = i;
@@ -1350,8 +1352,8 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
     return TXM_OK;
 }
 
-/* Give every side and every corner to the first triangle that has it. */
-static txm_status tmc_own(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
+/* Assign every edge and every vertex to the first triangle that has it. */
+static txm_status tmc_assign_owners(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
     const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
@@ -1371,7 +1373,7 @@ static txm_status tmc_own(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
 }
 
 /* The patch of a triangle and how it is turned. */
-static const tmc_kit *tmc_choice(const tmc_scatter *s, size_t t, size_t *rotation) {
+static const tmc_prepared *tmc_choice(const tmc_scatter *s, size_t t, size_t *rotation) {
     const trimesh_scatter_desc *d = s->desc;
     const uint64_t h = txm_hash(s->key + t);
     const size_t random = (size_t)((h >> 32) * (uint64_t)d->patch_count >> 32);
@@ -1389,7 +1391,7 @@ static int tmc_owns(const tmc_scatter *s, size_t t, size_t rotation, const tmc_i
 
 /* ---- geometry on triangles: how many where --------------------------------------------------- */
 
-/* The edge length of the triangle, as heights and scales take it. */
+/* The edge length of the triangle that heights and scales refer to. */
 static double tmc_unit(const tmc_scatter *s, txm_dvec3 area2) {
     return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMC_H);
 }
@@ -1408,12 +1410,12 @@ static void tmc_area_block(const void *job, size_t first, size_t end) {
             p[k] = txm_d3_mad(p[k], txm_d3_load(n), up);
         }
         const txm_dvec3 there = txm_d3_area2(p[0], p[1], p[2]);
-        /* beyond the centre of a bend the triangle is turned over: no room there */
+        /* beyond the centre of curvature the triangle is inverted: no room there */
         s->area[t] = txm_d3_dot(there, flat) > 0 ? 0.5 * txm_d3_len(there) : 0;
     }
 }
 
-/* every third bit of 30 from the 10 of x */
+/* spread the lower ten bits of x to every third bit */
 static uint32_t tmc_third_bits(uint32_t x) {
     x = (x | x << 16) & 0x030000ffu;
     x = (x | x << 8) & 0x0300f00fu;
@@ -1421,7 +1423,8 @@ static uint32_t tmc_third_bits(uint32_t x) {
     return (x | x << 2) & 0x09249249u;
 }
 
-/* The triangles along a Morton curve through their middles. pairs: room for 2 per triangle. */
+/* The triangles in the order of a Morton curve through their middles. pairs: room for 2 per
+   triangle. */
 static void tmc_morton(const txm_mesh *mesh, txm_pair *pairs) {
     double low[3] = {0, 0, 0}, size = 0;
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
@@ -1444,9 +1447,9 @@ static void tmc_morton(const txm_mesh *mesh, txm_pair *pairs) {
     txm_sort_pairs(pairs, pairs + mesh->face_count, mesh->face_count);
 }
 
-/* How long a beginning of a patch comes nearest to so many sixths of a thing. */
-static uint32_t tmc_beginning(const tmc_kit *kit, double sixths) {
-    uint32_t low = 0, high = kit->count; /* low points are not too many, high + 1 are */
+/* How many points from the front of a patch come nearest to so many sixths of a thing. */
+static uint32_t tmc_prefix_length(const tmc_prepared *kit, double sixths) {
+    uint32_t low = 0, high = kit->count; /* low points are not too many, high + 1 points are */
     while (low < high) {
         const uint32_t middle = (low + high + 1) / 2;
         const uint32_t sum = middle < kit->count ? kit->items[middle].before : kit->sixths;
@@ -1458,8 +1461,8 @@ static uint32_t tmc_beginning(const tmc_kit *kit, double sixths) {
     return sixths - next->before > 0.5 * tmc_sixths(next) ? low + 1 : low;
 }
 
-/* Fill s->take so that the things on any stretch of the curve are as many as its area wants. */
-static txm_status tmc_thin(const tmc_scatter *s, const txm_pair *order, txm_env *env) {
+/* Fill s->take so that the number of things on any stretch of the curve fits its area. */
+static txm_status tmc_thin_patches(const tmc_scatter *s, const txm_pair *order, txm_env *env) {
     const size_t triangles = s->desc->mesh.face_count;
     double carry = 0, most = 0;
     int short_of = 0;
@@ -1467,10 +1470,10 @@ static txm_status tmc_thin(const tmc_scatter *s, const txm_pair *order, txm_env 
         const size_t t = order[i].value;
         const double wanted = TMC_WHOLE * (double)s->desc->density * s->area[t];
         size_t rotation;
-        const tmc_kit *kit = tmc_choice(s, t, &rotation);
-        const uint32_t n = tmc_beginning(kit, wanted + carry);
+        const tmc_prepared *kit = tmc_choice(s, t, &rotation);
+        const uint32_t n = tmc_prefix_length(kit, wanted + carry);
         carry += wanted - (n < kit->count ? kit->items[n].before : kit->sixths);
-        /* what one triangle lacks the next few have, but no more than an eighth of it */
+        /* what one triangle lacks goes to the next few, at most an eighth of their number */
         if (carry > fmax(TMC_WHOLE, wanted / 8)) {
             short_of = 1;
             carry = 0;
@@ -1492,7 +1495,7 @@ static void tmc_count_block(const void *job, size_t first, size_t end) {
     const tmc_scatter *s = (const tmc_scatter *)job;
     for (size_t t = first; t < end; t++) {
         size_t rotation;
-        const tmc_kit *kit = tmc_choice(s, t, &rotation);
+        const tmc_prepared *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         size_t count = take;
         for (uint32_t i = 0; i < kit->rim_count && kit->rim[i] < take; i++)
@@ -1536,11 +1539,11 @@ static void tmc_base_make(const tmc_scatter *s, size_t t, size_t rotation, tmc_b
     b->edge = sqrt(txm_d3_len(b->up) / TMC_H);
 }
 
-/* Phong tessellation [4]: the point p of the triangle moves towards its feet on
-   the tangent planes at the corners, here half the way, which on a sphere leads back to it:
+/* Phong tessellation [4]: the point p of the triangle moves towards its feet on the tangent planes
+   at the corners, here by half the distance, which on a sphere leads back to the sphere:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
-static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, double curve) {
+static txm_dvec3 tmc_curve_point(const tmc_base *b, const double w[3], txm_dvec3 p, double curve) {
     txm_dvec3 sum = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++)
         sum = txm_d3_mad(sum, b->n[k], w[k] * txm_d3_dot(txm_d3_sub(b->p[k], p), b->n[k]));
@@ -1549,7 +1552,7 @@ static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, do
     return length > b->edge ? txm_d3_scale(sum, b->edge / length) : sum;
 }
 
-/* A random turn about z: half the angle is that of a random point of the disc. */
+/* A random rotation about z: half its angle is the angle of a random point of the disc. */
 static txm_quat tmc_spin(uint64_t h) {
     double x, y, r;
     do {
@@ -1581,10 +1584,10 @@ static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_it
     }
     n = txm_d3_unit(txm_d3_len2(n) > 0 ? n : b->up);
     if (!(txm_d3_len2(n) > 0)) n = txm_d3(0, 0, 1);
-    if (d->curve > 0) p = txm_d3_add(p, tmc_bulge(b, w, p, d->curve));
+    if (d->curve > 0) p = txm_d3_add(p, tmc_curve_point(b, w, p, d->curve));
     p = txm_d3_mad(p, n, side * (item->height + d->height) * b->unit);
-    /* In the plane of the triangle the nearest rotation takes x to ex + ey turned back by 90 degrees;
-       seen from below, where the winding is the other one, turned forth. */
+    /* In the plane of the triangle the nearest rotation takes x to the sum of ex and ey rotated by
+       -90 degrees; seen from below, where the winding is opposite, by +90 degrees. */
     const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
     const txm_dvec3 x = tmc_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
     const txm_dvec3 z = txm_d3_scale(n, side);
@@ -1608,7 +1611,7 @@ static void tmc_fill_block(const void *job, size_t first, size_t end) {
     for (size_t t = first; t < end; t++) {
         tmc_base base;
         size_t rotation;
-        const tmc_kit *kit = tmc_choice(s, t, &rotation);
+        const tmc_prepared *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         trimesh_instance *out = s->out + s->offset[t];
         tmc_base_make(s, t, rotation, &base);
@@ -1674,21 +1677,22 @@ static txm_status tmc_plan_density(tmc_scatter *s, txm_arena *arena, txm_env *en
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, triangles, 2 * sizeof(txm_pair));
     txm_status status = tmc_check_memory(arena, env);
     if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
-    if (status == TXM_OK) status = tmc_spread(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
+    if (status == TXM_OK)
+        status = tmc_run_blocks(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
     if (status == TXM_OK) {
         tmc_morton(&s->desc->mesh, pairs);
-        status = tmc_thin(s, pairs, env);
+        status = tmc_thin_patches(s, pairs, env);
     }
     txm_arena_free(&scratch);
     return status;
 }
 
-/* All that goes before placing: normals, patches, who owns the sides, counts, offsets. */
+/* Everything before placing: normals, patches, owners of edges and vertices, counts, offsets. */
 static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
     const trimesh_scatter_desc *d = s->desc;
     const size_t triangles = d->mesh.face_count;
     int rims = 0;
-    txm_status status = tmc_ready(d, arena, env, s, &rims);
+    txm_status status = tmc_prepare(d, arena, env, s, &rims);
     if (status == TXM_OK) status = tmc_report(env, 0, "patches");
     if (status != TXM_OK) return status;
     s->normals = d->normals;
@@ -1697,7 +1701,7 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
         txm_env quiet;
         memset(&quiet, 0, sizeof quiet);
         if (env) quiet = *env;
-        quiet.progress = NULL; /* its bar is not the call's */
+        quiet.progress = NULL; /* the call has progress of its own */
         if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
         if ((status = trimesh_normals(&d->mesh, &quiet, n)) != TXM_OK)
             return txm_fail(env, status, quiet.message);
@@ -1712,7 +1716,7 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
     if (rims) {
         uint8_t *owned = (uint8_t *)txm_arena_zero(arena, triangles, 1);
         if ((status = tmc_check_memory(arena, env)) == TXM_OK)
-            status = tmc_own(&d->mesh, env, owned);
+            status = tmc_assign_owners(&d->mesh, env, owned);
         if (status != TXM_OK) return status;
         s->owned = owned;
     }
@@ -1720,7 +1724,7 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
     if (status != TXM_OK) return status;
     s->offset = (size_t *)txm_arena_alloc(arena, triangles, sizeof(size_t));
     if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
-    status = tmc_spread(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
+    status = tmc_run_blocks(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
     uint64_t sum = 0;
     for (size_t t = 0; t < triangles && status == TXM_OK; t++) {
         const size_t here = s->offset[t];
@@ -1754,7 +1758,7 @@ TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, t
         status = txm_fail_numbers(env, TXM_TOO_LARGE, "# instances, but out has room for # only",
                                   *count, capacity);
     if (status == TXM_OK && out)
-        status = tmc_spread(tmc_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
+        status = tmc_run_blocks(tmc_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
     txm_arena_free(&arena);
     return status;
 }
@@ -1773,15 +1777,15 @@ TRIMESH_COVER_API void trimesh_instance_apply(const trimesh_instance *instance, 
 
 /* ---- geometry on triangles: making patches --------------------------------------------------- */
 
-#define TMC_RADIUS 1.9 /* of influence, in steps; the best of 1.5, 1.7, 1.9, 2.5 */
-#define TMC_FORCE 0.2  /* constant f; of 0.1, 0.2, 0.3, 0.5 */
+#define TMC_RADIUS 1.9 /* ours: radius of influence, in steps; best of 1.5, 1.7, 1.9, 2.5 */
+#define TMC_FORCE 0.2  /* ours: constant f; best of 0.1, 0.2, 0.3, 0.5 */
 
-/* Points as u, v; the triangles across the sides are taken for mirror images. */
+/* Points as u, v; the triangles across the sides are treated as mirror images. */
 typedef struct tmc_uv {
     double u, v;
 } tmc_uv;
 
-/* its image in side k, where the weight of the corner opposite changes its sign */
+/* its mirror image in side k: the weight of the opposite corner changes its sign */
 static tmc_uv tmc_mirror(tmc_uv p, int k) {
     const double w = 1 - p.u - p.v, s = k == 0 ? p.v : k == 1 ? w : p.u;
     tmc_uv q;
@@ -1795,7 +1799,7 @@ static double tmc_uv_dist2(tmc_uv a, tmc_uv b) {
     return u * u + u * v + v * v;
 }
 
-/* Every next point is the one furthest from those before and their images. gap: 1 per point. */
+/* Each next point is the one furthest from those before and their images. gap: 1 per point. */
 static void tmc_order(trimesh_point *points, size_t count, double *gap) {
     tmc_uv at;
     at.u = at.v = 1.0 / 3;
@@ -1847,7 +1851,7 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
 /* Repulsion inside a triangle: `fixed` points on its sides, the others move. */
 typedef struct tmc_swarm {
     int fixed, count;       /* points                                                     */
-    int all;                /* with the images near the sides                             */
+    int all;                /* including the images near the sides                        */
     double radius, margin;  /* of influence; least weight of a corner for those that move */
     tmc_uv *at, *to;        /* room for 4 per point                                       */
     int *head, *next;       /* which points lie in a cell: a list each                    */
@@ -1874,9 +1878,9 @@ static void tmc_fill_cells(tmc_swarm *s) {
     }
 }
 
-/* pos_new = pos + sum over the others (r - d) f direction [1, equation 3.1]. The thesis has f = 1/2;
-   with all moving at once that swings to and fro, and pairs stay in one place: least distances of
-   0.02 to 0.17 steps against 0.7 to 0.8 with these two. */
+/* pos_new = pos + sum over the others (r - d) f direction [1, equation 3.1]. The thesis has f =
+   1/2; as all points move at once they then oscillate, and pairs of them stay together: the least
+   distances are 0.02 to 0.17 steps, and 0.7 to 0.8 with our two numbers. */
 static tmc_uv tmc_push(const tmc_swarm *s, int i) {
     const tmc_uv p = s->at[i];
     const int column = tmc_cell(s, p.u), row = tmc_cell(s, p.v);

@@ -35,31 +35,31 @@
      }
 
    HOW IT WORKS
-     The input is mended (welded, wound alike, freed of double and empty triangles), creases and
-     borders become lines, each border loop is closed by a ghost vertex. The mesh that changes starts
-     as a copy of the surface and is a closed manifold at every moment: it is only ever split,
-     collapsed (under the link condition) and flipped, so that its topology cannot go wrong.
-       TRIMESH_LATTICE (default): the copy is brought to about twice the number of vertices; a
+     The input is mended (welded, consistently oriented, freed of duplicate triangles and of those
+     without area), creases and borders become lines, each border loop is closed by a ghost vertex.
+     The working mesh starts as a copy of the surface and is a closed manifold at every moment: it is
+     only split, collapsed (under the link condition) and flipped, so its topology cannot change.
+       TRIMESH_LATTICE (default): the copy is resampled to about twice the number of vertices; a
      six-fold direction field and triangular lattice points are found on a hierarchy [3]; edges whose
-     ends share a lattice point collapse. From 20,000 vertices on this is done at a quarter of the
-     number and each triangle cut in four.
-       TRIMESH_REPEL: the method of [1] and [2]: points strewn by area repel each other along the
-     surface, and replace the old vertices by mutual tessellation, which cannot fail where [1]'s
-     greedy triangulation can. For viewers, and for surfaces that are edited (trimesh_update).
-       Then both are relaxed - each triangle pulls its corners towards the equilateral triangle
-     that fits it best, of the wanted size - flipped, brought to the exact number, and fitted: a
-     vertex moves off the surface by the mean height of the surface over its triangles, so that
-     volume is kept. At last crossings and turned triangles are looked for and smoothed away; a
-     result that is not sound is never handed out.
+     ends share a lattice point collapse. From 20,000 vertices on this is done for a quarter of the
+     number, and then each triangle is cut in four.
+       TRIMESH_REPEL: the method of [1] and [2]: points sampled by area repel each other along the
+     surface and replace the old vertices by mutual tessellation, which cannot fail as [1]'s greedy
+     triangulation can. For viewers, and for surfaces that are edited (trimesh_update).
+       Then with both methods the mesh is relaxed (each triangle pulls its corners towards the best
+     fitting equilateral triangle of the wanted size) and flipped [4], brought to the exact number of
+     vertices, and fitted: a vertex moves off the surface by the mean height of the surface over its
+     triangles, which keeps the volume. Last, crossing and inverted triangles are searched for and
+     smoothed away; a result that is not sound is never returned.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
-     TRIMESH_RELAX_STATIC         every function static to the including file (set it everywhere)
+     TRIMESH_RELAX_STATIC   every function static to the including file (set it everywhere)
      TRIMESH_MAX_VERTICES   refuse more vertices or triangles; default 2^26
      TRIMESH_ASSERT(x)      programming errors inside the library, no input can reach one; default
                             assert of <assert.h>
 
    MEMORY     About 200 bytes per input vertex and 600 per output vertex while working; the result
-              takes 60 bytes per vertex. After an error nothing stays allocated, *out is NULL.
+              takes 60 bytes per vertex. After an error nothing stays allocated, *mesh is NULL.
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
    SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
@@ -68,11 +68,11 @@
               weight normals, order sheets around an edge and find tips.
 
    LIMITS
-     Uniform triangles cannot show what is finer than they are: ears thinner than an edge are
-     smoothed, and where that would leave crossings the edges there become shorter, or the call says
-     that it needs more vertices. A surface that crosses itself is accepted and may do so in the
-     result. Creases sharper than 120 degrees stay creases, so two triangles nearly face each other
-     there. The number of vertices is exact; edge lengths follow from it.
+     Uniform triangles cannot show detail that is finer than they are: ears thinner than an edge are
+     smoothed. Where that would leave crossings, edges become shorter there, or the call says that it
+     needs more vertices. A surface that crosses itself is accepted; its result may cross itself, too.
+     Creases sharper than 120 degrees stay creases, so two triangles nearly face each other there.
+     The number of vertices is exact; edge lengths follow from it.
 
    REFERENCES
      [1] M. Glinzner. Texturing of 3D objects using simple physics and equilateral triangle patches.
@@ -111,7 +111,7 @@ typedef enum trimesh_kind {
     TRIMESH_FREE = 0,   /* anywhere on the surface           */
     TRIMESH_CREASE = 1, /* on a crease line                  */
     TRIMESH_BORDER = 2, /* on the border                     */
-    TRIMESH_CORNER = 3  /* where lines meet, end or turn: never moves */
+    TRIMESH_CORNER = 3  /* where lines meet, end or bend: never moves */
 } trimesh_kind;
 
 /* A finished mesh; read only, released by trimesh_mesh_free. Triangles are counter-clockwise seen from
@@ -125,8 +125,8 @@ typedef struct trimesh_mesh {
     uint8_t *kinds;          /* 1 per vertex: a trimesh_kind                               */
     int32_t *old_vertices;   /* of trimesh_update: 1 per vertex, which one of the old mesh it was,
                                 -1 = new; else NULL                                        */
-    double edge_length;      /* that was aimed at, in units of the input                   */
-    txm_arena memory;        /* where all this lies                                        */
+    double edge_length;      /* the target length, in units of the input                   */
+    txm_arena memory;        /* private                                                    */
 } trimesh_mesh;
 
 /* ---- what was found and mended in the input ---------------------------------------------- */
@@ -135,14 +135,14 @@ typedef struct trimesh_report {
     size_t vertices, triangles; /* after mending                                             */
     size_t welded;              /* vertices that another one lies on                         */
     size_t unused;              /* vertices of no triangle                                   */
-    size_t degenerate;          /* triangles without area taken away or flipped away         */
-    size_t duplicate;           /* triangles that were there before                          */
+    size_t degenerate;          /* triangles without area, removed or flipped                */
+    size_t duplicate;           /* triangles that were there already                         */
     size_t fins;                /* triangles that stuck out of an edge of two others         */
-    size_t turned;              /* triangles turned to agree with their neighbours           */
+    size_t turned;              /* triangles reversed to agree with their neighbours         */
     size_t split;               /* vertices added where fans met in one vertex               */
     size_t components;          /* connected pieces                                          */
     size_t loops;               /* border loops                                              */
-    long euler;                 /* vertices - edges + triangles of what is left              */
+    long euler;                 /* vertices - edges + triangles after mending                */
     size_t crease_edges;        /* edges kept as creases                                     */
     uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that cannot be mended   */
 } trimesh_report;
@@ -151,8 +151,8 @@ typedef struct trimesh_report {
 
 typedef enum trimesh_method {
     TRIMESH_LATTICE = 0, /* points from a lattice that follows the surface: most regular     */
-    TRIMESH_REPEL = 1    /* points strewn by area that repel each other, as in [1] and [2]; where
-                            that gives crossings, the lattice after all                      */
+    TRIMESH_REPEL = 1    /* points sampled by area that repel each other, as in [1] and [2]; if
+                            that leaves crossings, the lattice instead                       */
 } trimesh_method;
 
 typedef struct trimesh_desc {
@@ -163,12 +163,12 @@ typedef struct trimesh_desc {
                               above 0, at most 1000 times the least; NULL = uniform             */
     float adapt;           /* 0..1: how much shorter edges are where the surface bends; 0 = not */
     float crease_angle;    /* degrees between the normals of two triangles from which on their
-                              edge may be a crease, 0 = 50; 180 = none. Below 75 it must also
-                              stand out from the edges around, and creases that hang together
-                              to less than 6 percent of the diagonal are left out              */
+                              edge may be a crease, 0 = 50; 180 = none. Below 75 it must also be
+                              clearly sharper than the edges around it, and connected creases of
+                              less than 6 percent of the diagonal in all are left out          */
     float line_spacing;    /* edge length along creases and borders relative to that inside,
-                              0.25..4; 0 = 1. More, where they would take over half of the
-                              vertices                                                          */
+                              0.25..4; 0 = 1. Increased where lines would take more than half of
+                              the vertices                                                      */
     float weld;            /* weld vertices nearer than this, relative to the diagonal of the
                               bounding box, 0..0.01; 0 = only those in equal places             */
     int iterations;        /* TRIMESH_REPEL: at most so many rounds of repulsion, 1..1000; 0 = 40 */
@@ -196,8 +196,8 @@ TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh);
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
-/* A retiling under way, for viewers that show it and programs that have other things to do in
-   between. trimesh_retile is trimesh_begin, trimesh_step while there is more, trimesh_get_mesh,
+/* A retiling in progress, for viewers that show it and programs that do other work in between.
+   trimesh_retile is trimesh_begin, trimesh_step while there is more, trimesh_get_mesh,
    trimesh_free. */
 typedef struct trimesh_job trimesh_job;
 
@@ -209,8 +209,8 @@ typedef struct trimesh_job trimesh_job;
    return  as trimesh_retile                                                                   */
 TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job);
 
-/* Do the next piece: with TRIMESH_REPEL strew the points, join them, one round of repulsion, ...,
-   finish. Does nothing once the job is done.
+/* Do the next part of the work: with TRIMESH_REPEL sample the points, join them, one round of
+   repulsion, ..., finish. Does nothing once the job is done.
 
    env    for hooks and message of this call; the allocator stays that of trimesh_begin
    more   receives 0 when nothing is left to do, also after an error; NULL is allowed
@@ -220,8 +220,8 @@ TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more);
 
 /* How far a job is. All pointers are valid until the next call for the job. */
 typedef struct trimesh_state {
-    const char *stage;       /* what the last step did: "mend", "strew", "join", "repel", "lattice",
-                                "subdivide", "finish"                                          */
+    const char *stage;       /* what the last step did: "mend", "sample", "join", "repel",
+                                "lattice", "subdivide", "finish"                               */
     int round;               /* of repulsion, from 1; 0 before                                 */
     float mean, largest;     /* movement of the points in the last round, in edge lengths      */
     size_t points;           /* 0 before there are any, and after an error                     */
@@ -230,12 +230,12 @@ typedef struct trimesh_state {
     const uint32_t *indices; /* 3 per triangle, of points                                      */
 } trimesh_state;
 
-/* What a viewer shows between two steps; makes the arrays.
+/* What a viewer shows between two steps. Makes the arrays.
 
    return  TXM_OK; TXM_OUT_OF_MEMORY, then the state is all zero and the job can go on          */
 TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state);
 
-/* The mesh of a job that is done. Each call makes one.
+/* The mesh of a job that is done. Each call makes a new copy.
 
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free; it does not
            need the job any more
@@ -254,13 +254,13 @@ typedef struct trimesh_update_desc {
     float radius;      /* how far from the change vertices may move, in edge lengths, 1..1000;
                           0 = 4                                                                */
     float tolerance;   /* how far off the new surface an old vertex may lie, in edge lengths,
-                          0..0.5; 0 = 0.2. Smaller changes of the surface go unnoticed; results
-                          lie up to 0.1 or so off it where it bends, for the sake of the whole  */
+                          0..0.5; 0 = 0.2. Smaller changes of the surface are not seen. Fitted
+                          vertices lie up to about 0.1 off the surface where it bends           */
 } trimesh_update_desc;
 
-/* Retile a surface that was edited or cut, from the mesh of what it was before: old vertices that
-   lie on the new surface stay, where it has none (at a seam, on faces of a cut) new ones enter, and
-   all within a radius of these relax [1, chapter 6: splitting objects].
+/* Retile a surface that was edited or cut, starting from the mesh made before: old vertices that lie
+   on the new surface stay, new ones are added where there are none (at a seam, on faces of a cut),
+   and all within a radius of these are relaxed [1, chapter 6: splitting objects].
 
             old            cut            updated             A: far ones, bit for bit where they
          .--+--+--.     .--+--+ .      .--+--+-.                 were, with the same triangles
@@ -269,9 +269,9 @@ typedef struct trimesh_update_desc {
         \  \/ \/ \ /   \  \/ \ |      \  \/ \ /|             N: new ones
          '--+--+--'     '--+--+'       '--+--+-'
 
-   A vertex stays if its distance to the new surface is at most the tolerance and its normal agrees
-   to 45 degrees; of vertices on creases and borders only corners and such as lie on a line of their
-   kind again; none stays so near to a new line that it would crowd the points there.
+   A vertex stays if its distance to the new surface is at most the tolerance and its normal differs
+   by at most 45 degrees. A vertex on a crease or border stays only if it is a corner again or lies on
+   a line of the same kind. No vertex stays that would be too near to the points of a new line.
 
    old     a result for the surface as it was
    mesh    receives the mesh, or NULL on any error; its old_vertices say which vertex of old each
@@ -345,7 +345,7 @@ typedef struct tmr_surface {
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */
 } tmr_surface;
-/* How to walk round a vertex, from corner c of it (surfaces are oriented, vertices have one fan):
+/* How to walk around a vertex, from corner c of it (surfaces are oriented, vertices have one fan):
 
           b ___              tmr_ccw(c): the corner of the same vertex v in the next triangle
           |\   ` .           counter-clockwise, which lies beyond the edge from v to b;
@@ -368,53 +368,53 @@ static int32_t tmr_cw(const int32_t *opposite, int32_t c) {
 
 /* What is done to the caller's triangles, in this order:
 
-   vertices   scale to the unit box, weld, forget those not used
-   faces      drop those with a vertex twice, and repetitions
-   edges      find opposites; where an edge has more than two faces cut fins and inner walls, part
-              sheets that touch, or refuse
-   winding    turn faces so that neighbours agree, or refuse
-   area       flip caps and collapse needles; where that changed which faces there are, go back
+   vertices   scale to the unit box, weld, ignore unused ones
+   faces      remove those with a vertex twice, and duplicates
+   edges      find opposites; where an edge has more than two faces remove fins and interior walls,
+              separate sheets that touch, or refuse
+   winding    orient faces consistently, or refuse
+   area       flip caps and collapse needles; start again if faces were added or removed
    fans       one vertex for each, numbered
    measures   normals, components, border loops                                                 */
 
 /* ---- mending: state and checks ------------------------------------------------------------ */
 
 enum {
-    TMR_MOST = 1 << 26,      /* vertices and triangles of an input or a result                    */
-    TMR_MOST_SLOTS = INT32_MAX / 3, /* of vertices or of triangles: corners are numbered by int32_t */
-    TMR_NO_VERTEX = -1,      /* in the first corner of a triangle: to be taken away               */
-    TMR_OVERFULL = -2,       /* as opposite: the edge has more than two triangles                 */
-    TMR_MAPPED = 8,          /* as turn: corners do not match, take the nearest point of origin  */
-    TMR_MEND_ROUNDS = 8,     /* ours: of flipping and collapsing; one or two do for real damage   */
-    TMR_FLIP_SWEEPS = 64,    /* ours: to and fro over the thin triangles; few use more than three */
-    TMR_FAN_LIMIT = 256      /* ours: vertices of more triangles are not touched, for speed       */
+    TMR_MOST = 1 << 26, /* vertices and triangles of an input or a result                    */
+    TMR_MOST_SLOTS = INT32_MAX / 3, /* vertices or triangles: int32_t numbers the corners        */
+    TMR_NO_VERTEX = -1,   /* in the first corner of a triangle: to be removed                  */
+    TMR_OVERFULL = -2,    /* as opposite: the edge has more than two triangles                 */
+    TMR_MAPPED = 8,       /* as turn: corners do not match; use the nearest point of origin   */
+    TMR_MEND_ROUNDS = 8,  /* ours: of flipping and collapsing; one or two are enough           */
+    TMR_FLIP_SWEEPS = 64, /* ours: back and forth over the thin triangles; mostly three        */
+    TMR_FAN_LIMIT = 256   /* ours: vertices of more triangles are left as they are             */
 };
 
-/* What is worked on until the faces are clean. Vertices keep the caller's numbers to the end: a
-   vertex that another one lies on, or that is not used, is just not mentioned any more. */
+/* The input while it is mended. Vertices keep the caller's numbers to the end: no face refers to a
+   vertex that was welded to another one, or to an unused one. */
 typedef struct tmr_mend {
     const trimesh_desc *desc;
     txm_env *env;
     trimesh_report report;
     int32_t vertex_count, face_count;
     txm_dvec3 *point;  /* 1 per input vertex, scaled                                      */
-    int32_t *rename;   /* 1 per input vertex: which one stands for it                     */
-    int32_t *degree;   /* 1 per input vertex: counts, of the step at hand                 */
-    int32_t *stamp;    /* 1 per input vertex: marks neighbours                            */
+    int32_t *rename;   /* 1 per input vertex: the vertex that replaces it                    */
+    int32_t *degree;   /* 1 per input vertex: a count, used by each step                  */
+    int32_t *stamp;    /* 1 per input vertex: marks neighbours                              */
     int32_t *vertex;   /* the next four as in tmr_surface, with room for the input        */
     int32_t *opposite;
     uint32_t *origin;
     uint8_t *turn;
     uint8_t *flag;     /* 1 per face, of the step at hand                                 */
-    uint8_t *twin;     /* 1 per face: there was one of opposite winding                   */
-    int single;        /* non-zero: there are faces of which that is not so               */
+    uint8_t *twin;     /* 1 per face: it had a duplicate of opposite winding              */
+    int single;        /* non-zero: some face has no such duplicate                       */
     int32_t *list;     /* 1 per face, of the step at hand                                 */
     uint32_t *sides;   /* 1 per corner: the sides in the order of their edges; as much scratch */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
     txm_dvec3 centre;
     double diagonal;
-    double noise;      /* scaled units: where single precision ends                       */
+    double noise; /* scaled units: resolution of single precision                   */
 } tmr_mend;
 
 static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
@@ -457,7 +457,7 @@ static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
     return TXM_OK;
 }
 
-/* All that can be wrong with the numbers themselves. */
+/* Check all numbers of the input. */
 static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
     const size_t limit = TRIMESH_MAX_VERTICES < TMR_MOST ? TRIMESH_MAX_VERTICES : TMR_MOST;
@@ -541,7 +541,7 @@ static txm_dvec3 tmr_cell(txm_dvec3 p, double size) {
 }
 
 /* The lowest vertex in a cell that is not farther than size from point i, or else best. */
-static int32_t tmr_weld_look(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
+static int32_t tmr_weld_find(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
                              int32_t best) {
     size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
     for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
@@ -552,12 +552,12 @@ static int32_t tmr_weld_look(const tmr_mend *m, txm_dvec3 cell, int32_t i, doubl
     return best;
 }
 
-/* Each vertex, in order, joins the first one kept that is near enough, or else is kept. So no
-   chain of near vertices runs together, and few of those kept lie in one cell of the grid. With
-   size 0 a cell is a place. */
+/* Each vertex, in order, is welded to the first kept vertex that is near enough, or else is kept.
+   So chains of near vertices do not collapse into one, and a cell of the grid holds few kept
+   vertices. With size 0 only vertices in equal places are welded. */
 static void tmr_weld(tmr_mend *m) {
     double size = m->desc->weld;
-    if (size < 1e-14) size = 0; /* cells must be numbers that 1 can be added to */
+    if (size < 1e-14) size = 0; /* so that a cell's number plus 1 is another number */
     const int reach = size > 0 ? 1 : 0;
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t i = 0; i < m->vertex_count; i++) {
@@ -567,7 +567,7 @@ static void tmr_weld(tmr_mend *m) {
         for (int x = -reach; x <= reach; x++) {
             for (int y = -reach; y <= reach; y++) {
                 for (int z = -reach; z <= reach; z++)
-                    best = tmr_weld_look(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
+                    best = tmr_weld_find(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
             }
         }
         if (best >= 0) {
@@ -589,7 +589,7 @@ static void tmr_mend_load(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) m->origin[f] = (uint32_t)f;
 }
 
-/* Take away the faces that are marked so or have a vertex twice; the latter are counted. */
+/* Remove the faces that are marked with TMR_NO_VERTEX or have a vertex twice; count the latter. */
 static void tmr_mend_compact(tmr_mend *m) {
     int32_t n = 0;
     for (int32_t f = 0; f < m->face_count; f++) {
@@ -607,7 +607,7 @@ static void tmr_mend_compact(tmr_mend *m) {
     m->face_count = n;
 }
 
-/* 0: other vertices; 1: the same, the same way round; -1: the other way round */
+/* 0: other vertices; 1: the same, in the same winding; -1: in the opposite winding */
 static int tmr_same_face(const int32_t *a, const int32_t *b) {
     for (int k = 0; k < 3; k++) {
         if (a[0] != b[k]) continue;
@@ -617,13 +617,14 @@ static int tmr_same_face(const int32_t *a, const int32_t *b) {
     return 0;
 }
 
-/* Of faces with the same three vertices keep the first; remember where another was turned. */
+/* Of faces with the same three vertices keep the first; note whether another had opposite
+   winding. */
 static void tmr_mend_duplicates(tmr_mend *m) {
     const size_t mask = m->table_size - 1;
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t f = 0; f < m->face_count; f++) {
         const int32_t *v = m->vertex + 3 * f;
-        /* a sum, for the order does not matter */
+        /* a sum, which does not depend on their order */
         size_t slot = (size_t)(txm_hash((uint64_t)v[0] + 1) + txm_hash((uint64_t)v[1] + 1) +
                                txm_hash((uint64_t)v[2] + 1)) & mask;
         int same = 0;
@@ -665,8 +666,8 @@ static int32_t tmr_run_end(const tmr_mend *m, int32_t i) {
     return (int32_t)txm_mesh_edge_end(&mesh, m->sides, (size_t)i);
 }
 
-/* Find the opposites; the number of edges with more than two faces. */
-static int32_t tmr_mend_link(tmr_mend *m) {
+/* Find the opposites. Returns how many edges have more than two faces. */
+static int32_t tmr_mend_opposites(tmr_mend *m) {
     const txm_mesh mesh = tmr_mend_mesh(m);
     int32_t overfull = 0;
     txm_mesh_sort_sides(&mesh, m->sides);
@@ -685,13 +686,13 @@ static int32_t tmr_mend_link(tmr_mend *m) {
     return overfull;
 }
 
-/* Without area, for all that single precision can tell. */
+/* Has the triangle no area, as far as single precision can tell? */
 static int tmr_is_thin(const tmr_mend *m, const txm_dvec3 p[3]) {
     double longest = 0;
     for (int k = 0; k < 3; k++) longest = fmax(longest, txm_d3_dist2(p[k], p[(k + 1) % 3]));
     longest = sqrt(longest);
     const double height = longest > 0 ? txm_d3_len(txm_d3_area2(p[0], p[1], p[2])) / longest : 0;
-    /* the height that rounding alone can make counts only where the triangle looks thin as well */
+    /* a height within rounding errors counts only if the triangle is slim as well */
     return height <= 1e-6 * longest || (height <= m->noise && height <= 1e-3 * longest);
 }
 static void tmr_face_points(const tmr_mend *m, int32_t f, txm_dvec3 p[3]) {
@@ -703,13 +704,13 @@ static int tmr_face_is_thin(const tmr_mend *m, int32_t f) {
     return tmr_is_thin(m, p);
 }
 
-/* A fin hangs on the edge of its corner c alone: its other two edges are borders. */
+/* A fin is attached at the edge of its corner c only: its other two edges are borders. */
 static int tmr_is_fin(const tmr_mend *m, int32_t c, int thin_only) {
     return m->opposite[tmr_next(c)] == -1 && m->opposite[tmr_prev(c)] == -1 &&
            (!thin_only || tmr_face_is_thin(m, c / 3));
 }
 
-/* Mark the fins of a run if two or more faces stay; in doubt only those without area. */
+/* Mark the fins of a run if two or more faces remain; if not, try only those without area. */
 static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
     for (int thin_only = 0; thin_only < 2; thin_only++) {
         int32_t fins = 0;
@@ -725,9 +726,9 @@ static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
     return 0;
 }
 
-/* A wall inside, of two faces back to back, from which the first step kept one: where it meets two
-   faces of the outside, or only other walls, it goes, and so does all that hangs together with it.
-   (If all faces were double, they are the outside.) */
+/* An interior wall of two faces back to back, of which the first step kept one, is removed where it
+   meets two faces of the outside, or only other walls; so is all of the wall that is connected to
+   it. (If all faces of the input were double, they are the outside.) */
 static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     int32_t twins = 0, top = 0;
     for (int32_t k = begin; k < end; k++) twins += m->twin[m->sides[k] / 3];
@@ -751,8 +752,8 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     return 1;
 }
 
-/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces round it,
-   winding to and fro in turn. Faces with the inside between them belong together:
+/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces around
+   it, with alternating winding. Faces with the inside between them belong together:
 
             \  solid /           e is the edge from its lower vertex to the higher. The normal of a
          -   \      /  +         face that winds along e (+) points to rising angles, so the solid
@@ -788,7 +789,7 @@ static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
         angle[at] = a;
         corner[at] = c;
     }
-    for (int32_t k = 0; k < count; k++) { /* clearly apart, and in turn? */
+    for (int32_t k = 0; k < count; k++) { /* clearly apart, and alternating? */
         const int32_t next = (k + 1) % count;
         const double gap = angle[next] - angle[k] + (next ? 0 : 2 * TXM_PI);
         const int along = m->vertex[tmr_next(corner[k])] == low;
@@ -805,7 +806,7 @@ static void tmr_clear_flags(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) m->flag[f] = 0;
 }
 
-/* Visit the edges with more than two faces; how many of them were mended. */
+/* Call `mend` for the edges with more than two faces. Returns how many of them it mended. */
 static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t),
                                  int32_t *bad, int *bad_count) {
     int32_t mended = 0;
@@ -821,7 +822,7 @@ static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, i
     return mended;
 }
 
-/* Take away the faces that have a flag; how many. */
+/* Remove the flagged faces. Returns how many. */
 static size_t tmr_cut_flagged(tmr_mend *m) {
     size_t count = 0;
     for (int32_t f = 0; f < m->face_count; f++) {
@@ -832,11 +833,11 @@ static size_t tmr_cut_flagged(tmr_mend *m) {
     return count;
 }
 
-/* Opposites, with every edge of at most two faces. */
+/* Find the opposites, mending edges until each has at most two faces. */
 static txm_status tmr_mend_edges(tmr_mend *m) {
     int32_t bad = -1;
     int bad_count = 0;
-    for (int round = 0; tmr_mend_link(m) > 0; round++) {
+    for (int round = 0; tmr_mend_opposites(m) > 0; round++) {
         int32_t ignored = 0; /* not below 0: nothing is written */
         tmr_clear_flags(m);
         for (int32_t f = 0; f < m->face_count; f++) m->single |= !m->twin[f];
@@ -859,9 +860,9 @@ static txm_status tmr_mend_edges(tmr_mend *m) {
 
 /* ---- mending: orientation ----------------------------------------------------------------- */
 
-/* Flag the component of face first: 1 = as it is, 2 = to be turned, so that all of it winds as
-   most of its area does (half and half: as the first). 0 where that cannot be; then the edge
-   opposite to corner *bad closes a one-sided band. */
+/* Flag the component of face first: 1 = stays, 2 = to be reversed, so that all of it has the
+   winding of most of its area (if equal: of the first face). Returns 0 if it cannot be oriented;
+   then the edge opposite to corner *bad closes a one-sided band. */
 static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
     double stays = 0, turns = 0; /* area */
     int32_t count = 0;
@@ -888,14 +889,14 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
             }
         }
     }
-    if (turns > stays * (1 + 1e-9)) { /* as much, but for rounding: the first face stays */
+    if (turns > stays * (1 + 1e-9)) { /* if equal up to rounding, the first face stays   */
         for (int32_t i = 0; i < count; i++)
             m->flag[m->list[i]] = (uint8_t)(3 - m->flag[m->list[i]]);
     }
     return 1;
 }
 
-/* Turn the faces of flag 2: corners 1 and 2 change places. */
+/* Reverse the faces with flag 2: swap their corners 1 and 2. */
 static void tmr_turn_flagged(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) {
         if (m->flag[f] != 2) continue;
@@ -949,8 +950,8 @@ static int tmr_is_needle(const tmr_mend *m, int32_t f, int32_t *shortest, int32_
     return least <= 1e-6 * most || (least <= m->noise && least <= 1e-3 * most);
 }
 
-/* The corners round the vertex of c, and the vertices round it: as many, or on the border (*open)
-   one more. How many corners, or 0 if they are too many to bother. */
+/* The corners at the vertex of c, and its neighbours: as many, or on the border (*open) one more.
+   Returns how many corners, or 0 if they are more than TMR_FAN_LIMIT. */
 static int32_t tmr_ring(const tmr_mend *m, int32_t c, int32_t *corner, int32_t *around, int *open) {
     int32_t n = 0, k = c;
     for (int32_t back = tmr_cw(m->opposite, c); back >= 0 && back != c; n++) {
@@ -976,7 +977,7 @@ static int tmr_has_neighbor(const tmr_mend *m, int32_t c, int32_t v) {
     for (int32_t k = 0; k < n + open; k++) {
         if (around[k] == v) return 1;
     }
-    return n == 0; /* too many to look at: say yes, nothing is done then */
+    return n == 0; /* too many to look at: "yes" prevents the flip       */
 }
 
 static void tmr_join(tmr_mend *m, int32_t a, int32_t b) {
@@ -990,8 +991,8 @@ static double tmr_slimness(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
     return longest2 > 0 ? txm_d3_len(txm_d3_area2(a, b, c)) / longest2 : 0;
 }
 
-/* Flip the edge of corner c if the worse of the two triangles gets better and none turns over. The
-   new ones lie in the triangle beyond, as far as there is anything in this one. */
+/* Flip the edge of corner c if the worse of the two triangles gets better and none is inverted. As
+   this triangle has no area, both new ones lie in the triangle beyond. */
 static int tmr_flip_thin(tmr_mend *m, int32_t c) {
     const int32_t o = m->opposite[c];
     if (o < 0 || m->vertex[o] == m->vertex[c]) return 0;
@@ -1015,7 +1016,7 @@ static int tmr_flip_thin(tmr_mend *m, int32_t c) {
     return 1;
 }
 
-/* Detach a face and flag it, to be cut. */
+/* Detach a face and flag it for removal. */
 static void tmr_drop_face(tmr_mend *m, int32_t f) {
     for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
         if (m->opposite[c] >= 0) m->opposite[m->opposite[c]] = -1;
@@ -1024,8 +1025,8 @@ static void tmr_drop_face(tmr_mend *m, int32_t f) {
     m->flag[f] = 1;
 }
 
-/* Flip the longest edge of a thin face, or drop the face if that is on the border. Needles are left
-   alone. Non-zero if something changed. */
+/* Flip the longest edge of a thin face, or remove the face if that edge is on the border. Needles
+   are left as they are. Returns non-zero if something changed. */
 static int tmr_flip_cap(tmr_mend *m, int32_t f) {
     int32_t shortest = 0, longest = 0;
     if (m->flag[f] || !tmr_face_is_thin(m, f) || tmr_is_needle(m, f, &shortest, &longest)) return 0;
@@ -1038,8 +1039,8 @@ static int tmr_flip_cap(tmr_mend *m, int32_t f) {
     return 1;
 }
 
-/* Go over the count thin faces of m->list, to and fro, so that a row of them along one edge is
-   undone from either end. m->list keeps those that are still thin; how many. */
+/* Go over the count thin faces of m->list, back and forth, so that a row of them along one edge is
+   undone from either end. m->list keeps those that are still thin. Returns how many. */
 static int32_t tmr_flip_caps(tmr_mend *m, int32_t count) {
     int done = 1;
     for (int sweep = 0; done && sweep < TMR_FLIP_SWEEPS; sweep++) {
@@ -1056,9 +1057,9 @@ static int32_t tmr_flip_caps(tmr_mend *m, int32_t count) {
     return count;
 }
 
-/* Would moving vertex v, of these corners, to point p turn a face over that keeps its area? */
-static int tmr_move_turns(const tmr_mend *m, const int32_t *corner, int32_t n, int32_t other,
-                          txm_dvec3 p) {
+/* Would moving the vertex of these corners to point p invert a face that has an area? */
+static int tmr_move_inverts(const tmr_mend *m, const int32_t *corner, int32_t n, int32_t other,
+                            txm_dvec3 p) {
     for (int32_t k = 0; k < n; k++) {
         const int32_t i = m->vertex[tmr_next(corner[k])], j = m->vertex[tmr_prev(corner[k])];
         if (i == other || j == other || tmr_face_is_thin(m, corner[k] / 3)) continue;
@@ -1069,9 +1070,9 @@ static int tmr_move_turns(const tmr_mend *m, const int32_t *corner, int32_t n, i
     return 0;
 }
 
-/* Let one end of the edge of corner c stand for the other, if that leaves a manifold: the ends have
-   only the apices of the edge's faces as neighbours in common, and the edge is not a bridge between
-   two borders. Vertices near it are left alone for the rest of the round (degree 0). */
+/* Merge the ends of the edge of corner c, if that leaves a manifold: their only common neighbours
+   are the apices of the edge's faces, and the edge does not join two borders. Neighbours are not
+   touched for the rest of the round (degree 0). */
 static int tmr_collapse_needle(tmr_mend *m, int32_t c, int32_t stamp) {
     int32_t from[TMR_FAN_LIMIT], to[TMR_FAN_LIMIT], near_from[TMR_FAN_LIMIT + 1];
     int32_t near_to[TMR_FAN_LIMIT + 1], common = 0, u = m->vertex[tmr_next(c)];
@@ -1079,7 +1080,7 @@ static int tmr_collapse_needle(tmr_mend *m, int32_t c, int32_t stamp) {
     const int32_t v = m->vertex[tmr_prev(c)];
     const int32_t nu = tmr_ring(m, tmr_next(c), to, near_to, &open_u);
     const int32_t nv = tmr_ring(m, tmr_prev(c), from, near_from, &open_v);
-    /* also true of vertices with several fans, and of long rings */
+    /* also for vertices with several fans, and for long rings */
     if (nu == 0 || nv == 0 || nu != m->degree[u] || nv != m->degree[v]) return 0;
     if (m->opposite[c] >= 0 && open_u && open_v) return 0;
     if (!open_u && !open_v && (nu == 3 || nv == 3)) return 0; /* might be a tetrahedron */
@@ -1088,16 +1089,17 @@ static int tmr_collapse_needle(tmr_mend *m, int32_t c, int32_t stamp) {
     if (common != (m->opposite[c] >= 0 ? 2 : 1)) return 0;
     /* the border stays where it is; else the lower number stays */
     const int keep_u = open_u != open_v ? open_u : u < v;
-    if (keep_u ? tmr_move_turns(m, from, nv, u, m->point[u])
-               : tmr_move_turns(m, to, nu, v, m->point[v])) return 0;
+    if (keep_u ? tmr_move_inverts(m, from, nv, u, m->point[u])
+               : tmr_move_inverts(m, to, nu, v, m->point[v]))
+        return 0;
     m->rename[keep_u ? v : u] = keep_u ? u : v;
     for (int32_t k = 0; k < nu + open_u; k++) m->degree[near_to[k]] = 0;
     for (int32_t k = 0; k < nv + open_v; k++) m->degree[near_from[k]] = 0;
     return 1;
 }
 
-/* Choose and collapse needles among the count faces of m->list; how many. The faces must be linked
-   anew afterwards. */
+/* Choose and collapse needles among the count faces of m->list. Returns how many. Opposites must be
+   found again afterwards. */
 static int32_t tmr_collapse_needles(tmr_mend *m, int32_t count) {
     int32_t done = 0, shortest = 0, longest = 0;
     for (int32_t i = 0; i < m->vertex_count; i++) {
@@ -1116,7 +1118,7 @@ static int32_t tmr_collapse_needles(tmr_mend *m, int32_t count) {
 
 static txm_status tmr_mend_faces(tmr_mend *m);
 
-/* Flip and collapse until nothing without area is left, or it cannot be helped. */
+/* Flip and collapse until no face without area is left, or nothing changes. */
 static txm_status tmr_mend_thin(tmr_mend *m) {
     txm_status status = TXM_OK;
     for (int round = 0; status == TXM_OK && round < TMR_MEND_ROUNDS; round++) {
@@ -1140,9 +1142,10 @@ static txm_status tmr_mend_thin(tmr_mend *m) {
 
 /* ---- mending: vertices where fans meet, and numbering ------------------------------------- */
 
-/* Mark the fan round the vertex of corner c, and let the vertex be v unless that is negative.
-   Returns its first corner, counter-clockwise: with the border on its right; c without border. */
-static int32_t tmr_take_fan(tmr_mend *m, int32_t c, uint8_t *seen, int32_t v) {
+/* Mark the fan around the vertex of corner c as seen, and set its vertex to v unless that is
+   negative. Returns the first corner counter-clockwise, which has the border on its right; without
+   border c. */
+static int32_t tmr_mark_fan(tmr_mend *m, int32_t c, uint8_t *seen, int32_t v) {
     int32_t first = c;
     for (int32_t k = c; k >= 0;) {
         seen[k] = 1;
@@ -1158,14 +1161,14 @@ static int32_t tmr_take_fan(tmr_mend *m, int32_t c, uint8_t *seen, int32_t v) {
     return first;
 }
 
-/* How many fans there are, and degree = 1 for vertices in use. */
+/* Count the fans; set degree = 1 for vertices in use. */
 static int32_t tmr_count_fans(tmr_mend *m, uint8_t *seen) {
     int32_t fans = 0;
     memset(m->degree, 0, (size_t)m->vertex_count * sizeof *m->degree);
     for (int32_t c = 0; c < 3 * m->face_count; c++) {
         if (seen[c]) continue;
         m->degree[m->vertex[c]] = 1;
-        tmr_take_fan(m, c, seen, -1);
+        tmr_mark_fan(m, c, seen, -1);
         fans++;
     }
     return fans;
@@ -1188,11 +1191,11 @@ static void tmr_number_fans(tmr_mend *m, tmr_surface *s, uint8_t *seen) {
         TRIMESH_ASSERT(v < s->vertex_count); /* as many as tmr_count_fans has counted */
         s->point[v] = m->point[old];
         if (s->scale) s->scale[v] = m->desc->scale[old];
-        s->corner[v] = tmr_take_fan(m, c, seen, v);
+        s->corner[v] = tmr_mark_fan(m, c, seen, v);
     }
 }
 
-/* Hand over to the surface what is mended, with vertices split and numbered. */
+/* Store the mended faces in the surface, with vertices split and numbered. */
 static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s) {
     const size_t f = (size_t)m->face_count;
     s->face_count = m->face_count;
@@ -1223,8 +1226,8 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
 
 /* ---- the surface: normals and topology ---------------------------------------------------- */
 
-/* Normals of faces without area: the mean of their neighbours', area by area, from the rim of
-   such a region inwards. */
+/* Normals of faces without area: the mean of their neighbours', from the rim of such a region
+   inwards. */
 static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count) {
     int left = count > 0;
     for (int round = 0; left && round < TMR_FLIP_SWEEPS; round++) {
@@ -1240,7 +1243,7 @@ static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count)
             left |= !(txm_d3_len2(sum) > 0);
         }
     }
-    for (int32_t i = 0; i < count; i++) { /* nothing near has a normal: its own, or any */
+    for (int32_t i = 0; i < count; i++) { /* no face nearby has a normal: use its own, or any */
         const int32_t *v = s->vertex + 3 * thin[i];
         txm_dvec3 *n = s->normal + thin[i];
         if (txm_d3_len2(*n) > 0) continue;
@@ -1312,7 +1315,7 @@ static int32_t tmr_next_border(const tmr_surface *s, int32_t c) {
     return k;
 }
 
-/* Count border loops and take stock. */
+/* Count border loops and edges; fill in components, loops and Euler characteristic. */
 static void tmr_count_loops(tmr_surface *s, trimesh_report *report, uint8_t *seen) {
     int32_t loops = 0, border = 0;
     memset(seen, 0, 3 * (size_t)s->face_count);
@@ -1353,7 +1356,7 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
 
 /* ---- the input, mended: the whole --------------------------------------------------------- */
 
-/* Faces without repetition, two at an edge at most, wound alike. */
+/* Faces without duplicates, at most two at an edge, consistently oriented. */
 static txm_status tmr_mend_faces(tmr_mend *m) {
     tmr_mend_compact(m);
     tmr_mend_duplicates(m);
@@ -1420,7 +1423,7 @@ static txm_status tmr_surface_build(const trimesh_desc *desc, txm_env *env, txm_
 typedef struct tmr_lines {
     int32_t line_count, segment_count;
     int32_t *first;   /* 1 per line and one more: its first segment                             */
-    uint8_t *closed;  /* 1 per line: its end is its beginning, and no corner                    */
+    uint8_t *closed;  /* 1 per line: a loop without a corner                                    */
     uint8_t *border;  /* 1 per line: part of the border                                         */
     double *length;   /* 1 per line                                                             */
     int32_t *a, *b;   /* 1 per segment: its vertices on the surface                             */
@@ -1433,7 +1436,7 @@ typedef struct tmr_lines {
 } tmr_lines;
 
 /* the edge opposite to corner c, seen from its vertex v: the other end */
-static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
+static int32_t tmr_other_end(const tmr_surface *s, int32_t c, int32_t v) {
     const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
     return a == v ? b : a;
 }
@@ -1444,11 +1447,11 @@ static double tmr_turn_at(const tmr_surface *s, int32_t c) {
     return o < 0 ? 0 : 1 - txm_d3_dot(s->normal[c / 3], s->normal[o / 3]);
 }
 
-/* Which edges of the surface are creases? Those at which it turns by the angle and more, and, for
-   a sharp edge is not the same as a coarse mesh, clearly more than at the other edges of the two
-   triangles: the surface turns at most half as much there. Where three or four edges of two
-   triangles are sharp, as on small steps and pins, they count by the angle alone if it is wide.
-   Writes 1 per corner into s->edge_kind. */
+/* Which edges of the surface are creases? Those at which it turns by the angle or more, and clearly
+   more than at the other edges of the two triangles, which tells a sharp edge from a coarse mesh:
+   there it turns at most half as much. Where three or four edges of two triangles are sharp, as on
+   small steps and pins, the angle alone decides if it is wide. Writes 1 per corner into
+   s->edge_kind. Returns how many edges are creases. */
 static size_t tmr_find_creases(tmr_surface *s, double angle) {
     const double least = angle >= 180 ? 3 : 1 - cos(angle * (TXM_PI / 180));
     const double sure = fmax(least, 1 - cos(75 * (TXM_PI / 180)));
@@ -1458,7 +1461,7 @@ static size_t tmr_find_creases(tmr_surface *s, double angle) {
         s->edge_kind[c] = o < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE;
         const double turn = tmr_turn_at(s, c);
         if (o < 0 || turn < least) continue;
-        /* the largest turn of the other edges but for those that are as sharp themselves */
+        /* how much the other edges turn, except those that are as sharp themselves */
         const double around[4] = {tmr_turn_at(s, tmr_next(c)), tmr_turn_at(s, tmr_prev(c)),
                                   tmr_turn_at(s, tmr_next(o)), tmr_turn_at(s, tmr_prev(o))};
         double sum = 0;
@@ -1480,8 +1483,8 @@ typedef struct tmr_ends {
     int32_t *corner; /* the edge opposite to it  */
 } tmr_ends;
 
-/* is this the one of an edge's two corners that speaks for it? */
-static int tmr_speaks(const tmr_surface *s, int32_t c) {
+/* does this one of an edge's two corners represent it? */
+static int tmr_represents_edge(const tmr_surface *s, int32_t c) {
     return s->opposite[c] < c;
 }
 
@@ -1492,7 +1495,7 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
     if (!ends->first) return TXM_OUT_OF_MEMORY;
     int32_t *count = ends->first + 1;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
+        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_represents_edge(s, c)) continue;
         count[s->vertex[tmr_next(c)]]++;
         count[s->vertex[tmr_prev(c)]]++;
         total += 2;
@@ -1506,14 +1509,14 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
         sum += k;
     }
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
+        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_represents_edge(s, c)) continue;
         ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
         ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
     }
     return TXM_OK;
 }
 
-/* Creases that hang together to less than the given length in all are noise: make them plain. */
+/* Connected creases of less than the given length in all are noise: make them plain. */
 static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
                                          txm_arena *arena) {
     const int32_t n = s->vertex_count;
@@ -1530,7 +1533,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
         for (; done < size; done++) {
             const int32_t u = stack[done];
             for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
-                const int32_t w = tmr_far_end(s, ends->corner[e], u);
+                const int32_t w = tmr_other_end(s, ends->corner[e], u);
                 has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
                 length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
@@ -1552,19 +1555,19 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
 }
 
 /* Direction from v along the line that starts with the edge of corner c, over about the distance
-   reach or up to where it branches. */
+   reach, or less if the line branches. */
 static txm_dvec3 tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v,
                                     int32_t c, double reach) {
-    int32_t at = tmr_far_end(s, c, v), e = c;
+    int32_t at = tmr_other_end(s, c, v), e = c;
     for (int i = 0; i < 1000; i++) {
         if (txm_d3_dist2(s->point[at], s->point[v]) >= reach * reach) break;
         if (ends->first[at + 1] - ends->first[at] != 2) break;
         const int32_t k = ends->first[at];
         e = ends->corner[k] == e ? ends->corner[k + 1] : ends->corner[k];
-        at = tmr_far_end(s, e, at);
+        at = tmr_other_end(s, e, at);
         if (at == v) break;
     }
-    if (at == v) at = tmr_far_end(s, c, v);
+    if (at == v) at = tmr_other_end(s, c, v);
     return txm_d3_unit(txm_d3_sub(s->point[at], s->point[v]));
 }
 
@@ -1594,7 +1597,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
             int32_t at = v, e = ends->corner[k];
             double way = 0;
             for (int i = 0; i < 1000 && sharpest; i++) {
-                const int32_t next = tmr_far_end(s, e, at);
+                const int32_t next = tmr_other_end(s, e, at);
                 way += txm_d3_dist(s->point[at], s->point[next]);
                 at = next;
                 if (way > reach || at == v || turn[at] <= 0) break;
@@ -1609,7 +1612,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
     return TXM_OK;
 }
 
-enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are near it is no tip */
+enum { TMR_TIP_BALL = 64 }; /* vertices around a tip, at most                                  */
 #define TMR_TIP_DEFECT 1.3  /* ours: radians of angle missing around a tip                    */
 
 /* 2 pi minus the angles around each vertex: what is missing there for the surface to be flat. */
@@ -1623,8 +1626,8 @@ static void tmr_angle_defects(const tmr_surface *s, float *defect) {
     }
 }
 
-/* Is v the tip of something thinner than an edge, such as a horn? Within reach much angle is
-   missing, and no vertex there lies beyond v along its normal. */
+/* Is v the tip of something thinner than an edge, such as a horn? The vertices within reach have a
+   large angle defect in all, and none of them lies beyond v along its normal. */
 static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *kind, int32_t v,
                       double reach) {
     int32_t list[TMR_TIP_BALL];
@@ -1661,7 +1664,7 @@ static txm_status tmr_find_tips(const tmr_surface *s, double reach, txm_arena *s
     return TXM_OK;
 }
 
-/* Follow the line from v over the edge of corner c to its end, as one more line. */
+/* Add a line: from v over the edge of corner c to its end. */
 static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, int32_t v,
                       int32_t c) {
     const int32_t id = l->line_count++, begin = v;
@@ -1670,7 +1673,7 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->border[id] = s->edge_kind[c] == TMR_BORDER_EDGE;
     for (;;) {
         TRIMESH_ASSERT(l->segment_count < ends->first[s->vertex_count] / 2);
-        const int32_t k = l->segment_count++, w = tmr_far_end(s, c, v);
+        const int32_t k = l->segment_count++, w = tmr_other_end(s, c, v);
         l->a[k] = v;
         l->b[k] = w;
         l->face[k] = c / 3;
@@ -1690,8 +1693,8 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->first[id + 1] = l->segment_count;
 }
 
-/* Find all lines. spacing: the edge length to come, by which short creases and slight bends are
-   told from real ones. */
+/* Find all lines. spacing: the edge length of the result, which decides which creases are too short
+   and which bends too slight. */
 static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
                                   txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
     tmr_ends ends;
@@ -1723,7 +1726,7 @@ static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, 
     if (status == TXM_OK && angle < 180)
         status = tmr_find_tips(s, 0.75 * spacing, scratch, l->kind);
     if (status != TXM_OK) return status;
-    for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
+    for (int pass = 0; pass < 2; pass++) { /* lines from corners; then closed ones  */
         for (int32_t v = 0; v < s->vertex_count; v++) {
             if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
             for (int32_t k = ends.first[v]; k < ends.first[v + 1]; k++)
@@ -1744,7 +1747,7 @@ static int32_t tmr_segment_step(const tmr_lines *l, int32_t k, int step) {
     return k + step;
 }
 
-/* The place on the line nearest to p, walking from segment *k as long as it gets nearer. */
+/* The place on the line nearest to p, found by walking from segment *k while the distance falls. */
 static txm_dvec3 tmr_project_line(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p,
                                   int32_t *k) {
     txm_dvec3 best = p;
@@ -1792,12 +1795,12 @@ static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p
 
 /* ---- density ------------------------------------------------------------------------------ */
 
-enum { TMR_GRADE_SWEEPS = 12 };   /* ours: of the limit on how fast the edge length may change    */
+enum { TMR_GRADE_SWEEPS = 12 };   /* ours: for the limit on how fast the edge length may change   */
 #define TMR_TURN_PER_EDGE 0.6     /* ours: radians that one edge may turn where density adapts    */
 #define TMR_LEAST_SIZE 0.2        /* ours: the shortest edges where it adapts fully               */
 
-/* The edge length, where the scale is 1, of so many vertices on the surface: triangles of edge L
-   take sqrt(3) / 4 L^2 each, and there are two per vertex. */
+/* The edge length, where the scale is 1, of a mesh of so many vertices: a triangle of edge L has
+   the area sqrt(3) / 4 L^2, and there are two triangles per vertex. */
 static double tmr_spacing(const tmr_surface *s, double vertices) {
     double sum = 0;
     for (int32_t f = 0; f < s->face_count && s->scale; f++) {
@@ -1809,15 +1812,15 @@ static double tmr_spacing(const tmr_surface *s, double vertices) {
     return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
 }
 
-/* Make the mean of the scale such that with and without it the same number of vertices gives the
-   same spacing where it is 1. */
+/* Normalize the scale: the same number of vertices shall give the same spacing where it is 1 as
+   without a scale. */
 static void tmr_normalize_scale(tmr_surface *s) {
     if (!s->scale) return;
     const double factor = tmr_spacing(s, 1) / sqrt(s->area * 1.1547005383792515);
     for (int32_t v = 0; v < s->vertex_count; v++) s->scale[v] = txm_float(s->scale[v] * factor);
 }
 
-/* Curvature at every vertex: the most that the normal turns per unit of length along an edge. */
+/* Curvature at every vertex: the largest change of the normal per unit of length along an edge. */
 static void tmr_curvature(const tmr_surface *s, float *curvature) {
     for (int32_t v = 0; v < s->vertex_count; v++) curvature[v] = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
@@ -1830,9 +1833,8 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     }
 }
 
-/* Shorten the wanted edge lengths where the surface bends, such that an edge turns by no more than
-   TMR_TURN_PER_EDGE, fully or in part (adapt); and let them grow with the distance no faster than by
-   a third of it. */
+/* Shorten the wanted edge lengths where the surface bends, fully or in part (adapt), so that an
+   edge turns by no more than TMR_TURN_PER_EDGE. Over a distance d they grow by no more than d / 3. */
 static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
                                   txm_arena *scratch) {
     const size_t n = (size_t)s->vertex_count;
@@ -1865,30 +1867,30 @@ enum {
     TMR_KIND = 3,
     TMR_GHOST = 4,
     TMR_MARK = 8,
-    TMR_PINNED = 16 /* of updates: shall stay as it is, edges between such vertices too */
+    TMR_PINNED = 16 /* for updates: this vertex, and edges between such, must stay      */
 };
 
-enum { TMR_VALENCE = 60 }; /* no operation makes a vertex of more neighbours            */
+enum { TMR_VALENCE = 60 }; /* no operation gives a vertex more neighbours               */
 
 /* A closed manifold at every moment: each border loop is closed by a ghost vertex joined to all of
-   the loop, so that one set of operators does for borders too. Corners as in tmr_surface; a dead
-   triangle has vertex -1 in its first corner, a dead vertex corner -1.
+   the loop, so that the operators need no special case for borders. Corners as in tmr_surface; a
+   dead triangle has vertex -1 in its first corner, a dead vertex corner -1.
 
                         ghost
                        /  |  \          ghost triangles, which stay out of all geometry
                  -----a---b---c-----    the border, each with the number of its line            */
 typedef struct tmr_mesh {
-    int32_t vertex_count, face_count; /* slots in use, dead ones too                            */
-    int32_t vertex_limit, face_limit; /* slots there are                                        */
-    int32_t live, ghosts;             /* vertices that live and are no ghosts; ghosts           */
-    int32_t live_faces;               /* triangles that live, ghost triangles too               */
+    int32_t vertex_count, face_count; /* slots in use, including dead ones                      */
+    int32_t vertex_limit, face_limit; /* slots allocated                                        */
+    int32_t live, ghosts;             /* live vertices without ghosts; ghosts                   */
+    int32_t live_faces;               /* live triangles, including ghost triangles              */
     txm_dvec3 *p;                     /* position                                               */
     txm_dvec3 *n;                     /* normal of the surface there, smooth                    */
     int32_t *source; /* face of the surface that p lies in; of a vertex on a line its segment;
                         of a vertex that never moves: its vertex of the surface                */
     int32_t *corner;                  /* one corner                                             */
     uint8_t *flags;
-    int32_t *valence; /* neighbours, ghosts too                                                 */
+    int32_t *valence; /* neighbours, including ghosts                                           */
     int32_t *vertex, *opposite; /* of corners                                                   */
     int32_t *edge;              /* of corners: 0, or 1 + the line that their edge is part of    */
 } tmr_mesh;
@@ -1916,7 +1918,7 @@ static void tmr_link(tmr_mesh *m, int32_t a, int32_t b, int32_t line) {
     m->opposite[b] = a;
     m->edge[a] = m->edge[b] = line;
 }
-/* the corner at a of the triangle in which b comes next, -1 if a and b are no neighbours */
+/* the corner at a of the triangle in which b comes next; -1 if a and b are not neighbours */
 static int32_t tmr_find_edge(const tmr_mesh *m, int32_t a, int32_t b) {
     const int32_t first = m->corner[a];
     int32_t c = first;
@@ -1927,13 +1929,13 @@ static int32_t tmr_find_edge(const tmr_mesh *m, int32_t a, int32_t b) {
     return -1;
 }
 
-/* Are a and b neighbours? Asks the one that is no ghost. */
+/* Are a and b neighbours? Looks around the one that is not a ghost. */
 static int tmr_are_neighbors(const tmr_mesh *m, int32_t a, int32_t b) {
     if (tmr_is_ghost(m, a)) return tmr_is_ghost(m, b) ? 0 : tmr_find_edge(m, b, a) >= 0;
     return tmr_find_edge(m, a, b) >= 0;
 }
 
-/* May the edge opposite to c turn? Two triangles  a b d, c' ... of the quad; topology only. */
+/* May the edge opposite to c be flipped? Looks at the topology only. */
 static int tmr_can_flip(const tmr_mesh *m, int32_t c) {
     const int32_t o = m->opposite[c], d = m->vertex[c], e = m->vertex[o];
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
@@ -1945,7 +1947,7 @@ static int tmr_can_flip(const tmr_mesh *m, int32_t c) {
     return !tmr_are_neighbors(m, d, e);
 }
 
-/* Turn the edge opposite to c:
+/* Flip the edge opposite to c:
 
           d (c)                 d
          /   \                / | \
@@ -1982,7 +1984,7 @@ static int32_t tmr_new_vertex(tmr_mesh *m) {
     return v;
 }
 
-/* Put a new vertex on the edge opposite to c, all but its geometry; -1 if there is no room.
+/* Put a new vertex on the edge opposite to c, without its geometry. Returns -1 if there is no room.
 
           d (c)                 d
          /   \                / | \
@@ -2027,7 +2029,7 @@ static int32_t tmr_split(tmr_mesh *m, int32_t c) {
     return v;
 }
 
-/* Put a new vertex into the triangle of c, all but its geometry; -1 if there is no room. */
+/* Put a new vertex into a triangle, without its geometry. Returns -1 if there is no room. */
 static int32_t tmr_split_face(tmr_mesh *m, int32_t face) {
     if (m->vertex_count >= m->vertex_limit || m->face_count + 2 > m->face_limit) return -1;
     const int32_t i = 3 * face, f = 3 * m->face_count, g = f + 3;
@@ -2062,9 +2064,9 @@ static int32_t tmr_split_face(tmr_mesh *m, int32_t face) {
     return v;
 }
 
-/* May b = vertex[prev(c)] be pulled into a = vertex[next(c)], so that the mesh stays a manifold of
-   the same topology, and creases and borders the same lines? The link condition: a and b have only
-   the two neighbours d and e in common. Costs O(valence). */
+/* May b = vertex[prev(c)] be merged into a = vertex[next(c)], so that the mesh stays a manifold of
+   the same topology, with the same creases and borders? The link condition: a and b have only the
+   two neighbours d and e in common. Costs O(valence). */
 static int tmr_can_collapse(tmr_mesh *m, int32_t c) {
     const int32_t o = m->opposite[c], cn = tmr_next(c), cp = tmr_prev(c);
     const int32_t a = m->vertex[cn], b = m->vertex[cp], d = m->vertex[c], e = m->vertex[o];
@@ -2101,7 +2103,7 @@ static void tmr_kill_face(tmr_mesh *m, int32_t face) {
     m->live_faces--;
 }
 
-/* Pull b = vertex[prev(c)] into a = vertex[next(c)]; a keeps its place. */
+/* Merge b = vertex[prev(c)] into a = vertex[next(c)]; a keeps its place. */
 static void tmr_collapse(tmr_mesh *m, int32_t c) {
     const int32_t o = m->opposite[c], cn = tmr_next(c), cp = tmr_prev(c);
     const int32_t on = tmr_next(o), op = tmr_prev(o);
@@ -2195,8 +2197,8 @@ static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, txm_dvec3 p) {
     return at;
 }
 
-/* Walk from a face to where the surface is nearest to p, as long as it gets nearer: linear in the
-   way, and it cannot jump to another sheet. */
+/* The place on the surface nearest to p, found by walking from a face while the distance falls:
+   takes time proportional to the way, and cannot jump to another sheet. */
 static tmr_place tmr_project(const tmr_surface *s, txm_dvec3 p, int32_t face) {
     tmr_place at = tmr_on_face(s, face, p);
     for (int guard = 0; guard < 4096 && at.part != 0; guard++) {
@@ -2242,7 +2244,7 @@ static double tmr_scale_at(const tmr_surface *s, const tmr_place *at) {
 
 /* ---- the work ----------------------------------------------------------------------------- */
 
-enum { TMR_CHUNK = 2048 }; /* vertices or triangles per parallel task; fixes no result */
+enum { TMR_CHUNK = 2048 }; /* vertices or triangles per parallel task; does not change results */
 
 typedef struct tmr_work {
     const tmr_surface *s;
@@ -2253,13 +2255,13 @@ typedef struct tmr_work {
     float *size;       /* 1 per vertex of m: edge length there relative to length               */
     double length;     /* edge length aimed at                                                  */
     double line_scale; /* along lines relative to that                                          */
-    txm_dvec3 *moved;  /* 1 per vertex: room for where it shall go                              */
-    int32_t *landed;   /* 1 per vertex: room for the face or segment there                      */
-    uint8_t *bad;      /* 1 per vertex: room for a mark                                         */
-    uint8_t *flag;     /* 1 per triangle: room for a mark                                       */
-    float *height;     /* 1 per triangle: room for the height of the surface over it            */
+    txm_dvec3 *moved;  /* 1 per vertex: scratch: the place it moves to                          */
+    int32_t *landed;   /* 1 per vertex: scratch: the face or segment there                      */
+    uint8_t *bad;      /* 1 per vertex: scratch: a mark                                         */
+    uint8_t *flag;     /* 1 per triangle: scratch: a mark                                       */
+    float *height;     /* 1 per triangle: scratch: height of the surface over it                */
     uint8_t *mask;     /* of relaxation: NULL, or 1 per vertex: may it move?                    */
-    uint8_t *mask_room; /* 1 per vertex: room for that                                           */
+    uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
 } tmr_work;
@@ -2280,8 +2282,8 @@ static void tmr_put(tmr_work *w, int32_t v, const tmr_place *at) {
     w->size[v] = txm_float(tmr_scale_at(w->s, at));
 }
 
-/* Until something else is said vertex v stays where it is. */
-static void tmr_stay(tmr_work *w, int32_t v) {
+/* Let vertex v stay where it is, unless w->moved is set later. */
+static void tmr_keep_place(tmr_work *w, int32_t v) {
     w->moved[v] = w->m.p[v];
     w->landed[v] = w->m.source[v];
 }
@@ -2301,7 +2303,7 @@ static txm_dvec3 tmr_middle(const tmr_mesh *m, const int32_t *v) {
     return txm_d3_scale(txm_d3_add(txm_d3_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
 }
 
-/* the place of the surface nearest to that, walking from all three vertices */
+/* the place of the surface nearest to it, walking from all three vertices */
 static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
     const txm_dvec3 middle = tmr_middle(&w->m, v);
     tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
@@ -2312,8 +2314,8 @@ static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
     return at;
 }
 
-/* The normal that a triangle should have: that of the surface around, judged by its free vertices
-   only where there are any, since normals on creases say little. */
+/* The normal that a triangle should have: the mean normal of its free vertices, since normals on
+   creases say little; without a free vertex that of the surface below its middle. */
 static txm_dvec3 tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t v[3] = {a, b, c};
@@ -2340,7 +2342,7 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
     return txm_d3_dot(n, tmr_expected_normal(w, a, b, c)) / length;
 }
 
-#define TMR_LEAST_AGREEMENT 0.4 /* cosine: triangles steeper than this to the surface are avoided */
+#define TMR_LEAST_AGREEMENT 0.4 /* cosine of the steepest angle to the surface that is accepted   */
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
@@ -2450,8 +2452,8 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
 
 /* ---- back to the caller's triangles ------------------------------------------------------- */
 
-/* The place in the caller's triangle. Where mending turned an edge, a face is none of the caller's:
-   then the nearest point of the triangle that it came from. */
+/* The place in the caller's triangle. Where mending has flipped an edge, a face is not one of the
+   caller's: then the nearest point of the triangle that it came from. */
 static txm_mesh_place tmr_surface_source(const tmr_surface *s, const trimesh_desc *desc,
                                          const tmr_place *at) {
     txm_mesh_place source;
@@ -2489,7 +2491,7 @@ static double tmr_quality(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 n) {
     return txm_d3_dot(cross, n) < TMR_LEAST_AGREEMENT * area2 ? -1 : q;
 }
 
-/* neighbours that a vertex should have, ghosts too */
+/* neighbours that a vertex should have, including ghosts */
 static int tmr_ideal_valence(const tmr_mesh *m, int32_t v) {
     return tmr_kind_of(m, v) == TRIMESH_BORDER ? 5 : 6;
 }
@@ -2499,7 +2501,7 @@ static int tmr_valence_cost(const tmr_mesh *m, int32_t v, int change) {
     return d * d;
 }
 
-/* by how much turning the edge opposite to c would lower the valence costs */
+/* by how much flipping the edge opposite to c would lower the cost of valences */
 static int tmr_flip_gain(const tmr_mesh *m, int32_t c) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
@@ -2513,8 +2515,8 @@ typedef struct tmr_quad {
     double before, after;      /* the lower quality of the two triangles */
 } tmr_quad;
 
-/* What would turning the edge opposite to c do? 0: it cannot turn. */
-static int tmr_look_at_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
+/* What would flipping the edge opposite to c do? Returns 0 if it cannot be flipped. */
+static int tmr_measure_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
     const tmr_mesh *m = &w->m;
     if (!tmr_can_flip(m, c)) return 0;
     const int32_t o = m->opposite[c];
@@ -2539,7 +2541,7 @@ static int tmr_is_wide(const tmr_mesh *m, int32_t c) {
     const double cd = txm_d3_dot(da, db), ce = txm_d3_dot(ea, eb);
     if (cd >= 0 && ce >= 0) return 0;
     const double sd = txm_d3_len(txm_d3_cross(da, db)), se = txm_d3_len(txm_d3_cross(ea, eb));
-    /* sin(d + e) < 0, a little less so that equal diagonals stay */
+    /* sin(d + e) < 0, with a margin so that equal diagonals stay */
     return sd * ce + se * cd <
            -1e-6 * sqrt(txm_d3_len2(da) * txm_d3_len2(db) * txm_d3_len2(ea) * txm_d3_len2(eb));
 }
@@ -2559,7 +2561,7 @@ static void tmr_wide_chunk(void *context, int index) {
     }
 }
 
-/* Turn edges until the mesh is Delaunay, as far as the normals allow. */
+/* Flip edges until the mesh is Delaunay, as far as the normals allow. */
 static void tmr_flip_delaunay(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     tmr_quad q;
@@ -2569,7 +2571,7 @@ static void tmr_flip_delaunay(tmr_work *w, int rounds) {
         for (int32_t f = 0; f < m->face_count; f++) {
             for (int32_t c = 3 * f; w->flag[f] && c < 3 * f + 3; c++) {
                 if (!((w->flag[f] >> (c - 3 * f)) & 1) || m->edge[c]) continue;
-                if (!tmr_is_wide(m, c) || !tmr_look_at_flip(w, c, &q)) continue;
+                if (!tmr_is_wide(m, c) || !tmr_measure_flip(w, c, &q)) continue;
                 if (q.after <= 0 && q.after <= q.before) continue;
                 tmr_flip(m, c);
                 turned++;
@@ -2579,7 +2581,7 @@ static void tmr_flip_delaunay(tmr_work *w, int rounds) {
     }
 }
 
-/* Turn edges that bring valences nearer to 6, where the triangles stay fair. */
+/* Flip edges where that brings valences nearer to 6 and the triangles stay fair. */
 static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
     tmr_mesh *m = &w->m;
     tmr_quad q;
@@ -2587,7 +2589,7 @@ static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
         int32_t turned = 0;
         for (int32_t c = 0; c < 3 * m->face_count; c++) {
             if (m->vertex[c] < 0 || m->opposite[c] < c || m->edge[c]) continue;
-            if (tmr_flip_gain(m, c) <= 0 || !tmr_look_at_flip(w, c, &q)) continue;
+            if (tmr_flip_gain(m, c) <= 0 || !tmr_measure_flip(w, c, &q)) continue;
             if (q.after < least && q.after <= q.before) continue;
             tmr_flip(m, c);
             turned++;
@@ -2615,14 +2617,14 @@ static txm_dvec3 tmr_fit(const tmr_work *w, const int32_t *v, txm_dvec3 *centre,
                    txm_d3_scale(txm_d3_cross(*n, txm_d3_sub(c, b)), 0.28867513459481287));
     const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
     const double radius = size * 0.57735026918962576, length = txm_d3_len(pull);
-    if (length < 0.1 * radius) { /* turned over or flat: start from its first corner */
+    if (length < 0.1 * radius) { /* inverted or flat: start from its first corner    */
         const double arm_length = txm_d3_len(arm);
         return arm_length > 0 ? txm_d3_scale(arm, radius / arm_length) : pull;
     }
     return txm_d3_scale(pull, ((1 - w->pull) * length + w->pull * radius) / length);
 }
 
-/* the two neighbours of a vertex on its line; 0 if they are not just two */
+/* the two neighbours of a vertex on its line; returns 0 if there are not exactly two */
 static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
     int count = 0;
     int32_t c = m->corner[v];
@@ -2641,7 +2643,7 @@ static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
 static void tmr_relax_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
-    tmr_stay(w, v);
+    tmr_keep_place(w, v);
     if (w->mask && !w->mask[v]) return;
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
         return;
@@ -2689,7 +2691,7 @@ static int tmr_has_moved(const tmr_work *w, int32_t v) {
     return a.x < b.x || a.x > b.x || a.y < b.y || a.y > b.y || a.z < b.z || a.z > b.z;
 }
 
-/* Is the triangle worse than allowed when its corners go where they shall? */
+/* Would the triangle be worse than allowed after its corners have moved? */
 static int tmr_is_spoilt(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
@@ -2708,7 +2710,7 @@ static void tmr_spoilt_chunk(void *context, int index) {
     for (int32_t f = from; f < to; f++) w->flag[f] = (uint8_t)tmr_is_spoilt(w, f);
 }
 
-/* Mark the vertices of all spoilt triangles in w->bad; how many triangles there are. */
+/* Mark the vertices of all spoilt triangles in w->bad. Returns how many such triangles there are. */
 static int32_t tmr_find_spoilt(tmr_work *w) {
     tmr_mesh *m = &w->m;
     int32_t found = 0;
@@ -2740,7 +2742,7 @@ static void tmr_settle_chunk(void *context, int index) {
     }
 }
 
-/* Move all vertices where w->moved says, but for those by which a triangle would turn over. */
+/* Move all vertices to w->moved, except those that would invert a triangle. */
 static void tmr_settle(tmr_work *w) {
     tmr_mesh *m = &w->m;
     const int chunks = (m->vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
@@ -2759,8 +2761,8 @@ static void tmr_relax(tmr_work *w) {
     tmr_settle(w);
 }
 
-/* The edge length that triangles of the present area and number would have were they equilateral
-   (each counted as large as its wanted size says). */
+/* The edge length that as many equilateral triangles of the same total area would have, areas taken
+   relative to the wanted sizes. */
 static double tmr_ideal_length(const tmr_work *w) {
     const tmr_mesh *m = &w->m;
     double sum = 0;
@@ -2789,8 +2791,8 @@ static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
            !tmr_is_ghost(m, m->vertex[tmr_prev(c)]);
 }
 
-/* Where b's triangles go when b is pulled into a at position to: is each of them fair? reach: no
-   edge may become longer than this, relative to what is wanted; 0 = any. */
+/* Would all triangles of b be fair after b is merged into a at position to? reach: no edge may
+   become longer than this, relative to the wanted length; 0 = any. */
 static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, double reach) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
@@ -2816,12 +2818,12 @@ static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, doub
     return 1;
 }
 
-/* Collapse the edge opposite to c, either way round, to the end that must stay or else to its
-   middle. 0: not possible. */
+/* Collapse the edge opposite to c, to the end that must stay, or else to its middle or either end.
+   Returns 0 if that is not possible. */
 static int tmr_try_collapse(tmr_work *w, int32_t c, double reach, int middle) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-    /* the one that is more bound stays: corner, line, free */
+    /* the more constrained one stays: corner, line, free */
     const int rank_a = tmr_kind_of(m, a) == TRIMESH_CORNER ? 2 : tmr_kind_of(m, a) != TRIMESH_FREE;
     const int rank_b = tmr_kind_of(m, b) == TRIMESH_CORNER ? 2 : tmr_kind_of(m, b) != TRIMESH_FREE;
     if (rank_b > rank_a) c = m->opposite[c];
@@ -2881,8 +2883,8 @@ static txm_dvec3 tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32
     return tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5), k);
 }
 
-/* Put a vertex on the middle of the edge opposite to c, on the surface; -1 if there is no room or
-   no place. */
+/* Split the edge opposite to c at its middle, on the surface. Returns the new vertex; -1 if there
+   is no room or the triangles would not be fair. */
 static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
@@ -2907,12 +2909,12 @@ static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     return v;
 }
 
-/* an edge's length relative to what is allowed: over 1 it has to be split */
+/* an edge's length relative to what is allowed; above 1 it must be split */
 static double tmr_excess(const tmr_work *w, int32_t c, double limit, double line_limit) {
     return tmr_edge_size(w, c) / (w->m.edge[c] ? line_limit : limit);
 }
 
-/* Is no other edge of the two triangles longer? (lines come first) */
+/* Is no other edge of the two triangles longer? (always true on lines) */
 static int tmr_is_longest(const tmr_work *w, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
@@ -2925,7 +2927,7 @@ static int tmr_is_longest(const tmr_work *w, int32_t c) {
     return 1;
 }
 
-/* Split all edges longer than limit, lines relative to their own spacing; how many. The longest
+/* Split all edges longer than limit, on lines longer than line_limit. Returns how many. The longest
    first, and only where an edge is the longest of its triangles: otherwise slivers arise. */
 static int32_t tmr_split_long(tmr_work *w, double limit, double line_limit) {
     tmr_mesh *m = &w->m;
@@ -3012,9 +3014,9 @@ static void tmr_half_angle(const double a[2], double out[2]) {
     out[0] = re;
     out[1] = a[1] < 0 ? -im : im;
 }
-/* a sixth root of a complex number, unit length. The third of an angle is a quarter and a
-   sixteenth and a 64th of it and a little; Newton's method does the rest. sqrt alone gives the
-   same bits with every C library, atan2 and cos do not. */
+/* A sixth root of a complex number, of unit length. A third of an angle is about 1/4 + 1/16 + 1/64
+   of it; Newton's method does the rest. sqrt gives the same bits with every C library, atan2 and
+   cos do not. */
 static void tmr_sixth_root(const double z[2], double out[2]) {
     const double length = sqrt(z[0] * z[0] + z[1] * z[1]);
     double a[2] = {1, 0}, r[2], part[2];
@@ -3047,8 +3049,8 @@ static void tmr_sixth_root(const double z[2], double out[2]) {
     out[1] = r[1];
 }
 
-/* How the frame (n1, x1) lies in (n0, x0) when n1 is turned onto n0 the short way: the complex
-   number by which coordinates are multiplied. */
+/* The complex number that takes coordinates in the frame (n1, x1) to the frame (n0, x0), when n1 is
+   rotated onto n0 by the shortest rotation. */
 static void tmr_transport(txm_dvec3 n0, txm_dvec3 x0, txm_dvec3 n1, txm_dvec3 x1, double out[2]) {
     const txm_dvec3 axis = txm_d3_cross(n1, n0);
     const double cosine = txm_d3_dot(n0, n1);
@@ -3113,7 +3115,7 @@ static txm_status tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *ar
         do {
             const int32_t to = m->vertex[tmr_next(c)];
             if (!tmr_is_ghost(m, to)) {
-                TRIMESH_ASSERT(k < links); /* of the valences: no more than neighbours, ghosts too */
+                TRIMESH_ASSERT(k < links); /* the valences count all neighbours, also ghosts */
                 level->to[k] = f->node[to];
                 level->weight[k++] = 1;
             }
@@ -3138,7 +3140,7 @@ static txm_status tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *ar
     return TXM_OK;
 }
 
-/* The next level: each node joined with the neighbour that is most like it. */
+/* The next level: each node merged with the most similar neighbour. */
 static txm_status tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena,
                                txm_arena *scratch) {
     int32_t count = 0;
@@ -3190,7 +3192,7 @@ static txm_status tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *aren
                 const int32_t to = a->parent[a->to[j]];
                 if (to == i) continue;
                 if (seen[to] < first) {
-                    TRIMESH_ASSERT(k < a->links); /* each comes from a link below, and no two from one */
+                    TRIMESH_ASSERT(k < a->links); /* each comes from a link of its own below */
                     seen[to] = k;
                     b->to[k] = to;
                     b->weight[k++] = 0;
@@ -3253,7 +3255,7 @@ static void tmr_smooth_directions(tmr_level *level, int sweeps) {
             level->z[i][1] = im / sum;
             most = fmax(most, fmax(fabs(re), fabs(im)) / sum);
         }
-        if (most > 0 && most < 1e-3) { /* no underflow; what is fixed does not matter then */
+        if (most > 0 && most < 1e-3) { /* avoids underflow; fixed nodes do not matter then */
             for (int32_t i = 0; i < level->count; i++) {
                 if (level->fixed[i] == 1) continue;
                 level->z[i][0] /= most;
@@ -3345,8 +3347,8 @@ static txm_dvec3 tmr_between(txm_dvec3 p0, txm_dvec3 n0, txm_dvec3 p1, txm_dvec3
                       txm_d3_scale(txm_d3_add(txm_d3_scale(n0, -l0), txm_d3_scale(n1, -l1)), 0.25));
 }
 
-/* Of the lattice points of two nodes about half-way between them, the pair that lies closest
-   together: what both should agree on. */
+/* Of the lattice points of two nodes about half-way between them, the closest pair: the place on
+   which both should agree. */
 static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, int32_t j,
                              txm_dvec3 *a, txm_dvec3 *b) {
     const double spacing = 0.5 * (level->scale[i] + (double)level->scale[j]);
@@ -3433,8 +3435,8 @@ static txm_status tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *
 
 /* ---- from the lattice to a mesh ----------------------------------------------------------- */
 
-/* Pull b = vertex[prev(c)] into a, or a into b, or both onto their lattice point, whichever keeps
-   the triangles around fair; the lattice point becomes the mean of the two. */
+/* Merge b = vertex[prev(c)] into a, or a into b, or both at their lattice point: the first of these
+   that keeps the triangles around fair. Their lattice point becomes the mean of the two. */
 static int tmr_collapse_onto(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
@@ -3464,7 +3466,7 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
 }
 
 /* Collapse the edges whose ends share a lattice point, the shortest first. moved[v] holds the
-   lattice point of v, and bad[v] how many vertices went into it. */
+   lattice point of v, and bad[v] how many vertices were merged into v. */
 static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const size_t most = (size_t)m->live_faces * 3 / 2 + 1; /* edges of a closed mesh */
@@ -3526,7 +3528,7 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
 
 /* ---- the right number --------------------------------------------------------------------- */
 
-/* what collapsing (sign -1) or splitting (+1) the edge of c would do to the valences */
+/* how collapsing (sign -1) or splitting (+1) the edge of c would change the cost of valences */
 static int tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
@@ -3556,9 +3558,9 @@ static int tmr_claim(tmr_work *w, int32_t c) {
     return 1;
 }
 
-/* Split or collapse where it harms the pattern least, until there are so many vertices; a few
-   rounds of relaxation in between. How many vertices are missing (over: negative) at the end goes to
-   *missing. */
+/* Split or collapse edges where it disturbs the pattern least, until there are target vertices,
+   with a few rounds of relaxation in between. *missing receives how many vertices are missing at
+   the end (negative: too many). */
 static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
                                 int32_t *missing) {
     tmr_mesh *m = &w->m;
@@ -3598,10 +3600,11 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
             }
             done += m->live != before;
             *missing = target - m->live;
-            /* not too many at once, so that the rest of them are looked at afresh */
+            /* not too many at once, so that the others are ranked again */
             if (pass < 8 && done * 4 > (*missing < 0 ? -*missing : *missing) + 8) break;
         }
-        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count); /* relax where something was done */
+        /* relax where something was changed */
+        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count);
         w->mask = pass % 4 == 3 ? NULL : w->mask_room;
         tmr_flip_valences(w, 2, 0.4);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
@@ -3617,9 +3620,9 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
 /* Bring the copy of the surface to about two vertices per lattice point to come. */
 static txm_status tmr_resample(tmr_work *w) {
     const double aim = sqrt(0.5); /* of edges, relative to w->length */
-    /* lines first: what is inside is split to fit them */
+    /* lines first: the inside is then split to fit them */
     tmr_split_long(w, 1e9, 1.0);
-    /* fine input: take away, the shortest edges first */
+    /* fine input: collapse edges, the shortest first */
     double limit = 0.05 * aim;
     while (limit < 0.72 * aim) {
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
@@ -3637,7 +3640,7 @@ static txm_status tmr_resample(tmr_work *w) {
     return TXM_OK;
 }
 
-/* Take away what a line has more of edges than fit its length; the rest is spread evenly later. */
+/* Collapse edges of lines that have more than fit their length; the others are spaced evenly later. */
 static txm_status tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const tmr_lines *l = w->l;
@@ -3667,12 +3670,12 @@ static void tmr_even_lines(tmr_work *w) {
         const int kind = m->corner[v] < 0 || tmr_is_ghost(m, v) ? 0 : tmr_kind_of(m, v);
         w->bad[v] = kind == TRIMESH_CREASE || kind == TRIMESH_BORDER; /* still to do */
         any |= w->bad[v];
-        tmr_stay(w, v);
+        tmr_keep_place(w, v);
     }
     for (int32_t v = 0; v < m->vertex_count && any; v++) {
         int32_t two[2];
         if (!w->bad[v] || !tmr_line_neighbors(m, v, two)) continue;
-        /* back to an end of the line, or all the way round to v */
+        /* back to an end of the line, or all the way around to v */
         int32_t before = two[0], at = v, begin = -1;
         for (;;) {
             const int32_t next = before;
@@ -3698,7 +3701,7 @@ static void tmr_even_lines(tmr_work *w) {
                 way = tmr_line_way(w->s, w->l, m->p[v], m->source[v]);
             }
             if (pass == 1) {
-                /* which way along the line do we go? */
+                /* in which direction along the line? */
                 const double w0 = tmr_line_way(w->s, w->l, m->p[to], m->source[to]);
                 if (begin >= 0) {
                     const double near = w0, far = w->l->length[line] - w0;
@@ -3758,8 +3761,8 @@ static int tmr_may_subdivide(const tmr_work *w) {
 /* Copy the living part of w->m into new arrays, each triangle cut in four if wanted, with room for
    1000 vertices more.
 
-   Of each vertex and ghost that lives one stays. A cut adds at most one vertex per edge, of which
-   there are 3/2 live_faces, and makes four triangles of one, of a ghost triangle two. */
+   Every live vertex and ghost stays. A cut adds at most one vertex per edge, of which there are 3/2
+   live_faces, and makes four triangles of one, of a ghost triangle two. */
 static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena *scratch) {
     enum { MORE = 1000 };
     const tmr_mesh old = w->m;
@@ -3906,10 +3909,10 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
 
 /* ---- fitting ------------------------------------------------------------------------------ */
 
-/* Chords lie inside what they cut off, so vertices on the surface make a body too thin. Each free
-   vertex moves along its normal by the mean height of the surface over the triangles around it;
-   that of one triangle follows from the heights at its centre and its corners (exactly so for a
-   paraboloid): 3/4 centre + 1/4 mean of the corners. */
+/* Chords lie inside a round surface, so a mesh with its vertices on the surface has too little
+   volume. Each free vertex moves along its normal by the mean height of the surface over the
+   triangles around it. The mean height over one triangle is 3/4 of that at its centre plus 1/4 of
+   the mean of those at its corners, which is exact for a paraboloid. */
 static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
@@ -3933,7 +3936,7 @@ static void tmr_fit_chunk(void *context, int index) {
     const int32_t from = index * TMR_CHUNK;
     const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
     for (int32_t v = from; v < to; v++) {
-        tmr_stay(w, v);
+        tmr_keep_place(w, v);
         if (m->corner[v] < 0 || tmr_is_ghost(m, v) || tmr_kind_of(m, v) != TRIMESH_FREE) continue;
         double sum = 0;
         int count = 0;
@@ -3974,7 +3977,7 @@ static txm_status tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
 
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
-/* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
+/* Does the open segment p q cross the interior of triangle a b c? rim: or its boundary. */
 static int tmr_crosses(txm_dvec3 p, txm_dvec3 q, txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, int rim) {
     const txm_dvec3 e1 = txm_d3_sub(b, a), e2 = txm_d3_sub(c, a), d = txm_d3_sub(q, p);
     const txm_dvec3 h = txm_d3_cross(d, e2);
@@ -3986,8 +3989,8 @@ static int tmr_crosses(txm_dvec3 p, txm_dvec3 q, txm_dvec3 a, txm_dvec3 b, txm_d
     return u > least && v > least && u + v < 1 - least && t > eps && t < 1 - eps;
 }
 
-/* Do two triangles, which share at most one vertex, cross each other? rim: also where an edge passes
-   through no more than the rim of the other triangle, as with cards that cross edge to edge. */
+/* Do two triangles, which share at most one vertex, cross each other? rim: also where an edge only
+   passes through the boundary of the other triangle, as with cards that cross edge to edge. */
 static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
     const int32_t *v = m->vertex + 3 * f, *w = m->vertex + 3 * g;
     int shared = 0, kf = 0, kg = 0;
@@ -4060,7 +4063,9 @@ static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
     }
 }
 
-enum { TMR_NEAR_CELLS = 1 << 16 }; /* coarse cells by hash that are near a marked vertex, or seem so */
+enum {
+    TMR_NEAR_CELLS = 1 << 16
+}; /* coarse cells by hash: near a marked vertex?                    */
 
 static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
     return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
@@ -4087,7 +4092,7 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cel
     g->entry = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
     g->spare = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
     if (!g->entry || !g->spare) return TXM_OUT_OF_MEMORY;
-    do { /* in coarser cells if there are many large triangles */
+    do { /* use coarser cells if there are many large triangles */
         g->cell *= 2;
         g->count = 0;
         g->overflow = 0;
@@ -4138,8 +4143,8 @@ static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim,
 
 enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one spot */
 
-/* Does the surface face along n anywhere near the place? Looks at the faces that hang together
-   with it, as far as they reach into a ball around p. */
+/* Does the surface face along n anywhere near the place? Looks at the faces that are connected to
+   it within a ball around p. */
 static int tmr_faces_along(const tmr_surface *s, txm_dvec3 n, int32_t face, txm_dvec3 p,
                            double radius) {
     int32_t list[TMR_SPOT_FACES];
@@ -4158,10 +4163,10 @@ static int tmr_faces_along(const tmr_surface *s, txm_dvec3 n, int32_t face, txm_
     return 0;
 }
 
-/* How many triangles have no area or face against all of the surface nearby? Those that only face
-   against the place nearest to them, as happens on thin sheets, are counted in *doubtful. Marks
-   their vertices. */
-static long tmr_count_turned(tmr_work *w, long *doubtful) {
+/* Count the triangles that have no area, or whose normal is opposite to that of all of the surface
+   nearby. Those that are only opposite to the nearest place, as happens on thin sheets, are counted
+   in *doubtful. Marks their vertices. */
+static long tmr_count_inverted(tmr_work *w, long *doubtful) {
     const tmr_mesh *m = &w->m;
     long found = 0;
     *doubtful = 0;
@@ -4189,14 +4194,14 @@ static long tmr_count_turned(tmr_work *w, long *doubtful) {
     return found;
 }
 
-/* Edges at which two triangles nearly lie on each other (they turn by more than 120 degrees), and
-   which are none of the surface's own: pull them towards the middle between the two far corners.
-   How many there were. */
+/* Open folds, that is, edges at which two triangles nearly lie on each other (the mesh turns by
+   more than 120 degrees): move such an edge towards the middle between the two far corners. Returns
+   how many there were. */
 static long tmr_open_folds(tmr_work *w, double share) {
     tmr_mesh *m = &w->m;
     long found = 0;
     for (int32_t v = 0; v < m->vertex_count; v++) {
-        tmr_stay(w, v);
+        tmr_keep_place(w, v);
     }
     for (int32_t c = 0; c < 3 * m->face_count; c++) {
         if (!tmr_is_real_edge(m, c)) continue;
@@ -4230,8 +4235,8 @@ static void tmr_grow_marks(tmr_work *w) {
     for (int32_t v = 0; v < m->vertex_count; v++) w->bad[v] = w->bad[v] != 0;
 }
 
-/* Move every marked vertex half-way to the middle of its neighbours, off the surface: what is finer
-   than the triangles can follow is smoothed away there. Lines only if nothing else has helped. */
+/* Move every marked vertex half-way to the mean of its neighbours, off the surface: detail that is
+   too fine for the triangles is smoothed away there. Creases are moved only if lines_too is set. */
 static void tmr_smooth_marked(tmr_work *w, int lines_too) {
     tmr_mesh *m = &w->m;
     for (int32_t v = 0; v < m->vertex_count; v++) {
@@ -4259,7 +4264,7 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
 
 #define TMR_FAIR 0.85 /* ours: quality of triangles that gets no further attention */
 
-/* A few more rounds of relaxation and flips just around the triangles that are still poor. */
+/* More rounds of relaxation and flips around the triangles that are still poor. */
 static void tmr_improve_spots(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     w->pull = w->step = 1;
@@ -4288,8 +4293,8 @@ static void tmr_improve_spots(tmr_work *w, int rounds) {
 
 enum { TMR_SPOT_ROUNDS = 16 };
 
-/* Mend the few spots where triangles cross or face against the surface, by smoothing around them,
-   wider and wider; the best state found stays. *faults: how many are left. */
+/* Smooth around the spots where triangles cross or are inverted, in growing neighbourhoods; the
+   best state found stays. *faults receives how many are left. */
 static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     const size_t count = (size_t)w->m.vertex_count;
     txm_arena arena;
@@ -4308,7 +4313,7 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
         status = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch, &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
-        const long turned = tmr_count_turned(w, &doubtful);
+        const long turned = tmr_count_inverted(w, &doubtful);
         const long score = 1000 * (crossings + turned) + doubtful;
         if (best < 0 || score < best) {
             if (score > 0 && !kept) {
@@ -4321,7 +4326,7 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
             if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
         }
         if (score == 0 || (best < 1000 && round >= 4)) break;
-        if (50 * (crossings + turned) > (long)w->m.live_faces + 2000) break; /* hopeless */
+        if (50 * (crossings + turned) > (long)w->m.live_faces + 2000) break; /* too many to mend */
         for (int k = 0; k < 1 + round / 6; k++) tmr_grow_marks(w);
         tmr_smooth_marked(w, round >= 6);
     }
@@ -4336,57 +4341,57 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
 
 /* ---- points that repel each other [1, sections 3.1 to 3.3] --------------------------------- */
 
-/* The thesis strews points, lets them repel each other, then joins them. Here they are joined first
-   and stay so while they repel each other, edges turning as they go. Then
+/* The thesis distributes points, lets them repel each other, then joins them to triangles. Here they
+   are joined first and stay joined while they repel each other, with edges flipped as they move:
 
-   - the neighbours of a point are those that a walk over edges finds within the radius of influence:
-     geodesic ones. Two sheets close together, of one piece or of two, know nothing of each other,
-     and there is no search in space;
+   - the neighbours of a point are those within the radius of influence that a walk over edges finds.
+     Points of two sheets that are close together, of one piece or of two, do not affect each other,
+     and no search in space is needed;
    - the triangulation cannot fail: it is a closed manifold of the right topology from the start;
-   - vertices of the input that cannot go, since a handle hangs on them, are points like the others,
-     and the number is exact before points find their places.
+   - vertices of the input that cannot be removed, since a handle needs them, become points like the
+     others, and the number is exact before points find their places.
 
-   Stages:  strew    points by area, evenly on lines       (tmr_strew)
-            join     put each into the mesh of the input   (tmr_insert; mutual tessellation [Turk 1991])
-                     and take the vertices of the input out (tmr_take_out)
-            repel    equation 3.1                           (tmr_repel_round)                  */
+   Stages:  sample   points by area, evenly on lines       (tmr_sample)
+            join     put each into the mesh of the input   (tmr_insert; mutual tessellation [2])
+                     and remove the input's vertices       (tmr_remove_vertices)
+            repel    equation 3.1                          (tmr_repel_round)                    */
 
 enum {
-    TMR_ROUNDS = 40,       /* of repulsion; Turk's k, and the thesis's                           */
-    TMR_NEAR = 48,         /* most points that push one; a dozen is usual                        */
-    TMR_TAKE_PASSES = 60,  /* ours: over the vertices of the input; 5 to 20 are needed           */
-    TMR_WALK = 4096        /* steps within one face of the input                                 */
+    TMR_ROUNDS = 40,        /* of repulsion; k of Turk and of the thesis                          */
+    TMR_NEAR = 48,          /* most points that repel one; a dozen is usual                       */
+    TMR_REMOVE_PASSES = 60, /* ours: over the vertices of the input; 5 to 20 are usual           */
+    TMR_WALK = 4096         /* steps within one face of the input                                 */
 };
 
-/* Radius of influence r = 2 sqrt(area / N), Turk's, here in lengths of the edge
-   L = sqrt(2 / sqrt(3) area / N) of the triangular lattice with so many points. In the lattice the
-   six neighbours are nearer than r and the next six just so. */
+/* Radius of influence r = 2 sqrt(area / N), Turk's, here in lengths of the edge L = sqrt(2 /
+   sqrt(3) area / N) of the triangular lattice with so many points. In the lattice the six
+   neighbours are nearer than r, and the next six only just. */
 #define TMR_REACH 1.86
 
-/* f of equation 3.1: the thesis's 0.5 at first, falling to where the points come to rest. With
-   all points moving at once 0.5 is too much for that, neighbours swing against each other from
-   f = 0.2 on; but the swinging, like heat, gets points out of poor arrangements: cooling slowly
-   gives mean quality 0.981 instead of 0.976 in 40 rounds, 0.985 in 120. */
+/* f of equation 3.1: the thesis's 0.5 at first, then falling until the points come to rest. As all
+   points move at once, 0.5 is too large for that: neighbours oscillate from f = 0.2 on. But the
+   oscillation gets points out of poor arrangements, as heat does: lowering f slowly gives a mean
+   quality of 0.981 instead of 0.976 in 40 rounds, and 0.985 in 120. */
 #define TMR_FORCE 0.5
 #define TMR_LAST_FORCE 0.15
 
-typedef struct tmr_strewn {
+typedef struct tmr_sampling {
     tmr_work *w;
     const trimesh_desc *desc;
-    int32_t *inside;   /* 1 per triangle of the mesh: the face of the surface it is a part of     */
+    int32_t *inside;   /* 1 per triangle of the mesh: the face of the surface that contains it    */
     int32_t *fixed;    /* 1 per component: points on lines and corners                           */
-    int32_t *wanted;   /* 1 per component: points in all                                         */
-    int32_t *spare;    /* 1 per component: how many of them it could do without                  */
+    int32_t *wanted;   /* 1 per component: all points                                            */
+    int32_t *spare;    /* 1 per component: how many of them are not required                     */
     double *weight;    /* 1 per component                                                        */
-    double *piece;     /* 1 per face: area / size^2, what its share of the points goes by        */
+    double *piece; /* 1 per face: area / size^2, which its share of the points is proportional to */
     uint8_t *keep;     /* 1 per vertex of the mesh: is a point                                    */
-    double *ways;      /* line_room + 1: places on the line at hand                              */
+    double *ways;      /* line_room + 1: places on the current line                              */
     int32_t line_room; /* the most edges that a line is cut into                                 */
     double length;     /* L, where the size is 1                                                  */
-    int32_t hint;      /* triangle of the mesh to start looking from                             */
-} tmr_strewn;
+    int32_t hint;      /* triangle of the mesh where a search starts                             */
+} tmr_sampling;
 
-/* ---- strewing: how many where -------------------------------------------------------------- */
+/* ---- sampling: how many where --------------------------------------------------------------- */
 
 /* wanted edge length at a vertex of the surface, relative */
 static double tmr_vertex_size(const tmr_surface *s, int32_t v) {
@@ -4414,10 +4419,10 @@ static double tmr_face_weight(const tmr_surface *s, int32_t f) {
            (size * size);
 }
 
-/* Edge length of so many points: each has sqrt(3) / 2 L^2 of the weighted area, on the border half
-   of that. */
-static double tmr_strewn_length(const tmr_surface *s, const tmr_lines *l, double line_scale,
-                                double points) {
+/* Edge length L for so many points: each has sqrt(3) / 2 L^2 of the weighted area, on the border
+   half of that. */
+static double tmr_sampling_length(const tmr_surface *s, const tmr_lines *l, double line_scale,
+                                  double points) {
     double area = 0, border = 0;
     for (int32_t f = 0; f < s->face_count; f++) area += tmr_face_weight(s, f);
     for (int32_t i = 0; i < l->line_count; i++)
@@ -4430,8 +4435,8 @@ static double tmr_strewn_length(const tmr_surface *s, const tmr_lines *l, double
     return length;
 }
 
-/* Edges that a line is cut into: by its length, and so many that no two edges are the same. */
-static int32_t tmr_line_steps(const tmr_strewn *t, int32_t line) {
+/* How many edges a line is cut into: by its length, and so many that no two edges coincide. */
+static int32_t tmr_line_steps(const tmr_sampling *t, int32_t line) {
     const tmr_lines *l = t->w->l;
     const double spacing = t->length * (t->desc->line_spacing > 0 ? t->desc->line_spacing : 1);
     const double steps = floor(tmr_line_weight(t->w->s, l, line) / spacing + 0.5);
@@ -4441,8 +4446,9 @@ static int32_t tmr_line_steps(const tmr_strewn *t, int32_t line) {
                                                                  : (int32_t)steps;
 }
 
-/* The least points of each component, from its Euler characteristic. Before anything is cut. */
-static void tmr_least_points(tmr_strewn *t) {
+/* The smallest number of points for each component, from its Euler characteristic. Call it before
+   anything is cut. */
+static void tmr_least_points(tmr_sampling *t) {
     const tmr_surface *s = t->w->s;
     const tmr_mesh *m = &t->w->m;
     double *euler = t->weight; /* free until later */
@@ -4458,9 +4464,9 @@ static void tmr_least_points(tmr_strewn *t) {
         t->wanted[i] = (int32_t)ceil((7 + sqrt(fmax(49 - 24 * euler[i], 1))) / 2);
 }
 
-/* Share the points among the components: by weight, but each at least what it needs. What that
-   takes too much is taken from those that have most to spare. */
-static void tmr_share_points(tmr_strewn *t, int32_t total) {
+/* Share the points among the components by weight, but give each at least what it needs. If that is
+   too many in all, take points from those that have most to spare. */
+static void tmr_share_points(tmr_sampling *t, int32_t total) {
     const tmr_surface *s = t->w->s;
     const int32_t n = s->component_count;
     double sum = 0, run = 0;
@@ -4491,9 +4497,9 @@ static void tmr_share_points(tmr_strewn *t, int32_t total) {
 
 /* ---- joining: putting a point into the mesh ------------------------------------------------ */
 
-/* Turn edges around the new vertex v of corner first until they are Delaunay, within one face of
-   the surface only, so that triangles stay parts of faces. */
-static void tmr_legalize(tmr_strewn *t, int32_t v) {
+/* Flip edges around the new vertex v until they are Delaunay, only within faces of the surface, so
+   that triangles stay parts of faces. */
+static void tmr_legalize(tmr_sampling *t, int32_t v) {
     tmr_mesh *m = &t->w->m;
     int32_t stack[64], count = 0, c = m->corner[v];
     const int32_t first = c;
@@ -4516,7 +4522,7 @@ static void tmr_legalize(tmr_strewn *t, int32_t v) {
 }
 
 /* The part of the face in which p lies, and the weights of its corners there. */
-static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, txm_dvec3 p, double weight[3]) {
+static int32_t tmr_find_part(const tmr_sampling *t, int32_t face, txm_dvec3 p, double weight[3]) {
     const tmr_mesh *m = &t->w->m;
     const txm_dvec3 n = t->w->s->normal[face];
     int32_t part = t->inside[t->hint] == face ? t->hint : face;
@@ -4539,7 +4545,7 @@ static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, txm_dvec3 p, dou
 }
 
 /* Cut the edge opposite to c at a new vertex; -1 without room. */
-static int32_t tmr_cut_edge(tmr_strewn *t, int32_t c) {
+static int32_t tmr_cut_edge(tmr_sampling *t, int32_t c) {
     tmr_mesh *m = &t->w->m;
     const int32_t a = t->inside[c / 3], b = t->inside[m->opposite[c] / 3];
     const int32_t v = tmr_split(m, c);
@@ -4550,10 +4556,11 @@ static int32_t tmr_cut_edge(tmr_strewn *t, int32_t c) {
     return v;
 }
 
-/* Put a point that lies in a face of the surface into the mesh: into the triangle that holds it,
-   on an edge if it lies there. Returns its vertex; -1: no room, or it lies on a line or a vertex
-   that is a point already. exact: do not move the point; else it is kept off the edges. */
-static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
+/* Put a point that lies in a face of the surface into the mesh: into the triangle that holds it, on
+   an edge if it lies there. Returns its vertex, or -1 if there is no room, or if it lies on a line
+   or on a vertex that is a point already. exact: do not move the point; else it keeps a margin from
+   the edges. */
+static int32_t tmr_insert(tmr_sampling *t, int32_t face, txm_dvec3 p, int exact) {
     tmr_work *w = t->w;
     tmr_mesh *m = &w->m;
     double weight[3];
@@ -4575,7 +4582,7 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
         if (m->edge[3 * part + least]) return -1;
         v = tmr_cut_edge(t, 3 * part + least);
     } else {
-        if (weight[least] < margin) { /* as far in as asked for */
+        if (weight[least] < margin) { /* keep the margin        */
             double sum = 0;
             for (int k = 0; k < 3; k++) sum += weight[k] = fmax(weight[k], margin);
             p = txm_d3(0, 0, 0);
@@ -4595,10 +4602,10 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
     return v;
 }
 
-/* Cut a line at places given by their distance from its beginning in wanted edge lengths, rising.
-   A vertex of the surface very near to one of them is taken for it. vertices: NULL, or receives the
-   vertex for each place. TXM_TOO_SMALL: there is no room for so many vertices. */
-static txm_status tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t count,
+/* Cut a line at places given by their distance from its beginning, in wanted edge lengths, in
+   rising order. A vertex of the surface very near to one of them is used instead. vertices: NULL,
+   or receives the vertex for each place. TXM_TOO_SMALL: there is no room for so many vertices. */
+static txm_status tmr_cut_line(tmr_sampling *t, int32_t line, const double *ways, int32_t count,
                                int32_t *vertices) {
     tmr_work *w = t->w;
     const tmr_surface *s = w->s;
@@ -4674,8 +4681,8 @@ static void tmr_order_faces(const tmr_surface *s, txm_pair *pairs, txm_pair *roo
        m = 3, row 0 at the corner 0:   /\       row j has 2 j + 1 parts, up and down in turn
                                       /\/\
                                      /\/\/\                                                    */
-static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
-                                 txm_rng *rng) {
+static txm_dvec3 tmr_sample_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
+                                  txm_rng *rng) {
     const int32_t *v = s->vertex + 3 * face;
     int32_t m = (int32_t)floor(sqrt((double)count));
     if (m < 1) m = 1;
@@ -4685,7 +4692,7 @@ static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, 
     while ((double)row * row > cell) row--;
     while ((row + 1.0) * (row + 1) <= cell) row++;
     int32_t k = (int32_t)(cell - (double)row * row);
-    if (row & 1) k = 2 * row - k; /* to and fro, so that points follow each other closely */
+    if (row & 1) k = 2 * row - k; /* back and forth, so that consecutive points are close */
     double x = txm_rng_double(rng), y = txm_rng_double(rng);
     if (x + y > 1) {
         x = 1 - x;
@@ -4708,7 +4715,7 @@ static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, 
 
 /* Strew the points that are on no line: each component is cut into as many runs of equal weight
    along the order of its faces, and each run gets one. */
-static txm_status tmr_strew_faces(tmr_strewn *t, txm_arena *scratch) {
+static txm_status tmr_sample_faces(tmr_sampling *t, txm_arena *scratch) {
     const tmr_surface *s = t->w->s;
     const size_t n = (size_t)s->face_count;
     txm_rng rng = txm_rng_make(t->desc->seed, 66);
@@ -4737,17 +4744,17 @@ static txm_status tmr_strew_faces(tmr_strewn *t, txm_arena *scratch) {
             next = step * (placed + txm_rng_double(&rng));
         }
         for (int32_t k = 0; k < here; k++)
-            tmr_insert(t, f, tmr_strew_place(s, f, k, here, &rng), 0);
-        if (i % 65536 == 65535 && txm_progress(t->w->env, 0.1f, "strew")) return TXM_CANCELLED;
+            tmr_insert(t, f, tmr_sample_place(s, f, k, here, &rng), 0);
+        if (i % 65536 == 65535 && txm_progress(t->w->env, 0.1f, "sample")) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
 
-/* ---- joining: taking the vertices of the surface out --------------------------------------- */
+/* ---- joining: removing the vertices of the surface ------------------------------------------ */
 
-/* the worst quality of the triangles that b has when it is pulled into a at the other end of c's
-   edge; -1: not allowed */
-static double tmr_take_quality(const tmr_work *w, int32_t c) {
+/* the worst quality of b's triangles after b is merged into the other end of c's edge; -1: not
+   allowed */
+static double tmr_remove_quality(const tmr_work *w, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c], first = tmr_prev(c), a = m->vertex[tmr_next(c)];
     double worst = 1;
@@ -4763,9 +4770,9 @@ static double tmr_take_quality(const tmr_work *w, int32_t c) {
     return worst;
 }
 
-/* Turn edges of v that may, the worst triangles' first: fewer neighbours make it easier to take
-   out. */
-static void tmr_thin_out(tmr_work *w, int32_t v) {
+/* Flip edges of v where possible, the best result first: with fewer neighbours it is easier to
+   remove. */
+static void tmr_lower_valence(tmr_work *w, int32_t v) {
     tmr_mesh *m = &w->m;
     for (int guard = 0; guard < TMR_VALENCE && m->valence[v] > 3; guard++) {
         tmr_quad q;
@@ -4773,7 +4780,7 @@ static void tmr_thin_out(tmr_work *w, int32_t v) {
         int32_t turn = -1, c = m->corner[v];
         const int32_t first = c;
         do { /* the edge from v to next(c) */
-            if (tmr_look_at_flip(w, tmr_prev(c), &q) && q.after > best) {
+            if (tmr_measure_flip(w, tmr_prev(c), &q) && q.after > best) {
                 best = q.after;
                 turn = tmr_prev(c);
             }
@@ -4784,9 +4791,9 @@ static void tmr_thin_out(tmr_work *w, int32_t v) {
     }
 }
 
-/* Pull vertex v into the neighbour where the triangles stay best. 0: into none. force: also where
-   one is against the surface, if it was so before. */
-static int tmr_take_vertex(tmr_work *w, int32_t v, int force) {
+/* Merge vertex v into the neighbour for which the triangles stay best. Returns 0 if no neighbour
+   will do. force: accept a triangle that is inverted if it was so before. */
+static int tmr_remove_vertex(tmr_work *w, int32_t v, int force) {
     tmr_mesh *m = &w->m;
     double best = -2;
     int32_t into = -1, c = m->corner[v];
@@ -4795,7 +4802,7 @@ static int tmr_take_vertex(tmr_work *w, int32_t v, int force) {
             v = prev(o), as the collapse wants it */
         const int32_t o = m->opposite[tmr_prev(c)];
         if (m->vertex[tmr_prev(o)] == v && tmr_can_collapse(m, o)) {
-            const double q = tmr_take_quality(w, o);
+            const double q = tmr_remove_quality(w, o);
             const int fair = q > 0 || (force && tmr_collapse_is_fair(
                                                     w, o, m->p[m->vertex[tmr_next(o)]], 0));
             if (q > best && fair) {
@@ -4810,9 +4817,9 @@ static int tmr_take_vertex(tmr_work *w, int32_t v, int force) {
     return 1;
 }
 
-/* One pass over the vertices that are no points: those that have no neighbour touched already in
-   this pass are taken out. So the mesh thins evenly however fine the input is. How many left. */
-static int32_t tmr_take_pass(tmr_work *w, const uint8_t *keep, int effort, int32_t *taken) {
+/* One pass over the vertices that are no points: removes those without a neighbour that was touched
+   in this pass, so that the mesh becomes coarser evenly. Returns how many are left. */
+static int32_t tmr_remove_pass(tmr_work *w, const uint8_t *keep, int effort, int32_t *taken) {
     tmr_mesh *m = &w->m;
     int32_t left = 0;
     memset(w->bad, 0, (size_t)m->vertex_count);
@@ -4827,21 +4834,21 @@ static int32_t tmr_take_pass(tmr_work *w, const uint8_t *keep, int effort, int32
             w->bad[m->vertex[tmr_next(c)]] = 1;
             c = tmr_swing(m, c);
         } while (c != first);
-        if (effort > 0) tmr_thin_out(w, v);
-        if (!tmr_take_vertex(w, v, effort > 2)) continue;
+        if (effort > 0) tmr_lower_valence(w, v);
+        if (!tmr_remove_vertex(w, v, effort > 2)) continue;
         left--;
         ++*taken;
     }
     return left;
 }
 
-/* Take out all vertices that are no points, as far as they go; what must stay is a point like the
+/* Remove all vertices that are no points where possible; those that must stay are points like the
    others from now on. fraction: for the progress. */
-static txm_status tmr_take_out(tmr_work *w, const uint8_t *keep, float fraction) {
+static txm_status tmr_remove_vertices(tmr_work *w, const uint8_t *keep, float fraction) {
     int idle = 0;
-    for (int pass = 0; pass < TMR_TAKE_PASSES; pass++) {
+    for (int pass = 0; pass < TMR_REMOVE_PASSES; pass++) {
         int32_t taken;
-        const int32_t left = tmr_take_pass(w, keep, idle, &taken);
+        const int32_t left = tmr_remove_pass(w, keep, idle, &taken);
         if (left == 0) break;
         tmr_flip_delaunay(w, 2);
         idle = taken * 50 < left ? idle + 1 : 0;
@@ -4852,15 +4859,15 @@ static txm_status tmr_take_out(tmr_work *w, const uint8_t *keep, float fraction)
     return TXM_OK;
 }
 
-/* ---- strewing and joining: the whole -------------------------------------------------------- */
+/* ---- sampling and joining: the whole -------------------------------------------------------- */
 
 /* Vertices to make room for so that a mesh of the surface takes so many points (ours: a quarter more,
    for the vertices of lines). */
-static double tmr_strewn_room(double points) {
+static double tmr_sampling_room(double points) {
     return points + floor(points / 4) + 1000;
 }
 
-static txm_status tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
+static txm_status tmr_sampling_alloc(tmr_sampling *t, txm_arena *scratch) {
     const tmr_surface *s = t->w->s;
     const tmr_mesh *m = &t->w->m;
     const size_t n = (size_t)s->component_count;
@@ -4885,7 +4892,7 @@ static txm_status tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
 }
 
 /* Corners and the points on lines. */
-static txm_status tmr_strew_lines(tmr_strewn *t) {
+static txm_status tmr_sample_lines(tmr_sampling *t) {
     const tmr_surface *s = t->w->s;
     const tmr_lines *l = t->w->l;
     const tmr_mesh *m = &t->w->m;
@@ -4911,34 +4918,35 @@ static txm_status tmr_strew_lines(tmr_strewn *t) {
 }
 
 /* Strew desc->vertices points over a mesh that is a copy of the surface, with room as
-   tmr_strewn_room has it. */
-static txm_status tmr_strew(tmr_strewn *t, tmr_work *w, const trimesh_desc *desc,
-                            txm_arena *scratch) {
+   tmr_sampling_room has it. */
+static txm_status tmr_sample(tmr_sampling *t, tmr_work *w, const trimesh_desc *desc,
+                             txm_arena *scratch) {
     const int32_t total = (int32_t)desc->vertices;
     memset(t, 0, sizeof *t);
     t->w = w;
     t->desc = desc;
     t->length = w->length =
-        tmr_strewn_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
-    txm_status status = tmr_strewn_alloc(t, scratch);
+        tmr_sampling_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
+    txm_status status = tmr_sampling_alloc(t, scratch);
     if (status != TXM_OK) return status;
     tmr_least_points(t);
-    if ((status = tmr_strew_lines(t)) != TXM_OK) return status;
+    if ((status = tmr_sample_lines(t)) != TXM_OK) return status;
     tmr_share_points(t, total);
-    return tmr_strew_faces(t, scratch);
+    return tmr_sample_faces(t, scratch);
 }
 
-/* From there to a mesh of these points only, as many as were asked for. */
-static txm_status tmr_join_points(tmr_strewn *t, txm_arena *scratch) {
+/* Make the mesh one of these points only, as many as are wanted. */
+static txm_status tmr_join_points(tmr_sampling *t, txm_arena *scratch) {
     int32_t missing;
-    const txm_status status = tmr_take_out(t->w, t->keep, 0.15f);
+    const txm_status status = tmr_remove_vertices(t->w, t->keep, 0.15f);
     if (status != TXM_OK) return status;
     return tmr_fix_count(t->w, (int32_t)t->desc->vertices, 1, scratch, &missing);
 }
 
 /* ---- repulsion ------------------------------------------------------------------------------ */
 
-/* The points within reach of v by way of edges between points within reach; v itself first. */
+/* The points within reach of v that are connected to it by edges between such points; v itself
+   first. */
 static int tmr_find_near(const tmr_work *w, int32_t v, int32_t near[TMR_NEAR]) {
     const tmr_mesh *m = &w->m;
     const double reach = TMR_REACH * w->length * w->size[v];
@@ -4972,7 +4980,7 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const int kind = tmr_kind_of(m, v);
     int32_t near[TMR_NEAR];
     txm_dvec3 push = txm_d3(0, 0, 0);
-    tmr_stay(w, v);
+    tmr_keep_place(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
     const int count = tmr_find_near(w, v, near);
     for (int i = 1; i < count; i++) {
@@ -4988,7 +4996,7 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
                              v < x ? 1 : -1);
         push = txm_d3_mad(push, d, w->step * (r - length));
     }
-    /* not farther than to where others push the other way */
+    /* no farther than to where other points push back */
     const double limit = 0.5 * w->length * w->size[v], way = txm_d3_len(push);
     if (way > limit) push = txm_d3_scale(push, limit / way);
     const txm_dvec3 to = txm_d3_add(m->p[v], push);
@@ -5008,9 +5016,9 @@ static void tmr_repel_chunk(void *context, int index) {
     for (int32_t v = from; v < to; v++) tmr_repel_vertex(w, v);
 }
 
-/* Would a triangle turn over that is right now? Slivers, of which strewn points have some, count as
-   bad already in tmr_settle and so could. */
-static int tmr_would_turn(const tmr_work *w, int32_t face) {
+/* Would a triangle be inverted that is not so now? tmr_settle does not see this for slivers, which
+   it takes for spoilt already. */
+static int tmr_would_invert(const tmr_work *w, int32_t face) {
     const int32_t *v = w->m.vertex + 3 * face;
     if (v[0] < 0 || tmr_is_ghost_face(&w->m, face)) return 0;
     const txm_dvec3 *p = w->moved, *q = w->m.p;
@@ -5021,16 +5029,16 @@ static int tmr_would_turn(const tmr_work *w, int32_t face) {
     return txm_d3_dot(after, n) <= 0 && txm_d3_dot(before, n) >= 0;
 }
 
-static void tmr_hold_turning(tmr_work *w) {
+static void tmr_hold_inverting(tmr_work *w) {
     tmr_mesh *m = &w->m;
     for (int round = 0; round < 8; round++) {
         int32_t found = 0;
         for (int32_t f = 0; f < m->face_count; f++) {
-            if (!tmr_would_turn(w, f)) continue;
+            if (!tmr_would_invert(w, f)) continue;
             found++;
             for (int k = 0; k < 3; k++) {
                 const int32_t v = m->vertex[3 * f + k];
-                tmr_stay(w, v);
+                tmr_keep_place(w, v);
             }
         }
         if (found == 0) break;
@@ -5043,8 +5051,8 @@ static double tmr_repel_force(int round, int rounds) {
     return TMR_LAST_FORCE + (TMR_FORCE - TMR_LAST_FORCE) * left * left;
 }
 
-/* One round: all points at once (so the result does not depend on threads), then edges turn after
-   them. mean and largest movement, in wanted edge lengths. */
+/* One round: move all points at once (so that the result does not depend on threads), then flip
+   edges. mean and largest movement, in wanted edge lengths. */
 static void tmr_repel_round(tmr_work *w, double force, double *mean, double *largest) {
     const tmr_mesh *m = &w->m;
     const int chunks = (m->vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
@@ -5059,12 +5067,12 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
     }
     *mean = m->live ? sum / m->live : 0;
     *largest = most;
-    tmr_hold_turning(w);
+    tmr_hold_inverting(w);
     tmr_settle(w);
     tmr_flip_delaunay(w, 2);
 }
 
-#define TMR_CALM 0.002 /* ours: mean movement, in edge lengths, below which nothing more comes */
+#define TMR_CALM 0.002 /* ours: mean movement, in edge lengths, at which it stops              */
 
 /* ---- retiling ----------------------------------------------------------------------------- */
 
@@ -5072,7 +5080,7 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
 
 /* All numbers here are ours, see docs/choices.md#tuning. Lengths are in wanted edge lengths. */
 enum {
-    TMR_CUT_FROM = 20000,   /* from so many vertices on at a quarter of them, then cut in four    */
+    TMR_CUT_FROM = 20000,   /* from so many vertices on a quarter of them, then cut in four       */
     TMR_SPACING_ROUNDS = 3, /* of relaxation before the lattice spacing is set                   */
     TMR_CLEAN_ROUNDS = 4,   /* of splits and collapses after the lattice                          */
     TMR_FOLD_ROUNDS = 8     /* of opening folds, at most                                          */
@@ -5098,8 +5106,7 @@ static const tmr_effort tmr_after_cut = {2, 2, 1, 1};
 static const tmr_effort tmr_polish_density = {1, 2, 1.5, 0.8};
 static const tmr_effort tmr_polish_angles = {2, 2, 1.2, 1};
 
-/* Rounds of relaxation and flips. A strong pull brings the density into balance, a weak one the
-   angles. */
+/* Rounds of relaxation and flips. A strong pull evens out the density, a weak one the angles. */
 static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
     w->pull = effort->pull;
     w->step = effort->step;
@@ -5114,9 +5121,9 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
     return TXM_OK;
 }
 
-/* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
-   many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has a
-   few vertices too many: taking vertices away mends the pattern, adding some harms it. */
+/* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of
+   as many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has
+   a few vertices too many: removing vertices improves the pattern, adding some disturbs it. */
 static void tmr_set_spacing(tmr_work *w, int32_t target) {
     const double faces = w->m.live_faces;
     w->pull = 0.5;
@@ -5140,7 +5147,7 @@ static txm_status tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena
     return tmr_collapse_lattice(w, &f, arena);
 }
 
-/* Bring w->m, a copy of the surface, to a lattice of so many vertices. */
+/* Turn w->m, a copy of the surface, into a lattice of target vertices. */
 static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
@@ -5166,7 +5173,7 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     return status;
 }
 
-/* The last part of every method: the exact number, and as much regularity as pays. */
+/* The last part of every method: the exact number, and more regularity. */
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
     txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
@@ -5193,7 +5200,7 @@ static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     return tmr_surface_source(s, w->desc, &at);
 }
 
-/* Hand the result over in the caller's units. */
+/* Make the result, in the caller's units. */
 static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
     const tmr_mesh *m = &w->m;
     txm_arena arena, scratch;
@@ -5267,7 +5274,7 @@ TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh) {
 
 enum tmr_stage {
     TMR_STAGE_MEND,
-    TMR_STAGE_STREW,
+    TMR_STAGE_SAMPLE,
     TMR_STAGE_JOIN,
     TMR_STAGE_REPEL,
     TMR_STAGE_LATTICE,
@@ -5278,7 +5285,7 @@ enum tmr_stage {
 
 struct trimesh_job {
     trimesh_desc desc;
-    txm_env env;           /* hooks of the call at hand, its progress by way of tmr_job_report     */
+    txm_env env; /* hooks of the current call; progress goes through tmr_job_report      */
     int (*progress)(void *user, float fraction, const char *stage); /* the caller's             */
     void *progress_user;
     float fraction;        /* the highest reported                                              */
@@ -5286,23 +5293,23 @@ struct trimesh_job {
     txm_status status;     /* of the first failure                                             */
     int stage;             /* next to be done                                                  */
     int shown;             /* the last one done                                                */
-    int round, rounds;     /* of repulsion: done, at most                                      */
+    int round, rounds;     /* of repulsion: done; at most                                      */
     double mean, largest;  /* movement in the last one                                         */
-    int retries;           /* with adapted density                                              */
-    float *plain_scale;    /* before that                                                       */
-    int cut;               /* lattice: how often the number is quartered, then triangles cut in four */
+    int retries;           /* with adapted density so far                                       */
+    float *plain_scale;    /* scale before the retries                                          */
+    int cut; /* how often the number is quartered, then triangles cut in four          */
     tmr_surface s;
     tmr_lines l;
     tmr_work w;
-    tmr_strewn t;
+    tmr_sampling t;
     txm_arena input;       /* surface and lines                                                */
-    txm_arena first;       /* the mesh, in it the surface's vertices                           */
+    txm_arena first;       /* the mesh, including the surface's vertices                       */
     txm_arena second;      /* the mesh, compact                                                */
-    txm_arena scratch;     /* of the stage at hand                                             */
+    txm_arena scratch;     /* of the current stage                                             */
     txm_arena view;        /* what the state points to                                         */
 };
 
-/* Everything that can be wrong with the numbers in a descriptor, but for the surface. */
+/* Check a descriptor except its surface. */
 static txm_status tmr_check_desc(const trimesh_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
     if (desc->vertices < 4)
@@ -5328,8 +5335,8 @@ static double tmr_job_spacing(const trimesh_job *job) {
     return tmr_spacing(&job->s, (double)job->desc.vertices);
 }
 
-/* Fewer than any such surface can do with? A closed piece needs 4 vertices, one with handles as
-   many as the complete graph that can be drawn on it (Heawood), an open one 3. */
+/* Are the vertices fewer than any such surface needs? A closed piece needs 4, one with handles as
+   many as Heawood's bound says, an open one 3. */
 static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
     const trimesh_report *r = &job->report;
     char text[160];
@@ -5366,7 +5373,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     job->w.desc = &job->desc;
     job->w.env = &job->env;
     job->w.line_scale = job->desc.line_spacing > 0 ? job->desc.line_spacing : 1;
-    double lines = 0; /* at most half of the vertices go to lines: further apart if need be */
+    double lines = 0; /* with more than half of the vertices on lines space these more widely */
     for (int32_t i = 0; i < job->l.line_count; i++) lines += job->l.length[i];
     job->w.line_scale = fmax(job->w.line_scale, lines / tmr_job_spacing(job) /
                                                     (0.5 * (double)job->desc.vertices));
@@ -5376,19 +5383,19 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     const double euler = (double)job->report.euler + (double)job->report.loops;
     if (job->desc.vertices >= TMR_CUT_FROM && (double)job->desc.vertices + 3 * euler > 1000)
         job->cut = job->desc.vertices >= 4 * TMR_CUT_FROM ? 2 : 1;
-    job->stage = job->desc.method == TRIMESH_REPEL ? TMR_STAGE_STREW : TMR_STAGE_LATTICE;
+    job->stage = job->desc.method == TRIMESH_REPEL ? TMR_STAGE_SAMPLE : TMR_STAGE_LATTICE;
     return TXM_OK;
 }
 
-static txm_status tmr_job_strew(trimesh_job *job) {
-    const double room = tmr_strewn_room((double)job->desc.vertices);
+static txm_status tmr_job_sample(trimesh_job *job) {
+    const double room = tmr_sampling_room((double)job->desc.vertices);
     const txm_status status = tmr_copy_surface(&job->w, room, &job->first);
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_JOIN;
-    return tmr_strew(&job->t, &job->w, &job->desc, &job->scratch);
+    return tmr_sample(&job->t, &job->w, &job->desc, &job->scratch);
 }
 
-/* Join the strewn points; then leave behind what room the surface's own vertices took. */
+/* Join the points; then copy the mesh without the slots of the surface's own vertices. */
 static txm_status tmr_job_join(trimesh_job *job) {
     txm_status status = tmr_join_points(&job->t, &job->scratch);
     if (status != TXM_OK) return status;
@@ -5413,7 +5420,8 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
     int32_t aim = (int32_t)target;
     for (int k = 0; k < job->cut; k++) aim = (int32_t)floor((aim + 3 * euler) / 4);
     /* room for three vertices per one aimed at, or as many as the surface has, and a quarter more */
-    const double closed = (double)job->s.vertex_count + job->s.loop_count, most = fmax(closed, 3.0 * aim);
+    const double closed = (double)job->s.vertex_count + job->s.loop_count;
+    const double most = fmax(closed, 3.0 * aim);
     job->w.length = tmr_job_spacing(job) * sqrt(target / aim);
     txm_status status = tmr_copy_surface(&job->w, most + floor(most / 4) + 1000 - closed, &job->first);
     if (status != TXM_OK) return status;
@@ -5421,7 +5429,7 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_SUBDIVIDE;
     if (!job->cut || tmr_may_subdivide(&job->w)) return TXM_OK;
-    job->cut--; /* too coarse: once more, at four times the number */
+    job->cut--; /* too coarse: try again with four times the number */
     job->stage = TMR_STAGE_LATTICE;
     txm_arena_free(&job->first);
     memset(&job->w.m, 0, sizeof job->w.m);
@@ -5458,8 +5466,8 @@ static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
     return status;
 }
 
-/* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
-   surface bends. *retries: 0 if nothing is left to try. */
+/* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
+   with shorter edges where the surface bends. *retries receives 0 if nothing is left to try. */
 static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     const int coarse = job->w.line_scale > 1;
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
@@ -5469,7 +5477,7 @@ static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
     if (coarse) {
-        job->w.line_scale = 1; /* lines too coarse for what lies between them */
+        job->w.line_scale = 1; /* lines were too coarse for the inside        */
     } else if (quartered) {
         job->cut--;
     } else {
@@ -5484,7 +5492,8 @@ static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     return TXM_OK;
 }
 
-/* Finish, and see that nothing is turned over or crosses: a result that is not sound never leaves. */
+/* Finish, and check that no triangle is inverted or crosses another one: a result that is not sound
+   is never returned. */
 static txm_status tmr_job_finish(trimesh_job *job) {
     int again, crosses = 0;
     txm_status status = tmr_polish(&job->w, (int32_t)job->desc.vertices, &job->scratch);
@@ -5511,19 +5520,19 @@ static txm_status tmr_job_finish(trimesh_job *job) {
 }
 
 static const char *tmr_stage_name(int stage) {
-    static const char *const names[] = {"mend",    "strew",     "join",   "repel",
+    static const char *const names[] = {"mend",    "sample",    "join",   "repel",
                                         "lattice", "subdivide", "finish", "finish"};
     return names[stage];
 }
 
-/* how much of the work is done, about */
+/* how much of the work is done, roughly */
 static float tmr_job_fraction(const trimesh_job *job) {
     static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
     const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
     return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
 }
 
-/* One stage or round. A failure is for good. */
+/* One stage or round. A job that has failed stays failed. */
 static txm_status tmr_job_advance(trimesh_job *job) {
     txm_status status = TXM_OK;
     if (job->status != TXM_OK) return txm_fail(&job->env, job->status, "the job has failed before");
@@ -5532,13 +5541,13 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     if (txm_progress(&job->env, tmr_job_fraction(job), tmr_stage_name(stage)))
         status = TXM_CANCELLED;
     else if (stage == TMR_STAGE_MEND) status = tmr_job_mend(job);
-    else if (stage == TMR_STAGE_STREW) status = tmr_job_strew(job);
+    else if (stage == TMR_STAGE_SAMPLE) status = tmr_job_sample(job);
     else if (stage == TMR_STAGE_JOIN) status = tmr_job_join(job);
     else if (stage == TMR_STAGE_REPEL) status = tmr_job_repel(job);
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
-    if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its flags are there */
+    if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its marks lie there */
     job->shown = stage;
     job->status = status;
     if (status == TXM_OUT_OF_MEMORY)
@@ -5549,14 +5558,14 @@ static txm_status tmr_job_advance(trimesh_job *job) {
 
 /* ---- what a viewer sees --------------------------------------------------------------------- */
 
-/* is vertex v of the mesh one of the points? Before they are joined only those strewn are. */
+/* is vertex v of the mesh one of the points? Before they are joined only the samples are. */
 static int tmr_is_point(const trimesh_job *job, int32_t v) {
     const tmr_mesh *m = &job->w.m;
     if (m->corner[v] < 0 || tmr_is_ghost(m, v)) return 0;
     return job->stage != TMR_STAGE_JOIN || job->t.keep[v];
 }
 
-static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_state *state) {
+static txm_status tmr_fill_points(trimesh_job *job, int32_t *number, trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
     size_t n = 0;
     for (int32_t v = 0; v < m->vertex_count; v++)
@@ -5576,7 +5585,7 @@ static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_sta
     return TXM_OK;
 }
 
-static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
+static txm_status tmr_fill_triangles(trimesh_job *job, const int32_t *number,
                                      trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
     size_t n = 0;
@@ -5593,7 +5602,7 @@ static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
     return TXM_OK;
 }
 
-static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
+static txm_status tmr_fill_state(trimesh_job *job, trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
     state->stage = tmr_stage_name(job->shown);
     state->round = job->round;
@@ -5603,9 +5612,9 @@ static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
     int32_t *number =
         (int32_t *)txm_arena_alloc(&job->view, (size_t)m->vertex_count, sizeof(int32_t));
     if (!number) return TXM_OUT_OF_MEMORY;
-    txm_status status = tmr_show_points(job, number, state);
+    txm_status status = tmr_fill_points(job, number, state);
     if (status == TXM_OK && job->stage != TMR_STAGE_JOIN)
-        status = tmr_show_triangles(job, number, state);
+        status = tmr_fill_triangles(job, number, state);
     return status;
 }
 
@@ -5618,7 +5627,7 @@ static int tmr_job_report(void *user, float fraction, const char *stage) {
     return job->progress(job->progress_user, job->fraction, stage);
 }
 
-/* Take the hooks of this call, not its allocator: the blocks are of the first one's. */
+/* Use the hooks of this call, but the allocator of trimesh_begin, which made the blocks. */
 static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
     const txm_env old = job->env;
     memset(&job->env, 0, sizeof job->env);
@@ -5679,7 +5688,7 @@ TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh
     if (!job || !state) return txm_fail(env, TXM_BAD_ARGUMENT, "job or state is NULL");
     tmr_job_enter(job, env);
     txm_arena_free(&job->view);
-    const txm_status status = tmr_show(job, state);
+    const txm_status status = tmr_fill_state(job, state);
     if (status != TXM_OK) {
         txm_arena_free(&job->view);
         memset(state, 0, sizeof *state);
@@ -5728,9 +5737,9 @@ TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, tr
 
 /* The new surface is retiled with points that come from three places: the old mesh, where it lies
    on the new surface; its lines, in the gaps between the old points there; and the rest of the
-   surface that no triangle of the old mesh covers. Then as in TRIMESH_REPEL: put into the mesh of
-   the surface, whose own vertices are taken out. The old mesh's edges are turned back to between its
-   points, those far from anything new are pinned, and what remains is relaxed.                  */
+   surface that no triangle of the old mesh covers. Then as in TRIMESH_REPEL these are put into the
+   mesh of the surface, whose own vertices are removed. Between old points the edges of the old mesh
+   are restored, points far from anything new are pinned, and the others are relaxed. */
 
 enum { TMR_LEAF = 4 }; /* triangles in a leaf of the tree */
 
@@ -5777,7 +5786,7 @@ static txm_status tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int3
             high = t->high[2 * i + 1];
             tmr_grow_box(&low, &high, t->low[2 * i + 2]);
             tmr_grow_box(&low, &high, t->high[2 * i + 2]);
-            if (t->low[2 * i + 2].x > t->high[2 * i + 2].x) { /* nothing in there */
+            if (t->low[2 * i + 2].x > t->high[2 * i + 2].x) { /* nothing in it    */
                 low = t->low[2 * i + 1];
                 high = t->high[2 * i + 1];
             }
@@ -5836,12 +5845,12 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, dou
     return best;
 }
 
-/* ---- what is there: points in a grid --------------------------------------------------------- */
+/* ---- points in a grid ------------------------------------------------------------------------- */
 
 typedef struct tmr_grid {
     double cell;
     int32_t mask;
-    int32_t *head; /* 1 per slot: the last vertex put there, -1 */
+    int32_t *head; /* 1 per slot: the last vertex put there, or -1 */
     int32_t *next; /* 1 per vertex of the mesh: the one before it */
 } tmr_grid;
 
@@ -5873,8 +5882,8 @@ static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
     *head = v;
 }
 
-/* Is a point of the grid nearer to p than reach, on the same side of a sheet? was: NULL, or points
-   with a number there do not count. */
+/* Is a point of the grid nearer to p than reach, on the same side of a sheet? was: NULL, or 1 per
+   vertex: those with a number >= 0 do not count. */
 static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, txm_dvec3 p,
                           txm_dvec3 n, double reach) {
     const double k = fmin(ceil(reach / g->cell), 8);
@@ -5904,7 +5913,7 @@ typedef struct tmr_update {
     tmr_surface s;
     tmr_lines l;
     tmr_work w;
-    tmr_strewn t;
+    tmr_sampling t;
     tmr_tree tree;       /* of the surface                                                       */
     tmr_tree old_tree;
     tmr_grid grid;
@@ -5915,7 +5924,7 @@ typedef struct tmr_update {
     int32_t *was;        /* 1 per vertex of the new one: its vertex in the old one, -1            */
     int32_t *face;       /* 1 per vertex of the old mesh: the face it lies in, -1                 */
     txm_dvec3 *place;    /* 1 per vertex of the old mesh: where                                  */
-    int32_t *segment;    /* 1 per corner of the surface: the segment that its edge is, -1          */
+    int32_t *segment; /* 1 per corner of the surface: the segment on its edge, -1               */
     double *way;         /* 1 per vertex of the old mesh on a line: distance from its beginning  */
     int32_t *level;      /* 1 per vertex of the mesh: edges to the nearest new one                 */
     txm_arena input, first, scratch;
@@ -5974,7 +5983,7 @@ static void tmr_find_segment(tmr_update *u, int32_t i, int32_t face) {
     }
 }
 
-/* Is old vertex i a corner that is one again? */
+/* If old vertex i, a corner, lies at a corner of the new surface, map it there. */
 static void tmr_find_corner(tmr_update *u, int32_t i, int32_t face) {
     const double reach = u->tolerance * u->t.length;
     for (int k = 0; k < 3; k++) {
@@ -5986,12 +5995,12 @@ static void tmr_find_corner(tmr_update *u, int32_t i, int32_t face) {
     }
 }
 
-/* Where do the old vertices lie on the new surface? Of those on lines face is the segment. */
+/* Where do the old vertices lie on the new surface? For those on lines `face` is the segment. */
 static void tmr_find_old(tmr_update *u) {
     for (int32_t i = 0; i < (int32_t)u->old->vertex_count; i++) {
         tmr_place at;
         const int kind = u->old->kinds[i];
-        const int sharp = kind != TRIMESH_FREE; /* the normal there is one of two */
+        const int sharp = kind != TRIMESH_FREE; /* there are two normals there    */
         u->now[i] = u->face[i] = -1;
         const int32_t f = tmr_tree_nearest(&u->tree, u->old_point[i], tmr_old_normal(u, i),
                                            sharp ? -2 : 0.7, u->tolerance * u->t.length, &at);
@@ -6007,7 +6016,7 @@ static void tmr_find_old(tmr_update *u) {
 
 /* ---- the update: lines ----------------------------------------------------------------------- */
 
-/* Old vertices on lines in their order along them: pairs[].value. How many. */
+/* List the old vertices on lines in their order along them in pairs[].value. Returns how many. */
 static size_t tmr_order_on_lines(const tmr_update *u, txm_pair *pairs, txm_pair *room) {
     size_t n = 0;
     for (size_t i = 0; i < u->old->vertex_count; i++) {
@@ -6022,7 +6031,7 @@ static size_t tmr_order_on_lines(const tmr_update *u, txm_pair *pairs, txm_pair 
     return n;
 }
 
-/* Fill the gap between two ways on a line with evenly spread new ones. */
+/* Fill the gap between two places on a line with evenly spaced new ones. */
 static int32_t tmr_fill_gap(tmr_update *u, double from, double to, double spacing, int32_t count,
                             int32_t room, int32_t *olds) {
     const double steps = floor((to - from) / spacing + 0.5);
@@ -6033,7 +6042,7 @@ static int32_t tmr_fill_gap(tmr_update *u, double from, double to, double spacin
     return count;
 }
 
-/* Points on a line: old ones that keep their distance, the gaps filled. */
+/* Points on a line: the old ones that are far enough apart, and new ones in the gaps. */
 static txm_status tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, size_t count,
                                   int32_t *olds, int32_t *vertices, int32_t room) {
     const double length = tmr_line_weight(&u->s, &u->l, line);
@@ -6064,7 +6073,7 @@ static txm_status tmr_update_line(tmr_update *u, int32_t line, const txm_pair *p
             olds[n++] = -1;
         }
         n = tmr_fill_gap(u, last, length, steps ? length / steps : spacing, n, room, olds);
-    } else { /* round the end of the ring to the first one; those beyond it come first again */
+    } else { /* across the end of the loop to the first one; those beyond the end move to the front */
         n = tmr_fill_gap(u, last, begin + length, spacing, n, room, olds);
         int32_t over = 0;
         while (over < n && u->t.ways[n - 1 - over] >= length) over++;
@@ -6111,7 +6120,7 @@ static txm_status tmr_update_lines(tmr_update *u) {
 
 /* ---- the update: points on faces -------------------------------------------------------------- */
 
-/* Put the old vertices on faces into the mesh, face by face, but for those in the way of lines. */
+/* Put the old vertices on faces into the mesh, face by face, except those too near to lines. */
 static txm_status tmr_update_old(tmr_update *u) {
     const size_t n = u->old->vertex_count;
     size_t count = 0;
@@ -6151,8 +6160,8 @@ static int tmr_is_covered(const tmr_update *u, txm_dvec3 p, txm_dvec3 n, double 
     return 1;
 }
 
-/* Strew new points where nothing is: many are tried, along the faces, and those taken that keep
-   the distance to all others. first: covered places are left out. limit: not more points in all. */
+/* Put new points where there are none: try many places, along the faces, and take those that keep
+   the distance from all others and that the old mesh does not cover. limit: most points in all. */
 static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double distance,
                                  int32_t *live, int32_t limit, uint64_t stream) {
     const double area = 0.86602540378443865 * u->t.length * u->t.length; /* of one point */
@@ -6164,7 +6173,7 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
         const int32_t tries = run < 1 ? 0 : run > 1e8 ? 100000000 : (int32_t)run;
         run -= tries;
         for (int32_t k = 0; k < tries && *live < limit; k++) {
-            const txm_dvec3 p = tmr_strew_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
+            const txm_dvec3 p = tmr_sample_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
             const tmr_place at = tmr_on_face(&u->s, f, p);
             const double length = u->t.length * tmr_scale_at(&u->s, &at);
             if (tmr_is_crowded(&u->grid, &u->w, NULL, p, n, distance * length)) continue;
@@ -6174,12 +6183,12 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
             tmr_grid_add(&u->grid, u->w.m.p[v], v);
             ++*live;
         }
-        if (i % 65536 == 65535 && txm_progress(u->w.env, 0.3f, "strew")) return TXM_CANCELLED;
+        if (i % 65536 == 65535 && txm_progress(u->w.env, 0.3f, "sample")) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
 
-static txm_status tmr_update_strew(tmr_update *u) {
+static txm_status tmr_update_sample(tmr_update *u) {
     /* in falling distance: a random packing at 0.78 is as dense as the lattice at 1 */
     static const double distance[] = {0.85, 0.75, 0.65, 0.55};
     const size_t n = (size_t)u->s.face_count;
@@ -6199,7 +6208,7 @@ static txm_status tmr_update_strew(tmr_update *u) {
     return status;
 }
 
-/* ---- the update: as it was where nothing is new ------------------------------------------------- */
+/* ---- the update: what stays as it was ----------------------------------------------------------- */
 
 static uint64_t tmr_edge_key(int32_t a, int32_t b) {
     const uint64_t x = (uint64_t)(a < b ? a : b), y = (uint64_t)(a < b ? b : a);
@@ -6213,8 +6222,8 @@ static int tmr_has_edge(const uint64_t *table, size_t mask, int32_t a, int32_t b
     return 0;
 }
 
-/* Turn edges between old vertices to what they were. */
-static txm_status tmr_turn_back(tmr_update *u) {
+/* Flip edges between old vertices to restore those of the old mesh. */
+static txm_status tmr_restore_edges(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const size_t n = 3 * u->old->triangle_count;
     size_t size = 16;
@@ -6237,7 +6246,7 @@ static txm_status tmr_turn_back(tmr_update *u) {
             const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
             tmr_quad q;
             if (u->was[d] < 0 || u->was[e] < 0 || !tmr_has_edge(table, size - 1, d, e)) continue;
-            if (tmr_has_edge(table, size - 1, a, b) || !tmr_look_at_flip(&u->w, c, &q)) continue;
+            if (tmr_has_edge(table, size - 1, a, b) || !tmr_measure_flip(&u->w, c, &q)) continue;
             if (q.after <= 0 && q.after <= q.before) continue;
             tmr_flip(m, c);
             turned++;
@@ -6247,8 +6256,8 @@ static txm_status tmr_turn_back(tmr_update *u) {
     return TXM_OK;
 }
 
-/* Pin the old vertices farther than the radius, in edges, from every new one and every place that
-   an old one has gone from. */
+/* Pin the old vertices that are farther than the radius, in edges, from every new vertex and from
+   every place where an old one is gone. */
 static void tmr_pin(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const int32_t most = (int32_t)ceil(u->radius);
@@ -6301,7 +6310,7 @@ static txm_status tmr_update_alloc(tmr_update *u) {
     return status;
 }
 
-/* Points that the surface holds at edge length u->t.length. */
+/* How many points the surface has at edge length u->t.length. */
 static double tmr_points_for(const tmr_update *u) {
     const double scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     double area = 0, border = 0;
@@ -6335,16 +6344,16 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     u->t.desc = &u->desc;
     u->t.length = length;
     if (u->desc.vertices > 0)
-        u->t.length = tmr_strewn_length(&u->s, &u->l,
-                                        u->desc.line_spacing > 0 ? u->desc.line_spacing : 1,
-                                        (double)u->desc.vertices);
+        u->t.length =
+            tmr_sampling_length(&u->s, &u->l, u->desc.line_spacing > 0 ? u->desc.line_spacing : 1,
+                                (double)u->desc.vertices);
     u->w.length = u->t.length;
     u->w.line_scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double points = fmax(tmr_points_for(u), (double)u->old->vertex_count);
     if (points > TMR_MOST / 4)
         return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
-    status = tmr_copy_surface(&u->w, tmr_strewn_room(floor(2 * points)), &u->first);
-    if (status == TXM_OK) status = tmr_strewn_alloc(&u->t, &u->scratch);
+    status = tmr_copy_surface(&u->w, tmr_sampling_room(floor(2 * points)), &u->first);
+    if (status == TXM_OK) status = tmr_sampling_alloc(&u->t, &u->scratch);
     if (status == TXM_OK) status = tmr_update_alloc(u);
     if (status == TXM_OK)
         status =
@@ -6383,7 +6392,7 @@ static txm_status tmr_update_relax(tmr_update *u) {
     return TXM_OK;
 }
 
-/* Old positions bit for bit, and the map. */
+/* Make the result; pinned vertices keep their positions bit for bit. */
 static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out) {
     const tmr_mesh *m = &u->w.m;
     trimesh_mesh *mesh = NULL;
@@ -6412,11 +6421,11 @@ static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out) {
 static txm_status tmr_update_run(tmr_update *u, trimesh_report *report, trimesh_mesh **out) {
     txm_status status = tmr_update_begin(u, report);
     if (status != TXM_OK) return status;
-    if (txm_progress(u->w.env, 0.2f, "strew")) return TXM_CANCELLED;
-    if ((status = tmr_update_strew(u)) != TXM_OK) return status;
+    if (txm_progress(u->w.env, 0.2f, "sample")) return TXM_CANCELLED;
+    if ((status = tmr_update_sample(u)) != TXM_OK) return status;
     if (txm_progress(u->w.env, 0.4f, "join")) return TXM_CANCELLED;
-    if ((status = tmr_take_out(&u->w, u->t.keep, 0.4f)) != TXM_OK) return status;
-    if ((status = tmr_turn_back(u)) != TXM_OK) return status;
+    if ((status = tmr_remove_vertices(&u->w, u->t.keep, 0.4f)) != TXM_OK) return status;
+    if ((status = tmr_restore_edges(u)) != TXM_OK) return status;
     tmr_pin(u);
     if ((status = tmr_update_relax(u)) != TXM_OK) return status;
     return tmr_update_write(u, out);

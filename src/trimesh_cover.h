@@ -97,14 +97,14 @@ extern "C" {
 
 /* ---- meshes ------------------------------------------------------------------------------- */
 
-/* All functions take any mesh of triangles, a result of trimesh_retile or your own: borders,
-   several pieces, edges with more than two triangles and unequal winding are allowed, holes in the
-   numbering too; two triangles are neighbours if they share two vertex numbers. Outputs are arrays
-   of the caller's, of the size stated, untouched after an error unless said otherwise. Every call
-   returns TXM_OK; TXM_BAD_ARGUMENT for a NULL, a field outside its range, an index that is not below
+/* All functions take any mesh of triangles, a result of trimesh_retile or your own. Borders, several
+   pieces, edges with more than two triangles, inconsistent orientation and unused vertices are
+   allowed; two triangles are neighbours if they share two vertex numbers. Outputs are arrays of the
+   caller's, of the size stated, untouched after an error unless said otherwise. Every call returns
+   TXM_OK; TXM_BAD_ARGUMENT for a NULL, a field outside its range, an index that is not below
    vertex_count, a position that is not finite; TXM_TOO_LARGE above TRIMESH_MAX_VERTICES vertices
-   or triangles; TXM_OUT_OF_MEMORY; TXM_CANCELLED; what else, it says. A mesh without triangles is
-   allowed and gives nothing. Same arguments, same bytes, whatever the threads. */
+   or triangles; TXM_OUT_OF_MEMORY; TXM_CANCELLED; further statuses are listed with the call. A mesh
+   without triangles is allowed and gives no output. */
 
 /* Smooth unit normals of a mesh that has none, 3 floats per vertex; 0 0 0 at a vertex without
    triangles of an area above 0. Each triangle counts by sin(angle at the vertex) / (product of the
@@ -125,27 +125,26 @@ typedef struct trimesh_values {
 } trimesh_values;
 
 /* Values at points of the input: a + u (b - a) + v (c - a) of the three corners' values a, b, c.
-   Right for what is continuous, colours and weights; for texture coordinates with seams there is
-   the next function.
+   For what is continuous: colours, weights; for texture coordinates with seams use the next function.
 
-   input    as it was given to trimesh_retile (positions are not looked at)
+   input    the mesh that trimesh_retile was given (positions are not used)
    sources  count of them, a result's: mesh->sources and mesh->vertex_count
    out      channels floats per source
    cost     O(count)                                                                           */
 TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trimesh_values *values,
-                                        const txm_mesh_place *sources, size_t count, txm_env *env,
-                                        float *out);
+                                              const txm_mesh_place *sources, size_t count,
+                                              txm_env *env, float *out);
 
 /* Values with seams (charts of texture coordinates) at the corners of a result's triangles, so that
-   no triangle spans two charts. A seam is an edge of the input whose two triangles have other
-   values there, or that has no or several triangles on its other side; vertices in equal places are
-   one, so that meshes cut along their seams (glTF) do as well.
+   no triangle spans two charts. A seam is an edge of the input whose two triangles have different
+   values there, or that has no or several triangles on its other side. Vertices in equal places
+   count as one, so that meshes cut along their seams (glTF) work as well.
 
-   Each triangle takes the chart of the input at its middle: from the source of its corner 0 a path
-   leads there, over seams, in the plane through both that stands upright on the triangle. From the
-   middle another such path leads to each corner, and ends where it meets a seam: a corner beyond
-   takes the value at that place. So along a seam charts end up to a triangle early or late, as the
-   triangles lie; nothing is ever interpolated across.
+   Each triangle takes the chart of the input at its middle: a path leads there from the source of its
+   corner 0, across seams, in the plane through both places that is perpendicular to the triangle.
+   From the middle another such path leads to each corner, and ends where it meets a seam: a corner
+   beyond the seam takes the value at that place. So along a seam charts end up to a triangle early or
+   late, depending on the triangles; values are never interpolated across a seam.
 
                chart 1    s   chart 2
                +----------s------+          m middle, in chart 1; s the seam
@@ -153,37 +152,39 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
                  \        s    /            where the path meets s
                   \       s   /
 
-   input    as it was given to trimesh_retile, sound enough: degenerate triangles only end paths
-   mesh     the result (its indices; positions are not looked at)
+   input    the mesh that trimesh_retile was given; degenerate triangles only end paths
+   mesh     the result (its indices; positions are not used)
    sources  1 per vertex of mesh
    out      channels floats per corner, 3 corners per triangle, in the order of mesh->indices
    cost     O(input) for the neighbours, then for each triangle of mesh as many steps as input
             triangles lie on its paths; 75 bytes per triangle of the input, 20 per vertex       */
-TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, const trimesh_values *values,
-                                                const txm_mesh *mesh, const txm_mesh_place *sources,
-                                                txm_env *env, float *out);
+TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input,
+                                                      const trimesh_values *values,
+                                                      const txm_mesh *mesh,
+                                                      const txm_mesh_place *sources, txm_env *env,
+                                                      float *out);
 
 /* From values at corners to the vertex arrays of a renderer: a vertex whose corners differ is
    doubled, one copy for each different value (bits are compared, -0 equals 0). New vertices are in
    the order of the old ones; old ones without triangles are left out.
 
-   mesh         indices and counts; positions are not looked at and may be NULL
+   mesh         indices and counts; positions are not used and may be NULL
    values       channels floats per corner
    new_indices  receives 3 per triangle, or NULL: count only
-   corners      receives for each new vertex one of its corners, or NULL; room for 3 * triangle_count
-                is always enough, *count of a first call exactly. With c = corners[i], new vertex i is
-                a copy of vertex mesh->indices[c] with the value at values + channels * c.
+   corners      receives for each new vertex one of its corners, or NULL; 3 * face_count entries are
+                always enough, *count of a first call exactly. With c = corners[i], new vertex i
+                is a copy of vertex mesh->indices[c] with the value at values + channels * c.
    count        receives the number of new vertices
    cost         O(triangles), 60 bytes each                                                     */
 TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const float *values,
-                                             int channels, txm_env *env, uint32_t *new_indices,
-                                             uint32_t *corners, size_t *count);
+                                                   int channels, txm_env *env, uint32_t *new_indices,
+                                                   uint32_t *corners, size_t *count);
 
 /* ---- texturing [1, section 3.4] ------------------------------------------------------------ */
 
-/* The thesis's atlas: equilateral triangles side by side in one picture, each in a cell with a gutter
-   around. With h = size sqrt(3) / 2, in pixels from the top left corner of the picture, corners
-   0, 1, 2 of patch p lie at
+/* The thesis's atlas: equilateral triangles side by side in one picture, each in a cell with a
+   gutter around it. With h = size sqrt(3) / 2, in pixels from the top left corner of the picture,
+   corners 0, 1, 2 of patch p lie at
 
        x = p pitch + gutter + (0, size, size / 2),   y = height - gutter - (0, 0, h)
 
@@ -199,17 +200,17 @@ typedef struct trimesh_atlas {
 /* Lay out an atlas. count 1..256, 0 = 4; size (pixels a side) 2..16384, 0 = 256; gutter (pixels)
    0..size, -1 = 8. */
 TRIMESH_COVER_API txm_status trimesh_atlas_make(int count, int size, int gutter, txm_env *env,
-                                          trimesh_atlas *atlas);
+                                                trimesh_atlas *atlas);
 
 /* Texture coordinates u v of the corners 0, 1, 2 of one patch, or, with patch -1, of all: 6 floats
-   each, what trimesh_place_tiles takes. 0 for a bad number. */
+   each, as trimesh_place_tiles takes them. Returns 0 for a bad patch number. */
 TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, float *uv);
 
 typedef struct trimesh_choose_desc {
     int patches;   /* how many there are to choose from, 1..65536; 0 = 4                          */
-    int rotations; /* 1: corner k always shows corner k; 3: also turned; 0 = 3                    */
-    int repeat;    /* 0: neighbours differ in patch where they can, else in rotation; non-zero: all
-                      at random, as in [1]                                                        */
+    int rotations; /* 1: corner k always shows corner k; 3: all three rotations; 0 = 3            */
+    int repeat;    /* 0: neighbours have different patches where possible, else different rotations;
+                      non-zero: all at random, as in [1]                                          */
     uint64_t seed; /* another number, another choice                                              */
 } trimesh_choose_desc;
 
@@ -222,7 +223,7 @@ typedef struct trimesh_choose_desc {
               may be NULL
    cost       O(triangles), 60 bytes each; with repeat: none                                     */
 TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_choose_desc *desc,
-                                      txm_env *env, int *patches, int *rotations);
+                                            txm_env *env, int *patches, int *rotations);
 
 /* Texture coordinates of all corners from the tile and rotation of each triangle.
 
@@ -230,13 +231,13 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
                      NULL = all 0
    tile_uv           6 floats per tile, its corners 0, 1, 2: of trimesh_atlas_uv, or the first three
                      of textiles_place; tile_count tiles
-   uv                receives 6 floats per triangle: corner k gets corner (k + rotation) mod 3 of the
-                     tile. Double vertices by trimesh_split_corners with 2 channels.           */
+   uv                receives 6 floats per triangle: corner k gets corner (k + rotation) mod 3 of
+                     the tile. trimesh_split_corners with 2 channels makes vertices of them     */
 TRIMESH_COVER_API txm_status trimesh_place_tiles(size_t triangle_count, const int *tiles,
-                                           const int *rotations, const float *tile_uv,
-                                           size_t tile_count, txm_env *env, float *uv);
+                                                 const int *rotations, const float *tile_uv,
+                                                 size_t tile_count, txm_env *env, float *uv);
 
-/* For edge-matching tiles of any make: a colour for every edge, by hash of its two vertices and the
+/* For any edge-matching tiles: a colour for every edge, by hash of its two vertices and the
    seed, and a direction, from its lower to its higher vertex number. Side k of a triangle runs from
    corner k to corner (k + 1) mod 3. The same hash as textiles_assign_triangles begins with (which
    then recolours edges so that equal tiles do not meet).
@@ -244,23 +245,23 @@ TRIMESH_COVER_API txm_status trimesh_place_tiles(size_t triangle_count, const in
    colors       how many, 1..65536
    edge_colors  receives 3 per triangle: 0..colors - 1, equal on both sides of an edge
    directions   receives 3 per triangle: +1 if the side runs along the edge's direction, -1 against
-                it; may be NULL. The three of a triangle never run one way round.               */
+                it; may be NULL. Those of a triangle are never all +1 or all -1                 */
 TRIMESH_COVER_API txm_status trimesh_edge_colors(const txm_mesh *mesh, int colors, uint64_t seed,
-                                           txm_env *env, int *edge_colors, int *directions);
+                                                 txm_env *env, int *edge_colors, int *directions);
 
 /* A random colour 0..count - 1 for every vertex, as in [1] (with 3). count 1..65536; 0 = 3. */
 TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int count, uint64_t seed,
-                                             txm_env *env, int *colors);
+                                                   txm_env *env, int *colors);
 
-/* A colour for every vertex so that the ends of every edge differ. Greedy, in smallest-last order [5]:
-   the vertex with the fewest neighbours left is taken away, over and over, and the last one taken is
-   coloured first. At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
+/* A colour for every vertex so that the ends of every edge differ. Greedy, in smallest-last order
+   [5]:    the vertex with the fewest neighbours left is removed, over and over, and the last one
+   removed is coloured first. At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
 
    colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
    count   receives how many colours were used; may be NULL
    cost    O(triangles), 60 bytes each and 16 per vertex                                        */
 TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env *env, int *colors,
-                                             int *count);
+                                                   int *count);
 
 /* ---- geometry on triangles ----------------------------------------------------------------- */
 
@@ -270,25 +271,25 @@ typedef struct trimesh_point {
     float u, v;         /* 0 or more, u + v at most 1; exactly 0 or 1 on the sides              */
     float height;       /* over the surface, in edge lengths, -1000..1000                       */
     float scale;        /* size, in edge lengths, 0..1000; 0 = 1                                */
-    float rotation[4];  /* quaternion x, y, z, w that turns the thing in the frame x, y, z of the
-                           reference triangle, of any length; 0 0 0 0 = as it is                */
-    uint32_t prototype; /* which thing, handed through                                          */
+    float rotation[4];  /* quaternion x, y, z, w that rotates the thing in the frame x, y, z of the
+                           reference triangle, of any length; 0 0 0 0 = none                    */
+    uint32_t prototype; /* which thing; copied to the instances                                 */
 } trimesh_point;
 
-/* What is put on a triangle. Where desc->density thins it, points are taken from the front of the
-   list, so put them in an order in which every beginning is spread well (trimesh_order_patch).
+/* What is put on a triangle. With desc->density only some points are used, from the front of the
+   list, so order them such that the first n are well spread for every n (trimesh_order_patch).
 
-   Points on the sides (within 10^-6 of an edge) belong to one triangle only: an edge to the first
-   (lowest) of its triangles, a vertex to the first of its. So that edges have neither gaps nor
-   doubles, have the same points on all three sides, at t and 1 - t alike, and all corners or none,
-   in all patches of a call; then every edge and vertex of the mesh shows them once, whatever patches
-   and rotations meet there. */
+   Points on the sides (within 10^-6 of an edge) are placed once: those on an edge by the first
+   (lowest) of its triangles, those on a vertex by the first of its triangles. To avoid gaps and
+   doubles at edges, give all patches of a call the same points on all three sides, symmetric under
+   t to 1 - t, and all corners or none; then every edge and vertex of the mesh shows them once,
+   whatever patches and rotations meet there. */
 typedef struct trimesh_patch {
     const trimesh_point *points;
     size_t count; /* 0..2^20 */
 } trimesh_patch;
 
-/* A thing in space: place it by scaling, then turning, then moving. */
+/* A thing in space: scaled, then rotated, then moved. */
 typedef struct trimesh_instance {
     float position[3];
     float rotation[4];  /* unit quaternion x, y, z, w: glTF's order; w >= 0                     */
@@ -305,77 +306,77 @@ typedef struct trimesh_scatter_desc {
     const int *choices;           /* 1 per triangle: its patch; NULL = at random                  */
     const int *rotations;         /* 1 per triangle, 0..2: corner k of the triangle is corner
                                      (k + rotation) mod 3 of the patch; NULL = at random          */
-    float unit;   /* length of an edge, for heights and scales: above 0, in units of the mesh; 0 =
-                     each triangle's own, that of the equilateral triangle of its area            */
+    float unit;   /* edge length for heights and scales: above 0, in units of the mesh; 0 = that of
+                     the equilateral triangle of each triangle's area                             */
     float height; /* added to the height of every point, in edge lengths, -1000..1000             */
-    int inside;   /* non-zero: the other side. Heights count against the normals, and things are
-                     turned half round about their x axis, z against the normal                   */
-    float curve;  /* 0..1: 0 = things stand on the flat triangles, 1 = on the curved surface that the
-                     normals tell of (Phong tessellation [4] with half its weight, which is what a sphere
-                     needs); clamped to 1 edge                                                    */
-    float density; /* things per unit of area at height `height` (on side `inside`): patches are
-                     thinned for it, see below; 0 = all points of the patches on every triangle   */
-    int spin;      /* non-zero: every thing is turned by a random angle about its own z axis      */
+    int inside;   /* non-zero: the other side. Heights are measured against the normals, and things
+                     are rotated by 180 degrees about their x axis, z against the normal          */
+    float curve;  /* 0..1: 0 = things stand on the flat triangles, 1 = on the curved surface that
+                     the normals describe (Phong tessellation [4] with half its weight, which is
+                     right for a sphere); the shift is at most 1 edge                             */
+    float density; /* things per unit of area at height `height` (on side `inside`): then patches
+                     are used in part, see below; 0 = all points of the patches on every triangle */
+    int spin;      /* non-zero: every thing is rotated by a random angle about its own z axis     */
     const float *mix; /* shares, mix_count of them, 0 or more: prototypes 0..mix_count - 1 are drawn
                      at random in these proportions; NULL = the points' own                       */
     int mix_count;    /* 0..256                                                                   */
     uint64_t seed;    /* another number, other choices                                            */
 } trimesh_scatter_desc;
 
-/* Put a patch on every triangle of a mesh, and list what stands where.
+/* Put a patch on every triangle of a mesh, and list the instances.
 
    Position: the point (u, v) of the triangle (moved by curve), plus height times the unit normal
    interpolated there. Orientation: z along that normal, x along the direction of the patch's x axis
-   on the triangle: of the affine map from the reference triangle the rotation nearest to it, made
-   perpendicular to z. So frames go on smoothly across edges, up to the turn by a multiple of
+   on the triangle (by the rotation nearest to the affine map from the reference triangle), made
+   perpendicular to z. So frames are continuous across edges, up to a rotation by a multiple of
    60 degrees. Scale: the point's times the edge length.
 
-   With density, triangle t of area A(t) (its corners moved along their normals to the height) gets
-   the beginning of its patch that comes nearest to density A(t) + e things, where e is the error
-   left by the triangle before, in the order of a space-filling (Morton) curve; a point on a side
-   counts 1/2, on a corner 1/6, as so many triangles share it. So counts are right in any region, to
-   a thing or so per side of it. The patches need enough points for the largest triangle: a third
-   more than for the mean do for meshes of trimesh_retile.
+   With density, triangle t of area A(t) (its corners moved along their normals to the height) gets as
+   many points from the front of its patch as come nearest to density A(t) + e things, where e is the
+   error left by the previous triangle along a space-filling (Morton) curve; a point on a side counts
+   1/2, on a corner 1/6, since that many triangles share it. So the count in any region is right to
+   about one thing per side of the region. The patches need enough points for the largest triangle: for
+   meshes of trimesh_retile a third more than for the mean are enough.
 
    out       receives *count instances, triangle by triangle in the patch's order; NULL: count only.
              After TXM_CANCELLED it may be filled in part
    capacity  how many instances out has room for
-   count     receives how many there are, also after TXM_TOO_LARGE for want of room
+   count     receives how many there are, also after TXM_TOO_LARGE because of capacity
    return    also TXM_TOO_SMALL: the patches have too few points for this density, the message says
              how many the largest triangle needs; TXM_TOO_LARGE: more than capacity or 2^31
    cost      O(triangles + instances), 0.1 to 0.2 us per instance; 36 bytes per triangle, 36 per
-             vertex without normals; with points on the sides 50 more per triangle. The parallel-for
-             hook spreads the triangles                                                         */
+             vertex without normals; with points on the sides 50 more per triangle               */
 TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
-                                       trimesh_instance *out, size_t capacity, size_t *count);
+                                             trimesh_instance *out, size_t capacity, size_t *count);
 
-/* position + scale (point turned): where a point of the thing comes to lie. out may be point. */
+/* position + scale (rotated point): where a point of the thing is in space. out may be point. */
 TRIMESH_COVER_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
-                                        float out[3]);
+                                              float out[3]);
 
 typedef struct trimesh_patch_desc {
     int points;      /* how many per triangle of a mesh, on average, 1..4096; 0 = 32              */
-    int hexagonal;   /* non-zero: the triangular lattice with m steps along a side, m^2 / 2 points per
-                        triangle, m = the nearest to sqrt(2 points); then rotations do not show   */
+    int hexagonal;   /* non-zero: the triangular lattice with m steps along a side, m^2 / 2 points
+                        per triangle, m = the nearest to sqrt(2 points); rotations do not show    */
     int iterations;  /* rounds of repulsion, 1..1000; 0 = 100                                     */
-    uint64_t seed;   /* another number, another patch; all with the same `points` go together     */
+    uint64_t seed;   /* another number, another patch; all with the same `points` fit together    */
 } trimesh_patch_desc;
 
-/* Make a patch of evenly spread points, in an order for thinning. m + 1 points lie on each side, the
-   corners included, at equal steps, m as above, so that all patches of the same `points` join
-   without gaps in all rotations; those inside repel each other and these, with a force falling to
-   zero at the radius of influence [1, equation 3.1]. Heights are 0, scales 1, prototypes 0.
+/* Make a patch of evenly spread points, ordered for use in part. m + 1 points lie on each side,
+   including the corners, at equal steps, m as above, so that all patches of the same `points` join
+   without gaps in all rotations. Those inside repel each other and are repelled by those on sides,
+   with a force that falls to zero at the radius of influence [1, equation 3.1]. Heights are 0,
+   scales 1, prototypes 0.
 
-   points    receives *count points; NULL: count only. points + 2 m + 2 is always room enough
+   points    receives *count points; NULL: count only. points + 2 m + 2 are always enough
    capacity  how many points it has room for
-   return    also TXM_TOO_LARGE for want of room; count is right then
+   return    also TXM_TOO_LARGE if capacity is too small; count is right then
    cost      O(count^2 + iterations count), 0.1 s for 1000                                       */
 TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
-                                               trimesh_point *points, size_t capacity,
-                                               size_t *count);
+                                                     trimesh_point *points, size_t capacity,
+                                                     size_t *count);
 
-/* Put the points of a patch of your own in an order for thinning: each next point the one furthest
-   from those before, neighbouring triangles taken for mirror images. O(count^2); count up to 16384.
+/* Order the points of a patch of your own for use in part: each next point is the one furthest from
+   those before, with neighbouring triangles treated as mirror images. O(count^2); count up to 16384;
    8 bytes each. */
 TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t count, txm_env *env);
 

@@ -35,31 +35,31 @@
      }
 
    HOW IT WORKS
-     The input is mended (welded, wound alike, freed of double and empty triangles), creases and
-     borders become lines, each border loop is closed by a ghost vertex. The mesh that changes starts
-     as a copy of the surface and is a closed manifold at every moment: it is only ever split,
-     collapsed (under the link condition) and flipped, so that its topology cannot go wrong.
-       TRIMESH_LATTICE (default): the copy is brought to about twice the number of vertices; a
+     The input is mended (welded, consistently oriented, freed of duplicate triangles and of those
+     without area), creases and borders become lines, each border loop is closed by a ghost vertex.
+     The working mesh starts as a copy of the surface and is a closed manifold at every moment: it is
+     only split, collapsed (under the link condition) and flipped, so its topology cannot change.
+       TRIMESH_LATTICE (default): the copy is resampled to about twice the number of vertices; a
      six-fold direction field and triangular lattice points are found on a hierarchy [3]; edges whose
-     ends share a lattice point collapse. From 20,000 vertices on this is done at a quarter of the
-     number and each triangle cut in four.
-       TRIMESH_REPEL: the method of [1] and [2]: points strewn by area repel each other along the
-     surface, and replace the old vertices by mutual tessellation, which cannot fail where [1]'s
-     greedy triangulation can. For viewers, and for surfaces that are edited (trimesh_update).
-       Then both are relaxed - each triangle pulls its corners towards the equilateral triangle
-     that fits it best, of the wanted size - flipped, brought to the exact number, and fitted: a
-     vertex moves off the surface by the mean height of the surface over its triangles, so that
-     volume is kept. At last crossings and turned triangles are looked for and smoothed away; a
-     result that is not sound is never handed out.
+     ends share a lattice point collapse. From 20,000 vertices on this is done for a quarter of the
+     number, and then each triangle is cut in four.
+       TRIMESH_REPEL: the method of [1] and [2]: points sampled by area repel each other along the
+     surface and replace the old vertices by mutual tessellation, which cannot fail as [1]'s greedy
+     triangulation can. For viewers, and for surfaces that are edited (trimesh_update).
+       Then with both methods the mesh is relaxed (each triangle pulls its corners towards the best
+     fitting equilateral triangle of the wanted size) and flipped [4], brought to the exact number of
+     vertices, and fitted: a vertex moves off the surface by the mean height of the surface over its
+     triangles, which keeps the volume. Last, crossing and inverted triangles are searched for and
+     smoothed away; a result that is not sound is never returned.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
-     TRIMESH_RELAX_STATIC         every function static to the including file (set it everywhere)
+     TRIMESH_RELAX_STATIC   every function static to the including file (set it everywhere)
      TRIMESH_MAX_VERTICES   refuse more vertices or triangles; default 2^26
      TRIMESH_ASSERT(x)      programming errors inside the library, no input can reach one; default
                             assert of <assert.h>
 
    MEMORY     About 200 bytes per input vertex and 600 per output vertex while working; the result
-              takes 60 bytes per vertex. After an error nothing stays allocated, *out is NULL.
+              takes 60 bytes per vertex. After an error nothing stays allocated, *mesh is NULL.
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
    SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
@@ -68,11 +68,11 @@
               weight normals, order sheets around an edge and find tips.
 
    LIMITS
-     Uniform triangles cannot show what is finer than they are: ears thinner than an edge are
-     smoothed, and where that would leave crossings the edges there become shorter, or the call says
-     that it needs more vertices. A surface that crosses itself is accepted and may do so in the
-     result. Creases sharper than 120 degrees stay creases, so two triangles nearly face each other
-     there. The number of vertices is exact; edge lengths follow from it.
+     Uniform triangles cannot show detail that is finer than they are: ears thinner than an edge are
+     smoothed. Where that would leave crossings, edges become shorter there, or the call says that it
+     needs more vertices. A surface that crosses itself is accepted; its result may cross itself, too.
+     Creases sharper than 120 degrees stay creases, so two triangles nearly face each other there.
+     The number of vertices is exact; edge lengths follow from it.
 
    REFERENCES
      [1] M. Glinzner. Texturing of 3D objects using simple physics and equilateral triangle patches.
@@ -111,7 +111,7 @@ typedef enum trimesh_kind {
     TRIMESH_FREE = 0,   /* anywhere on the surface           */
     TRIMESH_CREASE = 1, /* on a crease line                  */
     TRIMESH_BORDER = 2, /* on the border                     */
-    TRIMESH_CORNER = 3  /* where lines meet, end or turn: never moves */
+    TRIMESH_CORNER = 3  /* where lines meet, end or bend: never moves */
 } trimesh_kind;
 
 /* A finished mesh; read only, released by trimesh_mesh_free. Triangles are counter-clockwise seen from
@@ -125,8 +125,8 @@ typedef struct trimesh_mesh {
     uint8_t *kinds;          /* 1 per vertex: a trimesh_kind                               */
     int32_t *old_vertices;   /* of trimesh_update: 1 per vertex, which one of the old mesh it was,
                                 -1 = new; else NULL                                        */
-    double edge_length;      /* that was aimed at, in units of the input                   */
-    txm_arena memory;        /* where all this lies                                        */
+    double edge_length;      /* the target length, in units of the input                   */
+    txm_arena memory;        /* private                                                    */
 } trimesh_mesh;
 
 /* ---- what was found and mended in the input ---------------------------------------------- */
@@ -135,14 +135,14 @@ typedef struct trimesh_report {
     size_t vertices, triangles; /* after mending                                             */
     size_t welded;              /* vertices that another one lies on                         */
     size_t unused;              /* vertices of no triangle                                   */
-    size_t degenerate;          /* triangles without area taken away or flipped away         */
-    size_t duplicate;           /* triangles that were there before                          */
+    size_t degenerate;          /* triangles without area, removed or flipped                */
+    size_t duplicate;           /* triangles that were there already                         */
     size_t fins;                /* triangles that stuck out of an edge of two others         */
-    size_t turned;              /* triangles turned to agree with their neighbours           */
+    size_t turned;              /* triangles reversed to agree with their neighbours         */
     size_t split;               /* vertices added where fans met in one vertex               */
     size_t components;          /* connected pieces                                          */
     size_t loops;               /* border loops                                              */
-    long euler;                 /* vertices - edges + triangles of what is left              */
+    long euler;                 /* vertices - edges + triangles after mending                */
     size_t crease_edges;        /* edges kept as creases                                     */
     uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that cannot be mended   */
 } trimesh_report;
@@ -151,8 +151,8 @@ typedef struct trimesh_report {
 
 typedef enum trimesh_method {
     TRIMESH_LATTICE = 0, /* points from a lattice that follows the surface: most regular     */
-    TRIMESH_REPEL = 1    /* points strewn by area that repel each other, as in [1] and [2]; where
-                            that gives crossings, the lattice after all                      */
+    TRIMESH_REPEL = 1    /* points sampled by area that repel each other, as in [1] and [2]; if
+                            that leaves crossings, the lattice instead                       */
 } trimesh_method;
 
 typedef struct trimesh_desc {
@@ -163,12 +163,12 @@ typedef struct trimesh_desc {
                               above 0, at most 1000 times the least; NULL = uniform             */
     float adapt;           /* 0..1: how much shorter edges are where the surface bends; 0 = not */
     float crease_angle;    /* degrees between the normals of two triangles from which on their
-                              edge may be a crease, 0 = 50; 180 = none. Below 75 it must also
-                              stand out from the edges around, and creases that hang together
-                              to less than 6 percent of the diagonal are left out              */
+                              edge may be a crease, 0 = 50; 180 = none. Below 75 it must also be
+                              clearly sharper than the edges around it, and connected creases of
+                              less than 6 percent of the diagonal in all are left out          */
     float line_spacing;    /* edge length along creases and borders relative to that inside,
-                              0.25..4; 0 = 1. More, where they would take over half of the
-                              vertices                                                          */
+                              0.25..4; 0 = 1. Increased where lines would take more than half of
+                              the vertices                                                      */
     float weld;            /* weld vertices nearer than this, relative to the diagonal of the
                               bounding box, 0..0.01; 0 = only those in equal places             */
     int iterations;        /* TRIMESH_REPEL: at most so many rounds of repulsion, 1..1000; 0 = 40 */
@@ -196,8 +196,8 @@ TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh);
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
-/* A retiling under way, for viewers that show it and programs that have other things to do in
-   between. trimesh_retile is trimesh_begin, trimesh_step while there is more, trimesh_get_mesh,
+/* A retiling in progress, for viewers that show it and programs that do other work in between.
+   trimesh_retile is trimesh_begin, trimesh_step while there is more, trimesh_get_mesh,
    trimesh_free. */
 typedef struct trimesh_job trimesh_job;
 
@@ -209,8 +209,8 @@ typedef struct trimesh_job trimesh_job;
    return  as trimesh_retile                                                                   */
 TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job);
 
-/* Do the next piece: with TRIMESH_REPEL strew the points, join them, one round of repulsion, ...,
-   finish. Does nothing once the job is done.
+/* Do the next part of the work: with TRIMESH_REPEL sample the points, join them, one round of
+   repulsion, ..., finish. Does nothing once the job is done.
 
    env    for hooks and message of this call; the allocator stays that of trimesh_begin
    more   receives 0 when nothing is left to do, also after an error; NULL is allowed
@@ -220,8 +220,8 @@ TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more);
 
 /* How far a job is. All pointers are valid until the next call for the job. */
 typedef struct trimesh_state {
-    const char *stage;       /* what the last step did: "mend", "strew", "join", "repel", "lattice",
-                                "subdivide", "finish"                                          */
+    const char *stage;       /* what the last step did: "mend", "sample", "join", "repel",
+                                "lattice", "subdivide", "finish"                               */
     int round;               /* of repulsion, from 1; 0 before                                 */
     float mean, largest;     /* movement of the points in the last round, in edge lengths      */
     size_t points;           /* 0 before there are any, and after an error                     */
@@ -230,12 +230,12 @@ typedef struct trimesh_state {
     const uint32_t *indices; /* 3 per triangle, of points                                      */
 } trimesh_state;
 
-/* What a viewer shows between two steps; makes the arrays.
+/* What a viewer shows between two steps. Makes the arrays.
 
    return  TXM_OK; TXM_OUT_OF_MEMORY, then the state is all zero and the job can go on          */
 TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state);
 
-/* The mesh of a job that is done. Each call makes one.
+/* The mesh of a job that is done. Each call makes a new copy.
 
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free; it does not
            need the job any more
@@ -254,13 +254,13 @@ typedef struct trimesh_update_desc {
     float radius;      /* how far from the change vertices may move, in edge lengths, 1..1000;
                           0 = 4                                                                */
     float tolerance;   /* how far off the new surface an old vertex may lie, in edge lengths,
-                          0..0.5; 0 = 0.2. Smaller changes of the surface go unnoticed; results
-                          lie up to 0.1 or so off it where it bends, for the sake of the whole  */
+                          0..0.5; 0 = 0.2. Smaller changes of the surface are not seen. Fitted
+                          vertices lie up to about 0.1 off the surface where it bends           */
 } trimesh_update_desc;
 
-/* Retile a surface that was edited or cut, from the mesh of what it was before: old vertices that
-   lie on the new surface stay, where it has none (at a seam, on faces of a cut) new ones enter, and
-   all within a radius of these relax [1, chapter 6: splitting objects].
+/* Retile a surface that was edited or cut, starting from the mesh made before: old vertices that lie
+   on the new surface stay, new ones are added where there are none (at a seam, on faces of a cut),
+   and all within a radius of these are relaxed [1, chapter 6: splitting objects].
 
             old            cut            updated             A: far ones, bit for bit where they
          .--+--+--.     .--+--+ .      .--+--+-.                 were, with the same triangles
@@ -269,9 +269,9 @@ typedef struct trimesh_update_desc {
         \  \/ \/ \ /   \  \/ \ |      \  \/ \ /|             N: new ones
          '--+--+--'     '--+--+'       '--+--+-'
 
-   A vertex stays if its distance to the new surface is at most the tolerance and its normal agrees
-   to 45 degrees; of vertices on creases and borders only corners and such as lie on a line of their
-   kind again; none stays so near to a new line that it would crowd the points there.
+   A vertex stays if its distance to the new surface is at most the tolerance and its normal differs
+   by at most 45 degrees. A vertex on a crease or border stays only if it is a corner again or lies on
+   a line of the same kind. No vertex stays that would be too near to the points of a new line.
 
    old     a result for the surface as it was
    mesh    receives the mesh, or NULL on any error; its old_vertices say which vertex of old each

@@ -91,12 +91,12 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     j.sources = sources;
     j.out = out;
-    return tmc_spread(tmc_transfer_block, &j, count, 0, 1, "values", env);
+    return tmc_run_blocks(tmc_transfer_block, &j, count, 0, 1, "values", env);
 }
 
 /* ---- attributes: paths on the input ---------------------------------------------------------- */
 
-/* The input as paths see it. */
+/* The input, prepared for paths. */
 typedef struct tmc_paths {
     txm_mesh input;
     tmc_values values;
@@ -121,12 +121,12 @@ static txm_dvec3 tmc_point(const txm_mesh *input, tmc_place at) {
     return txm_d3_mad(txm_d3_mad(p[0], txm_d3_sub(p[1], p[0]), at.u), txm_d3_sub(p[2], p[0]), at.v);
 }
 
-/* Number vertices in equal places alike. pairs: room for 2 per vertex. */
+/* Give vertices in equal places the same number. pairs: room for 2 per vertex. */
 static void tmc_weld(const txm_mesh *input, txm_pair *pairs, uint32_t *welded) {
     const size_t n = input->vertex_count;
     for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
     for (size_t axis = 3; axis-- > 0;) {
-        for (size_t i = 0; i < n; i++) /* + 0: there is one zero */
+        for (size_t i = 0; i < n; i++) /* + 0: -0 becomes 0      */
             pairs[i].key = txm_sort_key(input->positions[3 * (size_t)pairs[i].value + axis] + 0.0f);
         txm_sort_pairs(pairs, pairs + n, n);
     }
@@ -151,7 +151,7 @@ static int tmc_equal_values(const tmc_values *x, size_t corner, size_t other) {
 static uint8_t tmc_seam(const tmc_paths *p, size_t side) {
     const size_t other = p->next[side];
     if (other == side || p->next[other] != side) return 2;
-    size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, whichever way round */
+    size_t a = other, b = txm_mesh_next(&p->input, other); /* the same ends, in either order     */
     if (p->vertex[a] != p->vertex[side]) {
         a = b;
         b = other;
@@ -190,8 +190,8 @@ typedef struct tmc_path {
     int through;                  /* cross seams                                              */
 } tmc_path;
 
-/* Where the plane meets a side, as a share of it. The values on both sides of the plane are computed
-   from the vertex alone, so that all triangles there agree. */
+/* Where the plane meets a side, as a fraction of it. The values on both sides of the plane are
+   computed from the vertex alone, so that all triangles there give the same result. */
 static double tmc_cut(const tmc_path *w, const txm_dvec3 c[3], size_t k) {
     const double f = txm_d3_dot(txm_d3_sub(c[k], w->start), w->across);
     const double g = txm_d3_dot(txm_d3_sub(c[(k + 1) % 3], w->start), w->across);
@@ -212,8 +212,8 @@ static double tmc_along(const tmc_path *w, txm_dvec3 x) {
     return txm_d3_dot(txm_d3_sub(x, w->start), w->ahead);
 }
 
-/* The side by which the path leaves a triangle: the one that the plane meets, other than the side
-   `from` (0..2, or 3: at the start, then the one further ahead). 3 if there is none. */
+/* The side by which the path leaves a triangle: a side that the plane meets, not the side `from`
+   (0..2); at the start from is 3, then the one further ahead. Returns 3 if there is none. */
 static size_t tmc_exit(const tmc_path *w, const txm_dvec3 c[3], size_t from) {
     int above[3];
     size_t best = 3;
@@ -232,8 +232,8 @@ static size_t tmc_exit(const tmc_path *w, const txm_dvec3 c[3], size_t from) {
     return best;
 }
 
-/* Follow a path. *at is its start and receives its end: where it meets a seam, or what lies at the
-   end's distance. 1 if it came to the goal triangle. */
+/* Follow a path. *at is its start and receives its end: where it meets a seam, or the place at the
+   distance of the end. Returns 1 if it came to the goal triangle. */
 static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
     size_t triangle = at->triangle, from = 3;
     int reached = 0;
@@ -248,7 +248,7 @@ static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
         const double along = tmc_along(w, x), least = -0.5 * w->reach;
         const tmc_place out = tmc_on_side(triangle, k, s);
         if (!reached && along >= w->reach) {
-            /* between the way in and the way out; the end may yet lie in a triangle nearby */
+            /* between the entry and the exit; the end may also lie in a triangle nearby */
             tmc_place in = *at;
             if (from < 3) in = tmc_on_side(triangle, from, tmc_cut(w, c, from));
             const double before = tmc_along(w, tmc_point(&p->input, in));
@@ -272,8 +272,8 @@ static int tmc_walk(const tmc_paths *p, const tmc_path *w, tmc_place *at) {
     return 0;
 }
 
-/* A path from a place, which is first moved a little into its triangle: so the plane certainly cuts
-   two sides of it, and a start in a corner needs no search of the fan. */
+/* A path from a place, which is first moved a little into its triangle: so the plane surely cuts
+   two sides of it, and a start in a corner needs no search around the corner. */
 static tmc_path tmc_path_make(const tmc_paths *p, tmc_place *at, txm_dvec3 end, txm_dvec3 up,
                               size_t goal, int through) {
     tmc_path w;
@@ -337,14 +337,14 @@ TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input, con
     txm_arena_init(&arena, env);
     status = tmc_paths_build(&p, &arena, env);
     if (status == TXM_OK)
-        status = tmc_spread(tmc_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
+        status = tmc_run_blocks(tmc_transfer_faces, &p, mesh->face_count, 0.3, 1, "values", env);
     txm_arena_free(&arena);
     return status;
 }
 
 /* ---- attributes: doubled vertices ------------------------------------------------------------ */
 
-/* the bits of a float, one pattern for both zeros */
+/* the bits of a float, the same for 0 and -0 */
 static uint32_t tmc_bits(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
@@ -391,8 +391,8 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
     size_t made = 0;
     if ((status = tmc_check_memory(&arena, env)) != TXM_OK) goto done;
     tmc_sort_corners(mesh, values, width, pairs);
-    /* Equal corners now follow each other, but for the rare ones whose hashes are equal by chance: a
-       new vertex more then, which does no harm. */
+    /* Equal corners now follow each other, except where different values have the same hash, which
+       is rare: then there is an extra vertex, which does no harm. */
     for (size_t i = 0; i < n; i++) {
         const size_t c = pairs[i].value, before = pairs[i ? i - 1 : 0].value;
         const int fresh = i == 0 || mesh->indices[c] != mesh->indices[before] ||

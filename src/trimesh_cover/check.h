@@ -31,7 +31,7 @@ static int tmc_are_finite(const float *values, size_t count) {
     return 1;
 }
 
-/* A loop over count things, of which each block writes its own: what a thread is given. */
+/* A loop over count things; each block of them writes only its own results. */
 typedef struct tmc_loop {
     void (*body)(const void *job, size_t first, size_t end);
     const void *job;
@@ -46,9 +46,9 @@ static void tmc_block(void *context, int index) {
 }
 
 /* body(job, first, end) for all of count, spread over threads; progress goes from..to. */
-static txm_status tmc_spread(void (*body)(const void *, size_t, size_t), const void *job,
-                             size_t count, double from, double to, const char *stage,
-                             txm_env *env) {
+static txm_status tmc_run_blocks(void (*body)(const void *, size_t, size_t), const void *job,
+                                 size_t count, double from, double to, const char *stage,
+                                 txm_env *env) {
     tmc_loop l;
     const size_t blocks = (count + TMC_BLOCK - 1) / TMC_BLOCK;
     l.body = body;
@@ -109,7 +109,7 @@ TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env,
 
 /* ---- which sides share an edge -------------------------------------------------------------- */
 
-/* The sides of a mesh in the order of their edges; they lie in the arena, and as much scratch. */
+/* The sides of a mesh in the order of their edges, allocated in the arena, with as much scratch. */
 static txm_status tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena, txm_env *env,
                                  uint32_t **sorted) {
     *sorted = (uint32_t *)txm_arena_alloc(arena, txm_mesh_sides(mesh), 2 * sizeof(uint32_t));
@@ -118,7 +118,7 @@ static txm_status tmc_sort_sides(const txm_mesh *mesh, txm_arena *arena, txm_env
     return status;
 }
 
-/* The ring of the sides of each edge, as txm_mesh_link has it. */
+/* Link the sides of each edge into a ring, as txm_mesh_link does. */
 static txm_status tmc_link(const txm_mesh *mesh, txm_env *env, uint32_t *next) {
     txm_arena scratch;
     uint32_t *sorted;

@@ -5,15 +5,15 @@
 
 /* ---- geometry on triangles: making patches --------------------------------------------------- */
 
-#define TMC_RADIUS 1.9 /* of influence, in steps; the best of 1.5, 1.7, 1.9, 2.5 */
-#define TMC_FORCE 0.2  /* constant f; of 0.1, 0.2, 0.3, 0.5 */
+#define TMC_RADIUS 1.9 /* ours: radius of influence, in steps; best of 1.5, 1.7, 1.9, 2.5 */
+#define TMC_FORCE 0.2  /* ours: constant f; best of 0.1, 0.2, 0.3, 0.5 */
 
-/* Points as u, v; the triangles across the sides are taken for mirror images. */
+/* Points as u, v; the triangles across the sides are treated as mirror images. */
 typedef struct tmc_uv {
     double u, v;
 } tmc_uv;
 
-/* its image in side k, where the weight of the corner opposite changes its sign */
+/* its mirror image in side k: the weight of the opposite corner changes its sign */
 static tmc_uv tmc_mirror(tmc_uv p, int k) {
     const double w = 1 - p.u - p.v, s = k == 0 ? p.v : k == 1 ? w : p.u;
     tmc_uv q;
@@ -27,7 +27,7 @@ static double tmc_uv_dist2(tmc_uv a, tmc_uv b) {
     return u * u + u * v + v * v;
 }
 
-/* Every next point is the one furthest from those before and their images. gap: 1 per point. */
+/* Each next point is the one furthest from those before and their images. gap: 1 per point. */
 static void tmc_order(trimesh_point *points, size_t count, double *gap) {
     tmc_uv at;
     at.u = at.v = 1.0 / 3;
@@ -79,7 +79,7 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
 /* Repulsion inside a triangle: `fixed` points on its sides, the others move. */
 typedef struct tmc_swarm {
     int fixed, count;       /* points                                                     */
-    int all;                /* with the images near the sides                             */
+    int all;                /* including the images near the sides                        */
     double radius, margin;  /* of influence; least weight of a corner for those that move */
     tmc_uv *at, *to;        /* room for 4 per point                                       */
     int *head, *next;       /* which points lie in a cell: a list each                    */
@@ -106,9 +106,9 @@ static void tmc_fill_cells(tmc_swarm *s) {
     }
 }
 
-/* pos_new = pos + sum over the others (r - d) f direction [1, equation 3.1]. The thesis has f = 1/2;
-   with all moving at once that swings to and fro, and pairs stay in one place: least distances of
-   0.02 to 0.17 steps against 0.7 to 0.8 with these two. */
+/* pos_new = pos + sum over the others (r - d) f direction [1, equation 3.1]. The thesis has f =
+   1/2; as all points move at once they then oscillate, and pairs of them stay together: the least
+   distances are 0.02 to 0.17 steps, and 0.7 to 0.8 with our two numbers. */
 static tmc_uv tmc_push(const tmc_swarm *s, int i) {
     const tmc_uv p = s->at[i];
     const int column = tmc_cell(s, p.u), row = tmc_cell(s, p.v);

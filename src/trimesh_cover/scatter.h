@@ -17,24 +17,24 @@ typedef struct tmc_item {
     txm_quat turn;  /* of length 1                                                        */
     uint32_t prototype;
     uint32_t before;      /* sixths of the points before this one                         */
-    uint8_t side, corner; /* on which it lies; TMC_NONE = inside. Of a corner both     */
+    uint8_t side, corner; /* on which it lies; TMC_NONE = inside; both for a corner    */
 } tmc_item;
 
-typedef struct tmc_kit {
+typedef struct tmc_prepared {
     const tmc_item *items;
     const uint32_t *rim; /* numbers of the items on sides and corners, rising             */
     uint32_t count, rim_count;
     uint32_t sixths; /* of all points                                                     */
-} tmc_kit;
+} tmc_prepared;
 
 typedef struct tmc_scatter {
     const trimesh_scatter_desc *desc;
     const float *normals;
-    const tmc_kit *kits;
+    const tmc_prepared *kits;
     const uint8_t *owned; /* 1 per triangle: bit k = its side k, bit 3 + k = its corner k; NULL =
                              no patch has points there                                    */
     double *area;         /* 1 per triangle, at the height                                */
-    uint32_t *take;       /* 1 per triangle: length of the beginning that is used; NULL = all */
+    uint32_t *take;       /* 1 per triangle: how many points are used; NULL = all             */
     size_t *offset;       /* 1 per triangle: number of its first instance                 */
     const double *mix;    /* sums of the shares                                           */
     uint64_t key;         /* of the seed                                                  */
@@ -55,7 +55,7 @@ static txm_status tmc_check_point(const trimesh_point *p, size_t patch, size_t i
     return why ? txm_fail_numbers(env, TXM_BAD_ARGUMENT, why, patch, i) : TXM_OK;
 }
 
-static void tmc_ready_point(const trimesh_point *p, tmc_item *item) {
+static void tmc_prepare_point(const trimesh_point *p, tmc_item *item) {
     const txm_quat turn = {p->rotation[0], p->rotation[1], p->rotation[2], p->rotation[3]};
     double sum = 0;
     int zeros = 0;
@@ -84,9 +84,9 @@ static uint32_t tmc_sixths(const tmc_item *item) {
     return item->corner != TMC_NONE ? 1 : item->side != TMC_NONE ? 3 : TMC_WHOLE;
 }
 
-/* Check all patches and make them ready; *rims: has one points on its sides? */
-static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
-                            tmc_scatter *s, int *rims) {
+/* Check and prepare all patches; *rims: has one of them points on its sides? */
+static txm_status tmc_prepare(const trimesh_scatter_desc *desc, txm_arena *arena, txm_env *env,
+                              tmc_scatter *s, int *rims) {
     size_t total = 0;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
         const trimesh_patch *patch = &desc->patches[p];
@@ -101,18 +101,19 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
     }
     tmc_item *items = (tmc_item *)txm_arena_alloc(arena, total + 1, sizeof *items);
     uint32_t *rim = (uint32_t *)txm_arena_alloc(arena, total + 1, sizeof *rim);
-    tmc_kit *kits = (tmc_kit *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
+    tmc_prepared *kits =
+        (tmc_prepared *)txm_arena_alloc(arena, (size_t)desc->patch_count, sizeof *kits);
     const txm_status status = tmc_check_memory(arena, env);
     if (status != TXM_OK) return status;
     s->kits = kits;
     for (size_t p = 0; p < (size_t)desc->patch_count; p++) {
-        tmc_kit *kit = &kits[p];
+        tmc_prepared *kit = &kits[p];
         kit->items = items;
         kit->rim = rim;
         kit->count = (uint32_t)desc->patches[p].count;
         kit->rim_count = kit->sixths = 0;
         for (uint32_t i = 0; i < kit->count; i++) {
-            tmc_ready_point(&desc->patches[p].points[i], &items[i]);
+            tmc_prepare_point(&desc->patches[p].points[i], &items[i]);
             items[i].before = kit->sixths;
             kit->sixths += tmc_sixths(&items[i]);
             if (items[i].side != TMC_NONE) rim[kit->rim_count++] = i;
@@ -124,8 +125,8 @@ static txm_status tmc_ready(const trimesh_scatter_desc *desc, txm_arena *arena, 
     return TXM_OK;
 }
 
-/* Give every side and every corner to the first triangle that has it. */
-static txm_status tmc_own(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
+/* Assign every edge and every vertex to the first triangle that has it. */
+static txm_status tmc_assign_owners(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
     const size_t sides = 3 * mesh->face_count;
     const uint32_t *vertex = mesh->indices;
     txm_arena scratch;
@@ -145,7 +146,7 @@ static txm_status tmc_own(const txm_mesh *mesh, txm_env *env, uint8_t *owned) {
 }
 
 /* The patch of a triangle and how it is turned. */
-static const tmc_kit *tmc_choice(const tmc_scatter *s, size_t t, size_t *rotation) {
+static const tmc_prepared *tmc_choice(const tmc_scatter *s, size_t t, size_t *rotation) {
     const trimesh_scatter_desc *d = s->desc;
     const uint64_t h = txm_hash(s->key + t);
     const size_t random = (size_t)((h >> 32) * (uint64_t)d->patch_count >> 32);
@@ -163,7 +164,7 @@ static int tmc_owns(const tmc_scatter *s, size_t t, size_t rotation, const tmc_i
 
 /* ---- geometry on triangles: how many where --------------------------------------------------- */
 
-/* The edge length of the triangle, as heights and scales take it. */
+/* The edge length of the triangle that heights and scales refer to. */
 static double tmc_unit(const tmc_scatter *s, txm_dvec3 area2) {
     return s->desc->unit > 0 ? s->desc->unit : sqrt(txm_d3_len(area2) / TMC_H);
 }
@@ -182,12 +183,12 @@ static void tmc_area_block(const void *job, size_t first, size_t end) {
             p[k] = txm_d3_mad(p[k], txm_d3_load(n), up);
         }
         const txm_dvec3 there = txm_d3_area2(p[0], p[1], p[2]);
-        /* beyond the centre of a bend the triangle is turned over: no room there */
+        /* beyond the centre of curvature the triangle is inverted: no room there */
         s->area[t] = txm_d3_dot(there, flat) > 0 ? 0.5 * txm_d3_len(there) : 0;
     }
 }
 
-/* every third bit of 30 from the 10 of x */
+/* spread the lower ten bits of x to every third bit */
 static uint32_t tmc_third_bits(uint32_t x) {
     x = (x | x << 16) & 0x030000ffu;
     x = (x | x << 8) & 0x0300f00fu;
@@ -195,7 +196,8 @@ static uint32_t tmc_third_bits(uint32_t x) {
     return (x | x << 2) & 0x09249249u;
 }
 
-/* The triangles along a Morton curve through their middles. pairs: room for 2 per triangle. */
+/* The triangles in the order of a Morton curve through their middles. pairs: room for 2 per
+   triangle. */
 static void tmc_morton(const txm_mesh *mesh, txm_pair *pairs) {
     double low[3] = {0, 0, 0}, size = 0;
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
@@ -218,9 +220,9 @@ static void tmc_morton(const txm_mesh *mesh, txm_pair *pairs) {
     txm_sort_pairs(pairs, pairs + mesh->face_count, mesh->face_count);
 }
 
-/* How long a beginning of a patch comes nearest to so many sixths of a thing. */
-static uint32_t tmc_beginning(const tmc_kit *kit, double sixths) {
-    uint32_t low = 0, high = kit->count; /* low points are not too many, high + 1 are */
+/* How many points from the front of a patch come nearest to so many sixths of a thing. */
+static uint32_t tmc_prefix_length(const tmc_prepared *kit, double sixths) {
+    uint32_t low = 0, high = kit->count; /* low points are not too many, high + 1 points are */
     while (low < high) {
         const uint32_t middle = (low + high + 1) / 2;
         const uint32_t sum = middle < kit->count ? kit->items[middle].before : kit->sixths;
@@ -232,8 +234,8 @@ static uint32_t tmc_beginning(const tmc_kit *kit, double sixths) {
     return sixths - next->before > 0.5 * tmc_sixths(next) ? low + 1 : low;
 }
 
-/* Fill s->take so that the things on any stretch of the curve are as many as its area wants. */
-static txm_status tmc_thin(const tmc_scatter *s, const txm_pair *order, txm_env *env) {
+/* Fill s->take so that the number of things on any stretch of the curve fits its area. */
+static txm_status tmc_thin_patches(const tmc_scatter *s, const txm_pair *order, txm_env *env) {
     const size_t triangles = s->desc->mesh.face_count;
     double carry = 0, most = 0;
     int short_of = 0;
@@ -241,10 +243,10 @@ static txm_status tmc_thin(const tmc_scatter *s, const txm_pair *order, txm_env 
         const size_t t = order[i].value;
         const double wanted = TMC_WHOLE * (double)s->desc->density * s->area[t];
         size_t rotation;
-        const tmc_kit *kit = tmc_choice(s, t, &rotation);
-        const uint32_t n = tmc_beginning(kit, wanted + carry);
+        const tmc_prepared *kit = tmc_choice(s, t, &rotation);
+        const uint32_t n = tmc_prefix_length(kit, wanted + carry);
         carry += wanted - (n < kit->count ? kit->items[n].before : kit->sixths);
-        /* what one triangle lacks the next few have, but no more than an eighth of it */
+        /* what one triangle lacks goes to the next few, at most an eighth of their number */
         if (carry > fmax(TMC_WHOLE, wanted / 8)) {
             short_of = 1;
             carry = 0;
@@ -266,7 +268,7 @@ static void tmc_count_block(const void *job, size_t first, size_t end) {
     const tmc_scatter *s = (const tmc_scatter *)job;
     for (size_t t = first; t < end; t++) {
         size_t rotation;
-        const tmc_kit *kit = tmc_choice(s, t, &rotation);
+        const tmc_prepared *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         size_t count = take;
         for (uint32_t i = 0; i < kit->rim_count && kit->rim[i] < take; i++)
@@ -310,11 +312,11 @@ static void tmc_base_make(const tmc_scatter *s, size_t t, size_t rotation, tmc_b
     b->edge = sqrt(txm_d3_len(b->up) / TMC_H);
 }
 
-/* Phong tessellation [4]: the point p of the triangle moves towards its feet on
-   the tangent planes at the corners, here half the way, which on a sphere leads back to it:
+/* Phong tessellation [4]: the point p of the triangle moves towards its feet on the tangent planes
+   at the corners, here by half the distance, which on a sphere leads back to the sphere:
 
        sum_i w_i ((p_i - p) . n_i) n_i  =  sum_{i<j} w_i w_j |p_i - p_j|^2 / r  =  2 sagitta      */
-static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, double curve) {
+static txm_dvec3 tmc_curve_point(const tmc_base *b, const double w[3], txm_dvec3 p, double curve) {
     txm_dvec3 sum = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++)
         sum = txm_d3_mad(sum, b->n[k], w[k] * txm_d3_dot(txm_d3_sub(b->p[k], p), b->n[k]));
@@ -323,7 +325,7 @@ static txm_dvec3 tmc_bulge(const tmc_base *b, const double w[3], txm_dvec3 p, do
     return length > b->edge ? txm_d3_scale(sum, b->edge / length) : sum;
 }
 
-/* A random turn about z: half the angle is that of a random point of the disc. */
+/* A random rotation about z: half its angle is the angle of a random point of the disc. */
 static txm_quat tmc_spin(uint64_t h) {
     double x, y, r;
     do {
@@ -355,10 +357,10 @@ static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_it
     }
     n = txm_d3_unit(txm_d3_len2(n) > 0 ? n : b->up);
     if (!(txm_d3_len2(n) > 0)) n = txm_d3(0, 0, 1);
-    if (d->curve > 0) p = txm_d3_add(p, tmc_bulge(b, w, p, d->curve));
+    if (d->curve > 0) p = txm_d3_add(p, tmc_curve_point(b, w, p, d->curve));
     p = txm_d3_mad(p, n, side * (item->height + d->height) * b->unit);
-    /* In the plane of the triangle the nearest rotation takes x to ex + ey turned back by 90 degrees;
-       seen from below, where the winding is the other one, turned forth. */
+    /* In the plane of the triangle the nearest rotation takes x to the sum of ex and ey rotated by
+       -90 degrees; seen from below, where the winding is opposite, by +90 degrees. */
     const double back = txm_d3_dot(n, b->up) < 0 ? -1 : 1;
     const txm_dvec3 x = tmc_tangent(txm_d3_mad(b->ex, txm_d3_cross(b->ey, n), back), n);
     const txm_dvec3 z = txm_d3_scale(n, side);
@@ -382,7 +384,7 @@ static void tmc_fill_block(const void *job, size_t first, size_t end) {
     for (size_t t = first; t < end; t++) {
         tmc_base base;
         size_t rotation;
-        const tmc_kit *kit = tmc_choice(s, t, &rotation);
+        const tmc_prepared *kit = tmc_choice(s, t, &rotation);
         const uint32_t take = s->take ? s->take[t] : kit->count;
         trimesh_instance *out = s->out + s->offset[t];
         tmc_base_make(s, t, rotation, &base);
@@ -448,21 +450,22 @@ static txm_status tmc_plan_density(tmc_scatter *s, txm_arena *arena, txm_env *en
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, triangles, 2 * sizeof(txm_pair));
     txm_status status = tmc_check_memory(arena, env);
     if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
-    if (status == TXM_OK) status = tmc_spread(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
+    if (status == TXM_OK)
+        status = tmc_run_blocks(tmc_area_block, s, triangles, 0.1, 0.2, "areas", env);
     if (status == TXM_OK) {
         tmc_morton(&s->desc->mesh, pairs);
-        status = tmc_thin(s, pairs, env);
+        status = tmc_thin_patches(s, pairs, env);
     }
     txm_arena_free(&scratch);
     return status;
 }
 
-/* All that goes before placing: normals, patches, who owns the sides, counts, offsets. */
+/* Everything before placing: normals, patches, owners of edges and vertices, counts, offsets. */
 static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_t *count) {
     const trimesh_scatter_desc *d = s->desc;
     const size_t triangles = d->mesh.face_count;
     int rims = 0;
-    txm_status status = tmc_ready(d, arena, env, s, &rims);
+    txm_status status = tmc_prepare(d, arena, env, s, &rims);
     if (status == TXM_OK) status = tmc_report(env, 0, "patches");
     if (status != TXM_OK) return status;
     s->normals = d->normals;
@@ -471,7 +474,7 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
         txm_env quiet;
         memset(&quiet, 0, sizeof quiet);
         if (env) quiet = *env;
-        quiet.progress = NULL; /* its bar is not the call's */
+        quiet.progress = NULL; /* the call has progress of its own */
         if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
         if ((status = trimesh_normals(&d->mesh, &quiet, n)) != TXM_OK)
             return txm_fail(env, status, quiet.message);
@@ -486,7 +489,7 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
     if (rims) {
         uint8_t *owned = (uint8_t *)txm_arena_zero(arena, triangles, 1);
         if ((status = tmc_check_memory(arena, env)) == TXM_OK)
-            status = tmc_own(&d->mesh, env, owned);
+            status = tmc_assign_owners(&d->mesh, env, owned);
         if (status != TXM_OK) return status;
         s->owned = owned;
     }
@@ -494,7 +497,7 @@ static txm_status tmc_plan(tmc_scatter *s, txm_arena *arena, txm_env *env, size_
     if (status != TXM_OK) return status;
     s->offset = (size_t *)txm_arena_alloc(arena, triangles, sizeof(size_t));
     if ((status = tmc_check_memory(arena, env)) != TXM_OK) return status;
-    status = tmc_spread(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
+    status = tmc_run_blocks(tmc_count_block, s, triangles, 0.2, 0.3, "counting", env);
     uint64_t sum = 0;
     for (size_t t = 0; t < triangles && status == TXM_OK; t++) {
         const size_t here = s->offset[t];
@@ -528,7 +531,7 @@ TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, t
         status = txm_fail_numbers(env, TXM_TOO_LARGE, "# instances, but out has room for # only",
                                   *count, capacity);
     if (status == TXM_OK && out)
-        status = tmc_spread(tmc_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
+        status = tmc_run_blocks(tmc_fill_block, &s, desc->mesh.face_count, 0.3, 1, "placing", env);
     txm_arena_free(&arena);
     return status;
 }

@@ -36,9 +36,9 @@ TRIMESH_COVER_API int trimesh_atlas_uv(const trimesh_atlas *atlas, int patch, fl
     return 1;
 }
 
-/* All triangles, each after the one that it was reached from: breadth first. */
-static void tmc_spread_order(const uint32_t *next, size_t triangles, uint8_t *seen,
-                             uint32_t *order) {
+/* All triangles in breadth-first order. */
+static void tmc_breadth_first(const uint32_t *next, size_t triangles, uint8_t *seen,
+                              uint32_t *order) {
     size_t end = 0;
     for (size_t first = 0, at = 0; first < triangles; first++) {
         if (seen[first]) continue;
@@ -56,11 +56,11 @@ static void tmc_spread_order(const uint32_t *next, size_t triangles, uint8_t *se
     }
 }
 
-/* How badly a choice goes with the neighbours' so far: 0 = none has this patch. */
+/* The cost of a choice beside the neighbours' choices so far: 0 = none of them has this patch. */
 static int tmc_clashes(const uint32_t *next, const int *choice, int patches, size_t t, int chosen) {
     int sum = 0;
     for (size_t side = 3 * t; side < 3 * t + 3; side++) {
-        int looked = 0; /* edges of very many triangles are not worth it */
+        int looked = 0; /* not for edges of very many triangles          */
         for (size_t s = next[side]; s != side && looked < 8; s = next[s], looked++) {
             const int other = choice[s / 3];
             if (other >= 0 && other % patches == chosen % patches) sum += other == chosen ? 8 : 1;
@@ -69,9 +69,9 @@ static int tmc_clashes(const uint32_t *next, const int *choice, int patches, siz
     return sum;
 }
 
-/* Choose backwards in that order: then every triangle but the last of its piece still has a neighbour
-   without a choice, so that two neighbours at most stand in its way. choice = patch + patches *
-   rotation. */
+/* Choose in the reverse of that order: then every triangle but the last of its piece still has a
+   neighbour without a choice, so that at most two neighbours constrain it. choice = patch + patches
+   * rotation. */
 static void tmc_choose(const uint32_t *next, const uint32_t *order, size_t triangles, int patches,
                        int total, uint64_t seed, int *choice) {
     for (size_t t = 0; t < triangles; t++) choice[t] = -1;
@@ -127,7 +127,7 @@ TRIMESH_COVER_API txm_status trimesh_choose(const txm_mesh *mesh, const trimesh_
     if (status == TXM_OK) status = tmc_link(mesh, env, next);
     if (status == TXM_OK) status = tmc_report(env, 0.5, "patches");
     if (status == TXM_OK) {
-        tmc_spread_order(next, count, seen, order);
+        tmc_breadth_first(next, count, seen, order);
         tmc_choose(next, order, count, n, n * turns, desc->seed, choice);
         for (size_t t = 0; t < count; t++) tmc_put_choice(choice[t], n, t, patches, rotations);
     }
@@ -198,7 +198,7 @@ typedef struct tmc_graph {
     size_t count;
     uint32_t *first, *ends;
     uint32_t *degree; /* neighbours left                                                  */
-    uint32_t *order;  /* all vertices by degree; taken away from the front               */
+    uint32_t *order;  /* all vertices by degree; removed from the front                  */
     uint32_t *place;  /* where a vertex lies in order                                     */
     uint32_t *bucket; /* where the vertices of each degree begin                          */
 } tmc_graph;
@@ -223,7 +223,7 @@ static txm_status tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena 
                 g->ends[g->first[low + 1]] = high;
                 g->ends[g->first[high + 1]] = low;
             }
-            /* counted two places further on, then filled one further on, they end in place */
+            /* count at + 2, then fill from + 1: afterwards first[v] is right */
             g->first[low + (pass ? 1 : 2)]++;
             g->first[high + (pass ? 1 : 2)]++;
         }
@@ -233,8 +233,8 @@ static txm_status tmc_graph_build(tmc_graph *g, const txm_mesh *mesh, txm_arena 
     return status;
 }
 
-/* Take away the vertex with the fewest neighbours left, over and over; order receives them. Vertices
-   lie sorted by degree; one that loses a neighbour changes places with the first of its degree. */
+/* Remove the vertex with the fewest neighbours left, over and over; order receives them. Vertices
+   are sorted by degree; one that loses a neighbour is swapped with the first of its degree. */
 static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *env) {
     const size_t n = g->count;
     g->degree = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
@@ -258,7 +258,7 @@ static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *en
         const uint32_t v = g->order[i];
         for (uint32_t e = g->first[v]; e < g->first[v + 1]; e++) {
             const uint32_t u = g->ends[e], d = g->degree[u];
-            if (g->place[u] <= i || d <= g->degree[v]) continue; /* gone, or next anyway */
+            if (g->place[u] <= i || d <= g->degree[v]) continue; /* removed, or next anyway */
             const uint32_t to = g->bucket[d]++, w = g->order[to], from = g->place[u];
             g->order[from] = w;
             g->place[w] = from;
@@ -270,7 +270,7 @@ static txm_status tmc_smallest_first(tmc_graph *g, txm_arena *arena, txm_env *en
     return TXM_OK;
 }
 
-/* Color in the opposite order; taken[c] = v + 1: a neighbour of v has colour c. */
+/* Colour in the reverse order; taken[c] = v + 1: a neighbour of v has colour c. */
 static int tmc_color_back(const tmc_graph *g, uint32_t *taken, int *colors) {
     int most = 0;
     for (size_t i = g->count; i-- > 0;) {

@@ -5,7 +5,7 @@
 
 /* ---- the right number --------------------------------------------------------------------- */
 
-/* what collapsing (sign -1) or splitting (+1) the edge of c would do to the valences */
+/* how collapsing (sign -1) or splitting (+1) the edge of c would change the cost of valences */
 static int tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
@@ -35,9 +35,9 @@ static int tmr_claim(tmr_work *w, int32_t c) {
     return 1;
 }
 
-/* Split or collapse where it harms the pattern least, until there are so many vertices; a few
-   rounds of relaxation in between. How many vertices are missing (over: negative) at the end goes to
-   *missing. */
+/* Split or collapse edges where it disturbs the pattern least, until there are target vertices,
+   with a few rounds of relaxation in between. *missing receives how many vertices are missing at
+   the end (negative: too many). */
 static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, txm_arena *scratch,
                                 int32_t *missing) {
     tmr_mesh *m = &w->m;
@@ -77,10 +77,11 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
             }
             done += m->live != before;
             *missing = target - m->live;
-            /* not too many at once, so that the rest of them are looked at afresh */
+            /* not too many at once, so that the others are ranked again */
             if (pass < 8 && done * 4 > (*missing < 0 ? -*missing : *missing) + 8) break;
         }
-        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count); /* relax where something was done */
+        /* relax where something was changed */
+        memcpy(w->mask_room, w->bad, (size_t)m->vertex_count);
         w->mask = pass % 4 == 3 ? NULL : w->mask_room;
         tmr_flip_valences(w, 2, 0.4);
         for (int k = 0; k < relaxations; k++) tmr_relax(w);
@@ -96,9 +97,9 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
 /* Bring the copy of the surface to about two vertices per lattice point to come. */
 static txm_status tmr_resample(tmr_work *w) {
     const double aim = sqrt(0.5); /* of edges, relative to w->length */
-    /* lines first: what is inside is split to fit them */
+    /* lines first: the inside is then split to fit them */
     tmr_split_long(w, 1e9, 1.0);
-    /* fine input: take away, the shortest edges first */
+    /* fine input: collapse edges, the shortest first */
     double limit = 0.05 * aim;
     while (limit < 0.72 * aim) {
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
@@ -116,7 +117,7 @@ static txm_status tmr_resample(tmr_work *w) {
     return TXM_OK;
 }
 
-/* Take away what a line has more of edges than fit its length; the rest is spread evenly later. */
+/* Collapse edges of lines that have more than fit their length; the others are spaced evenly later. */
 static txm_status tmr_thin_lines(tmr_work *w, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const tmr_lines *l = w->l;
@@ -146,12 +147,12 @@ static void tmr_even_lines(tmr_work *w) {
         const int kind = m->corner[v] < 0 || tmr_is_ghost(m, v) ? 0 : tmr_kind_of(m, v);
         w->bad[v] = kind == TRIMESH_CREASE || kind == TRIMESH_BORDER; /* still to do */
         any |= w->bad[v];
-        tmr_stay(w, v);
+        tmr_keep_place(w, v);
     }
     for (int32_t v = 0; v < m->vertex_count && any; v++) {
         int32_t two[2];
         if (!w->bad[v] || !tmr_line_neighbors(m, v, two)) continue;
-        /* back to an end of the line, or all the way round to v */
+        /* back to an end of the line, or all the way around to v */
         int32_t before = two[0], at = v, begin = -1;
         for (;;) {
             const int32_t next = before;
@@ -177,7 +178,7 @@ static void tmr_even_lines(tmr_work *w) {
                 way = tmr_line_way(w->s, w->l, m->p[v], m->source[v]);
             }
             if (pass == 1) {
-                /* which way along the line do we go? */
+                /* in which direction along the line? */
                 const double w0 = tmr_line_way(w->s, w->l, m->p[to], m->source[to]);
                 if (begin >= 0) {
                     const double near = w0, far = w->l->length[line] - w0;

@@ -57,9 +57,9 @@ static void tmr_half_angle(const double a[2], double out[2]) {
     out[0] = re;
     out[1] = a[1] < 0 ? -im : im;
 }
-/* a sixth root of a complex number, unit length. The third of an angle is a quarter and a
-   sixteenth and a 64th of it and a little; Newton's method does the rest. sqrt alone gives the
-   same bits with every C library, atan2 and cos do not. */
+/* A sixth root of a complex number, of unit length. A third of an angle is about 1/4 + 1/16 + 1/64
+   of it; Newton's method does the rest. sqrt gives the same bits with every C library, atan2 and
+   cos do not. */
 static void tmr_sixth_root(const double z[2], double out[2]) {
     const double length = sqrt(z[0] * z[0] + z[1] * z[1]);
     double a[2] = {1, 0}, r[2], part[2];
@@ -92,8 +92,8 @@ static void tmr_sixth_root(const double z[2], double out[2]) {
     out[1] = r[1];
 }
 
-/* How the frame (n1, x1) lies in (n0, x0) when n1 is turned onto n0 the short way: the complex
-   number by which coordinates are multiplied. */
+/* The complex number that takes coordinates in the frame (n1, x1) to the frame (n0, x0), when n1 is
+   rotated onto n0 by the shortest rotation. */
 static void tmr_transport(txm_dvec3 n0, txm_dvec3 x0, txm_dvec3 n1, txm_dvec3 x1, double out[2]) {
     const txm_dvec3 axis = txm_d3_cross(n1, n0);
     const double cosine = txm_d3_dot(n0, n1);
@@ -158,7 +158,7 @@ static txm_status tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *ar
         do {
             const int32_t to = m->vertex[tmr_next(c)];
             if (!tmr_is_ghost(m, to)) {
-                TRIMESH_ASSERT(k < links); /* of the valences: no more than neighbours, ghosts too */
+                TRIMESH_ASSERT(k < links); /* the valences count all neighbours, also ghosts */
                 level->to[k] = f->node[to];
                 level->weight[k++] = 1;
             }
@@ -183,7 +183,7 @@ static txm_status tmr_level_zero(const tmr_work *w, tmr_fields *f, txm_arena *ar
     return TXM_OK;
 }
 
-/* The next level: each node joined with the neighbour that is most like it. */
+/* The next level: each node merged with the most similar neighbour. */
 static txm_status tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *arena,
                                txm_arena *scratch) {
     int32_t count = 0;
@@ -235,7 +235,7 @@ static txm_status tmr_level_up(const tmr_level *a, tmr_level *b, txm_arena *aren
                 const int32_t to = a->parent[a->to[j]];
                 if (to == i) continue;
                 if (seen[to] < first) {
-                    TRIMESH_ASSERT(k < a->links); /* each comes from a link below, and no two from one */
+                    TRIMESH_ASSERT(k < a->links); /* each comes from a link of its own below */
                     seen[to] = k;
                     b->to[k] = to;
                     b->weight[k++] = 0;
@@ -298,7 +298,7 @@ static void tmr_smooth_directions(tmr_level *level, int sweeps) {
             level->z[i][1] = im / sum;
             most = fmax(most, fmax(fabs(re), fabs(im)) / sum);
         }
-        if (most > 0 && most < 1e-3) { /* no underflow; what is fixed does not matter then */
+        if (most > 0 && most < 1e-3) { /* avoids underflow; fixed nodes do not matter then */
             for (int32_t i = 0; i < level->count; i++) {
                 if (level->fixed[i] == 1) continue;
                 level->z[i][0] /= most;
@@ -390,8 +390,8 @@ static txm_dvec3 tmr_between(txm_dvec3 p0, txm_dvec3 n0, txm_dvec3 p1, txm_dvec3
                       txm_d3_scale(txm_d3_add(txm_d3_scale(n0, -l0), txm_d3_scale(n1, -l1)), 0.25));
 }
 
-/* Of the lattice points of two nodes about half-way between them, the pair that lies closest
-   together: what both should agree on. */
+/* Of the lattice points of two nodes about half-way between them, the closest pair: the place on
+   which both should agree. */
 static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, int32_t j,
                              txm_dvec3 *a, txm_dvec3 *b) {
     const double spacing = 0.5 * (level->scale[i] + (double)level->scale[j]);
@@ -478,8 +478,8 @@ static txm_status tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *
 
 /* ---- from the lattice to a mesh ----------------------------------------------------------- */
 
-/* Pull b = vertex[prev(c)] into a, or a into b, or both onto their lattice point, whichever keeps
-   the triangles around fair; the lattice point becomes the mean of the two. */
+/* Merge b = vertex[prev(c)] into a, or a into b, or both at their lattice point: the first of these
+   that keeps the triangles around fair. Their lattice point becomes the mean of the two. */
 static int tmr_collapse_onto(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
@@ -509,7 +509,7 @@ static int tmr_collapse_onto(tmr_work *w, int32_t c) {
 }
 
 /* Collapse the edges whose ends share a lattice point, the shortest first. moved[v] holds the
-   lattice point of v, and bad[v] how many vertices went into it. */
+   lattice point of v, and bad[v] how many vertices were merged into v. */
 static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
     const size_t most = (size_t)m->live_faces * 3 / 2 + 1; /* edges of a closed mesh */

@@ -9,7 +9,7 @@
 
 enum tmr_stage {
     TMR_STAGE_MEND,
-    TMR_STAGE_STREW,
+    TMR_STAGE_SAMPLE,
     TMR_STAGE_JOIN,
     TMR_STAGE_REPEL,
     TMR_STAGE_LATTICE,
@@ -20,7 +20,7 @@ enum tmr_stage {
 
 struct trimesh_job {
     trimesh_desc desc;
-    txm_env env;           /* hooks of the call at hand, its progress by way of tmr_job_report     */
+    txm_env env; /* hooks of the current call; progress goes through tmr_job_report      */
     int (*progress)(void *user, float fraction, const char *stage); /* the caller's             */
     void *progress_user;
     float fraction;        /* the highest reported                                              */
@@ -28,23 +28,23 @@ struct trimesh_job {
     txm_status status;     /* of the first failure                                             */
     int stage;             /* next to be done                                                  */
     int shown;             /* the last one done                                                */
-    int round, rounds;     /* of repulsion: done, at most                                      */
+    int round, rounds;     /* of repulsion: done; at most                                      */
     double mean, largest;  /* movement in the last one                                         */
-    int retries;           /* with adapted density                                              */
-    float *plain_scale;    /* before that                                                       */
-    int cut;               /* lattice: how often the number is quartered, then triangles cut in four */
+    int retries;           /* with adapted density so far                                       */
+    float *plain_scale;    /* scale before the retries                                          */
+    int cut; /* how often the number is quartered, then triangles cut in four          */
     tmr_surface s;
     tmr_lines l;
     tmr_work w;
-    tmr_strewn t;
+    tmr_sampling t;
     txm_arena input;       /* surface and lines                                                */
-    txm_arena first;       /* the mesh, in it the surface's vertices                           */
+    txm_arena first;       /* the mesh, including the surface's vertices                       */
     txm_arena second;      /* the mesh, compact                                                */
-    txm_arena scratch;     /* of the stage at hand                                             */
+    txm_arena scratch;     /* of the current stage                                             */
     txm_arena view;        /* what the state points to                                         */
 };
 
-/* Everything that can be wrong with the numbers in a descriptor, but for the surface. */
+/* Check a descriptor except its surface. */
 static txm_status tmr_check_desc(const trimesh_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
     if (desc->vertices < 4)
@@ -70,8 +70,8 @@ static double tmr_job_spacing(const trimesh_job *job) {
     return tmr_spacing(&job->s, (double)job->desc.vertices);
 }
 
-/* Fewer than any such surface can do with? A closed piece needs 4 vertices, one with handles as
-   many as the complete graph that can be drawn on it (Heawood), an open one 3. */
+/* Are the vertices fewer than any such surface needs? A closed piece needs 4, one with handles as
+   many as Heawood's bound says, an open one 3. */
 static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
     const trimesh_report *r = &job->report;
     char text[160];
@@ -108,7 +108,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     job->w.desc = &job->desc;
     job->w.env = &job->env;
     job->w.line_scale = job->desc.line_spacing > 0 ? job->desc.line_spacing : 1;
-    double lines = 0; /* at most half of the vertices go to lines: further apart if need be */
+    double lines = 0; /* with more than half of the vertices on lines space these more widely */
     for (int32_t i = 0; i < job->l.line_count; i++) lines += job->l.length[i];
     job->w.line_scale = fmax(job->w.line_scale, lines / tmr_job_spacing(job) /
                                                     (0.5 * (double)job->desc.vertices));
@@ -118,19 +118,19 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     const double euler = (double)job->report.euler + (double)job->report.loops;
     if (job->desc.vertices >= TMR_CUT_FROM && (double)job->desc.vertices + 3 * euler > 1000)
         job->cut = job->desc.vertices >= 4 * TMR_CUT_FROM ? 2 : 1;
-    job->stage = job->desc.method == TRIMESH_REPEL ? TMR_STAGE_STREW : TMR_STAGE_LATTICE;
+    job->stage = job->desc.method == TRIMESH_REPEL ? TMR_STAGE_SAMPLE : TMR_STAGE_LATTICE;
     return TXM_OK;
 }
 
-static txm_status tmr_job_strew(trimesh_job *job) {
-    const double room = tmr_strewn_room((double)job->desc.vertices);
+static txm_status tmr_job_sample(trimesh_job *job) {
+    const double room = tmr_sampling_room((double)job->desc.vertices);
     const txm_status status = tmr_copy_surface(&job->w, room, &job->first);
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_JOIN;
-    return tmr_strew(&job->t, &job->w, &job->desc, &job->scratch);
+    return tmr_sample(&job->t, &job->w, &job->desc, &job->scratch);
 }
 
-/* Join the strewn points; then leave behind what room the surface's own vertices took. */
+/* Join the points; then copy the mesh without the slots of the surface's own vertices. */
 static txm_status tmr_job_join(trimesh_job *job) {
     txm_status status = tmr_join_points(&job->t, &job->scratch);
     if (status != TXM_OK) return status;
@@ -155,7 +155,8 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
     int32_t aim = (int32_t)target;
     for (int k = 0; k < job->cut; k++) aim = (int32_t)floor((aim + 3 * euler) / 4);
     /* room for three vertices per one aimed at, or as many as the surface has, and a quarter more */
-    const double closed = (double)job->s.vertex_count + job->s.loop_count, most = fmax(closed, 3.0 * aim);
+    const double closed = (double)job->s.vertex_count + job->s.loop_count;
+    const double most = fmax(closed, 3.0 * aim);
     job->w.length = tmr_job_spacing(job) * sqrt(target / aim);
     txm_status status = tmr_copy_surface(&job->w, most + floor(most / 4) + 1000 - closed, &job->first);
     if (status != TXM_OK) return status;
@@ -163,7 +164,7 @@ static txm_status tmr_job_lattice(trimesh_job *job) {
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_SUBDIVIDE;
     if (!job->cut || tmr_may_subdivide(&job->w)) return TXM_OK;
-    job->cut--; /* too coarse: once more, at four times the number */
+    job->cut--; /* too coarse: try again with four times the number */
     job->stage = TMR_STAGE_LATTICE;
     txm_arena_free(&job->first);
     memset(&job->w.m, 0, sizeof job->w.m);
@@ -200,8 +201,8 @@ static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
     return status;
 }
 
-/* Once more, otherwise: at full number if it was a quarter; then with shorter edges where the
-   surface bends. *retries: 0 if nothing is left to try. */
+/* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
+   with shorter edges where the surface bends. *retries receives 0 if nothing is left to try. */
 static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     const int coarse = job->w.line_scale > 1;
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
@@ -211,7 +212,7 @@ static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
     if (coarse) {
-        job->w.line_scale = 1; /* lines too coarse for what lies between them */
+        job->w.line_scale = 1; /* lines were too coarse for the inside        */
     } else if (quartered) {
         job->cut--;
     } else {
@@ -226,7 +227,8 @@ static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     return TXM_OK;
 }
 
-/* Finish, and see that nothing is turned over or crosses: a result that is not sound never leaves. */
+/* Finish, and check that no triangle is inverted or crosses another one: a result that is not sound
+   is never returned. */
 static txm_status tmr_job_finish(trimesh_job *job) {
     int again, crosses = 0;
     txm_status status = tmr_polish(&job->w, (int32_t)job->desc.vertices, &job->scratch);
@@ -253,19 +255,19 @@ static txm_status tmr_job_finish(trimesh_job *job) {
 }
 
 static const char *tmr_stage_name(int stage) {
-    static const char *const names[] = {"mend",    "strew",     "join",   "repel",
+    static const char *const names[] = {"mend",    "sample",    "join",   "repel",
                                         "lattice", "subdivide", "finish", "finish"};
     return names[stage];
 }
 
-/* how much of the work is done, about */
+/* how much of the work is done, roughly */
 static float tmr_job_fraction(const trimesh_job *job) {
     static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
     const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
     return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
 }
 
-/* One stage or round. A failure is for good. */
+/* One stage or round. A job that has failed stays failed. */
 static txm_status tmr_job_advance(trimesh_job *job) {
     txm_status status = TXM_OK;
     if (job->status != TXM_OK) return txm_fail(&job->env, job->status, "the job has failed before");
@@ -274,13 +276,13 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     if (txm_progress(&job->env, tmr_job_fraction(job), tmr_stage_name(stage)))
         status = TXM_CANCELLED;
     else if (stage == TMR_STAGE_MEND) status = tmr_job_mend(job);
-    else if (stage == TMR_STAGE_STREW) status = tmr_job_strew(job);
+    else if (stage == TMR_STAGE_SAMPLE) status = tmr_job_sample(job);
     else if (stage == TMR_STAGE_JOIN) status = tmr_job_join(job);
     else if (stage == TMR_STAGE_REPEL) status = tmr_job_repel(job);
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
-    if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its flags are there */
+    if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its marks lie there */
     job->shown = stage;
     job->status = status;
     if (status == TXM_OUT_OF_MEMORY)
@@ -291,14 +293,14 @@ static txm_status tmr_job_advance(trimesh_job *job) {
 
 /* ---- what a viewer sees --------------------------------------------------------------------- */
 
-/* is vertex v of the mesh one of the points? Before they are joined only those strewn are. */
+/* is vertex v of the mesh one of the points? Before they are joined only the samples are. */
 static int tmr_is_point(const trimesh_job *job, int32_t v) {
     const tmr_mesh *m = &job->w.m;
     if (m->corner[v] < 0 || tmr_is_ghost(m, v)) return 0;
     return job->stage != TMR_STAGE_JOIN || job->t.keep[v];
 }
 
-static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_state *state) {
+static txm_status tmr_fill_points(trimesh_job *job, int32_t *number, trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
     size_t n = 0;
     for (int32_t v = 0; v < m->vertex_count; v++)
@@ -318,7 +320,7 @@ static txm_status tmr_show_points(trimesh_job *job, int32_t *number, trimesh_sta
     return TXM_OK;
 }
 
-static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
+static txm_status tmr_fill_triangles(trimesh_job *job, const int32_t *number,
                                      trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
     size_t n = 0;
@@ -335,7 +337,7 @@ static txm_status tmr_show_triangles(trimesh_job *job, const int32_t *number,
     return TXM_OK;
 }
 
-static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
+static txm_status tmr_fill_state(trimesh_job *job, trimesh_state *state) {
     const tmr_mesh *m = &job->w.m;
     state->stage = tmr_stage_name(job->shown);
     state->round = job->round;
@@ -345,9 +347,9 @@ static txm_status tmr_show(trimesh_job *job, trimesh_state *state) {
     int32_t *number =
         (int32_t *)txm_arena_alloc(&job->view, (size_t)m->vertex_count, sizeof(int32_t));
     if (!number) return TXM_OUT_OF_MEMORY;
-    txm_status status = tmr_show_points(job, number, state);
+    txm_status status = tmr_fill_points(job, number, state);
     if (status == TXM_OK && job->stage != TMR_STAGE_JOIN)
-        status = tmr_show_triangles(job, number, state);
+        status = tmr_fill_triangles(job, number, state);
     return status;
 }
 
@@ -360,7 +362,7 @@ static int tmr_job_report(void *user, float fraction, const char *stage) {
     return job->progress(job->progress_user, job->fraction, stage);
 }
 
-/* Take the hooks of this call, not its allocator: the blocks are of the first one's. */
+/* Use the hooks of this call, but the allocator of trimesh_begin, which made the blocks. */
 static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
     const txm_env old = job->env;
     memset(&job->env, 0, sizeof job->env);
@@ -421,7 +423,7 @@ TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh
     if (!job || !state) return txm_fail(env, TXM_BAD_ARGUMENT, "job or state is NULL");
     tmr_job_enter(job, env);
     txm_arena_free(&job->view);
-    const txm_status status = tmr_show(job, state);
+    const txm_status status = tmr_fill_state(job, state);
     if (status != TXM_OK) {
         txm_arena_free(&job->view);
         memset(state, 0, sizeof *state);

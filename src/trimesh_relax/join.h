@@ -5,57 +5,57 @@
 
 /* ---- points that repel each other [1, sections 3.1 to 3.3] --------------------------------- */
 
-/* The thesis strews points, lets them repel each other, then joins them. Here they are joined first
-   and stay so while they repel each other, edges turning as they go. Then
+/* The thesis distributes points, lets them repel each other, then joins them to triangles. Here they
+   are joined first and stay joined while they repel each other, with edges flipped as they move:
 
-   - the neighbours of a point are those that a walk over edges finds within the radius of influence:
-     geodesic ones. Two sheets close together, of one piece or of two, know nothing of each other,
-     and there is no search in space;
+   - the neighbours of a point are those within the radius of influence that a walk over edges finds.
+     Points of two sheets that are close together, of one piece or of two, do not affect each other,
+     and no search in space is needed;
    - the triangulation cannot fail: it is a closed manifold of the right topology from the start;
-   - vertices of the input that cannot go, since a handle hangs on them, are points like the others,
-     and the number is exact before points find their places.
+   - vertices of the input that cannot be removed, since a handle needs them, become points like the
+     others, and the number is exact before points find their places.
 
-   Stages:  strew    points by area, evenly on lines       (tmr_strew)
-            join     put each into the mesh of the input   (tmr_insert; mutual tessellation [Turk 1991])
-                     and take the vertices of the input out (tmr_take_out)
-            repel    equation 3.1                           (tmr_repel_round)                  */
+   Stages:  sample   points by area, evenly on lines       (tmr_sample)
+            join     put each into the mesh of the input   (tmr_insert; mutual tessellation [2])
+                     and remove the input's vertices       (tmr_remove_vertices)
+            repel    equation 3.1                          (tmr_repel_round)                    */
 
 enum {
-    TMR_ROUNDS = 40,       /* of repulsion; Turk's k, and the thesis's                           */
-    TMR_NEAR = 48,         /* most points that push one; a dozen is usual                        */
-    TMR_TAKE_PASSES = 60,  /* ours: over the vertices of the input; 5 to 20 are needed           */
-    TMR_WALK = 4096        /* steps within one face of the input                                 */
+    TMR_ROUNDS = 40,        /* of repulsion; k of Turk and of the thesis                          */
+    TMR_NEAR = 48,          /* most points that repel one; a dozen is usual                       */
+    TMR_REMOVE_PASSES = 60, /* ours: over the vertices of the input; 5 to 20 are usual           */
+    TMR_WALK = 4096         /* steps within one face of the input                                 */
 };
 
-/* Radius of influence r = 2 sqrt(area / N), Turk's, here in lengths of the edge
-   L = sqrt(2 / sqrt(3) area / N) of the triangular lattice with so many points. In the lattice the
-   six neighbours are nearer than r and the next six just so. */
+/* Radius of influence r = 2 sqrt(area / N), Turk's, here in lengths of the edge L = sqrt(2 /
+   sqrt(3) area / N) of the triangular lattice with so many points. In the lattice the six
+   neighbours are nearer than r, and the next six only just. */
 #define TMR_REACH 1.86
 
-/* f of equation 3.1: the thesis's 0.5 at first, falling to where the points come to rest. With
-   all points moving at once 0.5 is too much for that, neighbours swing against each other from
-   f = 0.2 on; but the swinging, like heat, gets points out of poor arrangements: cooling slowly
-   gives mean quality 0.981 instead of 0.976 in 40 rounds, 0.985 in 120. */
+/* f of equation 3.1: the thesis's 0.5 at first, then falling until the points come to rest. As all
+   points move at once, 0.5 is too large for that: neighbours oscillate from f = 0.2 on. But the
+   oscillation gets points out of poor arrangements, as heat does: lowering f slowly gives a mean
+   quality of 0.981 instead of 0.976 in 40 rounds, and 0.985 in 120. */
 #define TMR_FORCE 0.5
 #define TMR_LAST_FORCE 0.15
 
-typedef struct tmr_strewn {
+typedef struct tmr_sampling {
     tmr_work *w;
     const trimesh_desc *desc;
-    int32_t *inside;   /* 1 per triangle of the mesh: the face of the surface it is a part of     */
+    int32_t *inside;   /* 1 per triangle of the mesh: the face of the surface that contains it    */
     int32_t *fixed;    /* 1 per component: points on lines and corners                           */
-    int32_t *wanted;   /* 1 per component: points in all                                         */
-    int32_t *spare;    /* 1 per component: how many of them it could do without                  */
+    int32_t *wanted;   /* 1 per component: all points                                            */
+    int32_t *spare;    /* 1 per component: how many of them are not required                     */
     double *weight;    /* 1 per component                                                        */
-    double *piece;     /* 1 per face: area / size^2, what its share of the points goes by        */
+    double *piece; /* 1 per face: area / size^2, which its share of the points is proportional to */
     uint8_t *keep;     /* 1 per vertex of the mesh: is a point                                    */
-    double *ways;      /* line_room + 1: places on the line at hand                              */
+    double *ways;      /* line_room + 1: places on the current line                              */
     int32_t line_room; /* the most edges that a line is cut into                                 */
     double length;     /* L, where the size is 1                                                  */
-    int32_t hint;      /* triangle of the mesh to start looking from                             */
-} tmr_strewn;
+    int32_t hint;      /* triangle of the mesh where a search starts                             */
+} tmr_sampling;
 
-/* ---- strewing: how many where -------------------------------------------------------------- */
+/* ---- sampling: how many where --------------------------------------------------------------- */
 
 /* wanted edge length at a vertex of the surface, relative */
 static double tmr_vertex_size(const tmr_surface *s, int32_t v) {
@@ -83,10 +83,10 @@ static double tmr_face_weight(const tmr_surface *s, int32_t f) {
            (size * size);
 }
 
-/* Edge length of so many points: each has sqrt(3) / 2 L^2 of the weighted area, on the border half
-   of that. */
-static double tmr_strewn_length(const tmr_surface *s, const tmr_lines *l, double line_scale,
-                                double points) {
+/* Edge length L for so many points: each has sqrt(3) / 2 L^2 of the weighted area, on the border
+   half of that. */
+static double tmr_sampling_length(const tmr_surface *s, const tmr_lines *l, double line_scale,
+                                  double points) {
     double area = 0, border = 0;
     for (int32_t f = 0; f < s->face_count; f++) area += tmr_face_weight(s, f);
     for (int32_t i = 0; i < l->line_count; i++)
@@ -99,8 +99,8 @@ static double tmr_strewn_length(const tmr_surface *s, const tmr_lines *l, double
     return length;
 }
 
-/* Edges that a line is cut into: by its length, and so many that no two edges are the same. */
-static int32_t tmr_line_steps(const tmr_strewn *t, int32_t line) {
+/* How many edges a line is cut into: by its length, and so many that no two edges coincide. */
+static int32_t tmr_line_steps(const tmr_sampling *t, int32_t line) {
     const tmr_lines *l = t->w->l;
     const double spacing = t->length * (t->desc->line_spacing > 0 ? t->desc->line_spacing : 1);
     const double steps = floor(tmr_line_weight(t->w->s, l, line) / spacing + 0.5);
@@ -110,8 +110,9 @@ static int32_t tmr_line_steps(const tmr_strewn *t, int32_t line) {
                                                                  : (int32_t)steps;
 }
 
-/* The least points of each component, from its Euler characteristic. Before anything is cut. */
-static void tmr_least_points(tmr_strewn *t) {
+/* The smallest number of points for each component, from its Euler characteristic. Call it before
+   anything is cut. */
+static void tmr_least_points(tmr_sampling *t) {
     const tmr_surface *s = t->w->s;
     const tmr_mesh *m = &t->w->m;
     double *euler = t->weight; /* free until later */
@@ -127,9 +128,9 @@ static void tmr_least_points(tmr_strewn *t) {
         t->wanted[i] = (int32_t)ceil((7 + sqrt(fmax(49 - 24 * euler[i], 1))) / 2);
 }
 
-/* Share the points among the components: by weight, but each at least what it needs. What that
-   takes too much is taken from those that have most to spare. */
-static void tmr_share_points(tmr_strewn *t, int32_t total) {
+/* Share the points among the components by weight, but give each at least what it needs. If that is
+   too many in all, take points from those that have most to spare. */
+static void tmr_share_points(tmr_sampling *t, int32_t total) {
     const tmr_surface *s = t->w->s;
     const int32_t n = s->component_count;
     double sum = 0, run = 0;
@@ -160,9 +161,9 @@ static void tmr_share_points(tmr_strewn *t, int32_t total) {
 
 /* ---- joining: putting a point into the mesh ------------------------------------------------ */
 
-/* Turn edges around the new vertex v of corner first until they are Delaunay, within one face of
-   the surface only, so that triangles stay parts of faces. */
-static void tmr_legalize(tmr_strewn *t, int32_t v) {
+/* Flip edges around the new vertex v until they are Delaunay, only within faces of the surface, so
+   that triangles stay parts of faces. */
+static void tmr_legalize(tmr_sampling *t, int32_t v) {
     tmr_mesh *m = &t->w->m;
     int32_t stack[64], count = 0, c = m->corner[v];
     const int32_t first = c;
@@ -185,7 +186,7 @@ static void tmr_legalize(tmr_strewn *t, int32_t v) {
 }
 
 /* The part of the face in which p lies, and the weights of its corners there. */
-static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, txm_dvec3 p, double weight[3]) {
+static int32_t tmr_find_part(const tmr_sampling *t, int32_t face, txm_dvec3 p, double weight[3]) {
     const tmr_mesh *m = &t->w->m;
     const txm_dvec3 n = t->w->s->normal[face];
     int32_t part = t->inside[t->hint] == face ? t->hint : face;
@@ -208,7 +209,7 @@ static int32_t tmr_find_part(const tmr_strewn *t, int32_t face, txm_dvec3 p, dou
 }
 
 /* Cut the edge opposite to c at a new vertex; -1 without room. */
-static int32_t tmr_cut_edge(tmr_strewn *t, int32_t c) {
+static int32_t tmr_cut_edge(tmr_sampling *t, int32_t c) {
     tmr_mesh *m = &t->w->m;
     const int32_t a = t->inside[c / 3], b = t->inside[m->opposite[c] / 3];
     const int32_t v = tmr_split(m, c);
@@ -219,10 +220,11 @@ static int32_t tmr_cut_edge(tmr_strewn *t, int32_t c) {
     return v;
 }
 
-/* Put a point that lies in a face of the surface into the mesh: into the triangle that holds it,
-   on an edge if it lies there. Returns its vertex; -1: no room, or it lies on a line or a vertex
-   that is a point already. exact: do not move the point; else it is kept off the edges. */
-static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
+/* Put a point that lies in a face of the surface into the mesh: into the triangle that holds it, on
+   an edge if it lies there. Returns its vertex, or -1 if there is no room, or if it lies on a line
+   or on a vertex that is a point already. exact: do not move the point; else it keeps a margin from
+   the edges. */
+static int32_t tmr_insert(tmr_sampling *t, int32_t face, txm_dvec3 p, int exact) {
     tmr_work *w = t->w;
     tmr_mesh *m = &w->m;
     double weight[3];
@@ -244,7 +246,7 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
         if (m->edge[3 * part + least]) return -1;
         v = tmr_cut_edge(t, 3 * part + least);
     } else {
-        if (weight[least] < margin) { /* as far in as asked for */
+        if (weight[least] < margin) { /* keep the margin        */
             double sum = 0;
             for (int k = 0; k < 3; k++) sum += weight[k] = fmax(weight[k], margin);
             p = txm_d3(0, 0, 0);
@@ -264,10 +266,10 @@ static int32_t tmr_insert(tmr_strewn *t, int32_t face, txm_dvec3 p, int exact) {
     return v;
 }
 
-/* Cut a line at places given by their distance from its beginning in wanted edge lengths, rising.
-   A vertex of the surface very near to one of them is taken for it. vertices: NULL, or receives the
-   vertex for each place. TXM_TOO_SMALL: there is no room for so many vertices. */
-static txm_status tmr_cut_line(tmr_strewn *t, int32_t line, const double *ways, int32_t count,
+/* Cut a line at places given by their distance from its beginning, in wanted edge lengths, in
+   rising order. A vertex of the surface very near to one of them is used instead. vertices: NULL,
+   or receives the vertex for each place. TXM_TOO_SMALL: there is no room for so many vertices. */
+static txm_status tmr_cut_line(tmr_sampling *t, int32_t line, const double *ways, int32_t count,
                                int32_t *vertices) {
     tmr_work *w = t->w;
     const tmr_surface *s = w->s;
@@ -343,8 +345,8 @@ static void tmr_order_faces(const tmr_surface *s, txm_pair *pairs, txm_pair *roo
        m = 3, row 0 at the corner 0:   /\       row j has 2 j + 1 parts, up and down in turn
                                       /\/\
                                      /\/\/\                                                    */
-static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
-                                 txm_rng *rng) {
+static txm_dvec3 tmr_sample_place(const tmr_surface *s, int32_t face, int32_t i, int32_t count,
+                                  txm_rng *rng) {
     const int32_t *v = s->vertex + 3 * face;
     int32_t m = (int32_t)floor(sqrt((double)count));
     if (m < 1) m = 1;
@@ -354,7 +356,7 @@ static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, 
     while ((double)row * row > cell) row--;
     while ((row + 1.0) * (row + 1) <= cell) row++;
     int32_t k = (int32_t)(cell - (double)row * row);
-    if (row & 1) k = 2 * row - k; /* to and fro, so that points follow each other closely */
+    if (row & 1) k = 2 * row - k; /* back and forth, so that consecutive points are close */
     double x = txm_rng_double(rng), y = txm_rng_double(rng);
     if (x + y > 1) {
         x = 1 - x;
@@ -377,7 +379,7 @@ static txm_dvec3 tmr_strew_place(const tmr_surface *s, int32_t face, int32_t i, 
 
 /* Strew the points that are on no line: each component is cut into as many runs of equal weight
    along the order of its faces, and each run gets one. */
-static txm_status tmr_strew_faces(tmr_strewn *t, txm_arena *scratch) {
+static txm_status tmr_sample_faces(tmr_sampling *t, txm_arena *scratch) {
     const tmr_surface *s = t->w->s;
     const size_t n = (size_t)s->face_count;
     txm_rng rng = txm_rng_make(t->desc->seed, 66);
@@ -406,17 +408,17 @@ static txm_status tmr_strew_faces(tmr_strewn *t, txm_arena *scratch) {
             next = step * (placed + txm_rng_double(&rng));
         }
         for (int32_t k = 0; k < here; k++)
-            tmr_insert(t, f, tmr_strew_place(s, f, k, here, &rng), 0);
-        if (i % 65536 == 65535 && txm_progress(t->w->env, 0.1f, "strew")) return TXM_CANCELLED;
+            tmr_insert(t, f, tmr_sample_place(s, f, k, here, &rng), 0);
+        if (i % 65536 == 65535 && txm_progress(t->w->env, 0.1f, "sample")) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
 
-/* ---- joining: taking the vertices of the surface out --------------------------------------- */
+/* ---- joining: removing the vertices of the surface ------------------------------------------ */
 
-/* the worst quality of the triangles that b has when it is pulled into a at the other end of c's
-   edge; -1: not allowed */
-static double tmr_take_quality(const tmr_work *w, int32_t c) {
+/* the worst quality of b's triangles after b is merged into the other end of c's edge; -1: not
+   allowed */
+static double tmr_remove_quality(const tmr_work *w, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c], first = tmr_prev(c), a = m->vertex[tmr_next(c)];
     double worst = 1;
@@ -432,9 +434,9 @@ static double tmr_take_quality(const tmr_work *w, int32_t c) {
     return worst;
 }
 
-/* Turn edges of v that may, the worst triangles' first: fewer neighbours make it easier to take
-   out. */
-static void tmr_thin_out(tmr_work *w, int32_t v) {
+/* Flip edges of v where possible, the best result first: with fewer neighbours it is easier to
+   remove. */
+static void tmr_lower_valence(tmr_work *w, int32_t v) {
     tmr_mesh *m = &w->m;
     for (int guard = 0; guard < TMR_VALENCE && m->valence[v] > 3; guard++) {
         tmr_quad q;
@@ -442,7 +444,7 @@ static void tmr_thin_out(tmr_work *w, int32_t v) {
         int32_t turn = -1, c = m->corner[v];
         const int32_t first = c;
         do { /* the edge from v to next(c) */
-            if (tmr_look_at_flip(w, tmr_prev(c), &q) && q.after > best) {
+            if (tmr_measure_flip(w, tmr_prev(c), &q) && q.after > best) {
                 best = q.after;
                 turn = tmr_prev(c);
             }
@@ -453,9 +455,9 @@ static void tmr_thin_out(tmr_work *w, int32_t v) {
     }
 }
 
-/* Pull vertex v into the neighbour where the triangles stay best. 0: into none. force: also where
-   one is against the surface, if it was so before. */
-static int tmr_take_vertex(tmr_work *w, int32_t v, int force) {
+/* Merge vertex v into the neighbour for which the triangles stay best. Returns 0 if no neighbour
+   will do. force: accept a triangle that is inverted if it was so before. */
+static int tmr_remove_vertex(tmr_work *w, int32_t v, int force) {
     tmr_mesh *m = &w->m;
     double best = -2;
     int32_t into = -1, c = m->corner[v];
@@ -464,7 +466,7 @@ static int tmr_take_vertex(tmr_work *w, int32_t v, int force) {
             v = prev(o), as the collapse wants it */
         const int32_t o = m->opposite[tmr_prev(c)];
         if (m->vertex[tmr_prev(o)] == v && tmr_can_collapse(m, o)) {
-            const double q = tmr_take_quality(w, o);
+            const double q = tmr_remove_quality(w, o);
             const int fair = q > 0 || (force && tmr_collapse_is_fair(
                                                     w, o, m->p[m->vertex[tmr_next(o)]], 0));
             if (q > best && fair) {
@@ -479,9 +481,9 @@ static int tmr_take_vertex(tmr_work *w, int32_t v, int force) {
     return 1;
 }
 
-/* One pass over the vertices that are no points: those that have no neighbour touched already in
-   this pass are taken out. So the mesh thins evenly however fine the input is. How many left. */
-static int32_t tmr_take_pass(tmr_work *w, const uint8_t *keep, int effort, int32_t *taken) {
+/* One pass over the vertices that are no points: removes those without a neighbour that was touched
+   in this pass, so that the mesh becomes coarser evenly. Returns how many are left. */
+static int32_t tmr_remove_pass(tmr_work *w, const uint8_t *keep, int effort, int32_t *taken) {
     tmr_mesh *m = &w->m;
     int32_t left = 0;
     memset(w->bad, 0, (size_t)m->vertex_count);
@@ -496,21 +498,21 @@ static int32_t tmr_take_pass(tmr_work *w, const uint8_t *keep, int effort, int32
             w->bad[m->vertex[tmr_next(c)]] = 1;
             c = tmr_swing(m, c);
         } while (c != first);
-        if (effort > 0) tmr_thin_out(w, v);
-        if (!tmr_take_vertex(w, v, effort > 2)) continue;
+        if (effort > 0) tmr_lower_valence(w, v);
+        if (!tmr_remove_vertex(w, v, effort > 2)) continue;
         left--;
         ++*taken;
     }
     return left;
 }
 
-/* Take out all vertices that are no points, as far as they go; what must stay is a point like the
+/* Remove all vertices that are no points where possible; those that must stay are points like the
    others from now on. fraction: for the progress. */
-static txm_status tmr_take_out(tmr_work *w, const uint8_t *keep, float fraction) {
+static txm_status tmr_remove_vertices(tmr_work *w, const uint8_t *keep, float fraction) {
     int idle = 0;
-    for (int pass = 0; pass < TMR_TAKE_PASSES; pass++) {
+    for (int pass = 0; pass < TMR_REMOVE_PASSES; pass++) {
         int32_t taken;
-        const int32_t left = tmr_take_pass(w, keep, idle, &taken);
+        const int32_t left = tmr_remove_pass(w, keep, idle, &taken);
         if (left == 0) break;
         tmr_flip_delaunay(w, 2);
         idle = taken * 50 < left ? idle + 1 : 0;
@@ -521,15 +523,15 @@ static txm_status tmr_take_out(tmr_work *w, const uint8_t *keep, float fraction)
     return TXM_OK;
 }
 
-/* ---- strewing and joining: the whole -------------------------------------------------------- */
+/* ---- sampling and joining: the whole -------------------------------------------------------- */
 
 /* Vertices to make room for so that a mesh of the surface takes so many points (ours: a quarter more,
    for the vertices of lines). */
-static double tmr_strewn_room(double points) {
+static double tmr_sampling_room(double points) {
     return points + floor(points / 4) + 1000;
 }
 
-static txm_status tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
+static txm_status tmr_sampling_alloc(tmr_sampling *t, txm_arena *scratch) {
     const tmr_surface *s = t->w->s;
     const tmr_mesh *m = &t->w->m;
     const size_t n = (size_t)s->component_count;
@@ -554,7 +556,7 @@ static txm_status tmr_strewn_alloc(tmr_strewn *t, txm_arena *scratch) {
 }
 
 /* Corners and the points on lines. */
-static txm_status tmr_strew_lines(tmr_strewn *t) {
+static txm_status tmr_sample_lines(tmr_sampling *t) {
     const tmr_surface *s = t->w->s;
     const tmr_lines *l = t->w->l;
     const tmr_mesh *m = &t->w->m;
@@ -580,27 +582,27 @@ static txm_status tmr_strew_lines(tmr_strewn *t) {
 }
 
 /* Strew desc->vertices points over a mesh that is a copy of the surface, with room as
-   tmr_strewn_room has it. */
-static txm_status tmr_strew(tmr_strewn *t, tmr_work *w, const trimesh_desc *desc,
-                            txm_arena *scratch) {
+   tmr_sampling_room has it. */
+static txm_status tmr_sample(tmr_sampling *t, tmr_work *w, const trimesh_desc *desc,
+                             txm_arena *scratch) {
     const int32_t total = (int32_t)desc->vertices;
     memset(t, 0, sizeof *t);
     t->w = w;
     t->desc = desc;
     t->length = w->length =
-        tmr_strewn_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
-    txm_status status = tmr_strewn_alloc(t, scratch);
+        tmr_sampling_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
+    txm_status status = tmr_sampling_alloc(t, scratch);
     if (status != TXM_OK) return status;
     tmr_least_points(t);
-    if ((status = tmr_strew_lines(t)) != TXM_OK) return status;
+    if ((status = tmr_sample_lines(t)) != TXM_OK) return status;
     tmr_share_points(t, total);
-    return tmr_strew_faces(t, scratch);
+    return tmr_sample_faces(t, scratch);
 }
 
-/* From there to a mesh of these points only, as many as were asked for. */
-static txm_status tmr_join_points(tmr_strewn *t, txm_arena *scratch) {
+/* Make the mesh one of these points only, as many as are wanted. */
+static txm_status tmr_join_points(tmr_sampling *t, txm_arena *scratch) {
     int32_t missing;
-    const txm_status status = tmr_take_out(t->w, t->keep, 0.15f);
+    const txm_status status = tmr_remove_vertices(t->w, t->keep, 0.15f);
     if (status != TXM_OK) return status;
     return tmr_fix_count(t->w, (int32_t)t->desc->vertices, 1, scratch, &missing);
 }

@@ -10,7 +10,7 @@
 typedef struct tmr_lines {
     int32_t line_count, segment_count;
     int32_t *first;   /* 1 per line and one more: its first segment                             */
-    uint8_t *closed;  /* 1 per line: its end is its beginning, and no corner                    */
+    uint8_t *closed;  /* 1 per line: a loop without a corner                                    */
     uint8_t *border;  /* 1 per line: part of the border                                         */
     double *length;   /* 1 per line                                                             */
     int32_t *a, *b;   /* 1 per segment: its vertices on the surface                             */
@@ -23,7 +23,7 @@ typedef struct tmr_lines {
 } tmr_lines;
 
 /* the edge opposite to corner c, seen from its vertex v: the other end */
-static int32_t tmr_far_end(const tmr_surface *s, int32_t c, int32_t v) {
+static int32_t tmr_other_end(const tmr_surface *s, int32_t c, int32_t v) {
     const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
     return a == v ? b : a;
 }
@@ -34,11 +34,11 @@ static double tmr_turn_at(const tmr_surface *s, int32_t c) {
     return o < 0 ? 0 : 1 - txm_d3_dot(s->normal[c / 3], s->normal[o / 3]);
 }
 
-/* Which edges of the surface are creases? Those at which it turns by the angle and more, and, for
-   a sharp edge is not the same as a coarse mesh, clearly more than at the other edges of the two
-   triangles: the surface turns at most half as much there. Where three or four edges of two
-   triangles are sharp, as on small steps and pins, they count by the angle alone if it is wide.
-   Writes 1 per corner into s->edge_kind. */
+/* Which edges of the surface are creases? Those at which it turns by the angle or more, and clearly
+   more than at the other edges of the two triangles, which tells a sharp edge from a coarse mesh:
+   there it turns at most half as much. Where three or four edges of two triangles are sharp, as on
+   small steps and pins, the angle alone decides if it is wide. Writes 1 per corner into
+   s->edge_kind. Returns how many edges are creases. */
 static size_t tmr_find_creases(tmr_surface *s, double angle) {
     const double least = angle >= 180 ? 3 : 1 - cos(angle * (TXM_PI / 180));
     const double sure = fmax(least, 1 - cos(75 * (TXM_PI / 180)));
@@ -48,7 +48,7 @@ static size_t tmr_find_creases(tmr_surface *s, double angle) {
         s->edge_kind[c] = o < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE;
         const double turn = tmr_turn_at(s, c);
         if (o < 0 || turn < least) continue;
-        /* the largest turn of the other edges but for those that are as sharp themselves */
+        /* how much the other edges turn, except those that are as sharp themselves */
         const double around[4] = {tmr_turn_at(s, tmr_next(c)), tmr_turn_at(s, tmr_prev(c)),
                                   tmr_turn_at(s, tmr_next(o)), tmr_turn_at(s, tmr_prev(o))};
         double sum = 0;
@@ -70,8 +70,8 @@ typedef struct tmr_ends {
     int32_t *corner; /* the edge opposite to it  */
 } tmr_ends;
 
-/* is this the one of an edge's two corners that speaks for it? */
-static int tmr_speaks(const tmr_surface *s, int32_t c) {
+/* does this one of an edge's two corners represent it? */
+static int tmr_represents_edge(const tmr_surface *s, int32_t c) {
     return s->opposite[c] < c;
 }
 
@@ -82,7 +82,7 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
     if (!ends->first) return TXM_OUT_OF_MEMORY;
     int32_t *count = ends->first + 1;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
+        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_represents_edge(s, c)) continue;
         count[s->vertex[tmr_next(c)]]++;
         count[s->vertex[tmr_prev(c)]]++;
         total += 2;
@@ -96,14 +96,14 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
         sum += k;
     }
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
-        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_speaks(s, c)) continue;
+        if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_represents_edge(s, c)) continue;
         ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
         ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
     }
     return TXM_OK;
 }
 
-/* Creases that hang together to less than the given length in all are noise: make them plain. */
+/* Connected creases of less than the given length in all are noise: make them plain. */
 static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
                                          txm_arena *arena) {
     const int32_t n = s->vertex_count;
@@ -120,7 +120,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
         for (; done < size; done++) {
             const int32_t u = stack[done];
             for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
-                const int32_t w = tmr_far_end(s, ends->corner[e], u);
+                const int32_t w = tmr_other_end(s, ends->corner[e], u);
                 has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
                 length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
@@ -142,19 +142,19 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
 }
 
 /* Direction from v along the line that starts with the edge of corner c, over about the distance
-   reach or up to where it branches. */
+   reach, or less if the line branches. */
 static txm_dvec3 tmr_line_direction(const tmr_surface *s, const tmr_ends *ends, int32_t v,
                                     int32_t c, double reach) {
-    int32_t at = tmr_far_end(s, c, v), e = c;
+    int32_t at = tmr_other_end(s, c, v), e = c;
     for (int i = 0; i < 1000; i++) {
         if (txm_d3_dist2(s->point[at], s->point[v]) >= reach * reach) break;
         if (ends->first[at + 1] - ends->first[at] != 2) break;
         const int32_t k = ends->first[at];
         e = ends->corner[k] == e ? ends->corner[k + 1] : ends->corner[k];
-        at = tmr_far_end(s, e, at);
+        at = tmr_other_end(s, e, at);
         if (at == v) break;
     }
-    if (at == v) at = tmr_far_end(s, c, v);
+    if (at == v) at = tmr_other_end(s, c, v);
     return txm_d3_unit(txm_d3_sub(s->point[at], s->point[v]));
 }
 
@@ -184,7 +184,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
             int32_t at = v, e = ends->corner[k];
             double way = 0;
             for (int i = 0; i < 1000 && sharpest; i++) {
-                const int32_t next = tmr_far_end(s, e, at);
+                const int32_t next = tmr_other_end(s, e, at);
                 way += txm_d3_dist(s->point[at], s->point[next]);
                 at = next;
                 if (way > reach || at == v || turn[at] <= 0) break;
@@ -199,7 +199,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
     return TXM_OK;
 }
 
-enum { TMR_TIP_BALL = 64 }; /* vertices looked at around one; where more are near it is no tip */
+enum { TMR_TIP_BALL = 64 }; /* vertices around a tip, at most                                  */
 #define TMR_TIP_DEFECT 1.3  /* ours: radians of angle missing around a tip                    */
 
 /* 2 pi minus the angles around each vertex: what is missing there for the surface to be flat. */
@@ -213,8 +213,8 @@ static void tmr_angle_defects(const tmr_surface *s, float *defect) {
     }
 }
 
-/* Is v the tip of something thinner than an edge, such as a horn? Within reach much angle is
-   missing, and no vertex there lies beyond v along its normal. */
+/* Is v the tip of something thinner than an edge, such as a horn? The vertices within reach have a
+   large angle defect in all, and none of them lies beyond v along its normal. */
 static int tmr_is_tip(const tmr_surface *s, const float *defect, const uint8_t *kind, int32_t v,
                       double reach) {
     int32_t list[TMR_TIP_BALL];
@@ -251,7 +251,7 @@ static txm_status tmr_find_tips(const tmr_surface *s, double reach, txm_arena *s
     return TXM_OK;
 }
 
-/* Follow the line from v over the edge of corner c to its end, as one more line. */
+/* Add a line: from v over the edge of corner c to its end. */
 static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, int32_t v,
                       int32_t c) {
     const int32_t id = l->line_count++, begin = v;
@@ -260,7 +260,7 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->border[id] = s->edge_kind[c] == TMR_BORDER_EDGE;
     for (;;) {
         TRIMESH_ASSERT(l->segment_count < ends->first[s->vertex_count] / 2);
-        const int32_t k = l->segment_count++, w = tmr_far_end(s, c, v);
+        const int32_t k = l->segment_count++, w = tmr_other_end(s, c, v);
         l->a[k] = v;
         l->b[k] = w;
         l->face[k] = c / 3;
@@ -280,8 +280,8 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->first[id + 1] = l->segment_count;
 }
 
-/* Find all lines. spacing: the edge length to come, by which short creases and slight bends are
-   told from real ones. */
+/* Find all lines. spacing: the edge length of the result, which decides which creases are too short
+   and which bends too slight. */
 static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
                                   txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
     tmr_ends ends;
@@ -313,7 +313,7 @@ static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, 
     if (status == TXM_OK && angle < 180)
         status = tmr_find_tips(s, 0.75 * spacing, scratch, l->kind);
     if (status != TXM_OK) return status;
-    for (int pass = 0; pass < 2; pass++) { /* from the corners; then what is closed */
+    for (int pass = 0; pass < 2; pass++) { /* lines from corners; then closed ones  */
         for (int32_t v = 0; v < s->vertex_count; v++) {
             if ((l->kind[v] == TRIMESH_CORNER) != (pass == 0)) continue;
             for (int32_t k = ends.first[v]; k < ends.first[v + 1]; k++)
@@ -334,7 +334,7 @@ static int32_t tmr_segment_step(const tmr_lines *l, int32_t k, int step) {
     return k + step;
 }
 
-/* The place on the line nearest to p, walking from segment *k as long as it gets nearer. */
+/* The place on the line nearest to p, found by walking from segment *k while the distance falls. */
 static txm_dvec3 tmr_project_line(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p,
                                   int32_t *k) {
     txm_dvec3 best = p;
@@ -382,12 +382,12 @@ static double tmr_line_way(const tmr_surface *s, const tmr_lines *l, txm_dvec3 p
 
 /* ---- density ------------------------------------------------------------------------------ */
 
-enum { TMR_GRADE_SWEEPS = 12 };   /* ours: of the limit on how fast the edge length may change    */
+enum { TMR_GRADE_SWEEPS = 12 };   /* ours: for the limit on how fast the edge length may change   */
 #define TMR_TURN_PER_EDGE 0.6     /* ours: radians that one edge may turn where density adapts    */
 #define TMR_LEAST_SIZE 0.2        /* ours: the shortest edges where it adapts fully               */
 
-/* The edge length, where the scale is 1, of so many vertices on the surface: triangles of edge L
-   take sqrt(3) / 4 L^2 each, and there are two per vertex. */
+/* The edge length, where the scale is 1, of a mesh of so many vertices: a triangle of edge L has
+   the area sqrt(3) / 4 L^2, and there are two triangles per vertex. */
 static double tmr_spacing(const tmr_surface *s, double vertices) {
     double sum = 0;
     for (int32_t f = 0; f < s->face_count && s->scale; f++) {
@@ -399,15 +399,15 @@ static double tmr_spacing(const tmr_surface *s, double vertices) {
     return sqrt((s->scale ? sum : s->area) / vertices * 1.1547005383792515);
 }
 
-/* Make the mean of the scale such that with and without it the same number of vertices gives the
-   same spacing where it is 1. */
+/* Normalize the scale: the same number of vertices shall give the same spacing where it is 1 as
+   without a scale. */
 static void tmr_normalize_scale(tmr_surface *s) {
     if (!s->scale) return;
     const double factor = tmr_spacing(s, 1) / sqrt(s->area * 1.1547005383792515);
     for (int32_t v = 0; v < s->vertex_count; v++) s->scale[v] = txm_float(s->scale[v] * factor);
 }
 
-/* Curvature at every vertex: the most that the normal turns per unit of length along an edge. */
+/* Curvature at every vertex: the largest change of the normal per unit of length along an edge. */
 static void tmr_curvature(const tmr_surface *s, float *curvature) {
     for (int32_t v = 0; v < s->vertex_count; v++) curvature[v] = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
@@ -420,9 +420,8 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     }
 }
 
-/* Shorten the wanted edge lengths where the surface bends, such that an edge turns by no more than
-   TMR_TURN_PER_EDGE, fully or in part (adapt); and let them grow with the distance no faster than by
-   a third of it. */
+/* Shorten the wanted edge lengths where the surface bends, fully or in part (adapt), so that an
+   edge turns by no more than TMR_TURN_PER_EDGE. Over a distance d they grow by no more than d / 3. */
 static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
                                   txm_arena *scratch) {
     const size_t n = (size_t)s->vertex_count;

@@ -6,41 +6,41 @@
 /* ---- mending: state and checks ------------------------------------------------------------ */
 
 enum {
-    TMR_MOST = 1 << 26,      /* vertices and triangles of an input or a result                    */
-    TMR_MOST_SLOTS = INT32_MAX / 3, /* of vertices or of triangles: corners are numbered by int32_t */
-    TMR_NO_VERTEX = -1,      /* in the first corner of a triangle: to be taken away               */
-    TMR_OVERFULL = -2,       /* as opposite: the edge has more than two triangles                 */
-    TMR_MAPPED = 8,          /* as turn: corners do not match, take the nearest point of origin  */
-    TMR_MEND_ROUNDS = 8,     /* ours: of flipping and collapsing; one or two do for real damage   */
-    TMR_FLIP_SWEEPS = 64,    /* ours: to and fro over the thin triangles; few use more than three */
-    TMR_FAN_LIMIT = 256      /* ours: vertices of more triangles are not touched, for speed       */
+    TMR_MOST = 1 << 26, /* vertices and triangles of an input or a result                    */
+    TMR_MOST_SLOTS = INT32_MAX / 3, /* vertices or triangles: int32_t numbers the corners        */
+    TMR_NO_VERTEX = -1,   /* in the first corner of a triangle: to be removed                  */
+    TMR_OVERFULL = -2,    /* as opposite: the edge has more than two triangles                 */
+    TMR_MAPPED = 8,       /* as turn: corners do not match; use the nearest point of origin   */
+    TMR_MEND_ROUNDS = 8,  /* ours: of flipping and collapsing; one or two are enough           */
+    TMR_FLIP_SWEEPS = 64, /* ours: back and forth over the thin triangles; mostly three        */
+    TMR_FAN_LIMIT = 256   /* ours: vertices of more triangles are left as they are             */
 };
 
-/* What is worked on until the faces are clean. Vertices keep the caller's numbers to the end: a
-   vertex that another one lies on, or that is not used, is just not mentioned any more. */
+/* The input while it is mended. Vertices keep the caller's numbers to the end: no face refers to a
+   vertex that was welded to another one, or to an unused one. */
 typedef struct tmr_mend {
     const trimesh_desc *desc;
     txm_env *env;
     trimesh_report report;
     int32_t vertex_count, face_count;
     txm_dvec3 *point;  /* 1 per input vertex, scaled                                      */
-    int32_t *rename;   /* 1 per input vertex: which one stands for it                     */
-    int32_t *degree;   /* 1 per input vertex: counts, of the step at hand                 */
-    int32_t *stamp;    /* 1 per input vertex: marks neighbours                            */
+    int32_t *rename;   /* 1 per input vertex: the vertex that replaces it                    */
+    int32_t *degree;   /* 1 per input vertex: a count, used by each step                  */
+    int32_t *stamp;    /* 1 per input vertex: marks neighbours                              */
     int32_t *vertex;   /* the next four as in tmr_surface, with room for the input        */
     int32_t *opposite;
     uint32_t *origin;
     uint8_t *turn;
     uint8_t *flag;     /* 1 per face, of the step at hand                                 */
-    uint8_t *twin;     /* 1 per face: there was one of opposite winding                   */
-    int single;        /* non-zero: there are faces of which that is not so               */
+    uint8_t *twin;     /* 1 per face: it had a duplicate of opposite winding              */
+    int single;        /* non-zero: some face has no such duplicate                       */
     int32_t *list;     /* 1 per face, of the step at hand                                 */
     uint32_t *sides;   /* 1 per corner: the sides in the order of their edges; as much scratch */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
     txm_dvec3 centre;
     double diagonal;
-    double noise;      /* scaled units: where single precision ends                       */
+    double noise; /* scaled units: resolution of single precision                   */
 } tmr_mend;
 
 static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
@@ -83,7 +83,7 @@ static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
     return TXM_OK;
 }
 
-/* All that can be wrong with the numbers themselves. */
+/* Check all numbers of the input. */
 static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a trimesh_desc");
     const size_t limit = TRIMESH_MAX_VERTICES < TMR_MOST ? TRIMESH_MAX_VERTICES : TMR_MOST;
@@ -167,7 +167,7 @@ static txm_dvec3 tmr_cell(txm_dvec3 p, double size) {
 }
 
 /* The lowest vertex in a cell that is not farther than size from point i, or else best. */
-static int32_t tmr_weld_look(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
+static int32_t tmr_weld_find(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
                              int32_t best) {
     size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
     for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
@@ -178,12 +178,12 @@ static int32_t tmr_weld_look(const tmr_mend *m, txm_dvec3 cell, int32_t i, doubl
     return best;
 }
 
-/* Each vertex, in order, joins the first one kept that is near enough, or else is kept. So no
-   chain of near vertices runs together, and few of those kept lie in one cell of the grid. With
-   size 0 a cell is a place. */
+/* Each vertex, in order, is welded to the first kept vertex that is near enough, or else is kept.
+   So chains of near vertices do not collapse into one, and a cell of the grid holds few kept
+   vertices. With size 0 only vertices in equal places are welded. */
 static void tmr_weld(tmr_mend *m) {
     double size = m->desc->weld;
-    if (size < 1e-14) size = 0; /* cells must be numbers that 1 can be added to */
+    if (size < 1e-14) size = 0; /* so that a cell's number plus 1 is another number */
     const int reach = size > 0 ? 1 : 0;
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t i = 0; i < m->vertex_count; i++) {
@@ -193,7 +193,7 @@ static void tmr_weld(tmr_mend *m) {
         for (int x = -reach; x <= reach; x++) {
             for (int y = -reach; y <= reach; y++) {
                 for (int z = -reach; z <= reach; z++)
-                    best = tmr_weld_look(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
+                    best = tmr_weld_find(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
             }
         }
         if (best >= 0) {
@@ -215,7 +215,7 @@ static void tmr_mend_load(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) m->origin[f] = (uint32_t)f;
 }
 
-/* Take away the faces that are marked so or have a vertex twice; the latter are counted. */
+/* Remove the faces that are marked with TMR_NO_VERTEX or have a vertex twice; count the latter. */
 static void tmr_mend_compact(tmr_mend *m) {
     int32_t n = 0;
     for (int32_t f = 0; f < m->face_count; f++) {
@@ -233,7 +233,7 @@ static void tmr_mend_compact(tmr_mend *m) {
     m->face_count = n;
 }
 
-/* 0: other vertices; 1: the same, the same way round; -1: the other way round */
+/* 0: other vertices; 1: the same, in the same winding; -1: in the opposite winding */
 static int tmr_same_face(const int32_t *a, const int32_t *b) {
     for (int k = 0; k < 3; k++) {
         if (a[0] != b[k]) continue;
@@ -243,13 +243,14 @@ static int tmr_same_face(const int32_t *a, const int32_t *b) {
     return 0;
 }
 
-/* Of faces with the same three vertices keep the first; remember where another was turned. */
+/* Of faces with the same three vertices keep the first; note whether another had opposite
+   winding. */
 static void tmr_mend_duplicates(tmr_mend *m) {
     const size_t mask = m->table_size - 1;
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t f = 0; f < m->face_count; f++) {
         const int32_t *v = m->vertex + 3 * f;
-        /* a sum, for the order does not matter */
+        /* a sum, which does not depend on their order */
         size_t slot = (size_t)(txm_hash((uint64_t)v[0] + 1) + txm_hash((uint64_t)v[1] + 1) +
                                txm_hash((uint64_t)v[2] + 1)) & mask;
         int same = 0;
@@ -291,8 +292,8 @@ static int32_t tmr_run_end(const tmr_mend *m, int32_t i) {
     return (int32_t)txm_mesh_edge_end(&mesh, m->sides, (size_t)i);
 }
 
-/* Find the opposites; the number of edges with more than two faces. */
-static int32_t tmr_mend_link(tmr_mend *m) {
+/* Find the opposites. Returns how many edges have more than two faces. */
+static int32_t tmr_mend_opposites(tmr_mend *m) {
     const txm_mesh mesh = tmr_mend_mesh(m);
     int32_t overfull = 0;
     txm_mesh_sort_sides(&mesh, m->sides);
@@ -311,13 +312,13 @@ static int32_t tmr_mend_link(tmr_mend *m) {
     return overfull;
 }
 
-/* Without area, for all that single precision can tell. */
+/* Has the triangle no area, as far as single precision can tell? */
 static int tmr_is_thin(const tmr_mend *m, const txm_dvec3 p[3]) {
     double longest = 0;
     for (int k = 0; k < 3; k++) longest = fmax(longest, txm_d3_dist2(p[k], p[(k + 1) % 3]));
     longest = sqrt(longest);
     const double height = longest > 0 ? txm_d3_len(txm_d3_area2(p[0], p[1], p[2])) / longest : 0;
-    /* the height that rounding alone can make counts only where the triangle looks thin as well */
+    /* a height within rounding errors counts only if the triangle is slim as well */
     return height <= 1e-6 * longest || (height <= m->noise && height <= 1e-3 * longest);
 }
 static void tmr_face_points(const tmr_mend *m, int32_t f, txm_dvec3 p[3]) {
@@ -329,13 +330,13 @@ static int tmr_face_is_thin(const tmr_mend *m, int32_t f) {
     return tmr_is_thin(m, p);
 }
 
-/* A fin hangs on the edge of its corner c alone: its other two edges are borders. */
+/* A fin is attached at the edge of its corner c only: its other two edges are borders. */
 static int tmr_is_fin(const tmr_mend *m, int32_t c, int thin_only) {
     return m->opposite[tmr_next(c)] == -1 && m->opposite[tmr_prev(c)] == -1 &&
            (!thin_only || tmr_face_is_thin(m, c / 3));
 }
 
-/* Mark the fins of a run if two or more faces stay; in doubt only those without area. */
+/* Mark the fins of a run if two or more faces remain; if not, try only those without area. */
 static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
     for (int thin_only = 0; thin_only < 2; thin_only++) {
         int32_t fins = 0;
@@ -351,9 +352,9 @@ static int tmr_cut_fins(tmr_mend *m, int32_t begin, int32_t end) {
     return 0;
 }
 
-/* A wall inside, of two faces back to back, from which the first step kept one: where it meets two
-   faces of the outside, or only other walls, it goes, and so does all that hangs together with it.
-   (If all faces were double, they are the outside.) */
+/* An interior wall of two faces back to back, of which the first step kept one, is removed where it
+   meets two faces of the outside, or only other walls; so is all of the wall that is connected to
+   it. (If all faces of the input were double, they are the outside.) */
 static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     int32_t twins = 0, top = 0;
     for (int32_t k = begin; k < end; k++) twins += m->twin[m->sides[k] / 3];
@@ -377,8 +378,8 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     return 1;
 }
 
-/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces round it,
-   winding to and fro in turn. Faces with the inside between them belong together:
+/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces around
+   it, with alternating winding. Faces with the inside between them belong together:
 
             \  solid /           e is the edge from its lower vertex to the higher. The normal of a
          -   \      /  +         face that winds along e (+) points to rising angles, so the solid
@@ -414,7 +415,7 @@ static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
         angle[at] = a;
         corner[at] = c;
     }
-    for (int32_t k = 0; k < count; k++) { /* clearly apart, and in turn? */
+    for (int32_t k = 0; k < count; k++) { /* clearly apart, and alternating? */
         const int32_t next = (k + 1) % count;
         const double gap = angle[next] - angle[k] + (next ? 0 : 2 * TXM_PI);
         const int along = m->vertex[tmr_next(corner[k])] == low;
@@ -431,7 +432,7 @@ static void tmr_clear_flags(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) m->flag[f] = 0;
 }
 
-/* Visit the edges with more than two faces; how many of them were mended. */
+/* Call `mend` for the edges with more than two faces. Returns how many of them it mended. */
 static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t),
                                  int32_t *bad, int *bad_count) {
     int32_t mended = 0;
@@ -447,7 +448,7 @@ static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, i
     return mended;
 }
 
-/* Take away the faces that have a flag; how many. */
+/* Remove the flagged faces. Returns how many. */
 static size_t tmr_cut_flagged(tmr_mend *m) {
     size_t count = 0;
     for (int32_t f = 0; f < m->face_count; f++) {
@@ -458,11 +459,11 @@ static size_t tmr_cut_flagged(tmr_mend *m) {
     return count;
 }
 
-/* Opposites, with every edge of at most two faces. */
+/* Find the opposites, mending edges until each has at most two faces. */
 static txm_status tmr_mend_edges(tmr_mend *m) {
     int32_t bad = -1;
     int bad_count = 0;
-    for (int round = 0; tmr_mend_link(m) > 0; round++) {
+    for (int round = 0; tmr_mend_opposites(m) > 0; round++) {
         int32_t ignored = 0; /* not below 0: nothing is written */
         tmr_clear_flags(m);
         for (int32_t f = 0; f < m->face_count; f++) m->single |= !m->twin[f];

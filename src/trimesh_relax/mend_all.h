@@ -5,8 +5,8 @@
 
 /* ---- the surface: normals and topology ---------------------------------------------------- */
 
-/* Normals of faces without area: the mean of their neighbours', area by area, from the rim of
-   such a region inwards. */
+/* Normals of faces without area: the mean of their neighbours', from the rim of such a region
+   inwards. */
 static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count) {
     int left = count > 0;
     for (int round = 0; left && round < TMR_FLIP_SWEEPS; round++) {
@@ -22,7 +22,7 @@ static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count)
             left |= !(txm_d3_len2(sum) > 0);
         }
     }
-    for (int32_t i = 0; i < count; i++) { /* nothing near has a normal: its own, or any */
+    for (int32_t i = 0; i < count; i++) { /* no face nearby has a normal: use its own, or any */
         const int32_t *v = s->vertex + 3 * thin[i];
         txm_dvec3 *n = s->normal + thin[i];
         if (txm_d3_len2(*n) > 0) continue;
@@ -94,7 +94,7 @@ static int32_t tmr_next_border(const tmr_surface *s, int32_t c) {
     return k;
 }
 
-/* Count border loops and take stock. */
+/* Count border loops and edges; fill in components, loops and Euler characteristic. */
 static void tmr_count_loops(tmr_surface *s, trimesh_report *report, uint8_t *seen) {
     int32_t loops = 0, border = 0;
     memset(seen, 0, 3 * (size_t)s->face_count);
@@ -135,7 +135,7 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
 
 /* ---- the input, mended: the whole --------------------------------------------------------- */
 
-/* Faces without repetition, two at an edge at most, wound alike. */
+/* Faces without duplicates, at most two at an edge, consistently oriented. */
 static txm_status tmr_mend_faces(tmr_mend *m) {
     tmr_mend_compact(m);
     tmr_mend_duplicates(m);

@@ -6,9 +6,9 @@
 
 /* ---- mending: orientation ----------------------------------------------------------------- */
 
-/* Flag the component of face first: 1 = as it is, 2 = to be turned, so that all of it winds as
-   most of its area does (half and half: as the first). 0 where that cannot be; then the edge
-   opposite to corner *bad closes a one-sided band. */
+/* Flag the component of face first: 1 = stays, 2 = to be reversed, so that all of it has the
+   winding of most of its area (if equal: of the first face). Returns 0 if it cannot be oriented;
+   then the edge opposite to corner *bad closes a one-sided band. */
 static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
     double stays = 0, turns = 0; /* area */
     int32_t count = 0;
@@ -35,14 +35,14 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
             }
         }
     }
-    if (turns > stays * (1 + 1e-9)) { /* as much, but for rounding: the first face stays */
+    if (turns > stays * (1 + 1e-9)) { /* if equal up to rounding, the first face stays   */
         for (int32_t i = 0; i < count; i++)
             m->flag[m->list[i]] = (uint8_t)(3 - m->flag[m->list[i]]);
     }
     return 1;
 }
 
-/* Turn the faces of flag 2: corners 1 and 2 change places. */
+/* Reverse the faces with flag 2: swap their corners 1 and 2. */
 static void tmr_turn_flagged(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) {
         if (m->flag[f] != 2) continue;
@@ -96,8 +96,8 @@ static int tmr_is_needle(const tmr_mend *m, int32_t f, int32_t *shortest, int32_
     return least <= 1e-6 * most || (least <= m->noise && least <= 1e-3 * most);
 }
 
-/* The corners round the vertex of c, and the vertices round it: as many, or on the border (*open)
-   one more. How many corners, or 0 if they are too many to bother. */
+/* The corners at the vertex of c, and its neighbours: as many, or on the border (*open) one more.
+   Returns how many corners, or 0 if they are more than TMR_FAN_LIMIT. */
 static int32_t tmr_ring(const tmr_mend *m, int32_t c, int32_t *corner, int32_t *around, int *open) {
     int32_t n = 0, k = c;
     for (int32_t back = tmr_cw(m->opposite, c); back >= 0 && back != c; n++) {
@@ -123,7 +123,7 @@ static int tmr_has_neighbor(const tmr_mend *m, int32_t c, int32_t v) {
     for (int32_t k = 0; k < n + open; k++) {
         if (around[k] == v) return 1;
     }
-    return n == 0; /* too many to look at: say yes, nothing is done then */
+    return n == 0; /* too many to look at: "yes" prevents the flip       */
 }
 
 static void tmr_join(tmr_mend *m, int32_t a, int32_t b) {
@@ -137,8 +137,8 @@ static double tmr_slimness(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c) {
     return longest2 > 0 ? txm_d3_len(txm_d3_area2(a, b, c)) / longest2 : 0;
 }
 
-/* Flip the edge of corner c if the worse of the two triangles gets better and none turns over. The
-   new ones lie in the triangle beyond, as far as there is anything in this one. */
+/* Flip the edge of corner c if the worse of the two triangles gets better and none is inverted. As
+   this triangle has no area, both new ones lie in the triangle beyond. */
 static int tmr_flip_thin(tmr_mend *m, int32_t c) {
     const int32_t o = m->opposite[c];
     if (o < 0 || m->vertex[o] == m->vertex[c]) return 0;
@@ -162,7 +162,7 @@ static int tmr_flip_thin(tmr_mend *m, int32_t c) {
     return 1;
 }
 
-/* Detach a face and flag it, to be cut. */
+/* Detach a face and flag it for removal. */
 static void tmr_drop_face(tmr_mend *m, int32_t f) {
     for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
         if (m->opposite[c] >= 0) m->opposite[m->opposite[c]] = -1;
@@ -171,8 +171,8 @@ static void tmr_drop_face(tmr_mend *m, int32_t f) {
     m->flag[f] = 1;
 }
 
-/* Flip the longest edge of a thin face, or drop the face if that is on the border. Needles are left
-   alone. Non-zero if something changed. */
+/* Flip the longest edge of a thin face, or remove the face if that edge is on the border. Needles
+   are left as they are. Returns non-zero if something changed. */
 static int tmr_flip_cap(tmr_mend *m, int32_t f) {
     int32_t shortest = 0, longest = 0;
     if (m->flag[f] || !tmr_face_is_thin(m, f) || tmr_is_needle(m, f, &shortest, &longest)) return 0;
@@ -185,8 +185,8 @@ static int tmr_flip_cap(tmr_mend *m, int32_t f) {
     return 1;
 }
 
-/* Go over the count thin faces of m->list, to and fro, so that a row of them along one edge is
-   undone from either end. m->list keeps those that are still thin; how many. */
+/* Go over the count thin faces of m->list, back and forth, so that a row of them along one edge is
+   undone from either end. m->list keeps those that are still thin. Returns how many. */
 static int32_t tmr_flip_caps(tmr_mend *m, int32_t count) {
     int done = 1;
     for (int sweep = 0; done && sweep < TMR_FLIP_SWEEPS; sweep++) {
@@ -203,9 +203,9 @@ static int32_t tmr_flip_caps(tmr_mend *m, int32_t count) {
     return count;
 }
 
-/* Would moving vertex v, of these corners, to point p turn a face over that keeps its area? */
-static int tmr_move_turns(const tmr_mend *m, const int32_t *corner, int32_t n, int32_t other,
-                          txm_dvec3 p) {
+/* Would moving the vertex of these corners to point p invert a face that has an area? */
+static int tmr_move_inverts(const tmr_mend *m, const int32_t *corner, int32_t n, int32_t other,
+                            txm_dvec3 p) {
     for (int32_t k = 0; k < n; k++) {
         const int32_t i = m->vertex[tmr_next(corner[k])], j = m->vertex[tmr_prev(corner[k])];
         if (i == other || j == other || tmr_face_is_thin(m, corner[k] / 3)) continue;
@@ -216,9 +216,9 @@ static int tmr_move_turns(const tmr_mend *m, const int32_t *corner, int32_t n, i
     return 0;
 }
 
-/* Let one end of the edge of corner c stand for the other, if that leaves a manifold: the ends have
-   only the apices of the edge's faces as neighbours in common, and the edge is not a bridge between
-   two borders. Vertices near it are left alone for the rest of the round (degree 0). */
+/* Merge the ends of the edge of corner c, if that leaves a manifold: their only common neighbours
+   are the apices of the edge's faces, and the edge does not join two borders. Neighbours are not
+   touched for the rest of the round (degree 0). */
 static int tmr_collapse_needle(tmr_mend *m, int32_t c, int32_t stamp) {
     int32_t from[TMR_FAN_LIMIT], to[TMR_FAN_LIMIT], near_from[TMR_FAN_LIMIT + 1];
     int32_t near_to[TMR_FAN_LIMIT + 1], common = 0, u = m->vertex[tmr_next(c)];
@@ -226,7 +226,7 @@ static int tmr_collapse_needle(tmr_mend *m, int32_t c, int32_t stamp) {
     const int32_t v = m->vertex[tmr_prev(c)];
     const int32_t nu = tmr_ring(m, tmr_next(c), to, near_to, &open_u);
     const int32_t nv = tmr_ring(m, tmr_prev(c), from, near_from, &open_v);
-    /* also true of vertices with several fans, and of long rings */
+    /* also for vertices with several fans, and for long rings */
     if (nu == 0 || nv == 0 || nu != m->degree[u] || nv != m->degree[v]) return 0;
     if (m->opposite[c] >= 0 && open_u && open_v) return 0;
     if (!open_u && !open_v && (nu == 3 || nv == 3)) return 0; /* might be a tetrahedron */
@@ -235,16 +235,17 @@ static int tmr_collapse_needle(tmr_mend *m, int32_t c, int32_t stamp) {
     if (common != (m->opposite[c] >= 0 ? 2 : 1)) return 0;
     /* the border stays where it is; else the lower number stays */
     const int keep_u = open_u != open_v ? open_u : u < v;
-    if (keep_u ? tmr_move_turns(m, from, nv, u, m->point[u])
-               : tmr_move_turns(m, to, nu, v, m->point[v])) return 0;
+    if (keep_u ? tmr_move_inverts(m, from, nv, u, m->point[u])
+               : tmr_move_inverts(m, to, nu, v, m->point[v]))
+        return 0;
     m->rename[keep_u ? v : u] = keep_u ? u : v;
     for (int32_t k = 0; k < nu + open_u; k++) m->degree[near_to[k]] = 0;
     for (int32_t k = 0; k < nv + open_v; k++) m->degree[near_from[k]] = 0;
     return 1;
 }
 
-/* Choose and collapse needles among the count faces of m->list; how many. The faces must be linked
-   anew afterwards. */
+/* Choose and collapse needles among the count faces of m->list. Returns how many. Opposites must be
+   found again afterwards. */
 static int32_t tmr_collapse_needles(tmr_mend *m, int32_t count) {
     int32_t done = 0, shortest = 0, longest = 0;
     for (int32_t i = 0; i < m->vertex_count; i++) {
@@ -263,7 +264,7 @@ static int32_t tmr_collapse_needles(tmr_mend *m, int32_t count) {
 
 static txm_status tmr_mend_faces(tmr_mend *m);
 
-/* Flip and collapse until nothing without area is left, or it cannot be helped. */
+/* Flip and collapse until no face without area is left, or nothing changes. */
 static txm_status tmr_mend_thin(tmr_mend *m) {
     txm_status status = TXM_OK;
     for (int round = 0; status == TXM_OK && round < TMR_MEND_ROUNDS; round++) {
@@ -287,9 +288,10 @@ static txm_status tmr_mend_thin(tmr_mend *m) {
 
 /* ---- mending: vertices where fans meet, and numbering ------------------------------------- */
 
-/* Mark the fan round the vertex of corner c, and let the vertex be v unless that is negative.
-   Returns its first corner, counter-clockwise: with the border on its right; c without border. */
-static int32_t tmr_take_fan(tmr_mend *m, int32_t c, uint8_t *seen, int32_t v) {
+/* Mark the fan around the vertex of corner c as seen, and set its vertex to v unless that is
+   negative. Returns the first corner counter-clockwise, which has the border on its right; without
+   border c. */
+static int32_t tmr_mark_fan(tmr_mend *m, int32_t c, uint8_t *seen, int32_t v) {
     int32_t first = c;
     for (int32_t k = c; k >= 0;) {
         seen[k] = 1;
@@ -305,14 +307,14 @@ static int32_t tmr_take_fan(tmr_mend *m, int32_t c, uint8_t *seen, int32_t v) {
     return first;
 }
 
-/* How many fans there are, and degree = 1 for vertices in use. */
+/* Count the fans; set degree = 1 for vertices in use. */
 static int32_t tmr_count_fans(tmr_mend *m, uint8_t *seen) {
     int32_t fans = 0;
     memset(m->degree, 0, (size_t)m->vertex_count * sizeof *m->degree);
     for (int32_t c = 0; c < 3 * m->face_count; c++) {
         if (seen[c]) continue;
         m->degree[m->vertex[c]] = 1;
-        tmr_take_fan(m, c, seen, -1);
+        tmr_mark_fan(m, c, seen, -1);
         fans++;
     }
     return fans;
@@ -335,11 +337,11 @@ static void tmr_number_fans(tmr_mend *m, tmr_surface *s, uint8_t *seen) {
         TRIMESH_ASSERT(v < s->vertex_count); /* as many as tmr_count_fans has counted */
         s->point[v] = m->point[old];
         if (s->scale) s->scale[v] = m->desc->scale[old];
-        s->corner[v] = tmr_take_fan(m, c, seen, v);
+        s->corner[v] = tmr_mark_fan(m, c, seen, v);
     }
 }
 
-/* Hand over to the surface what is mended, with vertices split and numbered. */
+/* Store the mended faces in the surface, with vertices split and numbered. */
 static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s) {
     const size_t f = (size_t)m->face_count;
     s->face_count = m->face_count;

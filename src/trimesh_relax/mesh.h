@@ -10,30 +10,30 @@ enum {
     TMR_KIND = 3,
     TMR_GHOST = 4,
     TMR_MARK = 8,
-    TMR_PINNED = 16 /* of updates: shall stay as it is, edges between such vertices too */
+    TMR_PINNED = 16 /* for updates: this vertex, and edges between such, must stay      */
 };
 
-enum { TMR_VALENCE = 60 }; /* no operation makes a vertex of more neighbours            */
+enum { TMR_VALENCE = 60 }; /* no operation gives a vertex more neighbours               */
 
 /* A closed manifold at every moment: each border loop is closed by a ghost vertex joined to all of
-   the loop, so that one set of operators does for borders too. Corners as in tmr_surface; a dead
-   triangle has vertex -1 in its first corner, a dead vertex corner -1.
+   the loop, so that the operators need no special case for borders. Corners as in tmr_surface; a
+   dead triangle has vertex -1 in its first corner, a dead vertex corner -1.
 
                         ghost
                        /  |  \          ghost triangles, which stay out of all geometry
                  -----a---b---c-----    the border, each with the number of its line            */
 typedef struct tmr_mesh {
-    int32_t vertex_count, face_count; /* slots in use, dead ones too                            */
-    int32_t vertex_limit, face_limit; /* slots there are                                        */
-    int32_t live, ghosts;             /* vertices that live and are no ghosts; ghosts           */
-    int32_t live_faces;               /* triangles that live, ghost triangles too               */
+    int32_t vertex_count, face_count; /* slots in use, including dead ones                      */
+    int32_t vertex_limit, face_limit; /* slots allocated                                        */
+    int32_t live, ghosts;             /* live vertices without ghosts; ghosts                   */
+    int32_t live_faces;               /* live triangles, including ghost triangles              */
     txm_dvec3 *p;                     /* position                                               */
     txm_dvec3 *n;                     /* normal of the surface there, smooth                    */
     int32_t *source; /* face of the surface that p lies in; of a vertex on a line its segment;
                         of a vertex that never moves: its vertex of the surface                */
     int32_t *corner;                  /* one corner                                             */
     uint8_t *flags;
-    int32_t *valence; /* neighbours, ghosts too                                                 */
+    int32_t *valence; /* neighbours, including ghosts                                           */
     int32_t *vertex, *opposite; /* of corners                                                   */
     int32_t *edge;              /* of corners: 0, or 1 + the line that their edge is part of    */
 } tmr_mesh;
@@ -61,7 +61,7 @@ static void tmr_link(tmr_mesh *m, int32_t a, int32_t b, int32_t line) {
     m->opposite[b] = a;
     m->edge[a] = m->edge[b] = line;
 }
-/* the corner at a of the triangle in which b comes next, -1 if a and b are no neighbours */
+/* the corner at a of the triangle in which b comes next; -1 if a and b are not neighbours */
 static int32_t tmr_find_edge(const tmr_mesh *m, int32_t a, int32_t b) {
     const int32_t first = m->corner[a];
     int32_t c = first;
@@ -72,13 +72,13 @@ static int32_t tmr_find_edge(const tmr_mesh *m, int32_t a, int32_t b) {
     return -1;
 }
 
-/* Are a and b neighbours? Asks the one that is no ghost. */
+/* Are a and b neighbours? Looks around the one that is not a ghost. */
 static int tmr_are_neighbors(const tmr_mesh *m, int32_t a, int32_t b) {
     if (tmr_is_ghost(m, a)) return tmr_is_ghost(m, b) ? 0 : tmr_find_edge(m, b, a) >= 0;
     return tmr_find_edge(m, a, b) >= 0;
 }
 
-/* May the edge opposite to c turn? Two triangles  a b d, c' ... of the quad; topology only. */
+/* May the edge opposite to c be flipped? Looks at the topology only. */
 static int tmr_can_flip(const tmr_mesh *m, int32_t c) {
     const int32_t o = m->opposite[c], d = m->vertex[c], e = m->vertex[o];
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
@@ -90,7 +90,7 @@ static int tmr_can_flip(const tmr_mesh *m, int32_t c) {
     return !tmr_are_neighbors(m, d, e);
 }
 
-/* Turn the edge opposite to c:
+/* Flip the edge opposite to c:
 
           d (c)                 d
          /   \                / | \
@@ -127,7 +127,7 @@ static int32_t tmr_new_vertex(tmr_mesh *m) {
     return v;
 }
 
-/* Put a new vertex on the edge opposite to c, all but its geometry; -1 if there is no room.
+/* Put a new vertex on the edge opposite to c, without its geometry. Returns -1 if there is no room.
 
           d (c)                 d
          /   \                / | \
@@ -172,7 +172,7 @@ static int32_t tmr_split(tmr_mesh *m, int32_t c) {
     return v;
 }
 
-/* Put a new vertex into the triangle of c, all but its geometry; -1 if there is no room. */
+/* Put a new vertex into a triangle, without its geometry. Returns -1 if there is no room. */
 static int32_t tmr_split_face(tmr_mesh *m, int32_t face) {
     if (m->vertex_count >= m->vertex_limit || m->face_count + 2 > m->face_limit) return -1;
     const int32_t i = 3 * face, f = 3 * m->face_count, g = f + 3;
@@ -207,9 +207,9 @@ static int32_t tmr_split_face(tmr_mesh *m, int32_t face) {
     return v;
 }
 
-/* May b = vertex[prev(c)] be pulled into a = vertex[next(c)], so that the mesh stays a manifold of
-   the same topology, and creases and borders the same lines? The link condition: a and b have only
-   the two neighbours d and e in common. Costs O(valence). */
+/* May b = vertex[prev(c)] be merged into a = vertex[next(c)], so that the mesh stays a manifold of
+   the same topology, with the same creases and borders? The link condition: a and b have only the
+   two neighbours d and e in common. Costs O(valence). */
 static int tmr_can_collapse(tmr_mesh *m, int32_t c) {
     const int32_t o = m->opposite[c], cn = tmr_next(c), cp = tmr_prev(c);
     const int32_t a = m->vertex[cn], b = m->vertex[cp], d = m->vertex[c], e = m->vertex[o];
@@ -246,7 +246,7 @@ static void tmr_kill_face(tmr_mesh *m, int32_t face) {
     m->live_faces--;
 }
 
-/* Pull b = vertex[prev(c)] into a = vertex[next(c)]; a keeps its place. */
+/* Merge b = vertex[prev(c)] into a = vertex[next(c)]; a keeps its place. */
 static void tmr_collapse(tmr_mesh *m, int32_t c) {
     const int32_t o = m->opposite[c], cn = tmr_next(c), cp = tmr_prev(c);
     const int32_t on = tmr_next(o), op = tmr_prev(o);

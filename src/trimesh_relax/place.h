@@ -69,8 +69,8 @@ static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, txm_dvec3 p) {
     return at;
 }
 
-/* Walk from a face to where the surface is nearest to p, as long as it gets nearer: linear in the
-   way, and it cannot jump to another sheet. */
+/* The place on the surface nearest to p, found by walking from a face while the distance falls:
+   takes time proportional to the way, and cannot jump to another sheet. */
 static tmr_place tmr_project(const tmr_surface *s, txm_dvec3 p, int32_t face) {
     tmr_place at = tmr_on_face(s, face, p);
     for (int guard = 0; guard < 4096 && at.part != 0; guard++) {

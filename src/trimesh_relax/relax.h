@@ -15,7 +15,7 @@ static double tmr_quality(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 n) {
     return txm_d3_dot(cross, n) < TMR_LEAST_AGREEMENT * area2 ? -1 : q;
 }
 
-/* neighbours that a vertex should have, ghosts too */
+/* neighbours that a vertex should have, including ghosts */
 static int tmr_ideal_valence(const tmr_mesh *m, int32_t v) {
     return tmr_kind_of(m, v) == TRIMESH_BORDER ? 5 : 6;
 }
@@ -25,7 +25,7 @@ static int tmr_valence_cost(const tmr_mesh *m, int32_t v, int change) {
     return d * d;
 }
 
-/* by how much turning the edge opposite to c would lower the valence costs */
+/* by how much flipping the edge opposite to c would lower the cost of valences */
 static int tmr_flip_gain(const tmr_mesh *m, int32_t c) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
@@ -39,8 +39,8 @@ typedef struct tmr_quad {
     double before, after;      /* the lower quality of the two triangles */
 } tmr_quad;
 
-/* What would turning the edge opposite to c do? 0: it cannot turn. */
-static int tmr_look_at_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
+/* What would flipping the edge opposite to c do? Returns 0 if it cannot be flipped. */
+static int tmr_measure_flip(const tmr_work *w, int32_t c, tmr_quad *q) {
     const tmr_mesh *m = &w->m;
     if (!tmr_can_flip(m, c)) return 0;
     const int32_t o = m->opposite[c];
@@ -65,7 +65,7 @@ static int tmr_is_wide(const tmr_mesh *m, int32_t c) {
     const double cd = txm_d3_dot(da, db), ce = txm_d3_dot(ea, eb);
     if (cd >= 0 && ce >= 0) return 0;
     const double sd = txm_d3_len(txm_d3_cross(da, db)), se = txm_d3_len(txm_d3_cross(ea, eb));
-    /* sin(d + e) < 0, a little less so that equal diagonals stay */
+    /* sin(d + e) < 0, with a margin so that equal diagonals stay */
     return sd * ce + se * cd <
            -1e-6 * sqrt(txm_d3_len2(da) * txm_d3_len2(db) * txm_d3_len2(ea) * txm_d3_len2(eb));
 }
@@ -85,7 +85,7 @@ static void tmr_wide_chunk(void *context, int index) {
     }
 }
 
-/* Turn edges until the mesh is Delaunay, as far as the normals allow. */
+/* Flip edges until the mesh is Delaunay, as far as the normals allow. */
 static void tmr_flip_delaunay(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     tmr_quad q;
@@ -95,7 +95,7 @@ static void tmr_flip_delaunay(tmr_work *w, int rounds) {
         for (int32_t f = 0; f < m->face_count; f++) {
             for (int32_t c = 3 * f; w->flag[f] && c < 3 * f + 3; c++) {
                 if (!((w->flag[f] >> (c - 3 * f)) & 1) || m->edge[c]) continue;
-                if (!tmr_is_wide(m, c) || !tmr_look_at_flip(w, c, &q)) continue;
+                if (!tmr_is_wide(m, c) || !tmr_measure_flip(w, c, &q)) continue;
                 if (q.after <= 0 && q.after <= q.before) continue;
                 tmr_flip(m, c);
                 turned++;
@@ -105,7 +105,7 @@ static void tmr_flip_delaunay(tmr_work *w, int rounds) {
     }
 }
 
-/* Turn edges that bring valences nearer to 6, where the triangles stay fair. */
+/* Flip edges where that brings valences nearer to 6 and the triangles stay fair. */
 static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
     tmr_mesh *m = &w->m;
     tmr_quad q;
@@ -113,7 +113,7 @@ static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
         int32_t turned = 0;
         for (int32_t c = 0; c < 3 * m->face_count; c++) {
             if (m->vertex[c] < 0 || m->opposite[c] < c || m->edge[c]) continue;
-            if (tmr_flip_gain(m, c) <= 0 || !tmr_look_at_flip(w, c, &q)) continue;
+            if (tmr_flip_gain(m, c) <= 0 || !tmr_measure_flip(w, c, &q)) continue;
             if (q.after < least && q.after <= q.before) continue;
             tmr_flip(m, c);
             turned++;
@@ -141,14 +141,14 @@ static txm_dvec3 tmr_fit(const tmr_work *w, const int32_t *v, txm_dvec3 *centre,
                    txm_d3_scale(txm_d3_cross(*n, txm_d3_sub(c, b)), 0.28867513459481287));
     const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
     const double radius = size * 0.57735026918962576, length = txm_d3_len(pull);
-    if (length < 0.1 * radius) { /* turned over or flat: start from its first corner */
+    if (length < 0.1 * radius) { /* inverted or flat: start from its first corner    */
         const double arm_length = txm_d3_len(arm);
         return arm_length > 0 ? txm_d3_scale(arm, radius / arm_length) : pull;
     }
     return txm_d3_scale(pull, ((1 - w->pull) * length + w->pull * radius) / length);
 }
 
-/* the two neighbours of a vertex on its line; 0 if they are not just two */
+/* the two neighbours of a vertex on its line; returns 0 if there are not exactly two */
 static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
     int count = 0;
     int32_t c = m->corner[v];
@@ -167,7 +167,7 @@ static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
 static void tmr_relax_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
-    tmr_stay(w, v);
+    tmr_keep_place(w, v);
     if (w->mask && !w->mask[v]) return;
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
         return;
@@ -215,7 +215,7 @@ static int tmr_has_moved(const tmr_work *w, int32_t v) {
     return a.x < b.x || a.x > b.x || a.y < b.y || a.y > b.y || a.z < b.z || a.z > b.z;
 }
 
-/* Is the triangle worse than allowed when its corners go where they shall? */
+/* Would the triangle be worse than allowed after its corners have moved? */
 static int tmr_is_spoilt(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
@@ -234,7 +234,7 @@ static void tmr_spoilt_chunk(void *context, int index) {
     for (int32_t f = from; f < to; f++) w->flag[f] = (uint8_t)tmr_is_spoilt(w, f);
 }
 
-/* Mark the vertices of all spoilt triangles in w->bad; how many triangles there are. */
+/* Mark the vertices of all spoilt triangles in w->bad. Returns how many such triangles there are. */
 static int32_t tmr_find_spoilt(tmr_work *w) {
     tmr_mesh *m = &w->m;
     int32_t found = 0;
@@ -266,7 +266,7 @@ static void tmr_settle_chunk(void *context, int index) {
     }
 }
 
-/* Move all vertices where w->moved says, but for those by which a triangle would turn over. */
+/* Move all vertices to w->moved, except those that would invert a triangle. */
 static void tmr_settle(tmr_work *w) {
     tmr_mesh *m = &w->m;
     const int chunks = (m->vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
@@ -285,8 +285,8 @@ static void tmr_relax(tmr_work *w) {
     tmr_settle(w);
 }
 
-/* The edge length that triangles of the present area and number would have were they equilateral
-   (each counted as large as its wanted size says). */
+/* The edge length that as many equilateral triangles of the same total area would have, areas taken
+   relative to the wanted sizes. */
 static double tmr_ideal_length(const tmr_work *w) {
     const tmr_mesh *m = &w->m;
     double sum = 0;

@@ -5,7 +5,8 @@
 
 /* ---- repulsion ------------------------------------------------------------------------------ */
 
-/* The points within reach of v by way of edges between points within reach; v itself first. */
+/* The points within reach of v that are connected to it by edges between such points; v itself
+   first. */
 static int tmr_find_near(const tmr_work *w, int32_t v, int32_t near[TMR_NEAR]) {
     const tmr_mesh *m = &w->m;
     const double reach = TMR_REACH * w->length * w->size[v];
@@ -39,7 +40,7 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const int kind = tmr_kind_of(m, v);
     int32_t near[TMR_NEAR];
     txm_dvec3 push = txm_d3(0, 0, 0);
-    tmr_stay(w, v);
+    tmr_keep_place(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
     const int count = tmr_find_near(w, v, near);
     for (int i = 1; i < count; i++) {
@@ -55,7 +56,7 @@ static void tmr_repel_vertex(tmr_work *w, int32_t v) {
                              v < x ? 1 : -1);
         push = txm_d3_mad(push, d, w->step * (r - length));
     }
-    /* not farther than to where others push the other way */
+    /* no farther than to where other points push back */
     const double limit = 0.5 * w->length * w->size[v], way = txm_d3_len(push);
     if (way > limit) push = txm_d3_scale(push, limit / way);
     const txm_dvec3 to = txm_d3_add(m->p[v], push);
@@ -75,9 +76,9 @@ static void tmr_repel_chunk(void *context, int index) {
     for (int32_t v = from; v < to; v++) tmr_repel_vertex(w, v);
 }
 
-/* Would a triangle turn over that is right now? Slivers, of which strewn points have some, count as
-   bad already in tmr_settle and so could. */
-static int tmr_would_turn(const tmr_work *w, int32_t face) {
+/* Would a triangle be inverted that is not so now? tmr_settle does not see this for slivers, which
+   it takes for spoilt already. */
+static int tmr_would_invert(const tmr_work *w, int32_t face) {
     const int32_t *v = w->m.vertex + 3 * face;
     if (v[0] < 0 || tmr_is_ghost_face(&w->m, face)) return 0;
     const txm_dvec3 *p = w->moved, *q = w->m.p;
@@ -88,16 +89,16 @@ static int tmr_would_turn(const tmr_work *w, int32_t face) {
     return txm_d3_dot(after, n) <= 0 && txm_d3_dot(before, n) >= 0;
 }
 
-static void tmr_hold_turning(tmr_work *w) {
+static void tmr_hold_inverting(tmr_work *w) {
     tmr_mesh *m = &w->m;
     for (int round = 0; round < 8; round++) {
         int32_t found = 0;
         for (int32_t f = 0; f < m->face_count; f++) {
-            if (!tmr_would_turn(w, f)) continue;
+            if (!tmr_would_invert(w, f)) continue;
             found++;
             for (int k = 0; k < 3; k++) {
                 const int32_t v = m->vertex[3 * f + k];
-                tmr_stay(w, v);
+                tmr_keep_place(w, v);
             }
         }
         if (found == 0) break;
@@ -110,8 +111,8 @@ static double tmr_repel_force(int round, int rounds) {
     return TMR_LAST_FORCE + (TMR_FORCE - TMR_LAST_FORCE) * left * left;
 }
 
-/* One round: all points at once (so the result does not depend on threads), then edges turn after
-   them. mean and largest movement, in wanted edge lengths. */
+/* One round: move all points at once (so that the result does not depend on threads), then flip
+   edges. mean and largest movement, in wanted edge lengths. */
 static void tmr_repel_round(tmr_work *w, double force, double *mean, double *largest) {
     const tmr_mesh *m = &w->m;
     const int chunks = (m->vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
@@ -126,11 +127,11 @@ static void tmr_repel_round(tmr_work *w, double force, double *mean, double *lar
     }
     *mean = m->live ? sum / m->live : 0;
     *largest = most;
-    tmr_hold_turning(w);
+    tmr_hold_inverting(w);
     tmr_settle(w);
     tmr_flip_delaunay(w, 2);
 }
 
-#define TMR_CALM 0.002 /* ours: mean movement, in edge lengths, below which nothing more comes */
+#define TMR_CALM 0.002 /* ours: mean movement, in edge lengths, at which it stops              */
 
 #endif /* TRIMESH_RELAX_REPEL_H */

@@ -12,7 +12,7 @@
 
 /* All numbers here are ours, see docs/choices.md#tuning. Lengths are in wanted edge lengths. */
 enum {
-    TMR_CUT_FROM = 20000,   /* from so many vertices on at a quarter of them, then cut in four    */
+    TMR_CUT_FROM = 20000,   /* from so many vertices on a quarter of them, then cut in four       */
     TMR_SPACING_ROUNDS = 3, /* of relaxation before the lattice spacing is set                   */
     TMR_CLEAN_ROUNDS = 4,   /* of splits and collapses after the lattice                          */
     TMR_FOLD_ROUNDS = 8     /* of opening folds, at most                                          */
@@ -38,8 +38,7 @@ static const tmr_effort tmr_after_cut = {2, 2, 1, 1};
 static const tmr_effort tmr_polish_density = {1, 2, 1.5, 0.8};
 static const tmr_effort tmr_polish_angles = {2, 2, 1.2, 1};
 
-/* Rounds of relaxation and flips. A strong pull brings the density into balance, a weak one the
-   angles. */
+/* Rounds of relaxation and flips. A strong pull evens out the density, a weak one the angles. */
 static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
     w->pull = effort->pull;
     w->step = effort->step;
@@ -54,9 +53,9 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
     return TXM_OK;
 }
 
-/* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of as
-   many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has a
-   few vertices too many: taking vertices away mends the pattern, adding some harms it. */
+/* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of
+   as many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has
+   a few vertices too many: removing vertices improves the pattern, adding some disturbs it. */
 static void tmr_set_spacing(tmr_work *w, int32_t target) {
     const double faces = w->m.live_faces;
     w->pull = 0.5;
@@ -80,7 +79,7 @@ static txm_status tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena
     return tmr_collapse_lattice(w, &f, arena);
 }
 
-/* Bring w->m, a copy of the surface, to a lattice of so many vertices. */
+/* Turn w->m, a copy of the surface, into a lattice of target vertices. */
 static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
@@ -106,7 +105,7 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     return status;
 }
 
-/* The last part of every method: the exact number, and as much regularity as pays. */
+/* The last part of every method: the exact number, and more regularity. */
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
     txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
@@ -133,7 +132,7 @@ static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     return tmr_surface_source(s, w->desc, &at);
 }
 
-/* Hand the result over in the caller's units. */
+/* Make the result, in the caller's units. */
 static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
     const tmr_mesh *m = &w->m;
     txm_arena arena, scratch;

@@ -5,7 +5,7 @@
 
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
-/* Does the open segment p q cross the inside of triangle a b c? rim: or its rim. */
+/* Does the open segment p q cross the interior of triangle a b c? rim: or its boundary. */
 static int tmr_crosses(txm_dvec3 p, txm_dvec3 q, txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, int rim) {
     const txm_dvec3 e1 = txm_d3_sub(b, a), e2 = txm_d3_sub(c, a), d = txm_d3_sub(q, p);
     const txm_dvec3 h = txm_d3_cross(d, e2);
@@ -17,8 +17,8 @@ static int tmr_crosses(txm_dvec3 p, txm_dvec3 q, txm_dvec3 a, txm_dvec3 b, txm_d
     return u > least && v > least && u + v < 1 - least && t > eps && t < 1 - eps;
 }
 
-/* Do two triangles, which share at most one vertex, cross each other? rim: also where an edge passes
-   through no more than the rim of the other triangle, as with cards that cross edge to edge. */
+/* Do two triangles, which share at most one vertex, cross each other? rim: also where an edge only
+   passes through the boundary of the other triangle, as with cards that cross edge to edge. */
 static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
     const int32_t *v = m->vertex + 3 * f, *w = m->vertex + 3 * g;
     int shared = 0, kf = 0, kg = 0;
@@ -91,7 +91,9 @@ static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
     }
 }
 
-enum { TMR_NEAR_CELLS = 1 << 16 }; /* coarse cells by hash that are near a marked vertex, or seem so */
+enum {
+    TMR_NEAR_CELLS = 1 << 16
+}; /* coarse cells by hash: near a marked vertex?                    */
 
 static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
     return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
@@ -118,7 +120,7 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cel
     g->entry = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
     g->spare = (txm_pair *)txm_arena_alloc(arena, g->limit, sizeof(txm_pair));
     if (!g->entry || !g->spare) return TXM_OUT_OF_MEMORY;
-    do { /* in coarser cells if there are many large triangles */
+    do { /* use coarser cells if there are many large triangles */
         g->cell *= 2;
         g->count = 0;
         g->overflow = 0;
@@ -169,8 +171,8 @@ static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim,
 
 enum { TMR_SPOT_FACES = 256 }; /* of the surface that are looked at around one spot */
 
-/* Does the surface face along n anywhere near the place? Looks at the faces that hang together
-   with it, as far as they reach into a ball around p. */
+/* Does the surface face along n anywhere near the place? Looks at the faces that are connected to
+   it within a ball around p. */
 static int tmr_faces_along(const tmr_surface *s, txm_dvec3 n, int32_t face, txm_dvec3 p,
                            double radius) {
     int32_t list[TMR_SPOT_FACES];
@@ -189,10 +191,10 @@ static int tmr_faces_along(const tmr_surface *s, txm_dvec3 n, int32_t face, txm_
     return 0;
 }
 
-/* How many triangles have no area or face against all of the surface nearby? Those that only face
-   against the place nearest to them, as happens on thin sheets, are counted in *doubtful. Marks
-   their vertices. */
-static long tmr_count_turned(tmr_work *w, long *doubtful) {
+/* Count the triangles that have no area, or whose normal is opposite to that of all of the surface
+   nearby. Those that are only opposite to the nearest place, as happens on thin sheets, are counted
+   in *doubtful. Marks their vertices. */
+static long tmr_count_inverted(tmr_work *w, long *doubtful) {
     const tmr_mesh *m = &w->m;
     long found = 0;
     *doubtful = 0;
@@ -220,14 +222,14 @@ static long tmr_count_turned(tmr_work *w, long *doubtful) {
     return found;
 }
 
-/* Edges at which two triangles nearly lie on each other (they turn by more than 120 degrees), and
-   which are none of the surface's own: pull them towards the middle between the two far corners.
-   How many there were. */
+/* Open folds, that is, edges at which two triangles nearly lie on each other (the mesh turns by
+   more than 120 degrees): move such an edge towards the middle between the two far corners. Returns
+   how many there were. */
 static long tmr_open_folds(tmr_work *w, double share) {
     tmr_mesh *m = &w->m;
     long found = 0;
     for (int32_t v = 0; v < m->vertex_count; v++) {
-        tmr_stay(w, v);
+        tmr_keep_place(w, v);
     }
     for (int32_t c = 0; c < 3 * m->face_count; c++) {
         if (!tmr_is_real_edge(m, c)) continue;
@@ -261,8 +263,8 @@ static void tmr_grow_marks(tmr_work *w) {
     for (int32_t v = 0; v < m->vertex_count; v++) w->bad[v] = w->bad[v] != 0;
 }
 
-/* Move every marked vertex half-way to the middle of its neighbours, off the surface: what is finer
-   than the triangles can follow is smoothed away there. Lines only if nothing else has helped. */
+/* Move every marked vertex half-way to the mean of its neighbours, off the surface: detail that is
+   too fine for the triangles is smoothed away there. Creases are moved only if lines_too is set. */
 static void tmr_smooth_marked(tmr_work *w, int lines_too) {
     tmr_mesh *m = &w->m;
     for (int32_t v = 0; v < m->vertex_count; v++) {
@@ -290,7 +292,7 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
 
 #define TMR_FAIR 0.85 /* ours: quality of triangles that gets no further attention */
 
-/* A few more rounds of relaxation and flips just around the triangles that are still poor. */
+/* More rounds of relaxation and flips around the triangles that are still poor. */
 static void tmr_improve_spots(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     w->pull = w->step = 1;
@@ -319,8 +321,8 @@ static void tmr_improve_spots(tmr_work *w, int rounds) {
 
 enum { TMR_SPOT_ROUNDS = 16 };
 
-/* Mend the few spots where triangles cross or face against the surface, by smoothing around them,
-   wider and wider; the best state found stays. *faults: how many are left. */
+/* Smooth around the spots where triangles cross or are inverted, in growing neighbourhoods; the
+   best state found stays. *faults receives how many are left. */
 static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     const size_t count = (size_t)w->m.vertex_count;
     txm_arena arena;
@@ -339,7 +341,7 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
         status = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch, &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
-        const long turned = tmr_count_turned(w, &doubtful);
+        const long turned = tmr_count_inverted(w, &doubtful);
         const long score = 1000 * (crossings + turned) + doubtful;
         if (best < 0 || score < best) {
             if (score > 0 && !kept) {
@@ -352,7 +354,7 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
             if (kept) memcpy(kept_source, w->m.source, count * sizeof(int32_t));
         }
         if (score == 0 || (best < 1000 && round >= 4)) break;
-        if (50 * (crossings + turned) > (long)w->m.live_faces + 2000) break; /* hopeless */
+        if (50 * (crossings + turned) > (long)w->m.live_faces + 2000) break; /* too many to mend */
         for (int k = 0; k < 1 + round / 6; k++) tmr_grow_marks(w);
         tmr_smooth_marked(w, round >= 6);
     }

@@ -17,8 +17,8 @@ static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
            !tmr_is_ghost(m, m->vertex[tmr_prev(c)]);
 }
 
-/* Where b's triangles go when b is pulled into a at position to: is each of them fair? reach: no
-   edge may become longer than this, relative to what is wanted; 0 = any. */
+/* Would all triangles of b be fair after b is merged into a at position to? reach: no edge may
+   become longer than this, relative to the wanted length; 0 = any. */
 static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, double reach) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
@@ -44,12 +44,12 @@ static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, doub
     return 1;
 }
 
-/* Collapse the edge opposite to c, either way round, to the end that must stay or else to its
-   middle. 0: not possible. */
+/* Collapse the edge opposite to c, to the end that must stay, or else to its middle or either end.
+   Returns 0 if that is not possible. */
 static int tmr_try_collapse(tmr_work *w, int32_t c, double reach, int middle) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
-    /* the one that is more bound stays: corner, line, free */
+    /* the more constrained one stays: corner, line, free */
     const int rank_a = tmr_kind_of(m, a) == TRIMESH_CORNER ? 2 : tmr_kind_of(m, a) != TRIMESH_FREE;
     const int rank_b = tmr_kind_of(m, b) == TRIMESH_CORNER ? 2 : tmr_kind_of(m, b) != TRIMESH_FREE;
     if (rank_b > rank_a) c = m->opposite[c];
@@ -109,8 +109,8 @@ static txm_dvec3 tmr_line_middle(const tmr_work *w, int32_t id, int32_t a, int32
     return tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5), k);
 }
 
-/* Put a vertex on the middle of the edge opposite to c, on the surface; -1 if there is no room or
-   no place. */
+/* Split the edge opposite to c at its middle, on the surface. Returns the new vertex; -1 if there
+   is no room or the triangles would not be fair. */
 static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     tmr_mesh *m = &w->m;
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
@@ -135,12 +135,12 @@ static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
     return v;
 }
 
-/* an edge's length relative to what is allowed: over 1 it has to be split */
+/* an edge's length relative to what is allowed; above 1 it must be split */
 static double tmr_excess(const tmr_work *w, int32_t c, double limit, double line_limit) {
     return tmr_edge_size(w, c) / (w->m.edge[c] ? line_limit : limit);
 }
 
-/* Is no other edge of the two triangles longer? (lines come first) */
+/* Is no other edge of the two triangles longer? (always true on lines) */
 static int tmr_is_longest(const tmr_work *w, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
@@ -153,7 +153,7 @@ static int tmr_is_longest(const tmr_work *w, int32_t c) {
     return 1;
 }
 
-/* Split all edges longer than limit, lines relative to their own spacing; how many. The longest
+/* Split all edges longer than limit, on lines longer than line_limit. Returns how many. The longest
    first, and only where an edge is the longest of its triangles: otherwise slivers arise. */
 static int32_t tmr_split_long(tmr_work *w, double limit, double line_limit) {
     tmr_mesh *m = &w->m;

@@ -22,8 +22,8 @@ static int tmr_may_subdivide(const tmr_work *w) {
 /* Copy the living part of w->m into new arrays, each triangle cut in four if wanted, with room for
    1000 vertices more.
 
-   Of each vertex and ghost that lives one stays. A cut adds at most one vertex per edge, of which
-   there are 3/2 live_faces, and makes four triangles of one, of a ghost triangle two. */
+   Every live vertex and ghost stays. A cut adds at most one vertex per edge, of which there are 3/2
+   live_faces, and makes four triangles of one, of a ghost triangle two. */
 static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena *scratch) {
     enum { MORE = 1000 };
     const tmr_mesh old = w->m;
@@ -170,10 +170,10 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
 
 /* ---- fitting ------------------------------------------------------------------------------ */
 
-/* Chords lie inside what they cut off, so vertices on the surface make a body too thin. Each free
-   vertex moves along its normal by the mean height of the surface over the triangles around it;
-   that of one triangle follows from the heights at its centre and its corners (exactly so for a
-   paraboloid): 3/4 centre + 1/4 mean of the corners. */
+/* Chords lie inside a round surface, so a mesh with its vertices on the surface has too little
+   volume. Each free vertex moves along its normal by the mean height of the surface over the
+   triangles around it. The mean height over one triangle is 3/4 of that at its centre plus 1/4 of
+   the mean of those at its corners, which is exact for a paraboloid. */
 static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
@@ -197,7 +197,7 @@ static void tmr_fit_chunk(void *context, int index) {
     const int32_t from = index * TMR_CHUNK;
     const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
     for (int32_t v = from; v < to; v++) {
-        tmr_stay(w, v);
+        tmr_keep_place(w, v);
         if (m->corner[v] < 0 || tmr_is_ghost(m, v) || tmr_kind_of(m, v) != TRIMESH_FREE) continue;
         double sum = 0;
         int count = 0;

@@ -32,7 +32,7 @@ typedef struct tmr_surface {
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */
 } tmr_surface;
-/* How to walk round a vertex, from corner c of it (surfaces are oriented, vertices have one fan):
+/* How to walk around a vertex, from corner c of it (surfaces are oriented, vertices have one fan):
 
           b ___              tmr_ccw(c): the corner of the same vertex v in the next triangle
           |\   ` .           counter-clockwise, which lies beyond the edge from v to b;
@@ -55,12 +55,12 @@ static int32_t tmr_cw(const int32_t *opposite, int32_t c) {
 
 /* What is done to the caller's triangles, in this order:
 
-   vertices   scale to the unit box, weld, forget those not used
-   faces      drop those with a vertex twice, and repetitions
-   edges      find opposites; where an edge has more than two faces cut fins and inner walls, part
-              sheets that touch, or refuse
-   winding    turn faces so that neighbours agree, or refuse
-   area       flip caps and collapse needles; where that changed which faces there are, go back
+   vertices   scale to the unit box, weld, ignore unused ones
+   faces      remove those with a vertex twice, and duplicates
+   edges      find opposites; where an edge has more than two faces remove fins and interior walls,
+              separate sheets that touch, or refuse
+   winding    orient faces consistently, or refuse
+   area       flip caps and collapse needles; start again if faces were added or removed
    fans       one vertex for each, numbered
    measures   normals, components, border loops                                                 */
 

@@ -7,9 +7,9 @@
 
 /* The new surface is retiled with points that come from three places: the old mesh, where it lies
    on the new surface; its lines, in the gaps between the old points there; and the rest of the
-   surface that no triangle of the old mesh covers. Then as in TRIMESH_REPEL: put into the mesh of
-   the surface, whose own vertices are taken out. The old mesh's edges are turned back to between its
-   points, those far from anything new are pinned, and what remains is relaxed.                  */
+   surface that no triangle of the old mesh covers. Then as in TRIMESH_REPEL these are put into the
+   mesh of the surface, whose own vertices are removed. Between old points the edges of the old mesh
+   are restored, points far from anything new are pinned, and the others are relaxed. */
 
 enum { TMR_LEAF = 4 }; /* triangles in a leaf of the tree */
 
@@ -56,7 +56,7 @@ static txm_status tmr_tree_build(tmr_tree *t, const txm_dvec3 *point, const int3
             high = t->high[2 * i + 1];
             tmr_grow_box(&low, &high, t->low[2 * i + 2]);
             tmr_grow_box(&low, &high, t->high[2 * i + 2]);
-            if (t->low[2 * i + 2].x > t->high[2 * i + 2].x) { /* nothing in there */
+            if (t->low[2 * i + 2].x > t->high[2 * i + 2].x) { /* nothing in it    */
                 low = t->low[2 * i + 1];
                 high = t->high[2 * i + 1];
             }
@@ -115,12 +115,12 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, dou
     return best;
 }
 
-/* ---- what is there: points in a grid --------------------------------------------------------- */
+/* ---- points in a grid ------------------------------------------------------------------------- */
 
 typedef struct tmr_grid {
     double cell;
     int32_t mask;
-    int32_t *head; /* 1 per slot: the last vertex put there, -1 */
+    int32_t *head; /* 1 per slot: the last vertex put there, or -1 */
     int32_t *next; /* 1 per vertex of the mesh: the one before it */
 } tmr_grid;
 
@@ -152,8 +152,8 @@ static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
     *head = v;
 }
 
-/* Is a point of the grid nearer to p than reach, on the same side of a sheet? was: NULL, or points
-   with a number there do not count. */
+/* Is a point of the grid nearer to p than reach, on the same side of a sheet? was: NULL, or 1 per
+   vertex: those with a number >= 0 do not count. */
 static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, txm_dvec3 p,
                           txm_dvec3 n, double reach) {
     const double k = fmin(ceil(reach / g->cell), 8);
@@ -183,7 +183,7 @@ typedef struct tmr_update {
     tmr_surface s;
     tmr_lines l;
     tmr_work w;
-    tmr_strewn t;
+    tmr_sampling t;
     tmr_tree tree;       /* of the surface                                                       */
     tmr_tree old_tree;
     tmr_grid grid;
@@ -194,7 +194,7 @@ typedef struct tmr_update {
     int32_t *was;        /* 1 per vertex of the new one: its vertex in the old one, -1            */
     int32_t *face;       /* 1 per vertex of the old mesh: the face it lies in, -1                 */
     txm_dvec3 *place;    /* 1 per vertex of the old mesh: where                                  */
-    int32_t *segment;    /* 1 per corner of the surface: the segment that its edge is, -1          */
+    int32_t *segment; /* 1 per corner of the surface: the segment on its edge, -1               */
     double *way;         /* 1 per vertex of the old mesh on a line: distance from its beginning  */
     int32_t *level;      /* 1 per vertex of the mesh: edges to the nearest new one                 */
     txm_arena input, first, scratch;
@@ -253,7 +253,7 @@ static void tmr_find_segment(tmr_update *u, int32_t i, int32_t face) {
     }
 }
 
-/* Is old vertex i a corner that is one again? */
+/* If old vertex i, a corner, lies at a corner of the new surface, map it there. */
 static void tmr_find_corner(tmr_update *u, int32_t i, int32_t face) {
     const double reach = u->tolerance * u->t.length;
     for (int k = 0; k < 3; k++) {
@@ -265,12 +265,12 @@ static void tmr_find_corner(tmr_update *u, int32_t i, int32_t face) {
     }
 }
 
-/* Where do the old vertices lie on the new surface? Of those on lines face is the segment. */
+/* Where do the old vertices lie on the new surface? For those on lines `face` is the segment. */
 static void tmr_find_old(tmr_update *u) {
     for (int32_t i = 0; i < (int32_t)u->old->vertex_count; i++) {
         tmr_place at;
         const int kind = u->old->kinds[i];
-        const int sharp = kind != TRIMESH_FREE; /* the normal there is one of two */
+        const int sharp = kind != TRIMESH_FREE; /* there are two normals there    */
         u->now[i] = u->face[i] = -1;
         const int32_t f = tmr_tree_nearest(&u->tree, u->old_point[i], tmr_old_normal(u, i),
                                            sharp ? -2 : 0.7, u->tolerance * u->t.length, &at);
@@ -286,7 +286,7 @@ static void tmr_find_old(tmr_update *u) {
 
 /* ---- the update: lines ----------------------------------------------------------------------- */
 
-/* Old vertices on lines in their order along them: pairs[].value. How many. */
+/* List the old vertices on lines in their order along them in pairs[].value. Returns how many. */
 static size_t tmr_order_on_lines(const tmr_update *u, txm_pair *pairs, txm_pair *room) {
     size_t n = 0;
     for (size_t i = 0; i < u->old->vertex_count; i++) {
@@ -301,7 +301,7 @@ static size_t tmr_order_on_lines(const tmr_update *u, txm_pair *pairs, txm_pair 
     return n;
 }
 
-/* Fill the gap between two ways on a line with evenly spread new ones. */
+/* Fill the gap between two places on a line with evenly spaced new ones. */
 static int32_t tmr_fill_gap(tmr_update *u, double from, double to, double spacing, int32_t count,
                             int32_t room, int32_t *olds) {
     const double steps = floor((to - from) / spacing + 0.5);
@@ -312,7 +312,7 @@ static int32_t tmr_fill_gap(tmr_update *u, double from, double to, double spacin
     return count;
 }
 
-/* Points on a line: old ones that keep their distance, the gaps filled. */
+/* Points on a line: the old ones that are far enough apart, and new ones in the gaps. */
 static txm_status tmr_update_line(tmr_update *u, int32_t line, const txm_pair *pairs, size_t count,
                                   int32_t *olds, int32_t *vertices, int32_t room) {
     const double length = tmr_line_weight(&u->s, &u->l, line);
@@ -343,7 +343,7 @@ static txm_status tmr_update_line(tmr_update *u, int32_t line, const txm_pair *p
             olds[n++] = -1;
         }
         n = tmr_fill_gap(u, last, length, steps ? length / steps : spacing, n, room, olds);
-    } else { /* round the end of the ring to the first one; those beyond it come first again */
+    } else { /* across the end of the loop to the first one; those beyond the end move to the front */
         n = tmr_fill_gap(u, last, begin + length, spacing, n, room, olds);
         int32_t over = 0;
         while (over < n && u->t.ways[n - 1 - over] >= length) over++;
@@ -390,7 +390,7 @@ static txm_status tmr_update_lines(tmr_update *u) {
 
 /* ---- the update: points on faces -------------------------------------------------------------- */
 
-/* Put the old vertices on faces into the mesh, face by face, but for those in the way of lines. */
+/* Put the old vertices on faces into the mesh, face by face, except those too near to lines. */
 static txm_status tmr_update_old(tmr_update *u) {
     const size_t n = u->old->vertex_count;
     size_t count = 0;
@@ -430,8 +430,8 @@ static int tmr_is_covered(const tmr_update *u, txm_dvec3 p, txm_dvec3 n, double 
     return 1;
 }
 
-/* Strew new points where nothing is: many are tried, along the faces, and those taken that keep
-   the distance to all others. first: covered places are left out. limit: not more points in all. */
+/* Put new points where there are none: try many places, along the faces, and take those that keep
+   the distance from all others and that the old mesh does not cover. limit: most points in all. */
 static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double distance,
                                  int32_t *live, int32_t limit, uint64_t stream) {
     const double area = 0.86602540378443865 * u->t.length * u->t.length; /* of one point */
@@ -443,7 +443,7 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
         const int32_t tries = run < 1 ? 0 : run > 1e8 ? 100000000 : (int32_t)run;
         run -= tries;
         for (int32_t k = 0; k < tries && *live < limit; k++) {
-            const txm_dvec3 p = tmr_strew_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
+            const txm_dvec3 p = tmr_sample_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
             const tmr_place at = tmr_on_face(&u->s, f, p);
             const double length = u->t.length * tmr_scale_at(&u->s, &at);
             if (tmr_is_crowded(&u->grid, &u->w, NULL, p, n, distance * length)) continue;
@@ -453,12 +453,12 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
             tmr_grid_add(&u->grid, u->w.m.p[v], v);
             ++*live;
         }
-        if (i % 65536 == 65535 && txm_progress(u->w.env, 0.3f, "strew")) return TXM_CANCELLED;
+        if (i % 65536 == 65535 && txm_progress(u->w.env, 0.3f, "sample")) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
 
-static txm_status tmr_update_strew(tmr_update *u) {
+static txm_status tmr_update_sample(tmr_update *u) {
     /* in falling distance: a random packing at 0.78 is as dense as the lattice at 1 */
     static const double distance[] = {0.85, 0.75, 0.65, 0.55};
     const size_t n = (size_t)u->s.face_count;
@@ -478,7 +478,7 @@ static txm_status tmr_update_strew(tmr_update *u) {
     return status;
 }
 
-/* ---- the update: as it was where nothing is new ------------------------------------------------- */
+/* ---- the update: what stays as it was ----------------------------------------------------------- */
 
 static uint64_t tmr_edge_key(int32_t a, int32_t b) {
     const uint64_t x = (uint64_t)(a < b ? a : b), y = (uint64_t)(a < b ? b : a);
@@ -492,8 +492,8 @@ static int tmr_has_edge(const uint64_t *table, size_t mask, int32_t a, int32_t b
     return 0;
 }
 
-/* Turn edges between old vertices to what they were. */
-static txm_status tmr_turn_back(tmr_update *u) {
+/* Flip edges between old vertices to restore those of the old mesh. */
+static txm_status tmr_restore_edges(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const size_t n = 3 * u->old->triangle_count;
     size_t size = 16;
@@ -516,7 +516,7 @@ static txm_status tmr_turn_back(tmr_update *u) {
             const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
             tmr_quad q;
             if (u->was[d] < 0 || u->was[e] < 0 || !tmr_has_edge(table, size - 1, d, e)) continue;
-            if (tmr_has_edge(table, size - 1, a, b) || !tmr_look_at_flip(&u->w, c, &q)) continue;
+            if (tmr_has_edge(table, size - 1, a, b) || !tmr_measure_flip(&u->w, c, &q)) continue;
             if (q.after <= 0 && q.after <= q.before) continue;
             tmr_flip(m, c);
             turned++;
@@ -526,8 +526,8 @@ static txm_status tmr_turn_back(tmr_update *u) {
     return TXM_OK;
 }
 
-/* Pin the old vertices farther than the radius, in edges, from every new one and every place that
-   an old one has gone from. */
+/* Pin the old vertices that are farther than the radius, in edges, from every new vertex and from
+   every place where an old one is gone. */
 static void tmr_pin(tmr_update *u) {
     tmr_mesh *m = &u->w.m;
     const int32_t most = (int32_t)ceil(u->radius);
@@ -580,7 +580,7 @@ static txm_status tmr_update_alloc(tmr_update *u) {
     return status;
 }
 
-/* Points that the surface holds at edge length u->t.length. */
+/* How many points the surface has at edge length u->t.length. */
 static double tmr_points_for(const tmr_update *u) {
     const double scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     double area = 0, border = 0;
@@ -614,16 +614,16 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     u->t.desc = &u->desc;
     u->t.length = length;
     if (u->desc.vertices > 0)
-        u->t.length = tmr_strewn_length(&u->s, &u->l,
-                                        u->desc.line_spacing > 0 ? u->desc.line_spacing : 1,
-                                        (double)u->desc.vertices);
+        u->t.length =
+            tmr_sampling_length(&u->s, &u->l, u->desc.line_spacing > 0 ? u->desc.line_spacing : 1,
+                                (double)u->desc.vertices);
     u->w.length = u->t.length;
     u->w.line_scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double points = fmax(tmr_points_for(u), (double)u->old->vertex_count);
     if (points > TMR_MOST / 4)
         return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
-    status = tmr_copy_surface(&u->w, tmr_strewn_room(floor(2 * points)), &u->first);
-    if (status == TXM_OK) status = tmr_strewn_alloc(&u->t, &u->scratch);
+    status = tmr_copy_surface(&u->w, tmr_sampling_room(floor(2 * points)), &u->first);
+    if (status == TXM_OK) status = tmr_sampling_alloc(&u->t, &u->scratch);
     if (status == TXM_OK) status = tmr_update_alloc(u);
     if (status == TXM_OK)
         status =
@@ -662,7 +662,7 @@ static txm_status tmr_update_relax(tmr_update *u) {
     return TXM_OK;
 }
 
-/* Old positions bit for bit, and the map. */
+/* Make the result; pinned vertices keep their positions bit for bit. */
 static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out) {
     const tmr_mesh *m = &u->w.m;
     trimesh_mesh *mesh = NULL;
@@ -691,11 +691,11 @@ static txm_status tmr_update_write(tmr_update *u, trimesh_mesh **out) {
 static txm_status tmr_update_run(tmr_update *u, trimesh_report *report, trimesh_mesh **out) {
     txm_status status = tmr_update_begin(u, report);
     if (status != TXM_OK) return status;
-    if (txm_progress(u->w.env, 0.2f, "strew")) return TXM_CANCELLED;
-    if ((status = tmr_update_strew(u)) != TXM_OK) return status;
+    if (txm_progress(u->w.env, 0.2f, "sample")) return TXM_CANCELLED;
+    if ((status = tmr_update_sample(u)) != TXM_OK) return status;
     if (txm_progress(u->w.env, 0.4f, "join")) return TXM_CANCELLED;
-    if ((status = tmr_take_out(&u->w, u->t.keep, 0.4f)) != TXM_OK) return status;
-    if ((status = tmr_turn_back(u)) != TXM_OK) return status;
+    if ((status = tmr_remove_vertices(&u->w, u->t.keep, 0.4f)) != TXM_OK) return status;
+    if ((status = tmr_restore_edges(u)) != TXM_OK) return status;
     tmr_pin(u);
     if ((status = tmr_update_relax(u)) != TXM_OK) return status;
     return tmr_update_write(u, out);

@@ -7,7 +7,7 @@
 
 /* ---- the work ----------------------------------------------------------------------------- */
 
-enum { TMR_CHUNK = 2048 }; /* vertices or triangles per parallel task; fixes no result */
+enum { TMR_CHUNK = 2048 }; /* vertices or triangles per parallel task; does not change results */
 
 typedef struct tmr_work {
     const tmr_surface *s;
@@ -18,13 +18,13 @@ typedef struct tmr_work {
     float *size;       /* 1 per vertex of m: edge length there relative to length               */
     double length;     /* edge length aimed at                                                  */
     double line_scale; /* along lines relative to that                                          */
-    txm_dvec3 *moved;  /* 1 per vertex: room for where it shall go                              */
-    int32_t *landed;   /* 1 per vertex: room for the face or segment there                      */
-    uint8_t *bad;      /* 1 per vertex: room for a mark                                         */
-    uint8_t *flag;     /* 1 per triangle: room for a mark                                       */
-    float *height;     /* 1 per triangle: room for the height of the surface over it            */
+    txm_dvec3 *moved;  /* 1 per vertex: scratch: the place it moves to                          */
+    int32_t *landed;   /* 1 per vertex: scratch: the face or segment there                      */
+    uint8_t *bad;      /* 1 per vertex: scratch: a mark                                         */
+    uint8_t *flag;     /* 1 per triangle: scratch: a mark                                       */
+    float *height;     /* 1 per triangle: scratch: height of the surface over it                */
     uint8_t *mask;     /* of relaxation: NULL, or 1 per vertex: may it move?                    */
-    uint8_t *mask_room; /* 1 per vertex: room for that                                           */
+    uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
 } tmr_work;
@@ -45,8 +45,8 @@ static void tmr_put(tmr_work *w, int32_t v, const tmr_place *at) {
     w->size[v] = txm_float(tmr_scale_at(w->s, at));
 }
 
-/* Until something else is said vertex v stays where it is. */
-static void tmr_stay(tmr_work *w, int32_t v) {
+/* Let vertex v stay where it is, unless w->moved is set later. */
+static void tmr_keep_place(tmr_work *w, int32_t v) {
     w->moved[v] = w->m.p[v];
     w->landed[v] = w->m.source[v];
 }
@@ -66,7 +66,7 @@ static txm_dvec3 tmr_middle(const tmr_mesh *m, const int32_t *v) {
     return txm_d3_scale(txm_d3_add(txm_d3_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
 }
 
-/* the place of the surface nearest to that, walking from all three vertices */
+/* the place of the surface nearest to it, walking from all three vertices */
 static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
     const txm_dvec3 middle = tmr_middle(&w->m, v);
     tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
@@ -77,8 +77,8 @@ static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
     return at;
 }
 
-/* The normal that a triangle should have: that of the surface around, judged by its free vertices
-   only where there are any, since normals on creases say little. */
+/* The normal that a triangle should have: the mean normal of its free vertices, since normals on
+   creases say little; without a free vertex that of the surface below its middle. */
 static txm_dvec3 tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, int32_t c) {
     const tmr_mesh *m = &w->m;
     const int32_t v[3] = {a, b, c};
@@ -105,7 +105,7 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
     return txm_d3_dot(n, tmr_expected_normal(w, a, b, c)) / length;
 }
 
-#define TMR_LEAST_AGREEMENT 0.4 /* cosine: triangles steeper than this to the surface are avoided */
+#define TMR_LEAST_AGREEMENT 0.4 /* cosine of the steepest angle to the surface that is accepted   */
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
@@ -215,8 +215,8 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
 
 /* ---- back to the caller's triangles ------------------------------------------------------- */
 
-/* The place in the caller's triangle. Where mending turned an edge, a face is none of the caller's:
-   then the nearest point of the triangle that it came from. */
+/* The place in the caller's triangle. Where mending has flipped an edge, a face is not one of the
+   caller's: then the nearest point of the triangle that it came from. */
 static txm_mesh_place tmr_surface_source(const tmr_surface *s, const trimesh_desc *desc,
                                          const tmr_place *at) {
     txm_mesh_place source;

@@ -157,7 +157,7 @@ static inline double length3(const float *a) {
 }
 
 /* random sources on the input, as many as `count` */
-static inline txm_mesh_place *strew(const shape *s, size_t count) {
+static inline txm_mesh_place *random_places(const shape *s, size_t count) {
     txm_mesh_place *sources = (txm_mesh_place *)malloc(count * sizeof *sources);
     txm_rng rng = txm_rng_make(5, 5);
     assert_non_null(sources);

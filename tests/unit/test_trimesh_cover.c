@@ -31,7 +31,7 @@ static void test_transfer(void **state) {
     shape s;
     (void)state;
     make_plane(&s, 20, 10);
-    txm_mesh_place *sources = strew(&s, COUNT);
+    txm_mesh_place *sources = random_places(&s, COUNT);
     /* a linear function of the place, once per vertex and once per corner */
     float *value = (float *)malloc(2 * s.vertices * sizeof(float));
     float *out = (float *)malloc(4 * COUNT * sizeof(float));

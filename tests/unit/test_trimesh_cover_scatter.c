@@ -451,7 +451,7 @@ static void test_degenerate(void **state) {
         }
         free(out);
     }
-    txm_mesh_place *sources = strew(&s, s.vertices);
+    txm_mesh_place *sources = random_places(&s, s.vertices);
     const trimesh_values values = {s.positions, s.vertices, NULL, 3};
     float *out = (float *)malloc(9 * s.triangles * sizeof(float));
     assert_int_equal(trimesh_transfer_corners(&s.view, &values, &s.view, sources, NULL, out), TXM_OK);

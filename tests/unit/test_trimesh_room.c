@@ -131,7 +131,7 @@ static void test_confetti(void **state) {
     }
 }
 
-/* Only as far as strewing: to be retiled such a surface would need many more vertices. */
+/* Only as far as sampling: to be retiled such a surface would need many more vertices. */
 static void test_handles(void **state) {
     (void)state;
     make_handles(70);
