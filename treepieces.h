@@ -3403,59 +3403,78 @@ static void tpc_children(const uint32_t *record, uint32_t children[TREEPIECES_MA
     children[2] = record[2] & 0xffffu;
 }
 
+/* An instance of a piece with what its bones have in common for all its vertices. */
+typedef struct tpc_instance {
+    const treepieces_piece *piece;
+    const tpc_local_vertex *local;                   /* vertex_count for each leaf rim       */
+    const float *own, *child[TREEPIECES_MAX_LEAVES]; /* bones                                */
+    float own_squares[3], squares[TREEPIECES_MAX_LEAVES][3]; /* of the bones' columns        */
+    float stretch[TREEPIECES_MAX_LEAVES];            /* of the own piece over the child's    */
+    int turn[TREEPIECES_MAX_LEAVES];
+} tpc_instance;
+
+static void tpc_find_instance(const treepieces_forest *forest, const float *bones, int type,
+                              uint32_t number, tpc_instance *s) {
+    const treepieces_batch *batch = &forest->batches[type];
+    const uint32_t *word = batch->words + (size_t)number * batch->stride;
+    uint32_t difference[TREEPIECES_MAX_LEAVES];
+    s->piece = &forest->kit->pieces[type];
+    s->local = forest->kit->local[type];
+    s->own = bones + TREEPIECES_BONE * (size_t)word[0];
+    tpc_columns(s->own, s->own_squares);
+    tpc_children(word, difference);
+    for (int k = 0; k < s->piece->leaf_count; k++) {
+        s->child[k] = s->own + TREEPIECES_BONE * (size_t)difference[k];
+        s->turn[k] = (int)(word[2] >> (16 + 4 * k) & 15u);
+        tpc_columns(s->child[k], s->squares[k]);
+        s->stretch[k] = sqrtf(s->squares[k][0] * s->own_squares[1] /
+                              (s->own_squares[0] * s->squares[k][1]));
+    }
+}
+
+/* Vertex i, which is on no leaf rim; the normal has no unit length yet. */
+static void tpc_blend_vertex(const tpc_instance *s, int i, float position[3], float normal[3]) {
+    const treepieces_vertex *v = &s->piece->vertices[i];
+    const float w = v->weights[0];
+    float p[3], n[3], moved[3];
+    tpc_move_point(s->own, v->position, position);
+    tpc_move_normal(s->own, v->normal, normal);
+    for (int c = 0; c < 3 && w < 1; c++) position[c] *= w;
+    for (int c = 0; c < 3 && w < 1; c++) normal[c] *= w * sqrtf(s->own_squares[0]);
+    for (int k = 0; k < s->piece->leaf_count; k++) {
+        const float wk = v->weights[1 + k];
+        const tpc_local_vertex *at = &s->local[k * s->piece->vertex_count + i];
+        if (!(wk > 0)) continue;
+        tpc_turn((TREEPIECES_RIM - s->turn[k]) % TREEPIECES_RIM, at->position, p);
+        tpc_turn((TREEPIECES_RIM - s->turn[k]) % TREEPIECES_RIM, at->normal, n);
+        p[1] *= s->stretch[k];
+        n[1] /= s->stretch[k];
+        tpc_move_point(s->child[k], p, moved);
+        for (int c = 0; c < 3; c++) position[c] += wk * moved[c];
+        tpc_move_normal(s->child[k], n, moved);
+        for (int c = 0; c < 3; c++) normal[c] += wk * sqrtf(s->squares[k][0]) * moved[c];
+    }
+}
+
 TREEPIECES_API void treepieces_skin(const treepieces_forest *forest, const float *bones, int type,
                                     uint32_t instance, float *positions, float *normals) {
-    const treepieces_piece *piece = &forest->kit->pieces[type];
-    const treepieces_batch *batch = &forest->batches[type];
-    const uint32_t *word = batch->words + (size_t)instance * batch->stride;
-    uint32_t difference[TREEPIECES_MAX_LEAVES];
-    const float *own = bones + TREEPIECES_BONE * (size_t)word[0];
-    const float *child[TREEPIECES_MAX_LEAVES];
-    float stretch[TREEPIECES_MAX_LEAVES], own_squares[3];
-    int turn[TREEPIECES_MAX_LEAVES];
-    tpc_columns(own, own_squares);
-    tpc_children(word, difference);
-    for (int k = 0; k < piece->leaf_count; k++) {
-        float squares[3];
-        child[k] = own + TREEPIECES_BONE * (size_t)difference[k];
-        turn[k] = (int)(word[2] >> (16 + 4 * k) & 15u);
-        tpc_columns(child[k], squares);
-        stretch[k] = sqrtf(squares[0] * own_squares[1] / (own_squares[0] * squares[1]));
-    }
-    for (int i = 0; i < piece->vertex_count; i++) {
-        const treepieces_vertex *v = &piece->vertices[i];
-        float *position = positions + 3 * i, p[3], n[3], moved[3], sum[3] = {0, 0, 0};
-        if (v->rim >= 0) {
-            const int k = v->rim / TREEPIECES_RIM;
-            tpc_rim_vertex((v->rim + TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, p, n);
-            tpc_move_point(child[k], p, position);
+    tpc_instance s;
+    tpc_find_instance(forest, bones, type, instance, &s);
+    for (int i = 0; i < s.piece->vertex_count; i++) {
+        const int rim = s.piece->vertices[i].rim;
+        float p[3], n[3], normal[3];
+        if (rim >= 0) {
+            const int k = rim / TREEPIECES_RIM;
+            tpc_rim_vertex((rim + TREEPIECES_RIM - s.turn[k]) % TREEPIECES_RIM, p, n);
+            tpc_move_point(s.child[k], p, positions + 3 * i);
             if (!normals) continue;
-            tpc_move_normal(child[k], n, sum);
+            tpc_move_normal(s.child[k], n, normal);
         } else {
-            const float w = v->weights[0];
-            tpc_move_point(own, v->position, position);
-            tpc_move_normal(own, v->normal, sum);
-            for (int c = 0; c < 3 && w < 1; c++) position[c] *= w;
-            for (int c = 0; c < 3 && w < 1; c++) sum[c] *= w * sqrtf(own_squares[0]);
-            for (int k = 0; k < piece->leaf_count; k++) {
-                const float wk = v->weights[1 + k];
-                const tpc_local_vertex *at = &forest->kit->local[type][k * piece->vertex_count + i];
-                if (!(wk > 0)) continue;
-                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->position, p);
-                tpc_turn((TREEPIECES_RIM - turn[k]) % TREEPIECES_RIM, at->normal, n);
-                p[1] *= stretch[k];
-                n[1] /= stretch[k];
-                tpc_move_point(child[k], p, moved);
-                for (int c = 0; c < 3; c++) position[c] += wk * moved[c];
-                float squares[3];
-                tpc_columns(child[k], squares);
-                tpc_move_normal(child[k], n, moved);
-                for (int c = 0; c < 3; c++) sum[c] += wk * sqrtf(squares[0]) * moved[c];
-            }
+            tpc_blend_vertex(&s, i, positions + 3 * i, normal);
             if (!normals) continue;
         }
-        tpc_unit(sum);
-        memcpy(normals + 3 * i, sum, sizeof sum);
+        tpc_unit(normal);
+        memcpy(normals + 3 * i, normal, sizeof normal);
     }
 }
 
