@@ -3704,12 +3704,12 @@ static void tmr_even_lines(tmr_work *w) {
                 /* in which direction along the line? */
                 const double w0 = tmr_line_way(w->s, w->l, m->p[to], m->source[to]);
                 if (begin >= 0) {
-                    const double near = w0, far = w->l->length[line] - w0;
+                    const double nearby = w0, distant = w->l->length[line] - w0;
                     const txm_dvec3 first_point = w->s->point[w->l->a[w->l->first[line]]];
                     const txm_dvec3 last_point = w->s->point[w->l->b[w->l->first[line + 1] - 1]];
                     const double d_first = txm_d3_dist2(first_point, m->p[begin]);
                     const double d_last = txm_d3_dist2(last_point, m->p[begin]);
-                    forward = d_first < d_last || (d_first <= d_last && near <= far);
+                    forward = d_first < d_last || (d_first <= d_last && nearby <= distant);
                     way = forward ? 0 : w->l->length[line];
                 } else {
                     double d = w0 - way;
@@ -4073,17 +4073,17 @@ static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
 }
 
 /* Set near for the coarse cells around the vertices marked in w->bad. */
-static void tmr_mark_near(const tmr_work *w, uint8_t *near) {
-    memset(near, 0, TMR_NEAR_CELLS);
+static void tmr_mark_near(const tmr_work *w, uint8_t *nearby) {
+    memset(nearby, 0, TMR_NEAR_CELLS);
     for (int32_t v = 0; v < w->m.vertex_count; v++) {
         if (!w->bad[v]) continue;
         for (int k = 0; k < 27; k++)
-            near[tmr_near_key(w->m.p[v], 3 * w->length, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)] = 1;
+            nearby[tmr_near_key(w->m.p[v], 3 * w->length, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)] = 1;
     }
 }
 
 /* The cells of all triangles, or of those near, in order. */
-static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g,
+static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *nearby, tmr_cells *g,
                                  txm_arena *arena) {
     const tmr_mesh *m = &w->m;
     memset(g, 0, sizeof *g);
@@ -4098,7 +4098,8 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cel
         g->overflow = 0;
         for (int32_t f = 0; f < m->face_count && !g->overflow; f++) {
             if (tmr_is_dead(m, f) || tmr_is_ghost_face(m, f)) continue;
-            if (near && !near[tmr_near_key(m->p[m->vertex[3 * f]], 3 * w->length, 0, 0, 0)]) continue;
+            if (nearby && !nearby[tmr_near_key(m->p[m->vertex[3 * f]], 3 * w->length, 0, 0, 0)])
+                continue;
             tmr_cells_add(m, g, f);
         }
     } while (g->overflow);
@@ -4109,12 +4110,12 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cel
 /* Count the pairs of triangles that cross each other in *found, and mark their vertices in w->bad.
    near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
    Linear in the number of triangles. */
-static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch,
-                                      long *found) {
+static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int rim,
+                                      txm_arena *scratch, long *found) {
     const tmr_mesh *m = &w->m;
     tmr_cells g;
     *found = 0;
-    const txm_status status = tmr_cells_make(w, near, &g, scratch);
+    const txm_status status = tmr_cells_make(w, nearby, &g, scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
@@ -4211,9 +4212,10 @@ static long tmr_open_folds(tmr_work *w, double share) {
         const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[d], m->p[a], m->p[b]));
         if (txm_d3_dot(n, txm_d3_unit(txm_d3_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
         found++;
-        const txm_dvec3 far = txm_d3_scale(txm_d3_add(m->p[d], m->p[e]), 0.5);
-        const txm_dvec3 near = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
-        const txm_dvec3 to = txm_d3_scale(txm_d3_unit(txm_d3_sub(far, near)), share * w->length);
+        const txm_dvec3 distant = txm_d3_scale(txm_d3_add(m->p[d], m->p[e]), 0.5);
+        const txm_dvec3 nearby = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
+        const txm_dvec3 to =
+            txm_d3_scale(txm_d3_unit(txm_d3_sub(distant, nearby)), share * w->length);
         if (tmr_kind_of(m, a) == TRIMESH_FREE)
             w->moved[a] = txm_d3_add(w->moved[a], txm_d3_scale(to, w->size[a]));
         if (tmr_kind_of(m, b) == TRIMESH_FREE)
@@ -4302,15 +4304,15 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     txm_dvec3 *kept = NULL;
     int32_t *kept_source = NULL;
     txm_arena_init(&arena, w->env);
-    uint8_t *near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
+    uint8_t *nearby = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
     txm_status status = tmr_check_memory(&arena);
     for (int round = 0; round <= TMR_SPOT_ROUNDS && status == TXM_OK; round++) {
         txm_arena scratch;
         long crossings, doubtful;
-        if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
+        if (round > 0) tmr_mark_near(w, nearby); /* w->bad: what was moved */
         memset(w->bad, 0, count);
         txm_arena_init(&scratch, w->env);
-        status = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch, &crossings);
+        status = tmr_count_crossings(w, round > 0 ? nearby : NULL, 0, &scratch, &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
         const long turned = tmr_count_inverted(w, &doubtful);
@@ -4610,17 +4612,17 @@ static txm_status tmr_cut_line(tmr_sampling *t, int32_t line, const double *ways
     tmr_work *w = t->w;
     const tmr_surface *s = w->s;
     const tmr_lines *l = w->l;
-    const double near = 0.02 * t->length;
+    const double nearby = 0.02 * t->length;
     double way = 0;
     int32_t done = 0;
     for (int32_t k = l->first[line]; k < l->first[line + 1]; k++) {
         const int32_t a = l->a[k], b = l->b[k];
         const double weight = tmr_segment_weight(s, l, k);
         int32_t left = a;
-        for (; done < count && ways[done] < way + weight + near; done++) {
+        for (; done < count && ways[done] < way + weight + nearby; done++) {
             const double u = weight > 0 ? (ways[done] - way) / weight : 0;
             int32_t v = u < 0.5 ? a : b;
-            if (u * weight >= near && (1 - u) * weight >= near) {
+            if (u * weight >= nearby && (1 - u) * weight >= nearby) {
                 const int32_t c = tmr_find_edge(&w->m, left, b);
                 v = c < 0 ? -1 : tmr_cut_edge(t, tmr_prev(c));
                 if (v < 0) return TXM_TOO_SMALL;
@@ -4947,19 +4949,19 @@ static txm_status tmr_join_points(tmr_sampling *t, txm_arena *scratch) {
 
 /* The points within reach of v that are connected to it by edges between such points; v itself
    first. */
-static int tmr_find_near(const tmr_work *w, int32_t v, int32_t near[TMR_NEAR]) {
+static int tmr_find_near(const tmr_work *w, int32_t v, int32_t nearby[TMR_NEAR]) {
     const tmr_mesh *m = &w->m;
     const double reach = TMR_REACH * w->length * w->size[v];
     int count = 1;
-    near[0] = v;
+    nearby[0] = v;
     for (int i = 0; i < count; i++) {
-        int32_t c = m->corner[near[i]];
+        int32_t c = m->corner[nearby[i]];
         const int32_t first = c;
         do {
             const int32_t x = m->vertex[tmr_next(c)];
             int known = tmr_is_ghost(m, x) || txm_d3_dist2(m->p[x], m->p[v]) > reach * reach;
-            for (int k = 0; k < count && !known; k++) known = near[k] == x;
-            if (!known && count < TMR_NEAR) near[count++] = x;
+            for (int k = 0; k < count && !known; k++) known = nearby[k] == x;
+            if (!known && count < TMR_NEAR) nearby[count++] = x;
             c = tmr_swing(m, c);
         } while (c != first);
     }
@@ -4978,13 +4980,13 @@ static double tmr_arc(double cosine) {
 static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
-    int32_t near[TMR_NEAR];
+    int32_t nearby[TMR_NEAR];
     txm_dvec3 push = txm_d3(0, 0, 0);
     tmr_keep_place(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
-    const int count = tmr_find_near(w, v, near);
+    const int count = tmr_find_near(w, v, nearby);
     for (int i = 1; i < count; i++) {
-        const int32_t x = near[i];
+        const int32_t x = nearby[i];
         if (kind != TRIMESH_FREE && tmr_kind_of(m, x) == TRIMESH_FREE) continue;
         txm_dvec3 d = txm_d3_sub(m->p[v], m->p[x]);
         const double r = TMR_REACH * w->length * 0.5 * (w->size[v] + (double)w->size[x]);
@@ -5821,9 +5823,9 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, dou
         const int32_t i = stack[--size];
         if (tmr_box_dist2(t, i, p) > least) continue;
         if (i < t->leaves - 1) { /* the nearer one first */
-            const int far = tmr_box_dist2(t, 2 * i + 1, p) < tmr_box_dist2(t, 2 * i + 2, p);
-            stack[size++] = 2 * i + 1 + far;
-            stack[size++] = 2 * i + 2 - far;
+            const int distant = tmr_box_dist2(t, 2 * i + 1, p) < tmr_box_dist2(t, 2 * i + 2, p);
+            stack[size++] = 2 * i + 1 + distant;
+            stack[size++] = 2 * i + 2 - distant;
             continue;
         }
         const int32_t first = (i - t->leaves + 1) * TMR_LEAF;

@@ -181,12 +181,12 @@ static void tmr_even_lines(tmr_work *w) {
                 /* in which direction along the line? */
                 const double w0 = tmr_line_way(w->s, w->l, m->p[to], m->source[to]);
                 if (begin >= 0) {
-                    const double near = w0, far = w->l->length[line] - w0;
+                    const double nearby = w0, distant = w->l->length[line] - w0;
                     const txm_dvec3 first_point = w->s->point[w->l->a[w->l->first[line]]];
                     const txm_dvec3 last_point = w->s->point[w->l->b[w->l->first[line + 1] - 1]];
                     const double d_first = txm_d3_dist2(first_point, m->p[begin]);
                     const double d_last = txm_d3_dist2(last_point, m->p[begin]);
-                    forward = d_first < d_last || (d_first <= d_last && near <= far);
+                    forward = d_first < d_last || (d_first <= d_last && nearby <= distant);
                     way = forward ? 0 : w->l->length[line];
                 } else {
                     double d = w0 - way;

@@ -274,17 +274,17 @@ static txm_status tmr_cut_line(tmr_sampling *t, int32_t line, const double *ways
     tmr_work *w = t->w;
     const tmr_surface *s = w->s;
     const tmr_lines *l = w->l;
-    const double near = 0.02 * t->length;
+    const double nearby = 0.02 * t->length;
     double way = 0;
     int32_t done = 0;
     for (int32_t k = l->first[line]; k < l->first[line + 1]; k++) {
         const int32_t a = l->a[k], b = l->b[k];
         const double weight = tmr_segment_weight(s, l, k);
         int32_t left = a;
-        for (; done < count && ways[done] < way + weight + near; done++) {
+        for (; done < count && ways[done] < way + weight + nearby; done++) {
             const double u = weight > 0 ? (ways[done] - way) / weight : 0;
             int32_t v = u < 0.5 ? a : b;
-            if (u * weight >= near && (1 - u) * weight >= near) {
+            if (u * weight >= nearby && (1 - u) * weight >= nearby) {
                 const int32_t c = tmr_find_edge(&w->m, left, b);
                 v = c < 0 ? -1 : tmr_cut_edge(t, tmr_prev(c));
                 if (v < 0) return TXM_TOO_SMALL;

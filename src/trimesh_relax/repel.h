@@ -7,19 +7,19 @@
 
 /* The points within reach of v that are connected to it by edges between such points; v itself
    first. */
-static int tmr_find_near(const tmr_work *w, int32_t v, int32_t near[TMR_NEAR]) {
+static int tmr_find_near(const tmr_work *w, int32_t v, int32_t nearby[TMR_NEAR]) {
     const tmr_mesh *m = &w->m;
     const double reach = TMR_REACH * w->length * w->size[v];
     int count = 1;
-    near[0] = v;
+    nearby[0] = v;
     for (int i = 0; i < count; i++) {
-        int32_t c = m->corner[near[i]];
+        int32_t c = m->corner[nearby[i]];
         const int32_t first = c;
         do {
             const int32_t x = m->vertex[tmr_next(c)];
             int known = tmr_is_ghost(m, x) || txm_d3_dist2(m->p[x], m->p[v]) > reach * reach;
-            for (int k = 0; k < count && !known; k++) known = near[k] == x;
-            if (!known && count < TMR_NEAR) near[count++] = x;
+            for (int k = 0; k < count && !known; k++) known = nearby[k] == x;
+            if (!known && count < TMR_NEAR) nearby[count++] = x;
             c = tmr_swing(m, c);
         } while (c != first);
     }
@@ -38,13 +38,13 @@ static double tmr_arc(double cosine) {
 static void tmr_repel_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
-    int32_t near[TMR_NEAR];
+    int32_t nearby[TMR_NEAR];
     txm_dvec3 push = txm_d3(0, 0, 0);
     tmr_keep_place(w, v);
     if (m->corner[v] < 0 || kind == TRIMESH_CORNER || tmr_is_ghost(m, v)) return;
-    const int count = tmr_find_near(w, v, near);
+    const int count = tmr_find_near(w, v, nearby);
     for (int i = 1; i < count; i++) {
-        const int32_t x = near[i];
+        const int32_t x = nearby[i];
         if (kind != TRIMESH_FREE && tmr_kind_of(m, x) == TRIMESH_FREE) continue;
         txm_dvec3 d = txm_d3_sub(m->p[v], m->p[x]);
         const double r = TMR_REACH * w->length * 0.5 * (w->size[v] + (double)w->size[x]);

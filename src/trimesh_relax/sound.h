@@ -101,17 +101,17 @@ static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
 }
 
 /* Set near for the coarse cells around the vertices marked in w->bad. */
-static void tmr_mark_near(const tmr_work *w, uint8_t *near) {
-    memset(near, 0, TMR_NEAR_CELLS);
+static void tmr_mark_near(const tmr_work *w, uint8_t *nearby) {
+    memset(nearby, 0, TMR_NEAR_CELLS);
     for (int32_t v = 0; v < w->m.vertex_count; v++) {
         if (!w->bad[v]) continue;
         for (int k = 0; k < 27; k++)
-            near[tmr_near_key(w->m.p[v], 3 * w->length, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)] = 1;
+            nearby[tmr_near_key(w->m.p[v], 3 * w->length, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)] = 1;
     }
 }
 
 /* The cells of all triangles, or of those near, in order. */
-static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cells *g,
+static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *nearby, tmr_cells *g,
                                  txm_arena *arena) {
     const tmr_mesh *m = &w->m;
     memset(g, 0, sizeof *g);
@@ -126,7 +126,8 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cel
         g->overflow = 0;
         for (int32_t f = 0; f < m->face_count && !g->overflow; f++) {
             if (tmr_is_dead(m, f) || tmr_is_ghost_face(m, f)) continue;
-            if (near && !near[tmr_near_key(m->p[m->vertex[3 * f]], 3 * w->length, 0, 0, 0)]) continue;
+            if (nearby && !nearby[tmr_near_key(m->p[m->vertex[3 * f]], 3 * w->length, 0, 0, 0)])
+                continue;
             tmr_cells_add(m, g, f);
         }
     } while (g->overflow);
@@ -137,12 +138,12 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *near, tmr_cel
 /* Count the pairs of triangles that cross each other in *found, and mark their vertices in w->bad.
    near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
    Linear in the number of triangles. */
-static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *near, int rim, txm_arena *scratch,
-                                      long *found) {
+static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int rim,
+                                      txm_arena *scratch, long *found) {
     const tmr_mesh *m = &w->m;
     tmr_cells g;
     *found = 0;
-    const txm_status status = tmr_cells_make(w, near, &g, scratch);
+    const txm_status status = tmr_cells_make(w, nearby, &g, scratch);
     if (status != TXM_OK) return status;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
@@ -239,9 +240,10 @@ static long tmr_open_folds(tmr_work *w, double share) {
         const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[d], m->p[a], m->p[b]));
         if (txm_d3_dot(n, txm_d3_unit(txm_d3_area2(m->p[e], m->p[b], m->p[a]))) >= -0.47) continue;
         found++;
-        const txm_dvec3 far = txm_d3_scale(txm_d3_add(m->p[d], m->p[e]), 0.5);
-        const txm_dvec3 near = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
-        const txm_dvec3 to = txm_d3_scale(txm_d3_unit(txm_d3_sub(far, near)), share * w->length);
+        const txm_dvec3 distant = txm_d3_scale(txm_d3_add(m->p[d], m->p[e]), 0.5);
+        const txm_dvec3 nearby = txm_d3_scale(txm_d3_add(m->p[a], m->p[b]), 0.5);
+        const txm_dvec3 to =
+            txm_d3_scale(txm_d3_unit(txm_d3_sub(distant, nearby)), share * w->length);
         if (tmr_kind_of(m, a) == TRIMESH_FREE)
             w->moved[a] = txm_d3_add(w->moved[a], txm_d3_scale(to, w->size[a]));
         if (tmr_kind_of(m, b) == TRIMESH_FREE)
@@ -330,15 +332,15 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     txm_dvec3 *kept = NULL;
     int32_t *kept_source = NULL;
     txm_arena_init(&arena, w->env);
-    uint8_t *near = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
+    uint8_t *nearby = (uint8_t *)txm_arena_alloc(&arena, TMR_NEAR_CELLS, 1);
     txm_status status = tmr_check_memory(&arena);
     for (int round = 0; round <= TMR_SPOT_ROUNDS && status == TXM_OK; round++) {
         txm_arena scratch;
         long crossings, doubtful;
-        if (round > 0) tmr_mark_near(w, near); /* w->bad: what was moved */
+        if (round > 0) tmr_mark_near(w, nearby); /* w->bad: what was moved */
         memset(w->bad, 0, count);
         txm_arena_init(&scratch, w->env);
-        status = tmr_count_crossings(w, round > 0 ? near : NULL, 0, &scratch, &crossings);
+        status = tmr_count_crossings(w, round > 0 ? nearby : NULL, 0, &scratch, &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
         const long turned = tmr_count_inverted(w, &doubtful);

@@ -91,9 +91,9 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, dou
         const int32_t i = stack[--size];
         if (tmr_box_dist2(t, i, p) > least) continue;
         if (i < t->leaves - 1) { /* the nearer one first */
-            const int far = tmr_box_dist2(t, 2 * i + 1, p) < tmr_box_dist2(t, 2 * i + 2, p);
-            stack[size++] = 2 * i + 1 + far;
-            stack[size++] = 2 * i + 2 - far;
+            const int distant = tmr_box_dist2(t, 2 * i + 1, p) < tmr_box_dist2(t, 2 * i + 2, p);
+            stack[size++] = 2 * i + 1 + distant;
+            stack[size++] = 2 * i + 2 - distant;
             continue;
         }
         const int32_t first = (i - t->leaves + 1) * TMR_LEAF;
