@@ -1537,7 +1537,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
             span[y][1] = i / 16 * 16 + 16;
         }
     }
-    /* costs are gray levels summed over known bytes, of which the first block has none */
+    /* costs are gray levels summed over known bytes; the first block has no such bytes */
     const double unit = known ? (double)known : 1;
     double best = 1e30;
     const double tolerance = 1.02; /* ours: candidates of costs this near the least are as good */
@@ -2426,8 +2426,8 @@ static void txp_measure_band(void *context, int lane) {
     }
 }
 
-/* Allocate a field: its values, all 0, in memory, the rest in scratch. Their failed tells whether
-   that went wrong. */
+/* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
+   tells whether there was no memory. */
 static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
                            txm_arena *memory, txm_arena *scratch) {
     const size_t pixels = (size_t)c->width * (size_t)c->height;
@@ -2809,7 +2809,7 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Allocate what a pass over c needs, except bands; scratch->failed tells whether that failed. */
+/* Allocate what a pass over c needs, except bands; scratch->failed: no memory. */
 static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
@@ -2924,7 +2924,7 @@ static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, 
 }
 
 /* Allocate what is given of a canvas; what is 0 here is not needed. memory->failed tells whether
-   that failed. */
+   there was no memory. */
 static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
                            int free_guide, int places, txm_arena *memory) {
     g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);

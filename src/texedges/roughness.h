@@ -296,7 +296,7 @@ static txm_status txe_measure_layer(txe_roughness *u, const texedges_set *e, int
     return TXM_OK;
 }
 
-/* ---- new roughness out of pieces ------------------------------------------------------- */
+/* ---- new roughness from pieces --------------------------------------------------------- */
 
 /* The squared distance of two runs of TXE_JOIN samples: it compares offsets and slopes. */
 static double txe_mismatch(const txe_sample *a, const txe_sample *b) {

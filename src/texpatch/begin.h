@@ -33,7 +33,7 @@ static texpatch_job *txp_job_make(const txp_setup *u, txp_source *s, int width, 
 }
 
 /* Allocate what is given of a canvas; what is 0 here is not needed. memory->failed tells whether
-   that failed. */
+   there was no memory. */
 static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int fixed,
                            int free_guide, int places, txm_arena *memory) {
     g->pixels = (uint8_t *)txm_arena_zero(memory, pixels, (size_t)s->bytes);

@@ -260,8 +260,8 @@ static void txp_measure_band(void *context, int lane) {
     }
 }
 
-/* Allocate a field: its values, all 0, in memory, the rest in scratch. Their failed tells whether
-   that went wrong. */
+/* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
+   tells whether there was no memory. */
 static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
                            txm_arena *memory, txm_arena *scratch) {
     const size_t pixels = (size_t)c->width * (size_t)c->height;

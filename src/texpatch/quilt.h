@@ -132,7 +132,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
             span[y][1] = i / 16 * 16 + 16;
         }
     }
-    /* costs are gray levels summed over known bytes, of which the first block has none */
+    /* costs are gray levels summed over known bytes; the first block has no such bytes */
     const double unit = known ? (double)known : 1;
     double best = 1e30;
     const double tolerance = 1.02; /* ours: candidates of costs this near the least are as good */
