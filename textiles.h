@@ -3829,8 +3829,8 @@ static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int
    So it costs energy, more the further from the border. */
 static int32_t txt_bias(const txt_canvas *c, int label, int p) {
     if (!c->layers[label].is_frame || c->border[p] < 3) return 0;
-    const int far = c->border[p] < 24 ? c->border[p] - 2 : 22;
-    return TXT_BIAS * far;
+    const int depth = c->border[p] < 24 ? c->border[p] - 2 : 22;
+    return TXT_BIAS * depth;
 }
 
 /* Energy of all cuts that touch the rectangle, and of the layers that its texels show. */
@@ -4720,17 +4720,17 @@ static int txt_base(const txt_build *b, int tile) {
     return tile - b->set->tiles[tile].variant;
 }
 
-/* Are two places closer than `near`? */
-static int txt_places_agree(const txt_place *a, const txt_place *b, int near) {
-    return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < near &&
-           abs(a->j - b->j) < near;
+/* Are two places closer than `reach`? */
+static int txt_places_agree(const txt_place *a, const txt_place *b, int reach) {
+    return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < reach &&
+           abs(a->j - b->j) < reach;
 }
 
 /* The cost of a place, in gray levels, for being shown by other tiles: variants of one tile must
    not show the same, and no two tiles exactly the same. */
 static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k,
                                const txt_place *place) {
-    const int near = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
+    const int reach = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
     const int first = txt_base(b, tile), begun = batch->canvas[0].tile;
     double cost = 0;
     for (int t = 0; t < begun; t++) {
@@ -4740,7 +4740,7 @@ static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k
         const txt_canvas *other = &batch->canvas[o];
         for (int q = 0; q < other->place_count && q < other->tries; q++) {
             const int variant = other->tile >= first;
-            if (!txt_places_agree(&other->places[q], place, variant ? apart : near)) continue;
+            if (!txt_places_agree(&other->places[q], place, variant ? apart : reach)) continue;
             cost += variant ? 300 : TXT_USE / (q ? 2 : 1);
         }
     }

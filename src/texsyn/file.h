@@ -183,10 +183,10 @@ static int txs_most_alike(const txs_level *l, int k) {
     for (int i = 0; i < k; i++) {
         const txs_type *o = &l->types[i];
         const int length = abs(t->dx) + abs(t->dy), other = abs(o->dx) + abs(o->dy);
-        int far = (o->band != t->band) * 200 + (o->other != t->other) * 100 +
+        int distance = (o->band != t->band) * 200 + (o->other != t->other) * 100 +
                   8 * abs(length - other) + abs(o->dx - t->dx) + abs(o->dy - t->dy);
-        if (o->kind == t->kind && far <= least) {
-            least = far;
+        if (o->kind == t->kind && distance <= least) {
+            least = distance;
             best = i;
         }
     }

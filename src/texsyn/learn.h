@@ -130,16 +130,16 @@ static void txs_list_candidates(txs_learner *a, int reach, const float *seen) {
             const float weight = seen[b] < seen[o] ? seen[b] : seen[o];
             for (int y = -reach; y <= reach; y++) {
                 for (int x = -reach; x <= reach; x++) {
-                    const int d[4] = {x, y, 0, 0}, far = x * x + y * y,
+                    const int d[4] = {x, y, 0, 0}, square = x * x + y * y,
                               half = y > 0 || (y == 0 && x > 0);
-                    if (far > reach * reach || (y == 0 && x % TXS_GRID == 0)) continue;
+                    if (square > reach * reach || (y == 0 && x % TXS_GRID == 0)) continue;
                     if (b == o && half) {
                         txs_add_candidate(a, TEXSYN_PAIR, b, b, d, weight);
                         txs_add_candidate(a, TEXSYN_VALUES, b, b, d, weight);
                     }
-                    if (b != o && far <= 9 && far)
+                    if (b != o && square <= 9 && square)
                         txs_add_candidate(a, TEXSYN_PAIR, b, o, d, weight);
-                    if (b == 0 && o && half && far <= 5)
+                    if (b == 0 && o && half && square <= 5)
                         txs_add_candidate(a, TEXSYN_PARALLEL, b, o, d, weight);
                 }
             }

@@ -52,8 +52,8 @@ static int32_t txt_cut_cost(const txt_canvas *c, int p, int q, int x, int y, int
    So it costs energy, more the further from the border. */
 static int32_t txt_bias(const txt_canvas *c, int label, int p) {
     if (!c->layers[label].is_frame || c->border[p] < 3) return 0;
-    const int far = c->border[p] < 24 ? c->border[p] - 2 : 22;
-    return TXT_BIAS * far;
+    const int depth = c->border[p] < 24 ? c->border[p] - 2 : 22;
+    return TXT_BIAS * depth;
 }
 
 /* Energy of all cuts that touch the rectangle, and of the layers that its texels show. */

@@ -99,17 +99,17 @@ static int txt_base(const txt_build *b, int tile) {
     return tile - b->set->tiles[tile].variant;
 }
 
-/* Are two places closer than `near`? */
-static int txt_places_agree(const txt_place *a, const txt_place *b, int near) {
-    return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < near &&
-           abs(a->j - b->j) < near;
+/* Are two places closer than `reach`? */
+static int txt_places_agree(const txt_place *a, const txt_place *b, int reach) {
+    return a->sheet == b->sheet && a->turn == b->turn && abs(a->i - b->i) < reach &&
+           abs(a->j - b->j) < reach;
 }
 
 /* The cost of a place, in gray levels, for being shown by other tiles: variants of one tile must
    not show the same, and no two tiles exactly the same. */
 static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k,
                                const txt_place *place) {
-    const int near = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
+    const int reach = b->set->size / 3, apart = b->set->size / 8, tile = batch->canvas[k].tile;
     const int first = txt_base(b, tile), begun = batch->canvas[0].tile;
     double cost = 0;
     for (int t = 0; t < begun; t++) {
@@ -119,7 +119,7 @@ static double txt_sharing_cost(const txt_build *b, const txt_batch *batch, int k
         const txt_canvas *other = &batch->canvas[o];
         for (int q = 0; q < other->place_count && q < other->tries; q++) {
             const int variant = other->tile >= first;
-            if (!txt_places_agree(&other->places[q], place, variant ? apart : near)) continue;
+            if (!txt_places_agree(&other->places[q], place, variant ? apart : reach)) continue;
             cost += variant ? 300 : TXT_USE / (q ? 2 : 1);
         }
     }

@@ -25,7 +25,14 @@ matrix() {
             printf '#define %s_STATIC\n' "$macro"
             cat "$tmp/whole.x"
         } >"$tmp/static.x"
-        for form in alone twice whole-twice; do
+        {
+            # as <windows.h> has them
+            printf '#define %s\n' near far 'small char' 'interface struct' 'IN' 'OUT'
+            printf '#define min(a, b) ((a) < (b) ? (a) : (b))\n'
+            printf '#define max(a, b) ((a) > (b) ? (a) : (b))\n'
+            cat "$tmp/whole.x"
+        } >"$tmp/windows.x"
+        for form in alone twice whole-twice windows; do
             check "$header $form, $1 $2" \
                 $1 -std=$2 $warn -fsyntax-only -I. -x "$3" "$tmp/$form.x"
         done
