@@ -1621,7 +1621,7 @@ static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
     }
     for (int i = 0; i < count || at >= 0; i++, at--) {
         if (at == -1 && i) *to++ = '.';
-        *to++ = i < count ? digits[i] : '0';
+        *to++ = (char)(i < count ? digits[i] : '0');
     }
     *to = 0;
     if (!plain) snprintf(to, (size_t)(text + TPC_NUMBER - to), "e%d", power);
@@ -1983,7 +1983,7 @@ static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const ch
             n += 3;
             break;
         }
-        shown[n++] = *p > ' ' && *p < 127 ? *p : '?';
+        shown[n++] = (char)(*p > ' ' && *p < 127 ? *p : '?');
     }
     shown[n] = 0;
     snprintf(line, sizeof line, "line %d: %s%s%s", r->line, shown, n ? ": " : "", fault);
@@ -2191,7 +2191,7 @@ TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
     char line[240];
     if (!name || !species) return txm_fail(env, TXM_BAD_ARGUMENT, "name or species is NULL");
     for (int i = 0; i < treepieces_preset_count(); i++) {
-        if (strcmp(name, tpc_presets[i].name)) continue;
+        if (strcmp(name, tpc_presets[i].name) != 0) continue;
         const char *text = tpc_presets[i].text;
         return treepieces_species_parse(text, strlen(text), env, species);
     }
@@ -2370,7 +2370,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
         if ((dice -= o->pair) < 0) return TREEPIECES_PLANAR;
     }
     if ((dice -= o->fork) < 0) return TREEPIECES_Y;
-    if ((dice -= o->triple) < 0) return TREEPIECES_SPATIAL;
+    if (dice < o->triple) return TREEPIECES_SPATIAL;
     return TREEPIECES_I;
 }
 
@@ -2828,8 +2828,9 @@ static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
     while (side < 46340 && side * side < p->desc->tree_count) side++;
     memset(&place, 0, sizeof place);
     if (p->desc->tree_count > 1) {
-        const float x = (float)(i % side) + 0.5f - 0.5f * (float)side;
-        const float z = (float)(i / side) + 0.5f - 0.5f * (float)side;
+        const int column = i % side, row = i / side;
+        const float x = (float)column + 0.5f - 0.5f * (float)side;
+        const float z = (float)row + 0.5f - 0.5f * (float)side;
         place.position[0] = p->spacing * (x + 0.6f * (txm_rng_float(&rng) - 0.5f));
         place.position[2] = p->spacing * (z + 0.6f * (txm_rng_float(&rng) - 0.5f));
         place.scale = 0.8f + 0.4f * txm_rng_float(&rng);
@@ -3513,7 +3514,8 @@ TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float
 static float tpc_fraction(int i, int n) {
     if (2 * i > n) return 1 - tpc_fraction(n - i, n);
     if (2 * i == n) return 0.5f;
-    return (float)(i * ((65536 * 2 + n) / (2 * n))) / 65536.0f;
+    const int step = (65536 * 2 + n) / (2 * n);
+    return (float)(i * step) / 65536.0f;
 }
 
 /* The vertices of a pattern: first those of the sides, side k from corner k up to the one before
@@ -4233,8 +4235,9 @@ static void tpc_draw_row(void *context, int index) {
         float sum[3] = {0, 0, 0}, color[3];
         int covered = 0;
         for (int k = 0; k < TPC_SAMPLES * TPC_SAMPLES; k++) {
-            const float at_x = ((float)x + ((float)(k % TPC_SAMPLES) + 0.5f) * step) / width;
-            const float at_y = ((float)y + ((float)(k / TPC_SAMPLES) + 0.5f) * step) / height;
+            const int column = k % TPC_SAMPLES, row = k / TPC_SAMPLES;
+            const float at_x = ((float)x + ((float)column + 0.5f) * step) / width;
+            const float at_y = ((float)y + ((float)row + 0.5f) * step) / height;
             if (!tpc_spray_at(s, listed, count, at_x, at_y, color)) continue;
             for (int c = 0; c < 3; c++) sum[c] += color[c];
             covered++;
@@ -4686,7 +4689,7 @@ static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int e
 static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
                          const float weights[4]) {
     treepieces_mesh *m = b->out;
-    uint32_t bits[3];
+    uint32_t bits[3], there[3];
     for (int k = 0; k < 3; k++) {
         const float x = position[k] + 0.0f; /* -0 is 0 */
         memcpy(&bits[k], &x, sizeof x);
@@ -4697,8 +4700,8 @@ static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float nor
     for (;; slot++) {
         const uint32_t found = b->table[slot & b->table_mask];
         if (!found) break;
-        if (memcmp(m->positions + 3 * (size_t)(found - 1), bits, sizeof bits) == 0)
-            return found - 1;
+        memcpy(there, m->positions + 3 * (size_t)(found - 1), sizeof there);
+        if (memcmp(there, bits, sizeof bits) == 0) return found - 1;
     }
     const size_t i = m->vertex_count++;
     b->table[slot & b->table_mask] = (uint32_t)i + 1;

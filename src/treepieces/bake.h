@@ -92,7 +92,7 @@ static int tpc_quad_levels(const tpc_baking *b, const float positions[12], int e
 static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float normal[3],
                          const float weights[4]) {
     treepieces_mesh *m = b->out;
-    uint32_t bits[3];
+    uint32_t bits[3], there[3];
     for (int k = 0; k < 3; k++) {
         const float x = position[k] + 0.0f; /* -0 is 0 */
         memcpy(&bits[k], &x, sizeof x);
@@ -103,8 +103,8 @@ static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float nor
     for (;; slot++) {
         const uint32_t found = b->table[slot & b->table_mask];
         if (!found) break;
-        if (memcmp(m->positions + 3 * (size_t)(found - 1), bits, sizeof bits) == 0)
-            return found - 1;
+        memcpy(there, m->positions + 3 * (size_t)(found - 1), sizeof there);
+        if (memcmp(there, bits, sizeof bits) == 0) return found - 1;
     }
     const size_t i = m->vertex_count++;
     b->table[slot & b->table_mask] = (uint32_t)i + 1;

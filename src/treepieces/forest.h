@@ -45,8 +45,9 @@ static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
     while (side < 46340 && side * side < p->desc->tree_count) side++;
     memset(&place, 0, sizeof place);
     if (p->desc->tree_count > 1) {
-        const float x = (float)(i % side) + 0.5f - 0.5f * (float)side;
-        const float z = (float)(i / side) + 0.5f - 0.5f * (float)side;
+        const int column = i % side, row = i / side;
+        const float x = (float)column + 0.5f - 0.5f * (float)side;
+        const float z = (float)row + 0.5f - 0.5f * (float)side;
         place.position[0] = p->spacing * (x + 0.6f * (txm_rng_float(&rng) - 0.5f));
         place.position[2] = p->spacing * (z + 0.6f * (txm_rng_float(&rng) - 0.5f));
         place.scale = 0.8f + 0.4f * txm_rng_float(&rng);

@@ -171,7 +171,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
         if ((dice -= o->pair) < 0) return TREEPIECES_PLANAR;
     }
     if ((dice -= o->fork) < 0) return TREEPIECES_Y;
-    if ((dice -= o->triple) < 0) return TREEPIECES_SPATIAL;
+    if (dice < o->triple) return TREEPIECES_SPATIAL;
     return TREEPIECES_I;
 }
 

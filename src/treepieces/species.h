@@ -188,7 +188,7 @@ static void tpc_write_rounded(float x, int count, char text[TPC_NUMBER]) {
     }
     for (int i = 0; i < count || at >= 0; i++, at--) {
         if (at == -1 && i) *to++ = '.';
-        *to++ = i < count ? digits[i] : '0';
+        *to++ = (char)(i < count ? digits[i] : '0');
     }
     *to = 0;
     if (!plain) snprintf(to, (size_t)(text + TPC_NUMBER - to), "e%d", power);

@@ -165,8 +165,9 @@ static void tpc_draw_row(void *context, int index) {
         float sum[3] = {0, 0, 0}, color[3];
         int covered = 0;
         for (int k = 0; k < TPC_SAMPLES * TPC_SAMPLES; k++) {
-            const float at_x = ((float)x + ((float)(k % TPC_SAMPLES) + 0.5f) * step) / width;
-            const float at_y = ((float)y + ((float)(k / TPC_SAMPLES) + 0.5f) * step) / height;
+            const int column = k % TPC_SAMPLES, row = k / TPC_SAMPLES;
+            const float at_x = ((float)x + ((float)column + 0.5f) * step) / width;
+            const float at_y = ((float)y + ((float)row + 0.5f) * step) / height;
             if (!tpc_spray_at(s, listed, count, at_x, at_y, color)) continue;
             for (int c = 0; c < 3; c++) sum[c] += color[c];
             covered++;

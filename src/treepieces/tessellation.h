@@ -38,7 +38,8 @@ TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float
 static float tpc_fraction(int i, int n) {
     if (2 * i > n) return 1 - tpc_fraction(n - i, n);
     if (2 * i == n) return 0.5f;
-    return (float)(i * ((65536 * 2 + n) / (2 * n))) / 65536.0f;
+    const int step = (65536 * 2 + n) / (2 * n);
+    return (float)(i * step) / 65536.0f;
 }
 
 /* The vertices of a pattern: first those of the sides, side k from corner k up to the one before

@@ -47,7 +47,7 @@ static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const ch
             n += 3;
             break;
         }
-        shown[n++] = *p > ' ' && *p < 127 ? *p : '?';
+        shown[n++] = (char)(*p > ' ' && *p < 127 ? *p : '?');
     }
     shown[n] = 0;
     snprintf(line, sizeof line, "line %d: %s%s%s", r->line, shown, n ? ": " : "", fault);
@@ -255,7 +255,7 @@ TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
     char line[240];
     if (!name || !species) return txm_fail(env, TXM_BAD_ARGUMENT, "name or species is NULL");
     for (int i = 0; i < treepieces_preset_count(); i++) {
-        if (strcmp(name, tpc_presets[i].name)) continue;
+        if (strcmp(name, tpc_presets[i].name) != 0) continue;
         const char *text = tpc_presets[i].text;
         return treepieces_species_parse(text, strlen(text), env, species);
     }
