@@ -1,4 +1,4 @@
-/* gridkit.h - what the tests of laying tiles share: sets of gray tiles, checks of a tiling, calls that fail
+/* gridkit.h - what the tests of tilings share: sets of gray tiles, checks, calls under faults
    SPDX-License-Identifier: MIT OR Unlicense
 
    Includes cmocka.h, textiles.h and testkit.h. What the tiles show plays no part here: all sets are
@@ -183,7 +183,7 @@ static inline void solve(const textiles_set *set, int w, int h, int periodic, ui
 
 /* ---- failing memory, cancelling --------------------------------------------------------- */
 
-/* A call with its outputs: number what of a list. */
+/* A call with its outputs; what: 0 solve, 1 triangles, 2 quads. */
 typedef struct call {
     int what;
     textiles_set *set;
@@ -194,7 +194,7 @@ typedef struct call {
     int good_known;
 } call;
 
-/* Do it: with what the outputs were if it fails, with the same result each time if not. */
+/* Make the call: if it fails, the outputs must be untouched, else the same each time. */
 static inline txm_status run(void *context, txm_env *env) {
     call *c = (call *)context;
     txm_status status;
@@ -217,7 +217,7 @@ static inline txm_status run(void *context, txm_env *env) {
     return status;
 }
 
-static inline void check_misfortune(call *c) {
+static inline void check_faults(call *c) {
     c->good_known = 0;
     assert_int_equal(run(c, NULL), TXM_OK);
     memcpy(c->good, c->out, sizeof c->good);

@@ -8,7 +8,7 @@
 /* ---- checks that every set must pass -------------------------------------------------------- */
 
 /* Every texel has a source inside its exemplar. sizes: width and height of each. */
-static inline void check_sources(const book *b, const int (*sizes)[2]) {
+static inline void check_sources(const readback *b, const int (*sizes)[2]) {
     for (int t = 0; t < b->count; t++) {
         for (int y = 0; y < b->side; y++) {
             for (int x = 0; x < b->side; x++) {
@@ -29,7 +29,7 @@ static inline void check_sources(const book *b, const int (*sizes)[2]) {
 }
 
 /* The first two rows at a side are the same in all tiles with its colour. */
-static inline void check_square_borders(const book *b) {
+static inline void check_square_borders(const readback *b) {
     for (int k = 0; k < 4; k++) {
         for (int t = 0; t < b->count; t++) {
             const int first = tile_with(b, k, side_key(b, t, k));
@@ -47,8 +47,8 @@ static inline void check_square_borders(const book *b) {
     }
 }
 
-/* The exemplar goes on across the joints and along them, but for a place per cut and row. */
-static inline void check_square_joints(const book *b, int segments) {
+/* The exemplar continues across the joints and along them, except once per cut and row. */
+static inline void check_square_joints(const readback *b, int segments) {
     const int n = b->size, zone = n / 4 < 12 ? n / 4 : 12;
     int joints = 0;
     for (int axis = 0; axis < 2; axis++) { /* 0: south over north, 1: east beside west */
@@ -80,7 +80,7 @@ static inline void check_square_joints(const book *b, int segments) {
 }
 
 /* Around a vertex four tiles show one piece of exemplar, always the same for its colour. */
-static inline void check_square_corners(const book *b) {
+static inline void check_square_corners(const readback *b) {
     const int n = b->size;
     for (int color = 0; color < b->colors; color++) {
         size_t vertex = (size_t)-1;
@@ -103,7 +103,7 @@ static inline void check_square_corners(const book *b) {
 }
 
 /* Edges of different colours show different places. */
-static inline void check_edges_differ(const book *b) {
+static inline void check_edges_differ(const readback *b) {
     const int triangle = b->kind == TEXTILES_TRIANGLE;
     for (int k = 0; k < (triangle ? 3 : 4); k++) {
         for (int one = 0; one < KEYS; one++) {
@@ -122,7 +122,7 @@ static inline void check_edges_differ(const book *b) {
 
 /* Edge texels are the same whichever side and tile they are seen from, vertices everywhere; the rows
    beside an edge are the same in all tiles that see it from the same side. */
-static inline void check_triangle_borders(const book *b) {
+static inline void check_triangle_borders(const readback *b) {
     const int n = b->size;
     int first[TEXTILES_MAX_COLORS][2][2]; /* color, direction -> tile, side */
     memset(first, -1, sizeof first);
@@ -159,7 +159,7 @@ static inline void check_triangle_borders(const book *b) {
 }
 
 /* The rows on both sides of an edge lie in the exemplar on both sides of what the edge shows. */
-static inline void check_triangle_joints(const book *b, int segments) {
+static inline void check_triangle_joints(const readback *b, int segments) {
     const int n = b->size;
     int joints = 0;
     for (int color = 0; color < b->colors; color++) {
@@ -200,7 +200,7 @@ static inline void check_triangle_joints(const book *b, int segments) {
     assert_true(joints > 0);
 }
 
-static inline void check_set(const book *b, int segments) {
+static inline void check_set(const readback *b, int segments) {
     if (b->kind == TEXTILES_TRIANGLE) {
         check_triangle_borders(b);
         check_triangle_joints(b, segments);
@@ -212,13 +212,13 @@ static inline void check_set(const book *b, int segments) {
 }
 
 /* Is p's pixel of a map that of the exemplar at its source? Squares. */
-static inline int shows_source(const book *b, const textiles_exemplar *exemplars, int m, size_t p) {
+static inline int shows_source(const readback *b, const textiles_exemplar *exemplars, int m, size_t p) {
     const txm_image *im = &exemplars[b->sheet[p]].maps[m];
     const char *row = (const char *)txm_image_row_const(im, (int)b->from[p][1]);
     return memcmp(pixel(b, m, p), row + (size_t)b->from[p][0] * b->texel[m], b->texel[m]) == 0;
 }
 
-static inline void check_pixels(const book *b, const textiles_exemplar *exemplars) {
+static inline void check_pixels(const readback *b, const textiles_exemplar *exemplars) {
     for (int m = 0; m < b->maps; m++) {
         for (int t = 0; t < b->count; t++) {
             for (int i = 0; i < b->side * b->side; i++) {

@@ -1,4 +1,4 @@
-/* tilekit.h - what the tests of tile sets share: exemplars, sets made of them, sets read out
+/* tilekit.h - what the tests of tile sets share: exemplars, sets made of them, sets read back
    SPDX-License-Identifier: MIT OR Unlicense
 
    Includes cmocka.h, textiles.h and testkit.h. Most tests look at a few sets that are made once, in
@@ -82,7 +82,7 @@ typedef int drawing(int x, int y, int c);
 static drawing *const drawings[] = {draw_blobs, draw_cells, draw_stripes};
 enum { BLOBS, CELLS, STRIPES };
 
-/* U8 picture of a drawing, from that place of it on */
+/* U8 picture of a drawing, shifted */
 static inline txm_image draw(int which, int width, int height, int channels, int shift) {
     const txm_image im = new_image(width, height, channels, TXM_U8);
     uint8_t *to = (uint8_t *)im.pixels;
@@ -146,8 +146,8 @@ static inline textiles_set *make(const textiles_desc *desc) {
     return make_with(desc, tk_parallel_threads);
 }
 
-/* A set read out: all pixels and where they come from. */
-typedef struct book {
+/* A set read back: all pixels and where they come from. */
+typedef struct readback {
     const textiles_set *set;
     textiles_kind kind;
     int size, side, count, colors, variants, maps;
@@ -158,18 +158,18 @@ typedef struct book {
     textiles_tile *tiles;
     signed char *sheet; /* the exemplar, or -1 */
     float (*from)[2];
-} book;
+} readback;
 
-static inline int is_inside(const book *b, int x, int y) {
+static inline int is_inside(const readback *b, int x, int y) {
     return b->kind != TEXTILES_TRIANGLE || x + y <= b->size;
 }
 
-static inline size_t place_of(const book *b, int t, int x, int y) {
+static inline size_t place_of(const readback *b, int t, int x, int y) {
     return ((size_t)t * (size_t)b->side + (size_t)y) * (size_t)b->side + (size_t)x;
 }
 
-static inline book open_book(const textiles_set *set, int types) {
-    book b;
+static inline readback read_back(const textiles_set *set, int types) {
+    readback b;
     memset(&b, 0, sizeof b);
     b.set = set;
     b.kind = textiles_kind_of(set);
@@ -212,43 +212,43 @@ static inline book open_book(const textiles_set *set, int types) {
     return b;
 }
 
-static inline void close_book(book *b) {
+static inline void free_readback(readback *b) {
     for (int m = 0; m < b->maps; m++) free(b->bytes[m]);
     free(b->tiles);
     free(b->sheet);
     free(b->from);
 }
 
-static const uint8_t *pixel(const book *b, int m, size_t place) {
+static const uint8_t *pixel(const readback *b, int m, size_t place) {
     return b->bytes[m] + place * b->texel[m];
 }
 
-static inline double sample_of(const book *b, int m, size_t place, int c) {
+static inline double sample_of(const readback *b, int m, size_t place, int c) {
     const void *p = pixel(b, m, place);
     if (b->types >> m & 1) return (double)((const float *)p)[c];
     if (b->types >> (m + 8) & 1) return ((const uint16_t *)p)[c];
     return ((const uint8_t *)p)[c];
 }
 
-static inline int same_source(const book *b, size_t p, size_t q) {
+static inline int same_source(const readback *b, size_t p, size_t q) {
     return b->sheet[p] == b->sheet[q] && memcmp(b->from[p], b->from[q], sizeof b->from[p]) == 0;
 }
 
-static inline int same_bytes(const book *b, size_t p, size_t q) {
+static inline int same_bytes(const readback *b, size_t p, size_t q) {
     for (int m = 0; m < b->maps; m++) {
         if (memcmp(pixel(b, m, p), pixel(b, m, q), b->texel[m]) != 0) return 0;
     }
     return 1;
 }
 
-/* is q's source the exemplar's pixel (dx, dy) from p's? */
-static inline int is_next(const book *b, size_t p, size_t q, int dx, int dy) {
+/* Does q show the pixel of the exemplar at (dx, dy) from the one that p shows? */
+static inline int is_next(const readback *b, size_t p, size_t q, int dx, int dy) {
     return b->sheet[p] >= 0 && b->sheet[p] == b->sheet[q] &&
            b->from[q][0] == b->from[p][0] + (float)dx && b->from[q][1] == b->from[p][1] + (float)dy;
 }
 
 /* One number for a set: pixels and, of a made one, sources. */
-static inline uint64_t hash_of(const book *b) {
+static inline uint64_t hash_of(const readback *b) {
     uint64_t h = 0;
     for (int t = 0; t < b->count; t++) {
         h = tk_hash(h, b->tiles[t].edges, sizeof b->tiles[t].edges);
@@ -266,15 +266,15 @@ static inline uint64_t hash_of(const book *b) {
 }
 
 static inline uint64_t hash_and_free(textiles_set *set, int types) {
-    book b = open_book(set, types);
+    readback b = read_back(set, types);
     const uint64_t h = hash_of(&b);
-    close_book(&b);
+    free_readback(&b);
     textiles_set_free(set);
     return h;
 }
 
 /* texel number a of row r of side k; rows count from the joint (triangles: 0 is the edge itself) */
-static inline size_t side_place(const book *b, int t, int k, int a, int r) {
+static inline size_t side_place(const readback *b, int t, int k, int a, int r) {
     const int n = b->size;
     int x, y;
     if (b->kind == TEXTILES_TRIANGLE) {
@@ -288,14 +288,14 @@ static inline size_t side_place(const book *b, int t, int k, int a, int r) {
 }
 
 /* what a side of a square matches by: its colour, of corner tiles those of both its ends */
-static inline int side_key(const book *b, int t, int k) {
+static inline int side_key(const readback *b, int t, int k) {
     static const int ends[4][2] = {{0, 1}, {1, 2}, {3, 2}, {0, 3}};
     const int *e = b->tiles[t].edges;
     return b->kind == TEXTILES_CORNER ? e[ends[k][0]] * TEXTILES_MAX_COLORS + e[ends[k][1]] : e[k];
 }
 
 /* first tile whose side k matches by key; -1: none */
-static inline int tile_with(const book *b, int k, int key) {
+static inline int tile_with(const readback *b, int k, int key) {
     for (int t = 0; t < b->count; t++) {
         if (side_key(b, t, k) == key) return t;
     }
@@ -314,7 +314,7 @@ static const int common_classes[][4] = {
 static txm_image common_maps[3];
 static textiles_exemplar common_exemplar;
 static textiles_set *common_sets[KINDS][2]; /* unrepaired, repaired */
-static book common[KINDS][2];
+static readback common[KINDS][2];
 
 static inline textiles_desc common_desc(int kind) {
     textiles_desc d = desc_of((textiles_kind)kind, &common_exemplar, 1, SIZE);
@@ -338,7 +338,7 @@ static inline int make_common(void **state) {
         for (int r = 0; r < 2; r++) {
             d.repair = r ? TEXTILES_REPAIR_DEFAULT : TEXTILES_REPAIR_NONE;
             common_sets[k][r] = make(&d);
-            common[k][r] = open_book(common_sets[k][r], 4);
+            common[k][r] = read_back(common_sets[k][r], 4);
         }
     }
     return 0;
@@ -348,7 +348,7 @@ static inline int free_common(void **state) {
     (void)state;
     for (int k = 0; k < KINDS; k++) {
         for (int r = 0; r < 2; r++) {
-            close_book(&common[k][r]);
+            free_readback(&common[k][r]);
             textiles_set_free(common_sets[k][r]);
         }
     }
@@ -386,7 +386,7 @@ static inline void cut_gray(int tile, int side, const txm_image *from, txm_image
 
 /* ---- measuring ------------------------------------------------------------------------------ */
 
-static inline double step_of(const book *b, int m, size_t p, size_t q) {
+static inline double step_of(const readback *b, int m, size_t p, size_t q) {
     double sum = 0;
     for (int c = 0; c < b->channels[m]; c++)
         sum += fabs(sample_of(b, m, p, c) - sample_of(b, m, q, c));
@@ -403,7 +403,7 @@ static inline double mean_of(tally t) {
 }
 
 /* rows from side k of a triangle: 0 on it */
-static inline int row_from(const book *b, int k, int x, int y) {
+static inline int row_from(const readback *b, int k, int x, int y) {
     return k == 0 ? x : k == 1 ? b->size - x - y : y;
 }
 

@@ -156,7 +156,7 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
 typedef void painter(const kind_of *k, const textiles_tile *tile, int index, int size, int x, int y,
                      uint8_t rgba[4]);
 
-/* Smooth pictures, another one for each tile. */
+/* Smooth pictures, a different one for each tile. */
 static void paint_waves(const kind_of *k, const textiles_tile *tile, int index, int size, int x, int y,
                         uint8_t rgba[4]) {
     (void)k;
@@ -337,7 +337,7 @@ static void render(GLuint program, const scene *s, const view *v, float *rgba) {
     for (int i = 0; i < VIEW * VIEW * 4; i++) rgba[i] *= 255.0f;
 }
 
-/* the plane's place (x, y) by textiles_draw_plane */
+/* position (x, y) of the plane as textiles_draw_plane draws it */
 static void probe(const scene *s, double x, double y, uint8_t rgba[4]) {
     const double step = 1.0 / 4096;
     txm_env env = {0};
@@ -356,7 +356,7 @@ static void probe(const scene *s, double x, double y, uint8_t rgba[4]) {
 static double compare(GLuint program, const scene *s, const view *v, int upright, float *rgba) {
     static uint8_t want[VIEW * VIEW * 4];
     const int n = s->layout.size, triangle = s->plane.kind == TEXTILES_TRIANGLE;
-    /* what the origin amounts to in pixels */
+    /* the origin in pixels */
     const double ox = n * (v->origin[0] + (triangle ? v->origin[1] / 2.0 : 0));
     const double oy = n * v->origin[1] * (triangle ? sqrt(3.0) / 2 : 1);
     if (upright) {
@@ -422,7 +422,7 @@ static void test_lookups(GLuint program, float *rgba) {
 
 /* ---- mip-maps ------------------------------------------------------------------------- */
 
-/* Pixels that show a colour which is nowhere near: *foreign, of *judged that lie in one colour and of
+/* Pixels that show a colour that does not occur nearby: *foreign, of *judged that lie in one colour and of
    which *joints have a joint in reach. */
 static void judge(GLuint program, const scene *s, int level, int levels, float *rgba, int *judged,
                   int *joints, int *foreign) {
@@ -487,7 +487,7 @@ static void test_mipmaps(GLuint program, float *rgba) {
     static const char *const packings[] = {"packed", "torus", "slices"};
     for (int i = 0; i < KINDS; i++) {
         const kind_of *k = &kinds[i];
-        if (k->variants > 1) continue; /* painted alike */
+        if (k->variants > 1) continue; /* the same picture */
         for (int p = 0; p < 3; p++) {
             if (p == TEXTILES_TORUS && k->kind == TEXTILES_TRIANGLE) continue;
             for (int levels = 1; levels <= 3; levels += 2) {

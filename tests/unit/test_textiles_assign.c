@@ -330,7 +330,7 @@ static void test_mesh_refuses(void **state) {
     textiles_set_free(set);
 }
 
-static void test_mesh_misfortune(void **state) {
+static void test_mesh_faults(void **state) {
     (void)state;
     static mesh m;
     static call c;
@@ -341,7 +341,7 @@ static void test_mesh_misfortune(void **state) {
     c.faces = m.faces;
     c.vertices = m.vertices;
     fill(c.in, 4096, FILL);
-    check_misfortune(&c);
+    check_faults(&c);
     textiles_set_free(c.set);
 }
 
@@ -521,7 +521,7 @@ static void test_quads_refuse(void **state) {
     textiles_set_free(frame);
 }
 
-static void test_quads_misfortune(void **state) {
+static void test_quads_faults(void **state) {
     (void)state;
     static uint32_t index[4 * 400];
     static int edges[4 * 400];
@@ -532,9 +532,9 @@ static void test_quads_misfortune(void **state) {
     c.faces = c.vertices = 400;
     fill(c.in, 4096, FILL);
     c.set = make_set(TEXTILES_WANG, 2, 1, 0);
-    check_misfortune(&c);
+    check_faults(&c);
     c.edges = edges;
-    check_misfortune(&c);
+    check_faults(&c);
     textiles_set_free(c.set);
 }
 
@@ -544,11 +544,11 @@ int main(void) {
         cmocka_unit_test(test_mesh_is_deterministic),
         cmocka_unit_test(test_mesh_sparse_numbers),
         cmocka_unit_test(test_mesh_refuses),
-        cmocka_unit_test(test_mesh_misfortune),
+        cmocka_unit_test(test_mesh_faults),
         cmocka_unit_test(test_quads),
         cmocka_unit_test(test_quads_with_edges),
         cmocka_unit_test(test_quads_refuse),
-        cmocka_unit_test(test_quads_misfortune),
+        cmocka_unit_test(test_quads_faults),
     };
     return cmocka_run_group_tests_name("textiles_assign", tests, NULL, NULL);
 }

@@ -19,7 +19,7 @@ static void test_sixteen_bits(void **state) {
         if (k == TEXTILES_TRIANGLE) continue;
         for (int repair = 1; repair <= 2; repair++) {
             textiles_joints joints[2];
-            book b[2];
+            readback b[2];
             textiles_set *sets[2];
             for (int i = 0; i < 2; i++) {
                 const textiles_exemplar exemplar = {&maps[i], 1};
@@ -27,7 +27,7 @@ static void test_sixteen_bits(void **state) {
                 d.repair = (textiles_repair)repair;
                 d.reduced = k == TEXTILES_WANG;
                 sets[i] = make(&d);
-                b[i] = open_book(sets[i], i << 8);
+                b[i] = read_back(sets[i], i << 8);
                 joints[i] = measure(sets[i], 0);
             }
             for (size_t p = 0; p < place_of(b, b->count, 0, 0); p++) {
@@ -40,7 +40,7 @@ static void test_sixteen_bits(void **state) {
             assert_int_equal(joints[0].pairs, joints[1].pairs);
             assert_near(joints[0].mean, joints[1].mean, repair == TEXTILES_REPAIR_NONE ? 1e-9 : 0.01);
             for (int i = 0; i < 2; i++) {
-                close_book(&b[i]);
+                free_readback(&b[i]);
                 textiles_set_free(sets[i]);
             }
         }
@@ -69,7 +69,7 @@ static void test_several_exemplars(void **state) {
             if (told) d.edge_exemplars = wishes;
             if (told == (k == TEXTILES_CORNER)) continue; /* of these refused, see test_bad_kinds */
             textiles_set *set = make(&d);
-            book b = open_book(set, 0);
+            readback b = read_back(set, 0);
             int used[3] = {0, 0, 0};
             check_sources(&b, sizes);
             check_set(&b, 1);
@@ -88,7 +88,7 @@ static void test_several_exemplars(void **state) {
             }
             if (!used[0] || !used[1] || !used[2])
                 fail_msg("kind %d: %d, %d, %d pixels of the exemplars", k, used[0], used[1], used[2]);
-            close_book(&b);
+            free_readback(&b);
             textiles_set_free(set);
         }
     }
@@ -106,13 +106,13 @@ static void try_size(textiles_kind kind, int width, int height, int channels, in
     d.reduced = kind == TEXTILES_TRIANGLE || kind == TEXTILES_WANG;
     d.repair = TEXTILES_REPAIR_NONE;
     textiles_set *set = make(&d);
-    book b = open_book(set, 0);
+    readback b = read_back(set, 0);
     assert_int_equal(b.size, size ? size : 128);
     check_sources(&b, sizes);
     check_set(&b, segments);
     if (kind != TEXTILES_TRIANGLE) check_pixels(&b, &exemplar);
     if (getenv("TEXTILES_TEST_SHOW")) measure(set, 0);
-    close_book(&b);
+    free_readback(&b);
     textiles_set_free(set);
     free(map.pixels);
 }
@@ -159,10 +159,10 @@ static void test_tiny_exemplars(void **state) {
             assert_int_equal(status, TXM_TOO_SMALL);
             assert_true(!set && env.message[0]);
         } else {
-            book b = open_book(set, 0);
+            readback b = read_back(set, 0);
             check_sources(&b, sizes);
             check_pixels(&b, &exemplar);
-            close_book(&b);
+            free_readback(&b);
             textiles_set_free(set);
         }
         assert_int_equal(tk_leaks(&memory), 0);
@@ -186,7 +186,7 @@ static void test_constant(void **state) {
             textiles_desc d = desc_of((textiles_kind)k, &exemplar, 1, 32);
             d.reduced = k == TEXTILES_WANG || k == TEXTILES_TRIANGLE;
             textiles_set *set = make(&d);
-            book b = open_book(set, i);
+            readback b = read_back(set, i);
             for (int t = 0; t < b.count; t++) {
                 for (int p = 0; p < b.side * b.side; p++) {
                     if (!is_inside(&b, p % b.side, p / b.side)) continue;
@@ -198,7 +198,7 @@ static void test_constant(void **state) {
                 const textiles_joints j = measure(set, 0);
                 assert_true(j.mean == 1 && j.worst == 1 && j.least == 1 && j.overall == 1);
             }
-            close_book(&b);
+            free_readback(&b);
             textiles_set_free(set);
         }
     }

@@ -122,7 +122,7 @@ static void test_scanline_refuses(void **state) {
 static void test_solve(void **state) {
     (void)state;
     enum { MOST_CELLS = 40 * 40 };
-    static int tiles[MOST_CELLS], wishes[MOST_CELLS], again[MOST_CELLS];
+    static int tiles[MOST_CELLS], given[MOST_CELLS], again[MOST_CELLS];
     static const int sizes[][2] = {{1, 1}, {1, 9}, {9, 1}, {2, 2}, {3, 2}, {5, 4}, {24, 19}, {40, 40}};
     for (int i = 0; i < SOLVE_CASES; i++) {
         textiles_set *set = solve_case(i);
@@ -146,15 +146,15 @@ static void test_solve(void **state) {
                 solve(set, w, h, periodic, 99, again);
                 assert_true(differences(tiles, again, n) > n / 8);
             }
-            /* some of it as wishes, from one in sixteen to all */
+            /* some of it given, from one cell in sixteen to all */
             for (uint32_t keep = 1; keep <= 16; keep *= 2) {
                 for (int t = 0; t < n; t++)
-                    wishes[t] = txm_rng_below(&rng, 16) < keep ? tiles[t] : -1;
-                memcpy(again, wishes, sizeof again);
+                    given[t] = txm_rng_below(&rng, 16) < keep ? tiles[t] : -1;
+                memcpy(again, given, sizeof again);
                 solve(set, w, h, periodic, (uint64_t)k + 100, again);
                 check_joins(set, again, w, h, periodic);
                 for (int t = 0; t < n; t++)
-                    if (wishes[t] >= 0) assert_int_equal(again[t], wishes[t]);
+                    if (given[t] >= 0) assert_int_equal(again[t], given[t]);
             }
         }
         textiles_set_free(set);
@@ -162,23 +162,23 @@ static void test_solve(void **state) {
 }
 
 /* Is there a tiling? Tries everything, cell by cell from number `at`. */
-static int has_tiling(const textiles_set *set, int *tiles, const int *wishes, int at, int w, int h,
+static int has_tiling(const textiles_set *set, int *tiles, const int *given, int at, int w, int h,
                       int periodic) {
     const int x = at % w, y = at / w, v = textiles_variants(set);
     if (at == w * h) return 1;
     for (int t = 0; t < textiles_count(set); t += v) {
-        if (wishes[at] >= 0 && t != wishes[at] / v * v) continue;
+        if (given[at] >= 0 && t != given[at] / v * v) continue;
         tiles[at] = t;
         if (x && !joins(set, tiles[at - 1], t, 0)) continue;
         if (y && !joins(set, tiles[at - w], t, 1)) continue;
         if (periodic && x == w - 1 && !joins(set, t, tiles[at - x], 0)) continue;
         if (periodic && y == h - 1 && !joins(set, t, tiles[x], 1)) continue;
-        if (has_tiling(set, tiles, wishes, at + 1, w, h, periodic)) return 1;
+        if (has_tiling(set, tiles, given, at + 1, w, h, periodic)) return 1;
     }
     return 0;
 }
 
-/* Small grids, wishes at random: solved if and only if there is a tiling. */
+/* Small grids with random given tiles: solved if and only if there is a tiling. */
 static void test_solve_is_exact(void **state) {
     (void)state;
     static const int which[] = {4, 5, 6, 7, 13, SOLVE_CASES - 1};
@@ -188,22 +188,22 @@ static void test_solve_is_exact(void **state) {
         txm_rng rng = txm_rng_make(6, (uint64_t)i);
         for (int k = 0; k < 300; k++) {
             const int w = txm_rng_range(&rng, 1, 3), h = txm_rng_range(&rng, 1, 3), periodic = k % 2;
-            int wishes[9], tiles[9], scratch[9];
+            int given[9], tiles[9], scratch[9];
             for (int t = 0; t < w * h; t++) {
-                const int wish = (int)txm_rng_below(&rng, (uint32_t)textiles_count(set));
-                wishes[t] = txm_rng_below(&rng, 4) ? -1 : wish;
+                const int index = (int)txm_rng_below(&rng, (uint32_t)textiles_count(set));
+                given[t] = txm_rng_below(&rng, 4) ? -1 : index;
             }
-            memcpy(tiles, wishes, sizeof tiles);
+            memcpy(tiles, given, sizeof tiles);
             const txm_status status = textiles_solve(set, w, h, periodic, (uint64_t)k, NULL, tiles);
-            const int expected = has_tiling(set, scratch, wishes, 0, w, h, periodic);
+            const int expected = has_tiling(set, scratch, given, 0, w, h, periodic);
             if ((status == TXM_OK) != expected) fail_msg("case %d, %d: %d", which[i], k, status);
             if (expected) {
                 check_joins(set, tiles, w, h, periodic);
                 for (int t = 0; t < w * h; t++)
-                    if (wishes[t] >= 0) assert_int_equal(tiles[t], wishes[t]);
+                    if (given[t] >= 0) assert_int_equal(tiles[t], given[t]);
                 solved++;
             } else {
-                assert_memory_equal(tiles, wishes, sizeof(int) * (size_t)(w * h));
+                assert_memory_equal(tiles, given, sizeof(int) * (size_t)(w * h));
                 assert_true(status == TXM_BAD_ARGUMENT || status == TXM_BAD_DATA);
                 refused++;
             }
@@ -229,24 +229,24 @@ static void test_solve_runs(void **state) {
     }
 }
 
-static void refuses_solve(const textiles_set *set, int w, int h, int periodic, const int *wishes,
+static void refuses_solve(const textiles_set *set, int w, int h, int periodic, const int *given,
                           txm_status expected, const char *words) {
     int tiles[128];
     tk_memory memory = {0};
     txm_env env = tk_env(&memory, NULL);
     const size_t bytes = sizeof(int) * (size_t)(w > 0 && h > 0 && w * h <= 128 ? w * h : 1);
-    memcpy(tiles, wishes, bytes);
+    memcpy(tiles, given, bytes);
     const txm_status status = textiles_solve(set, w, h, periodic, 1, &env, tiles);
     if (status != expected) fail_msg("%s: status %d, %s", words, status, env.message);
     if (!strstr(env.message, words)) fail_msg("'%s' does not say '%s'", env.message, words);
-    assert_memory_equal(tiles, wishes, bytes);
+    assert_memory_equal(tiles, given, bytes);
     assert_int_equal(tk_leaks(&memory), 0);
     assert_int_equal(textiles_solve(set, w, h, periodic, 1, NULL, tiles), expected);
 }
 
 static void test_solve_refuses(void **state) {
     (void)state;
-    int wishes[128];
+    int given[128];
     textiles_set *wang = make_set(TEXTILES_WANG, 2, 1, 0);
     textiles_set *reduced = make_set(TEXTILES_WANG, 3, 1, 1);
     textiles_set *corner = make_set(TEXTILES_CORNER, 2, 2, 0);
@@ -255,56 +255,56 @@ static void test_solve_refuses(void **state) {
     textiles_set *frame = make_frame(lonely, 1, 2, 1), *bricks = make_frame(brick, 2, 2, 1);
     txm_env env = {0};
 
-    fill(wishes, 128, -1);
-    refuses_solve(NULL, 2, 2, 0, wishes, TXM_BAD_ARGUMENT, "NULL");
+    fill(given, 128, -1);
+    refuses_solve(NULL, 2, 2, 0, given, TXM_BAD_ARGUMENT, "NULL");
     assert_int_equal(textiles_solve(wang, 2, 2, 0, 1, &env, NULL), TXM_BAD_ARGUMENT);
-    refuses_solve(triangle, 2, 2, 0, wishes, TXM_BAD_ARGUMENT, "triangle");
-    refuses_solve(wang, 0, 2, 0, wishes, TXM_BAD_ARGUMENT, "width");
-    refuses_solve(wang, 2, -1, 0, wishes, TXM_BAD_ARGUMENT, "height");
-    refuses_solve(wang, 1 << 20, 1 << 10, 0, wishes, TXM_TOO_LARGE, "width");
-    wishes[7 * 4 + 3] = 16;
-    refuses_solve(wang, 7, 5, 0, wishes, TXM_BAD_ARGUMENT, "column 3, row 4");
-    wishes[7 * 4 + 3] = -2;
-    refuses_solve(corner, 7, 5, 0, wishes, TXM_BAD_ARGUMENT, "column 3, row 4");
+    refuses_solve(triangle, 2, 2, 0, given, TXM_BAD_ARGUMENT, "triangle");
+    refuses_solve(wang, 0, 2, 0, given, TXM_BAD_ARGUMENT, "width");
+    refuses_solve(wang, 2, -1, 0, given, TXM_BAD_ARGUMENT, "height");
+    refuses_solve(wang, 1 << 20, 1 << 10, 0, given, TXM_TOO_LARGE, "width");
+    given[7 * 4 + 3] = 16;
+    refuses_solve(wang, 7, 5, 0, given, TXM_BAD_ARGUMENT, "column 3, row 4");
+    given[7 * 4 + 3] = -2;
+    refuses_solve(corner, 7, 5, 0, given, TXM_BAD_ARGUMENT, "column 3, row 4");
 
     /* neighbours that do not match; corners that meet at a corner only */
-    fill(wishes, 128, -1);
-    wishes[10] = 0, wishes[11] = 1; /* east 0, west 1 */
-    refuses_solve(wang, 8, 3, 0, wishes, TXM_BAD_ARGUMENT, "column 3, row 1");
-    fill(wishes, 128, -1);
-    wishes[8 + 2] = 0, wishes[8 * 2 + 3] = 31;
-    refuses_solve(corner, 8, 5, 0, wishes, TXM_BAD_ARGUMENT, "column 3, row 2");
+    fill(given, 128, -1);
+    given[10] = 0, given[11] = 1; /* east 0, west 1 */
+    refuses_solve(wang, 8, 3, 0, given, TXM_BAD_ARGUMENT, "column 3, row 1");
+    fill(given, 128, -1);
+    given[8 + 2] = 0, given[8 * 2 + 3] = 31;
+    refuses_solve(corner, 8, 5, 0, given, TXM_BAD_ARGUMENT, "column 3, row 2");
     /* across the border, and with itself */
-    fill(wishes, 128, -1);
-    wishes[0] = 1, wishes[7] = 0;
-    refuses_solve(wang, 8, 1, 1, wishes, TXM_BAD_ARGUMENT, "column 7, row 0");
-    solve(wang, 8, 1, 0, 1, wishes);
-    wishes[0] = 1;
-    refuses_solve(wang, 1, 1, 1, wishes, TXM_BAD_ARGUMENT, "column 0, row 0");
+    fill(given, 128, -1);
+    given[0] = 1, given[7] = 0;
+    refuses_solve(wang, 8, 1, 1, given, TXM_BAD_ARGUMENT, "column 7, row 0");
+    solve(wang, 8, 1, 0, 1, given);
+    given[0] = 1;
+    refuses_solve(wang, 1, 1, 1, given, TXM_BAD_ARGUMENT, "column 0, row 0");
 
-    /* wishes that only propagation finds at odds: south goes up by 0 or 1 from row to row */
-    fill(wishes, 128, -1);
+    /* given tiles that only propagation finds to contradict: south rises by 0 or 1 from row to row */
+    fill(given, 128, -1);
     int up = -1, down = -1;
     for (int t = 0; t < textiles_count(reduced); t++) {
         const textiles_tile tile = tile_at(reduced, t);
         if (tile.edges[2] == 0) up = t;
         if (tile.edges[0] == 2) down = t;
     }
-    wishes[3] = up, wishes[5 * 2 + 3] = down;
-    refuses_solve(reduced, 5, 4, 0, wishes, TXM_BAD_ARGUMENT, "contradict");
-    wishes[5 * 2 + 3] = -1, wishes[5 * 3 + 3] = down;
-    solve(reduced, 5, 4, 0, 1, wishes);
-    check_joins(reduced, wishes, 5, 4, 0);
+    given[3] = up, given[5 * 2 + 3] = down;
+    refuses_solve(reduced, 5, 4, 0, given, TXM_BAD_ARGUMENT, "contradict");
+    given[5 * 2 + 3] = -1, given[5 * 3 + 3] = down;
+    solve(reduced, 5, 4, 0, 1, given);
+    check_joins(reduced, given, 5, 4, 0);
 
-    /* no wishes, but no tiling either; one that exists for even heights only */
-    fill(wishes, 128, -1);
-    refuses_solve(frame, 2, 1, 0, wishes, TXM_BAD_DATA, "no tiling");
-    refuses_solve(bricks, 3, 5, 1, wishes, TXM_BAD_DATA, "tiling");
-    solve(bricks, 3, 4, 1, 1, wishes);
-    check_joins(bricks, wishes, 3, 4, 1);
-    fill(wishes, 128, -1);
-    solve(frame, 1, 9, 0, 1, wishes); /* below each other they do */
-    refuses_solve(frame, 1, 9, 1, wishes, TXM_BAD_DATA, "no tiling");
+    /* nothing given, but no tiling either; one that exists for even heights only */
+    fill(given, 128, -1);
+    refuses_solve(frame, 2, 1, 0, given, TXM_BAD_DATA, "no tiling");
+    refuses_solve(bricks, 3, 5, 1, given, TXM_BAD_DATA, "tiling");
+    solve(bricks, 3, 4, 1, 1, given);
+    check_joins(bricks, given, 3, 4, 1);
+    fill(given, 128, -1);
+    solve(frame, 1, 9, 0, 1, given); /* one below the other they match */
+    refuses_solve(frame, 1, 9, 1, given, TXM_BAD_DATA, "no tiling");
     textiles_set_free(wang);
     textiles_set_free(reduced);
     textiles_set_free(corner);
@@ -313,14 +313,14 @@ static void test_solve_refuses(void **state) {
     textiles_set_free(bricks);
 }
 
-static void test_solve_misfortune(void **state) {
+static void test_solve_faults(void **state) {
     (void)state;
     static call c;
     for (int i = 0; i < SOLVE_CASES; i += 2) {
         c.what = 0;
         c.set = solve_case(i);
         fill(c.in, 4096, -1);
-        check_misfortune(&c);
+        check_faults(&c);
         textiles_set_free(c.set);
     }
 }
@@ -357,7 +357,7 @@ int main(void) {
         cmocka_unit_test(test_solve_is_exact),
         cmocka_unit_test(test_solve_runs),
         cmocka_unit_test(test_solve_refuses),
-        cmocka_unit_test(test_solve_misfortune),
+        cmocka_unit_test(test_solve_faults),
         cmocka_unit_test(test_solve_cancel_search),
     };
     return cmocka_run_group_tests_name("textiles_grid", tests, NULL, NULL);

@@ -21,7 +21,7 @@ static void test_borders(void **state) {
 }
 
 /* share of the texels away from the border that differ between two tiles, by source */
-static double share_different(const book *b, const book *o, int s, int t) {
+static double share_different(const readback *b, const readback *o, int s, int t) {
     int count = 0, different = 0;
     for (int y = 0; y < b->side; y++) {
         for (int x = 0; x < b->side; x++) {
@@ -39,7 +39,7 @@ static double share_different(const book *b, const book *o, int s, int t) {
 static void test_insides_differ(void **state) {
     (void)state;
     for (int k = 0; k < KINDS; k++) {
-        const book *b = &common[k][0];
+        const readback *b = &common[k][0];
         double sum = 0;
         int pairs = 0;
         for (int t = 1; t < b->count; t++) {
@@ -60,12 +60,12 @@ static void test_seeds_differ(void **state) {
     static const uint64_t seeds[] = {6, 0x100000005u}; /* all 64 bits count */
     for (int i = 0; i < 3; i++) {
         const int k = i ? TEXTILES_FRAME : TEXTILES_TRIANGLE;
-        const book *b = &common[k][0]; /* of seed 5 */
+        const readback *b = &common[k][0]; /* of seed 5 */
         textiles_desc d = common_desc(k);
         d.repair = TEXTILES_REPAIR_NONE;
         d.seed = seeds[i / 2];
         textiles_set *set = make(&d);
-        book other = open_book(set, 4);
+        readback other = read_back(set, 4);
         double share = 0;
         int edge = 0;
         for (int t = 0; t < b->count; t++) {
@@ -77,7 +77,7 @@ static void test_seeds_differ(void **state) {
         }
         assert_between(share, 0.8, 1);
         assert_true(edge * 2 > b->count * SIZE);
-        close_book(&other);
+        free_readback(&other);
         textiles_set_free(set);
     }
 }
@@ -94,7 +94,7 @@ static void test_pixels_are_the_exemplars(void **state) {
 static void test_repair(void **state) {
     (void)state;
     for (int k = 0; k < KINDS; k++) {
-        const book *b = &common[k][0], *r = &common[k][1];
+        const readback *b = &common[k][0], *r = &common[k][1];
         const int triangle = k == TEXTILES_TRIANGLE;
         double steps[2][3] = {{0}};
         int changed = 0, cuts = 0;
@@ -160,7 +160,7 @@ static void test_repair(void **state) {
 static void test_register(void **state) {
     (void)state;
     for (int k = 0; k < KINDS; k++) {
-        const book *b = &common[k][0];
+        const readback *b = &common[k][0];
         int values = 0;
         assert_int_equal(b->maps, 3);
         assert_true(b->channels[0] == 3 && b->channels[1] == 4 && b->channels[2] == 1);
@@ -212,7 +212,7 @@ static void test_triangle_values(void **state) {
     d.reduced = 1;
     d.repair = TEXTILES_REPAIR_NONE;
     textiles_set *set = make(&d);
-    book b = open_book(set, 1 | 4 << 8);
+    readback b = read_back(set, 1 | 4 << 8);
     check_sources(&b, sizes);
     check_set(&b, 1);
     int turned = 0, inner = 0;
@@ -234,7 +234,7 @@ static void test_triangle_values(void **state) {
         }
     }
     assert_true(inner > b.count * 300 && turned > b.count * 20);
-    close_book(&b);
+    free_readback(&b);
     textiles_set_free(set);
     for (int m = 0; m < 3; m++) free(maps[m].pixels);
 }

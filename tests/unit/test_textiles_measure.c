@@ -10,7 +10,7 @@
 
 /* all pairs of neighbours inside a tile: those across the joint that it has on side k, and all that
    count as usual there */
-static void tally_tile(const book *b, int m, int t, int k, tally *joint, tally *all) {
+static void tally_tile(const readback *b, int m, int t, int k, tally *joint, tally *all) {
     static const int dx[3] = {1, 0, 1}, dy[3] = {0, 1, -1};
     const int triangle = b->kind == TEXTILES_TRIANGLE;
     for (int y = 0; y < b->side; y++) {
@@ -32,7 +32,7 @@ static void tally_tile(const book *b, int m, int t, int k, tally *joint, tally *
     }
 }
 
-static textiles_joints measure_again(const book *b, int m) {
+static textiles_joints measure_again(const readback *b, int m) {
     textiles_joints j = {0, 0, 1e300, 0, 0};
     const int triangle = b->kind == TEXTILES_TRIANGLE, sides = triangle ? 3 : 4;
     tally(*joint)[4] = (tally(*)[4])need((size_t)b->count * sizeof *joint);
@@ -81,7 +81,7 @@ static textiles_joints measure_again(const book *b, int m) {
     return j;
 }
 
-static void check_measure(const book *b, int m) {
+static void check_measure(const readback *b, int m) {
     const textiles_joints j = measure(b->set, m), again = measure_again(b, m);
     assert_int_equal(j.pairs, again.pairs);
     assert_near(j.mean, again.mean, 1e-9 * again.mean);
@@ -167,20 +167,20 @@ static void test_measure_controls(void **state) {
         textiles_joints j, good = measure(common_sets[k][1], 0);
 
         textiles_set *set = import_cut(&d, counts[k], &common_maps[0], cut_anywhere);
-        book b = open_book(set, 0);
+        readback b = read_back(set, 0);
         if (k != TEXTILES_TRIANGLE) check_measure(&b, 0);
         j = measure(set, 0);
         if (!(j.mean > 1.5 && j.mean > 1.4 * good.mean && j.worst > 1.8))
             fail_msg("kind %d: tiles cut anywhere seem to match: mean %.3f, worst %.3f; of a made set "
                      "%.3f, %.3f", k, j.mean, j.worst, good.mean, good.worst);
-        close_book(&b);
+        free_readback(&b);
         textiles_set_free(set);
 
         /* one tile for all, whose sides belong together but for the step from last to first */
         set = import_cut(&d, counts[k], &periodic, cut_the_same);
-        b = open_book(set, 0);
+        b = read_back(set, 0);
         if (k != TEXTILES_TRIANGLE) check_measure(&b, 0);
-        close_book(&b);
+        free_readback(&b);
         textiles_set_free(set);
 
         const txm_image none = view(NULL, 0, 0, 1, TXM_U8);

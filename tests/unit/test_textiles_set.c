@@ -145,7 +145,7 @@ static void test_list_frames(void **state) {
         }
         textiles_set_free(set);
     }
-    const book *b = &common[TEXTILES_FRAME][0];
+    const readback *b = &common[TEXTILES_FRAME][0];
     assert_int_equal(b->count, 15);
     check_variants(b->set, 3);
     for (int k = 0; k < 5; k++) check_find(b->set, common_classes[k], NULL, 3 * k, 0);
@@ -217,7 +217,7 @@ static void test_import_round_trip(void **state) {
         txm_env env = tk_env(&memory, NULL);
         assert_int_equal(textiles_import(&d, tiles, count, 3, &env, &set), TXM_OK);
         memset(&env, 0xff, sizeof env); /* need not outlive the call */
-        book b = open_book(set, 2 | 4 << 8);
+        readback b = read_back(set, 2 | 4 << 8);
         assert_int_equal(b.maps, 3);
         assert_int_equal(b.channels[0], 3);
         assert_int_equal(b.channels[1], 2);
@@ -234,7 +234,7 @@ static void test_import_round_trip(void **state) {
                 }
             }
         }
-        close_book(&b);
+        free_readback(&b);
         textiles_set_free(set);
         assert_int_equal(tk_leaks(&memory), 0);
         free(bytes);
