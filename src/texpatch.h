@@ -307,7 +307,7 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 #include "texpatch/draw.h"
 #include "texpatch/again.h"
 #include "texpatch/plane.h"
-#include "texpatch/half.h"
+#include "texpatch/levels.h"
 #endif /* TEXPATCH_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------

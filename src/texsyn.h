@@ -260,9 +260,9 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 #include "texsyn/energy.h"
 #include "texsyn/sampler.h"
 #include "texsyn/example.h"
-#include "texsyn/learn.h"
+#include "texsyn/neighbourhood.h"
 #include "texsyn/file.h"
-#include "texsyn/learning.h"
+#include "texsyn/learn.h"
 #include "texsyn/synthesis.h"
 #endif /* TEXSYN_IMPLEMENTATION */
 

@@ -1,7 +1,7 @@
 #ifndef TEXSYN_FILE_H
 #define TEXSYN_FILE_H
 
-#include "learn.h"
+#include "neighbourhood.h"
 
 /* ---- the model as bytes -------------------------------------------------------------------
 

@@ -1,5 +1,5 @@
-#ifndef TEXPATCH_HALF_H
-#define TEXPATCH_HALF_H
+#ifndef TEXPATCH_LEVELS_H
+#define TEXPATCH_LEVELS_H
 
 #include "config.h"
 
@@ -79,4 +79,4 @@ TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map
     return TXM_OK;
 }
 
-#endif /* TEXPATCH_HALF_H */
+#endif /* TEXPATCH_LEVELS_H */
