@@ -486,7 +486,7 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
 #include "textiles/exemplar.h"
 #include "textiles/search.h"
 #include "textiles/frame.h"
-#include "textiles/cut.h"
+#include "textiles/tile.h"
 #include "textiles/interior.h"
 #include "textiles/repair.h"
 #include "textiles/make.h"

@@ -1,7 +1,7 @@
 #ifndef TEXTILES_INTERIOR_H
 #define TEXTILES_INTERIOR_H
 
-#include "cut.h"
+#include "tile.h"
 
 /* ---- interiors: what the tiles so far show ----------------------------------------------- */
 

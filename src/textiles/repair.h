@@ -1,7 +1,7 @@
 #ifndef TEXTILES_REPAIR_H
 #define TEXTILES_REPAIR_H
 
-#include "cut.h"
+#include "tile.h"
 
 /* ---- repair ------------------------------------------------------------------------------ */
 

@@ -1,5 +1,5 @@
-#ifndef TEXTILES_CUT_H
-#define TEXTILES_CUT_H
+#ifndef TEXTILES_TILE_H
+#define TEXTILES_TILE_H
 
 #include "frame.h"
 
@@ -338,4 +338,4 @@ static void txt_expand_all(txt_canvas *c) {
     }
 }
 
-#endif /* TEXTILES_CUT_H */
+#endif /* TEXTILES_TILE_H */
