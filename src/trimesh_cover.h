@@ -390,6 +390,7 @@ TRIMESH_COVER_API txm_status trimesh_order_patch(trimesh_point *points, size_t c
 
 #include "trimesh_cover/check.h"
 #include "trimesh_cover/attributes.h"
+#include "trimesh_cover/seams.h"
 #include "trimesh_cover/texture.h"
 #include "trimesh_cover/scatter.h"
 #include "trimesh_cover/patch.h"

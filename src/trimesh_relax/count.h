@@ -1,7 +1,7 @@
 #ifndef TRIMESH_RELAX_COUNT_H
 #define TRIMESH_RELAX_COUNT_H
 
-#include "split.h"
+#include "collapse.h"
 
 /* ---- the right number --------------------------------------------------------------------- */
 

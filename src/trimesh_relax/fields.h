@@ -1,7 +1,7 @@
 #ifndef TRIMESH_RELAX_FIELDS_H
 #define TRIMESH_RELAX_FIELDS_H
 
-#include "split.h"
+#include "collapse.h"
 
 /* ---- fields on a hierarchy ---------------------------------------------------------------- */
 

@@ -2,6 +2,7 @@
 #define TRIMESH_RELAX_JOB_H
 
 #include "mend_all.h"
+#include "density.h"
 #include "repel.h"
 #include "retile.h"
 

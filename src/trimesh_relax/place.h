@@ -1,7 +1,7 @@
 #ifndef TRIMESH_RELAX_PLACE_H
 #define TRIMESH_RELAX_PLACE_H
 
-#include "lines.h"
+#include "creases.h"
 
 /* ---- moving on the surface ---------------------------------------------------------------- */
 

@@ -4,7 +4,7 @@
 #include "fields.h"
 #include "count.h"
 #include "subdivide.h"
-#include "sound.h"
+#include "validity.h"
 
 /* ---- retiling ----------------------------------------------------------------------------- */
 

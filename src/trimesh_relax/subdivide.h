@@ -1,7 +1,7 @@
 #ifndef TRIMESH_RELAX_SUBDIVIDE_H
 #define TRIMESH_RELAX_SUBDIVIDE_H
 
-#include "split.h"
+#include "collapse.h"
 
 /* ---- subdividing -------------------------------------------------------------------------- */
 

@@ -1,5 +1,5 @@
-#ifndef TRIMESH_RELAX_SPLIT_H
-#define TRIMESH_RELAX_SPLIT_H
+#ifndef TRIMESH_RELAX_COLLAPSE_H
+#define TRIMESH_RELAX_COLLAPSE_H
 
 #include "relax.h"
 
@@ -186,4 +186,4 @@ static int32_t tmr_collapse_short(tmr_work *w, double limit, double line_limit, 
     return count;
 }
 
-#endif /* TRIMESH_RELAX_SPLIT_H */
+#endif /* TRIMESH_RELAX_COLLAPSE_H */

@@ -1,7 +1,7 @@
-#ifndef TRIMESH_RELAX_SOUND_H
-#define TRIMESH_RELAX_SOUND_H
+#ifndef TRIMESH_RELAX_VALIDITY_H
+#define TRIMESH_RELAX_VALIDITY_H
 
-#include "split.h"
+#include "collapse.h"
 
 /* ---- is the result sound? ----------------------------------------------------------------- */
 
@@ -369,4 +369,4 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
     return status;
 }
 
-#endif /* TRIMESH_RELAX_SOUND_H */
+#endif /* TRIMESH_RELAX_VALIDITY_H */
