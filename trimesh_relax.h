@@ -924,6 +924,18 @@ static txm_status tmr_mend_orient(tmr_mend *m) {
     return TXM_OK;
 }
 
+/* Faces without duplicates, at most two at an edge, consistently oriented. */
+static txm_status tmr_mend_faces(tmr_mend *m) {
+    tmr_mend_compact(m);
+    tmr_mend_duplicates(m);
+    txm_status status = tmr_mend_cancel(m, 0.02f);
+    if (status == TXM_OK) status = tmr_mend_edges(m);
+    if (status == TXM_OK && m->face_count == 0)
+        status = txm_fail(m->env, TXM_TOO_SMALL, "the surface has no area");
+    if (status == TXM_OK) status = tmr_mend_orient(m);
+    return status;
+}
+
 /* ---- mending: triangles without area ------------------------------------------------------ */
 
 /* Without area there are needles, with two corners in almost one place, and caps, with a corner
@@ -1115,8 +1127,6 @@ static int32_t tmr_collapse_needles(tmr_mend *m, int32_t count) {
     for (int32_t c = 0; c < 3 * m->face_count && done; c++) m->vertex[c] = m->rename[m->vertex[c]];
     return done;
 }
-
-static txm_status tmr_mend_faces(tmr_mend *m);
 
 /* Flip and collapse until no face without area is left, or nothing changes. */
 static txm_status tmr_mend_thin(tmr_mend *m) {
@@ -1355,18 +1365,6 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
 }
 
 /* ---- the input, mended: the whole --------------------------------------------------------- */
-
-/* Faces without duplicates, at most two at an edge, consistently oriented. */
-static txm_status tmr_mend_faces(tmr_mend *m) {
-    tmr_mend_compact(m);
-    tmr_mend_duplicates(m);
-    txm_status status = tmr_mend_cancel(m, 0.02f);
-    if (status == TXM_OK) status = tmr_mend_edges(m);
-    if (status == TXM_OK && m->face_count == 0)
-        status = txm_fail(m->env, TXM_TOO_SMALL, "the surface has no area");
-    if (status == TXM_OK) status = tmr_mend_orient(m);
-    return status;
-}
 
 static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
                                txm_arena *scratch, tmr_surface *s) {

@@ -135,18 +135,6 @@ static txm_status tmr_surface_measure(tmr_mend *m, txm_arena *arena, txm_arena *
 
 /* ---- the input, mended: the whole --------------------------------------------------------- */
 
-/* Faces without duplicates, at most two at an edge, consistently oriented. */
-static txm_status tmr_mend_faces(tmr_mend *m) {
-    tmr_mend_compact(m);
-    tmr_mend_duplicates(m);
-    txm_status status = tmr_mend_cancel(m, 0.02f);
-    if (status == TXM_OK) status = tmr_mend_edges(m);
-    if (status == TXM_OK && m->face_count == 0)
-        status = txm_fail(m->env, TXM_TOO_SMALL, "the surface has no area");
-    if (status == TXM_OK) status = tmr_mend_orient(m);
-    return status;
-}
-
 static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
                                txm_arena *scratch, tmr_surface *s) {
     txm_status status = tmr_check_surface(m->desc, m->env);
