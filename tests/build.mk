@@ -9,7 +9,10 @@ FULL     ?= 0
 MODULES  := $(filter-out texmath,$(basename $(HEADERS)))
 # -Og: in gcc half the time of -O1 to compile, about the same to run
 SANITIZE  = -Og -g1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+# the longest first, so that none is left to run alone
+LONG      = test_trimesh_relax test_textiles_exemplars test_texsyn test_trimesh_repel
 UNITS    := $(basename $(notdir $(wildcard tests/unit/test_*.c)))
+UNITS    := $(filter $(LONG),$(UNITS)) $(filter-out $(LONG),$(UNITS))
 GOLDEN    = texmath texsyn texpatch texedges textiles trimesh_relax trimesh_cover treepieces
 TEST_C    = $(CC) -std=gnu99 -ffp-contract=off -Wall -Wextra -Isrc -Itests/kit -Itools -MMD -MP
 
@@ -72,7 +75,7 @@ unit_runs = $(foreach u,$(UNITS),$(if $(filter $(u),$(SWEEPING)),$(1),test)/$(u)
 TEST_RUN  = wide_sources $(GOLDEN:%=golden_%) tool_quick $(MODULES:%=quick_%) quick_texmath
 CHECK_RUN = $(GOLDEN:%=golden_%) wide_sources
 
-# the longest first, so that none is left to run alone
+# programs and modules to compile come with what runs, so that both processors have work
 ALL_test  = $(patsubst %,$(TESTS)/%,$(call unit_runs,test) $(TEST_RUN:%=test/%))
 ALL_check = $(patsubst %,$(TESTS)/%,$(addprefix check/,$(WIDE_RUNS) $(TOOL_RUNS) $(LOOK_RUNS)) \
               $(call unit_runs,check) $(CHECK_RUN:%=test/%))

@@ -16,6 +16,7 @@ static void test_synth_sizes(void **state) {
         for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
             for (int tileable = 0; tileable < 2; tileable++) {
                 const int width = sizes[i][0], height = sizes[i][1];
+                if (width == 700 && levels < 3 && !tk_full()) continue;
                 const size_t bytes = (size_t)(width * height * 3);
                 texsyn_synth_desc d = synth_desc(model, width, height);
                 d.tileable = tileable;
@@ -57,7 +58,7 @@ static void test_synth_tileable(void **state) {
     double border[2] = {0, 0}, inside[2] = {0, 0};
     add_wrap(pixels, 128, 128, border, inside); /* the example does not tile, so it would show */
     assert_true(border[0] > 1.5 * inside[0] && border[1] > 1.5 * inside[1]);
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i += tk_full() ? 1 : 2) {
         const int width = cases[i].width, height = cases[i].height;
         texsyn_learn_desc d = learn_desc(view_bytes(pixels, 128, 128, 1), 5);
         d.levels = cases[i].levels;
