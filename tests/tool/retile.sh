@@ -300,7 +300,7 @@ refuses 1 "no texture coordinates" cube.obj -o n.glb --vertices 100 --texture ce
 refuses 1 "no texture coordinates" cube.obj -o n.glb --vertices 100 --density cells.png
 refuses 1 "missing.ply" torus.obj -o n.glb --vertices 100 --instances missing.ply
 sed 's/^0.4 0.2 0 255/0.9 0.8 0 255/' points.ply >outside.ply
-refuses 1 "outside of the triangle" torus.obj -o n.glb --vertices 100 --instances outside.ply
+refuses 1 "outside the triangle" torus.obj -o n.glb --vertices 100 --instances outside.ply
 mkdir broken
 sed 's/"edges"/"corners"/' triangles/tiles.json >broken/tiles.json
 cp triangles/atlas.png broken/
