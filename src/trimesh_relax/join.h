@@ -568,11 +568,10 @@ static txm_status tmr_sample_lines(tmr_sampling *t) {
         for (int32_t k = first; k < steps; k++) t->ways[k - first] = k * step;
         if (tmr_cut_line(t, i, t->ways, steps - first, NULL) != TXM_OK) {
             for (; i < l->line_count; i++) points += (uint64_t)tmr_line_steps(t, i);
-            return txm_fail_numbers(
-                t->w->env, TXM_TOO_SMALL,
-                "creases and borders alone take # vertices, and # are asked for;"
-                " give more, or a larger line_spacing",
-                points, t->desc->vertices);
+            return txm_fail_numbers(t->w->env, TXM_TOO_SMALL,
+                                    "# vertices are too few for creases and borders alone; give "
+                                    "about #, or a larger line_spacing",
+                                    t->desc->vertices, points);
         }
         points += (uint64_t)steps;
     }

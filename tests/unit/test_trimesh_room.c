@@ -148,12 +148,33 @@ static void test_handles(void **state) {
     }
 }
 
+/* Many narrow blades: their borders take more vertices than their area. */
+static void test_blades(void **state) {
+    const char *too_few = "1000 vertices are too few for creases and borders alone; give about ";
+    (void)state;
+    in.vertices = in.triangles = 0;
+    for (int i = 0; i < 100; i++) {
+        const double x = i % 10, y = 0.7 * i;
+        const uint32_t a = vertex(x, y, 0), b = vertex(x + 0.01, y, 0), c = vertex(x + 0.01, y, 1);
+        quad(a, b, c, vertex(x, y, 1));
+    }
+    const trimesh_desc d = describe(1000, TRIMESH_REPEL);
+    trimesh_mesh *mesh = NULL;
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    assert_int_equal(trimesh_retile(&d, &env, &mesh), TXM_TOO_SMALL);
+    assert_null(mesh);
+    assert_memory_equal(env.message, too_few, strlen(too_few));
+    assert_true(atol(env.message + strlen(too_few)) > 1000);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_crosses),
         cmocka_unit_test(test_soup),
         cmocka_unit_test(test_confetti),
         cmocka_unit_test(test_handles),
+        cmocka_unit_test(test_blades),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
