@@ -124,10 +124,10 @@ static void tmr_flip_valences(tmr_work *w, int rounds, double least) {
 
 /* ---- relaxation --------------------------------------------------------------------------- */
 
-/* What a triangle wants: the equilateral triangle that fits it best, about its centre, in the
-   plane that its normals span, part of the way to the wanted size. Its corner 0 is at centre +
-   pull, the others are that turned by 120 degrees. The fit is the mean of the three corners turned
-   back onto the first:
+/* The target of a triangle: the equilateral triangle that fits it best, around its *centre,
+   perpendicular to the normal *n expected there, part of the way to the wanted size. Its corner 0 is
+   at centre + pull, which is returned, the others are rotated by 120 degrees. The fit is the mean of
+   the three corners rotated back onto the first:
        pull = (A + R^-1 B + R^-2 C) / 3 = A / 2 + sqrt(3) / 6 n x (C - B)                        */
 static txm_dvec3 tmr_fit(const tmr_work *w, const int32_t *v, txm_dvec3 *centre, txm_dvec3 *n) {
     const tmr_mesh *m = &w->m;
@@ -163,7 +163,7 @@ static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
     return count == 2;
 }
 
-/* Where shall vertex v go? Into w->moved and w->landed; *n: the normal there. */
+/* Find the new place of vertex v; store it in w->moved and w->landed. */
 static void tmr_relax_vertex(tmr_work *w, int32_t v) {
     const tmr_mesh *m = &w->m;
     const int kind = tmr_kind_of(m, v);
