@@ -1552,7 +1552,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 double extra = 0;
                 if (s->has_lattice) {
                     const double d = txp_off_lattice(k, x - bx - q->shift_x, y - by - q->shift_y);
-                    if (d > TXP_OFF_LATTICE && strict) continue;
+                    if (d > (double)TXP_OFF_LATTICE && strict) continue;
                     extra += q->lattice_weight * fmin(d, TXP_OFF_LATTICE);
                 }
                 if (k->bad && !txp_fits(s, k, x, y, size, size)) continue;

@@ -27,14 +27,15 @@ static int tmr_may_subdivide(const tmr_work *w) {
 static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena *scratch) {
     enum { MORE = 1000 };
     const tmr_mesh old = w->m;
-    const double vertices = old.live + (double)old.ghosts + (cut ? 1.5 * old.live_faces : 0) + MORE;
+    const double vertices =
+        (double)MORE + old.live + (double)old.ghosts + (cut ? 1.5 * old.live_faces : 0);
     const double faces = (cut ? 4.0 : 1.0) * old.live_faces + 4 * MORE;
     const float *old_size = w->size;
     tmr_mesh *m = &w->m;
     int32_t *number = (int32_t *)txm_arena_alloc(scratch, (size_t)old.vertex_count, sizeof(int32_t));
     int32_t *middle = (int32_t *)txm_arena_alloc(scratch, 3 * (size_t)old.face_count, sizeof(int32_t));
     int32_t *where = (int32_t *)txm_arena_alloc(scratch, (size_t)old.face_count, sizeof(int32_t));
-    if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
+    if (vertices > (double)TMR_MOST_SLOTS || faces > (double)TMR_MOST_SLOTS)
         return txm_fail(w->env, TXM_TOO_LARGE, "too many triangles");
     txm_status status = tmr_check_memory(scratch);
     if (status == TXM_OK) status = tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena);

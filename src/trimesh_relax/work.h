@@ -150,7 +150,7 @@ static txm_status tmr_copy_surface(tmr_work *w, double more, txm_arena *arena) {
     const double vertices = (double)s->vertex_count + s->loop_count + more;
     const double faces = (double)s->face_count + s->border_count + 2 * more;
     memset(m, 0, sizeof *m);
-    if (vertices > TMR_MOST_SLOTS || faces > TMR_MOST_SLOTS)
+    if (vertices > (double)TMR_MOST_SLOTS || faces > (double)TMR_MOST_SLOTS)
         return txm_fail(w->env, TXM_TOO_LARGE, "the surface and its borders are too large");
     const txm_status status = tmr_alloc_mesh(w, (int32_t)vertices, (int32_t)faces, arena);
     if (status != TXM_OK) return status;
