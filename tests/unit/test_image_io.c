@@ -254,15 +254,9 @@ static void from_a_path(void **state) {
     (void)state;
     const char *path = "build/tests/deep.png", *why = NULL;
     uint16_t pixels[W * H];
-    size_t size;
     draw(pixels, 1);
     const txm_image image = view(pixels, 1, TXM_U16);
-    unsigned char *png = encode(&image, &size);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(png, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
-    free(png);
+    assert_true(image_write(path, &image, &why));
     txm_image back;
     assert_true(image_read_deep(path, 0, &back, &why));
     assert_int_equal(back.sample, TXM_U16);
@@ -275,6 +269,14 @@ static void from_a_path(void **state) {
     assert_false(image_read_deep(path, 0, &back, &why));
     assert_non_null(why);
     assert_null(back.pixels);
+
+    why = NULL;
+    assert_false(image_write("build/tests/no/such/folder.png", &image, &why));
+    assert_string_equal(why, "cannot write the file");
+    assert_false(image_write("build/tests/deep.gif", &image, &why));
+    assert_non_null(strstr(why, ".png"));
+    assert_null(fopen("build/tests/deep.gif", "rb"));
+    assert_false(file_write("build/tests", (const unsigned char *)"", 0));
 }
 
 int main(void) {
