@@ -32,7 +32,7 @@ END {
                 objects = objects " " root "/modules/" module[i] ".o"
         if ("image_io.h" in seen || "mesh_io.h" in seen || "mesh_file.h" in seen) objects = objects " " files
         more = file in sweeps
-        for (name in seen) more = more || (name in sweeps && name != "testkit.h")
+        for (name in seen) more = more || (name in sweeps && name != "faults.h")
         if (more) sweeping = sweeping " " substr(file, 1, length(file) - 2)
         print root "/unit/" substr(file, 1, length(file) - 2) ":" objects
     }

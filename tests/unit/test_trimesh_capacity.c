@@ -1,4 +1,4 @@
-/* test_trimesh_capacity.c - surfaces that are mostly border, or mostly handles: arrays large enough for all of it
+/* test_trimesh_capacity.c - surfaces that are mostly border, or mostly handles: enough room for them
    SPDX-License-Identifier: MIT OR Unlicense
 
    Every border edge gets a ghost triangle, and a surface of many handles has many more triangles
