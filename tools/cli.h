@@ -112,7 +112,7 @@ void cli_figures(cli *run, const char *name, const int *values, int count);
 /* Seconds since the command began. */
 double cli_seconds(const cli *run);
 
-/* ---- the files of a run --------------------------------------------------------------------
+/* ---- the files of a run: outputs.c --------------------------------------------------------
 
    No input may be written over, and no two outputs may be the same file, through whatever links.
    So every file is announced before any work. cli_begin does this for the inputs, -o, --stats and
@@ -145,5 +145,13 @@ int cli_finish_files(cli *run, const cli_file *files, int count);
 
 /* The same for files in the output folder, which is made if it does not exist. */
 int cli_finish_folder(cli *run, const cli_file *files, int count);
+
+/* ---- between cli.c and outputs.c ----------------------------------------------------------- */
+
+/* Announce the files that the command line names. */
+int cli_announce(cli *run, const cli_option *own, const cli_option *common);
+
+/* Stop the clock and remove the progress bar; with --stats, their text. Returns its size. */
+size_t cli_end(cli *run, char *text, size_t capacity);
 
 #endif /* CLI_H */

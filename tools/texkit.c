@@ -1,9 +1,10 @@
 /* texkit.c - the texkit headers on the command line
    SPDX-License-Identifier: MIT OR Unlicense
 
-   The table below lists the commands, which are in commands/. What they share is in cli.c and
-   command.c; files/ reads and writes pictures and meshes; modules/ compiles the implementations.
-   To see how a header is embedded, start with run_learn in commands/clique.c.                  */
+   The table below lists the commands, which are in commands/. What they share is in cli.c,
+   outputs.c, env.c and command.c; files/ reads and writes pictures and meshes; modules/ compiles
+   the implementations. To see how a header is embedded, start with run_learn in
+   commands/clique.c.                                                                           */
 #include "command.h"
 
 #include "texedges.h"
