@@ -43,3 +43,27 @@ refuses() {
     shift 2
     check "status $status, \"$text\": $(echo "$*" | tail -c 70)" refuses_so "$status" "$text" "$@"
 }
+
+# stops OUT ARGUMENTS...: a signal ends the run of $released with status 1, a message and no OUT
+stops() {
+    out=$1
+    shift
+    "$released" "$@" -o "$out" --quiet 2>err.log &
+    child=$!
+    sleep 0.4
+    kill -TERM $child
+    wait $child
+    [ $? = 1 ] && says "stopped" && [ ! -e "$out" ]
+}
+# starves KILOBYTES OUT ARGUMENTS...: with so little memory the run of $released ends with status 1, one
+# line and no OUT
+starves() {
+    memory=$1 out=$2
+    shift 2
+    (ulimit -v "$memory" && "$released" "$@" -o "$out" --threads 1 2>err.log)
+    [ $? = 1 ] && says "memory" && [ "$(wc -l <err.log)" = 1 ] && [ ! -e "$out" ]
+}
+# has_terminal: can a terminal be had for a progress bar?
+has_terminal() { has script && script -qec true /dev/null >/dev/null 2>&1; }
+# shows_bar ARGUMENTS...: $released draws a progress bar on a terminal
+shows_bar() { script -qec "'$released' $* --threads 1" /dev/null | grep -q '##.*%'; }

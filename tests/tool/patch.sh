@@ -447,23 +447,9 @@ check "no file was made or changed" nothing_changed
 check "a full disk: status 1" run 1 cells.png -o n.json --layers n.png --stats /dev/full
 
 # ---- stopped, out of memory (the tool as released)
-stop() {
-    "$released" patch bricks.png -o stopped.png --size 4000x4000 --quiet 2>err.log &
-    child=$!
-    sleep 0.5
-    kill -TERM $child
-    wait $child
-    [ $? = 1 ] && says "stopped" && [ ! -e stopped.png ]
-}
-check "stopped by a signal: status 1 and nothing written" stop
-starve() {
-    (ulimit -v 300000 && "$released" patch bricks.png -o starved.png --size 8000x8000 \
-        --threads 1 2>err.log)
-    [ $? = 1 ] && says "memory" && [ "$(wc -l <err.log)" = 1 ] && [ ! -e starved.png ]
-}
-check "out of memory: status 1, one line" starve
-if has script && script -qec true /dev/null >/dev/null 2>&1; then
-    check "a progress bar on a terminal" sh -c "
-        script -qec \"'$released' patch bricks.png -o bar.png --size 2000x2000 --threads 1\" \
-            /dev/null | grep -q '##.*%'"
+check "stopped by a signal: status 1 and nothing written" \
+    stops stopped.png patch bricks.png --size 4000x4000
+check "out of memory: status 1, one line" starves 300000 starved.png patch bricks.png --size 8000x8000
+if has_terminal; then
+    check "a progress bar on a terminal" shows_bar patch bricks.png -o bar.png --size 2000x2000
 fi
