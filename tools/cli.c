@@ -1,30 +1,15 @@
-/* cli.c - options, messages, progress, timing; cli.h tells how they are used
+/* cli.c - options and messages; cli.h tells how they are used
    SPDX-License-Identifier: MIT OR Unlicense */
-#define _XOPEN_SOURCE 700 /* POSIX: clock_gettime, isatty, sigaction */
 #include "cli.h"
 
 #include <ctype.h>
 #include <errno.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <time.h>
-#include <unistd.h>
 
-enum { MAX_THREADS = 256, BAR_WIDTH = 30 };
+enum { MAX_THREADS = 256 };
 
 /* ---- messages --------------------------------------------------------------------------- */
-
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static void clear_bar(cli *run) {
-    if (run->bar_is_on) fprintf(stderr, "\r%*s\r", BAR_WIDTH + 30, "");
-    run->bar_is_on = 0;
-}
 
 int cli_fail(cli *run, int status, const char *format, ...) {
     char line[1024];
@@ -36,7 +21,7 @@ int cli_fail(cli *run, int status, const char *format, ...) {
     for (char *c = line; *c; c++) {
         if (iscntrl((unsigned char)*c)) *c = '?';
     }
-    clear_bar(run);
+    cli_clear_bar(run);
     fprintf(stderr, "texkit %s: %s\n", run->manual->name, line);
     return status;
 }
@@ -138,45 +123,6 @@ static void print_manual(const cli_manual *m, const cli_option *own, const cli_o
     printf("\nExample:\n%s", m->example);
 }
 
-/* ---- the environment -------------------------------------------------------------------- */
-
-static volatile sig_atomic_t interrupted;
-
-static void on_signal(int signal_number) {
-    (void)signal_number;
-    interrupted = 1;
-}
-
-/* Draws the bar, and cancels the work when the user has pressed Ctrl-C. */
-static int progress(void *user, float fraction, const char *stage) {
-    cli *run = (cli *)user;
-    double t = now();
-    if (interrupted) return 1;
-    if (run->quiet || !isatty(STDERR_FILENO)) return 0;
-    if (t - run->started < 1 || t - run->shown < 0.1) return 0;
-    int filled = (int)(fraction * (float)BAR_WIDTH + 0.5f);
-    fprintf(stderr, "\r%-16.16s [", stage);
-    for (int i = 0; i < BAR_WIDTH; i++) fputc(i < filled ? '#' : '.', stderr);
-    fprintf(stderr, "] %3d %%", (int)(100 * fraction));
-    fflush(stderr);
-    run->shown = t;
-    run->bar_is_on = 1;
-    return 0;
-}
-
-static void make_env(cli *run) {
-    struct sigaction action;
-    memset(&action, 0, sizeof action);
-    action.sa_handler = on_signal;
-    action.sa_flags = (int)SA_RESETHAND; /* the second Ctrl-C kills at once */
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-
-    env_fill(&run->env, &run->memory, &run->threads);
-    run->env.progress = progress;
-    run->env.progress_user = run;
-}
-
 /* ---- the command line -------------------------------------------------------------------- */
 
 static int add_input(cli *run, int *count, const char *argument) {
@@ -194,7 +140,7 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
     run->manual = manual;
     run->seed = 1;
     run->threads = env_cores() < MAX_THREADS ? env_cores() : MAX_THREADS;
-    run->started = run->stage_started = now();
+    run->started = run->stage_started = cli_now();
     const cli_option common[] = {
         {CLI_TEXT, "-o", "PATH", "where to write the result", &run->output, 0, 0},
         {CLI_SEED, "--seed", "N", "a different seed gives a different result; default 1",
@@ -252,62 +198,6 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
         *status = cli_announce(run, options, common);
     }
     if (*status != CLI_DONE) return 1;
-    make_env(run);
+    cli_make_env(run);
     return 0;
-}
-
-/* ---- timing and figures ------------------------------------------------------------------ */
-
-double cli_seconds(const cli *run) {
-    return now() - run->started;
-}
-
-void cli_stage(cli *run, const char *name) {
-    double t = now();
-    if (run->stage_count) run->stages[run->stage_count - 1].seconds = t - run->stage_started;
-    run->stage_started = t;
-    if (name && run->stage_count < CLI_MAX_STAGES) run->stages[run->stage_count++].name = name;
-}
-
-void cli_figure(cli *run, const char *name, double value) {
-    if (run->figure_count == CLI_MAX_FIGURES) return;
-    run->figures[run->figure_count].name = name;
-    run->figures[run->figure_count++].values[0] = value;
-}
-
-void cli_figures(cli *run, const char *name, const int *values, int count) {
-    if (run->figure_count == CLI_MAX_FIGURES || count > CLI_MAX_LIST) return;
-    run->figures[run->figure_count].name = name;
-    for (int i = 0; i < count; i++) run->figures[run->figure_count].values[i] = values[i];
-    run->figures[run->figure_count++].count = count;
-}
-
-/* The statistics as JSON. All names are literals of ours: nothing to escape. */
-static size_t format_stats(const cli *run, char *text, size_t capacity) {
-    size_t n = 0;
-#define ADD(...) n += (size_t)snprintf(text + n, capacity - n, __VA_ARGS__)
-    ADD("{\n  \"command\": \"%s\",\n", run->manual->name);
-    ADD("  \"version\": \"%s\",\n  \"seed\": %llu,\n  \"threads\": %d,\n", TEXKIT_VERSION,
-        (unsigned long long)run->seed, run->threads);
-    ADD("  \"seconds\": {\n");
-    for (int i = 0; i < run->stage_count; i++)
-        ADD("    \"%s\": %.6f,\n", run->stages[i].name, run->stages[i].seconds);
-    ADD("    \"total\": %.6f\n  },\n  \"peak_bytes\": %zu,\n  \"result\": {\n", cli_seconds(run),
-        run->memory.peak_bytes);
-    for (int i = 0; i < run->figure_count; i++) {
-        const int count = run->figures[i].count;
-        ADD("    \"%s\": %s%.15g", run->figures[i].name, count ? "[" : "",
-            run->figures[i].values[0]);
-        for (int k = 1; k < count; k++) ADD(", %.15g", run->figures[i].values[k]);
-        ADD("%s%s\n", count ? "]" : "", i + 1 < run->figure_count ? "," : "");
-    }
-    ADD("  }\n}\n");
-#undef ADD
-    return n;
-}
-
-size_t cli_end(cli *run, char *text, size_t capacity) {
-    cli_stage(run, NULL);
-    clear_bar(run);
-    return run->stats ? format_stats(run, text, capacity) : 0;
 }

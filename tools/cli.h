@@ -73,7 +73,7 @@ typedef struct cli {
 
     txm_env env; /* for the calls into the library */
 
-    /* the rest belongs to cli.c */
+    /* the rest belongs to cli.c, progress.c and stats.c */
     double started, stage_started, shown;
     struct {
         const char *name;
@@ -146,10 +146,19 @@ int cli_finish_files(cli *run, const cli_file *files, int count);
 /* The same for files in the output folder, which is made if it does not exist. */
 int cli_finish_folder(cli *run, const cli_file *files, int count);
 
-/* ---- between cli.c and outputs.c ----------------------------------------------------------- */
+/* ---- between cli.c, progress.c, stats.c and outputs.c --------------------------------------- */
 
 /* Announce the files that the command line names. */
 int cli_announce(cli *run, const cli_option *own, const cli_option *common);
+
+/* The environment of the library's calls: memory, threads, the progress bar, cancelling by Ctrl-C. */
+void cli_make_env(cli *run);
+
+/* Remove the progress bar, if there is one. */
+void cli_clear_bar(cli *run);
+
+/* Seconds on a clock that never goes back. */
+double cli_now(void);
 
 /* Stop the clock and remove the progress bar; with --stats, their text. Returns its size. */
 size_t cli_end(cli *run, char *text, size_t capacity);
