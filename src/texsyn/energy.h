@@ -83,7 +83,7 @@ static int txs_pick_sse2(const uint8_t *const *rows, int count, const int16_t *s
         e3 = _mm_add_epi16(e3, _mm_srli_epi16(b, 8));
     }
 #define TXS_FINISH(e, k) \
-    _mm_add_epi16(_mm_slli_epi16(e, 2), _mm_add_epi16(txs_load(single + k), txs_load(noise + k)))
+    _mm_add_epi16(_mm_slli_epi16(e, 2), _mm_add_epi16(txs_load(single + (k)), txs_load(noise + (k))))
     e0 = TXS_FINISH(e0, 0);
     e1 = TXS_FINISH(e1, 8);
     e2 = TXS_FINISH(e2, 16);
