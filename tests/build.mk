@@ -38,7 +38,7 @@ $(TESTS)/asan/texkit: $(TEXKIT:$(BUILD)/%=$(TESTS)/asan/%)
 
 $(TESTS)/unit/%.o: tests/unit/%.c
 	@mkdir -p $(@D)
-	$(TEST_C) $(SANITIZE) -c $< -o $@
+	$(TEST_C) $(SANITIZE) $(if $(findstring _IMPLEMENTATION,$(file <$<)),,-O0) -c $< -o $@
 
 $(TESTS)/unit/%: $(TESTS)/unit/%.o
 	$(CC) $(SANITIZE) $^ -o $@ -lcmocka -lpthread -lm
