@@ -5,7 +5,7 @@
      Divides the gray values of a picture into a few layers and finds the boundaries between them,
      as closed lines and as pictures [1, 3.2]. Strokes that a user draws are disturbed with the
      statistics of these boundaries, so that they look like edges of the texture, and become a guide
-     picture that says which layer each pixel shall show [1, 3.3].
+     picture that says which layer each pixel should show [1, 3.3].
 
    QUICK START                                 (tests build and run this very block)
      // Layers of a picture, and a stroke with edges like theirs. cc -std=c99 quick.c -lm
@@ -68,12 +68,12 @@
      guide of its exemplar, the two pictures of texedges_guide are its guide and guide_mask.
 
    HOW IT WORKS
-     The histogram of the grays is cut into parts of about the same area, at its emptiest places;
-     small connected regions can be given to the layer around them. Lines follow the cracks between
-     pixels. The roughness of a layer is how far its lines P lie from their smooth course
-     2 S P - S S P (S a blur of 32 pixels), ahead and to the side. Along a stroke pieces of this
+     The histogram of the grays is divided into parts of about the same area, at its least frequent
+     values; small connected regions can be merged into the layer around them. Lines follow the
+     cracks between pixels. The roughness of a layer is how far its lines P deviate from their smooth
+     course 2 S P - S S P (S a blur of 32 pixels), along and across it. Along a stroke pieces of this
      roughness, 16 to 48 pixels long, are joined end to end; of those that join well the one is
-     taken that brings the directions of the line nearest to those of the exemplar's lines. Loops
+     taken that brings the directions of the line closest to those of the exemplar's lines. Loops
      are cut off, and the line is filled by its winding number.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
@@ -83,7 +83,7 @@
    MEMORY
      5 to 13 bytes for each pixel while layers are found, 8 for each point of the lines, of which
      there are up to four a pixel, 200 for each pixel along the longest stroke. After an error
-     nothing stays allocated, and what a call was to return is NULL.
+     nothing stays allocated, and the set to be returned is NULL.
 
    TIME   (one core of 2023)
      Some 0.2 us for each pixel of a picture, 1 us for each pixel along edges and strokes, 50 ns for
@@ -141,10 +141,10 @@ typedef struct texedges_polyline {
 
    Lines that texedges_find makes run along the cracks between pixels, with a point at each pixel
    corner that they pass. The layer lies to the right of the line's direction (outer boundaries run
-   clockwise as seen, holes counter-clockwise); what lies beyond the picture belongs to no layer.
+   clockwise as seen, holes counter-clockwise); the outside of the picture belongs to no layer.
    Each side of each crack between two layers is part of exactly one line. Pixels that touch only at
-   a corner are not connected: where a layer meets itself so, its line turns right, around the pixel
-   that it came along. So lines may touch at a corner, but never cross themselves or each other.
+   a corner are not connected: where two pixels of a layer touch so, its line turns right, around the
+   pixel that it came along. So lines may touch at a corner, but never cross themselves or each other.
 
          +---+              lines are in raster order of their first points: the top left corner
          | k |              of the topmost (then leftmost) pixel of an outer boundary
@@ -161,7 +161,7 @@ typedef struct texedges_set {
     txm_vec2 *points; /* (0, 0) is the top left corner of the picture, (0.5, 0.5) the centre of the
                          top left pixel                                                        */
     size_t point_count;
-    txm_arena memory; /* of the set, which lies in it: for the library alone                   */
+    txm_arena memory; /* private: holds the set                                                */
 } texedges_set;
 
 /* What to find. All zero but the image is a good default. */
@@ -172,16 +172,16 @@ typedef struct texedges_desc {
     float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
                         1 to 3                                                                 */
     int least;       /* pixels: a connected region whose boundary (holes and the picture's border
-                        included) is shorter is given to the neighbouring layer that shares most
-                        of that boundary, the shortest first; 0 = all regions are kept         */
+                        included) is shorter is merged into the neighbouring layer that shares
+                        most of that boundary, the shortest first; 0 = all regions are kept    */
     const float *thresholds; /* levels - 1 of them, rising, in 0..1; NULL = such that the layers
-                        have about the same area, each at the emptiest gray nearby             */
+                        have about the same area, each at the least frequent gray nearby       */
 } texedges_desc;
 
 /* Find the boundaries of all layers.
 
    env    NULL, or how to allocate, report and cancel
-   out    receives them, or NULL on any error; release them with texedges_set_free
+   out    receives the set, or NULL on any error; release it with texedges_set_free
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range or samples that are not finite;
           TXM_TOO_LARGE above TEXEDGES_MAX_PIXELS or 2^20 pixels a side; TXM_OUT_OF_MEMORY;
           TXM_CANCELLED
@@ -230,11 +230,11 @@ typedef struct texedges_control {
     const texedges_set *edges; /* of the exemplar, from texedges_find                           */
     const texedges_stroke *strokes;
     int stroke_count;  /* 0 or more                                                             */
-    int background;    /* the layer outside all strokes; -1 = free: whatever the texture has there,
-                          but next to a stroke not the stroke's own layer                       */
+    int background;    /* the layer outside all strokes; -1 = free: any layer, except the stroke's
+                          own next to a stroke                                                  */
     float disturb;     /* 0..4: how much of the exemplar's roughness the strokes take on; 0 = 1;
                           -1 = none                                                             */
-    uint64_t seed;     /* another seed, another disturbance                                     */
+    uint64_t seed;     /* another seed gives another disturbance                                */
 } texedges_control;
 
 /* The strokes, disturbed with the statistics of the exemplar's edges of their layer: pieces of the

@@ -4,8 +4,8 @@
    WHAT IT DOES
      Takes a triangle mesh of any shape and quality and covers the same surface with a given number
      of vertices whose triangles are as equilateral and equal as the surface allows: a closed or
-     bordered manifold of the same topology, creases and borders kept. On such triangles textures
-     are easy: see trimesh_cover.h.
+     bordered manifold of the same topology, with creases and borders preserved. Such triangles are
+     easy to texture: see trimesh_cover.h.
 
    QUICK START                                 (tests build and run this very block)
      // Cover a tetrahedron-like pebble with 500 vertices. cc -std=c99 quick.c -lm
@@ -35,8 +35,8 @@
      }
 
    HOW IT WORKS
-     The input is mended (welded, consistently oriented, freed of duplicate triangles and of those
-     without area), creases and borders become lines, each border loop is closed by a ghost vertex.
+     The input is repaired (welded, consistently oriented; duplicate and degenerate triangles are
+     removed), creases and borders become lines, each border loop is closed by a ghost vertex.
      The working mesh starts as a copy of the surface and is a closed manifold at every moment: it is
      only split, collapsed (under the link condition) and flipped, so its topology cannot change.
        TRIMESH_LATTICE (default): the copy is resampled to about twice the number of vertices; a
@@ -44,18 +44,18 @@
      ends share a lattice point collapse. From 20,000 vertices on this is done for a quarter of the
      number, and then each triangle is cut in four.
        TRIMESH_REPEL: the method of [1] and [2]: points sampled by area repel each other along the
-     surface and replace the old vertices by mutual tessellation, which cannot fail as [1]'s greedy
-     triangulation can. For viewers, and for surfaces that are edited (trimesh_update).
+     surface and replace the old vertices by mutual tessellation, which unlike the greedy
+     triangulation of [1] cannot fail. For viewers, and for surfaces that are edited (trimesh_update).
        Then with both methods the mesh is relaxed (each triangle pulls its corners towards the best
-     fitting equilateral triangle of the wanted size) and flipped [4], brought to the exact number of
+     fitting equilateral triangle of the target size) and flipped [4], brought to the exact number of
      vertices, and fitted: a vertex moves off the surface by the mean height of the surface over its
      triangles, which keeps the volume. Last, crossing and inverted triangles are searched for and
-     smoothed away; a result that is not sound is never returned.
+     smoothed away; an invalid result is never returned, unless the surface crosses itself.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TRIMESH_RELAX_STATIC   every function static to the including file (set it everywhere)
      TRIMESH_MAX_VERTICES   refuse more vertices or triangles; default 2^26
-     TRIMESH_ASSERT(x)      programming errors inside the library, no input can reach one; default
+     TRIMESH_ASSERT(x)      checks for errors in the library, which no input can trigger; default
                             assert of <assert.h>
 
    MEMORY     About 200 bytes per input vertex and 600 per output vertex while working; the result
@@ -63,7 +63,7 @@
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
    SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
-              Of libm's functions that differ between C libraries two take part in decisions: cos
+              Of libm's functions that differ between C libraries, two affect decisions: cos
               for the limits of angles (creases, corners of lines), and atan2 for the angles that
               weight normals, order sheets around an edge and find tips.
 
@@ -129,22 +129,22 @@ typedef struct trimesh_mesh {
     txm_arena memory;        /* private                                                    */
 } trimesh_mesh;
 
-/* ---- what was found and mended in the input ---------------------------------------------- */
+/* ---- what was found and repaired in the input -------------------------------------------- */
 
 typedef struct trimesh_report {
-    size_t vertices, triangles; /* after mending                                             */
-    size_t welded;              /* vertices that another one lies on                         */
-    size_t unused;              /* vertices of no triangle                                   */
+    size_t vertices, triangles; /* after the repair                                          */
+    size_t welded;              /* vertices merged with another in the same place            */
+    size_t unused;              /* vertices without triangles                                */
     size_t degenerate;          /* triangles without area, removed or flipped                */
-    size_t duplicate;           /* triangles that were there already                         */
+    size_t duplicate;           /* triangles with the vertices of another                    */
     size_t fins;                /* triangles that stuck out of an edge of two others         */
     size_t turned;              /* triangles reversed to agree with their neighbours         */
     size_t split;               /* vertices added where fans met in one vertex               */
     size_t components;          /* connected pieces                                          */
     size_t loops;               /* border loops                                              */
-    long euler;                 /* vertices - edges + triangles after mending                */
+    long euler;                 /* vertices - edges + triangles after the repair             */
     size_t crease_edges;        /* edges kept as creases                                     */
-    uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that cannot be mended   */
+    uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that is not repairable  */
 } trimesh_report;
 
 /* ---- retiling ---------------------------------------------------------------------------- */
@@ -159,22 +159,23 @@ typedef struct trimesh_desc {
     txm_mesh surface; /* triangles; not modified, need not outlive the call (a job's must)    */
     size_t vertices;       /* how many the result has, 4 or more                                */
     trimesh_method method; /* 0 = lattice                                                       */
-    const float *scale;    /* 1 per input vertex: wanted edge length relative to the others,
-                              above 0, at most 1000 times the least; NULL = uniform             */
-    float adapt;           /* 0..1: how much shorter edges are where the surface bends; 0 = not */
-    float crease_angle;    /* degrees between the normals of two triangles from which on their
-                              edge may be a crease, 0 = 50; 180 = none. Below 75 it must also be
-                              clearly sharper than the edges around it, and connected creases of
-                              less than 6 percent of the diagonal in all are left out          */
+    const float *scale;    /* 1 per input vertex: target edge length relative to other vertices,
+                              above 0, at most 1000 times the smallest; NULL = uniform          */
+    float adapt;           /* 0..1: how much shorter edges are where the surface bends; 0 = no
+                              adaptation                                                        */
+    float crease_angle;    /* smallest angle between the normals of two triangles, in degrees, at
+                              which their edge may be a crease; 0 = 50; 180 = none. Below 75 it
+                              must also be clearly sharper than the edges around it. Connected
+                              creases shorter than 6 percent of the diagonal are left out       */
     float line_spacing;    /* edge length along creases and borders relative to that inside,
                               0.25..4; 0 = 1. Increased where lines would take more than half of
                               the vertices                                                      */
-    float weld;            /* weld vertices nearer than this, relative to the diagonal of the
-                              bounding box, 0..0.01; 0 = only those in equal places             */
-    int iterations;        /* TRIMESH_REPEL: at most so many rounds of repulsion, 1..1000; 0 = 40 */
-    uint64_t seed;         /* another number, another result                                    */
+    float weld;            /* weld vertices closer than this, relative to the diagonal of the
+                              bounding box, 0..0.01; 0 = only those in the same place           */
+    int iterations;        /* TRIMESH_REPEL: maximum rounds of repulsion, 1..1000; 0 = 40       */
+    uint64_t seed;         /* another seed gives another result                                 */
     trimesh_report *report; /* out: receives what was found in the input, also after an error;
-                              NULL = not wanted                                                 */
+                              NULL = no report                                                  */
 } trimesh_desc;
 
 /* Retile a surface.
@@ -183,12 +184,12 @@ typedef struct trimesh_desc {
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free
    return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, an index that is not below
            vertex_count, a position that is not finite; TXM_BAD_DATA for a surface that cannot be
-           mended (message and report name the first bad edge); TXM_TOO_SMALL if the surface cannot
+           repaired (message and report name the first bad edge); TXM_TOO_SMALL if the surface cannot
            be covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
            TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                      */
 TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh);
 
-/* A result as a mesh of texmath.h, which shows its arrays: for trimesh_cover.h. */
+/* A view of a result as a mesh of texmath.h, without a copy of its arrays: for trimesh_cover.h. */
 TRIMESH_API txm_mesh trimesh_as_view(const trimesh_mesh *mesh);
 
 /* Release a mesh; NULL is allowed. */
@@ -201,10 +202,10 @@ TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh);
    trimesh_free. */
 typedef struct trimesh_job trimesh_job;
 
-/* Check the descriptor and mend the surface.
+/* Check the descriptor and repair the surface.
 
-   desc    what it points to must stay as it is until the job is gone, the struct itself and the
-           report need not
+   desc    what it points to must stay unchanged until the job is released, except for the struct
+           itself and the report
    job     receives the job, or NULL on any error; release it with trimesh_free
    return  as trimesh_retile                                                                   */
 TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job);
@@ -218,11 +219,11 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, tri
           same                                                                                 */
 TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more);
 
-/* How far a job is. All pointers are valid until the next call for the job. */
+/* The state of a job. All pointers are valid until the next call for the job. */
 typedef struct trimesh_state {
     const char *stage;       /* what the last step did: "mend", "sample", "join", "repel",
                                 "lattice", "subdivide", "finish"                               */
-    int round;               /* of repulsion, from 1; 0 before                                 */
+    int round;               /* of repulsion, from 1; 0 = not begun                            */
     float mean, largest;     /* movement of the points in the last round, in edge lengths      */
     size_t points;           /* 0 before there are any, and after an error                     */
     const float *positions;  /* 3 per point, in the caller's units                             */
@@ -230,17 +231,17 @@ typedef struct trimesh_state {
     const uint32_t *indices; /* 3 per triangle, of points                                      */
 } trimesh_state;
 
-/* What a viewer shows between two steps. Makes the arrays.
+/* What a viewer shows between two steps. Allocates the arrays of the state.
 
-   return  TXM_OK; TXM_OUT_OF_MEMORY, then the state is all zero and the job can go on          */
+   return  TXM_OK; TXM_OUT_OF_MEMORY: the state is then all zero, and the job can continue      */
 TRIMESH_API txm_status trimesh_get_state(trimesh_job *job, txm_env *env, trimesh_state *state);
 
 /* The mesh of a job that is done. Each call makes a new copy.
 
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free; it does not
-           need the job any more
-   return  TXM_OK; TXM_BAD_ARGUMENT if the job is not done; TXM_OUT_OF_MEMORY; if a step has failed
-           what that step returned                                                             */
+           depend on the job
+   return  TXM_OK; TXM_BAD_ARGUMENT if the job is not done; TXM_OUT_OF_MEMORY; if a step has failed,
+           the status that it returned                                                         */
 TRIMESH_API txm_status trimesh_get_mesh(trimesh_job *job, txm_env *env, trimesh_mesh **mesh);
 
 /* Release a job, done or not; NULL is allowed. */
@@ -250,33 +251,33 @@ TRIMESH_API void trimesh_free(trimesh_job *job);
 
 typedef struct trimesh_update_desc {
     trimesh_desc desc; /* of the new surface. vertices: 0 = at the density of the old mesh. scale,
-                          adapt, crease_angle, ... as for the old one, method is not looked at   */
+                          adapt, crease_angle, ... as for the old one; method is ignored         */
     float radius;      /* how far from the change vertices may move, in edge lengths, 1..1000;
                           0 = 4                                                                */
     float tolerance;   /* how far off the new surface an old vertex may lie, in edge lengths,
-                          0..0.5; 0 = 0.2. Smaller changes of the surface are not seen. Fitted
+                          0..0.5; 0 = 0.2. Smaller changes of the surface go unnoticed. Fitted
                           vertices lie up to about 0.1 off the surface where it bends           */
 } trimesh_update_desc;
 
 /* Retile a surface that was edited or cut, starting from the mesh made before: old vertices that lie
    on the new surface stay, new ones are added where there are none (at a seam, on faces of a cut),
-   and all within a radius of these are relaxed [1, chapter 6: splitting objects].
+   and all vertices within a radius of the new ones are relaxed [1, chapter 6: splitting objects].
 
             old            cut            updated             A: far ones, bit for bit where they
          .--+--+--.     .--+--+ .      .--+--+-.                 were, with the same triangles
-        /  /\ /\ / \   /  /\ / |      /  /\ / \|             B: nearer than the radius, old ones
-        A-----------B  A-------|      A---B--B-N                 that may move a little
+        /  /\ /\ / \   /  /\ / |      /  /\ / \|             B: old ones within the radius, which
+        A-----------B  A-------|      A---B--B-N                 may move a little
         \  \/ \/ \ /   \  \/ \ |      \  \/ \ /|             N: new ones
          '--+--+--'     '--+--+'       '--+--+-'
 
    A vertex stays if its distance to the new surface is at most the tolerance and its normal differs
    by at most 45 degrees. A vertex on a crease or border stays only if it is a corner again or lies on
-   a line of the same kind. No vertex stays that would be too near to the points of a new line.
+   a line of the same kind. Vertices too close to the points of a new line are removed.
 
-   old     a result for the surface as it was
+   old     a result for the surface before the change
    mesh    receives the mesh, or NULL on any error; its old_vertices say which vertex of old each
            one was
-   return  as trimesh_retile, but for desc.vertices = 0
+   return  as trimesh_retile, except that desc.vertices may be 0
    cost    O((old + surface) log), as retiling with TRIMESH_REPEL without the repulsion          */
 TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
                                       txm_env *env, trimesh_mesh **mesh);

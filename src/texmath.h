@@ -1,13 +1,13 @@
-/* texmath.h - v0.2.0 - the common ground of the texkit headers
+/* texmath.h - v0.2.0 - what all texkit headers share
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     Small things that every texkit header needs: status codes, the environment (allocator,
+     The basics that every texkit header needs: status codes, the environment (allocator,
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
      generator, a sort, vectors, quaternions, sRGB; and the few kernels that more than one of them
      uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the minimum cut of a grid,
-     the halving of an image, the Poisson equation on a masked image, and which sides of a mesh
-     share an edge.
+     the halving of an image, the Poisson equation on a masked image, and the edge adjacency of a
+     mesh.
 
    QUICK START                                 (tests build and run this very block)
      // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
@@ -50,8 +50,8 @@
    MEMORY
      Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
      txm_arena_zero, txm_flow_make (from an arena) and txm_poisson. txm_poisson holds
-     64 + 4 * channels bytes for each unknown pixel, and gives all of it back before it returns.
-     The sort, the minimum-error cut and the sides of a mesh work in memory of the caller.
+     64 + 4 * channels bytes for each unknown pixel, and frees all of it before it returns. The
+     sort, the minimum-error cut and the sides of a mesh work in the caller's memory.
 
    THREADS
      No global state. Two calls may overlap unless they share what one of them writes: an env, an
@@ -59,12 +59,13 @@
 
    SAME BYTES
      Integers, 8- and 16-bit samples, generator, hash and sort: the same bits everywhere. All else
-     is computed in double in a fixed order and rounded once, by txm_float, which a bug of gcc makes
-     necessary (vectors in double are not rounded). That gives the same bits wherever arithmetic is
-     IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (as gcc -std=c99 has it) and without
-     -ffast-math. What calls pow, sin, cos or acos depends on the C library in about one result of
-     10^8 (txm_sincos and txm_exp2 do not): use it for what is only displayed, not for decisions.
-     Sort, cut, eigenvectors and the sides of a mesh are the same also where there are ties.
+     is computed in double in a fixed order and rounded once, by txm_float, which works around a
+     bug of gcc (vectors in double are not rounded). That gives the same bits wherever arithmetic is
+     IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (the default of gcc -std=c99) and
+     without -ffast-math. Functions that call pow, sin, cos or acos depend on the C library in about
+     one result of 10^8 (txm_sincos and txm_exp2 do not): use them for display, not for decisions.
+     Sort, cut, eigenvectors and the sides of a mesh give the same result even where there are
+     ties.
 
    LIMITS
      An image may span PTRDIFF_MAX bytes; txm_poisson takes up to 2^31 - 1 unknowns; a mesh may have

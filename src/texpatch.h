@@ -3,10 +3,10 @@
 
    WHAT IT DOES
      Synthesises texture of any size from a photograph: bricks stay in their courses, tiles and
-     woven patterns on their lattice, gravel becomes other gravel [1]. Several maps of a material
+     woven patterns on their lattice, gravel becomes more gravel [1]. Several maps of a material
      (albedo, normals, height ...) are made in register. The result can be tileable, follow a
-     painted guide (texedges.h makes one from drawn strokes), keep given pixels, and have parts of
-     it made again; or it is any window of an endless plane.
+     painted guide (texedges.h makes one from drawn strokes) and keep given pixels, and parts of it
+     can be synthesised again after an edit; or it is any window of an endless plane.
 
    QUICK START                                 (tests build and run this very block)
      // Twice as much of a texture. cc -std=c99 quick.c -lm
@@ -42,12 +42,12 @@
 
    WHICH CALL
      texpatch_make        a picture, or several maps in register, in one call
-     texpatch_begin ...   the same in steps with a picture after each of them; texpatch_again makes
+     texpatch_begin ...   the same in steps, with a picture after each; texpatch_again synthesises
                           a part again, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
      texpatch_half        coarser levels of detail of a result
      texsyn.h makes stochastic texture from a model of a few kB instead of pieces of the photograph;
-     textiles.h makes sets of tiles that are laid when the picture is drawn.
+     textiles.h makes sets of tiles that are assembled when the picture is drawn.
 
    HOW IT WORKS
      Coordinates are synthesised, not colours [5]: each pixel of the output refers to a pixel of the
@@ -55,15 +55,15 @@
      N / 2 apart, in scan order, each the best match of all positions, joined along minimum-error
      cuts. Positions off the exemplar's lattice, which is found in its autocorrelation, cost more,
      and so do those that were used more often than others. Second pass [1, 3.5; 2], coarse to fine:
-     neighbourhoods of 16, then 8 pixels search their best match among what their pixels already
+     neighbourhoods of 16, then 8 pixels search for their best match among what their pixels already
      show, at random positions [4] and one lattice step away. Each pixel takes, of the candidates of
      all neighbourhoods that cover it, the one nearest to their mean with the adaptive weights
      w = P |x - z|^(r - 2), r = 0.8, where P is the share of well-matched neighbourhoods among those
      of high frequency nearby. As it takes one candidate and not the mean, nothing is blurred.
      Differences are sums of absolute differences of bytes. At the end pieces are bent by up to 4
-     pixels so that lines meet at seams, and small steps of colour there are spread.
-     A tileable output, a part made again and a cell of the plane are the same job with some pixels
-     given.
+     pixels so that lines meet at seams, and small steps of colour there are smoothed.
+     A part that is synthesised again and a cell of the plane are the same kind of job, with some
+     pixels given.
 
    LIMITS
      Touching stones are sometimes merged; perspective is not corrected; a lattice whose rows are
@@ -87,7 +87,7 @@
 
    THREADS
      No global state. Calls with different env and outputs may overlap; many threads may draw the
-     same plane, a job belongs to one call at a time.
+     same plane, but a job may be used by only one call at a time.
 
    SAME BYTES
      All decisions are made in integers, or in float and double rounded once: the same bytes on any
@@ -132,19 +132,19 @@ enum {
     TEXPATCH_MAX_EXEMPLARS = 8,
     TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
     TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
-    TEXPATCH_MAX_SIDE = 8192    /* of an exemplar; their heights together (with turns: the
-                                   larger sides, times turns) may be 32767                   */
+    TEXPATCH_MAX_SIDE = 8192    /* of an exemplar; the sum of their heights (with turns: of
+                                   their larger sides, times turns) may be 32767             */
 };
 
 /* How one of the maps is treated; all zero: a picture that follows the others. */
 typedef struct texpatch_map {
-    float weight;  /* 0..16: of a difference in this map when pieces are matched; 0 = it follows
-                      the others                                                             */
+    float weight;  /* 0..16: how much differences in this map count when pieces are matched;
+                      0 = it follows the others                                              */
     int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
                       as vectors, kept at unit length, turned with the piece. x to the right,
                       y up (OpenGL); 2 = y down (DirectX)                                     */
-    int is_label;  /* values are labels, not amounts: never blended or interpolated          */
-    int is_data;   /* amounts (height, roughness), not colours: averaged without decoding    */
+    int is_label;  /* values are labels, not quantities: never blended or interpolated       */
+    int is_data;   /* quantities (height, roughness), not colours: averaged without decoding */
 } texpatch_map;
 
 /* One exemplar: a photograph, or several maps of one material in register. */
@@ -171,22 +171,22 @@ typedef struct texpatch_desc {
                    size); -1 = none: patches, cuts and blending alone, in less than half the time */
     int turns;  /* 1, 2 or 4: pieces may be turned by half or quarter turns; 0 = 1               */
     int mirror; /* pieces may be mirrored left to right                                          */
-    float novelty; /* 0..1: how small verbatim pieces of the exemplar shall be: at 1 no piece is
-                      larger than a neighbourhood, which costs detail and likeness               */
+    float novelty; /* 0..1: how strongly large verbatim pieces of the exemplar are avoided: at 1
+                      no piece is larger than a neighbourhood, at the cost of detail and likeness */
     int lattice;   /* 0 = find the lattice of the exemplar, if it has one, and keep it; 1 = it has
-                      the one given below; -1 = treat it as having none. A lattice is searched in
-                      a single exemplar that is neither turned nor mirrored                      */
+                      the one given below; -1 = treat it as having none. A lattice is searched for
+                      only in a single exemplar that is neither turned nor mirrored              */
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
-    txm_image guide;    /* what the exemplars' guides shall look like here: width x height, with
-                           their channels and sample type; pixels NULL: none                     */
+    txm_image guide;    /* what the exemplars' guides should look like in the output: width x
+                           height, with their channels and sample type; pixels NULL: none        */
     txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide does not count here;
                            pixels NULL: it counts everywhere                                     */
-    float guide_weight; /* 0..16: of a difference in the guide, relative to a map of weight 1;
-                           0 = 2                                                                 */
+    float guide_weight; /* 0..16: how much differences in the guide count, relative to a map of
+                           weight 1; 0 = 2                                                       */
     const txm_image *kept; /* map_count pictures of width x height, kept where keep is non-zero;
                            NULL: none. They need not come from the exemplar                      */
     txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
-    uint64_t seed;         /* another seed, another texture                                      */
+    uint64_t seed;         /* another seed gives another texture                                 */
 } texpatch_desc;
 
 /* Make a texture in one call.
@@ -207,19 +207,19 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
    pictures. */
 typedef struct texpatch_job texpatch_job;
 
-/* Prepare a job: pyramids, lattice. The same statuses as texpatch_make. */
+/* Prepare a job: pyramids, lattice. The statuses are those of texpatch_make. */
 TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
                                        texpatch_job **out);
 
 /* One step of the work, coarse first: at 512 x 512 some 5 to 60 ms. After an error (cancelling
    included) the job is as before the step and the step may be tried again.
-   env    its progress callback receives how much of all steps is done
+   env    its progress callback receives the fraction of all steps that is done
    more   receives 0 once nothing is left to do; NULL is allowed                              */
 TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more);
 
-/* Draw a map as it is now, after one step or more (before the first, TXM_BAD_ARGUMENT). out may be
-   a window of the output: its top left pixel is pixel (x, y) of it, and all of out must lie
-   inside. */
+/* Draw a map in its current state, after one step or more (before the first, TXM_BAD_ARGUMENT). out
+   may be a window of the output: its top left pixel is pixel (x, y) of the output, and the window
+   must lie inside. */
 TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
                                       txm_image out);
 
@@ -234,8 +234,8 @@ typedef struct texpatch_source {
 } texpatch_source;
 TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
 
-/* Make a part again: the pixels where `again` is non-zero (TXM_U8, 1 channel, the size of the
-   output). Steps that are left are done first. All other pixels are kept, and the part is fitted to
+/* Synthesise a part again: the pixels where `again` is non-zero (TXM_U8, 1 channel, the size of the
+   output). Any remaining steps are done first. All other pixels are kept, and the part is fitted to
    them. The following steps do the work, in time proportional to the part's bounding box.
    guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = unchanged */
 TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
@@ -251,21 +251,21 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 /* ---- levels of detail -------------------------------------------------------------------- */
 
 /* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
-   pixels, in linear light for 8- and 16-bit colours that are not data; normals are normalised
-   again, of labels one is taken. So all levels agree with each other and with what a renderer makes
-   of level 0. map may be NULL: a picture. half is untouched after an error: TXM_BAD_ARGUMENT,
-   TXM_TOO_LARGE */
+   pixels, in linear light for 8- and 16-bit colours that are not data; normals are
+   renormalised; of four labels one is taken. So all levels agree with each other and with what a
+   renderer makes of level 0. map may be NULL: a picture. half is untouched after an error:
+   TXM_BAD_ARGUMENT, TXM_TOO_LARGE */
 TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
                                       txm_env *env, const txm_image *half);
 
-/* ---- the unbounded plane ----------------------------------------------------------------- */
+/* ---- the endless plane ------------------------------------------------------------------- */
 
-/* An endless texture without a period. Windows of it that overlap agree to the byte, on whatever
-   machines they are made, so a large picture can be made tile by tile.
+/* An endless texture without a period. Overlapping windows of it agree to the byte, even if they
+   are made on different machines, so a large picture can be made tile by tile.
 
-   The plane is divided into square cells. Pieces around the cells' corners are made first, from the
-   seed and their position alone; then strips along the sides between two of them; then the
-   insides. */
+   The plane is divided into square cells. The areas around the cells' corners are made first,
+   from the seed and their position alone; then strips along the sides between two corners; then the
+   interiors. */
 typedef struct texpatch_plane texpatch_plane;
 
 /* desc as for a job; width, height, tileable, guide and kept are ignored. */
@@ -275,7 +275,7 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
 /* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
    map_count pictures of one size. sources may be NULL, or width * height of them.
    cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
-          of whole cells waste least                                                          */
+          of whole cells are cheapest                                                          */
 TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
                                             txm_env *env, const txm_image *out,
                                             texpatch_source *sources);

@@ -2,10 +2,10 @@
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     Reads one photograph of a texture and keeps, for some dozens of relative positions of two to
+     Reads one photograph of a texture and records, for a few dozen relative positions of two to
      four pixels ("clique types"), how often each difference of their values occurs: two to four
-     thousand bytes. From these alone it makes new texture of any size, seamless if wanted. No pixel
-     of the photograph is kept, so none can be copied.
+     thousand bytes. From these alone it makes new texture of any size, optionally tileable. No
+     pixel of the photograph is kept, so none can be copied.
 
    QUICK START                                 (tests build and run this very block)
      // Learn a texture and make a larger one. cc -std=c99 quick.c -lm
@@ -47,18 +47,18 @@
      reproduce closed contours, long thin lines or exact layouts: cobbles merge, bricks lose their
      rows. A photograph whose lighting or material changes gives a texture with patches of both; a
      mask leaves out what does not belong. About 256 x 256 pixels that show the largest element a
-     few dozen times are enough; 64 x 64 are hardly enough for any statistics.
+     few dozen times are enough; 64 x 64 are too few for good statistics.
 
    HOW IT WORKS
      The example is split into decorrelated colour bands of at most 32 values and into pyramid
      levels. On each level, coarse first, a canvas is synthesised with the clique types so far, the
-     histograms of all others are compared with the example's, those that differ most are added, and
-     so on [1]. Synthesis is Gibbs sampling [4] in which the potentials of the clique types are
-     controlled so that the histograms of the canvas follow those of the example.
-     Beyond [1], which has pairs: a coarse joint histogram of two neighbouring values, which
-     distinguishes rare values from frequent ones; and cliques of three and four pixels (corners,
-     parallel differences, differences together with those of the coarser level), for what pairs
-     cannot express.
+     histograms of all other types are compared with the example's, the types that differ most are
+     added, and so on [1]. Synthesis is Gibbs sampling [4] in which the potentials of the clique
+     types are controlled so that the histograms of the canvas follow those of the example.
+     In addition to the pairs of [1] there is a coarse joint histogram of two neighbouring values,
+     which distinguishes rare values from frequent ones; and there are cliques of three and four
+     pixels (corners, parallel differences, differences together with those of the coarser level),
+     for what pairs cannot express.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
@@ -70,8 +70,8 @@
      A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
      sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
      takes 2 bytes per band and pixel for the current level and the next coarser one, without
-     margins: 8 to 9 bytes per RGB pixel in all, and 1 MB; a picture that need not tile is cut from
-     a canvas of at least 64 x 64. After an error nothing stays allocated and *out is NULL.
+     margins: 8 to 9 bytes per RGB pixel in all, and 1 MB; a picture that does not tile is cut
+     from a canvas of at least 64 x 64. After an error nothing stays allocated and *out is NULL.
 
    TIME   (one core of 2023; make bench measures yours)
      Learning 256 x 256 RGB about 1.3 s; synthesis about 1.5 s per RGB megapixel. Both grow with
@@ -143,9 +143,9 @@ typedef struct texsyn_learn_desc {
                           36 for a gray example                                                   */
     int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
                           fewer are made if a level would be under 8 px or hold little of a mask  */
-    float threshold;   /* stop adding types when no histogram differs by more, or by less than the
-                          sampling noise; 0 = 0.005                                               */
-    uint64_t seed;     /* of the random numbers; any value                                        */
+    float threshold;   /* types whose histograms differ by less than this, or by less than the
+                          sampling noise, are not added; 0 = 0.005                                */
+    uint64_t seed;     /* for the random numbers; any value                                       */
 } texsyn_learn_desc;
 
 /* Learn a model: the analysis of [1], section 3, steps 1 to 6, on every pyramid level.
@@ -158,7 +158,7 @@ typedef struct texsyn_learn_desc {
    cost   see MEMORY and TIME above; a larger max_distance or max_types costs in proportion      */
 TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env, texsyn_model **out);
 
-/* Release a model by the allocator it was made with; NULL is allowed. */
+/* Release a model with the allocator it was made with; NULL is allowed. */
 TEXSYN_API void texsyn_model_free(texsyn_model *model);
 
 /* ---- looking into a model --------------------------------------------------------------- */
@@ -204,7 +204,7 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
                                   size_t capacity, size_t *size);
 
 /* Read a model back. *out receives it, or NULL on any error; release it with texsyn_model_free.
-   return TXM_OK; TXM_BAD_DATA for anything but a whole, intact model whose numbers are in range;
+   return TXM_OK; TXM_BAD_DATA for anything but a complete, intact model with all numbers in range;
           TXM_BAD_ARGUMENT for NULL; TXM_OUT_OF_MEMORY                                        */
 TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, texsyn_model **out);
 
@@ -226,22 +226,22 @@ typedef struct texsyn_synth_desc {
    cost   O(width * height * clique types); see MEMORY and TIME above                         */
 TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *env, txm_image out);
 
-/* Synthesise in steps, for progressive display: begin, step while there is more to do, draw
-   whenever a picture is wanted, free. The picture is the same as that of the single call. */
+/* Synthesise in steps, for progressive display: begin, step while there is more to do, draw at any
+   time, free. The final picture is the same as that of the single call. */
 typedef struct texsyn_job texsyn_job;
 
-/* Check the description and make the job; *job is NULL on any error (as texsyn_synthesize has
-   them). The job keeps the allocator of env; the other calls may be given another env. */
+/* Check the descriptor and make the job; *job is NULL on any error. The statuses are those of
+   texsyn_synthesize. The job keeps the allocator of env; later calls may be given another env. */
 TEXSYN_API txm_status texsyn_begin(const texsyn_synth_desc *desc, txm_env *env, texsyn_job **job);
 
-/* Do one sweep; the environment is told how much of the whole job is done. After TXM_OUT_OF_MEMORY
-   the step may be tried again; after TXM_CANCELLED also, but a sweep was interrupted and the
-   picture will not be the one of the same seed.
+/* Do one sweep; the progress callback receives the fraction of the whole job that is done. After
+   TXM_OUT_OF_MEMORY the step may be tried again; after TXM_CANCELLED too, but as a sweep was
+   interrupted the picture will differ from an uninterrupted one with the same seed.
    more   receives 1, or 0 once nothing is left to do; untouched after an error; NULL is allowed */
 TEXSYN_API txm_status texsyn_step(texsyn_job *job, txm_env *env, int *more);
 
-/* Draw the picture so far at full size; at any time, the finished one at the end. TXM_BAD_ARGUMENT
-   if it does not fit out; out is as for texsyn_synthesize. */
+/* Draw the picture in its current state, at full size; once no step is left, the finished one.
+   TXM_BAD_ARGUMENT if it does not fit out; out is as for texsyn_synthesize. */
 TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image out);
 
 /* Release a job; NULL is allowed. */

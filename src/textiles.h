@@ -1,4 +1,4 @@
-/* textiles.h - v0.2.0 - cut tiles that join without seams out of photographs, and lay them
+/* textiles.h - v0.2.0 - cut tiles that join without seams out of photographs, and place them
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
@@ -69,11 +69,12 @@
      frame     for the quads of a model whose edges have fixed colours [5]: a class of tiles for
                each kind of quad, each class with any number of interiors.
      Two colours with two variants show no period at a glance; three colours are better where the
-     surface is seen for long. A tile should be about three times as wide as the largest element of
-     the texture, and the exemplar three times as wide as a tile. The exemplar may be as small as
-     64 x 64, but then the tiles repeat its content. Regular layouts, bricks for example, become
-     irregular. (stb_herringbone_wang_tile.h assembles maps from hand-made templates, in a third of
-     a microsecond per tile; it makes no tiles from pictures. textiles_import takes hand-made ones.)
+     surface is seen for a long time. A tile should be about three times as wide as the largest
+     element of the texture, and the exemplar three times as wide as a tile. The exemplar may be as
+     small as 64 x 64, but then the tiles repeat its content. Regular layouts, bricks for example,
+     become irregular. (stb_herringbone_wang_tile.h assembles maps from hand-made templates, in a
+     third of a microsecond per tile; it makes no tiles from pictures. textiles_import accepts
+     hand-made ones.)
 
    HOW IT WORKS
      First a place of the exemplar with typical colour and roughness is chosen for each corner.
@@ -85,7 +86,7 @@
      show all of the exemplar and the set keeps its mean colour, roughness and contrast. Graph cuts
      (expansion moves [7]) join it to the border [8], instead of the diamonds of [1]; then the worst
      places along the cuts are covered with further pieces. Steps of colour that remain at the cuts
-     are spread by a Poisson equation [9]. Triangles are made on a triangular lattice, on which
+     are smoothed by a Poisson equation [9]. Triangles are made on a triangular lattice, on which
      turning by 60 degrees needs no resampling.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
@@ -96,7 +97,7 @@
 
    MEMORY
      A set holds the pixels of its tiles and, for each pixel, 4 bytes that say where it comes from.
-     While it is made there are also about 35 bytes per pixel of the exemplars and 9 per channel of
+     While it is made it also takes about 35 bytes per pixel of the exemplars and 9 per channel of
      their first map, and 1 MB and 190 bytes per pixel of a tile for each of up to eight tiles that
      are made at the same time. The plane needs no memory.
 
@@ -108,7 +109,7 @@
      No global state. Calls with different env and outputs may overlap, and may share a set.
 
    SAME BYTES
-     All choices are made in integers, or in double and rounded once: the same bytes on any number
+     All decisions are made in integers, or in double and rounded once: the same bytes on any number
      of threads and on any compiler that keeps to IEEE 754 (see texmath.h), built with
      -ffp-contract=off.
 
@@ -117,7 +118,7 @@
      64 x 64 pixels or more. Joints are as rough as interiors within a few percent on average and
      35 % for any pair (textiles_measure reports it), unless the tiles are smaller than 64 pixels or
      the exemplar has smooth and rough areas larger than a tile. Cuts compare at most 8 channels;
-     float maps are scaled to their range before.
+     float maps are scaled to their range first.
 
    REFERENCES
      [1] M. F. Cohen, J. Shade, S. Hiller, O. Deussen. Wang tiles for image and texture generation.
@@ -216,7 +217,7 @@ typedef struct textiles_exemplar {
 typedef enum textiles_repair {
     TEXTILES_REPAIR_DEFAULT = 0, /* = POISSON                                                   */
     TEXTILES_REPAIR_NONE,        /* every pixel is a pixel of the exemplar                      */
-    TEXTILES_REPAIR_POISSON      /* steps of colour at cuts inside a tile are spread over a few
+    TEXTILES_REPAIR_POISSON      /* steps of colour at cuts inside a tile are smoothed over a few
                                     pixels; the pixels at its border stay as they are           */
 } textiles_repair;
 
@@ -250,11 +251,11 @@ typedef struct textiles_set textiles_set;
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, maps that do not fit together or
           samples that are not finite; TXM_TOO_SMALL for an exemplar under 64 x 64;
           TXM_TOO_LARGE above TEXTILES_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
-   cost   O(exemplar + tiles * (size^2 + exemplar)), of which no more than 131,072 places are looked
-          at in one search; see MEMORY and TIME                                               */
+   cost   O(exemplar + tiles * (size^2 + exemplar)), where one search examines at most 131,072
+          places; see MEMORY and TIME                                                         */
 TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, textiles_set **out);
 
-/* Make a set of finished pictures, for example hand-made ones; all that follows works for it too.
+/* Make a set of finished pictures, for example hand-made ones; all functions below work for it too.
    Of desc only kind, size, colors, variants, reduced and classes are read. tiles holds the pictures
    of map_count maps tile by tile, tiles[tile * map_count + map], in the order of textiles_tile_at:
    size x size, of a triangle (size + 1) x (size + 1) with texel (i, j) at column i, row j; texels
@@ -263,14 +264,14 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
                                         int tile_count, int map_count, txm_env *env,
                                         textiles_set **out);
 
-/* Release a set by the allocator it was made with; NULL is allowed. */
+/* Release a set with the allocator it was made with; NULL is allowed. */
 TEXTILES_API void textiles_set_free(textiles_set *set);
 
 /* ---- properties of a set ----------------------------------------------------------------- */
 
 TEXTILES_API textiles_kind textiles_kind_of(const textiles_set *set);
 TEXTILES_API int textiles_count(const textiles_set *set); /* tiles, variants included        */
-TEXTILES_API int textiles_size(const textiles_set *set);  /* pixels a side, as asked for     */
+TEXTILES_API int textiles_size(const textiles_set *set);  /* pixels a side, as requested     */
 TEXTILES_API int textiles_colors(const textiles_set *set);
 TEXTILES_API int textiles_variants(const textiles_set *set);
 TEXTILES_API int textiles_map_count(const textiles_set *set);
@@ -311,7 +312,7 @@ typedef enum textiles_packing {
     TEXTILES_TORUS,      /* Wei's layout [6] of complete wang and corner sets (corner: 2 or 3
                             colours): every tile's neighbours match it, across the borders of the
                             picture too, so that filtering and mip-maps need no gutter           */
-    TEXTILES_SLICES      /* one under the other, each with its gutter: layer t of a texture array
+    TEXTILES_SLICES      /* one below the other, each with its gutter: layer t of a texture array
                             is rows t * pitch_y to (t + 1) * pitch_y - 1. (OpenGL guarantees no
                             more than 256 layers.)                                               */
 } textiles_packing;
@@ -361,7 +362,7 @@ TEXTILES_API txm_status textiles_draw_tile(const textiles_set *set, int tile, in
 
 /* A plane without end and without period, covered by a set: which tile lies where is computed from
    the position and the seed alone, in constant time. Needs a complete wang, corner or triangle set
-   (a reduced triangle set will do). A plain value that may be copied; valid as long as the set. */
+   (a reduced triangle set is enough). A plain value that may be copied; valid as long as the set. */
 typedef struct textiles_plane {
     int colors, variants;
     textiles_kind kind;
@@ -372,8 +373,8 @@ typedef struct textiles_plane {
 TEXTILES_API txm_status textiles_plane_make(const textiles_set *set, uint32_t seed, txm_env *env,
                                             textiles_plane *plane);
 
-/* The tile of the square at column x, row y; any int, they wrap around. With two variants or more
-   no three equal tiles lie in a row or column. -1 on a plane of triangles. */
+/* The tile of the square at column x, row y, which may be any int: coordinates wrap around. With two
+   variants or more no three equal tiles lie in a row or column. -1 on a plane of triangles. */
 TEXTILES_API int textiles_plane_tile(const textiles_plane *plane, int x, int y);
 
 /* The same for a window of width x height squares; the fastest way. */
@@ -427,14 +428,14 @@ TEXTILES_API txm_status textiles_scanline(const textiles_set *set, int width, in
              contradict each other (the message says where); TXM_BAD_DATA: no tiling found, because
              there is none or because 64 searches gave up; TXM_TOO_LARGE above 2^27 cells;
              TXM_OUT_OF_MEMORY; TXM_CANCELLED
-   cost      O(width * height * tiles) for complete sets; others are searched              */
+   cost      O(width * height * tiles) for complete sets; others need a search             */
 TEXTILES_API txm_status textiles_solve(const textiles_set *set, int width, int height, int periodic,
                                        uint64_t seed, txm_env *env, int *tiles);
 
 /* ---- meshes ------------------------------------------------------------------------------ */
 
-/* Cover a triangle mesh. Every edge gets a color by hash and the direction from its lower to its
-   higher vertex number, every face a tile with these edges. Any connectivity will do: borders,
+/* Cover a triangle mesh. Every edge gets a colour by hash and the direction from its lower to its
+   higher vertex number, every face a tile with these edges. Any connectivity is allowed: borders,
    edges of more than two faces, inconsistent winding. Equal tiles are not neighbours where colours
    and variants can avoid it.
 

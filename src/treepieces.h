@@ -76,8 +76,8 @@
      Open rims get their pieces in order of decreasing radius, so that a limit on the number of
      pieces thins out the twigs and keeps the shape of the tree: this is the coarse level of detail.
      The fine one is tessellation by distance, symmetric along each edge [1, 4.4]. Wind is a sum of
-     gusts that travel across the land; each joint responds as a damped oscillator, the thinner the
-     faster, solved exactly over each time step.
+     gusts that travel across the land; each joint responds as a damped oscillator, faster the
+     thinner it is, solved exactly over each time step.
      Bark: all tiles of a set share one frame, so that any tile, and any rectangle of tiles, fits
      beside any other. A quad shows 1 to 16 of them across and 1 to 8 along, depending on its size,
      and blended tiles in the crotches, where directions of growth meet [1, 5].
@@ -230,7 +230,7 @@ TREEPIECES_API txm_status treepieces_kit_make(const treepieces_piece *pieces, in
                                               txm_env *env, treepieces_kit **out);
 
 /* Release a kit with the allocator it was made with; NULL is allowed. Forests made with it must not
-   be used any more. */
+   be used after that. */
 TREEPIECES_API void treepieces_kit_free(treepieces_kit *kit);
 
 /* Number of pieces in a kit, the built-in ones included; 0 for NULL. */
@@ -352,7 +352,7 @@ typedef struct treepieces_site {
 typedef struct treepieces_choice {
     int type;           /* of the kit; a piece without leaf rims ends the axis                    */
     int turn;           /* 0..5: multiples of 60 degrees about the stem; -1: as the roll of the
-                           branches asks for                                                      */
+                           branches requires                                                      */
     float direction[3]; /* of the stem, world space, of any length; limited to 60 degrees from the
                            direction of the site                                                  */
     float length;       /* of the piece, metres                                                   */
@@ -520,8 +520,8 @@ TREEPIECES_API txm_status treepieces_sway(const treepieces_forest *forest,
 /* The vertices of one instance in world space by linear blend skinning; the reference for shaders.
    Vertex j of leaf rim k is vertex (j - turn) mod 6 of the child's root rim, moved by the child's bone
    alone: the same expression of the same numbers as in the child, so that both are equal to the bit.
-   Other vertices blend: their position in model space moved by the own bone, and their position in the
-   frame of each child moved by the child's bone, with the stretch of the own piece.
+   Other vertices blend: their position in model space moved by its own bone, and their position in the
+   frame of each child moved by the child's bone, with the stretch of its own piece.
 
    type, instance      one record of forest->batches[type]
    positions, normals  3 floats per vertex of the piece; normals (may be NULL) of unit length     */
@@ -544,10 +544,10 @@ TREEPIECES_API int treepieces_edge_level(const treepieces_lod *lod, const float 
                                          const float b[3]);
 TREEPIECES_API int treepieces_inner_level(const treepieces_lod *lod, const float corners[12]);
 
-/* The triangles of a quad with levels 1..64 for the edges from corner 0 to 1, 1 to 2, 2 to 3, 3 to 0 and
-   for the inside; vertices are spaced as OpenGL's equal_spacing has them.
-   coords   u, v of each vertex: corner 0 (0, 0), 1 (0, 1), 2 (1, 1), 3 (1, 0); NULL = not wanted
-   indices  3 per triangle; NULL = not wanted
+/* The triangles of a quad with levels 1..64 for the edges from corner 0 to 1, 1 to 2, 2 to 3, 3 to 0
+   and for the inside; vertices are spaced as by OpenGL's equal_spacing.
+   coords   u, v of each vertex: corner 0 (0, 0), 1 (0, 1), 2 (1, 1), 3 (1, 0); may be NULL
+   indices  3 per triangle; may be NULL
    return   the number of vertices; *triangles receives that of triangles                         */
 TREEPIECES_API int treepieces_pattern(const int edges[4], int inner, float *coords,
                                       uint16_t *indices, int *triangles);
@@ -578,7 +578,7 @@ typedef struct treepieces_bake_desc {
     int tree;                  /* which of them                                                   */
     const float *bones;        /* of the whole forest                                             */
     const treepieces_lod *lod; /* NULL = no tessellation                                          */
-    int capped;                /* close the base as well                                          */
+    int capped;                /* non-zero: close the base as well                                */
     int sheet_size;            /* width of the bark sheet in pixels, as v stays half a pixel inside the
                                   tiles; 0 = 512                                                  */
     int sheet_layers;          /* 0 = TREEPIECES_OWN                                              */
@@ -660,7 +660,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
    color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255.
               Covers -1..1 along right and up
    depth      float, 1 channel, size of color: distance from the centre of the cloud towards the eye, in
-              radii of the cloud; -2 where nothing is                                            */
+              radii of the cloud; -2 where there is nothing                                      */
 typedef struct treepieces_impostor_desc {
     const treepieces_card *cards;
     int card_count;

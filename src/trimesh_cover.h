@@ -1,12 +1,12 @@
-/* trimesh_cover.h - v0.2.0 - textures, attributes and things on the triangles of a mesh
+/* trimesh_cover.h - v0.2.0 - textures, attributes and instances on the triangles of a mesh
    SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
 
    WHAT IT DOES
-     Takes any triangle mesh and covers it: lays triangular patches and edge-matching tiles on its
-     triangles, carries texture coordinates and colours over from another mesh of the same surface,
-     and places things (lipids, scales, blades of grass) on every triangle for instanced drawing.
-     All of it looks best on triangles of about one size and shape, as trimesh_relax.h makes them;
-     neither header needs the other.
+     Takes any triangle mesh and covers it: textures its triangles with triangular patches or
+     edge-matching tiles, transfers texture coordinates and colours from another mesh of the same
+     surface, and places objects (lipids, scales, blades of grass) on every triangle for instanced
+     drawing. All of it looks best on triangles of about one size and shape, as trimesh_relax.h makes
+     them; neither header needs the other.
 
    QUICK START                                 (tests build and run this very block)
      // Put 12 things on each triangle of a tetrahedron. cc -std=c99 quick.c -lm
@@ -45,25 +45,25 @@
      trimesh_normals                    smooth normals for a mesh that has none
      trimesh_transfer                   colours, weights: from the vertices of another mesh
      trimesh_transfer_corners           texture coordinates with seams, from another mesh
-     trimesh_split_corners              from values at corners to the vertex arrays of a renderer
+     trimesh_split_corners              vertex arrays for a renderer, from values at corners
      trimesh_atlas_make, _uv            where patches lie in one picture
      trimesh_choose                     a patch and a rotation for every triangle
      trimesh_place_tiles                texture coordinates from tiles and rotations
      trimesh_edge_colors, _random_colors, _proper_colors      colours of edges and of vertices
-     trimesh_scatter                    what stands where, from a patch on every triangle
+     trimesh_scatter                    instances of objects, from a patch on every triangle
      trimesh_reference_patch, trimesh_order_patch             patches for it
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TRIMESH_COVER_STATIC   every function static to the including file (set it everywhere)
      TRIMESH_MAX_VERTICES   refuse more vertices or triangles; default 2^26; as in trimesh_relax.h
 
-   MEMORY     Results lie in arrays of the caller's. What a call needs besides is said with it: some
-              10 to 75 bytes per triangle, given back before it returns.
+   MEMORY     Results are written to the caller's arrays. What else a call needs is stated with it:
+              10 to 75 bytes per triangle, which are freed before it returns.
    THREADS    No global state; calls with different env and outputs may overlap. Values and instances
               are computed on the environment's parallel-for.
    SAME BYTES The same results for any number of threads, and on any compiler that keeps to IEEE 754
-              (see texmath.h), built with -ffp-contract=off: integers, hashes, and doubles, of which
-              only square roots are taken, rounded to float once.
+              (see texmath.h), built with -ffp-contract=off: integers, hashes, and doubles, with no
+              function of libm but the square root, rounded to float once.
 
    REFERENCES
      [1] M. Glinzner. Texturing of 3D objects using simple physics and equilateral triangle patches.
@@ -98,9 +98,9 @@ extern "C" {
 /* ---- meshes ------------------------------------------------------------------------------- */
 
 /* All functions take any mesh of triangles, a result of trimesh_retile or your own. Borders, several
-   pieces, edges with more than two triangles, inconsistent orientation and unused vertices are
-   allowed; two triangles are neighbours if they share two vertex numbers. Outputs are arrays of the
-   caller's, of the size stated, untouched after an error unless said otherwise. Every call returns
+   components, edges with more than two triangles, inconsistent orientation and unused vertices are
+   allowed; two triangles are neighbours if they share two vertex numbers. Outputs are the caller's
+   arrays, of the size stated, untouched after an error unless said otherwise. Every call returns
    TXM_OK; TXM_BAD_ARGUMENT for a NULL, a field outside its range, an index that is not below
    vertex_count, a position that is not finite; TXM_TOO_LARGE above TRIMESH_MAX_VERTICES vertices
    or triangles; TXM_OUT_OF_MEMORY; TXM_CANCELLED; further statuses are listed with the call. A mesh
@@ -111,11 +111,11 @@ extern "C" {
    two edges' lengths), which is exact on spheres [3]. O(triangles), 24 bytes per vertex. */
 TRIMESH_COVER_API txm_status trimesh_normals(const txm_mesh *mesh, txm_env *env, float *normals);
 
-/* ---- attributes: values of the input at the vertices of the result ------------------------- */
+/* ---- attributes: from the input to the result ---------------------------------------------- */
 
 enum { TRIMESH_MAX_CHANNELS = 64 };
 
-/* What is known at the vertices or corners of the input: texture coordinates, colours, weights. */
+/* Values at the vertices or corners of the input: texture coordinates, colours, weights. */
 typedef struct trimesh_values {
     const float *values;     /* channels per entry, finite                                      */
     size_t count;            /* entries; without indices: vertex_count of the input             */
@@ -125,7 +125,7 @@ typedef struct trimesh_values {
 } trimesh_values;
 
 /* Values at points of the input: a + u (b - a) + v (c - a) of the three corners' values a, b, c.
-   For what is continuous: colours, weights; for texture coordinates with seams use the next function.
+   For continuous values (colours, weights); for texture coordinates with seams use the next function.
 
    input    the mesh that trimesh_retile was given (positions are not used)
    sources  count of them, a result's: mesh->sources and mesh->vertex_count
@@ -137,7 +137,7 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
 
 /* Values with seams (charts of texture coordinates) at the corners of a result's triangles, so that
    no triangle spans two charts. A seam is an edge of the input whose two triangles have different
-   values there, or that has no or several triangles on its other side. Vertices in equal places
+   values there, or that is an edge of one triangle or of more than two. Vertices in the same place
    count as one, so that meshes cut along their seams (glTF) work as well.
 
    Each triangle takes the chart of the input at its middle: a path leads there from the source of its
@@ -164,8 +164,8 @@ TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input,
                                                       const txm_mesh_place *sources, txm_env *env,
                                                       float *out);
 
-/* From values at corners to the vertex arrays of a renderer: a vertex whose corners differ is
-   doubled, one copy for each different value (bits are compared, -0 equals 0). New vertices are in
+/* Make the vertex arrays of a renderer from values at corners: a vertex whose corners differ is
+   split, with one copy for each different value (bits are compared, -0 equals 0). New vertices are in
    the order of the old ones; old ones without triangles are left out.
 
    mesh         indices and counts; positions are not used and may be NULL
@@ -193,7 +193,7 @@ TRIMESH_COVER_API txm_status trimesh_split_corners(const txm_mesh *mesh, const f
             / p \        height = ceil(h) + 2 gutter
            0 --- 1       texture coordinates: x / width, y / height, v downwards (glTF)        */
 typedef struct trimesh_atlas {
-    int count, size, gutter;  /* as asked for, defaults resolved */
+    int count, size, gutter;  /* as requested, defaults resolved */
     int pitch, width, height; /* pixels */
 } trimesh_atlas;
 
@@ -211,7 +211,7 @@ typedef struct trimesh_choose_desc {
     int rotations; /* 1: corner k always shows corner k; 3: all three rotations; 0 = 3            */
     int repeat;    /* 0: neighbours have different patches where possible, else different rotations;
                       non-zero: all at random, as in [1]                                          */
-    uint64_t seed; /* another number, another choice                                              */
+    uint64_t seed; /* another seed gives another choice                                           */
 } trimesh_choose_desc;
 
 /* Choose a patch and a rotation for every triangle, at random.
@@ -254,7 +254,7 @@ TRIMESH_COVER_API txm_status trimesh_random_colors(size_t vertex_count, int coun
                                                    txm_env *env, int *colors);
 
 /* A colour for every vertex so that the ends of every edge differ. Greedy, in smallest-last order
-   [5]:    the vertex with the fewest neighbours left is removed, over and over, and the last one
+   [5]: the vertex with the fewest remaining neighbours is removed repeatedly, and the last one
    removed is coloured first. At most 6 colours on surfaces of genus 0, mostly 4 or 5; 7 on a torus.
 
    colors  receives 1 per vertex, from 0; a vertex without triangles gets 0
@@ -265,15 +265,15 @@ TRIMESH_COVER_API txm_status trimesh_proper_colors(const txm_mesh *mesh, txm_env
 
 /* ---- geometry on triangles ----------------------------------------------------------------- */
 
-/* One thing on the reference triangle (0, 0), (1, 0), (1/2, sqrt(3)/2), at x = u + v / 2,
+/* One object on the reference triangle (0, 0), (1, 0), (1/2, sqrt(3)/2), at x = u + v / 2,
    y = v sqrt(3) / 2; z points away from the surface. Lengths are in edges of the triangle. */
 typedef struct trimesh_point {
     float u, v;         /* 0 or more, u + v at most 1; exactly 0 or 1 on the sides              */
     float height;       /* over the surface, in edge lengths, -1000..1000                       */
     float scale;        /* size, in edge lengths, 0..1000; 0 = 1                                */
-    float rotation[4];  /* quaternion x, y, z, w that rotates the thing in the frame x, y, z of the
+    float rotation[4];  /* quaternion x, y, z, w that rotates the object in the frame x, y, z of the
                            reference triangle, of any length; 0 0 0 0 = none                    */
-    uint32_t prototype; /* which thing; copied to the instances                                 */
+    uint32_t prototype; /* which object; copied to the instances                                */
 } trimesh_point;
 
 /* What is put on a triangle. With desc->density only some points are used, from the front of the
@@ -281,7 +281,7 @@ typedef struct trimesh_point {
 
    Points on the sides (within 10^-6 of an edge) are placed once: those on an edge by the first
    (lowest) of its triangles, those on a vertex by the first of its triangles. To avoid gaps and
-   doubles at edges, give all patches of a call the same points on all three sides, symmetric under
+   duplicates at edges, give all patches of a call the same points on all three sides, symmetric under
    t to 1 - t, and all corners or none; then every edge and vertex of the mesh shows them once,
    whatever patches and rotations meet there. */
 typedef struct trimesh_patch {
@@ -289,13 +289,13 @@ typedef struct trimesh_patch {
     size_t count; /* 0..2^20 */
 } trimesh_patch;
 
-/* A thing in space: scaled, then rotated, then moved. */
+/* An object in space: scaled, then rotated, then moved. */
 typedef struct trimesh_instance {
     float position[3];
     float rotation[4];  /* unit quaternion x, y, z, w: glTF's order; w >= 0                     */
     float scale;
     uint32_t prototype;
-    uint32_t triangle;  /* on which it stands                                                   */
+    uint32_t triangle;  /* on which it is placed                                                */
 } trimesh_instance;
 
 typedef struct trimesh_scatter_desc {
@@ -309,18 +309,18 @@ typedef struct trimesh_scatter_desc {
     float unit;   /* edge length for heights and scales: above 0, in units of the mesh; 0 = that of
                      the equilateral triangle of each triangle's area                             */
     float height; /* added to the height of every point, in edge lengths, -1000..1000             */
-    int inside;   /* non-zero: the other side. Heights are measured against the normals, and things
+    int inside;   /* non-zero: the other side. Heights are measured against the normals, and objects
                      are rotated by 180 degrees about their x axis, z against the normal          */
-    float curve;  /* 0..1: 0 = things stand on the flat triangles, 1 = on the curved surface that
+    float curve;  /* 0..1: 0 = objects are on the flat triangles, 1 = on the curved surface that
                      the normals describe (Phong tessellation [4] with half its weight, which is
                      right for a sphere); the shift is at most 1 edge                             */
-    float density; /* things per unit of area at height `height` (on side `inside`): then patches
+    float density; /* objects per unit of area at height `height` (on side `inside`): then patches
                      are used in part, see below; 0 = all points of the patches on every triangle */
-    int spin;      /* non-zero: every thing is rotated by a random angle about its own z axis     */
+    int spin;      /* non-zero: every object is rotated by a random angle about its own z axis    */
     const float *mix; /* shares, mix_count of them, 0 or more: prototypes 0..mix_count - 1 are drawn
                      at random in these proportions; NULL = the points' own                       */
     int mix_count;    /* 0..256                                                                   */
-    uint64_t seed;    /* another number, other choices                                            */
+    uint64_t seed;    /* another seed gives other choices                                         */
 } trimesh_scatter_desc;
 
 /* Put a patch on every triangle of a mesh, and list the instances.
@@ -332,11 +332,11 @@ typedef struct trimesh_scatter_desc {
    60 degrees. Scale: the point's times the edge length.
 
    With density, triangle t of area A(t) (its corners moved along their normals to the height) gets as
-   many points from the front of its patch as come nearest to density A(t) + e things, where e is the
+   many points from the front of its patch as come nearest to density A(t) + e objects, where e is the
    error left by the previous triangle along a space-filling (Morton) curve; a point on a side counts
-   1/2, on a corner 1/6, since that many triangles share it. So the count in any region is right to
-   about one thing per side of the region. The patches need enough points for the largest triangle: for
-   meshes of trimesh_retile a third more than for the mean are enough.
+   1/2, on a corner 1/6, since that many triangles share it. So the count in any region is accurate
+   to about one object per side of the region. The patches need enough points for the largest
+   triangle: for meshes of trimesh_retile a third more than for the mean are enough.
 
    out       receives *count instances, triangle by triangle in the patch's order; NULL: count only.
              After TXM_CANCELLED it may be filled in part
@@ -349,7 +349,7 @@ typedef struct trimesh_scatter_desc {
 TRIMESH_COVER_API txm_status trimesh_scatter(const trimesh_scatter_desc *desc, txm_env *env,
                                              trimesh_instance *out, size_t capacity, size_t *count);
 
-/* position + scale (rotated point): where a point of the thing is in space. out may be point. */
+/* position + scale (rotated point): where a point of the object is in space. out may be point. */
 TRIMESH_COVER_API void trimesh_instance_apply(const trimesh_instance *instance, const float point[3],
                                               float out[3]);
 
@@ -358,7 +358,7 @@ typedef struct trimesh_patch_desc {
     int hexagonal;   /* non-zero: the triangular lattice with m steps along a side, m^2 / 2 points
                         per triangle, m = the nearest to sqrt(2 points); rotations do not show    */
     int iterations;  /* rounds of repulsion, 1..1000; 0 = 100                                     */
-    uint64_t seed;   /* another number, another patch; all with the same `points` fit together    */
+    uint64_t seed;   /* another seed gives another patch; those with equal `points` fit together  */
 } trimesh_patch_desc;
 
 /* Make a patch of evenly spread points, ordered for use in part. m + 1 points lie on each side,
@@ -369,7 +369,7 @@ typedef struct trimesh_patch_desc {
 
    points    receives *count points; NULL: count only. points + 2 m + 2 are always enough
    capacity  how many points it has room for
-   return    also TXM_TOO_LARGE if capacity is too small; count is right then
+   return    also TXM_TOO_LARGE if capacity is too small; *count is correct then
    cost      O(count^2 + iterations count), 0.1 s for 1000                                       */
 TRIMESH_COVER_API txm_status trimesh_reference_patch(const trimesh_patch_desc *desc, txm_env *env,
                                                      trimesh_point *points, size_t capacity,

@@ -245,7 +245,7 @@ static int run_edges(int argc, char **argv) {
          TEXEDGES_MAX_LEVELS},
         {CLI_TEXT, "--thresholds", "T1,...", "gray levels, 0 to 1, where layers 1, 2, ... begin",
          &o.thresholds, 0, 0},
-        {CLI_TEXT, "--smooth", "R", "blur first, by so many pixels, 0 to 16; default 0",
+        {CLI_TEXT, "--smooth", "R", "radius of a blur beforehand, in pixels, 0 to 16; default 0",
          &o.smooth, 0, 0},
         {CLI_INT, "--least", "N", "leave out regions with a shorter boundary, in pixels; default 0",
          &desc.least, 0, 1 << 30},

@@ -12,12 +12,12 @@ static const cli_manual retile_manual = {
     "retile", "MESH -o OUT --vertices N [options]",
     "cover a surface with near-equilateral triangles",
     "MESH is an OBJ or PLY file; small faults are repaired (equal vertices welded, triangles\n"
-    "turned to agree, fins removed). OUT ends in .obj, .ply or .glb; it has exactly N\n"
+    "oriented consistently, fins removed). OUT ends in .obj, .ply or .glb; it has exactly N\n"
     "vertices, not counting copies along texture seams. Texture coordinates and colors of\n"
-    "MESH are carried over, unless\n"
+    "MESH are carried over, unless one of these options textures the triangles:\n"
     "--tiles DIR names a set of 'texkit tiles --kind triangle': every triangle gets a tile\n"
-    "  whose edges match those of its neighbours;\n"
-    "--patches PICTURE shows a row of equilateral triangles, each with a gutter around it:\n"
+    "  whose edges match those of its neighbours.\n"
+    "--patches PICTURE is a row of equilateral triangles, each with a gutter around it:\n"
     "  every triangle gets one of them at random.\n"
     "The picture is written beside OUT as OUT-atlas.png (that of --texture: OUT-texture.png),\n"
     "for an .obj with a material OUT.mtl; a .glb contains it too.\n"
@@ -26,8 +26,8 @@ static const cli_manual retile_manual = {
     "  their color, tilted by nx ny nz or qx qy qz qw; a mesh is put on every triangle as it\n"
     "  is. A .glb holds the surface and instances (EXT_mesh_gpu_instancing); .ply and .obj\n"
     "  hold only the meshes or points.\n"
-    "'mended' of --stats counts vertices welded and unused, triangles degenerate, duplicate,\n"
-    "fins and turned, and vertices split. 'quality' is twice the radius of the inscribed\n"
+    "'mended' of --stats counts repairs: vertices welded, unused and split, triangles\n"
+    "degenerate, duplicate and reversed, and fins. 'quality' is twice the radius of the inscribed\n"
     "circle over that of the circumscribed one: 1 for an equilateral triangle.\n",
     "  texkit retile bunny.obj -o bunny.glb --vertices 5000 --tiles gravel-triangles\n"
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
@@ -213,8 +213,8 @@ static int run_job(retile_job *j, int argc, char **argv) {
          TRIMESH_MAX_VERTICES},
         {CLI_TEXT, "--method", "HOW", "lattice (default, most regular) or repel (as published)",
          &method, 0, 0},
-        {CLI_INT, "--crease", "DEGREES", "keep edges sharp that bend by at least so much, 1 to 180; default 50",
-         &crease, 1, 180},
+        {CLI_INT, "--crease", "DEGREES",
+         "smallest angle of a crease, 1 to 180; default 50; 180 keeps none", &crease, 1, 180},
         {CLI_INT, "--adapt", "PERCENT", "shorter edges where the surface bends, 0 to 100", &adapt,
          0, 100},
         {CLI_INT, "--spacing", "PERCENT",
@@ -225,8 +225,8 @@ static int run_job(retile_job *j, int argc, char **argv) {
         {CLI_INPUT, "--patches", "PICTURE", "texture: triangles of this picture, chosen at random",
          &j->patches, 0, 0},
         {CLI_INT, "--patch-count", "N", "patches in PICTURE; default 4", &j->patch_count, 1, 256},
-        {CLI_INT, "--gutter", "G", "pixels around each patch; default 8, or none", &j->gutter, 0,
-         8192},
+        {CLI_INT, "--gutter", "G", "pixels around each patch; default 8, or 0 if that does not fit",
+         &j->gutter, 0, 8192},
         {CLI_INPUT, "--texture", "PICTURE", "texture: the one that MESH's coordinates are for",
          &j->texture, 0, 0},
         {CLI_INPUT, "--instances", "PATCH.ply", "points or a small mesh for every triangle",

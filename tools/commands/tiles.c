@@ -305,14 +305,14 @@ static int run_tiles(int argc, char **argv) {
     int gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
     const cli_option options[] = {
         {CLI_TEXT, "--kind", "KIND", "wang, corner, triangle or frame", &kind, 0, 0},
-        {CLI_INT, "--colors", "C", "colors per axis, of corners or of triangle edges, 2 to 4; default 2",
+        {CLI_INT, "--colors", "C", "colors of the edges or corners, 2 to 4 (frame: 1 to 4); default 2",
          &desc.colors, 1, TEXTILES_MAX_COLORS},
         {CLI_INT, "--variants", "V", "tiles with the same colors, 1 to 16; default 1",
          &desc.variants, 1, TEXTILES_MAX_VARIANTS},
         {CLI_INT, "--size", "S", "side of a tile in pixels, 32 to 1024; default 128", &desc.size,
          TEXTILES_MIN_SIZE, TEXTILES_MAX_SIZE},
         {CLI_FLAG, "--reduced", NULL,
-         "wang: only 2 C C tiles, for scan-line tiling; triangle: fewer, for meshes", &desc.reduced, 0,
+         "fewer tiles: wang 2 C^2, for scan-line tiling; triangle 2 C^3, for meshes", &desc.reduced, 0,
          0},
         {CLI_TEXT, "--classes", "LIST", "frame: edge colors n,e,s,w of each class, separated by ';'",
          &classes, 0, 0},

@@ -22,8 +22,8 @@ static const cli_manual tree_manual = {
     "Species: oak, beech, maple, birch, poplar, willow, almond, pine, spruce, dead.\n"
     "Each --seed gives a different tree. --bones gives the thinnest twigs no joints of their\n"
     "own, for engines that allow few. --pose bends every joint a little at random: the\n"
-    "skeleton of a .glb, the mesh of the others. --wind also bends the mesh of the others,\n"
-    "as at one moment. Without --tiles and --leaf, bark and leaves are drawn.\n",
+    "skeleton of a .glb, the mesh of an .obj or .ply. In .obj and .ply, --wind bends the mesh\n"
+    "as at one moment. Without --tiles and --leaf, bark and leaves are drawn procedurally.\n",
     "  texkit tree -o oak.glb --species oak --wind 8\n"
     "  texkit tree -o mine.txt --species birch\n"
     "  texkit tree -o mine.obj --species mine.txt --tiles bark-tiles --level 3\n",
@@ -389,7 +389,7 @@ static int run_tree(int argc, char **argv) {
         {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
          &j->sheet, 128, 8192},
         {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
-        {CLI_INT, "--pieces", "N", "at most so many pieces, 8 to 65535; default 600", &j->pieces, 8,
+        {CLI_INT, "--pieces", "N", "maximum number of pieces, 8 to 65535; default 600", &j->pieces, 8,
          65535},
         {CLI_INT, "--level", "N", "divide each side of the quads by N, 1 to 16; default 1",
          &j->level, 1, MAX_LEVEL},
@@ -398,8 +398,8 @@ static int run_tree(int argc, char **argv) {
         {CLI_TEXT, "--seconds", "S", "length of the animation, 1 to 60; default 4", &seconds, 0, 0},
         {CLI_INT, "--rate", "FPS", "keys per second, 1 to 60; default 12", &j->rate, 1, 60},
         {CLI_TEXT, "--pose", "AMOUNT",
-         "bend the joints at random by up to so many radians, 0 to 1", &bend, 0, 0},
-        {CLI_INT, "--bones", "N", "at most so many joints; default: one per piece", &j->bones, 1,
+         "bend the joints at random, by at most this many radians, 0 to 1", &bend, 0, 0},
+        {CLI_INT, "--bones", "N", "maximum number of joints; default: one per piece", &j->bones, 1,
          65535},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
@@ -429,7 +429,7 @@ static int run_forest(int argc, char **argv) {
          &j->species_list, 0, 0},
         {CLI_TEXT, "--spacing", "M", "metres between trees, 0.1 to 1000; default: by their height",
          &spacing, 0, 0},
-        {CLI_INT, "--pieces", "N", "at most so many per tree, 8 to 65535; default 600", &j->pieces, 8,
+        {CLI_INT, "--pieces", "N", "maximum per tree, 8 to 65535; default 600", &j->pieces, 8,
          65535},
         {CLI_TILES, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
         {CLI_INPUT, "--leaf", "PICTURE", "a spray of leaves, transparent around it", &j->leaf, 0, 0},
@@ -441,8 +441,8 @@ static int run_forest(int argc, char **argv) {
         {CLI_FLAG, "--capped", NULL, ".obj, .ply: close the feet of the trunks as well", &j->capped,
          0, 0},
         {CLI_TEXT, "--wind", "SPEED",
-         "bend as in wind of so many metres per second, up to 50; default 0", &wind, 0, 0},
-        {CLI_TEXT, "--pose", "AMOUNT", "bend the joints at random by up to so many radians, 0 to 1",
+         "bend as in wind of this speed, metres per second, up to 50; default 0", &wind, 0, 0},
+        {CLI_TEXT, "--pose", "AMOUNT", "bend the joints at random, by at most this many radians, 0 to 1",
          &bend, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
