@@ -135,8 +135,8 @@ static inline const char *txm_status_text(txm_status status) {
 /* ---- environment ------------------------------------------------------------------------ */
 
 /* How a call allocates, reports progress and runs in parallel. All zero (or a NULL pointer) means
-   malloc/free, silent, serial. An env belongs to one call at a time; a model or job copies
-   what it needs of the allocator, so the env need not outlive it, the user pointer must. */
+   malloc/free, silent, serial. An env may be used by only one call at a time. A model or
+   job copies the allocator, so the env need not outlive it, but what memory_user points to must. */
 typedef struct txm_env {
     void *(*allocate)(void *user, size_t bytes); /* NULL = malloc; may return NULL           */
     void (*release)(void *user, void *block);    /* NULL = free; never called with NULL      */
@@ -146,7 +146,7 @@ typedef struct txm_env {
     int (*progress)(void *user, float fraction, const char *stage);
     void *progress_user;
     /* Must call body(context, i) once for each i in 0..count-1, in any order, on any threads,
-       and return when all are done. Results do not depend on how. NULL = serial.            */
+       and return when all are done. Results do not depend on the order. NULL = serial.      */
     void (*parallel_for)(void *user, int count, void (*body)(void *context, int index),
                          void *context);
     void *parallel_user;
@@ -163,7 +163,7 @@ static inline txm_status txm_fail(txm_env *env, txm_status status, const char *m
     return status;
 }
 
-/* The same with the name of what is wrong in front: "name: message". */
+/* The same, preceded by the name of what is wrong: "name: message". */
 static inline txm_status txm_fail_at(txm_env *env, txm_status status, const char *name,
                                      const char *message) {
     char line[sizeof env->message];
@@ -202,7 +202,7 @@ static inline txm_status txm_fail_numbers(txm_env *env, txm_status status, const
     return txm_fail(env, status, line);
 }
 
-/* The same with the name of what is wrong in front: "name: text". */
+/* The same, preceded by the name of what is wrong: "name: text". */
 static inline txm_status txm_fail_numbers_at(txm_env *env, txm_status status, const char *name,
                                              const char *text, uint64_t a, uint64_t b) {
     char line[sizeof env->message];
@@ -216,14 +216,14 @@ static inline void *txm_alloc(const txm_env *env, size_t bytes) {
     return env && env->allocate ? env->allocate(env->memory_user, bytes) : malloc(bytes);
 }
 
-/* Give back what txm_alloc returned; NULL is allowed. */
+/* Free what txm_alloc returned; NULL is allowed. */
 static inline void txm_free(const txm_env *env, void *block) {
     if (!block) return;
     if (env && env->release) env->release(env->memory_user, block);
     else free(block);
 }
 
-/* Report progress; non-zero: stop, the caller wants no more. */
+/* Report progress; non-zero: the caller has cancelled, stop. */
 static inline int txm_progress(const txm_env *env, float fraction, const char *stage) {
     return env && env->progress ? env->progress(env->progress_user, fraction, stage) : 0;
 }
@@ -255,7 +255,7 @@ static inline int txm_add(size_t a, size_t b, size_t *sum) {
 
 /* ---- arena ------------------------------------------------------------------------------ */
 
-/* Blocks that are freed together: one exit path gives back whatever was allocated so far. Keeps
+/* Blocks that are freed together, so that one exit path frees all allocations so far. Keeps
    a copy of the allocator, so it may outlive the env and may lie in one of its own blocks.
 
        raw block:  | link to the older block | padding | 64-byte aligned result ...        */
@@ -264,8 +264,8 @@ typedef struct txm_arena {
     void (*release)(void *user, void *block);
     void *memory_user;
     void *blocks; /* the newest block, which links to the older ones; NULL = none */
-    int failed;   /* non-zero: some request since the arena was empty could not be met, so that
-                     a caller can make several and look once                     */
+    int failed;   /* non-zero: an allocation has failed since the arena was empty, so that a
+                     caller can make several and check once                      */
 } txm_arena;
 
 enum { TXM_ALIGN = 64 }; /* bytes; a cache line, and enough for any vector unit   */
@@ -280,8 +280,8 @@ static inline void txm_arena_init(txm_arena *arena, const txm_env *env) {
 }
 
 /* count * size bytes, not cleared, aligned to 64. NULL if that is 0, or if it overflows or there is
-   no memory, which also sets arena->failed. One request to the allocator each, 64 bytes and a
-   pointer longer. */
+   no memory, which also sets arena->failed. Each is one allocation, larger by 64 bytes and a
+   pointer. */
 static inline void *txm_arena_alloc(txm_arena *arena, size_t count, size_t size) {
     size_t bytes, total;
     void *raw = NULL;
@@ -305,7 +305,7 @@ static inline void *txm_arena_zero(txm_arena *arena, size_t count, size_t size) 
     return block;
 }
 
-/* Give back all blocks; the arena is empty and may be used again (unless it lay in one of them). */
+/* Free all blocks; the arena is then empty and may be used again (unless it was in one of them). */
 static inline void txm_arena_free(txm_arena *arena) {
     const txm_arena copy = *arena;
     void *block = arena->blocks;
@@ -380,9 +380,9 @@ static inline int txm_lowest_bit(uint64_t x) {
 #endif
 }
 
-/* Sine and cosine of an angle of at most some thousand turns, to 1e-10: reduced to -pi/4..pi/4,
-   then Taylor. Sums, products and quotients only, so that the bits are the same everywhere, which
-   those of the C library are not. */
+/* Sine and cosine of an angle of at most a few thousand turns, to 1e-10: reduced to -pi/4..pi/4,
+   then Taylor. Sums, products and quotients only, so that the bits are the same everywhere,
+   unlike those of the C library. */
 static inline void txm_sincos(double angle, double *sine, double *cosine) {
     const double turns = angle * (2 / TXM_PI);
     const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));
@@ -431,7 +431,7 @@ static inline size_t txm_sample_bytes(txm_sample sample) {
     return sample == TXM_F32 ? sizeof(float) : sample == TXM_U16 ? sizeof(uint16_t) : 1;
 }
 
-/* Is this a view that can be worked on? Everything but the samples themselves is checked.
+/* Is this a valid view? Everything but the samples themselves is checked.
 
    name        what the caller calls the image, for the message: "mask: pixels is NULL; ..."
    max_pixels  refuse larger images; 0 = whatever the address space holds
@@ -473,8 +473,8 @@ static inline txm_status txm_image_check(const txm_image *image, const char *nam
     return TXM_OK;
 }
 
-/* The same view with channels and stride spelled out where they were 0. The functions below do
-   this for themselves; it is for loops that walk the samples on their own. */
+/* The same view, with channels and stride set where they were 0. The functions below do this
+   themselves; it is for loops that access the samples directly. */
 static inline txm_image txm_image_resolve(txm_image image) {
     if (image.channels == 0) image.channels = 1;
     if (image.stride == 0)
@@ -527,8 +527,8 @@ static inline int txm_image_is_finite(const txm_image *image) {
 
 /* ---- colour ----------------------------------------------------------------------------- */
 
-/* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, values go on along the
-   same curves (below 0: the straight part), nothing is clamped. */
+/* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, the same curves are
+   extrapolated (below 0: the linear part); nothing is clamped. */
 static inline float txm_srgb_to_linear(float s) {
     return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
 }
@@ -538,9 +538,9 @@ static inline float txm_linear_to_srgb(float l) {
 
 /* ---- kernel: half size ------------------------------------------------------------------ */
 
-/* One step of an image pyramid: each pixel of half is the mean of the 2x2 pixels of image below
-   it. Of an odd width the last column is averaged by itself, of an odd height the last row: no
-   pixel is lost. In linear values if the caller's are; nothing is decoded.
+/* One step of an image pyramid: each pixel of half is the mean of 2x2 pixels of image. If the
+   width is odd the last column is averaged by itself, if the height is odd the last row, so that no
+   pixel is lost. Samples are averaged as they are, so they should be linear.
 
    image, half  float, the same channels, not overlapping; half is (width + 1) / 2 x
                 (height + 1) / 2 and receives the result, or is untouched after an error
@@ -619,7 +619,7 @@ static inline int txm_rng_range(txm_rng *rng, int low, int high) {
     return (int)(low + (int64_t)((txm_rng_next(rng) * n) >> 32));
 }
 
-/* uniform multiples of 2^-24 in [0, 1): all have equal chances, 1 is never returned */
+/* uniform multiples of 2^-24 in [0, 1): all are equally likely, 1 is never returned */
 static inline float txm_rng_float(txm_rng *rng) {
     return (float)(txm_rng_next(rng) >> 8) * (1.0f / 16777216.0f);
 }
@@ -630,7 +630,7 @@ static inline double txm_rng_double(txm_rng *rng) {
     return (double)((high << 26) | low) * (1.0 / 9007199254740992.0);
 }
 
-/* Put the items in random order, every order as likely (Fisher and Yates). */
+/* Put the items in random order, all orders equally likely (Fisher and Yates). */
 static inline void txm_shuffle(txm_rng *rng, int *items, int count) {
     for (int i = count - 1; i > 0; i--) {
         const int j = (int)txm_rng_below(rng, (uint32_t)i + 1);
@@ -653,7 +653,7 @@ static inline uint32_t txm_sort_key(float x) {
     return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
 }
 
-/* Sort by rising key; pairs of equal key keep their order, so there is only one result.
+/* Sort by ascending key; pairs with equal keys keep their order (stable).
 
    Counting sort by each byte of the key, lowest first; a byte that all keys share is skipped.
    scratch  room for count pairs; its contents are lost
@@ -690,7 +690,7 @@ typedef struct txm_vec3 {
     float x, y, z;
 } txm_vec3;
 
-/* Makers; C++11 has no compound literals. */
+/* Constructors, as C++11 has no compound literals. */
 static inline txm_vec2 txm_v2(float x, float y) {
     const txm_vec2 v = {x, y};
     return v;
@@ -743,7 +743,7 @@ static inline txm_vec3 txm_vec3_perpendicular(txm_vec3 v) {
 
 /* ---- vectors in double ------------------------------------------------------------------ */
 
-/* For geometry that decides: computed in double, no rounding to float in between. Plain sums and
+/* For geometric decisions: computed in double, no rounding to float in between. Plain sums and
    products in the order written, so the bits are the same everywhere. */
 typedef struct txm_dvec3 {
     double x, y, z;
@@ -863,9 +863,9 @@ static inline txm_quat txm_quat_from_axes(txm_dvec3 x, txm_dvec3 y, txm_dvec3 z)
    A = | a[1] a[3] a[4] |      A vectors[k] = values[k] vectors[k]
        | a[2] a[4] a[5] |
 
-   by cyclic Jacobi rotations in double [6]; the covariance of points is the usual A.
+   by cyclic Jacobi rotations in double [6]; A is usually the covariance of points.
 
-   values   falling
+   values   descending
    vectors  unit length, at right angles, vectors[2] = vectors[0] x vectors[1]; of the first two
             the component of largest magnitude (the first such) is positive. For equal values any
             basis of their space is right; this one depends on the bits of A only.
@@ -881,8 +881,8 @@ static inline txm_status txm_eigen3(const double a[6], double values[3], double 
     }
     for (int i = 0; i < 9 && scale > 0; i++) m[i / 3][i % 3] /= scale; /* squares cannot overflow */
 
-    /* Each rotation zeroes m[p][q]; what is left off the diagonal shrinks quadratically, 6 sweeps
-       are the rule and 32 never needed. Rotations that no longer change the diagonal end it. */
+    /* Each rotation zeroes m[p][q]; the off-diagonal elements converge quadratically: usually 6 sweeps
+       are enough, and 32 always. It ends when rotations no longer change the diagonal. */
     for (int sweep = 0, turned = 1; turned && sweep < 32; sweep++) {
         turned = 0;
         for (int k = 0; k < 3; k++) {
@@ -992,11 +992,11 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
    one cell on all sides whose capacities stay zero. Arc d of node p goes to p + step[d]; the
    opposite arc is d + directions / 2 there.
 
-   txm_flow_make gives the memory. Then set step[] and count, fill arc[][] and excess[], call
-   txm_flow_solve, and look at tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
+   txm_flow_make allocates the memory. Then set step[] and count, fill arc[][] and excess[], call
+   txm_flow_solve, and read tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
    capacities at a node must stay below 2^30. Integers only, so the same cut everywhere. */
 enum { TXM_FLOW_FREE = 0, TXM_FLOW_SOURCE = 1, TXM_FLOW_SINK = 2 };
-/* parents that are no arc */
+/* parents that are not an arc */
 enum { TXM_FLOW_TERMINAL = 6, TXM_FLOW_NONE = 7, TXM_FLOW_ORPHAN = 8 };
 
 typedef struct txm_flow {
@@ -1166,7 +1166,7 @@ static inline int txm_flow_grow(txm_flow *g, int p, int *from, int *direction) {
     return 0;
 }
 
-/* Push all the flow there is. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut;
+/* Push the maximum flow. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut;
    the arcs and excess hold what is left.
    cost  linear in practice, some 0.1 us per node; polynomial at worst                        */
 static inline void txm_flow_solve(txm_flow *g) {
@@ -1239,7 +1239,7 @@ typedef struct txm_poisson_desc {
     txm_image image;    /* TXM_F32, finite. In: known values outside the mask, a first guess
                            inside. Out: the solution inside; untouched after an error       */
     txm_image mask;     /* TXM_U8, 1 channel, same size: non-zero = unknown                 */
-    txm_image target;   /* TXM_F32, size and channels of image: wanted Laplacian; NULL = 0  */
+    txm_image target;   /* TXM_F32, size and channels of image: target Laplacian; NULL = 0  */
     float screen;       /* 0..1e6: pull towards the first guess; 0 = none                   */
     float tolerance;    /* relative residual to stop at, 1e-12..1; 0 = 1e-6                 */
     int max_iterations; /* per channel, then the last iterate is taken; 0 = 10000           */
@@ -1448,13 +1448,13 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
 
        screen (u - u0) - Lu = -target,   Lu(x) = sum over the neighbours y of x: u(y) - u(x)
 
-   where x has up to four neighbours: none beyond the border of the image (so nothing is pulled
-   there, the natural or Neumann border), and outside the mask u is the image (Dirichlet). With
+   where x has up to four neighbours: none beyond the border of the image (the natural or
+   Neumann boundary condition), and outside the mask u is the image (Dirichlet). With
    target and screen 0 this is the membrane through the known values. To paste gradients, let
-   target(x) be the sum of the wanted differences u(y) - u(x).
+   target(x) be the sum of the desired differences u(y) - u(x).
 
    The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [4].
-   desc    nothing in it is written but the pixels of desc->image, and those only on success
+   desc    only the pixels of desc->image are written, and only on success
    env     NULL, or how to allocate, report and cancel
    return  TXM_OK (also where no pixel is masked, or max_iterations was reached);
            TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED
@@ -1540,13 +1540,13 @@ static inline size_t txm_mesh_sides(const txm_mesh *mesh) {
     return mesh->face_count * txm_mesh_corners(mesh);
 }
 
-/* Is this a mesh that can be worked on? Any connectivity will do: borders, edges of many faces,
+/* Is this a valid mesh? Any connectivity is allowed: borders, edges of many faces,
    faces that name a vertex twice. A mesh without faces or vertices needs no array for them.
 
    name       what the caller calls the mesh, for the message: "mesh: indices is NULL"
-   corners    3 or 4 if faces must have so many; 0 = either
-   positions  non-zero: they are needed and must be finite; 0: they are not looked at
-   most       refuse more vertices or faces; 0 = as many as 32 bits can number the sides of
+   corners    number of corners that faces must have, 3 or 4; 0 = either
+   positions  non-zero: they are needed and must be finite; 0: they are ignored
+   most       refuse more vertices or faces; 0 = no limit but that of 32-bit numbers of sides
    return     TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE. The message names the first face or vertex
               that is wrong, from 0
    cost       O(faces + vertices)                                                          */
@@ -1616,8 +1616,8 @@ static inline int txm_mesh_runs_down(const txm_mesh *mesh, size_t i) {
     return a == b ? next < i : a > b;
 }
 
-/* A color 0..colors-1 for the edge of side i, by hash of its two vertices: all that color the edges
-   of a mesh with the same seed and number agree. */
+/* A color 0..colors-1 for the edge of side i, by hash of its two vertices, so that all functions
+   that color the edges of a mesh with the same seed and number agree. */
 static inline int txm_mesh_edge_color(const txm_mesh *mesh, size_t i, uint64_t seed, int colors) {
     const uint64_t edge = (uint64_t)txm_mesh_high(mesh, i) << 32 | txm_mesh_low(mesh, i);
     const uint64_t hash = txm_hash(txm_hash(seed ^ 0x7465787475726573u) + edge) >> 32;
@@ -1722,17 +1722,17 @@ static inline size_t txm_mesh_edge_end(const txm_mesh *mesh, const uint32_t *sor
     return i;
 }
 
-/* what txm_mesh_link may do otherwise; add them up */
+/* options of txm_mesh_link; add them up */
 enum {
     TXM_LINK_DOWN = 1,  /* each side to the one before it, the lowest to the highest          */
     TXM_LINK_POINTS = 2 /* sides from a vertex to itself have an edge like others             */
 };
 
 /* Link the sides of each edge into a ring: next[side] is the next higher side there, after the
-   highest the lowest; a side without another, or from a vertex to itself, is its own next.
+   highest the lowest; a side without others, or from a vertex to itself, is its own next.
 
    sorted  the sides as txm_mesh_sort_sides left them
-   flags   0, or what to do otherwise
+   flags   0, or options
    next    receives one side for each; may be sorted + sides                               */
 static inline void txm_mesh_link(const txm_mesh *mesh, const uint32_t *sorted, int flags,
                                  uint32_t *next) {

@@ -60,11 +60,11 @@ static inline double txm_cut(const float *error, int length, int width, ptrdiff_
    one cell on all sides whose capacities stay zero. Arc d of node p goes to p + step[d]; the
    opposite arc is d + directions / 2 there.
 
-   txm_flow_make gives the memory. Then set step[] and count, fill arc[][] and excess[], call
-   txm_flow_solve, and look at tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
+   txm_flow_make allocates the memory. Then set step[] and count, fill arc[][] and excess[], call
+   txm_flow_solve, and read tree[]: TXM_FLOW_SINK are the nodes on the sink's side. Sums of the
    capacities at a node must stay below 2^30. Integers only, so the same cut everywhere. */
 enum { TXM_FLOW_FREE = 0, TXM_FLOW_SOURCE = 1, TXM_FLOW_SINK = 2 };
-/* parents that are no arc */
+/* parents that are not an arc */
 enum { TXM_FLOW_TERMINAL = 6, TXM_FLOW_NONE = 7, TXM_FLOW_ORPHAN = 8 };
 
 typedef struct txm_flow {
@@ -234,7 +234,7 @@ static inline int txm_flow_grow(txm_flow *g, int p, int *from, int *direction) {
     return 0;
 }
 
-/* Push all the flow there is. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut;
+/* Push the maximum flow. Afterwards the nodes whose tree is TXM_FLOW_SINK lie beyond the cut;
    the arcs and excess hold what is left.
    cost  linear in practice, some 0.1 us per node; polynomial at worst                        */
 static inline void txm_flow_solve(txm_flow *g) {

@@ -12,9 +12,9 @@
    A = | a[1] a[3] a[4] |      A vectors[k] = values[k] vectors[k]
        | a[2] a[4] a[5] |
 
-   by cyclic Jacobi rotations in double [6]; the covariance of points is the usual A.
+   by cyclic Jacobi rotations in double [6]; A is usually the covariance of points.
 
-   values   falling
+   values   descending
    vectors  unit length, at right angles, vectors[2] = vectors[0] x vectors[1]; of the first two
             the component of largest magnitude (the first such) is positive. For equal values any
             basis of their space is right; this one depends on the bits of A only.
@@ -30,8 +30,8 @@ static inline txm_status txm_eigen3(const double a[6], double values[3], double 
     }
     for (int i = 0; i < 9 && scale > 0; i++) m[i / 3][i % 3] /= scale; /* squares cannot overflow */
 
-    /* Each rotation zeroes m[p][q]; what is left off the diagonal shrinks quadratically, 6 sweeps
-       are the rule and 32 never needed. Rotations that no longer change the diagonal end it. */
+    /* Each rotation zeroes m[p][q]; the off-diagonal elements converge quadratically: usually 6 sweeps
+       are enough, and 32 always. It ends when rotations no longer change the diagonal. */
     for (int sweep = 0, turned = 1; turned && sweep < 32; sweep++) {
         turned = 0;
         for (int k = 0; k < 3; k++) {

@@ -33,8 +33,8 @@ static inline const char *txm_status_text(txm_status status) {
 /* ---- environment ------------------------------------------------------------------------ */
 
 /* How a call allocates, reports progress and runs in parallel. All zero (or a NULL pointer) means
-   malloc/free, silent, serial. An env belongs to one call at a time; a model or job copies
-   what it needs of the allocator, so the env need not outlive it, the user pointer must. */
+   malloc/free, silent, serial. An env may be used by only one call at a time. A model or
+   job copies the allocator, so the env need not outlive it, but what memory_user points to must. */
 typedef struct txm_env {
     void *(*allocate)(void *user, size_t bytes); /* NULL = malloc; may return NULL           */
     void (*release)(void *user, void *block);    /* NULL = free; never called with NULL      */
@@ -44,7 +44,7 @@ typedef struct txm_env {
     int (*progress)(void *user, float fraction, const char *stage);
     void *progress_user;
     /* Must call body(context, i) once for each i in 0..count-1, in any order, on any threads,
-       and return when all are done. Results do not depend on how. NULL = serial.            */
+       and return when all are done. Results do not depend on the order. NULL = serial.      */
     void (*parallel_for)(void *user, int count, void (*body)(void *context, int index),
                          void *context);
     void *parallel_user;
@@ -61,7 +61,7 @@ static inline txm_status txm_fail(txm_env *env, txm_status status, const char *m
     return status;
 }
 
-/* The same with the name of what is wrong in front: "name: message". */
+/* The same, preceded by the name of what is wrong: "name: message". */
 static inline txm_status txm_fail_at(txm_env *env, txm_status status, const char *name,
                                      const char *message) {
     char line[sizeof env->message];
@@ -100,7 +100,7 @@ static inline txm_status txm_fail_numbers(txm_env *env, txm_status status, const
     return txm_fail(env, status, line);
 }
 
-/* The same with the name of what is wrong in front: "name: text". */
+/* The same, preceded by the name of what is wrong: "name: text". */
 static inline txm_status txm_fail_numbers_at(txm_env *env, txm_status status, const char *name,
                                              const char *text, uint64_t a, uint64_t b) {
     char line[sizeof env->message];
@@ -114,14 +114,14 @@ static inline void *txm_alloc(const txm_env *env, size_t bytes) {
     return env && env->allocate ? env->allocate(env->memory_user, bytes) : malloc(bytes);
 }
 
-/* Give back what txm_alloc returned; NULL is allowed. */
+/* Free what txm_alloc returned; NULL is allowed. */
 static inline void txm_free(const txm_env *env, void *block) {
     if (!block) return;
     if (env && env->release) env->release(env->memory_user, block);
     else free(block);
 }
 
-/* Report progress; non-zero: stop, the caller wants no more. */
+/* Report progress; non-zero: the caller has cancelled, stop. */
 static inline int txm_progress(const txm_env *env, float fraction, const char *stage) {
     return env && env->progress ? env->progress(env->progress_user, fraction, stage) : 0;
 }
@@ -153,7 +153,7 @@ static inline int txm_add(size_t a, size_t b, size_t *sum) {
 
 /* ---- arena ------------------------------------------------------------------------------ */
 
-/* Blocks that are freed together: one exit path gives back whatever was allocated so far. Keeps
+/* Blocks that are freed together, so that one exit path frees all allocations so far. Keeps
    a copy of the allocator, so it may outlive the env and may lie in one of its own blocks.
 
        raw block:  | link to the older block | padding | 64-byte aligned result ...        */
@@ -162,8 +162,8 @@ typedef struct txm_arena {
     void (*release)(void *user, void *block);
     void *memory_user;
     void *blocks; /* the newest block, which links to the older ones; NULL = none */
-    int failed;   /* non-zero: some request since the arena was empty could not be met, so that
-                     a caller can make several and look once                     */
+    int failed;   /* non-zero: an allocation has failed since the arena was empty, so that a
+                     caller can make several and check once                      */
 } txm_arena;
 
 enum { TXM_ALIGN = 64 }; /* bytes; a cache line, and enough for any vector unit   */
@@ -178,8 +178,8 @@ static inline void txm_arena_init(txm_arena *arena, const txm_env *env) {
 }
 
 /* count * size bytes, not cleared, aligned to 64. NULL if that is 0, or if it overflows or there is
-   no memory, which also sets arena->failed. One request to the allocator each, 64 bytes and a
-   pointer longer. */
+   no memory, which also sets arena->failed. Each is one allocation, larger by 64 bytes and a
+   pointer. */
 static inline void *txm_arena_alloc(txm_arena *arena, size_t count, size_t size) {
     size_t bytes, total;
     void *raw = NULL;
@@ -203,7 +203,7 @@ static inline void *txm_arena_zero(txm_arena *arena, size_t count, size_t size) 
     return block;
 }
 
-/* Give back all blocks; the arena is empty and may be used again (unless it lay in one of them). */
+/* Free all blocks; the arena is then empty and may be used again (unless it was in one of them). */
 static inline void txm_arena_free(txm_arena *arena) {
     const txm_arena copy = *arena;
     void *block = arena->blocks;

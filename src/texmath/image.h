@@ -27,7 +27,7 @@ static inline size_t txm_sample_bytes(txm_sample sample) {
     return sample == TXM_F32 ? sizeof(float) : sample == TXM_U16 ? sizeof(uint16_t) : 1;
 }
 
-/* Is this a view that can be worked on? Everything but the samples themselves is checked.
+/* Is this a valid view? Everything but the samples themselves is checked.
 
    name        what the caller calls the image, for the message: "mask: pixels is NULL; ..."
    max_pixels  refuse larger images; 0 = whatever the address space holds
@@ -69,8 +69,8 @@ static inline txm_status txm_image_check(const txm_image *image, const char *nam
     return TXM_OK;
 }
 
-/* The same view with channels and stride spelled out where they were 0. The functions below do
-   this for themselves; it is for loops that walk the samples on their own. */
+/* The same view, with channels and stride set where they were 0. The functions below do this
+   themselves; it is for loops that access the samples directly. */
 static inline txm_image txm_image_resolve(txm_image image) {
     if (image.channels == 0) image.channels = 1;
     if (image.stride == 0)
@@ -123,8 +123,8 @@ static inline int txm_image_is_finite(const txm_image *image) {
 
 /* ---- colour ----------------------------------------------------------------------------- */
 
-/* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, values go on along the
-   same curves (below 0: the straight part), nothing is clamped. */
+/* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, the same curves are
+   extrapolated (below 0: the linear part); nothing is clamped. */
 static inline float txm_srgb_to_linear(float s) {
     return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
 }
@@ -134,9 +134,9 @@ static inline float txm_linear_to_srgb(float l) {
 
 /* ---- kernel: half size ------------------------------------------------------------------ */
 
-/* One step of an image pyramid: each pixel of half is the mean of the 2x2 pixels of image below
-   it. Of an odd width the last column is averaged by itself, of an odd height the last row: no
-   pixel is lost. In linear values if the caller's are; nothing is decoded.
+/* One step of an image pyramid: each pixel of half is the mean of 2x2 pixels of image. If the
+   width is odd the last column is averaged by itself, if the height is odd the last row, so that no
+   pixel is lost. Samples are averaged as they are, so they should be linear.
 
    image, half  float, the same channels, not overlapping; half is (width + 1) / 2 x
                 (height + 1) / 2 and receives the result, or is untouched after an error

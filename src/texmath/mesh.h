@@ -33,13 +33,13 @@ static inline size_t txm_mesh_sides(const txm_mesh *mesh) {
     return mesh->face_count * txm_mesh_corners(mesh);
 }
 
-/* Is this a mesh that can be worked on? Any connectivity will do: borders, edges of many faces,
+/* Is this a valid mesh? Any connectivity is allowed: borders, edges of many faces,
    faces that name a vertex twice. A mesh without faces or vertices needs no array for them.
 
    name       what the caller calls the mesh, for the message: "mesh: indices is NULL"
-   corners    3 or 4 if faces must have so many; 0 = either
-   positions  non-zero: they are needed and must be finite; 0: they are not looked at
-   most       refuse more vertices or faces; 0 = as many as 32 bits can number the sides of
+   corners    number of corners that faces must have, 3 or 4; 0 = either
+   positions  non-zero: they are needed and must be finite; 0: they are ignored
+   most       refuse more vertices or faces; 0 = no limit but that of 32-bit numbers of sides
    return     TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE. The message names the first face or vertex
               that is wrong, from 0
    cost       O(faces + vertices)                                                          */
@@ -109,8 +109,8 @@ static inline int txm_mesh_runs_down(const txm_mesh *mesh, size_t i) {
     return a == b ? next < i : a > b;
 }
 
-/* A color 0..colors-1 for the edge of side i, by hash of its two vertices: all that color the edges
-   of a mesh with the same seed and number agree. */
+/* A color 0..colors-1 for the edge of side i, by hash of its two vertices, so that all functions
+   that color the edges of a mesh with the same seed and number agree. */
 static inline int txm_mesh_edge_color(const txm_mesh *mesh, size_t i, uint64_t seed, int colors) {
     const uint64_t edge = (uint64_t)txm_mesh_high(mesh, i) << 32 | txm_mesh_low(mesh, i);
     const uint64_t hash = txm_hash(txm_hash(seed ^ 0x7465787475726573u) + edge) >> 32;
@@ -215,17 +215,17 @@ static inline size_t txm_mesh_edge_end(const txm_mesh *mesh, const uint32_t *sor
     return i;
 }
 
-/* what txm_mesh_link may do otherwise; add them up */
+/* options of txm_mesh_link; add them up */
 enum {
     TXM_LINK_DOWN = 1,  /* each side to the one before it, the lowest to the highest          */
     TXM_LINK_POINTS = 2 /* sides from a vertex to itself have an edge like others             */
 };
 
 /* Link the sides of each edge into a ring: next[side] is the next higher side there, after the
-   highest the lowest; a side without another, or from a vertex to itself, is its own next.
+   highest the lowest; a side without others, or from a vertex to itself, is its own next.
 
    sorted  the sides as txm_mesh_sort_sides left them
-   flags   0, or what to do otherwise
+   flags   0, or options
    next    receives one side for each; may be sorted + sides                               */
 static inline void txm_mesh_link(const txm_mesh *mesh, const uint32_t *sorted, int flags,
                                  uint32_t *next) {

@@ -63,9 +63,9 @@ static inline int txm_lowest_bit(uint64_t x) {
 #endif
 }
 
-/* Sine and cosine of an angle of at most some thousand turns, to 1e-10: reduced to -pi/4..pi/4,
-   then Taylor. Sums, products and quotients only, so that the bits are the same everywhere, which
-   those of the C library are not. */
+/* Sine and cosine of an angle of at most a few thousand turns, to 1e-10: reduced to -pi/4..pi/4,
+   then Taylor. Sums, products and quotients only, so that the bits are the same everywhere,
+   unlike those of the C library. */
 static inline void txm_sincos(double angle, double *sine, double *cosine) {
     const double turns = angle * (2 / TXM_PI);
     const int quarter = (int)(turns + (turns < 0 ? -0.5 : 0.5));

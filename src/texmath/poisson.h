@@ -9,7 +9,7 @@ typedef struct txm_poisson_desc {
     txm_image image;    /* TXM_F32, finite. In: known values outside the mask, a first guess
                            inside. Out: the solution inside; untouched after an error       */
     txm_image mask;     /* TXM_U8, 1 channel, same size: non-zero = unknown                 */
-    txm_image target;   /* TXM_F32, size and channels of image: wanted Laplacian; NULL = 0  */
+    txm_image target;   /* TXM_F32, size and channels of image: target Laplacian; NULL = 0  */
     float screen;       /* 0..1e6: pull towards the first guess; 0 = none                   */
     float tolerance;    /* relative residual to stop at, 1e-12..1; 0 = 1e-6                 */
     int max_iterations; /* per channel, then the last iterate is taken; 0 = 10000           */
@@ -218,13 +218,13 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
 
        screen (u - u0) - Lu = -target,   Lu(x) = sum over the neighbours y of x: u(y) - u(x)
 
-   where x has up to four neighbours: none beyond the border of the image (so nothing is pulled
-   there, the natural or Neumann border), and outside the mask u is the image (Dirichlet). With
+   where x has up to four neighbours: none beyond the border of the image (the natural or
+   Neumann boundary condition), and outside the mask u is the image (Dirichlet). With
    target and screen 0 this is the membrane through the known values. To paste gradients, let
-   target(x) be the sum of the wanted differences u(y) - u(x).
+   target(x) be the sum of the desired differences u(y) - u(x).
 
    The channels are solved one by one, by conjugate gradients with the preconditioner MIC(0) [4].
-   desc    nothing in it is written but the pixels of desc->image, and those only on success
+   desc    only the pixels of desc->image are written, and only on success
    env     NULL, or how to allocate, report and cancel
    return  TXM_OK (also where no pixel is masked, or max_iterations was reached);
            TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED

@@ -45,7 +45,7 @@ static inline int txm_rng_range(txm_rng *rng, int low, int high) {
     return (int)(low + (int64_t)((txm_rng_next(rng) * n) >> 32));
 }
 
-/* uniform multiples of 2^-24 in [0, 1): all have equal chances, 1 is never returned */
+/* uniform multiples of 2^-24 in [0, 1): all are equally likely, 1 is never returned */
 static inline float txm_rng_float(txm_rng *rng) {
     return (float)(txm_rng_next(rng) >> 8) * (1.0f / 16777216.0f);
 }
@@ -56,7 +56,7 @@ static inline double txm_rng_double(txm_rng *rng) {
     return (double)((high << 26) | low) * (1.0 / 9007199254740992.0);
 }
 
-/* Put the items in random order, every order as likely (Fisher and Yates). */
+/* Put the items in random order, all orders equally likely (Fisher and Yates). */
 static inline void txm_shuffle(txm_rng *rng, int *items, int count) {
     for (int i = count - 1; i > 0; i--) {
         const int j = (int)txm_rng_below(rng, (uint32_t)i + 1);
@@ -79,7 +79,7 @@ static inline uint32_t txm_sort_key(float x) {
     return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
 }
 
-/* Sort by rising key; pairs of equal key keep their order, so there is only one result.
+/* Sort by ascending key; pairs with equal keys keep their order (stable).
 
    Counting sort by each byte of the key, lowest first; a byte that all keys share is skipped.
    scratch  room for count pairs; its contents are lost

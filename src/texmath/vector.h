@@ -12,7 +12,7 @@ typedef struct txm_vec3 {
     float x, y, z;
 } txm_vec3;
 
-/* Makers; C++11 has no compound literals. */
+/* Constructors, as C++11 has no compound literals. */
 static inline txm_vec2 txm_v2(float x, float y) {
     const txm_vec2 v = {x, y};
     return v;
@@ -65,7 +65,7 @@ static inline txm_vec3 txm_vec3_perpendicular(txm_vec3 v) {
 
 /* ---- vectors in double ------------------------------------------------------------------ */
 
-/* For geometry that decides: computed in double, no rounding to float in between. Plain sums and
+/* For geometric decisions: computed in double, no rounding to float in between. Plain sums and
    products in the order written, so the bits are the same everywhere. */
 typedef struct txm_dvec3 {
     double x, y, z;
