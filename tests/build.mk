@@ -7,7 +7,7 @@
 TESTS    := $(BUILD)/tests
 FULL     ?= 0
 MODULES  := $(filter-out texmath,$(basename $(HEADERS)))
-# -Og: in gcc half the time of -O1 to compile, about the same to run
+# -Og: in gcc half the time of -O1 to compile, mostly about the same to run
 SANITIZE  = -Og -g1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
 # the longest first, so that none is left to run alone
 LONG      = test_trimesh_relax test_textiles_exemplars test_texsyn test_trimesh_repel
@@ -19,14 +19,15 @@ TEST_C    = $(CC) -std=gnu99 -ffp-contract=off -Wall -Wextra -Isrc -Itests/kit -
 # ---- what is tested: modules, tool and their unit tests, with the sanitizers
 
 # too large sets of tiles are then quickly made
-$(TESTS)/modules/textiles.o: DEFINES = -DTEXTILES_MAX_PIXELS=4194304
-# its tests compute for long: twice as fast for 9 seconds more of the compiler
-$(TESTS)/modules/trimesh_relax.o: DEFINES = -O1
+$(TESTS)/modules/textiles.o: OPTIONS = -DTEXTILES_MAX_PIXELS=4194304
+# their tests compute for long: twice as fast for 3 and 9 seconds more of the compiler
+$(TESTS)/modules/texsyn.o: OPTIONS = -O2
+$(TESTS)/modules/trimesh_relax.o: OPTIONS = -O1
 
 $(TESTS)/modules/%.o: src/%.h
 	@mkdir -p $(@D)
 	printf '#define %s_IMPLEMENTATION\n#include "%s.h"\n' $$(echo $* | tr a-z A-Z) $* >$(@:.o=.c)
-	$(TEST_C) $(SANITIZE) $(DEFINES) -MT $@ -c $(@:.o=.c) -o $@
+	$(TEST_C) $(SANITIZE) $(OPTIONS) -MT $@ -c $(@:.o=.c) -o $@
 
 $(TESTS)/asan/%.o: tools/%.c | setup
 	@mkdir -p $(@D)
@@ -53,11 +54,16 @@ $(TESTS)/links.mk: $(wildcard tests/unit/*.c tests/kit/*.h) tests/kit/links.awk
 	    -v files="$(patsubst tools/%.c,$(TESTS)/asan/%.o,$(wildcard tools/files/*.c))" \
 	    -f tests/kit/links.awk $(wildcard tests/kit/*.h tests/unit/*.c) >$@
 
-# ---- golden programs
+# ---- golden programs, with the objects of the tool; other builds are for tests/wide/same_bytes.sh
 
-$(BUILD)/golden/%: tests/wide/golden/%.c
-	@mkdir -p $(@D)
-	$(TEST_C) -O2 -Itests/wide/golden $< -o $@ -lpthread -lm
+GOLDEN_C = @mkdir -p $(@D) && $(TEST_C) -O2 -Itests/wide/golden
+
+$(BUILD)/golden/golden_%: tests/wide/golden/golden_%.c $(BUILD)/modules/%.o
+	$(GOLDEN_C) -D$$(echo $* | tr a-z A-Z)_IMPLEMENTED $^ -o $@ -lpthread -lm
+
+# texmath.h has no object
+$(BUILD)/golden/golden_texmath: tests/wide/golden/golden_texmath.c
+	$(GOLDEN_C) $< -o $@ -lpthread -lm
 
 # the hashes that every build must give, written anew: only where output bytes change on purpose
 golden: $(GOLDEN:%=$(BUILD)/golden/golden_%)
