@@ -129,9 +129,11 @@ static void test_sizes(void **state) {
 
 static void test_small_exemplars(void **state) {
     (void)state;
-    try_size(TEXTILES_FRAME, 64, 64, 3, 0, 2, 6);
-    try_size(TEXTILES_FRAME, 90, 64, 1, 0, 2, 6);
     try_size(TEXTILES_FRAME, 400, 64, 1, 0, 1, 6);
+    if (tk_full()) {
+        try_size(TEXTILES_FRAME, 64, 64, 3, 0, 2, 6);
+        try_size(TEXTILES_FRAME, 90, 64, 1, 0, 2, 6);
+    }
     try_size(TEXTILES_FRAME, 64, 400, 1, 100, 1, 6);
     try_size(TEXTILES_CORNER, 90, 64, 1, 50, 2, 4);
     try_size(TEXTILES_TRIANGLE, 70, 64, 1, 60, 2, 4);
