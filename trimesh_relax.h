@@ -3496,15 +3496,13 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
         for (size_t i = 0; i < count; i++) {
             int32_t c = (int32_t)pairs[i].value;
             if (m->vertex[c] < 0) continue;
-            int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+            const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             if (tmr_is_ghost(m, a) || tmr_is_ghost(m, b)) continue;
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
             if (txm_d3_dist(w->moved[a], w->moved[b]) > 0.5 * spacing) continue;
             if (tmr_kind_of(m, b) != TRIMESH_FREE) {
                 if (tmr_kind_of(m, a) != TRIMESH_FREE) continue;
                 c = m->opposite[c];
-                b = a;
-                a = m->vertex[tmr_next(c)];
             }
             if (!tmr_collapse_onto(w, c)) continue;
             done++;
@@ -5887,11 +5885,11 @@ static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
    vertex: those with a number >= 0 do not count. */
 static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, txm_dvec3 p,
                           txm_dvec3 n, double reach) {
-    const double k = fmin(ceil(reach / g->cell), 8);
+    const int k = (int)fmin(ceil(reach / g->cell), 8);
     const double x = floor(p.x / g->cell), y = floor(p.y / g->cell), z = floor(p.z / g->cell);
-    for (double i = -k; i <= k; i++) {
-        for (double j = -k; j <= k; j++) {
-            for (double l = -k; l <= k; l++) {
+    for (int i = -k; i <= k; i++) {
+        for (int j = -k; j <= k; j++) {
+            for (int l = -k; l <= k; l++) {
                 int32_t v = g->head[tmr_grid_slot(g, x + i, y + j, z + l)];
                 for (; v >= 0; v = g->next[v]) {
                     if (was && was[v] >= 0) continue;

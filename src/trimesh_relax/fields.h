@@ -540,15 +540,13 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
         for (size_t i = 0; i < count; i++) {
             int32_t c = (int32_t)pairs[i].value;
             if (m->vertex[c] < 0) continue;
-            int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+            const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             if (tmr_is_ghost(m, a) || tmr_is_ghost(m, b)) continue;
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
             if (txm_d3_dist(w->moved[a], w->moved[b]) > 0.5 * spacing) continue;
             if (tmr_kind_of(m, b) != TRIMESH_FREE) {
                 if (tmr_kind_of(m, a) != TRIMESH_FREE) continue;
                 c = m->opposite[c];
-                b = a;
-                a = m->vertex[tmr_next(c)];
             }
             if (!tmr_collapse_onto(w, c)) continue;
             done++;

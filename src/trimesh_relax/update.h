@@ -156,11 +156,11 @@ static void tmr_grid_add(tmr_grid *g, txm_dvec3 p, int32_t v) {
    vertex: those with a number >= 0 do not count. */
 static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *was, txm_dvec3 p,
                           txm_dvec3 n, double reach) {
-    const double k = fmin(ceil(reach / g->cell), 8);
+    const int k = (int)fmin(ceil(reach / g->cell), 8);
     const double x = floor(p.x / g->cell), y = floor(p.y / g->cell), z = floor(p.z / g->cell);
-    for (double i = -k; i <= k; i++) {
-        for (double j = -k; j <= k; j++) {
-            for (double l = -k; l <= k; l++) {
+    for (int i = -k; i <= k; i++) {
+        for (int j = -k; j <= k; j++) {
+            for (int l = -k; l <= k; l++) {
                 int32_t v = g->head[tmr_grid_slot(g, x + i, y + j, z + l)];
                 for (; v >= 0; v = g->next[v]) {
                     if (was && was[v] >= 0) continue;
