@@ -34,7 +34,7 @@ $(TESTS)/asan/%.o: tools/%.c | setup
 	$(COMPILE) $(SANITIZE) -MMD -MP -c $< -o $@
 
 # stb shifts into the sign bit on purpose
-$(TESTS)/asan/files/stb.o: COMPILE += -fno-sanitize=undefined
+$(TESTS)/asan/files/stb.o: SANITIZE += -fno-sanitize=undefined
 
 $(TESTS)/asan/texkit: $(TEXKIT:$(BUILD)/%=$(TESTS)/asan/%)
 	$(LINK) $(SANITIZE) $^ -o $@ -lcjson -lm
