@@ -6349,7 +6349,7 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     u->w.length = u->t.length;
     u->w.line_scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double points = fmax(tmr_points_for(u), (double)u->old->vertex_count);
-    if (points > TMR_MOST / 4)
+    if (4 * points > (double)TMR_MOST)
         return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
     status = tmr_copy_surface(&u->w, tmr_sampling_room(floor(2 * points)), &u->first);
     if (status == TXM_OK) status = tmr_sampling_alloc(&u->t, &u->scratch);
