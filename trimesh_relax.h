@@ -6449,7 +6449,8 @@ static txm_status tmr_check_update(const trimesh_mesh *old, const trimesh_update
 
 TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_update_desc *desc,
                                       txm_env *env, trimesh_mesh **mesh) {
-    trimesh_report own, *report = desc && desc->desc.report ? desc->desc.report : &own;
+    trimesh_report own, *report = &own;
+    if (desc && desc->desc.report) report = desc->desc.report;
     memset(report, 0, sizeof *report);
     if (!mesh) return txm_fail(env, TXM_BAD_ARGUMENT, "mesh is NULL");
     *mesh = NULL;
