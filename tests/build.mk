@@ -24,12 +24,12 @@ $(TESTS)/modules/textiles.o: OPTIONS = -DTEXTILES_MAX_PIXELS=4194304
 $(TESTS)/modules/texsyn.o: OPTIONS = -O2
 $(TESTS)/modules/trimesh_relax.o: OPTIONS = -O1
 
-$(TESTS)/modules/%.o: src/%.h
+$(TESTS)/modules/%.o: src/%.h tests/build.mk
 	@mkdir -p $(@D)
 	printf '#define %s_IMPLEMENTATION\n#include "%s.h"\n' $$(echo $* | tr a-z A-Z) $* >$(@:.o=.c)
 	$(TEST_C) $(SANITIZE) $(OPTIONS) -MT $@ -c $(@:.o=.c) -o $@
 
-$(TESTS)/asan/%.o: tools/%.c | setup
+$(TESTS)/asan/%.o: tools/%.c tests/build.mk | setup
 	@mkdir -p $(@D)
 	$(COMPILE) $(SANITIZE) -MMD -MP -c $< -o $@
 
@@ -39,7 +39,7 @@ $(TESTS)/asan/files/stb.o: SANITIZE += -fno-sanitize=undefined
 $(TESTS)/asan/texkit: $(TEXKIT:$(BUILD)/%=$(TESTS)/asan/%)
 	$(LINK) $(SANITIZE) $^ -o $@ -lcjson -lm
 
-$(TESTS)/unit/%.o: tests/unit/%.c
+$(TESTS)/unit/%.o: tests/unit/%.c tests/build.mk
 	@mkdir -p $(@D)
 	$(TEST_C) $(SANITIZE) $(if $(findstring _IMPLEMENTATION,$(file <$<)),,-O0) -c $< -o $@
 
