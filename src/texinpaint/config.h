@@ -1,0 +1,97 @@
+#ifndef TEXINPAINT_CONFIG_H
+#define TEXINPAINT_CONFIG_H
+
+#include "../texinpaint.h"
+
+/* ---- windows --------------------------------------------------------------------------------
+   All completion is done in windows: flat pictures of a part of the surface (or of the picture) with
+   a hole in it. The surface is laid out almost without distortion, so that a window's pixels have
+   about the same size, that of a texel in the hole. A pixel is TXI_HOLE if it is to be filled.     */
+
+enum {
+    TXI_VOID = 0,    /* no surface here                                                        */
+    TXI_KNOWN = 1,   /* may be copied from                                                     */
+    TXI_HOLE = 2,    /* to be completed                                                        */
+    TXI_FOREIGN = 3, /* known, but not to be copied from (desc.source)                         */
+    TXI_MAX_CHANNELS = 4
+};
+
+/* A missing texel of the texture and where it lies in the window. */
+typedef struct txi_target {
+    uint32_t texel;  /* y * width + x in the texture                                           */
+    float x, y;      /* window pixels; pixel centres are whole numbers                         */
+    txm_vec2 axis;   /* direction of the texture's u axis in the window, unit                  */
+    int mirrored;    /* the texture is mirrored in the window: v axis = axis turned left, not right */
+} txi_target;
+
+typedef struct txi_window {
+    int width, height;
+    uint8_t *state;  /* TXI_VOID .. TXI_FOREIGN, one per pixel                                 */
+    uint8_t *color;  /* 4 per pixel, RGB as matched (over mid gray where alpha is below 1), 0   */
+    txm_vec2 *texel; /* where each pixel that is not void lies in the texture, in texels, texel
+                        centres are whole numbers                                              */
+    txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
+    txm_vec3 *normal; /* unit; pictures: 0, 0, 1                                               */
+    txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
+    uint8_t *mirrored; /* as in txi_target                                                     */
+    txi_target *targets; /* the missing texels that this window completes                      */
+    size_t target_count;
+} txi_window;
+
+/* The pixels of a window come from these copies of the window itself. */
+typedef struct txi_pose {
+    float a, b, c, d; /* a step to the right in the target is a step (a, b) in the source, a step
+                         down is (c, d): a rotation, perhaps mirrored                          */
+} txi_pose;
+
+/* Where a hole pixel is copied from: a place in the window (pixel centres are whole numbers). */
+typedef struct txi_copy {
+    float x, y;
+    int32_t piece; /* pixels of one piece (same pose, continuous) have the same number; -1 = not
+                      in the hole                                                             */
+    int32_t pose;  /* index into the poses                                                    */
+} txi_copy;
+
+/* A line through the hole, completed: points about one pixel apart, from the known side through the
+   hole to the known side, or to where it ends. */
+typedef struct txi_curve {
+    txm_vec2 *points;  /* window pixels                                                        */
+    int count;
+    int first, last;   /* points[first..last] lie in the hole                                  */
+    int ends[2];       /* the line ends that it joins; -1: it ends in the hole                 */
+    float strength;    /* contrast of the line, in levels of 8 bits                            */
+    int partner;       /* the curve along the other side of the same stroke, or -1             */
+} txi_curve;
+
+/* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
+typedef struct txi_plan {
+    uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and in the
+                        fourth byte the guide channel: 255 on a line (known or completed), falling
+                        with the distance                                                      */
+    uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
+    txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
+} txi_plan;
+
+/* ---- the domain ----------------------------------------------------------------------------- */
+
+/* What all windows share: the maps in their current state, and what is still missing. */
+typedef struct txi_surface txi_surface;
+typedef struct txi_domain {
+    const texinpaint_desc *desc;
+    int width, height, map_count;             /* map_count: 1 + desc->map_count              */
+    txm_image maps[TEXINPAINT_MAX_MAPS];      /* copies, resolved; 0 is the picture          */
+    uint8_t *missing;                         /* one per texel: 1 = missing, still           */
+    uint8_t *usable;                          /* one per texel: 1 = may be copied from       */
+    uint8_t *covered;                         /* one per texel: 1 = a chart covers its centre */
+    txi_surface *surface;                     /* NULL for pictures                           */
+} txi_domain;
+
+static txm_status txi_no_memory(txm_env *env) {
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the completion");
+}
+
+static txm_status txi_stopped(txm_env *env) {
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+#endif /* TEXINPAINT_CONFIG_H */

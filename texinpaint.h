@@ -1,0 +1,411 @@
+/* texinpaint.h - v0.2.0 - complete the missing texture of a mesh, or a hole in a picture
+   SPDX-License-Identifier: MIT OR Unlicense                   (full text: end of file)
+
+   WHAT IT DOES
+     Fills a hole in the texture of a mesh, across the seams of its atlas, or a hole in a plain
+     picture: first the lines that end at the hole are continued through it, then the texture is
+     completed along these lines, then everywhere else, from pieces of the surroundings [1].
+
+   QUICK START                                 (tests build and run this very block)
+     // Remove a disc from a striped picture. cc -std=c99 quick.c -lm
+     #define TEXINPAINT_IMPLEMENTATION        // in exactly one .c or .cpp file
+     #include "texinpaint.h"                  // texmath.h must lie beside it
+     #include <stdio.h>
+
+     enum { SIDE = 128 };
+     static unsigned char photo[SIDE * SIDE], hole[SIDE * SIDE], whole[SIDE * SIDE];
+
+     static txm_image image_of(unsigned char *pixels) {
+         txm_image image = {pixels, SIDE, SIDE, 1, TXM_U8, 0};
+         return image;
+     }
+
+     int main(void) {
+         static texinpaint_desc desc;         // static: all zero, which means the defaults
+         static txm_env env;                  // malloc, silent, serial; receives the message
+         const txm_image out = image_of(whole);
+         for (int i = 0; i < SIDE * SIDE; i++) {   // instead of a photograph: stripes
+             const int x = i % SIDE - 64, y = i / SIDE - 64;
+             photo[i] = (unsigned char)((i % SIDE + i / SIDE) / 16 % 2 ? 200 : 60);
+             hole[i] = x * x + y * y < 400 ? 255 : 0;
+         }
+         desc.image = image_of(photo);
+         desc.mask = image_of(hole);
+         if (texinpaint_complete(&desc, &env, &out) != TXM_OK) {
+             fprintf(stderr, "inpaint: %s\n", env.message);
+             return 1;
+         }
+         printf("the centre is %d now\n", whole[SIDE * 64 + 64]);
+         return 0;
+     }
+
+   REFERENCES
+     [1] K. Guo, X. Chen, Y. Liu, B. Zhou, Y. Guo. Geometric based structure propagation and texture
+         matching for 3D texture completion. 2013.                                             */
+#ifndef TEXINPAINT_H
+#define TEXINPAINT_H
+
+#include "texmath.h"
+
+#define TEXINPAINT_VERSION "0.2.0"
+
+#ifndef TEXINPAINT_MAX_PIXELS
+#define TEXINPAINT_MAX_PIXELS (1 << 28) /* larger pictures are refused */
+#endif
+
+#if defined(TEXINPAINT_STATIC) && defined(__GNUC__)
+#define TEXINPAINT_API __attribute__((unused)) static
+#elif defined(TEXINPAINT_STATIC)
+#define TEXINPAINT_API static
+#else
+#define TEXINPAINT_API extern
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- what to complete --------------------------------------------------------------------- */
+
+enum {
+    TEXINPAINT_MAX_MAPS = 16,  /* pictures in register: albedo, normal, roughness, ...         */
+    TEXINPAINT_MAX_SIDE = 32768 /* pixels of a picture                                          */
+};
+
+/* How one of the further maps is treated; all zero: a picture. */
+typedef struct texinpaint_map {
+    txm_image image; /* the size of desc.image, 1..4 channels, any sample type                  */
+    int is_normal;   /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2 in the
+                        tangent space of the texture: turned with the pieces, kept at unit length.
+                        x to the right, y up (OpenGL); 2 = y down (DirectX)                     */
+    int is_label;    /* values are labels, not quantities: never blended or interpolated        */
+} texinpaint_map;
+
+/* How lines are continued. */
+enum {
+    TEXINPAINT_AUTO = 0,  /* the hypotheses below are tried, the one that fits best wins        */
+    TEXINPAINT_TEXTURE,   /* no lines: texture alone                                            */
+    TEXINPAINT_PICTURE,   /* lines as in pictures of things: few, long, they may end            */
+    TEXINPAINT_PATTERN    /* lines as in patterns: each line end is joined to another           */
+};
+
+/* Prior knowledge about where lines run [1, II.C]. */
+enum { TEXINPAINT_PRIOR_NONE = 0, TEXINPAINT_PRIOR_CREST, TEXINPAINT_PRIOR_LINES };
+
+/* A line on a mesh or in a picture. */
+typedef struct texinpaint_line {
+    const float *points; /* 3 per point on or near the surface of the mesh, in its units; for a
+                            picture x, y in pixels (pixel centres at one half) and 0            */
+    int count;           /* 2 or more                                                            */
+} texinpaint_line;
+
+/* What to complete, and how. All zero but image and mask is a good default. Pictures are not modified;
+   they and the mesh must live as long as the job. */
+typedef struct texinpaint_desc {
+    txm_image image;  /* the picture, or the texture of the mesh: 1..4 channels, any sample type */
+    txm_image mask;   /* same size, TXM_U8; 1 channel: missing where 128 or more; 2 or 4 channels:
+                         where gray times alpha is at least half of its range                    */
+    txm_image source; /* same size and form as mask: where texture may be taken from; pixels NULL:
+                         from all that is known                                                  */
+    const texinpaint_map *maps; /* further maps in register, completed along with the picture    */
+    int map_count;              /* 0..TEXINPAINT_MAX_MAPS - 1                                    */
+    txm_mesh mesh;    /* triangles; face_count 0: the picture is a plain picture                 */
+    const float *uv;  /* 2 per entry: u to the right, v downwards, 0..1 is the picture once; values
+                         outside repeat it                                                       */
+    size_t uv_count;  /* entries of uv                                                           */
+    const uint32_t *uv_indices; /* 3 per triangle, which entry its corners have; NULL: the entry of
+                         the corner's vertex                                                     */
+    int gutter;       /* missing texels outside the charts are filled up to so many texels from
+                         them, 1..TEXINPAINT_MAX_SIDE; 0 = 8; -1 = none                          */
+    int structure;    /* TEXINPAINT_AUTO .. TEXINPAINT_PATTERN                                   */
+    int prior;        /* TEXINPAINT_PRIOR_...                                                    */
+    const texinpaint_line *lines; /* that the completed lines should follow, for
+                         TEXINPAINT_PRIOR_LINES                                                  */
+    int line_count;
+    float alpha;      /* line ends farther apart than this are not joined, in texels along the
+                         surface; 0 = 1.5 times the diameter of the hole [1, II.B]               */
+    int beta;         /* votes are propagated into the hole at most so often; 0 = 64 [1, II.B]   */
+    uint64_t seed;    /* another seed gives another completion                                   */
+    /* Receives intermediate results as pictures: points, votes, lines, hypotheses, pieces; NULL = none.
+       The picture belongs to the library and lives until the function returns.                 */
+    void (*show)(void *user, const char *name, const txm_image *picture);
+    void *show_user;
+} texinpaint_desc;
+
+/* Complete the picture and its maps in one call.
+
+   env    NULL, or how to allocate, report, cancel and run in parallel
+   out    1 + map_count pictures, size, channels and sample type of image and of each map: known
+          texels are copied, missing ones completed. Untouched after an error. They may be the
+          inputs themselves
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, samples
+          or coordinates that are not finite, a mesh without texture coordinates; TXM_TOO_SMALL if
+          there is too little known texture near the hole; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED                                                                        */
+TEXINPAINT_API txm_status texinpaint_complete(const texinpaint_desc *desc, txm_env *env,
+                                              const txm_image *out);
+
+/* ---- step by step ------------------------------------------------------------------------ */
+
+/* What was done, for curious callers. */
+typedef struct texinpaint_info {
+    int holes;           /* connected holes on the surface, or in the picture                    */
+    int windows;         /* flat windows that were completed                                     */
+    int structure;       /* of the largest hole: TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN        */
+    int line_ends;       /* line ends found at the border of the holes                           */
+    int joins;           /* lines continued from border to border                                */
+    size_t missing;      /* texels that were missing and lie in a chart                          */
+    size_t written;      /* texels written, gutters included                                     */
+} texinpaint_info;
+
+/* A completion that is made step by step. It keeps a copy of the allocator. */
+typedef struct texinpaint_job texinpaint_job;
+
+/* Prepare a job. The statuses are those of texinpaint_complete. */
+TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env *env,
+                                           texinpaint_job **out);
+
+/* One step of the work. The first makes a preview: smooth colour in the hole, with the lines in it.
+   After an error (cancelling included) the step may be tried again.
+   env    its progress callback receives the fraction of all steps that is done
+   more   receives 0 once nothing is left to do; NULL is allowed                              */
+TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int *more);
+
+/* Copy the picture (map 0) or a further map (1..map_count) in its current state, after one step or
+   more (before the first, TXM_BAD_ARGUMENT). out has the size, channels and sample type of the input. */
+TEXINPAINT_API txm_status texinpaint_draw(const texinpaint_job *job, int map, txm_env *env,
+                                          const txm_image *out);
+
+/* What has been done so far. */
+TEXINPAINT_API texinpaint_info texinpaint_info_of(const texinpaint_job *job);
+
+/* Release a job; NULL is allowed. */
+TEXINPAINT_API void texinpaint_free(texinpaint_job *job);
+
+/* ---- without texture: smooth fill, gutters -------------------------------------------------- */
+
+/* Fill the holes smoothly: each colour is a harmonic function on the surface (in the picture, without
+   a mesh), its values at the border of the hole those of the known texels. image, mask, maps, mesh, uv
+   and gutter of the desc are used. Holes without any known texel around them get the mean colour of
+   the known ones. As texinpaint_complete otherwise. */
+TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_env *env,
+                                              const txm_image *out);
+
+/* Fill the gutters: every texel outside the charts, however far (or up to desc->gutter texels), gets
+   the colour of the nearest texel in a chart. image, maps, mesh, uv, gutter (0 = without limit) are used;
+   mask, if it has pixels, marks texels in charts that are not to be spread either. As
+   texinpaint_complete otherwise. */
+TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,
+                                            const txm_image *out);
+
+/* ---- crest lines ------------------------------------------------------------------------- */
+
+/* Which crest lines of a mesh to find. */
+typedef struct texinpaint_crest_desc {
+    txm_mesh mesh;    /* triangles                                                              */
+    float threshold;  /* of the strength of a line, the integral of its curvature along it (no
+                         unit); 0 = chosen from the mesh                                        */
+    int kinds;        /* 1 ridges, 2 valleys, 3 or 0 both                                       */
+} texinpaint_crest_desc;
+
+/* Lines; points as in texinpaint_line. */
+typedef struct texinpaint_crests {
+    texinpaint_line *lines;
+    size_t line_count;
+    txm_arena memory; /* private */
+} texinpaint_crests;
+
+/* The crest lines of a mesh: where the larger principal curvature has an extremum along its own line
+   of curvature [2]. The estimate comes from a cubic fitted around each vertex.
+   out    receives the lines, or NULL on any error; release it with texinpaint_crests_free
+   return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED           */
+TEXINPAINT_API txm_status texinpaint_crest(const texinpaint_crest_desc *desc, txm_env *env,
+                                           texinpaint_crests **out);
+
+/* Release lines; NULL is allowed. */
+TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TEXINPAINT_H */
+
+#if defined(TEXINPAINT_IMPLEMENTATION) && !defined(TEXINPAINT_IMPLEMENTED)
+#define TEXINPAINT_IMPLEMENTED
+
+/* ---- windows --------------------------------------------------------------------------------
+   All completion is done in windows: flat pictures of a part of the surface (or of the picture) with
+   a hole in it. The surface is laid out almost without distortion, so that a window's pixels have
+   about the same size, that of a texel in the hole. A pixel is TXI_HOLE if it is to be filled.     */
+
+enum {
+    TXI_VOID = 0,    /* no surface here                                                        */
+    TXI_KNOWN = 1,   /* may be copied from                                                     */
+    TXI_HOLE = 2,    /* to be completed                                                        */
+    TXI_FOREIGN = 3, /* known, but not to be copied from (desc.source)                         */
+    TXI_MAX_CHANNELS = 4
+};
+
+/* A missing texel of the texture and where it lies in the window. */
+typedef struct txi_target {
+    uint32_t texel;  /* y * width + x in the texture                                           */
+    float x, y;      /* window pixels; pixel centres are whole numbers                         */
+    txm_vec2 axis;   /* direction of the texture's u axis in the window, unit                  */
+    int mirrored;    /* the texture is mirrored in the window: v axis = axis turned left, not right */
+} txi_target;
+
+typedef struct txi_window {
+    int width, height;
+    uint8_t *state;  /* TXI_VOID .. TXI_FOREIGN, one per pixel                                 */
+    uint8_t *color;  /* 4 per pixel, RGB as matched (over mid gray where alpha is below 1), 0   */
+    txm_vec2 *texel; /* where each pixel that is not void lies in the texture, in texels, texel
+                        centres are whole numbers                                              */
+    txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
+    txm_vec3 *normal; /* unit; pictures: 0, 0, 1                                               */
+    txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
+    uint8_t *mirrored; /* as in txi_target                                                     */
+    txi_target *targets; /* the missing texels that this window completes                      */
+    size_t target_count;
+} txi_window;
+
+/* The pixels of a window come from these copies of the window itself. */
+typedef struct txi_pose {
+    float a, b, c, d; /* a step to the right in the target is a step (a, b) in the source, a step
+                         down is (c, d): a rotation, perhaps mirrored                          */
+} txi_pose;
+
+/* Where a hole pixel is copied from: a place in the window (pixel centres are whole numbers). */
+typedef struct txi_copy {
+    float x, y;
+    int32_t piece; /* pixels of one piece (same pose, continuous) have the same number; -1 = not
+                      in the hole                                                             */
+    int32_t pose;  /* index into the poses                                                    */
+} txi_copy;
+
+/* A line through the hole, completed: points about one pixel apart, from the known side through the
+   hole to the known side, or to where it ends. */
+typedef struct txi_curve {
+    txm_vec2 *points;  /* window pixels                                                        */
+    int count;
+    int first, last;   /* points[first..last] lie in the hole                                  */
+    int ends[2];       /* the line ends that it joins; -1: it ends in the hole                 */
+    float strength;    /* contrast of the line, in levels of 8 bits                            */
+    int partner;       /* the curve along the other side of the same stroke, or -1             */
+} txi_curve;
+
+/* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
+typedef struct txi_plan {
+    uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and in the
+                        fourth byte the guide channel: 255 on a line (known or completed), falling
+                        with the distance                                                      */
+    uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
+    txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
+} txi_plan;
+
+/* ---- the domain ----------------------------------------------------------------------------- */
+
+/* What all windows share: the maps in their current state, and what is still missing. */
+typedef struct txi_surface txi_surface;
+typedef struct txi_domain {
+    const texinpaint_desc *desc;
+    int width, height, map_count;             /* map_count: 1 + desc->map_count              */
+    txm_image maps[TEXINPAINT_MAX_MAPS];      /* copies, resolved; 0 is the picture          */
+    uint8_t *missing;                         /* one per texel: 1 = missing, still           */
+    uint8_t *usable;                          /* one per texel: 1 = may be copied from       */
+    uint8_t *covered;                         /* one per texel: 1 = a chart covers its centre */
+    txi_surface *surface;                     /* NULL for pictures                           */
+} txi_domain;
+
+static txm_status txi_no_memory(txm_env *env) {
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the completion");
+}
+
+static txm_status txi_stopped(txm_env *env) {
+    return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+/* ---- check ---- */
+
+/* ---- surface ---- */
+
+/* ---- geodesic ---- */
+
+/* ---- unfold ---- */
+
+/* ---- window ---- */
+
+/* ---- harmonic ---- */
+
+/* ---- crest ---- */
+
+/* ---- vote ---- */
+
+/* ---- trace ---- */
+
+/* ---- join ---- */
+
+/* ---- belief ---- */
+
+/* ---- strip ---- */
+
+/* ---- picture ---- */
+
+/* ---- onion ---- */
+
+/* ---- search ---- */
+
+/* ---- ballot ---- */
+
+/* ---- fill ---- */
+
+/* ---- blend ---- */
+
+/* ---- choose ---- */
+
+/* ---- job ---- */
+
+#endif /* TEXINPAINT_IMPLEMENTATION */
+
+/* ---- licence ----------------------------------------------------------------------------
+
+   This file may be used under either of two licences, whichever you like better.
+
+   1. MIT
+
+   Copyright (c) 2026 the texkit authors
+
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software
+   and associated documentation files (the "Software"), to deal in the Software without
+   restriction, including without limitation the rights to use, copy, modify, merge, publish,
+   distribute, sublicense, and/or sell copies of the Software, and to permit persons to whom the
+   Software is furnished to do so, subject to the following conditions:
+
+   The above copyright notice and this permission notice shall be included in all copies or
+   substantial portions of the Software.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM,
+   DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   2. Public domain (Unlicense, unlicense.org)
+
+   This is free and unencumbered software released into the public domain.
+
+   Anyone is free to copy, modify, publish, use, compile, sell, or distribute this software,
+   either in source code form or as a compiled binary, for any purpose, commercial or non-
+   commercial, and by any means.
+
+   In jurisdictions that recognize copyright laws, the author or authors of this software dedicate
+   any and all copyright interest in the software to the public domain. We make this dedication
+   for the benefit of the public at large and to the detriment of our heirs and successors. We
+   intend this dedication to be an overt act of relinquishment in perpetuity of all present and
+   future rights to this software under copyright law.
+
+   THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING
+   BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND
+   NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+   LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM, OUT OF OR IN
+   CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+*/
