@@ -32,6 +32,8 @@ typedef struct txi_window {
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
     txm_vec3 *normal; /* unit; pictures: 0, 0, 1                                               */
+    double spacing;  /* units of the mesh per window pixel: place * spacing is a point of the mesh;
+                        pictures: 1                                                            */
     txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
     uint8_t *mirrored; /* as in txi_target                                                     */
     txi_target *targets; /* the missing texels that this window completes                      */
@@ -71,6 +73,15 @@ typedef struct txi_plan {
     uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
 } txi_plan;
+
+/* Prior knowledge about where lines run [1, II.C], in a window: polylines, clipped to the window. Line k
+   has the points starts[k] .. starts[k + 1] - 1, two or more. line_count 0: no prior; the pointers
+   may be NULL then. */
+typedef struct txi_prior {
+    txm_vec2 *points; /* window pixels; pixel centres are whole numbers                        */
+    int *starts;      /* line_count + 1                                                        */
+    int line_count;
+} txi_prior;
 
 /* ---- the domain ----------------------------------------------------------------------------- */
 
