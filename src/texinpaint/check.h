@@ -7,17 +7,23 @@
 
 #define TXI_MAX_UV 4096.0f /* repeats of the texture; beyond, a float no longer tells its texels apart */
 
-static txm_status txi_check_picture(const txm_image *im, const char *name, const txm_image *like,
-                                    txm_env *env) {
+static txm_status txi_check_size(const txm_image *im, const char *name, const txm_image *like,
+                                 txm_env *env) {
     const txm_status status = txm_image_check(im, name, TEXINPAINT_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (im->width > TEXINPAINT_MAX_SIDE || im->height > TEXINPAINT_MAX_SIDE)
         return txm_fail_at(env, TXM_TOO_LARGE, name, "sides may have up to 32768 pixels");
     if (im->width != like->width || im->height != like->height)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must have the size of image");
-    if (!txm_image_is_finite(im))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite");
     return TXM_OK;
+}
+
+static txm_status txi_check_picture(const txm_image *im, const char *name, const txm_image *like,
+                                    txm_env *env) {
+    const txm_status status = txi_check_size(im, name, like, env);
+    if (status == TXM_OK && !txm_image_is_finite(im))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite");
+    return status;
 }
 
 static txm_status txi_check_mask(const txm_image *im, const char *name, const txm_image *like,
@@ -121,7 +127,7 @@ static txm_status txi_check_outputs(const texinpaint_desc *d, const txm_image *o
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     for (int i = 0; i < count; i++) {
         const txm_image *in = i ? &d->maps[i - 1].image : &d->image;
-        const txm_status status = txi_check_picture(&out[i], "out", &d->image, env);
+        const txm_status status = txi_check_size(&out[i], "out", &d->image, env);
         if (status != TXM_OK) return status;
         if (txm_image_resolve(out[i]).channels != txm_image_resolve(*in).channels ||
             out[i].sample != in->sample)

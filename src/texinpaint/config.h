@@ -97,6 +97,36 @@ typedef struct txi_domain {
     txi_surface *surface;                     /* NULL for pictures                           */
 } txi_domain;
 
+/* ---- progress ------------------------------------------------------------------------------- */
+
+/* A stage of a call: its env fills the part from..to of the caller's progress. */
+typedef struct txi_stage {
+    txm_env env; /* to pass to the stage                                                       */
+    txm_env *whole;
+    float from, to;
+} txi_stage;
+
+static int txi_stage_report(void *user, float fraction, const char *name) {
+    const txi_stage *stage = (const txi_stage *)user;
+    const float part = txm_clampf(fraction, 0, 1);
+    return txm_progress(stage->whole, stage->from + (stage->to - stage->from) * part, name);
+}
+
+static void txi_stage_begin(txi_stage *stage, txm_env *whole, float from, float to) {
+    memset(stage, 0, sizeof *stage);
+    if (whole) stage->env = *whole;
+    stage->whole = whole;
+    stage->from = from;
+    stage->to = to;
+    stage->env.progress = txi_stage_report;
+    stage->env.progress_user = stage;
+}
+
+/* The status of the stage, its message passed on. */
+static txm_status txi_stage_end(const txi_stage *stage, txm_status status) {
+    return status == TXM_OK ? status : txm_fail(stage->whole, status, stage->env.message);
+}
+
 static txm_status txi_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the completion");
 }
