@@ -266,6 +266,7 @@ typedef struct txi_window {
                         pictures: 1                                                            */
     txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
     uint8_t *mirrored; /* as in txi_target                                                     */
+    uint32_t *face;  /* the triangle under each pixel, for txi_window_read; pictures: none      */
     txi_target *targets; /* the missing texels that this window completes                      */
     size_t target_count;
 } txi_window;
@@ -557,11 +558,656 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
 
 /* ---- surface ---- */
 
+#define TXI_NO_FACE 0xffffffffu
+
+/* The mesh as a surface, across the seams of its atlas. */
+struct txi_surface {
+    size_t face_count, vertex_count; /* vertices: welded, those at equal positions are one      */
+    txm_dvec3 *point;    /* 1 per vertex                                                       */
+    uint32_t *vertex;    /* 3 per face: its vertices                                           */
+    uint32_t *opposite;  /* 3 per face: the side on the other side of side k, from corner k to the
+                            next; TXM_NO_SIDE at borders                                       */
+    float *uv;           /* 6 per face: its corners in texels, texel centres are whole numbers; not
+                            wrapped                                                            */
+    uint32_t *chart;     /* 1 per face: faces that are connected in the atlas or overlap in it */
+    uint32_t *owner;     /* 1 per texel: the first face whose chart covers its centre, or TXI_NO_FACE */
+    uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] - 1] */
+    uint32_t *hole_first, *hole; /* the missing texels of face f: hole[hole_first[f]] .. as first */
+    size_t cursor;       /* no texel in front of this one is missing and covered               */
+};
+
+static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env) {
+    (void)arena;
+    (void)env;
+    d->surface = NULL;
+    return TXM_OK;
+}
+
 /* ---- geodesic ---- */
 
 /* ---- unfold ---- */
 
-/* ---- window ---- */
+/* ---- resample: between maps and windows ------------------------------------------------------ */
+
+enum {
+    TXI_NEAR = 3, /* texels; ours: how far a pixel between charts looks for a texel of its own   */
+    TXI_TAPS = 4  /* of the Catmull-Rom spline, per axis                                        */
+};
+
+/* A window of this size from the arena: everything void. */
+static txm_status txi_window_alloc(txi_window *w, int width, int height, txm_arena *arena,
+                                   txm_env *env) {
+    const size_t count = (size_t)width * (size_t)height;
+    memset(w, 0, sizeof *w);
+    w->width = width;
+    w->height = height;
+    w->state = (uint8_t *)txm_arena_zero(arena, count, 1);
+    w->color = (uint8_t *)txm_arena_zero(arena, count, 4);
+    w->texel = (txm_vec2 *)txm_arena_zero(arena, count, sizeof(txm_vec2));
+    w->place = (txm_vec3 *)txm_arena_zero(arena, count, sizeof(txm_vec3));
+    w->normal = (txm_vec3 *)txm_arena_zero(arena, count, sizeof(txm_vec3));
+    w->axis = (txm_vec2 *)txm_arena_zero(arena, count, sizeof(txm_vec2));
+    w->mirrored = (uint8_t *)txm_arena_zero(arena, count, 1);
+    w->face = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) w->face[i] = TXI_NO_FACE;
+    return TXM_OK;
+}
+
+/* The weights of the spline of Catmull and Rom at t, 0..1, for samples at -1, 0, 1, 2. */
+static void txi_spline(double t, double weight[TXI_TAPS]) {
+    weight[0] = t * (-0.5 + t * (1 - 0.5 * t));
+    weight[1] = 1 + t * t * (-2.5 + 1.5 * t);
+    weight[2] = t * (0.5 + t * (2 - 1.5 * t));
+    weight[3] = t * t * (-0.5 + 0.5 * t);
+}
+
+static int txi_wrap(int i, int n) {
+    const int r = i % n;
+    return r < 0 ? r + n : r;
+}
+
+/* May a pixel on this face take texel (x, y), not wrapped yet? Its number, or -1: there is none, or
+   it belongs to another chart. */
+static int64_t txi_tap(const txi_domain *d, uint32_t face, int x, int y) {
+    if (!d->surface) {
+        if (x < 0 || y < 0 || x >= d->width || y >= d->height) return -1;
+        return (int64_t)y * d->width + x;
+    }
+    const int64_t i = (int64_t)txi_wrap(y, d->height) * d->width + txi_wrap(x, d->width);
+    const uint32_t owner = d->surface->owner[i];
+    if (owner == TXI_NO_FACE || face == TXI_NO_FACE) return -1;
+    return d->surface->chart[owner] == d->surface->chart[face] ? i : -1;
+}
+
+/* The texel nearest to p that a pixel on this face may take, at most TXI_NEAR away, -1 if there is
+   none. known: only texels that are not missing. */
+static int64_t txi_nearest_tap(const txi_domain *d, uint32_t face, txm_vec2 p, int known) {
+    const int cx = (int)floor((double)p.x + 0.5), cy = (int)floor((double)p.y + 0.5);
+    int64_t best = -1;
+    double least = 0;
+    for (int y = cy - TXI_NEAR; y <= cy + TXI_NEAR; y++) {
+        for (int x = cx - TXI_NEAR; x <= cx + TXI_NEAR; x++) {
+            const int64_t i = txi_tap(d, face, x, y);
+            const double dx = (double)x - p.x, dy = (double)y - p.y, apart = dx * dx + dy * dy;
+            if (i < 0 || (known && d->missing[i]) || (best >= 0 && apart >= least)) continue;
+            best = i;
+            least = apart;
+        }
+    }
+    return best;
+}
+
+/* The texels around a place and their weights. Where all 16 exist and are known these are those of
+   the spline, else those of the known ones among the inner four, else the nearest known one.
+   Returns their number. */
+static int txi_taps_at(const txi_domain *d, uint32_t face, txm_vec2 p, int is_label,
+                       int64_t texel[16], double weight[16]) {
+    const double fx = floor(p.x), fy = floor(p.y);
+    const int x = (int)fx, y = (int)fy;
+    double wx[TXI_TAPS], wy[TXI_TAPS], sum = 0;
+    int count = 0, whole = 1;
+    if (!is_label) {
+        txi_spline(p.x - fx, wx);
+        txi_spline(p.y - fy, wy);
+        for (int k = 0; k < 16 && whole; k++) {
+            texel[k] = txi_tap(d, face, x - 1 + k % 4, y - 1 + k / 4);
+            weight[k] = wx[k % 4] * wy[k / 4];
+            whole = texel[k] >= 0 && !d->missing[texel[k]];
+        }
+        if (whole) return 16;
+        for (int k = 0; k < 4; k++) {
+            const int64_t i = txi_tap(d, face, x + k % 2, y + k / 2);
+            const double u = k % 2 ? p.x - fx : 1 - (p.x - fx), v = k / 2 ? p.y - fy : 1 - (p.y - fy);
+            if (i < 0 || d->missing[i] || !(u * v > 0)) continue;
+            texel[count] = i;
+            weight[count++] = u * v;
+            sum += u * v;
+        }
+        for (int k = 0; k < count; k++) weight[k] /= sum;
+        if (sum > 0.05) return count;
+    }
+    texel[0] = txi_nearest_tap(d, face, p, 1);
+    weight[0] = 1;
+    return texel[0] >= 0;
+}
+
+/* All channels of a map at pixel i of the window. */
+static void txi_read_pixel(const txi_domain *d, const txi_window *w, int map, size_t i, float *out) {
+    const txm_image *image = &d->maps[map];
+    const int label = map > 0 && d->desc->maps[map - 1].is_label;
+    int64_t texel[16];
+    double weight[16];
+    int taps = 0;
+    if (w->state[i] != TXI_VOID && d->surface) {
+        taps = txi_taps_at(d, w->face[i], w->texel[i], label, texel, weight);
+    } else if (w->state[i] != TXI_VOID) { /* pixels of a picture are its texels */
+        texel[0] = txi_tap(d, TXI_NO_FACE, (int)w->texel[i].x, (int)w->texel[i].y);
+        weight[0] = 1;
+        taps = texel[0] >= 0 && !d->missing[texel[0]];
+    }
+    for (int c = 0; c < image->channels; c++) {
+        double sum = 0;
+        for (int k = 0; k < taps; k++)
+            sum += weight[k] * txm_image_get(image, (int)(texel[k] % d->width),
+                                             (int)(texel[k] / d->width), c);
+        out[c] = txm_float(sum);
+    }
+}
+
+/* Every channel of a map at the window's pixels: values receives width * height * channels numbers,
+   in the units of txm_image_get. Interpolated by the spline of Catmull and Rom from known texels of
+   the pixel's own chart; labels are those of the nearest texel. 0 where there is no known texel. */
+static void txi_window_read(const txi_domain *d, const txi_window *w, int map, float *values) {
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    const size_t channels = (size_t)d->maps[map].channels;
+    for (size_t i = 0; i < count; i++) txi_read_pixel(d, w, map, i, values + i * channels);
+}
+
+/* Is a pixel, that has a surface, known, missing or not to be copied from? A hole if its nearest
+   texel is missing, or one that has more than 2 % of the bilinear weight; void without any. */
+static uint8_t txi_pixel_state(const txi_domain *d, uint32_t face, txm_vec2 p) {
+    const double fx = floor(p.x), fy = floor(p.y);
+    double most = 0;
+    int64_t nearest = -1;
+    for (int k = 0; k < 4; k++) {
+        const int64_t i = txi_tap(d, face, (int)fx + k % 2, (int)fy + k / 2);
+        const double u = k % 2 ? p.x - fx : 1 - (p.x - fx), v = k / 2 ? p.y - fy : 1 - (p.y - fy);
+        if (i < 0 || u * v < 0.02) continue;
+        if (d->missing[i]) return TXI_HOLE;
+        if (u * v <= most) continue;
+        most = u * v;
+        nearest = i;
+    }
+    if (nearest < 0) nearest = txi_nearest_tap(d, face, p, 0);
+    if (nearest < 0) return TXI_VOID;
+    if (d->missing[nearest]) return TXI_HOLE;
+    return d->usable[nearest] ? TXI_KNOWN : TXI_FOREIGN;
+}
+
+static uint8_t txi_byte(double unit) {
+    return (uint8_t)(unit >= 1 ? 255 : unit > 0 ? unit * 255 + 0.5 : 0.5);
+}
+
+/* Fill state, of pixels that are not void, and color from the maps as they are now. */
+static void txi_window_colors(const txi_domain *d, txi_window *w) {
+    const int channels = d->maps[0].channels, has_alpha = channels == 2 || channels == 4;
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    for (size_t i = 0; i < count; i++) {
+        float v[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
+        uint8_t *out = w->color + 4 * i;
+        memset(out, 0, 4);
+        if (w->state[i] != TXI_VOID) w->state[i] = txi_pixel_state(d, w->face[i], w->texel[i]);
+        if (w->state[i] == TXI_VOID) continue;
+        txi_read_pixel(d, w, 0, i, v);
+        const double alpha = has_alpha ? (double)txm_clampf(v[channels - 1], 0, 1) : 1;
+        for (int c = 0; c < 3; c++)
+            out[c] = txi_byte(alpha * v[channels >= 3 ? c : 0] + (1 - alpha) * (128 / 255.0));
+    }
+}
+
+/* The window's values at (x, y): the spline, limited to the range of the four pixels around, so
+   that it cannot ring; where a pixel of the sixteen is void, bilinear from those that are not. 0:
+   all four are void. */
+static int txi_window_value(const txi_window *w, int channels, int is_label, const float *values,
+                            double x, double y, float out[TXI_MAX_CHANNELS]) {
+    const double fx = floor(x), fy = floor(y);
+    const int left = (int)fx, up = (int)fy;
+    double wx[TXI_TAPS], wy[TXI_TAPS], bilinear[4], sum = 0, best = 0;
+    size_t at[16];
+    int solid[16], whole = 1, nearest = -1;
+    for (int k = 0; k < 16; k++) {
+        const int px = left - 1 + k % 4, py = up - 1 + k / 4;
+        solid[k] = px >= 0 && py >= 0 && px < w->width && py < w->height;
+        at[k] = solid[k] ? (size_t)py * (size_t)w->width + (size_t)px : 0;
+        solid[k] = solid[k] && w->state[at[k]] != TXI_VOID;
+        whole &= solid[k];
+    }
+    for (int k = 0; k < 4; k++) {
+        const int tap = 5 + k % 2 + 4 * (k / 2);
+        const double u = k % 2 ? x - fx : 1 - (x - fx), v = k / 2 ? y - fy : 1 - (y - fy);
+        bilinear[k] = solid[tap] ? u * v : 0;
+        sum += bilinear[k];
+        if (!(bilinear[k] > best)) continue;
+        best = bilinear[k];
+        nearest = tap;
+    }
+    if (nearest < 0) return 0;
+    txi_spline(x - fx, wx);
+    txi_spline(y - fy, wy);
+    for (int c = 0; c < channels; c++) {
+        double value = 0, low = 0, high = 0;
+        if (is_label) {
+            out[c] = values[at[nearest] * (size_t)channels + (size_t)c];
+            continue;
+        }
+        if (!whole) {
+            for (int k = 0; k < 4; k++) {
+                const size_t i = at[5 + k % 2 + 4 * (k / 2)];
+                value += bilinear[k] / sum * values[i * (size_t)channels + (size_t)c];
+            }
+            out[c] = txm_float(value);
+            continue;
+        }
+        for (int k = 0; k < 16; k++) {
+            const double v = values[at[k] * (size_t)channels + (size_t)c];
+            const int is_inner = (k % 4 == 1 || k % 4 == 2) && (k / 4 == 1 || k / 4 == 2);
+            value += wx[k % 4] * wy[k / 4] * v;
+            if (is_inner && (k == 5 || v < low)) low = v;
+            if (is_inner && (k == 5 || v > high)) high = v;
+        }
+        out[c] = txm_float(value < low ? low : value > high ? high : value);
+    }
+    return 1;
+}
+
+/* The pixel nearest to (x, y) that is not void, -1 if there is none within 8 pixels. */
+static int64_t txi_solid_near(const txi_window *w, double x, double y) {
+    const int cx = (int)floor(x + 0.5), cy = (int)floor(y + 0.5);
+    int64_t best = -1;
+    double least = 0;
+    for (int py = cy - 8; py <= cy + 8; py++) {
+        for (int px = cx - 8; px <= cx + 8; px++) {
+            if (px < 0 || py < 0 || px >= w->width || py >= w->height) continue;
+            const int64_t i = (int64_t)py * w->width + px;
+            const double dx = px - x, dy = py - y, apart = dx * dx + dy * dy;
+            if (w->state[i] == TXI_VOID || (best >= 0 && apart >= least)) continue;
+            best = i;
+            least = apart;
+        }
+    }
+    return best;
+}
+
+/* Write values, laid out as txi_window_read gives them, to the window's targets in a map. No other
+   texel changes. */
+static void txi_window_write(txi_domain *d, const txi_window *w, int map, const float *values) {
+    const txm_image *image = &d->maps[map];
+    const int channels = image->channels, label = map > 0 && d->desc->maps[map - 1].is_label;
+    for (size_t i = 0; i < w->target_count; i++) {
+        const txi_target *t = &w->targets[i];
+        const int x = (int)(t->texel % (uint32_t)d->width), y = (int)(t->texel / (uint32_t)d->width);
+        float value[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
+        if (!txi_window_value(w, channels, label, values, t->x, t->y, value)) {
+            const int64_t pixel = txi_solid_near(w, t->x, t->y);
+            for (int c = 0; c < channels && pixel >= 0; c++)
+                value[c] = values[pixel * channels + c];
+        }
+        for (int c = 0; c < channels; c++) txm_image_set(image, x, y, c, value[c]);
+    }
+}
+
+/* The targets are not missing any longer. They may be copied from unless the caller has said where
+   texture may be taken from. */
+static void txi_window_done(txi_domain *d, const txi_window *w) {
+    for (size_t i = 0; i < w->target_count; i++) {
+        d->missing[w->targets[i].texel] = 0;
+        if (!d->desc->source.pixels) d->usable[w->targets[i].texel] = 1;
+    }
+}
+
+/* ---- resample: gutters ----------------------------------------------------------------------- */
+
+/* The nearest texel with a mark, of equally near ones the first in its row, then the upper one.
+
+   First the nearest mark in each column; then along each row the lower envelope of the parabolas
+   (x - i)^2 + dy(i)^2: those of the columns that come first somewhere are kept on a stack.
+
+   nearest  receives one texel number for each, -1 without any marks
+   cost     O(width * height); 4 bytes for each texel of a row and each row               */
+static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_env *env,
+                              int32_t *nearest) {
+    txm_arena scratch;
+    const size_t w = (size_t)width;
+    txm_arena_init(&scratch, env);
+    int32_t *row = (int32_t *)txm_arena_alloc(&scratch, w, sizeof(int32_t)); /* row of the mark */
+    int *stack = (int *)txm_arena_alloc(&scratch, w, sizeof(int));
+    int *from = (int *)txm_arena_alloc(&scratch, w, sizeof(int)); /* where each becomes nearest  */
+    if (scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    for (int x = 0; x < width; x++) {
+        int32_t last = -1;
+        for (int y = 0; y < height; y++) {
+            if (marks[(size_t)y * w + (size_t)x]) last = y;
+            nearest[(size_t)y * w + (size_t)x] = last;
+        }
+        last = -1;
+        for (int y = height - 1; y >= 0; y--) {
+            int32_t *n = &nearest[(size_t)y * w + (size_t)x];
+            if (marks[(size_t)y * w + (size_t)x]) last = y;
+            if (last >= 0 && (*n < 0 || last - y < y - *n)) *n = last;
+        }
+    }
+    for (int y = 0; y < height; y++) {
+        int count = 0;
+        memcpy(row, nearest + (size_t)y * w, w * sizeof *row);
+        for (int x = 0; x < width; x++) {
+            const int64_t dy = row[x] - y;
+            if (row[x] < 0) continue;
+            int begin = 0;
+            while (count > 0) { /* first place at which x is nearer than the top of the stack */
+                const int i = stack[count - 1];
+                const int64_t di = row[i] - y;
+                const int64_t sum = (int64_t)x * x + dy * dy - (int64_t)i * i - di * di;
+                const int64_t place = sum < 0 ? 0 : sum / (2 * (int64_t)(x - i)) + 1;
+                if (place > from[count - 1]) {
+                    begin = place < width ? (int)place : width;
+                    break;
+                }
+                count--;
+            }
+            if (begin >= width) continue;
+            stack[count] = x;
+            from[count++] = begin;
+        }
+        for (int x = 0, k = 0; x < width; x++) {
+            while (k + 1 < count && from[k + 1] <= x) k++;
+            nearest[(size_t)y * w + (size_t)x] =
+                count ? (int32_t)((size_t)row[stack[k]] * w + (size_t)stack[k]) : -1;
+        }
+    }
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* Copy all maps from one texel to another. */
+static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
+    const size_t w = (size_t)d->width;
+    for (int m = 0; m < d->map_count; m++) {
+        const txm_image *image = &d->maps[m];
+        const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
+        memcpy((uint8_t *)txm_image_row(image, (int)(to / w)) + to % w * bytes,
+               (const uint8_t *)txm_image_row_const(image, (int)(from / w)) + from % w * bytes, bytes);
+    }
+}
+
+/* Missing texels outside the charts, at most desc->gutter from a texel in a chart, get the values of
+   the nearest one in all maps. They are not missing any longer. */
+static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env) {
+    const int gutter = d->desc->gutter == 0 ? 8 : d->desc->gutter;
+    const size_t count = (size_t)d->width * (size_t)d->height;
+    if (!d->surface || gutter < 0) return TXM_OK;
+    int32_t *nearest = (int32_t *)txm_arena_alloc(arena, count, sizeof(int32_t));
+    uint8_t *known = (uint8_t *)txm_arena_alloc(arena, count, 1);
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) known[i] = d->covered[i] && !d->missing[i];
+    const txm_status status = txi_nearest(known, d->width, d->height, env, nearest);
+    if (status != TXM_OK) return status;
+    for (size_t i = 0; i < count; i++) {
+        if (!d->missing[i] || d->covered[i] || nearest[i] < 0) continue;
+        const int64_t dx = (int64_t)(i % (size_t)d->width) - nearest[i] % d->width;
+        const int64_t dy = (int64_t)(i / (size_t)d->width) - nearest[i] / d->width;
+        if (dx * dx + dy * dy > (int64_t)gutter * gutter) continue;
+        txi_copy_texel(d, (size_t)nearest[i], i);
+        d->missing[i] = 0;
+    }
+    return TXM_OK;
+}
+
+/* ---- window: parts of plain pictures --------------------------------------------------------- */
+
+enum {
+    TXI_BAND_LEAST = 48,       /* pixels around a hole; RECIPES: 48 to 240                     */
+    TXI_BAND_MOST = 240,
+    TXI_SOURCE_LEAST = 20000,  /* pixels to copy from, if there are any; ours                  */
+    TXI_SOURCE_RATIO = 4,      /* ... and times the hole                                       */
+    TXI_WINDOW_MOST = 1 << 20, /* pixels of a window; larger holes take several                */
+    TXI_WINDOW_GROUP = 400000, /* pixels up to which the windows of near holes are joined      */
+    TXI_WINDOW_SIDE = 1000,    /* pixels: side of a window in a hole that is larger            */
+    TXI_MARGIN = 32            /* pixels: what lies nearer to a cut through a hole is left to the
+                                  next window                                                  */
+};
+
+/* While a window is laid out, what is missing and has been looked at has one of these marks in
+   d->missing, instead of 1. */
+enum { TXI_MARK_OURS = 2, TXI_MARK_OTHER = 3 };
+
+typedef struct txi_box {
+    int left, top, right, bottom; /* pixels, the last two are one past the end */
+} txi_box;
+
+/* numbers of texels; grows */
+typedef struct txi_list {
+    uint32_t *items;
+    size_t count, room;
+} txi_list;
+
+static int txi_push(txi_list *list, txm_arena *arena, uint32_t item) {
+    if (list->count == list->room) {
+        const size_t room = list->room ? 2 * list->room : 1024;
+        uint32_t *items = (uint32_t *)txm_arena_alloc(arena, room, sizeof(uint32_t));
+        if (!items) return 0;
+        if (list->count) memcpy(items, list->items, list->count * sizeof(uint32_t));
+        list->items = items;
+        list->room = room;
+    }
+    list->items[list->count++] = item;
+    return 1;
+}
+
+static size_t txi_box_area(txi_box b) {
+    return (size_t)(b.right - b.left) * (size_t)(b.bottom - b.top);
+}
+
+/* The box with a band around it, within the picture. */
+static txi_box txi_box_grow(txi_box b, int band, const txi_domain *d) {
+    b.left = b.left > band ? b.left - band : 0;
+    b.top = b.top > band ? b.top - band : 0;
+    b.right = b.right < d->width - band ? b.right + band : d->width;
+    b.bottom = b.bottom < d->height - band ? b.bottom + band : d->height;
+    return b;
+}
+
+static txi_box txi_box_union(txi_box a, txi_box b) {
+    if (b.left < a.left) a.left = b.left;
+    if (b.top < a.top) a.top = b.top;
+    if (b.right > a.right) a.right = b.right;
+    if (b.bottom > a.bottom) a.bottom = b.bottom;
+    return a;
+}
+
+/* .9 times the diameter of a disk of this area, within limits: how much is laid out around a hole */
+static int txi_band(size_t area) {
+    return txm_clampi((int)(0.9 * 1.13 * sqrt((double)area)), TXI_BAND_LEAST, TXI_BAND_MOST);
+}
+
+/* The hole that texel `start` lies in, 8-connected: its texels are added to list and marked. box
+   receives its bounding box. 0: no memory. */
+static int txi_flood(txi_domain *d, uint32_t start, uint8_t mark, txi_list *list, txm_arena *arena,
+                     txi_box *box) {
+    const int w = d->width;
+    size_t at = list->count;
+    if (!txi_push(list, arena, start)) return 0;
+    d->missing[start] = mark;
+    box->left = box->right = (int)(start % (uint32_t)w);
+    box->top = box->bottom = (int)(start / (uint32_t)w);
+    for (; at < list->count; at++) {
+        const int x = (int)(list->items[at] % (uint32_t)w), y = (int)(list->items[at] / (uint32_t)w);
+        const txi_box pixel = {x, y, x, y};
+        *box = txi_box_union(*box, pixel);
+        for (int k = 0; k < 9; k++) {
+            const int nx = x - 1 + k % 3, ny = y - 1 + k / 3;
+            const size_t i = (size_t)ny * (size_t)w + (size_t)nx;
+            if (nx < 0 || ny < 0 || nx >= w || ny >= d->height || d->missing[i] != 1) continue;
+            if (!txi_push(list, arena, (uint32_t)i)) return 0;
+            d->missing[i] = mark;
+        }
+    }
+    box->right++;
+    box->bottom++;
+    return 1;
+}
+
+/* The first texel of a hole, in the order of the picture, that has a known neighbour to its left,
+   right, above or below; its very first texel if none has. */
+static uint32_t txi_rim(const txi_domain *d, const txi_list *hole) {
+    const int w = d->width, h = d->height;
+    uint32_t first = hole->items[0], best = UINT32_MAX;
+    for (size_t k = 0; k < hole->count; k++) {
+        const uint32_t i = hole->items[k];
+        const int x = (int)(i % (uint32_t)w), y = (int)(i / (uint32_t)w);
+        if (i < first) first = i;
+        if (i < best && ((x > 0 && !d->missing[i - 1]) || (x + 1 < w && !d->missing[i + 1]) ||
+                         (y > 0 && !d->missing[i - (uint32_t)w]) ||
+                         (y + 1 < h && !d->missing[i + (uint32_t)w])))
+            best = i;
+    }
+    return best == UINT32_MAX ? first : best;
+}
+
+/* Add the holes in a window to ours as long as it does not become too large. box receives the
+   bounding box of all. 0: no memory. */
+static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena *arena, txi_box *box) {
+    for (int grown = 1; grown;) {
+        const txi_box window = txi_box_grow(*box, txi_band(ours->count), d);
+        grown = 0;
+        for (int y = window.top; y < window.bottom && !grown; y++) {
+            const size_t row = (size_t)y * (size_t)d->width;
+            const uint8_t *at = d->missing + row + window.left, *end = d->missing + row + window.right;
+            while (at < end && (at = (const uint8_t *)memchr(at, 1, (size_t)(end - at))) != NULL) {
+                const uint32_t start = (uint32_t)(at - d->missing);
+                const size_t before = others->count;
+                txi_box hole;
+                if (!txi_flood(d, start, TXI_MARK_OTHER, others, arena, &hole)) return 0;
+                hole = txi_box_union(*box, hole);
+                const size_t count = ours->count + others->count - before;
+                if (txi_box_area(txi_box_grow(hole, txi_band(count), d)) > TXI_WINDOW_GROUP) continue;
+                for (size_t k = before; k < others->count; k++) {
+                    d->missing[others->items[k]] = TXI_MARK_OURS;
+                    if (!txi_push(ours, arena, others->items[k])) return 0;
+                }
+                others->count = before;
+                *box = hole;
+                grown = 1;
+            }
+        }
+    }
+    return 1;
+}
+
+/* The window around a hole: with its band, and so much more that there is enough to copy from. */
+static txi_box txi_window_box(const txi_domain *d, txi_box hole, size_t area) {
+    size_t wanted = area * TXI_SOURCE_RATIO;
+    int band = txi_band(area);
+    if (wanted < TXI_SOURCE_LEAST) wanted = TXI_SOURCE_LEAST;
+    for (;;) {
+        const txi_box box = txi_box_grow(hole, band, d);
+        size_t usable = 0;
+        for (int y = box.top; y < box.bottom; y++) {
+            const uint8_t *row = d->usable + (size_t)y * (size_t)d->width;
+            for (int x = box.left; x < box.right; x++) usable += row[x] == 1;
+        }
+        const int next = band + band / 4;
+        const txi_box larger = txi_box_grow(hole, next, d);
+        if (usable >= wanted || txi_box_area(larger) == txi_box_area(box)) return box;
+        /* beyond the limit only if there is next to nothing */
+        if (txi_box_area(larger) > TXI_WINDOW_MOST && usable >= TXI_SOURCE_LEAST / 64) return box;
+        band = next;
+    }
+}
+
+/* The part of the picture in the box as a window. Targets: the marked texels, but for those within
+   margin of the box where it does not end with the picture. */
+static txm_status txi_cut_out(const txi_domain *d, txi_box box, int margin, const txi_list *ours,
+                              txm_arena *arena, txm_env *env, txi_window *w) {
+    const txm_status status =
+        txi_window_alloc(w, box.right - box.left, box.bottom - box.top, arena, env);
+    if (status != TXM_OK) return status;
+    w->targets = (txi_target *)txm_arena_alloc(arena, ours->count, sizeof(txi_target));
+    if (!w->targets) return txi_no_memory(env);
+    for (int y = 0; y < w->height; y++) {
+        for (int x = 0; x < w->width; x++) {
+            const size_t i = (size_t)y * (size_t)w->width + (size_t)x;
+            w->state[i] = TXI_KNOWN;
+            w->texel[i] = txm_v2((float)(x + box.left), (float)(y + box.top));
+            w->place[i] = txm_v3((float)(x + box.left), (float)(y + box.top), 0);
+            w->normal[i] = txm_v3(0, 0, 1);
+            w->axis[i] = txm_v2(1, 0);
+        }
+    }
+    const int left = box.left > 0 ? box.left + margin : 0, top = box.top > 0 ? box.top + margin : 0;
+    const int right = box.right < d->width ? box.right - margin : d->width;
+    const int bottom = box.bottom < d->height ? box.bottom - margin : d->height;
+    for (size_t k = 0; k < ours->count; k++) {
+        const int x = (int)(ours->items[k] % (uint32_t)d->width);
+        const int y = (int)(ours->items[k] / (uint32_t)d->width);
+        if (x < left || x >= right || y < top || y >= bottom) continue;
+        txi_target *t = &w->targets[w->target_count++];
+        t->texel = ours->items[k];
+        t->x = (float)(x - box.left);
+        t->y = (float)(y - box.top);
+        t->axis = txm_v2(1, 0);
+        t->mirrored = 0;
+    }
+    return TXM_OK;
+}
+
+/* The next window of a plain picture: the first hole and those near it; of a hole that is too large
+   for one window, a part at its rim. */
+static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
+                                     int *found) {
+    const size_t count = (size_t)d->width * (size_t)d->height;
+    const uint8_t *first = (const uint8_t *)memchr(d->missing, 1, count);
+    txm_status status = TXM_OK;
+    txm_arena scratch;
+    txi_list ours, others;
+    txi_box box, window;
+    int margin = 0;
+    *found = first != NULL;
+    if (!first) return TXM_OK;
+    memset(&ours, 0, sizeof ours);
+    memset(&others, 0, sizeof others);
+    txm_arena_init(&scratch, env);
+    if (!txi_flood(d, (uint32_t)(first - d->missing), TXI_MARK_OURS, &ours, &scratch, &box) ||
+        !txi_gather(d, &ours, &others, &scratch, &box))
+        status = txi_no_memory(env);
+    if (status == TXM_OK && txi_box_area(txi_box_grow(box, TXI_BAND_LEAST, d)) > TXI_WINDOW_MOST) {
+        const uint32_t rim = txi_rim(d, &ours);
+        const int x = (int)(rim % (uint32_t)d->width), y = (int)(rim / (uint32_t)d->width);
+        const txi_box pixel = {x, y, x + 1, y + 1};
+        window = txi_box_grow(pixel, TXI_WINDOW_SIDE / 2, d);
+        margin = TXI_MARGIN;
+    } else if (status == TXM_OK) {
+        window = txi_window_box(d, box, ours.count);
+    }
+    for (size_t k = 0; k < ours.count; k++) d->missing[ours.items[k]] = 1;
+    for (size_t k = 0; k < others.count; k++) d->missing[others.items[k]] = 1;
+    if (status == TXM_OK) status = txi_cut_out(d, window, margin, &ours, arena, env, w);
+    if (status == TXM_OK) txi_window_colors(d, w);
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* ---- window: the next one -------------------------------------------------------------------- */
+
+/* Lay out the next window with missing texels. found receives 0 if there are none left; else at least
+   one texel is a target. */
+static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
+                                   int *found) {
+    return txi_picture_window(d, arena, env, w, found);
+}
 
 /* ---- harmonic ---- */
 

@@ -238,6 +238,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/surface.h"
 #include "texinpaint/geodesic.h"
 #include "texinpaint/unfold.h"
+#include "texinpaint/resample.h"
 #include "texinpaint/window.h"
 #include "texinpaint/harmonic.h"
 #include "texinpaint/crest.h"

@@ -36,6 +36,7 @@ typedef struct txi_window {
                         pictures: 1                                                            */
     txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
     uint8_t *mirrored; /* as in txi_target                                                     */
+    uint32_t *face;  /* the triangle under each pixel, for txi_window_read; pictures: none      */
     txi_target *targets; /* the missing texels that this window completes                      */
     size_t target_count;
 } txi_window;
