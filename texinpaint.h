@@ -41,7 +41,9 @@
 
    REFERENCES
      [1] K. Guo, X. Chen, Y. Liu, B. Zhou, Y. Guo. Geometric based structure propagation and texture
-         matching for 3D texture completion. 2013.                                             */
+         matching for 3D texture completion. 2013.
+     [2] S. Yoshizawa, A. Belyaev, H.-P. Seidel. Fast and robust detection of crest lines on meshes.
+         ACM Symposium on Solid and Physical Modeling 2005.                                     */
 #ifndef TEXINPAINT_H
 #define TEXINPAINT_H
 
@@ -200,23 +202,33 @@ TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env
 
 /* ---- crest lines ------------------------------------------------------------------------- */
 
-/* Which crest lines of a mesh to find. */
+/* kinds of crest lines; add them up in a description */
+enum { TEXINPAINT_RIDGE = 1, TEXINPAINT_VALLEY = 2 };
+
+/* Which crest lines of a mesh to find. All zero but mesh is a good default. */
 typedef struct texinpaint_crest_desc {
-    txm_mesh mesh;    /* triangles                                                              */
-    float threshold;  /* of the strength of a line, the integral of its curvature along it (no
-                         unit); 0 = chosen from the mesh                                        */
-    int kinds;        /* 1 ridges, 2 valleys, 3 or 0 both                                       */
+    txm_mesh mesh;    /* triangles, counter-clockwise from outside, of any connectivity; vertices in
+                         equal places count as one                                              */
+    float threshold;  /* weaker lines are left out, 0..1e6; the strength of a line is the integral of
+                         its curvature along it, without unit: 1 for one as long as its radius of
+                         curvature. 0 = 1, or 0.02 of the strongest line if that is more        */
+    int kinds;        /* TEXINPAINT_RIDGE, TEXINPAINT_VALLEY, or their sum; 0 = both            */
+    int rings;        /* rings of vertices around each that curvature is taken from, 1..8; more for
+                         noisy meshes; 0 = 2                                                    */
 } texinpaint_crest_desc;
 
-/* Lines; points as in texinpaint_line. */
+/* Lines, the strongest first. Closed ones end with their first point. */
 typedef struct texinpaint_crests {
-    texinpaint_line *lines;
+    texinpaint_line *lines; /* points on the surface, about one per triangle                    */
+    const float *strengths; /* 1 per line                                                       */
+    const uint8_t *kinds;   /* 1 per line: TEXINPAINT_RIDGE or TEXINPAINT_VALLEY                */
     size_t line_count;
     txm_arena memory; /* private */
 } texinpaint_crests;
 
 /* The crest lines of a mesh: where the larger principal curvature has an extremum along its own line
-   of curvature [2]. The estimate comes from a cubic fitted around each vertex.
+   of curvature [2]. The estimate comes from a cubic fitted around each vertex. A mesh without faces has
+   none.
    out    receives the lines, or NULL on any error; release it with texinpaint_crests_free
    return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED           */
 TEXINPAINT_API txm_status texinpaint_crest(const texinpaint_crest_desc *desc, txm_env *env,
@@ -553,6 +565,69 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
             domain->covered[i] = desc->mesh.face_count == 0;
         }
     }
+    return TXM_OK;
+}
+
+/* ---- a mesh without duplicates ---------------------------------------------------------------
+   Meshes with texture coordinates often repeat a vertex for each chart that it lies in. Geometry is
+   computed on a mesh in which vertices in equal places are one.                                */
+
+typedef struct txi_weld {
+    uint32_t *vertex; /* 1 per vertex of the input: the first vertex in the same place          */
+    txm_mesh mesh;    /* the positions of the input, faces of welded vertices                   */
+    uint32_t *face;   /* 1 per face of mesh: its number in the input                            */
+} txi_weld;
+
+/* For each vertex the lowest one in the same place (-0 is 0). pairs: room for 2 per vertex. */
+static void txi_weld_vertices(const txm_mesh *input, txm_pair *pairs, uint32_t *first) {
+    const size_t n = input->vertex_count;
+    for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
+    for (size_t axis = 3; axis-- > 0;) {
+        for (size_t i = 0; i < n; i++) /* + 0: -0 becomes 0 */
+            pairs[i].key = txm_sort_key(input->positions[3 * (size_t)pairs[i].value + axis] + 0.0f);
+        txm_sort_pairs(pairs, pairs + n, n); /* stable: equal places stay in order of number */
+    }
+    for (size_t i = 0; i < n; i++) {
+        const size_t v = pairs[i].value, before = i ? pairs[i - 1].value : v;
+        const float *p = input->positions + 3 * v, *q = input->positions + 3 * before;
+        int equal = i > 0;
+        for (int k = 0; k < 3; k++) equal &= p[k] >= q[k] && p[k] <= q[k];
+        first[v] = equal ? first[before] : (uint32_t)v;
+    }
+}
+
+/* Weld a checked mesh of triangles; faces of which two corners are in one place are left out.
+   return  TXM_OK, TXM_TOO_LARGE or TXM_OUT_OF_MEMORY
+   cost    O(vertices + faces)                                                              */
+static txm_status txi_weld_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
+                                txi_weld *weld) {
+    const size_t n = input->vertex_count;
+    size_t count = 0;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    memset(weld, 0, sizeof *weld);
+    weld->mesh = *input;
+    weld->mesh.face_count = 0;
+    if (input->face_count == 0) return TXM_OK;
+    if (n > UINT32_MAX) return txm_fail(env, TXM_TOO_LARGE, "mesh: more than 2^32 - 1 vertices");
+    uint32_t *indices = (uint32_t *)txm_arena_alloc(arena, input->face_count, 3 * sizeof(uint32_t));
+    weld->face = (uint32_t *)txm_arena_alloc(arena, input->face_count, sizeof(uint32_t));
+    weld->vertex = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
+    if (arena->failed || !pairs) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    txi_weld_vertices(input, pairs, weld->vertex);
+    txm_arena_free(&scratch);
+    for (size_t f = 0; f < input->face_count; f++) {
+        uint32_t *t = indices + 3 * count;
+        for (size_t k = 0; k < 3; k++) t[k] = weld->vertex[input->indices[3 * f + k]];
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+        weld->face[count++] = (uint32_t)f;
+    }
+    weld->mesh.indices = indices;
+    weld->mesh.face_count = count;
     return TXM_OK;
 }
 
@@ -1211,7 +1286,756 @@ static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env
 
 /* ---- harmonic ---- */
 
-/* ---- crest ---- */
+/* ---- curvature ------------------------------------------------------------------------------
+   Principal curvatures, their directions, and their derivatives along these, at the vertices of a
+   mesh, from a local cubic [2, section 2]. In the frame (T, B, N) of a vertex, N its normal, the
+   surface is the graph of a height below the tangent plane,
+
+       h(x, y) = (b0 x^2 + 2 b1 x y + b2 y^2) / 2 + (c0 x^3 + 3 c1 x^2 y + 3 c2 x y^2 + c3 y^3) / 6
+
+   fitted by least squares to the places and the normals of the neighbours (the normals give dh/dx and
+   dh/dy). Not in [2]: the normals come from a fit of their own, of places alone and with linear terms.
+   Mean normals of faces are off by so much where triangles are irregular that e gets a wrong sign. The eigenvalues and eigenvectors of (b0 b1; b1 b2) are the curvatures k and directions t,
+   convex surfaces having positive k, and the derivative of k along its own t is
+
+       e = dk/dt = c0 t1^3 + 3 c1 t1^2 t2 + 3 c2 t1 t2^2 + c3 t2^3                              */
+
+enum {
+    TXI_FIT_TERMS = 9,       /* coefficients of a cubic: b0 b1 b2 c0 c1 c2 c3, and linear ones  */
+    TXI_FIT_CURVED = 7,      /* the same without linear ones                                   */
+    TXI_FIT_RINGS = 2,       /* rings of neighbours in a fit; as in [2]                        */
+    TXI_FIT_MOST_RINGS = 8,
+    TXI_FIT_MOST = 96,       /* vertices in a fit; ours: bounds the time where many edges meet */
+    TXI_FIT_STAR = 48,       /* edges of a vertex that are followed, evenly chosen; ours       */
+    TXI_FIT_LEAST = 5,       /* vertices in a fit, each gives up to three equations; ours      */
+    TXI_FIT_CHUNK = 512,     /* vertices per task                                              */
+    TXI_FIT_BATCH = 32       /* tasks between two progress reports                             */
+};
+
+/* Of one vertex; [0] the larger, [1] the smaller curvature. */
+typedef struct txi_curvature {
+    double k[2], e[2]; /* in 1 / unit of the mesh, and 1 / unit^2                              */
+    txm_dvec3 t[2];    /* unit                                                                 */
+    int is_valid;      /* 0: too few neighbours, all else is 0                                 */
+} txi_curvature;
+
+/* A welded mesh with its edges. */
+typedef struct txi_shape {
+    txm_mesh mesh;
+    size_t edge_count;
+    uint32_t *ends;       /* 2 per edge: its vertices, the lower first                         */
+    uint32_t *edge;       /* 1 per side of a face                                              */
+    uint32_t *star_first; /* vertex_count + 1: where the neighbours of a vertex begin          */
+    uint32_t *star;       /* 2 per edge: neighbours                                            */
+    txm_dvec3 *normal;    /* 1 per vertex: unit, outwards; 0 where there is none               */
+    txm_dvec3 *fitted;    /* 1 per vertex: the better normal                                   */
+    txi_curvature *curvature; /* 1 per vertex                                                  */
+    int rings;
+} txi_shape;
+
+/* Number the edges and collect the neighbours. sorted: room for 2 per side. */
+static void txi_shape_edges(txi_shape *s, uint32_t *sorted) {
+    const txm_mesh *mesh = &s->mesh;
+    const size_t sides = txm_mesh_sides(mesh), n = mesh->vertex_count;
+    txm_mesh_sort_sides(mesh, sorted);
+    s->edge_count = 0;
+    memset(s->star_first, 0, (n + 1) * sizeof *s->star_first);
+    for (size_t i = 0, end; i < sides; i = end) {
+        uint32_t *ends = s->ends + 2 * s->edge_count;
+        end = txm_mesh_edge_end(mesh, sorted, i);
+        ends[0] = txm_mesh_low(mesh, sorted[i]);
+        ends[1] = txm_mesh_high(mesh, sorted[i]);
+        for (size_t k = i; k < end; k++) s->edge[sorted[k]] = (uint32_t)s->edge_count;
+        for (int k = 0; k < 2; k++) s->star_first[ends[k] + 1]++;
+        s->edge_count++;
+    }
+    for (size_t v = 0; v < n; v++) s->star_first[v + 1] += s->star_first[v];
+    for (size_t e = s->edge_count; e-- > 0;) { /* from the last place of each star to its first */
+        const uint32_t a = s->ends[2 * e], b = s->ends[2 * e + 1];
+        s->star[--s->star_first[a + 1]] = b;
+        s->star[--s->star_first[b + 1]] = a;
+    }
+    for (size_t v = 0; v < n; v++) s->star_first[v] = s->star_first[v + 1];
+    s->star_first[n] = (uint32_t)(2 * s->edge_count);
+}
+
+/* Which faces are to be turned over so that those of each connected part agree, as few as possible:
+   flip receives 0 or 1 for each. Edges of other than two faces connect nothing; on surfaces that
+   cannot be oriented some edge stays between faces that disagree.
+   next    the rings of sides at an edge (txm_mesh_link)
+   queue   room for 1 per face                                                              */
+static void txi_shape_orient(const txm_mesh *mesh, const uint32_t *next, uint32_t *queue,
+                             uint8_t *flip) {
+    enum { UNSEEN = 2 };
+    memset(flip, UNSEEN, mesh->face_count);
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        size_t count = 0, turned = 0;
+        if (flip[f] != UNSEEN) continue;
+        flip[f] = 0;
+        queue[count++] = (uint32_t)f;
+        for (size_t i = 0; i < count; i++) {
+            for (size_t side = 3 * (size_t)queue[i]; side < 3 * (size_t)queue[i] + 3; side++) {
+                const size_t other = next[side], g = other / 3;
+                if (other == side || next[other] != side || flip[g] != UNSEEN) continue;
+                flip[g] = (uint8_t)(flip[queue[i]] ^ (txm_mesh_runs_down(mesh, side) ==
+                                                      txm_mesh_runs_down(mesh, other)));
+                turned += flip[g];
+                queue[count++] = (uint32_t)g;
+            }
+        }
+        for (size_t i = 0; i < count && 2 * turned > count; i++) flip[queue[i]] ^= 1;
+    }
+}
+
+/* Normals of the vertices: the sum over their corners of a x b / (|a|^2 |b|^2), a and b the two
+   sides there. It is exact on a sphere, whatever the triangles (N. Max, 1999). */
+static void txi_shape_normals(txi_shape *s, const uint8_t *flip) {
+    const size_t n = s->mesh.vertex_count;
+    for (size_t v = 0; v < n; v++) s->normal[v] = txm_d3(0, 0, 0);
+    for (size_t f = 0; f < s->mesh.face_count; f++) {
+        txm_dvec3 p[3];
+        txm_mesh_triangle(&s->mesh, f, p);
+        for (size_t k = 0; k < 3; k++) {
+            const txm_dvec3 a = txm_d3_sub(p[(k + 1) % 3], p[k]), b = txm_d3_sub(p[(k + 2) % 3], p[k]);
+            const double size = txm_d3_len2(a) * txm_d3_len2(b);
+            txm_dvec3 *sum = &s->normal[s->mesh.indices[3 * f + k]];
+            if (size > 0) *sum = txm_d3_mad(*sum, txm_d3_cross(a, b), (flip[f] ? -1 : 1) / size);
+        }
+    }
+    for (size_t v = 0; v < n; v++) s->normal[v] = txm_d3_unit(s->normal[v]);
+}
+
+/* The vertices of up to so many rings around v, v first; returns their number. */
+static int txi_fit_gather(const txi_shape *s, uint32_t v, uint32_t list[TXI_FIT_MOST]) {
+    enum { SLOTS = 256 };
+    uint32_t table[SLOTS]; /* vertex + 1; 0 = free */
+    int count = 1, from = 0;
+    memset(table, 0, sizeof table);
+    table[txm_hash(v) % SLOTS] = v + 1;
+    list[0] = v;
+    for (int ring = 0; ring < s->rings; ring++) {
+        const int end = count;
+        for (; from < end; from++) {
+            const uint32_t first = s->star_first[list[from]], last = s->star_first[list[from] + 1];
+            const uint32_t step = 1 + (last - first - 1) / TXI_FIT_STAR;
+            for (uint32_t i = first; i < last; i += step) {
+                size_t slot = txm_hash(s->star[i]) % SLOTS;
+                while (table[slot] && table[slot] != s->star[i] + 1) slot = (slot + 1) % SLOTS;
+                if (table[slot]) continue;
+                if (count == TXI_FIT_MOST) return count;
+                table[slot] = s->star[i] + 1;
+                list[count++] = s->star[i];
+            }
+        }
+    }
+    return count;
+}
+
+/* The normal equations of a least-squares fit: the lower half of A, and b. */
+typedef struct txi_fit {
+    double a[TXI_FIT_TERMS][TXI_FIT_TERMS], b[TXI_FIT_TERMS];
+    int terms;
+} txi_fit;
+
+static void txi_fit_add(txi_fit *fit, const double row[TXI_FIT_TERMS], double value) {
+    for (int i = 0; i < fit->terms; i++) {
+        for (int j = 0; j <= i; j++) fit->a[i][j] += row[i] * row[j];
+        fit->b[i] += row[i] * value;
+    }
+}
+
+/* Solve by Cholesky factors, in place; b receives the solution; 0 if the equations do not determine
+   it. */
+static int txi_fit_solve(txi_fit *fit) {
+    double(*a)[TXI_FIT_TERMS] = fit->a, *b = fit->b;
+    for (int i = 0; i < fit->terms; i++) {
+        const double whole = a[i][i];
+        for (int j = 0; j <= i; j++) {
+            double sum = a[i][j];
+            for (int k = 0; k < j; k++) sum -= a[i][k] * a[j][k];
+            if (j < i) a[i][j] = sum / a[j][j];
+            else if (sum > 1e-9 * whole) a[i][i] = sqrt(sum);
+            else return 0;
+        }
+    }
+    for (int i = 0; i < fit->terms; i++) {
+        for (int k = 0; k < i; k++) b[i] -= a[i][k] * b[k];
+        b[i] /= a[i][i];
+    }
+    for (int i = fit->terms; i-- > 0;) {
+        for (int k = i + 1; k < fit->terms; k++) b[i] -= a[k][i] * b[k];
+        b[i] /= a[i][i];
+    }
+    return 1;
+}
+
+/* Curvatures from the coefficients b0 b1 b2 c0 c1 c2 c3, in a frame whose unit is `unit`. */
+static void txi_curvature_set(txi_curvature *out, const double *c, txm_dvec3 frame[2], double unit) {
+    const double mean = (c[0] + c[2]) / 2, half = (c[0] - c[2]) / 2;
+    const double root = sqrt(half * half + c[1] * c[1]);
+    /* the eigenvector of the larger value, by the longer of two formulas */
+    double x = half >= 0 ? half + root : c[1], y = half >= 0 ? c[1] : root - half;
+    const double length = sqrt(x * x + y * y);
+    x = length > 0 ? x / length : 1;
+    y = length > 0 ? y / length : 0;
+    for (int i = 0; i < 2; i++) {
+        const double u = i ? -y : x, v = i ? x : y;
+        out->k[i] = (i ? mean - root : mean + root) / unit;
+        out->e[i] = (c[3] * u * u * u + 3 * c[4] * u * u * v + 3 * c[5] * u * v * v +
+                     c[6] * v * v * v) / (unit * unit);
+        out->t[i] = txm_d3_add(txm_d3_scale(frame[0], u), txm_d3_scale(frame[1], v));
+    }
+    out->is_valid = 1;
+}
+
+/* The neighbours of a vertex in its own frame: unit is their mean distance. */
+typedef struct txi_patch {
+    uint32_t list[TXI_FIT_MOST]; /* the vertex itself first                                    */
+    int count;
+    txm_dvec3 normal, frame[2];
+    double unit;
+} txi_patch;
+
+/* 0 if there are too few neighbours. */
+static int txi_patch_make(const txi_shape *s, uint32_t v, txi_patch *patch) {
+    const txm_dvec3 n = s->normal[v], place = txm_d3_load(s->mesh.positions + 3 * (size_t)v);
+    patch->count = txi_fit_gather(s, v, patch->list);
+    if (!(txm_d3_len2(n) > 0) || patch->count <= TXI_FIT_LEAST) return 0;
+    const txm_dvec3 axis = fabs(n.x) <= 0.6 ? txm_d3(1, 0, 0) : txm_d3(0, 1, 0);
+    patch->normal = n;
+    patch->frame[0] = txm_d3_unit(txm_d3_cross(n, axis));
+    patch->frame[1] = txm_d3_cross(n, patch->frame[0]);
+    patch->unit = 0;
+    for (int i = 1; i < patch->count; i++) {
+        const txm_dvec3 p = txm_d3_load(s->mesh.positions + 3 * (size_t)patch->list[i]);
+        patch->unit += txm_d3_dist(place, p) / (patch->count - 1);
+    }
+    return 1;
+}
+
+/* Neighbour i in the frame: x, y and depth below the tangent plane; 0 where the surface is folded over
+   or another sheet, so that it is no graph over the plane. */
+static int txi_patch_place(const txi_shape *s, const txi_patch *patch, int i, double *x, double *y,
+                           double *depth) {
+    const float *p = s->mesh.positions;
+    const txm_dvec3 d = txm_d3_scale(txm_d3_sub(txm_d3_load(p + 3 * (size_t)patch->list[i]),
+                                                txm_d3_load(p + 3 * (size_t)patch->list[0])),
+                                     1 / patch->unit);
+    *x = txm_d3_dot(d, patch->frame[0]);
+    *y = txm_d3_dot(d, patch->frame[1]);
+    *depth = -txm_d3_dot(d, patch->normal);
+    return txm_d3_dot(s->normal[patch->list[i]], patch->normal) > 0.1;
+}
+
+/* The normal of one vertex, from places. */
+static void txi_fit_normal(const txi_shape *s, uint32_t v) {
+    txi_patch patch;
+    txi_fit fit;
+    int used = 0;
+    memset(&fit, 0, sizeof fit);
+    fit.terms = TXI_FIT_TERMS;
+    s->fitted[v] = s->normal[v];
+    if (!txi_patch_make(s, v, &patch)) return;
+    for (int i = 1; i < patch.count; i++) {
+        double x, y, depth;
+        if (!txi_patch_place(s, &patch, i, &x, &y, &depth)) continue;
+        const double row[TXI_FIT_TERMS] = {x * x / 2,     x * y,         y * y / 2,
+                                           x * x * x / 6, x * x * y / 2, x * y * y / 2,
+                                           y * y * y / 6, x,             y};
+        txi_fit_add(&fit, row, depth);
+        used++;
+    }
+    if (used <= TXI_FIT_TERMS || !txi_fit_solve(&fit)) return;
+    const txm_dvec3 better =
+        txm_d3_unit(txm_d3_add(patch.normal, txm_d3_add(txm_d3_scale(patch.frame[0], fit.b[7]),
+                                                        txm_d3_scale(patch.frame[1], fit.b[8]))));
+    /* at sharp edges a cubic is no description, and the mean of the faces is */
+    if (txm_d3_dot(better, patch.normal) > 0.9) s->fitted[v] = better;
+}
+
+/* The curvature of one vertex, from places and normals. */
+static void txi_fit_curvature(const txi_shape *s, uint32_t v) {
+    txi_patch patch;
+    txi_fit fit;
+    int used = 0;
+    memset(&s->curvature[v], 0, sizeof s->curvature[v]);
+    memset(&fit, 0, sizeof fit);
+    fit.terms = TXI_FIT_CURVED;
+    if (!txi_patch_make(s, v, &patch)) return;
+    for (int i = 1; i < patch.count; i++) {
+        const txm_dvec3 m = s->normal[patch.list[i]];
+        const double up = txm_d3_dot(m, patch.normal);
+        double x, y, depth;
+        if (!txi_patch_place(s, &patch, i, &x, &y, &depth)) continue;
+        const double row[3][TXI_FIT_TERMS] = {
+            {x * x / 2, x * y, y * y / 2, x * x * x / 6, x * x * y / 2, x * y * y / 2,
+             y * y * y / 6, 0, 0},
+            {x, y, 0, x * x / 2, x * y, y * y / 2, 0, 0, 0},
+            {0, x, y, 0, x * x / 2, x * y, y * y / 2, 0, 0}};
+        txi_fit_add(&fit, row[0], depth);
+        txi_fit_add(&fit, row[1], txm_d3_dot(m, patch.frame[0]) / up);
+        txi_fit_add(&fit, row[2], txm_d3_dot(m, patch.frame[1]) / up);
+        used++;
+    }
+    if (used >= TXI_FIT_LEAST && txi_fit_solve(&fit))
+        txi_curvature_set(&s->curvature[v], fit.b, patch.frame, patch.unit);
+}
+
+/* One batch of fits, shared out in chunks. */
+typedef struct txi_fit_batch {
+    const txi_shape *shape;
+    size_t first;
+    void (*fit)(const txi_shape *s, uint32_t v);
+} txi_fit_batch;
+
+static void txi_fit_chunk(void *context, int index) {
+    const txi_fit_batch *batch = (const txi_fit_batch *)context;
+    const size_t from = batch->first + (size_t)index * TXI_FIT_CHUNK;
+    for (size_t i = from; i < from + TXI_FIT_CHUNK && i < batch->shape->mesh.vertex_count; i++)
+        batch->fit(batch->shape, (uint32_t)i);
+}
+
+/* Fit at all vertices; progress from..to. */
+static txm_status txi_fit_all(const txi_shape *s, void (*fit)(const txi_shape *s, uint32_t v),
+                              double from, double to, txm_env *env) {
+    const size_t n = s->mesh.vertex_count;
+    txi_fit_batch batch = {s, 0, fit};
+    for (; batch.first < n; batch.first += (size_t)TXI_FIT_CHUNK * TXI_FIT_BATCH) {
+        const size_t rest = (n - batch.first + TXI_FIT_CHUNK - 1) / TXI_FIT_CHUNK;
+        const double part = (double)batch.first / (double)n;
+        if (txm_progress(env, txm_float(from + (to - from) * part), "curvature"))
+            return txi_stopped(env);
+        txm_parallel_for(env, rest < TXI_FIT_BATCH ? (int)rest : TXI_FIT_BATCH, txi_fit_chunk,
+                         &batch);
+    }
+    return TXM_OK;
+}
+
+/* Edges, normals and curvatures of a welded mesh. rings: 1 or more, 0 = TXI_FIT_RINGS.
+   return  TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost    about 5 us per vertex with 2 rings                                               */
+static txm_status txi_shape_make(const txm_mesh *welded, int rings, txm_arena *arena, txm_env *env,
+                                 txi_shape *s) {
+    const size_t faces = welded->face_count, n = welded->vertex_count;
+    txm_arena scratch;
+    memset(s, 0, sizeof *s);
+    s->mesh = *welded;
+    s->rings = rings ? rings : TXI_FIT_RINGS;
+    if (faces == 0) return TXM_OK;
+    txm_arena_init(&scratch, env);
+    s->ends = (uint32_t *)txm_arena_alloc(arena, 3 * faces, 2 * sizeof(uint32_t));
+    s->edge = (uint32_t *)txm_arena_alloc(arena, 3 * faces, sizeof(uint32_t));
+    s->star_first = (uint32_t *)txm_arena_alloc(arena, n + 1, sizeof(uint32_t));
+    s->star = (uint32_t *)txm_arena_alloc(arena, 3 * faces, 2 * sizeof(uint32_t));
+    s->normal = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    s->fitted = (txm_dvec3 *)txm_arena_alloc(arena, n, sizeof(txm_dvec3));
+    s->curvature = (txi_curvature *)txm_arena_alloc(arena, n, sizeof(txi_curvature));
+    uint32_t *sorted = (uint32_t *)txm_arena_alloc(&scratch, 3 * faces, 2 * sizeof(uint32_t));
+    uint32_t *queue = (uint32_t *)txm_arena_alloc(&scratch, faces, sizeof(uint32_t));
+    uint8_t *flip = (uint8_t *)txm_arena_alloc(&scratch, faces, 1);
+    if (arena->failed || scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    txi_shape_edges(s, sorted);
+    txm_mesh_link(welded, sorted, 0, sorted + 3 * faces);
+    txi_shape_orient(welded, sorted + 3 * faces, queue, flip);
+    txi_shape_normals(s, flip);
+    txm_arena_free(&scratch);
+    txm_status status = txi_fit_all(s, txi_fit_normal, 0, 0.4, env);
+    if (status != TXM_OK) return status;
+    s->normal = s->fitted;
+    return txi_fit_all(s, txi_fit_curvature, 0.4, 0.9, env);
+}
+
+/* ---- crest lines ----------------------------------------------------------------------------
+   Ridges, where the larger curvature k_max has a maximum along its own direction [2, section 3]:
+
+       e_max = 0,   de_max / dt_max < 0,   k_max > |k_min|
+
+   and valleys, the ridges of the surface turned inside out. Both are traced through the triangles,
+   from crossing to crossing of their edges.
+
+   Not in [2]: lines are left out whose curvature hardly falls off to their sides, relative to its size
+   (k'' / k^3 has no unit; across the tip of an ellipse of axes 1 and c it is 3 (1 - c^2)). On a sphere, a
+   cylinder or a torus, where k_max has no extremum, they are artefacts of the mesh.             */
+
+enum {
+    TXI_CREST_PAIRED = 8,   /* links at a node that are paired; ours                           */
+    TXI_CREST_ROUNDING = 8, /* how far rounded positions are assumed to move derivatives, in units of
+                               2^-24 coordinate / edge^3; ours                                  */
+    TXI_CREST_NONE = -1
+};
+#define TXI_CREST_STRENGTH 1.0  /* default threshold: a line as long as its radius of curvature; ours */
+#define TXI_CREST_SHARE 0.02    /* and this share of the strongest line; ours                   */
+
+#define TXI_CREST_SHARP 0.05    /* least k'' / k^3, the mean along a line; ours: on tori of thousands of
+                                   triangles it stays below 0.03, on true ridges above 0.1      */
+
+#define TXI_CREST_BESIDE 0.25   /* cosine between an edge and t below which it runs along a line; ours */
+
+/* What counts at a vertex for ridges or for valleys. */
+typedef struct txi_crest_value {
+    double k, e; /* of the surface, or of the surface inside out                                */
+    txm_dvec3 t;
+    int is_candidate;
+} txi_crest_value;
+
+static txi_crest_value txi_crest_value_of(const txi_curvature *c, int is_valley) {
+    txi_crest_value v;
+    v.k = is_valley ? -c->k[1] : c->k[0];
+    v.e = is_valley ? -c->e[1] : c->e[0];
+    v.t = c->t[is_valley];
+    v.is_candidate = c->is_valid && v.k > fabs(c->k[!is_valley]);
+    return v;
+}
+
+/* The lines of one kind as a graph: nodes where they cross edges (and inside triangles where three
+   meet), links between them. */
+typedef struct txi_crest_net {
+    txm_dvec3 *place; /* 1 per node                                                             */
+    double *k;        /* 1 per node: the curvature                                              */
+    double *sharp;    /* 1 per node: k'' / k^3                                                  */
+    uint32_t *link;   /* 2 per link: its nodes                                                  */
+    int64_t *mate;    /* 2 per link: the end of another link that continues the line here, as
+                         2 * link + end, or TXI_CREST_NONE                                       */
+    size_t node_count, link_count;
+} txi_crest_net;
+
+/* Where a line crosses an edge. */
+typedef struct txi_crest_crossing {
+    double at;       /* 0..1 from the first end                                                 */
+    double k, sharp; /* curvature there, and k'' / k^3                                          */
+} txi_crest_crossing;
+
+/* Does a line cross the edge a b? The signs of t, and with it of e, are arbitrary: those of b are turned
+   to agree with a. */
+static int txi_crest_crosses(const txi_shape *s, size_t edge, int is_valley, double rounding,
+                             txi_crest_crossing *crossing) {
+    const uint32_t a = s->ends[2 * edge], b = s->ends[2 * edge + 1];
+    const txi_crest_value p = txi_crest_value_of(&s->curvature[a], is_valley);
+    const txi_crest_value q = txi_crest_value_of(&s->curvature[b], is_valley);
+    if (!p.is_candidate || !q.is_candidate) return 0;
+    const double turn = txm_d3_dot(p.t, q.t) < 0 ? -1 : 1, e = turn * q.e;
+    if ((p.e < 0) == (e < 0)) return 0;
+    const txm_dvec3 d = txm_d3_sub(txm_d3_load(s->mesh.positions + 3 * (size_t)b),
+                                   txm_d3_load(s->mesh.positions + 3 * (size_t)a));
+    const double length = txm_d3_len(d), jump = fabs(p.e) + fabs(e);
+    const int is_rounding = !(jump * length * length * length > rounding);
+    /* a maximum: from one of the two the curvature rises towards the other. Where a line runs along an
+       edge that cannot be told, and the edges beside it decide */
+    const double along = txm_d3_dot(p.t, d), back = -txm_d3_dot(q.t, d) * turn;
+    const int is_beside = fmax(fabs(along), fabs(back)) < TXI_CREST_BESIDE * length;
+    if (!is_rounding && !is_beside && !(p.e * along > 0) && !(e * back > 0)) return 0;
+    crossing->at = jump > 0 ? fabs(p.e) / jump : 0.5;
+    crossing->k = p.k + (q.k - p.k) * crossing->at;
+    crossing->sharp = is_rounding ? 0 : jump / length / (crossing->k * crossing->k * crossing->k);
+    return 1;
+}
+
+/* Find the crossings, node[edge] receives their nodes or UINT32_MAX, and count the links. */
+static txm_status txi_crest_nodes(const txi_shape *s, int is_valley, txm_arena *arena,
+                                  uint32_t *node, txi_crest_net *net, txm_env *env) {
+    size_t crossings = 0, centres = 0;
+    double rounding = 0;
+    txi_crest_crossing crossing;
+    for (size_t i = 0; i < 3 * s->mesh.face_count; i++) {
+        const txm_dvec3 p = txm_mesh_point(&s->mesh, i);
+        rounding = fmax(rounding, fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))));
+    }
+    rounding *= TXI_CREST_ROUNDING / 16777216.0;
+    for (size_t i = 0; i < s->edge_count; i++) {
+        const int crosses = txi_crest_crosses(s, i, is_valley, rounding, &crossing);
+        node[i] = crosses ? (uint32_t)crossings++ : UINT32_MAX;
+    }
+    net->node_count = crossings;
+    net->link_count = 0;
+    for (size_t f = 0; f < s->mesh.face_count; f++) {
+        int count = 0;
+        for (int i = 0; i < 3; i++) count += node[s->edge[3 * f + (size_t)i]] != UINT32_MAX;
+        net->link_count += count == 2 ? 1 : count == 3 ? 3 : 0;
+        centres += count == 3;
+    }
+    net->node_count += centres;
+    if (net->node_count == 0) return TXM_OK;
+    net->place = (txm_dvec3 *)txm_arena_alloc(arena, net->node_count, sizeof(txm_dvec3));
+    net->k = (double *)txm_arena_alloc(arena, net->node_count, sizeof(double));
+    net->sharp = (double *)txm_arena_alloc(arena, net->node_count, sizeof(double));
+    net->link = (uint32_t *)txm_arena_alloc(arena, net->link_count, 2 * sizeof(uint32_t));
+    net->mate = (int64_t *)txm_arena_alloc(arena, net->link_count, 2 * sizeof(int64_t));
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < s->edge_count; i++) {
+        if (node[i] == UINT32_MAX) continue;
+        txi_crest_crosses(s, i, is_valley, rounding, &crossing);
+        const txm_dvec3 p = txm_d3_load(s->mesh.positions + 3 * (size_t)s->ends[2 * i]);
+        const txm_dvec3 q = txm_d3_load(s->mesh.positions + 3 * (size_t)s->ends[2 * i + 1]);
+        net->place[node[i]] = txm_d3_mad(p, txm_d3_sub(q, p), crossing.at);
+        net->k[node[i]] = crossing.k;
+        net->sharp[node[i]] = crossing.sharp;
+    }
+    return TXM_OK;
+}
+
+/* Link the crossings of each triangle: two with each other, three with a node in their middle. */
+static void txi_crest_links(const txi_shape *s, const uint32_t *node, txi_crest_net *net) {
+    size_t links = 0, centre = 0;
+    for (size_t i = 0; i < s->edge_count; i++) centre += node[i] != UINT32_MAX;
+    for (size_t f = 0; f < s->mesh.face_count; f++) {
+        uint32_t n[3];
+        int count = 0;
+        for (size_t i = 0; i < 3; i++) {
+            if (node[s->edge[3 * f + i]] != UINT32_MAX) n[count++] = node[s->edge[3 * f + i]];
+        }
+        if (count == 2) {
+            net->link[2 * links] = n[0];
+            net->link[2 * links++ + 1] = n[1];
+        } else if (count == 3) {
+            txm_dvec3 sum = txm_d3(0, 0, 0);
+            net->k[centre] = net->sharp[centre] = 0;
+            for (int i = 0; i < 3; i++) {
+                sum = txm_d3_add(sum, net->place[n[i]]);
+                net->k[centre] += net->k[n[i]] / 3;
+                net->sharp[centre] += net->sharp[n[i]] / 3;
+                net->link[2 * links] = n[i];
+                net->link[2 * links++ + 1] = (uint32_t)centre;
+            }
+            net->place[centre++] = txm_d3_scale(sum, 1.0 / 3);
+        }
+    }
+}
+
+/* the direction of the line that leaves a node by this end of a link */
+static txm_dvec3 txi_crest_direction(const txi_crest_net *net, int64_t end) {
+    return txm_d3_unit(
+        txm_d3_sub(net->place[net->link[end ^ 1]], net->place[net->link[end]]));
+}
+
+/* Pair the ends of links at one node: again and again those two that continue each other best. */
+static void txi_crest_pair(txi_crest_net *net, int64_t *ends, int count) {
+    for (; count > 1; count -= 2) {
+        int a = 0, b = 1;
+        double best = 2;
+        for (int i = 0; i < count && count > 2; i++) {
+            for (int j = i + 1; j < count; j++) {
+                const double turn = txm_d3_dot(txi_crest_direction(net, ends[i]),
+                                               txi_crest_direction(net, ends[j]));
+                if (turn >= best) continue;
+                best = turn;
+                a = i;
+                b = j;
+            }
+        }
+        net->mate[ends[a]] = ends[b];
+        net->mate[ends[b]] = ends[a];
+        ends[b] = ends[count - 1]; /* a < b: first the later one */
+        ends[a] = ends[count - 2];
+    }
+}
+
+/* Find which links continue each other. first: room for one more than nodes; ends: 2 per link. */
+static void txi_crest_join(txi_crest_net *net, uint32_t *first, uint32_t *ends) {
+    memset(first, 0, (net->node_count + 1) * sizeof *first);
+    for (size_t i = 0; i < 2 * net->link_count; i++) {
+        first[net->link[i] + 1]++;
+        net->mate[i] = TXI_CREST_NONE;
+    }
+    for (size_t i = 0; i < net->node_count; i++) first[i + 1] += first[i];
+    for (size_t i = 2 * net->link_count; i-- > 0;) ends[--first[net->link[i] + 1]] = (uint32_t)i;
+    for (size_t i = 0; i < net->node_count; i++) first[i] = first[i + 1];
+    first[net->node_count] = (uint32_t)(2 * net->link_count);
+    for (size_t i = 0; i < net->node_count; i++) {
+        int64_t list[TXI_CREST_PAIRED];
+        int count = 0;
+        for (size_t k = first[i]; k < first[i + 1] && count < TXI_CREST_PAIRED; k++)
+            list[count++] = ends[k];
+        txi_crest_pair(net, list, count);
+    }
+}
+
+/* A line of a net, by the end of a link that it begins with. */
+typedef struct txi_crest_run {
+    int64_t begin;
+    size_t count; /* points */
+    double strength, length;
+    double sharp; /* integral of k'' / k^3 */
+    int net; /* 0 ridges, 1 valleys */
+} txi_crest_run;
+
+/* Follow a line to its end, or once round, and mark its links. Its strength is the integral of the
+   curvature along it. */
+static txi_crest_run txi_crest_follow(const txi_crest_net *net, int64_t begin, uint8_t *seen) {
+    txi_crest_run run = {begin, 1, 0, 0, 0, 0};
+    for (int64_t end = begin; end != TXI_CREST_NONE && !seen[end / 2]; end = net->mate[end ^ 1]) {
+        const uint32_t a = net->link[end], b = net->link[end ^ 1];
+        seen[end / 2] = 1;
+        run.count++;
+        const double length = txm_d3_dist(net->place[a], net->place[b]);
+        run.length += length;
+        run.strength += length * (net->k[a] + net->k[b]) / 2;
+        run.sharp += length * (net->sharp[a] + net->sharp[b]) / 2;
+    }
+    return run;
+}
+
+/* All lines of a net that are sharp enough: first those that end somewhere, then the closed ones. runs: room for 1 per
+   link; seen: 1 per link. Returns their number. */
+static size_t txi_crest_collect(const txi_crest_net *net, int which, uint8_t *seen,
+                                txi_crest_run *runs) {
+    size_t count = 0;
+    memset(seen, 0, net->link_count);
+    for (size_t i = 0; i < 4 * net->link_count; i++) {
+        const int64_t end = (int64_t)(i < 2 * net->link_count ? i : i - 2 * net->link_count);
+        if (seen[end / 2] || (i < 2 * net->link_count && net->mate[end] != TXI_CREST_NONE)) continue;
+        runs[count] = txi_crest_follow(net, end, seen);
+        runs[count].net = which;
+        count += runs[count].sharp > TXI_CREST_SHARP * runs[count].length;
+    }
+    return count;
+}
+
+/* Find the lines of one kind. */
+static txm_status txi_crest_trace(const txi_shape *s, int is_valley, txm_arena *arena,
+                                  txi_crest_net *net, txi_crest_run **runs, size_t *count,
+                                  txm_env *env) {
+    uint32_t *node = (uint32_t *)txm_arena_alloc(arena, s->edge_count, sizeof(uint32_t));
+    if (!node) return txi_no_memory(env);
+    const txm_status status = txi_crest_nodes(s, is_valley, arena, node, net, env);
+    if (status != TXM_OK || net->link_count == 0) return status;
+    uint32_t *first = (uint32_t *)txm_arena_alloc(arena, net->node_count + 1, sizeof(uint32_t));
+    uint32_t *ends = (uint32_t *)txm_arena_alloc(arena, net->link_count, 2 * sizeof(uint32_t));
+    uint8_t *seen = (uint8_t *)txm_arena_alloc(arena, net->link_count, 1);
+    *runs = (txi_crest_run *)txm_arena_alloc(arena, net->link_count, sizeof(txi_crest_run));
+    if (arena->failed) return txi_no_memory(env);
+    txi_crest_links(s, node, net);
+    txi_crest_join(net, first, ends);
+    *count = txi_crest_collect(net, is_valley, seen, *runs);
+    return TXM_OK;
+}
+
+/* Choose the lines at or above the threshold, the strongest first. chosen receives indices into the
+   runs of both nets, the valleys' after the ridges'; scratch: as many. Returns their number. */
+static size_t txi_crest_choose(txi_crest_run *const runs[2], const size_t counts[2], float threshold,
+                               txm_pair *chosen, txm_pair *scratch) {
+    double least = (double)threshold, most = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < counts[0] + counts[1]; i++)
+        most = fmax(most, i < counts[0] ? runs[0][i].strength : runs[1][i - counts[0]].strength);
+    if (!(threshold > 0)) least = fmax(TXI_CREST_STRENGTH, TXI_CREST_SHARE * most);
+    for (size_t i = 0; i < counts[0] + counts[1]; i++) {
+        const txi_crest_run *run = i < counts[0] ? &runs[0][i] : &runs[1][i - counts[0]];
+        if (run->strength < least) continue;
+        chosen[count].key = ~txm_sort_key(txm_float(run->strength));
+        chosen[count++].value = (uint32_t)i;
+    }
+    txm_sort_pairs(chosen, scratch, count);
+    return count;
+}
+
+/* Copy a line out. */
+static void txi_crest_emit(const txi_crest_net *net, const txi_crest_run *run, float *out) {
+    int64_t end = run->begin;
+    for (size_t i = 0; i < run->count; i++) {
+        const int is_last = i + 1 == run->count;
+        const txm_dvec3 p = net->place[net->link[is_last ? end ^ 1 : end]];
+        *out++ = txm_float(p.x);
+        *out++ = txm_float(p.y);
+        *out++ = txm_float(p.z);
+        if (i + 2 < run->count) end = net->mate[end ^ 1];
+    }
+}
+
+/* The chosen lines as the caller gets them. */
+static txm_status txi_crest_deliver(const txi_crest_net nets[2], txi_crest_run *const runs[2],
+                                    const size_t counts[2], const txm_pair *chosen, size_t count,
+                                    txm_env *env, texinpaint_crests **out) {
+    txm_arena memory;
+    size_t points = 0, used = 0;
+    txm_arena_init(&memory, env);
+    for (size_t i = 0; i < count; i++) {
+        const size_t n = chosen[i].value;
+        points += n < counts[0] ? runs[0][n].count : runs[1][n - counts[0]].count;
+    }
+    texinpaint_crests *crests = (texinpaint_crests *)txm_arena_zero(&memory, 1, sizeof *crests);
+    texinpaint_line *lines =
+        (texinpaint_line *)txm_arena_alloc(&memory, count, sizeof(texinpaint_line));
+    float *strengths = (float *)txm_arena_alloc(&memory, count, sizeof(float));
+    uint8_t *kinds = (uint8_t *)txm_arena_alloc(&memory, count, 1);
+    float *places = (float *)txm_arena_alloc(&memory, points, 3 * sizeof(float));
+    if (memory.failed) {
+        txm_arena_free(&memory);
+        return txi_no_memory(env);
+    }
+    for (size_t i = 0; i < count; i++) {
+        const size_t n = chosen[i].value;
+        const txi_crest_run *run = n < counts[0] ? &runs[0][n] : &runs[1][n - counts[0]];
+        txi_crest_emit(&nets[run->net], run, places + 3 * used);
+        lines[i].points = places + 3 * used;
+        lines[i].count = (int)run->count;
+        strengths[i] = txm_float(run->strength);
+        kinds[i] = run->net ? TEXINPAINT_VALLEY : TEXINPAINT_RIDGE;
+        used += run->count;
+    }
+    crests->lines = lines;
+    crests->strengths = strengths;
+    crests->kinds = kinds;
+    crests->line_count = count;
+    crests->memory = memory;
+    *out = crests;
+    return TXM_OK;
+}
+
+/* Everything but the checks. */
+static txm_status txi_crest_find(const texinpaint_crest_desc *desc, txm_arena *arena, txm_env *env,
+                                 texinpaint_crests **out) {
+    txi_weld weld;
+    txi_shape shape;
+    txi_crest_net nets[2];
+    txi_crest_run *runs[2] = {NULL, NULL};
+    size_t counts[2] = {0, 0};
+    memset(nets, 0, sizeof nets);
+    txm_status status = txi_weld_make(&desc->mesh, arena, env, &weld);
+    if (status == TXM_OK) status = txi_shape_make(&weld.mesh, desc->rings, arena, env, &shape);
+    for (int i = 0; i < 2 && status == TXM_OK && shape.edge_count; i++) {
+        if (desc->kinds && !(desc->kinds & (i ? TEXINPAINT_VALLEY : TEXINPAINT_RIDGE))) continue;
+        if (txm_progress(env, i ? 0.95f : 0.9f, "crest lines")) return txi_stopped(env);
+        status = txi_crest_trace(&shape, i, arena, &nets[i], &runs[i], &counts[i], env);
+    }
+    if (status != TXM_OK) return status;
+    const size_t most = counts[0] + counts[1];
+    txm_pair *chosen = (txm_pair *)txm_arena_alloc(arena, most, 2 * sizeof(txm_pair));
+    if (arena->failed) return txi_no_memory(env);
+    const size_t count =
+        most ? txi_crest_choose(runs, counts, desc->threshold, chosen, chosen + most) : 0;
+    return txi_crest_deliver(nets, runs, counts, chosen, count, env, out);
+}
+
+TEXINPAINT_API txm_status texinpaint_crest(const texinpaint_crest_desc *desc, txm_env *env,
+                                           texinpaint_crests **out) {
+    txm_arena arena;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    txm_status status = txm_mesh_check(&desc->mesh, "mesh", 3, 1, 1u << 29, env);
+    if (status != TXM_OK) return status;
+    if (!(desc->threshold >= 0 && desc->threshold <= 1e6f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "threshold must be 0 to 1e6");
+    if (desc->kinds < 0 || desc->kinds > (TEXINPAINT_RIDGE | TEXINPAINT_VALLEY))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "kinds must be 0 to 3");
+    if (desc->rings < 0 || desc->rings > TXI_FIT_MOST_RINGS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "rings must be 0 to 8");
+    txm_arena_init(&arena, env);
+    status = txi_crest_find(desc, &arena, env, out);
+    txm_arena_free(&arena);
+    return status;
+}
+
+TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests) {
+    if (!crests) return;
+    txm_arena memory = crests->memory;
+    txm_arena_free(&memory);
+}
+
+/* ---- prior ---- */
 
 /* ---- vote ---- */
 

@@ -41,7 +41,9 @@
 
    REFERENCES
      [1] K. Guo, X. Chen, Y. Liu, B. Zhou, Y. Guo. Geometric based structure propagation and texture
-         matching for 3D texture completion. 2013.                                             */
+         matching for 3D texture completion. 2013.
+     [2] S. Yoshizawa, A. Belyaev, H.-P. Seidel. Fast and robust detection of crest lines on meshes.
+         ACM Symposium on Solid and Physical Modeling 2005.                                     */
 #ifndef TEXINPAINT_H
 #define TEXINPAINT_H
 
@@ -200,23 +202,33 @@ TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env
 
 /* ---- crest lines ------------------------------------------------------------------------- */
 
-/* Which crest lines of a mesh to find. */
+/* kinds of crest lines; add them up in a description */
+enum { TEXINPAINT_RIDGE = 1, TEXINPAINT_VALLEY = 2 };
+
+/* Which crest lines of a mesh to find. All zero but mesh is a good default. */
 typedef struct texinpaint_crest_desc {
-    txm_mesh mesh;    /* triangles                                                              */
-    float threshold;  /* of the strength of a line, the integral of its curvature along it (no
-                         unit); 0 = chosen from the mesh                                        */
-    int kinds;        /* 1 ridges, 2 valleys, 3 or 0 both                                       */
+    txm_mesh mesh;    /* triangles, counter-clockwise from outside, of any connectivity; vertices in
+                         equal places count as one                                              */
+    float threshold;  /* weaker lines are left out, 0..1e6; the strength of a line is the integral of
+                         its curvature along it, without unit: 1 for one as long as its radius of
+                         curvature. 0 = 1, or 0.02 of the strongest line if that is more        */
+    int kinds;        /* TEXINPAINT_RIDGE, TEXINPAINT_VALLEY, or their sum; 0 = both            */
+    int rings;        /* rings of vertices around each that curvature is taken from, 1..8; more for
+                         noisy meshes; 0 = 2                                                    */
 } texinpaint_crest_desc;
 
-/* Lines; points as in texinpaint_line. */
+/* Lines, the strongest first. Closed ones end with their first point. */
 typedef struct texinpaint_crests {
-    texinpaint_line *lines;
+    texinpaint_line *lines; /* points on the surface, about one per triangle                    */
+    const float *strengths; /* 1 per line                                                       */
+    const uint8_t *kinds;   /* 1 per line: TEXINPAINT_RIDGE or TEXINPAINT_VALLEY                */
     size_t line_count;
     txm_arena memory; /* private */
 } texinpaint_crests;
 
 /* The crest lines of a mesh: where the larger principal curvature has an extremum along its own line
-   of curvature [2]. The estimate comes from a cubic fitted around each vertex.
+   of curvature [2]. The estimate comes from a cubic fitted around each vertex. A mesh without faces has
+   none.
    out    receives the lines, or NULL on any error; release it with texinpaint_crests_free
    return TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED           */
 TEXINPAINT_API txm_status texinpaint_crest(const texinpaint_crest_desc *desc, txm_env *env,
@@ -235,13 +247,16 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 
 #include "texinpaint/config.h"
 #include "texinpaint/check.h"
+#include "texinpaint/weld.h"
 #include "texinpaint/surface.h"
 #include "texinpaint/geodesic.h"
 #include "texinpaint/unfold.h"
 #include "texinpaint/resample.h"
 #include "texinpaint/window.h"
 #include "texinpaint/harmonic.h"
+#include "texinpaint/curvature.h"
 #include "texinpaint/crest.h"
+#include "texinpaint/prior.h"
 #include "texinpaint/vote.h"
 #include "texinpaint/trace.h"
 #include "texinpaint/join.h"
