@@ -572,11 +572,11 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
    Meshes with texture coordinates often repeat a vertex for each chart that it lies in. Geometry is
    computed on a mesh in which vertices in equal places are one.                                */
 
-typedef struct txi_weld {
+typedef struct txi_welded {
     uint32_t *vertex; /* 1 per vertex of the input: the first vertex in the same place          */
     txm_mesh mesh;    /* the positions of the input, faces of welded vertices                   */
     uint32_t *face;   /* 1 per face of mesh: its number in the input                            */
-} txi_weld;
+} txi_welded;
 
 /* For each vertex the lowest one in the same place (-0 is 0). pairs: room for 2 per vertex. */
 static void txi_weld_vertices(const txm_mesh *input, txm_pair *pairs, uint32_t *first) {
@@ -599,8 +599,8 @@ static void txi_weld_vertices(const txm_mesh *input, txm_pair *pairs, uint32_t *
 /* Weld a checked mesh of triangles; faces of which two corners are in one place are left out.
    return  TXM_OK, TXM_TOO_LARGE or TXM_OUT_OF_MEMORY
    cost    O(vertices + faces)                                                              */
-static txm_status txi_weld_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
-                                txi_weld *weld) {
+static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
+                                txi_welded *weld) {
     const size_t n = input->vertex_count;
     size_t count = 0;
     txm_arena scratch;
@@ -1987,13 +1987,13 @@ static txm_status txi_crest_deliver(const txi_crest_net nets[2], txi_crest_run *
 /* Everything but the checks. */
 static txm_status txi_crest_find(const texinpaint_crest_desc *desc, txm_arena *arena, txm_env *env,
                                  texinpaint_crests **out) {
-    txi_weld weld;
+    txi_welded weld;
     txi_shape shape;
     txi_crest_net nets[2];
     txi_crest_run *runs[2] = {NULL, NULL};
     size_t counts[2] = {0, 0};
     memset(nets, 0, sizeof nets);
-    txm_status status = txi_weld_make(&desc->mesh, arena, env, &weld);
+    txm_status status = txi_welded_make(&desc->mesh, arena, env, &weld);
     if (status == TXM_OK) status = txi_shape_make(&weld.mesh, desc->rings, arena, env, &shape);
     for (int i = 0; i < 2 && status == TXM_OK && shape.edge_count; i++) {
         if (desc->kinds && !(desc->kinds & (i ? TEXINPAINT_VALLEY : TEXINPAINT_RIDGE))) continue;

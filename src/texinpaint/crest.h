@@ -342,13 +342,13 @@ static txm_status txi_crest_deliver(const txi_crest_net nets[2], txi_crest_run *
 /* Everything but the checks. */
 static txm_status txi_crest_find(const texinpaint_crest_desc *desc, txm_arena *arena, txm_env *env,
                                  texinpaint_crests **out) {
-    txi_weld weld;
+    txi_welded weld;
     txi_shape shape;
     txi_crest_net nets[2];
     txi_crest_run *runs[2] = {NULL, NULL};
     size_t counts[2] = {0, 0};
     memset(nets, 0, sizeof nets);
-    txm_status status = txi_weld_make(&desc->mesh, arena, env, &weld);
+    txm_status status = txi_welded_make(&desc->mesh, arena, env, &weld);
     if (status == TXM_OK) status = txi_shape_make(&weld.mesh, desc->rings, arena, env, &shape);
     for (int i = 0; i < 2 && status == TXM_OK && shape.edge_count; i++) {
         if (desc->kinds && !(desc->kinds & (i ? TEXINPAINT_VALLEY : TEXINPAINT_RIDGE))) continue;
