@@ -2047,15 +2047,1926 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests) {
 
 /* ---- strip ---- */
 
-/* ---- picture ---- */
+/* ---- levels of a window -------------------------------------------------------------------- */
 
-/* ---- onion ---- */
+enum {
+    TXI_PATCH = 8,       /* pixels: side of the square patches that are compared               */
+    TXI_PATCH_AREA = TXI_PATCH * TXI_PATCH,
+    TXI_EDGE = 8,        /* pixels of void around each level, so that all patches lie inside   */
+    TXI_MAX_LEVELS = 8,
+    TXI_MAX_POSES = 16,
+    TXI_LEAST_PATCHES = 48, /* source patches that a coarse level must have; ours              */
+    TXI_LEAST_FILLED = 24   /* pixels that are not void in a patch to be matched; ours         */
+};
 
-/* ---- search ---- */
+/* How a pixel may be copied: not; by itself; interpolated with its neighbour to the right, below and
+   below right; by four pixels a direction. */
+enum { TXI_TAP_NONE = 0, TXI_TAP_ONE, TXI_TAP_LINEAR, TXI_TAP_CUBIC };
 
-/* ---- ballot ---- */
+/* A window at one level in one pose: what patches are copied from. Its pixel (i, j) is the level's
+   pixel (x + a i + c j, y + b i + d j), in units of 2^-16 pixels, so that all of it is integers. */
+typedef struct txi_source {
+    int width, height;
+    int32_t x, y, a, b, c, d;
+    uint8_t *color;  /* 4 per pixel; NULL: not made                                            */
+    uint8_t *usable; /* 1 where there is colour                                                */
+    uint16_t *worth; /* of the patch whose upper left corner the pixel is: 0 = not all of it may be
+                        copied, else 1 + its detail, see detail.h                              */
+} txi_source;
 
-/* ---- fill ---- */
+/* A window at half, a quarter, ... of its resolution. Pixel (x, y) of level l has its centre at
+   ((x + 1/2) 2^l - 1/2, ...) in the window. All arrays are rasters of width * height pixels with
+   TXI_EDGE pixels of void on all sides, or lists of numbers of pixels in these. */
+typedef struct txi_level {
+    int width, height;
+    uint8_t *state;      /* TXI_VOID .. TXI_FOREIGN                                            */
+    uint8_t *color;      /* 4 per pixel; 0 where there is nothing known. The fourth is the guide */
+    uint8_t *mask;       /* 4 per pixel: 255 where the pixel is not void                       */
+    uint8_t *taps;       /* how the pixel and those right of and below it may be copied: TXI_TAP_ */
+    uint8_t *guide;      /* the plan's guide, strips and their pull, at this level; see fill.h  */
+    uint8_t *strip, *pull;
+    uint8_t *depth;      /* of hole pixels: pixels to the nearest known one, at most 255       */
+    int32_t *hole;       /* the hole's pixels                                                  */
+    int hole_count;
+    int32_t *hole_row;   /* height + 1: the first of them in each row                          */
+    int32_t *anchor;     /* upper left corners of the patches that touch the hole              */
+    int anchor_count;
+    int32_t *anchor_row; /* height + 1                                                         */
+    int32_t *slot;       /* the pixel's number as an anchor, -1: it is none                    */
+    uint8_t *filled;     /* of each anchor: pixels of its patch that are not void, 1..64       */
+    uint32_t *want;      /* of each anchor: expected detail of its patch, as txi_source.worth - 1 */
+    uint32_t clamp;      /* largest detail of a pixel that counts                              */
+    double grain;        /* (median + 1/2) / (mean + 1/2) of the detail of known pixels        */
+    txi_source source[TXI_MAX_POSES];
+    int built[TXI_MAX_POSES]; /* numbers of the sources that are made                          */
+    int built_count;
+} txi_level;
+
+/* Memory of a level with these inner sides. 0: there is none. */
+static int txi_level_make(txi_level *l, int width, int height, txm_arena *arena) {
+    memset(l, 0, sizeof *l);
+    l->width = width + 2 * TXI_EDGE;
+    l->height = height + 2 * TXI_EDGE;
+    const size_t n = (size_t)l->width * (size_t)l->height;
+    l->state = (uint8_t *)txm_arena_zero(arena, n, 1);
+    l->color = (uint8_t *)txm_arena_zero(arena, n, 4);
+    l->mask = (uint8_t *)txm_arena_zero(arena, n, 4);
+    l->taps = (uint8_t *)txm_arena_zero(arena, n, 1);
+    l->depth = (uint8_t *)txm_arena_zero(arena, n, 1);
+    l->slot = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    l->hole_row = (int32_t *)txm_arena_zero(arena, (size_t)l->height + 1, sizeof(int32_t));
+    l->anchor_row = (int32_t *)txm_arena_zero(arena, (size_t)l->height + 1, sizeof(int32_t));
+    return !arena->failed;
+}
+
+/* The finest level: the window itself. */
+static void txi_level_load(txi_level *l, const txi_window *w) {
+    for (int y = 0; y < w->height; y++) {
+        for (int x = 0; x < w->width; x++) {
+            const size_t from = (size_t)y * (size_t)w->width + (size_t)x;
+            const size_t to = (size_t)(y + TXI_EDGE) * (size_t)l->width + (size_t)(x + TXI_EDGE);
+            l->state[to] = w->state[from];
+            if (w->state[from] == TXI_KNOWN || w->state[from] == TXI_FOREIGN)
+                memcpy(l->color + 4 * to, w->color + 4 * from, 3);
+        }
+    }
+}
+
+/* Half the resolution. A pixel is missing if one of the four that it covers is, foreign if one is
+   foreign; its colour is the mean of those that are not void. */
+static void txi_level_halve(const txi_level *f, txi_level *l) {
+    for (int y = TXI_EDGE; y < l->height - TXI_EDGE; y++) {
+        for (int x = TXI_EDGE; x < l->width - TXI_EDGE; x++) {
+            const size_t to = (size_t)y * (size_t)l->width + (size_t)x;
+            int count[4] = {0, 0, 0, 0}, sum[3] = {0, 0, 0};
+            for (int k = 0; k < 4; k++) {
+                const int fx = 2 * x - TXI_EDGE + (k & 1), fy = 2 * y - TXI_EDGE + (k >> 1);
+                if (fx >= f->width || fy >= f->height) continue;
+                const size_t from = (size_t)fy * (size_t)f->width + (size_t)fx;
+                count[f->state[from]]++;
+                for (int c = 0; c < 3; c++) sum[c] += f->color[4 * from + (size_t)c];
+            }
+            const int known = count[TXI_KNOWN] + count[TXI_FOREIGN];
+            l->state[to] = count[TXI_HOLE]      ? TXI_HOLE
+                           : count[TXI_FOREIGN] ? TXI_FOREIGN
+                           : known              ? TXI_KNOWN
+                                                : TXI_VOID;
+            if (l->state[to] == TXI_HOLE || !known) continue;
+            for (int c = 0; c < 3; c++)
+                l->color[4 * to + (size_t)c] = (uint8_t)((sum[c] + known / 2) / known);
+        }
+    }
+}
+
+/* How the pixels may be resampled. At the finest level a pixel may be copied only if its 3x3
+   neighbours are known, so that the caller can interpolate there. */
+static int txi_level_taps(txi_level *l, int finest, txm_arena *scratch) {
+    const size_t n = (size_t)l->width * (size_t)l->height, w = (size_t)l->width;
+    uint8_t *solid = (uint8_t *)txm_arena_zero(scratch, n, 1);
+    if (!solid) return 0;
+    for (size_t p = w + 1; p + w + 1 < n; p++) {
+        int all = l->state[p] == TXI_KNOWN;
+        for (size_t q = p - w; finest && all && q <= p + w; q += w)
+            all = l->state[q - 1] == TXI_KNOWN && l->state[q] == TXI_KNOWN &&
+                  l->state[q + 1] == TXI_KNOWN;
+        solid[p] = (uint8_t)all;
+    }
+    for (size_t p = w + 1; p + 2 * w + 2 < n; p++) {
+        if (!solid[p]) continue;
+        l->taps[p] = TXI_TAP_ONE;
+        if (!(solid[p + 1] && solid[p + w] && solid[p + w + 1])) continue;
+        l->taps[p] = TXI_TAP_LINEAR;
+        int all = 1;
+        for (size_t q = p - w - 1; all && q <= p + 2 * w - 1; q += w)
+            for (size_t k = 0; k < 4; k++) all &= l->state[q + k] == TXI_KNOWN;
+        if (all) l->taps[p] = TXI_TAP_CUBIC;
+    }
+    return 1;
+}
+
+/* Distances of hole pixels to the known part in pixels, by two passes with steps of 5 and 7 fifths.
+   Void counts as nothing, so a hole on the border of the window is deepest there. */
+static int txi_level_depth(txi_level *l, txm_arena *scratch) {
+    const int w = l->width, n = l->width * l->height;
+    int32_t *far5 = (int32_t *)txm_arena_alloc(scratch, (size_t)n, sizeof(int32_t));
+    if (!far5) return 0;
+    for (int p = 0; p < n; p++)
+        far5[p] = l->state[p] == TXI_KNOWN || l->state[p] == TXI_FOREIGN ? 0 : 1 << 20;
+    for (int pass = 0; pass < 2; pass++) {
+        const int s = pass ? -1 : 1;
+        for (int i = w + 1; i < n - w - 1; i++) {
+            const int p = pass ? n - 1 - i : i;
+            const int side[4] = {p - s, p - s * w, p - s * (w + 1), p - s * (w - 1)};
+            for (int k = 0; k < 4; k++) {
+                const int32_t through = far5[side[k]] + (k < 2 ? 5 : 7);
+                if (through < far5[p]) far5[p] = through;
+            }
+        }
+    }
+    for (int p = 0; p < n; p++) {
+        const int d = (far5[p] + 2) / 5;
+        l->depth[p] = (uint8_t)(l->state[p] != TXI_HOLE ? 0 : d > 255 ? 255 : d < 1 ? 1 : d);
+    }
+    return 1;
+}
+
+/* The lists of the hole's pixels and of the patches that touch it. */
+static int txi_level_lists(txi_level *l, txm_arena *arena) {
+    const int w = l->width, n = l->width * l->height;
+    uint8_t *touch = (uint8_t *)txm_arena_zero(arena, (size_t)n, 1);
+    if (!touch) return 0;
+    for (int p = 0; p < n; p++) {
+        l->slot[p] = -1;
+        if (l->state[p] != TXI_VOID) memset(l->mask + 4 * (size_t)p, 255, 4);
+        if (l->state[p] != TXI_HOLE) continue;
+        l->hole_count++;
+        for (int y = 0; y < TXI_PATCH; y++)
+            for (int x = 0; x < TXI_PATCH; x++) touch[p - y * w - x] = 1;
+    }
+    for (int p = 0; p < n; p++) {
+        if (!touch[p]) continue;
+        int filled = 0;
+        for (int y = 0; y < TXI_PATCH; y++)
+            for (int x = 0; x < TXI_PATCH; x++) filled += l->state[p + y * w + x] != TXI_VOID;
+        const int centre = p + (TXI_PATCH / 2) * (w + 1);
+        touch[p] = (uint8_t)(filled >= TXI_LEAST_FILLED || l->state[centre] == TXI_HOLE ? filled : 0);
+        l->anchor_count += touch[p] != 0;
+    }
+    l->hole = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof(int32_t));
+    l->anchor = (int32_t *)txm_arena_alloc(arena, (size_t)l->anchor_count, sizeof(int32_t));
+    l->filled = (uint8_t *)txm_arena_alloc(arena, (size_t)l->anchor_count, 1);
+    l->want = (uint32_t *)txm_arena_zero(arena, (size_t)l->anchor_count, sizeof(uint32_t));
+    if (arena->failed) return 0;
+    int h = 0, a = 0;
+    for (int p = 0; p < n; p++) {
+        if (p % w == 0) {
+            l->hole_row[p / w] = h;
+            l->anchor_row[p / w] = a;
+        }
+        if (l->state[p] == TXI_HOLE) l->hole[h++] = p;
+        if (!touch[p]) continue;
+        l->slot[p] = a;
+        l->filled[a] = touch[p];
+        l->anchor[a++] = p;
+    }
+    l->hole_row[l->height] = h;
+    l->anchor_row[l->height] = a;
+    return 1;
+}
+
+/* twice the largest depth: the width of the hole, in pixels */
+static int txi_level_hole_width(const txi_level *l) {
+    int deepest = 0;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int d = l->depth[l->hole[i]];
+        if (d > deepest) deepest = d;
+    }
+    return 2 * deepest;
+}
+
+/* ---- distances of patches -------------------------------------------------------------------- */
+
+/* Sum of squared differences of the four bytes of the pixels of two patches; a and b point to their
+   first bytes, mask to that of a's mask or NULL if all count. Stops once the sum exceeds limit. */
+static uint32_t txi_ssd(const uint8_t *a, size_t a_pitch, const uint8_t *mask, const uint8_t *b,
+                        size_t b_pitch, uint32_t limit) {
+    uint32_t total = 0;
+    for (int y = 0; y < TXI_PATCH; y++) {
+#ifdef TXI_SSE2
+        static const int step = 16;
+        __m128i sum = _mm_setzero_si128();
+        for (int i = 0; i < 4 * TXI_PATCH; i += step) {
+            const __m128i zero = _mm_setzero_si128();
+            const __m128i u = _mm_loadu_si128((const __m128i *)(const void *)(a + i));
+            const __m128i v = _mm_loadu_si128((const __m128i *)(const void *)(b + i));
+            __m128i d = _mm_or_si128(_mm_subs_epu8(u, v), _mm_subs_epu8(v, u));
+            if (mask)
+                d = _mm_and_si128(d, _mm_loadu_si128((const __m128i *)(const void *)(mask + i)));
+            const __m128i low = _mm_unpacklo_epi8(d, zero), high = _mm_unpackhi_epi8(d, zero);
+            sum = _mm_add_epi32(sum, _mm_madd_epi16(low, low));
+            sum = _mm_add_epi32(sum, _mm_madd_epi16(high, high));
+        }
+        sum = _mm_add_epi32(sum, _mm_shuffle_epi32(sum, 0x4e));
+        sum = _mm_add_epi32(sum, _mm_shuffle_epi32(sum, 0xb1));
+        total += (uint32_t)_mm_cvtsi128_si32(sum);
+#else
+        for (int i = 0; i < 4 * TXI_PATCH; i++) {
+            const int d = a[i] - b[i];
+            if (!mask || mask[i]) total += (uint32_t)(d * d);
+        }
+#endif
+        if (total > limit) return total;
+        a += a_pitch;
+        b += b_pitch;
+        if (mask) mask += a_pitch;
+    }
+    return total;
+}
+
+/* ---- detail: how rough the texture is, and is expected to be ------------------------------------
+
+   In noise of variance v, a patch differs from a smooth one by v per pixel and from another rough one
+   by 2 v. So distances alone prefer smooth patches, and grain is smeared. Therefore patches with less
+   detail than expected pay the difference. The detail of a pixel is
+
+       e(p) = min(clamp, sum over RGB of (p - mean of the usable pixels of 5x5)^2),
+
+   that of a patch the sum over its pixels. The expected one is the mean of its logarithm over the
+   known patches around, less a multiple of the standard deviation.                             */
+
+enum {
+    TXI_DETAIL_RADIUS = 2,  /* pixels: of the mean                                             */
+    TXI_DETAIL_BINS = 4096, /* of the histogram                                                */
+    TXI_REACHES = 7,        /* radii that the expectation is collected in                      */
+    TXI_WORTH_MOST = 65535, /* detail of a patch whose pixels all have the level's clamp        */
+    TXI_WANT_FLOOR = 64     /* added to the detail of a patch under the logarithm              */
+};
+
+/* e of each usable pixel, 0 of others, not clamped.
+   columns  room for 4 * width numbers                                                         */
+static void txi_detail(const uint8_t *color, const uint8_t *usable, int width, int height,
+                       int32_t *columns, uint32_t *e) {
+    const int r = TXI_DETAIL_RADIUS;
+    const size_t w = (size_t)width;
+    memset(columns, 0, 4 * w * sizeof *columns);
+    for (int y = -r; y < height; y++) {
+        for (int side = 0; side < 2; side++) { /* a row enters the sums, another one leaves them */
+            const int row = side ? y - r - 1 : y + r;
+            if (row < 0 || row >= height) continue;
+            const int sign = side ? -1 : 1;
+            for (size_t x = 0; x < w; x++) {
+                const size_t p = (size_t)row * w + x;
+                if (!usable[p]) continue;
+                for (size_t c = 0; c < 3; c++) columns[4 * x + c] += sign * color[4 * p + c];
+                columns[4 * x + 3] += sign;
+            }
+        }
+        if (y < 0) continue;
+        int32_t sum[4] = {0, 0, 0, 0};
+        for (int x = -r; x < width; x++) {
+            for (int c = 0; c < 4; c++) {
+                if (x + r < width) sum[c] += columns[4 * (x + r) + c];
+                if (x - r - 1 >= 0) sum[c] -= columns[4 * (x - r - 1) + c];
+            }
+            if (x < 0) continue;
+            const size_t p = (size_t)y * w + (size_t)x;
+            e[p] = 0;
+            if (!usable[p]) continue;
+            const int32_t n = sum[3];
+            uint32_t total = 0;
+            for (size_t c = 0; c < 3; c++) {
+                const int32_t d = color[4 * p + c] * n - sum[c];
+                total += (uint32_t)(d * d);
+            }
+            e[p] = total / (uint32_t)(n * n);
+        }
+    }
+}
+
+/* Sums over the 8x8 pixels right of and below each pixel, those beyond the raster being 0.
+   columns  room for width numbers                                                             */
+static void txi_patch_sums(const uint32_t *value, int width, int height, uint32_t *columns,
+                           uint32_t *sums) {
+    const size_t w = (size_t)width;
+    memset(columns, 0, w * sizeof *columns);
+    for (int y = height - 1; y >= 0; y--) {
+        uint32_t sum = 0;
+        for (size_t x = 0; x < w; x++) {
+            columns[x] += value[(size_t)y * w + x];
+            if (y + TXI_PATCH < height) columns[x] -= value[(size_t)(y + TXI_PATCH) * w + x];
+        }
+        for (int x = width - 1; x >= 0; x--) {
+            sum += columns[x];
+            if (x + TXI_PATCH < width) sum -= columns[x + TXI_PATCH];
+            sums[(size_t)y * w + (size_t)x] = sum;
+        }
+    }
+}
+
+/* Median and mean of the detail of the known pixels; sets grain and clamp of the level.
+   strength  the clamp is its square times (median + 2)                                        */
+static void txi_detail_clamp(txi_level *l, const uint32_t *e, float strength, uint32_t *bins) {
+    const int n = l->width * l->height;
+    uint32_t known = 0, below = 0, median = 0;
+    double sum = 0;
+    memset(bins, 0, TXI_DETAIL_BINS * sizeof *bins);
+    for (int p = 0; p < n; p++) {
+        if (l->state[p] != TXI_KNOWN) continue;
+        known++;
+        sum += e[p];
+        bins[e[p] < TXI_DETAIL_BINS ? e[p] : TXI_DETAIL_BINS - 1]++;
+    }
+    while (median < TXI_DETAIL_BINS - 1 && (below += bins[median]) * 2 < known) median++;
+    l->grain = known ? (median + 0.5) / (sum / known + 0.5) : 0;
+    const double most = (double)strength * strength * (median + 2.0);
+    l->clamp = (uint32_t)(most < 16 ? 16 : most > 195075 ? 195075 : most);
+}
+
+/* a box filter along one direction of a grid, of values step apart, in place */
+static void txi_box_line(float *v, int count, size_t step, int radius, float *copy) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) copy[i] = v[(size_t)i * step];
+    for (int i = -radius; i < count; i++) {
+        if (i + radius < count) sum += copy[i + radius];
+        if (i - radius - 1 >= 0) sum -= copy[i - radius - 1];
+        if (i >= 0) v[(size_t)i * step] = txm_float(sum / (2 * radius + 1));
+    }
+}
+
+/* The expectation is collected on a coarser grid: weight, mean and mean square of the logarithms
+   of known patches. */
+typedef struct txi_wish {
+    int width, height, step; /* cells; pixels per cell                                         */
+    float *weight, *first, *second; /* of the known patches                                    */
+    float *blur[3];          /* the same, filtered                                             */
+    float *copy;
+    float *result;           /* expected detail; below 0: not yet                              */
+} txi_wish;
+
+static void txi_wish_reach(txi_wish *g, int radius, float offset) {
+    const size_t w = (size_t)g->width, n = w * (size_t)g->height;
+    float *from[3];
+    from[0] = g->weight;
+    from[1] = g->first;
+    from[2] = g->second;
+    for (int k = 0; k < 3; k++) {
+        memcpy(g->blur[k], from[k], n * sizeof(float));
+        for (int pass = 0; pass < 2; pass++) {
+            for (int y = 0; y < g->height; y++)
+                txi_box_line(g->blur[k] + (size_t)y * w, g->width, 1, radius, g->copy);
+            for (int x = 0; x < g->width; x++)
+                txi_box_line(g->blur[k] + x, g->height, w, radius, g->copy);
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (g->result[i] >= 0 || g->blur[0][i] < 0.12f) continue;
+        const double mean = (double)g->blur[1][i] / g->blur[0][i];
+        const double square = (double)g->blur[2][i] / g->blur[0][i] - mean * mean;
+        const double level = exp(mean - (double)offset * sqrt(square > 0 ? square : 0));
+        g->result[i] = txm_float(level > TXI_WANT_FLOOR ? level - TXI_WANT_FLOOR : 0);
+    }
+}
+
+/* The expected detail of all anchors. sums: detail of all patches (void and hole: 0).
+   offset  standard deviations below the mean                                                  */
+static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_arena *scratch) {
+    txi_wish g;
+    memset(&g, 0, sizeof g);
+    g.step = l->width * l->height > 100000 ? 4 : 2;
+    g.width = (l->width + g.step - 1) / g.step;
+    g.height = (l->height + g.step - 1) / g.step;
+    const size_t n = (size_t)g.width * (size_t)g.height;
+    const int longer = g.width > g.height ? g.width : g.height;
+    float *block = (float *)txm_arena_zero(scratch, n, 7 * sizeof(float));
+    g.copy = (float *)txm_arena_alloc(scratch, (size_t)longer, sizeof(float));
+    if (scratch->failed) return 0;
+    g.weight = block;
+    g.first = block + n;
+    g.second = block + 2 * n;
+    for (size_t k = 0; k < 3; k++) g.blur[k] = block + (3 + k) * n;
+    g.result = block + 6 * n;
+    for (size_t i = 0; i < n; i++) {
+        const int x = (int)(i % (size_t)g.width) * g.step, y = (int)(i / (size_t)g.width) * g.step;
+        const int p = y * l->width + x;
+        g.result[i] = -1;
+        if (x > l->width - TXI_PATCH || y > l->height - TXI_PATCH || l->slot[p] >= 0) continue;
+        int known = 1;
+        for (int k = 0; known && k < TXI_PATCH_AREA; k++)
+            known = l->state[p + k / TXI_PATCH * l->width + k % TXI_PATCH] != TXI_VOID;
+        if (!known) continue;
+        const double value = log((double)sums[p] + TXI_WANT_FLOOR);
+        g.weight[i] = 1;
+        g.first[i] = txm_float(value);
+        g.second[i] = txm_float(value * value);
+    }
+    double radius = 4;
+    for (int i = 0; i < TXI_REACHES; i++, radius *= 1.8)
+        txi_wish_reach(&g, (int)(radius / g.step + 0.5), offset);
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int x = l->anchor[a] % l->width / g.step, y = l->anchor[a] / l->width / g.step;
+        const float r = g.result[(size_t)y * (size_t)g.width + (size_t)x];
+        l->want[a] = r > 0 ? (uint32_t)((double)r * TXI_WORTH_MOST / TXI_PATCH_AREA / l->clamp) : 0;
+    }
+    return 1;
+}
+
+/* Detail of a level: grain, clamp and the expectation of its anchors. want_it 0: the first two only. */
+static int txi_level_detail(txi_level *l, float clamp, float offset, int want_it,
+                            txm_arena *scratch) {
+    const size_t n = (size_t)l->width * (size_t)l->height;
+    uint8_t *usable = (uint8_t *)txm_arena_alloc(scratch, n, 1);
+    uint32_t *e = (uint32_t *)txm_arena_alloc(scratch, n, 2 * sizeof(uint32_t));
+    int32_t *columns = (int32_t *)txm_arena_alloc(scratch, (size_t)l->width, 4 * sizeof(int32_t));
+    uint32_t *bins = (uint32_t *)txm_arena_alloc(scratch, TXI_DETAIL_BINS, sizeof(uint32_t));
+    if (scratch->failed) return 0;
+    for (size_t p = 0; p < n; p++)
+        usable[p] = l->state[p] == TXI_KNOWN || l->state[p] == TXI_FOREIGN;
+    txi_detail(l->color, usable, l->width, l->height, columns, e);
+    txi_detail_clamp(l, e, clamp, bins);
+    if (!want_it) return 1;
+    for (size_t p = 0; p < n; p++) {
+        if (e[p] > l->clamp) e[p] = l->clamp;
+    }
+    txi_patch_sums(e, l->width, l->height, (uint32_t *)(void *)columns, e + n);
+    return txi_level_want(l, e + n, offset, scratch);
+}
+
+/* ---- sources: the window turned and mirrored --------------------------------------------------
+
+   Patches are copied from turned copies of the window, too. They are made beforehand, as pictures
+   of their own: then the neighbour of a copied patch is again one pixel further, and distances are
+   taken between rows of bytes.                                                                */
+
+enum {
+    TXI_UNIT = 1 << 16,    /* of txi_source: one pixel                                         */
+    TXI_PHASES = 64,       /* per pixel, of the interpolation                                  */
+    TXI_MESH_POSES = 16,   /* angles over the full circle                                      */
+    TXI_PICTURE_POSES = 14 /* 9 angles within +-20 degrees, 5 within +-10 degrees mirrored     */
+};
+
+/* The pose's axes. Pose 0 is the window as it is. */
+static void txi_pose_axes(int is_picture, int pose, txi_source *s) {
+    /* in 1/16 turns, or degrees; poses that are near pose 0 come first */
+    static const int degrees[TXI_PICTURE_POSES] = {0, 5, -5, 10, -10, 15, -15, 20, -20,
+                                                   0, 5, -5, 10, -10};
+    static const int turns[TXI_MESH_POSES] = {0, 1, 15, 2, 14, 3, 13, 4, 12, 5, 11, 6, 10, 7, 9, 8};
+    double sine, cosine;
+    txm_sincos(is_picture ? degrees[pose] * (TXM_PI / 180) : turns[pose] * (TXM_PI / 8), &sine,
+               &cosine);
+    const int32_t u = (int32_t)floor(cosine * TXI_UNIT + 0.5);
+    const int32_t v = (int32_t)floor(sine * TXI_UNIT + 0.5);
+    const int mirrored = is_picture && pose >= 9;
+    s->a = mirrored ? -u : u;
+    s->b = mirrored ? -v : v;
+    s->c = -v;
+    s->d = u;
+}
+
+/* the place of the source's pixel (i, j) in its level, 1/65536 pixels */
+static void txi_source_place(const txi_source *s, int i, int j, int32_t *x, int32_t *y) {
+    *x = s->x + s->a * i + s->c * j;
+    *y = s->y + s->b * i + s->d * j;
+}
+
+/* the source's pixel nearest to a place of its level; may lie outside */
+static void txi_source_pixel(const txi_source *s, int32_t x, int32_t y, int *i, int *j) {
+    const int64_t dx = (int64_t)x - s->x, dy = (int64_t)y - s->y, one = (int64_t)1 << 32;
+    const int64_t u = s->a * dx + s->b * dy, v = s->c * dx + s->d * dy;
+    *i = (int)((u + one / 2 + (one << 14)) / one - (1 << 14)); /* floor, also of negatives */
+    *j = (int)((v + one / 2 + (one << 14)) / one - (1 << 14));
+}
+
+/* Size and place of a source of a level: the level's inner part lies in it. */
+static void txi_source_size(txi_source *s, const txi_level *l) {
+    int64_t low[2] = {INT64_MAX, INT64_MAX}, high[2] = {INT64_MIN, INT64_MIN};
+    const int32_t cx = l->width / 2 * TXI_UNIT, cy = l->height / 2 * TXI_UNIT;
+    for (int k = 0; k < 4; k++) {
+        const int64_t dx = (int64_t)(k & 1 ? l->width - TXI_EDGE - 1 : TXI_EDGE) * TXI_UNIT - cx;
+        const int64_t dy = (int64_t)(k & 2 ? l->height - TXI_EDGE - 1 : TXI_EDGE) * TXI_UNIT - cy;
+        const int64_t at[2] = {s->a * dx + s->b * dy, s->c * dx + s->d * dy};
+        for (int i = 0; i < 2; i++) {
+            if (at[i] < low[i]) low[i] = at[i];
+            if (at[i] > high[i]) high[i] = at[i];
+        }
+    }
+    /* whole pixels from the centre, so that turns by right angles resample nothing */
+    const int64_t one = (int64_t)1 << 32, bias = one << 14;
+    const int i0 = (int)((low[0] + one - 1 + bias) / one - (1 << 14));
+    const int j0 = (int)((low[1] + one - 1 + bias) / one - (1 << 14));
+    s->width = (int)((high[0] + bias) / one - (1 << 14)) - i0 + 1;
+    s->height = (int)((high[1] + bias) / one - (1 << 14)) - j0 + 1;
+    s->x = cx + s->a * i0 + s->c * j0;
+    s->y = cy + s->b * i0 + s->d * j0;
+}
+
+/* weights of the four taps of Catmull-Rom interpolation at k / 64, in 1/1024 */
+static void txi_cubic_weights(int k, int *w) {
+    /* (-t^3 + 2 t^2 - t) / 2, (3 t^3 - 5 t^2 + 2) / 2, ..., t = k / 64, in 1/2^19, then rounded */
+    const int t = k, tt = t * t, ttt = tt * t;
+    w[0] = (-ttt + 2 * 64 * tt - 4096 * t) / 512;
+    w[2] = (-3 * ttt + 4 * 64 * tt + 4096 * t) / 512;
+    w[3] = (ttt - 64 * tt) / 512;
+    w[1] = 1024 - w[0] - w[2] - w[3];
+}
+
+/* The level's colour at a place, by taps taps a direction. */
+static void txi_level_sample(const txi_level *l, size_t p, int fx, int fy, int taps, uint8_t *out) {
+    int wx[4], wy[4];
+    const size_t pitch = 4 * (size_t)l->width;
+    if (taps == TXI_TAP_CUBIC) {
+        txi_cubic_weights(fx, wx);
+        txi_cubic_weights(fy, wy);
+    } else {
+        wx[0] = wx[3] = wy[0] = wy[3] = 0;
+        wx[2] = fx * (1024 / TXI_PHASES);
+        wy[2] = fy * (1024 / TXI_PHASES);
+        wx[1] = 1024 - wx[2];
+        wy[1] = 1024 - wy[2];
+    }
+    int sum[3] = {0, 0, 0};
+    const uint8_t *row = l->color + 4 * p - pitch - 4;
+    for (int y = 0; y < 4; y++, row += pitch) {
+        for (int c = 0; c < 3; c++) {
+            const int line = row[c] * wx[0] + row[4 + c] * wx[1] + row[8 + c] * wx[2] + row[12 + c] * wx[3];
+            sum[c] += line / 16 * wy[y];
+        }
+    }
+    for (int c = 0; c < 3; c++)
+        out[c] = (uint8_t)txm_clampi((sum[c] + (1 << 15)) / (1 << 16), 0, 255);
+}
+
+/* Make the picture of a source. */
+static void txi_source_draw(const txi_level *l, txi_source *s) {
+    for (int j = 0; j < s->height; j++) {
+        for (int i = 0; i < s->width; i++) {
+            const size_t q = (size_t)j * (size_t)s->width + (size_t)i;
+            int32_t x, y;
+            txi_source_place(s, i, j, &x, &y);
+            x += TXI_UNIT / TXI_PHASES / 2; /* rounded to a phase */
+            y += TXI_UNIT / TXI_PHASES / 2;
+            s->usable[q] = 0;
+            memset(s->color + 4 * q, 0, 4);
+            if (x < 0 || y < 0) continue;
+            const int px = x / TXI_UNIT, py = y / TXI_UNIT;
+            if (px < TXI_EDGE || py < TXI_EDGE || px >= l->width - TXI_EDGE || py >= l->height - TXI_EDGE)
+                continue;
+            const size_t p = (size_t)py * (size_t)l->width + (size_t)px;
+            const int fx = x % TXI_UNIT / (TXI_UNIT / TXI_PHASES);
+            const int fy = y % TXI_UNIT / (TXI_UNIT / TXI_PHASES);
+            const int taps = l->taps[p];
+            if (taps == TXI_TAP_NONE || ((fx || fy) && taps == TXI_TAP_ONE)) continue;
+            s->usable[q] = 1;
+            if (fx || fy) txi_level_sample(l, p, fx, fy, taps, s->color + 4 * q);
+            else memcpy(s->color + 4 * q, l->color + 4 * p, 3);
+        }
+    }
+}
+
+/* Detail of the source's patches, and which may be copied. numbers: 2 per pixel. */
+static void txi_source_worth(const txi_level *l, txi_source *s, uint32_t *numbers,
+                             int32_t *columns) {
+    const size_t n = (size_t)s->width * (size_t)s->height;
+    uint32_t *e = numbers, *sums = numbers + n;
+    txi_detail(s->color, s->usable, s->width, s->height, columns, e);
+    for (size_t q = 0; q < n; q++) { /* the number of usable pixels goes into the high bits */
+        const uint64_t limited = e[q] < l->clamp ? e[q] : l->clamp;
+        e[q] = (uint32_t)(limited * TXI_WORTH_MOST / l->clamp / TXI_PATCH_AREA);
+        if (s->usable[q]) e[q] += 1u << 20;
+    }
+    txi_patch_sums(e, s->width, s->height, (uint32_t *)(void *)columns, sums);
+    for (size_t q = 0; q < n; q++)
+        s->worth[q] = (uint16_t)(sums[q] >> 20 == TXI_PATCH_AREA
+                                     ? 1 + ((sums[q] & 0xfffff) < 65534 ? (sums[q] & 0xfffff) : 65534)
+                                     : 0);
+}
+
+/* One source per call of the body. Each has its own scratch memory, allocated before. */
+typedef struct txi_sources_task {
+    txi_level *level;
+    int pose[TXI_MAX_POSES];
+    uint32_t *numbers[TXI_MAX_POSES];
+    int32_t *columns[TXI_MAX_POSES];
+} txi_sources_task;
+
+static void txi_sources_body(void *context, int index) {
+    const txi_sources_task *t = (const txi_sources_task *)context;
+    txi_source *s = &t->level->source[t->pose[index]];
+    txi_source_draw(t->level, s);
+    txi_source_worth(t->level, s, t->numbers[index], t->columns[index]);
+}
+
+/* Make those sources of a level whose wanted[pose] is not 0 and that are not there yet. */
+static int txi_level_sources(txi_level *l, int is_picture, int pose_count, const uint8_t *wanted,
+                             txm_arena *arena, txm_env *env) {
+    txi_sources_task task;
+    txm_arena scratch;
+    int count = 0;
+    txm_arena_init(&scratch, env);
+    memset(&task, 0, sizeof task);
+    task.level = l;
+    for (int pose = 0; pose < pose_count; pose++) {
+        txi_source *s = &l->source[pose];
+        if (!wanted[pose] || s->color) continue;
+        txi_pose_axes(is_picture, pose, s);
+        txi_source_size(s, l);
+        const size_t n = (size_t)s->width * (size_t)s->height;
+        s->color = (uint8_t *)txm_arena_alloc(arena, n, 4);
+        s->usable = (uint8_t *)txm_arena_alloc(arena, n, 1);
+        s->worth = (uint16_t *)txm_arena_alloc(arena, n, sizeof(uint16_t));
+        task.pose[count] = pose;
+        task.numbers[count] = (uint32_t *)txm_arena_alloc(&scratch, n, 2 * sizeof(uint32_t));
+        task.columns[count++] =
+            (int32_t *)txm_arena_alloc(&scratch, (size_t)s->width, 4 * sizeof(int32_t));
+        l->built[l->built_count++] = pose;
+    }
+    const int ok = !arena->failed && !scratch.failed;
+    if (ok) txm_parallel_for(env, count, txi_sources_body, &task);
+    txm_arena_free(&scratch);
+    return ok;
+}
+
+/* patches that may be copied from a source */
+static int txi_source_patches(const txi_source *s) {
+    int count = 0;
+    const size_t n = (size_t)s->width * (size_t)s->height;
+    for (size_t q = 0; q < n; q++) count += s->worth[q] != 0;
+    return count;
+}
+
+/* ---- matches ---------------------------------------------------------------------------------- */
+
+enum {
+    TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
+    TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances [recipe: 4] */
+};
+
+/* Which source patch an anchor's patch is like. */
+typedef struct txi_match {
+    int16_t x, y;  /* upper left corner in the source                                          */
+    int16_t pose;  /* number of the source; -1: none                                           */
+    int16_t spare;
+    uint32_t cost; /* squared differences of a full patch, and what missing detail costs       */
+} txi_match;
+
+/* The state of a completion at one level. */
+typedef struct txi_canvas {
+    const txi_level *level;
+    uint8_t *color;     /* 4 per pixel: the level's, and in the hole the current guess         */
+    txi_match *match;   /* one per anchor                                                      */
+    txi_match *old;     /* as it was before the sweep                                          */
+    uint16_t *weight;   /* of each anchor's vote                                               */
+    uint32_t price;     /* of one unit of missing detail, in 1/65536                           */
+    uint64_t seed;
+    int sweep;          /* counts the sweeps                                                   */
+    int fresh;          /* the costs are up to date                                            */
+    int radius;         /* pixels: where random tries begin                                    */
+} txi_canvas;
+
+/* What the missing detail of a source patch costs. */
+static inline uint32_t txi_shortfall(const txi_canvas *t, int a, uint32_t worth) {
+    const uint32_t want = t->level->want[a];
+    return want >= worth ? (uint32_t)(((uint64_t)(want - worth + 1) * t->price) >> 16) : 0;
+}
+
+/* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs limit
+   or more. */
+static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uint32_t limit) {
+    const txi_level *l = t->level;
+    const txi_source *s = &l->source[pose];
+    if (x < 0 || y < 0 || x > s->width - TXI_PATCH || y > s->height - TXI_PATCH) return UINT32_MAX;
+    const size_t q = (size_t)y * (size_t)s->width + (size_t)x, p = (size_t)l->anchor[a];
+    const uint32_t worth = s->worth[q];
+    if (!worth) return UINT32_MAX;
+    const uint32_t short_of = txi_shortfall(t, a, worth), filled = l->filled[a];
+    if (short_of >= limit) return UINT32_MAX;
+    const uint32_t rest = limit - short_of;
+    uint32_t d;
+    if (filled == TXI_PATCH_AREA) {
+        d = txi_ssd(t->color + 4 * p, 4 * (size_t)l->width, NULL, s->color + 4 * q,
+                    4 * (size_t)s->width, rest);
+    } else { /* the void part is like the mean of the rest */
+        const uint32_t part = txi_ssd(t->color + 4 * p, 4 * (size_t)l->width, l->mask + 4 * p,
+                                      s->color + 4 * q, 4 * (size_t)s->width, rest);
+        d = part * TXI_PATCH_AREA / filled;
+    }
+    return d >= rest ? UINT32_MAX : d + short_of;
+}
+
+/* Take the patch if it is better. */
+static inline void txi_try(const txi_canvas *t, int a, int pose, int x, int y, txi_match *best) {
+    const uint32_t cost = txi_cost(t, a, pose, x, y, best->cost);
+    if (cost >= best->cost) return;
+    best->x = (int16_t)x;
+    best->y = (int16_t)y;
+    best->pose = (int16_t)pose;
+    best->cost = cost;
+}
+
+/* half a pixel less than half a patch: from a patch's corner to its centre, in units */
+enum { TXI_TO_CENTRE = (TXI_PATCH - 1) * TXI_UNIT / 2 };
+
+/* where the centre of a source patch lies in the level, in units */
+static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int32_t *cy) {
+    txi_source_place(s, x, y, cx, cy);
+    *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
+    *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
+}
+
+/* the patch of a source whose centre is nearest to a place of its level */
+static void txi_match_at(const txi_source *s, int32_t cx, int32_t cy, int *x, int *y) {
+    txi_source_pixel(s, cx - (s->a + s->c) * (TXI_PATCH - 1) / 2,
+                     cy - (s->b + s->d) * (TXI_PATCH - 1) / 2, x, y);
+}
+
+/* The same place in another pose. */
+static void txi_try_pose(const txi_canvas *t, int a, int pose, txi_match *best) {
+    const txi_level *l = t->level;
+    int32_t cx, cy;
+    int x, y;
+    txi_match_centre(&l->source[best->pose], best->x, best->y, &cx, &cy);
+    txi_match_at(&l->source[pose], cx, cy, &x, &y);
+    txi_try(t, a, pose, x, y, best);
+}
+
+/* Some patch that may be copied: random ones, else the first one there is. */
+static txi_match txi_match_any(const txi_level *l, txm_rng *rng) {
+    txi_match m;
+    memset(&m, 0, sizeof m);
+    m.cost = UINT32_MAX;
+    for (int k = 0; k < 100; k++) {
+        const int pose = l->built[txm_rng_below(rng, (uint32_t)l->built_count)];
+        const txi_source *s = &l->source[pose];
+        m.pose = (int16_t)pose;
+        m.x = (int16_t)txm_rng_below(rng, (uint32_t)s->width);
+        m.y = (int16_t)txm_rng_below(rng, (uint32_t)s->height);
+        if (s->worth[(size_t)m.y * (size_t)s->width + (size_t)m.x]) return m;
+    }
+    for (int k = 0; k < l->built_count; k++) {
+        const txi_source *s = &l->source[l->built[k]];
+        const size_t n = (size_t)s->width * (size_t)s->height;
+        for (size_t q = 0; q < n; q++) {
+            if (!s->worth[q]) continue;
+            m.pose = (int16_t)l->built[k];
+            m.x = (int16_t)(q % (size_t)s->width);
+            m.y = (int16_t)(q / (size_t)s->width);
+            return m;
+        }
+    }
+    m.pose = -1;
+    return m;
+}
+
+/* ---- search -------------------------------------------------------------------------------------
+
+   One sweep over the anchors [8], forwards or backwards: each tries the matches of the neighbours
+   that were there before it, shifted by one pixel, then random patches at falling distances from
+   its match, then other poses of the same place and random places. Bands of rows are independent:
+   what lies beyond the band is taken as it was before the sweep, so that the result does not
+   depend on the threads; the bands are shifted from sweep to sweep.                           */
+
+/* the match of the anchor at pixel p, shifted by (dx, dy), if there is one */
+static inline void txi_try_neighbour(const txi_canvas *t, int a, int p, int dx, int dy, int first,
+                                     int last, txi_match *best) {
+    const int b = t->level->slot[p];
+    if (b < 0) return;
+    const txi_match *m = b >= first && b < last ? &t->match[b] : &t->old[b];
+    if (m->pose >= 0) txi_try(t, a, m->pose, m->x + dx, m->y + dy, best);
+}
+
+static void txi_search_anchor(const txi_canvas *t, int a, int first, int last) {
+    const txi_level *l = t->level;
+    const int p = l->anchor[a], s = t->sweep & 1 ? -1 : 1;
+    txi_match best = t->match[a];
+    txm_rng rng = txm_rng_make(t->seed + (uint64_t)t->sweep, (uint64_t)a);
+    if (best.pose < 0) best = txi_match_any(l, &rng);
+    if (!t->fresh || best.cost == UINT32_MAX)
+        best.cost = txi_cost(t, a, best.pose, best.x, best.y, UINT32_MAX);
+    txi_try_neighbour(t, a, p - s, s, 0, first, last, &best);
+    txi_try_neighbour(t, a, p - s * l->width, 0, s, first, last, &best);
+    for (int r = t->radius; r >= 1; r /= 2) {
+        const int x = best.x + txm_rng_range(&rng, -r, r), y = best.y + txm_rng_range(&rng, -r, r);
+        txi_try(t, a, best.pose, x, y, &best);
+    }
+    for (int k = 0; k < TXI_RANDOM_TRIES; k++) {
+        const int pose = l->built[txm_rng_below(&rng, (uint32_t)l->built_count)];
+        if (k & 1) {
+            if (pose != best.pose) txi_try_pose(t, a, pose, &best);
+            continue;
+        }
+        const txi_source *source = &l->source[pose];
+        const int x = (int)txm_rng_below(&rng, (uint32_t)source->width);
+        const int y = (int)txm_rng_below(&rng, (uint32_t)source->height);
+        txi_try(t, a, pose, x, y, &best);
+    }
+    t->match[a] = best;
+}
+
+static void txi_search_band(void *context, int index) {
+    const txi_canvas *t = (const txi_canvas *)context;
+    const txi_level *l = t->level;
+    const int shift = t->sweep & 2 ? TXI_BAND / 2 : 0;
+    const int from = txm_clampi(index * TXI_BAND - shift, 0, l->height);
+    const int to = txm_clampi(index * TXI_BAND - shift + TXI_BAND, 0, l->height);
+    const int first = l->anchor_row[from], last = l->anchor_row[to];
+    for (int k = 0; k < last - first; k++)
+        txi_search_anchor(t, t->sweep & 1 ? last - 1 - k : first + k, first, last);
+}
+
+static void txi_search(txi_canvas *t, txm_env *env) {
+    memcpy(t->old, t->match, (size_t)t->level->anchor_count * sizeof *t->old);
+    txm_parallel_for(env, t->level->height / TXI_BAND + 2, txi_search_band, t);
+    t->sweep++;
+    t->fresh = 1;
+}
+
+/* ---- from level to level -------------------------------------------------------------------- */
+
+/* The match of anchor a that the coarser level's match m of the anchor at (cx, cy) means. All
+   coordinates in the finer level's pixels are twice those in the coarser one's, plus one half. */
+static txi_match txi_match_refine(const txi_level *coarse, const txi_level *fine, int a,
+                                  const txi_match *m, int coarse_anchor) {
+    txi_match out = *m;
+    const txi_source *from = &coarse->source[m->pose];
+    const int p = fine->anchor[a];
+    /* from the coarse patch's corner to the fine one's centre, in quarters of coarse pixels */
+    const int dx = 2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
+    const int dy = 2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
+    int32_t wx, wy;
+    txi_source_place(from, m->x, m->y, &wx, &wy);
+    wx += from->a / 4 * dx + from->c / 4 * dy;
+    wy += from->b / 4 * dx + from->d / 4 * dy;
+    wx = 2 * (wx - TXI_EDGE * TXI_UNIT) + TXI_UNIT / 2 + TXI_EDGE * TXI_UNIT;
+    wy = 2 * (wy - TXI_EDGE * TXI_UNIT) + TXI_UNIT / 2 + TXI_EDGE * TXI_UNIT;
+    int pose = m->pose, x, y;
+    if (!fine->source[pose].color) { /* the pose that is turned least against it */
+        int64_t most = INT64_MIN;
+        for (int k = 0; k < fine->built_count; k++) {
+            const txi_source *s = &fine->source[fine->built[k]];
+            const int64_t like = (int64_t)s->a * from->a + (int64_t)s->b * from->b +
+                                 (int64_t)s->c * from->c + (int64_t)s->d * from->d;
+            if (like <= most) continue;
+            most = like;
+            pose = fine->built[k];
+        }
+    }
+    txi_match_at(&fine->source[pose], wx, wy, &x, &y);
+    out.pose = (int16_t)pose;
+    out.x = (int16_t)x;
+    out.y = (int16_t)y;
+    return out;
+}
+
+/* is the match a patch that may be copied? */
+static int txi_match_holds(const txi_level *l, const txi_match *m) {
+    if (m->pose < 0 || !l->source[m->pose].color) return 0;
+    const txi_source *s = &l->source[m->pose];
+    return m->x >= 0 && m->y >= 0 && m->x < s->width && m->y < s->height &&
+           s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x];
+}
+
+/* Move a match to the nearest patch that may be copied, at most 4 pixels away. */
+static int txi_match_mend(const txi_level *l, txi_match *m) {
+    for (int r = 0; r <= 4; r++) {
+        for (int y = -r; y <= r; y++) {
+            for (int x = -r; x <= r; x++) {
+                txi_match near_one = *m;
+                if (x > -r && x < r && y > -r && y < r) continue;
+                near_one.x = (int16_t)(m->x + x);
+                near_one.y = (int16_t)(m->y + y);
+                if (!txi_match_holds(l, &near_one)) continue;
+                *m = near_one;
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Matches of a level from those of the next coarser one. */
+static void txi_upsample(const txi_level *coarse, const txi_match *from, txi_canvas *t) {
+    const txi_level *l = t->level;
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int p = l->anchor[a];
+        /* the coarse patch with the nearest centre, else one next to it */
+        const int x = (p % l->width - TXI_EDGE + 16) / 2 - 8 - 2 + TXI_EDGE;
+        const int y = (p / l->width - TXI_EDGE + 16) / 2 - 8 - 2 + TXI_EDGE;
+        txm_rng rng = txm_rng_make(t->seed - 1, (uint64_t)a);
+        int found = -1;
+        for (int r = 0; r <= 4 && found < 0; r++) {
+            for (int k = 0; k < (2 * r + 1) * (2 * r + 1) && found < 0; k++) {
+                const int qx = x + k % (2 * r + 1) - r, qy = y + k / (2 * r + 1) - r;
+                if (qx < 0 || qy < 0 || qx >= coarse->width || qy >= coarse->height) continue;
+                const int b = coarse->slot[qy * coarse->width + qx];
+                if (b >= 0 && from[b].pose >= 0) found = b;
+            }
+        }
+        txi_match m;
+        memset(&m, 0, sizeof m);
+        m.pose = -1;
+        if (found >= 0) m = txi_match_refine(coarse, l, a, &from[found], coarse->anchor[found]);
+        if (m.pose < 0 || !txi_match_mend(l, &m)) m = txi_match_any(l, &rng);
+        if (found >= 0) m.cost = from[found].cost;
+        t->match[a] = m;
+    }
+    t->fresh = 0;
+}
+
+/* ---- the coarsest level: ring by ring -----------------------------------------------------------
+
+   Patches at the hole's border, of which enough is known, are compared with the source patches
+   everywhere; their matches then fill the outermost ring of the hole, and so on. At this
+   resolution this is affordable, and random candidates instead would cost the structure.      */
+
+enum {
+    TXI_ONION_SHARE = 55,   /* percent of a patch that must be known                           */
+    TXI_ONION_FULL = 85,    /* percent from which patches off the lattice are compared, too    */
+    TXI_ONION_RING = 2,     /* pixels filled a pass                                            */
+    TXI_ONION_BEST = 8,     /* matches that are refined                                        */
+    TXI_ONION_REACH = 2,    /* pixels of the refinement                                        */
+    TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
+    TXI_ONION_LEAST = 4000  /* places compared at least                                        */
+};
+
+typedef struct txi_onion {
+    const txi_canvas *canvas;
+    uint8_t *known;        /* 4 per pixel: 255 where it is known or filled                     */
+    const txi_match *place; /* source patches to compare with                                  */
+    int place_count;
+    int32_t *todo;         /* anchors of this pass                                             */
+    txi_match *found;      /* of each anchor of the level; cost as of a full patch             */
+    int todo_count;
+} txi_onion;
+
+/* As txi_cost, over the pixels known so far. */
+static uint32_t txi_onion_cost(const txi_onion *o, int a, int known, int pose, int x, int y,
+                               uint32_t limit) {
+    const txi_canvas *t = o->canvas;
+    const txi_level *l = t->level;
+    const txi_source *s = &l->source[pose];
+    if (x < 0 || y < 0 || x >= s->width || y >= s->height) return UINT32_MAX;
+    const size_t q = (size_t)y * (size_t)s->width + (size_t)x, p = (size_t)l->anchor[a];
+    if (!s->worth[q]) return UINT32_MAX;
+    const uint32_t short_of = txi_shortfall(t, a, s->worth[q]);
+    if (short_of >= limit) return UINT32_MAX;
+    const uint32_t rest = limit - short_of;
+    const uint32_t most = (uint32_t)((uint64_t)rest * (uint32_t)known / TXI_PATCH_AREA);
+    const uint32_t d = txi_ssd(t->color + 4 * p, 4 * (size_t)l->width, o->known + 4 * p,
+                               s->color + 4 * q, 4 * (size_t)s->width, most);
+    if (d > most) return UINT32_MAX;
+    const uint32_t full = d * TXI_PATCH_AREA / (uint32_t)known;
+    return full >= rest ? UINT32_MAX : full + short_of;
+}
+
+static int txi_onion_known(const txi_onion *o, int p) {
+    const int w = o->canvas->level->width;
+    int known = 0;
+    for (int k = 0; k < TXI_PATCH_AREA; k++)
+        known += o->known[4 * (size_t)(p + k / TXI_PATCH * w + k % TXI_PATCH)] != 0;
+    return known;
+}
+
+/* Keep the best few, the worst last. */
+static void txi_onion_keep(txi_match *best, const txi_match *m, uint32_t cost) {
+    int k = TXI_ONION_BEST - 1;
+    for (; k > 0 && best[k - 1].cost > cost; k--) best[k] = best[k - 1];
+    best[k] = *m;
+    best[k].cost = cost;
+}
+
+/* Compare an anchor's patch with all places, then with the neighbours of the best in all poses. */
+static void txi_onion_anchor(void *context, int index) {
+    const txi_onion *o = (const txi_onion *)context;
+    const txi_level *l = o->canvas->level;
+    const int a = o->todo[index], known = txi_onion_known(o, l->anchor[a]);
+    txi_match best[TXI_ONION_BEST], top;
+    memset(best, 0, sizeof best);
+    for (int k = 0; k < TXI_ONION_BEST; k++) {
+        best[k].cost = UINT32_MAX;
+        best[k].pose = -1;
+    }
+    for (int k = 0; k < o->place_count; k++) {
+        const txi_match *m = &o->place[k];
+        const uint32_t cost = txi_onion_cost(o, a, known, m->pose, m->x, m->y, best[TXI_ONION_BEST - 1].cost);
+        if (cost < best[TXI_ONION_BEST - 1].cost) txi_onion_keep(best, m, cost);
+    }
+    top = best[0];
+    for (int k = 0; k < TXI_ONION_BEST && best[k].pose >= 0; k++) {
+        for (int i = 0; i < l->built_count; i++) {
+            const txi_source *s = &l->source[l->built[i]];
+            const int reach = l->built[i] == best[k].pose ? TXI_ONION_REACH : 0;
+            int32_t cx, cy;
+            int x0, y0;
+            txi_match_centre(&l->source[best[k].pose], best[k].x, best[k].y, &cx, &cy);
+            txi_match_at(s, cx, cy, &x0, &y0);
+            for (int y = y0 - reach; y <= y0 + reach; y++) {
+                for (int x = x0 - reach; x <= x0 + reach; x++) {
+                    const uint32_t cost = txi_onion_cost(o, a, known, l->built[i], x, y, top.cost);
+                    if (cost >= top.cost) continue;
+                    top.cost = cost;
+                    top.pose = (int16_t)l->built[i];
+                    top.x = (int16_t)x;
+                    top.y = (int16_t)y;
+                }
+            }
+        }
+    }
+    o->found[a] = top;
+}
+
+/* Mark the next pixels to fill in ring: those at most TXI_ONION_RING from what is known. */
+static int txi_onion_ring(const txi_onion *o, uint8_t *ring) {
+    const txi_level *l = o->canvas->level;
+    const int w = l->width;
+    int count = 0;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i];
+        ring[p] = 0;
+        if (o->known[4 * (size_t)p]) continue;
+        for (int y = -TXI_ONION_RING; y <= TXI_ONION_RING && !ring[p]; y++)
+            for (int x = -TXI_ONION_RING; x <= TXI_ONION_RING; x++)
+                ring[p] |= o->known[4 * (size_t)(p + y * w + x)] != 0;
+        count += ring[p];
+    }
+    return count;
+}
+
+/* The anchors of this pass: they cover a pixel of the ring, and enough of them is known. */
+static void txi_onion_list(txi_onion *o, const uint8_t *ring, int share) {
+    const txi_level *l = o->canvas->level;
+    o->todo_count = 0;
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int p = l->anchor[a], known = txi_onion_known(o, p);
+        const int lattice = (p % l->width) % 2 == 0 && (p / l->width) % 2 == 0;
+        const int most = known * 100 / l->filled[a];
+        if (known == 0 || most < (lattice ? share : TXI_ONION_FULL)) continue;
+        int covers = 0;
+        for (int k = 0; !covers && k < TXI_PATCH_AREA; k++)
+            covers = ring[p + k / TXI_PATCH * l->width + k % TXI_PATCH];
+        if (covers) o->todo[o->todo_count++] = a;
+    }
+}
+
+/* Fill the ring's pixels that a patch of this pass covers; returns their number. */
+static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *current) {
+    const txi_canvas *t = o->canvas;
+    const txi_level *l = t->level;
+    int filled = 0;
+    memset(current, 0, (size_t)l->anchor_count);
+    for (int k = 0; k < o->todo_count; k++) current[o->todo[k]] = o->found[o->todo[k]].pose >= 0;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i];
+        const uint8_t *color[TXI_PATCH_AREA];
+        double weight[TXI_PATCH_AREA], sum[3] = {0, 0, 0}, total = 0;
+        int n = 0;
+        for (int k = 0; ring[p] && k < TXI_PATCH_AREA; k++) {
+            const int y = k / TXI_PATCH, x = k % TXI_PATCH, a = l->slot[p - y * l->width - x];
+            if (a < 0 || !current[a]) continue;
+            const txi_match *m = &o->found[a];
+            const txi_source *s = &l->source[m->pose];
+            color[n] = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
+            const double fit = m->cost / (400.0 * TXI_PATCH_AREA);
+            weight[n] = txm_exp2(-(fit < 500 ? fit : 500) * 1.4426950408889634) + 1e-30;
+            total += weight[n];
+            for (int c = 0; c < 3; c++) sum[c] += weight[n] * color[n][c];
+            n++;
+        }
+        double least = 1e30;
+        for (int k = 0; k < n; k++) {
+            double d = 0;
+            for (int c = 0; c < 3; c++) {
+                const double off = color[k][c] - sum[c] / total;
+                d += off * off;
+            }
+            if (d >= least) continue;
+            least = d;
+            memcpy(t->color + 4 * (size_t)p, color[k], 3);
+        }
+        if (n) o->todo[l->anchor_count + filled++] = p;
+    }
+    for (int k = 0; k < filled; k++) memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);
+    return filled;
+}
+
+/* The source patches to compare with: every step-th, so that the work is limited. */
+static int txi_onion_places(const txi_level *l, txi_match *place, int most) {
+    int total = 0, count = 0, at = 0;
+    for (int k = 0; k < l->built_count; k++) total += txi_source_patches(&l->source[l->built[k]]);
+    for (int k = 0; k < l->built_count; k++) {
+        const txi_source *s = &l->source[l->built[k]];
+        for (int q = 0; q < s->width * s->height; q++) {
+            if (!s->worth[q]) continue;
+            /* the i-th of total is taken if the whole part of i most / total grows */
+            const int64_t i = at++;
+            if (total > most && i * most / total == (i + 1) * most / total) continue;
+            if (count == most) break;
+            memset(&place[count], 0, sizeof place[count]);
+            place[count].pose = (int16_t)l->built[k];
+            place[count].x = (int16_t)(q % s->width);
+            place[count++].y = (int16_t)(q / s->width);
+        }
+    }
+    return count;
+}
+
+/* Matches of the anchors that had none: those of the nearest anchor that has one, shifted. */
+static void txi_onion_rest(const txi_onion *o, txi_canvas *t) {
+    const txi_level *l = t->level;
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int p = l->anchor[a];
+        txi_match best = o->found[a];
+        for (int r = 1; best.pose < 0 && r <= 3; r++) {
+            for (int k = 0; best.pose < 0 && k < (2 * r + 1) * (2 * r + 1); k++) {
+                const int dx = k % (2 * r + 1) - r, dy = k / (2 * r + 1) - r;
+                const int x = p % l->width + dx, y = p / l->width + dy;
+                if (x < 0 || y < 0 || x >= l->width || y >= l->height) continue;
+                const int b = l->slot[y * l->width + x];
+                if (b < 0 || o->found[b].pose < 0) continue;
+                txi_match m = o->found[b];
+                m.x = (int16_t)(m.x - dx);
+                m.y = (int16_t)(m.y - dy);
+                if (txi_match_holds(l, &m)) best = m;
+            }
+        }
+        t->match[a] = best;
+    }
+    t->fresh = 0;
+}
+
+/* Fill the hole of the coarsest level, and give its anchors matches. */
+static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
+    int most = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
+    if (most < TXI_ONION_LEAST) most = TXI_ONION_LEAST;
+    txm_arena scratch;
+    txi_onion o;
+    txm_status status = TXM_OK;
+    txm_arena_init(&scratch, env);
+    memset(&o, 0, sizeof o);
+    o.canvas = t;
+    o.known = (uint8_t *)txm_arena_zero(&scratch, n, 4);
+    o.todo = (int32_t *)txm_arena_alloc(&scratch, anchors + (size_t)l->hole_count, sizeof(int32_t));
+    o.found = (txi_match *)txm_arena_zero(&scratch, anchors, sizeof(txi_match));
+    uint8_t *ring = (uint8_t *)txm_arena_zero(&scratch, n, 1);
+    uint8_t *current = (uint8_t *)txm_arena_zero(&scratch, anchors, 1);
+    txi_match *place = (txi_match *)txm_arena_alloc(&scratch, (size_t)most, sizeof(txi_match));
+    if (scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    o.place = place;
+    o.place_count = txi_onion_places(l, place, most);
+    for (size_t a = 0; a < anchors; a++) o.found[a].pose = -1;
+    for (size_t p = 0; p < n; p++) {
+        if (l->state[p] == TXI_KNOWN || l->state[p] == TXI_FOREIGN) memset(o.known + 4 * p, 255, 4);
+    }
+    int share = TXI_ONION_SHARE;
+    while (status == TXM_OK && txi_onion_ring(&o, ring) > 0) {
+        txi_onion_list(&o, ring, share);
+        txm_parallel_for(env, o.todo_count, txi_onion_anchor, &o);
+        if (txi_onion_fill(&o, ring, current) == 0) {
+            if (share <= 0) break; /* what is left is surrounded by void */
+            share = share > 10 ? share - 10 : 0;
+        }
+        if (txm_progress(env, 0, "matching")) status = txi_stopped(env);
+    }
+    txi_onion_rest(&o, t);
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* ---- votes --------------------------------------------------------------------------------------
+
+   Each hole pixel is covered by up to 64 patches, whose matches propose a colour. Their weighted
+   mean is found, once more with smaller weights for those far from it, and then not the mean but
+   the proposal nearest to it is taken, so that nothing is averaged.                           */
+
+enum {
+    TXI_WEIGHT_ONE = 4095, /* largest weight of a match                                       */
+    TXI_OUTLIER_BINS = 2048
+};
+
+/* Weights exp(-cost / (2 s)) exp(-fade * depth), s = 0.2 times the 75th percentile of the costs. */
+static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scratch) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->anchor_count;
+    for (size_t a = 0; a < n; a++) {
+        pairs[a].key = t->match[a].cost;
+        pairs[a].value = (uint32_t)a;
+    }
+    txm_sort_pairs(pairs, scratch, n);
+    const double s = 0.2 * pairs[n - 1 - (n - 1) / 4].key + 1;
+    for (size_t a = 0; a < n; a++) {
+        const int centre = l->anchor[a] + (TXI_PATCH / 2) * (l->width + 1);
+        const double x = t->match[a].cost / (2 * s) + fade * l->depth[centre];
+        const double w = x > 12 ? 0 : TXI_WEIGHT_ONE * txm_exp2(-x * 1.4426950408889634);
+        t->weight[a] = (uint16_t)(1 + (int)w);
+    }
+}
+
+/* What all pixels of a vote share. */
+typedef struct txi_ballot {
+    txi_canvas *canvas;
+    int pull;                /* strength of the plan's strips, 0..256                         */
+    int32_t *chosen;         /* receives the anchor whose proposal each hole pixel took, -1: a strip's
+                                or none. NULL: not wanted                                     */
+    const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
+} txi_ballot;
+
+static void txi_outlier_table(uint16_t *table) {
+    for (int k = 0; k < TXI_OUTLIER_BINS; k++)
+        table[k] = (uint16_t)(1 + (int)(4094 * pow(1 + 96.0 * k / 16, -0.6)));
+}
+
+/* A proposal for a pixel. */
+typedef struct txi_proposal {
+    const uint8_t *color;
+    int anchor;
+} txi_proposal;
+
+/* the proposals for pixel p; returns their number */
+static int txi_proposals(const txi_canvas *t, int p, txi_proposal *list) {
+    const txi_level *l = t->level;
+    int count = 0;
+    for (int y = 0; y < TXI_PATCH; y++) {
+        const int32_t *row = l->slot + p - y * l->width;
+        for (int x = 0; x < TXI_PATCH; x++) {
+            const int a = row[-x];
+            if (a < 0 || t->match[a].pose < 0) continue;
+            const txi_match *m = &t->match[a];
+            const txi_source *s = &l->source[m->pose];
+            list[count].color = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
+            list[count++].anchor = a;
+        }
+    }
+    return count;
+}
+
+static int txi_color_distance(const uint8_t *a, const int *b) {
+    const int r = a[0] - b[0], g = a[1] - b[1], u = a[2] - b[2];
+    return r * r + g * g + u * u;
+}
+
+static int txi_vote_pixel(const txi_ballot *v, int p) {
+    const txi_canvas *t = v->canvas;
+    txi_proposal list[TXI_PATCH_AREA];
+    const int n = txi_proposals(t, p, list);
+    if (n == 0) return -1;
+    int mean[3] = {0, 0, 0};
+    for (int pass = 0; pass < 2; pass++) {
+        uint64_t sum[3] = {0, 0, 0}, total = 0;
+        for (int k = 0; k < n; k++) {
+            uint32_t w = t->weight[list[k].anchor];
+            if (pass) {
+                const int bin = txi_color_distance(list[k].color, mean) / 96;
+                w *= v->outlier[bin < TXI_OUTLIER_BINS ? bin : TXI_OUTLIER_BINS - 1];
+            }
+            total += w;
+            for (int c = 0; c < 3; c++) sum[c] += (uint64_t)w * list[k].color[c];
+        }
+        for (int c = 0; c < 3; c++) mean[c] = (int)((sum[c] + total / 2) / total);
+    }
+    const int pull = t->level->pull ? t->level->pull[p] * v->pull / 256 : 0;
+    const uint8_t *strip = pull ? t->level->strip + 4 * (size_t)p : NULL;
+    uint8_t *out = t->color + 4 * (size_t)p;
+    if (pull >= 128) { /* the strip itself */
+        memcpy(out, strip, 3);
+        return -1;
+    }
+    for (int c = 0; c < 3 && pull; c++)
+        mean[c] += (strip[c] - mean[c]) * pull / 255;
+    int64_t best = INT64_MAX;
+    int chosen = -1;
+    for (int k = 0; k < n; k++) {
+        /* in tenths: 10 d^2 + cost per pixel */
+        const int64_t d = (int64_t)10 * txi_color_distance(list[k].color, mean) +
+                          t->match[list[k].anchor].cost / TXI_PATCH_AREA;
+        if (d >= best) continue;
+        best = d;
+        chosen = list[k].anchor;
+        memcpy(out, list[k].color, 3);
+    }
+    return chosen;
+}
+
+static void txi_vote_band(void *context, int index) {
+    const txi_ballot *v = (const txi_ballot *)context;
+    const txi_level *l = v->canvas->level;
+    const int from = txm_clampi(index * TXI_BAND, 0, l->height);
+    const int to = txm_clampi(index * TXI_BAND + TXI_BAND, 0, l->height);
+    for (int i = l->hole_row[from]; i < l->hole_row[to]; i++) {
+        const int chosen = txi_vote_pixel(v, l->hole[i]);
+        if (v->chosen) v->chosen[i] = chosen;
+    }
+}
+
+/* Replace the hole's colours by a vote. */
+static void txi_vote(txi_ballot *v, txm_env *env) {
+    txm_parallel_for(env, v->canvas->level->height / TXI_BAND + 1, txi_vote_band, v);
+    v->canvas->fresh = 0;
+}
+
+/* ---- assembly: from patches to pieces ------------------------------------------------------------
+
+   At the finest level each hole pixel gets a label: the source, and the offset from the target to
+   it. Pixels of equal labels are one piece, copied as it is. The labels minimise
+
+       sum over pairs of neighbours with labels A, B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
+     + sum over pixels:  drift * |A(p) - color(p)|^2
+
+   where A(p) is the colour that A copies to p; next to known pixels it is |A(q) - known(q)|^2. */
+
+enum {
+    TXI_JOINT = 40,      /* [recipe]                                                           */
+    TXI_DRIFT = 5,       /* in 1/256 [recipe: .02]                                             */
+    TXI_NOWHERE = 60000, /* what a colour costs that cannot be copied; ours                    */
+    TXI_LABEL_NONE = -1, /* not in the hole                                                    */
+    TXI_LABEL_STRIP = -2, /* copied by the plan                                                */
+    TXI_LABEL_BIAS = 1 << 12
+};
+
+/* Labels as numbers: pose * 2^26 + (x offset + bias) * 2^13 + y offset + bias. */
+static inline int32_t txi_label(int pose, int dx, int dy) {
+    return pose << 26 | (dx + TXI_LABEL_BIAS) << 13 | (dy + TXI_LABEL_BIAS);
+}
+
+typedef struct txi_assembly {
+    const txi_level *level;
+    const uint8_t *color; /* of the canvas                                                     */
+    int32_t *label;       /* one per pixel of the level                                        */
+} txi_assembly;
+
+/* the source pixel that a label copies to pixel p, or NULL: it is not usable */
+static inline const uint8_t *txi_label_color(const txi_assembly *t, int32_t label, int p) {
+    const txi_level *l = t->level;
+    if (label < 0) return l->pull && l->pull[p] ? l->strip + 4 * (size_t)p : NULL;
+    const txi_source *s = &l->source[label >> 26];
+    const int x = p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS;
+    const int y = p / l->width + (label & 8191) - TXI_LABEL_BIAS;
+    if (x < 0 || y < 0 || x >= s->width || y >= s->height) return NULL;
+    const size_t q = (size_t)y * (size_t)s->width + (size_t)x;
+    return s->usable[q] ? s->color + 4 * q : NULL;
+}
+
+static inline int txi_rgb_distance(const uint8_t *a, const uint8_t *b) {
+    if (!a || !b) return TXI_NOWHERE;
+    const int r = a[0] - b[0], g = a[1] - b[1], u = a[2] - b[2];
+    return r * r + g * g + u * u;
+}
+
+/* What label a at p costs next to q as it is. */
+static int txi_joint_cost(const txi_assembly *t, int32_t a, int p, int q) {
+    const uint8_t state = t->level->state[q];
+    if (state == TXI_VOID) return 0;
+    if (state != TXI_HOLE)
+        return txi_rgb_distance(txi_label_color(t, a, q), t->level->color + 4 * (size_t)q);
+    const int32_t b = t->label[q];
+    if (a == b) return 0;
+    return txi_rgb_distance(txi_label_color(t, a, p), txi_label_color(t, b, p)) +
+           txi_rgb_distance(txi_label_color(t, a, q), txi_label_color(t, b, q)) + TXI_JOINT;
+}
+
+static int txi_label_cost(const txi_assembly *t, int32_t a, int p) {
+    const int w = t->level->width;
+    const uint8_t *own = txi_label_color(t, a, p);
+    if (!own) return INT_MAX;
+    return txi_rgb_distance(own, t->color + 4 * (size_t)p) * TXI_DRIFT / 256 +
+           txi_joint_cost(t, a, p, p - 1) + txi_joint_cost(t, a, p, p + 1) +
+           txi_joint_cost(t, a, p, p - w) + txi_joint_cost(t, a, p, p + w);
+}
+
+/* One pass of iterated conditional modes: each pixel takes the best of its neighbours' labels. */
+static int txi_assembly_pass(txi_assembly *t) {
+    const txi_level *l = t->level;
+    const int w = l->width;
+    const int side[8] = {-w - 1, -w, -w + 1, -1, 1, w - 1, w, w + 1};
+    int changed = 0;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i];
+        int32_t best = t->label[p];
+        if (best == TXI_LABEL_STRIP) continue;
+        int cost = best >= 0 ? txi_label_cost(t, best, p) : INT_MAX;
+        for (int k = 0; k < 8; k++) {
+            const int32_t other = t->label[p + side[k]];
+            if (other < 0 || other == best) continue;
+            const int c = txi_label_cost(t, other, p);
+            if (c >= cost) continue;
+            cost = c;
+            best = other;
+        }
+        changed += best != t->label[p];
+        t->label[p] = best;
+    }
+    return changed;
+}
+
+/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. */
+static void txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
+    const txi_level *l = t->level;
+    const int w = l->width;
+    const int side[4] = {-1, 1, -w, w};
+    int count = 0;
+    for (int p = 0; p < w * l->height; p++) piece[p] = -1;
+    for (int i = 0; i < l->hole_count; i++) {
+        int first = 0, last = 0;
+        if (piece[l->hole[i]] >= 0) continue;
+        queue[last++] = l->hole[i];
+        piece[l->hole[i]] = count;
+        while (first < last) {
+            const int p = queue[first++];
+            for (int k = 0; k < 4; k++) {
+                const int q = p + side[k];
+                if (l->state[q] != TXI_HOLE || piece[q] >= 0 || t->label[q] != t->label[p]) continue;
+                piece[q] = count;
+                queue[last++] = q;
+            }
+        }
+        count++;
+    }
+}
+
+/* ---- texture completion of a window ---------------------------------------------------------- */
+
+/* How the texture is treated, chosen from what it is like. */
+typedef struct txi_style {
+    float detail_weight; /* of missing detail in the costs of patches                          */
+    float detail_clamp;  /* a pixel's detail counts up to its square times the median          */
+    float detail_offset; /* expected detail: standard deviations below the mean of the known   */
+    int start;           /* pixels: about the width of the hole at the coarsest level          */
+    int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
+} txi_style;
+
+enum {
+    TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
+    TXI_LEAST_ROUNDS = 2, /* at the finest                                                     */
+    TXI_GUIDE_MOST = 100, /* of the guide channel where there is a line                        */
+    TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
+};
+
+/* What all hypotheses of a window share. */
+typedef struct txi_filler {
+    const txi_window *window;
+    txi_style style;
+    uint64_t seed;
+    txm_arena *arena;
+    int level_count, pose_count;
+    const txi_plan *plan; /* whose guide the levels have                                       */
+    txi_level level[TXI_MAX_LEVELS];
+    txi_pose pose[TXI_MAX_POSES];
+    uint16_t outlier[TXI_OUTLIER_BINS];
+} txi_filler;
+
+/* A completion down to half resolution (the full one, if there is only one level). */
+typedef struct txi_field {
+    int level;
+    txi_match *match; /* one per anchor                                                        */
+    uint8_t *color;   /* 4 per pixel of the level                                              */
+} txi_field;
+
+/* Make a level: everything but its sources. */
+static int txi_filler_level(txi_filler *f, int k, txm_env *env) {
+    txi_level *l = &f->level[k];
+    txm_arena scratch;
+    const int scale = 1 << k;
+    if (!txi_level_make(l, (f->window->width + scale - 1) / scale,
+                        (f->window->height + scale - 1) / scale, f->arena))
+        return 0;
+    if (k) txi_level_halve(&f->level[k - 1], l);
+    else txi_level_load(l, f->window);
+    txm_arena_init(&scratch, env);
+    const int ok = txi_level_taps(l, k == 0, &scratch) && txi_level_depth(l, &scratch) &&
+                   txi_level_lists(l, f->arena) &&
+                   txi_level_detail(l, f->style.detail_clamp, f->style.detail_offset, 1, &scratch);
+    txm_arena_free(&scratch);
+    return ok;
+}
+
+/* Grain of a window: (median + 1/2) / (mean + 1/2) of the detail of its known pixels, 0..1. Large in
+   stochastic textures, small where there are edges between smooth parts. Below 0: no memory.   */
+static double txi_grain(const txi_window *w, txm_env *env) {
+    txi_level l;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    double grain = -1;
+    if (txi_level_make(&l, w->width, w->height, &arena)) {
+        txi_level_load(&l, w);
+        if (txi_level_detail(&l, 3, 0, 0, &arena)) grain = l.grain;
+    }
+    txm_arena_free(&arena);
+    return grain;
+}
+
+/* Prepare the completion of a window's hole.
+   w      the hole is not empty; w outlives *out
+   arena  receives all memory
+   return TXM_OK; TXM_TOO_SMALL: no patch of 8x8 pixels may be copied; TXM_OUT_OF_MEMORY        */
+static txm_status txi_filler_make(const txi_window *w, const txi_style *style, uint64_t seed,
+                                  txm_arena *arena, txm_env *env, txi_filler **out) {
+    txi_filler *f = (txi_filler *)txm_arena_zero(arena, 1, sizeof *f);
+    uint8_t all[TXI_MAX_POSES];
+    if (!f) return txi_no_memory(env);
+    f->window = w;
+    f->style = *style;
+    f->seed = seed;
+    f->arena = arena;
+    f->pose_count = style->is_picture ? TXI_PICTURE_POSES : TXI_MESH_POSES;
+    txi_outlier_table(f->outlier);
+    for (int k = 0; k < f->pose_count; k++) {
+        txi_source s;
+        txi_pose_axes(style->is_picture, k, &s);
+        f->pose[k].a = (float)s.a / TXI_UNIT;
+        f->pose[k].b = (float)s.b / TXI_UNIT;
+        f->pose[k].c = (float)s.c / TXI_UNIT;
+        f->pose[k].d = (float)s.d / TXI_UNIT;
+    }
+    memset(all, 1, sizeof all);
+    for (int k = 0; k < TXI_MAX_LEVELS; k++) {
+        uint8_t wanted[TXI_MAX_POSES];
+        txi_level *l = &f->level[k];
+        int patches = 0;
+        if (!txi_filler_level(f, k, env)) return txi_no_memory(env);
+        const int is_last = k == TXI_MAX_LEVELS - 1 ||
+                            txi_level_hole_width(l) * 10 < style->start * 14;
+        memset(wanted, k > 0 || is_last, sizeof wanted);
+        wanted[0] = 1; /* the finest level's others are made once it is known which are used */
+        if (!txi_level_sources(l, style->is_picture, f->pose_count, wanted, arena, env))
+            return txi_no_memory(env);
+        for (int pose = 0; pose < f->pose_count; pose++)
+            patches += l->source[pose].color ? txi_source_patches(&l->source[pose]) : 0;
+        if (k == 0 && patches == 0)
+            return txm_fail(env, TXM_TOO_SMALL,
+                            "too little known texture around a hole: no 8x8 texels to copy");
+        if (k && patches < TXI_LEAST_PATCHES) break;
+        f->level_count = k + 1;
+        if (is_last) break;
+    }
+    if (f->level_count == 1 &&
+        !txi_level_sources(&f->level[0], style->is_picture, f->pose_count, all, arena, env))
+        return txi_no_memory(env);
+    *out = f;
+    return TXM_OK;
+}
+
+/* ---- the plan ----------------------------------------------------------------------------- */
+
+/* The plan at the finest level, from the window's raster. */
+static void txi_plan_load(const txi_plan *plan, const txi_window *w, txi_level *l) {
+    for (int y = 0; y < w->height; y++) {
+        for (int x = 0; x < w->width; x++) {
+            const size_t from = (size_t)y * (size_t)w->width + (size_t)x;
+            const size_t to = (size_t)(y + TXI_EDGE) * (size_t)l->width + (size_t)(x + TXI_EDGE);
+            if (plan->color) l->guide[to] = (uint8_t)(plan->color[4 * from + 3] * TXI_GUIDE_MOST / 255);
+            if (!plan->pull || !plan->color || l->state[to] != TXI_HOLE) continue;
+            l->pull[to] = plan->pull[from];
+            memcpy(l->strip + 4 * to, plan->color + 4 * from, 3);
+        }
+    }
+}
+
+/* The plan at half resolution: the strongest guide, so that lines stay; the mean of the strips. */
+static void txi_plan_halve(const txi_level *f, txi_level *l) {
+    for (int y = TXI_EDGE; y < l->height - TXI_EDGE; y++) {
+        for (int x = TXI_EDGE; x < l->width - TXI_EDGE; x++) {
+            const size_t to = (size_t)y * (size_t)l->width + (size_t)x;
+            int pull = 0, sum[3] = {0, 0, 0};
+            for (int k = 0; k < 4; k++) {
+                const int fx = 2 * x - TXI_EDGE + (k & 1), fy = 2 * y - TXI_EDGE + (k >> 1);
+                if (fx >= f->width || fy >= f->height) continue;
+                const size_t from = (size_t)fy * (size_t)f->width + (size_t)fx;
+                if (f->guide[from] > l->guide[to]) l->guide[to] = f->guide[from];
+                pull += f->pull[from];
+                for (int c = 0; c < 3; c++) sum[c] += f->pull[from] * f->strip[4 * from + (size_t)c];
+            }
+            if (l->state[to] != TXI_HOLE || !pull) continue;
+            l->pull[to] = (uint8_t)(pull / 4);
+            for (int c = 0; c < 3; c++)
+                l->strip[4 * to + (size_t)c] = (uint8_t)((sum[c] + pull / 2) / pull);
+        }
+    }
+}
+
+/* The guide becomes the fourth byte of a source. */
+static void txi_source_guide(const txi_level *l, txi_source *s) {
+    for (int j = 0; j < s->height; j++) {
+        for (int i = 0; i < s->width; i++) {
+            const size_t q = (size_t)j * (size_t)s->width + (size_t)i;
+            int32_t x, y;
+            if (!s->usable[q]) continue;
+            txi_source_place(s, i, j, &x, &y);
+            const size_t p = (size_t)((y + TXI_UNIT / 2) / TXI_UNIT) * (size_t)l->width +
+                             (size_t)((x + TXI_UNIT / 2) / TXI_UNIT);
+            s->color[4 * q + 3] = l->guide[p];
+        }
+    }
+}
+
+/* Give the levels a plan's guide and strips, or take them away. */
+static txm_status txi_filler_plan(txi_filler *f, const txi_plan *plan, txm_env *env) {
+    if (plan == f->plan) return TXM_OK;
+    for (int k = 0; k < f->level_count; k++) {
+        txi_level *l = &f->level[k];
+        const size_t n = (size_t)l->width * (size_t)l->height;
+        if (!l->guide) {
+            l->guide = (uint8_t *)txm_arena_alloc(f->arena, n, 6);
+            if (!l->guide) return txi_no_memory(env);
+            l->pull = l->guide + n;
+            l->strip = l->guide + 2 * n;
+        }
+        memset(l->guide, 0, 6 * n);
+        if (plan && k == 0) txi_plan_load(plan, f->window, l);
+        if (plan && k) txi_plan_halve(&f->level[k - 1], l);
+        for (size_t p = 0; p < n; p++) {
+            if (l->state[p] != TXI_VOID) l->color[4 * p + 3] = l->guide[p];
+        }
+        for (int i = 0; i < l->built_count; i++) txi_source_guide(l, &l->source[l->built[i]]);
+    }
+    f->plan = plan;
+    return TXM_OK;
+}
+
+/* ---- levels --------------------------------------------------------------------------------- */
+
+/* Memory for the work on a level. */
+static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_arena *arena) {
+    const txi_level *l = &f->level[level];
+    const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
+    memset(t, 0, sizeof *t);
+    t->level = l;
+    t->color = (uint8_t *)txm_arena_alloc(arena, n, 4);
+    t->match = (txi_match *)txm_arena_zero(arena, anchors, sizeof(txi_match));
+    t->old = (txi_match *)txm_arena_alloc(arena, anchors, sizeof(txi_match));
+    t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
+    if (arena->failed) return 0;
+    memcpy(t->color, l->color, 4 * n);
+    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST *
+                          65536);
+    t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
+    t->radius = l->width < l->height ? l->width : l->height;
+    if (level == 0 && f->level_count > 1) t->radius = 16;
+    return 1;
+}
+
+/* How strongly the plan's strips pull, 0..256: first at the coarsest level, last at the finest. */
+static int txi_pull_at(int level, int level_count, int round, int rounds) {
+    const int last = rounds > 1 ? round * 256 / (rounds - 1) : 256;
+    if (level == level_count - 1 && level > 0) return 230;
+    if (level > 0) return 128 - last * 77 / 256;
+    return 64 - last / 4;
+}
+
+static int txi_rounds(int level, int level_count) {
+    if (level_count == 1) return TXI_MOST_ROUNDS;
+    return TXI_LEAST_ROUNDS + (TXI_MOST_ROUNDS - TXI_LEAST_ROUNDS) * level / (level_count - 1);
+}
+
+/* Rounds of searches and votes at a level whose matches are given. */
+static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, int32_t *chosen,
+                             txm_env *env) {
+    const size_t anchors = (size_t)t->level->anchor_count;
+    const int rounds = txi_rounds(level, f->level_count);
+    txm_status status = TXM_OK;
+    txm_arena scratch;
+    txi_ballot ballot;
+    txm_arena_init(&scratch, env);
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, anchors, 2 * sizeof(txm_pair));
+    ballot.canvas = t;
+    ballot.outlier = f->outlier;
+    ballot.chosen = chosen;
+    if (!pairs) status = txi_no_memory(env);
+    for (int round = 0; round < rounds && status == TXM_OK; round++) {
+        const int sweeps = round == 0 ? 4 : 2;
+        for (int k = 0; k < sweeps; k++) txi_search(t, env);
+        txi_weigh(t, 0.08, pairs, pairs + anchors);
+        ballot.pull = txi_pull_at(level, f->level_count, round, rounds);
+        txi_vote(&ballot, env);
+        if (txm_progress(env, 0, "filling")) status = txi_stopped(env);
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* Start a level from the next coarser one: its matches, and a first vote. */
+static txm_status txi_descend(const txi_filler *f, int level, const txi_match *from, txi_canvas *t,
+                              txm_env *env) {
+    const size_t anchors = (size_t)t->level->anchor_count;
+    txm_arena scratch;
+    txi_ballot ballot;
+    txm_arena_init(&scratch, env);
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, anchors, 2 * sizeof(txm_pair));
+    if (!pairs) return txi_no_memory(env);
+    txi_upsample(&f->level[level + 1], from, t);
+    txi_weigh(t, 0.08, pairs, pairs + anchors);
+    ballot.canvas = t;
+    ballot.outlier = f->outlier;
+    ballot.chosen = NULL;
+    ballot.pull = txi_pull_at(level, f->level_count, 0, 2);
+    txi_vote(&ballot, env);
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* ---- the calls ------------------------------------------------------------------------------ */
+
+/* Memory for a field. 0: there is none. */
+static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *field) {
+    field->level = f->level_count > 1 ? 1 : 0;
+    const txi_level *l = &f->level[field->level];
+    field->match = (txi_match *)txm_arena_zero(arena, (size_t)l->anchor_count, sizeof(txi_match));
+    field->color = (uint8_t *)txm_arena_zero(arena, (size_t)l->width * (size_t)l->height, 4);
+    return !arena->failed;
+}
+
+/* Complete the hole at all levels from the coarsest to that of the field.
+   plan   lines to follow, or NULL
+   field  from txi_field_make
+   return TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED                                              */
+static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *env,
+                                  txi_field *field) {
+    txm_arena memory[2];
+    txi_canvas canvas[2];
+    txm_status status = txi_filler_plan(f, plan, env);
+    if (status != TXM_OK) return status;
+    txm_arena_init(&memory[0], env);
+    txm_arena_init(&memory[1], env);
+    for (int level = f->level_count - 1; level >= field->level && status == TXM_OK; level--) {
+        const int now = level & 1;
+        txi_canvas *t = &canvas[now];
+        txm_arena_free(&memory[now]);
+        if (!txi_canvas_make(f, level, t, &memory[now])) status = txi_no_memory(env);
+        else if (level == f->level_count - 1) status = txi_onion_peel(t, env);
+        else status = txi_descend(f, level, canvas[!now].match, t, env);
+        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        if (status == TXM_OK && level == field->level) {
+            const txi_level *l = t->level;
+            memcpy(field->match, t->match, (size_t)l->anchor_count * sizeof *t->match);
+            memcpy(field->color, t->color, 4 * (size_t)l->width * (size_t)l->height);
+        }
+    }
+    txm_arena_free(&memory[0]);
+    txm_arena_free(&memory[1]);
+    return status;
+}
+
+/* A look at a field, as a picture of the window, with two measures of how good it is.
+   color   4 per pixel of the window, whose hole pixels receive RGB
+   energy  mean cost of a patch; detail: mean of log(detail / expected detail)                  */
+static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_t *color,
+                             double *energy, double *detail) {
+    const txi_level *l = &f->level[field->level];
+    const txi_window *w = f->window;
+    double cost = 0, ratio = 0;
+    int count = 0;
+    for (int a = 0; a < l->anchor_count; a++) {
+        const txi_match *m = &field->match[a];
+        if (m->pose < 0) continue;
+        const txi_source *s = &l->source[m->pose];
+        const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
+        const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
+        cost += m->cost;
+        ratio += log((worth * unit + TXI_WANT_FLOOR) / (l->want[a] * unit + TXI_WANT_FLOOR));
+        count++;
+    }
+    *energy = count ? cost / count : 0;
+    *detail = count ? ratio / count : 0;
+    for (int y = 0; y < w->height; y++) {
+        for (int x = 0; x < w->width; x++) {
+            const size_t p = (size_t)y * (size_t)w->width + (size_t)x;
+            if (w->state[p] != TXI_HOLE) continue;
+            /* bilinear, in quarters of a pixel of the level */
+            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0, fy = scale ? (y & 1 ? 1 : 3) : 0;
+            const int px = ((x + scale) >> scale) - scale + TXI_EDGE, py = ((y + scale) >> scale) - scale + TXI_EDGE;
+            int sum[3] = {0, 0, 0}, total = 0;
+            for (int k = 0; k < 4; k++) {
+                const size_t q = (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
+                const int weight = (k & 1 ? fx : 4 - fx) * (k >> 1 ? fy : 4 - fy);
+                if (l->state[q] == TXI_VOID) continue;
+                total += weight;
+                for (int c = 0; c < 3; c++) sum[c] += weight * field->color[4 * q + (size_t)c];
+            }
+            for (int c = 0; c < 3 && total; c++) color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
+        }
+    }
+}
+
+/* Make those sources of the finest level that enough of the field's matches use. */
+static txm_status txi_finest_sources(txi_filler *f, const txi_field *field, txm_env *env) {
+    txi_level *l = &f->level[0];
+    int uses[TXI_MAX_POSES];
+    uint8_t wanted[TXI_MAX_POSES];
+    const int anchors = f->level[field->level].anchor_count, before = l->built_count;
+    memset(uses, 0, sizeof uses);
+    for (int a = 0; a < anchors; a++) {
+        if (field->match[a].pose >= 0) uses[field->match[a].pose]++;
+    }
+    for (int k = 0; k < TXI_MAX_POSES; k++) wanted[k] = uses[k] * TXI_POSE_SHARE > anchors;
+    if (!txi_level_sources(l, f->style.is_picture, f->pose_count, wanted, f->arena, env))
+        return txi_no_memory(env);
+    for (int k = before; k < l->built_count && f->plan; k++)
+        txi_source_guide(l, &l->source[l->built[k]]);
+    return TXM_OK;
+}
+
+/* Labels from the vote's choices, improved; then where each pixel is copied from. */
+static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const int32_t *chosen,
+                                    const txi_plan *plan, txi_copy *copies, txm_env *env) {
+    const txi_level *l = &f->level[0];
+    const size_t n = (size_t)l->width * (size_t)l->height;
+    const txi_window *w = f->window;
+    txm_arena scratch;
+    txi_assembly assembly;
+    txm_arena_init(&scratch, env);
+    int32_t *label = (int32_t *)txm_arena_alloc(&scratch, n, 2 * sizeof(int32_t));
+    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, (size_t)l->hole_count, sizeof(int32_t));
+    if (!label || !queue) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    int32_t *piece = label + n;
+    assembly.level = l;
+    assembly.color = t->color;
+    assembly.label = label;
+    for (size_t p = 0; p < n; p++) label[p] = TXI_LABEL_NONE;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i];
+        if (chosen[i] < 0) continue;
+        const txi_match *m = &t->match[chosen[i]];
+        const int corner = l->anchor[chosen[i]];
+        label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
+    }
+    for (int k = 0; k < 4 && txi_assembly_pass(&assembly); k++) {}
+    txi_assembly_pieces(&assembly, piece, queue);
+    for (int y = 0; y < w->height; y++) {
+        for (int x = 0; x < w->width; x++) {
+            txi_copy *copy = &copies[(size_t)y * (size_t)w->width + (size_t)x];
+            const int p = (y + TXI_EDGE) * l->width + x + TXI_EDGE;
+            memset(copy, 0, sizeof *copy);
+            copy->piece = -1;
+            if (l->state[p] != TXI_HOLE || label[p] < 0) continue;
+            const txi_source *s = &l->source[label[p] >> 26];
+            int32_t px, py;
+            txi_source_place(s, x + TXI_EDGE + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
+                             y + TXI_EDGE + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
+            copy->x = (float)px / TXI_UNIT - TXI_EDGE;
+            copy->y = (float)py / TXI_UNIT - TXI_EDGE;
+            copy->pose = label[p] >> 26;
+            copy->piece = piece[p];
+        }
+    }
+    (void)plan;
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* Complete the finest level, and say where each hole pixel is copied from.
+   copies  one per pixel of the window
+   poses   receives the filler's poses, which copies[].pose counts                              */
+static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi_field *field,
+                                  txi_copy *copies, const txi_pose **poses, int *pose_count,
+                                  txm_env *env) {
+    txi_canvas t;
+    txm_arena memory;
+    txm_arena_init(&memory, env);
+    txm_status status = txi_filler_plan(f, plan, env);
+    if (status == TXM_OK && field->level) status = txi_finest_sources(f, field, env);
+    const txi_level *l = &f->level[0];
+    int32_t *chosen = NULL;
+    if (status == TXM_OK) {
+        chosen = (int32_t *)txm_arena_alloc(&memory, (size_t)l->hole_count, sizeof(int32_t));
+        if (!txi_canvas_make(f, 0, &t, &memory)) status = txi_no_memory(env);
+    }
+    if (status == TXM_OK && field->level) {
+        status = txi_descend(f, 0, field->match, &t, env);
+    } else if (status == TXM_OK) {
+        memcpy(t.match, field->match, (size_t)l->anchor_count * sizeof *t.match);
+        memcpy(t.color, field->color, 4 * (size_t)l->width * (size_t)l->height);
+    }
+    if (status == TXM_OK) status = txi_refine(f, 0, &t, chosen, env);
+    if (status == TXM_OK) status = txi_finish_pieces(f, &t, chosen, plan, copies, env);
+    *poses = f->pose;
+    *pose_count = f->pose_count;
+    txm_arena_free(&memory);
+    return status;
+}
 
 /* ---- Poisson blending [1, III.B] -------------------------------------------------------------
    The pixels of a hole are copies; pieces of them meet at seams, and at the rim of the hole they
