@@ -1,8 +1,886 @@
 #ifndef TEXINPAINT_TRACE_H
 #define TEXINPAINT_TRACE_H
 
-#include "config.h"
+#include "vote.h"
 
-/* ---- trace ---- */
+/* ---- lines near a hole ------------------------------------------------------------------------
+   The structure of [1, II.A]: points of strong colour gradient near the hole, thinned to lines, and
+   the ends of these lines at the border of the hole. A window is almost isometric to the surface, so
+   the gradient in the window is the gradient on the surface.                                       */
+
+enum {
+    TXI_GRADIENT_UNIT = 64, /* stored gradients are in 1/64 of a level per pixel               */
+    TXI_GRADIENT_TAPS = 3,  /* pixels; radius of the derivative of a Gaussian of sigma 1.2       */
+    TXI_TENSOR_TAPS = 3,    /* pixels; radius of the Gaussian of sigma 1.5 over the tensor      */
+    TXI_BAND_ROWS = 32,     /* rows that one call of a parallel loop computes                   */
+    TXI_PROFILE = 21,       /* samples of the colours across a line, half a pixel apart          */
+    TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
+    TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
+    TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
+    TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
+};
+
+/* A point of a thinned line. */
+typedef struct txi_thin {
+    txm_vec2 place;   /* window pixels                                                          */
+    txm_vec2 along;   /* direction of the line, unit, either way                                */
+    float strength;   /* gradient, levels per pixel                                             */
+} txi_thin;
+
+/* The end of a line at the border of the hole. */
+typedef struct txi_end {
+    txm_vec2 place;   /* where it enters the hole, window pixels                                */
+    txm_vec2 heading; /* unit, into the hole                                                    */
+    float curvature;  /* 1 / pixels, positive: it turns to the right (towards (-y, x) of heading) */
+    float strength;   /* mean gradient along it, levels per pixel                               */
+    float contrast;   /* difference of the colours of both sides, levels                        */
+    float length;     /* pixels over which it was followed outwards                             */
+    int is_long;      /* long enough to be a line and not grain                                 */
+    int first, count; /* its points in txi_lines.points, from the border outwards, 1 pixel apart */
+    int loop;         /* which loop of the border of the hole it lies on                        */
+    int along;        /* where on the loop, in pixel sides from its start                       */
+    float profile[TXI_PROFILE][3]; /* RGB across it from left to right, 5 pixels to each side   */
+    float fit[6];     /* x = fit[0] + fit[1] s + fit[2] s^2, y with fit[3..5], s = pixels outwards
+                         from place                                                             */
+    float fit_length; /* over how many pixels that holds                                        */
+} txi_end;
+
+/* Gradients of a window. */
+typedef struct txi_field {
+    int width, height;
+    const uint8_t *color; /* 4 per pixel                                                        */
+    uint8_t *known;      /* 1: the colour counts                                                */
+    int32_t *gap;        /* squared distance to the nearest pixel that is not known             */
+    int16_t *gradient;   /* 6 per pixel: x and y of R, G, B; 0 where unknown                     */
+    float *strength;     /* root of the sum of their squares, levels per pixel                  */
+    int32_t *tensor;     /* sums of xx, xy, yy over RGB, smoothed, (1/16 level per pixel)^2       */
+} txi_field;
+
+/* What is known about the lines of a window. */
+typedef struct txi_lines {
+    txi_end *ends;
+    int end_count;
+    txm_vec2 *points; /* of the ends                                                            */
+    int point_count;
+    txi_thin *thin;   /* all points of lines near the hole                                      */
+    int thin_count;
+    int32_t *thin_at; /* one per pixel: the point in it, or -1                                  */
+    int32_t *away;    /* one per pixel: squared distance to the nearest pixel of the hole        */
+    int32_t *depth;   /* one per pixel: squared distance to the nearest pixel outside of the hole */
+    txi_field field;
+    float threshold;  /* least gradient of a line, levels per pixel                             */
+    float width;      /* of the hole: twice the radius of the largest disc in it, pixels        */
+    float limit;      /* pixels over which lines were followed                                  */
+    float share_long; /* share of ends that are long; 0.45 or more: there is structure          */
+} txi_lines;
+
+static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
+    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
+}
+
+static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
+    const double x = (double)a.x - b.x, y = (double)a.y - b.y;
+    return sqrt(x * x + y * y);
+}
+
+static inline txm_vec2 txi_unit(double x, double y) {
+    const double n = sqrt(x * x + y * y);
+    return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
+}
+
+/* ---- distances --------------------------------------------------------------------------- */
+
+enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
+
+/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
+   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
+   row (Meijster, Roerdink, Hesselink 2000).
+   scratch  3 * max(width, height) numbers
+   cost     O(width * height)                                                                     */
+static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
+    int32_t *row = scratch, *hull = row + width, *from = hull + width;
+    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
+    for (int x = 0; x < width; x++) {
+        for (int pass = 0; pass < 2; pass++) {
+            int d = beyond;
+            for (int k = 0; k < height; k++) {
+                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
+                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
+                if (!pass || d < out[i]) out[i] = d;
+            }
+        }
+    }
+    for (int y = 0; y < height; y++) {
+        int32_t *o = out + (size_t)y * (size_t)width;
+        int top = 0;
+        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
+        hull[0] = from[0] = 0;
+        for (int x = 1; x < width; x++) {
+            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
+            for (; top >= 0; top--) {
+                const int h = hull[top], t = from[top];
+                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
+            }
+            if (top < 0) {
+                top = 0;
+                hull[0] = x;
+                from[0] = 0;
+                continue;
+            }
+            const int64_t h = hull[top];
+            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
+            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
+            if (at < width) {
+                hull[++top] = x;
+                from[top] = (int32_t)at;
+            }
+        }
+        for (int x = width - 1; x >= 0; x--) {
+            const int h = hull[top];
+            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
+            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
+            if (x == from[top] && top > 0) top--;
+        }
+    }
+}
+
+/* ---- gradients --------------------------------------------------------------------------- */
+
+/* 64 exp(-k^2 / 2 / 1.2^2): the derivative of a Gaussian is the slope of the plane that fits best
+   with these weights. Next to pixels that are not known the plane is fitted to the known ones, so
+   that the borders of the hole and of the surface are no edges. */
+static const int txi_gradient_weight[TXI_GRADIENT_TAPS + 1] = {64, 45, 16, 3};
+
+/* The slopes of the planes through the known pixels around (x, y): 6 numbers, levels per pixel. */
+static void txi_slope(const txi_field *f, int x, int y, double slope[6]) {
+    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x, y */
+    for (int j = -TXI_GRADIENT_TAPS; j <= TXI_GRADIENT_TAPS; j++) {
+        for (int i = -TXI_GRADIENT_TAPS; i <= TXI_GRADIENT_TAPS; i++) {
+            const int px = x + i, py = y + j;
+            if (px < 0 || py < 0 || px >= f->width || py >= f->height) continue;
+            const size_t at = (size_t)py * (size_t)f->width + (size_t)px;
+            if (!f->known[at]) continue;
+            const double w = txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
+            m[0] += w;
+            m[1] += w * i;
+            m[2] += w * j;
+            m[3] += w * i * i;
+            m[4] += w * i * j;
+            m[5] += w * j * j;
+            for (int c = 0; c < 3; c++) {
+                const double value = w * f->color[4 * at + (size_t)c];
+                v[c][0] += value;
+                v[c][1] += value * i;
+                v[c][2] += value * j;
+            }
+        }
+    }
+    for (int c = 0; c < 6; c++) slope[c] = 0;
+    if (m[0] <= 0) return;
+    const double xx = m[3] - m[1] * m[1] / m[0], xy = m[4] - m[1] * m[2] / m[0];
+    const double yy = m[5] - m[2] * m[2] / m[0], det = xx * yy - xy * xy;
+    if (det < 0.05 * m[0] * m[0]) return; /* pixels in one line, or too few: no slope             */
+    for (int c = 0; c < 3; c++) {
+        const double gx = v[c][1] - m[1] * v[c][0] / m[0], gy = v[c][2] - m[2] * v[c][0] / m[0];
+        slope[2 * c] = (yy * gx - xy * gy) / det;
+        slope[2 * c + 1] = (xx * gy - xy * gx) / det;
+    }
+}
+
+static int16_t txi_gradient_round(double slope) {
+    const double v = slope * TXI_GRADIENT_UNIT;
+    return (int16_t)(v < -32000 ? -32000 : v > 32000 ? 32000 : v < 0 ? v - 0.5 : v + 0.5);
+}
+
+/* The job of one band of rows. rows: scratch of this band, 6 * width * (TXI_BAND_ROWS + 6) ints */
+typedef struct txi_field_job {
+    txi_field *field;
+    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere   */
+    int32_t reach;
+    int32_t *rows;
+    int smooth;          /* 0: the gradients, 1: the tensor                                     */
+} txi_field_job;
+
+/* Horizontal sums of row y: smoothed and derived, RGB each. */
+static void txi_gradient_row(const txi_field *f, int y, int32_t *out) {
+    const uint8_t *c = f->color + 4 * (size_t)y * (size_t)f->width;
+    for (int x = TXI_GRADIENT_TAPS; x < f->width - TXI_GRADIENT_TAPS; x++) {
+        const uint8_t *p = c + 4 * x;
+        for (int k = 0; k < 3; k++) {
+            out[6 * x + k] = 64 * p[k] + 45 * (p[k - 4] + p[k + 4]) + 16 * (p[k - 8] + p[k + 8]) +
+                             3 * (p[k - 12] + p[k + 12]);
+            out[6 * x + 3 + k] =
+                45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) + 9 * (p[k + 12] - p[k - 12]);
+        }
+    }
+}
+
+static void txi_gradient_pixel(txi_field *f, int x, int y, const int32_t *row0, size_t pitch) {
+    const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+    const int taps = TXI_GRADIENT_TAPS;
+    double slope[6], sum = 0;
+    if (f->gap[i] > 2 * taps * taps && x >= taps && y >= taps && x < f->width - taps &&
+        y < f->height - taps) {
+        /* the sum of the weights is 192, that of weight * k^2 is 272                             */
+        for (int c = 0; c < 3; c++) {
+            int gx = 0, gy = 0;
+            for (int k = -taps; k <= taps; k++) {
+                const int32_t *r = row0 + (size_t)(k + taps) * pitch + 6 * (size_t)x;
+                const int w = txi_gradient_weight[k < 0 ? -k : k];
+                gx += w * r[3 + c];
+                gy += w * k * r[c];
+            }
+            slope[2 * c] = gx / (192.0 * 272.0);
+            slope[2 * c + 1] = gy / (192.0 * 272.0);
+        }
+    } else {
+        txi_slope(f, x, y, slope);
+    }
+    for (int c = 0; c < 6; c++) {
+        const int16_t g = txi_gradient_round(slope[c]);
+        f->gradient[6 * i + (size_t)c] = g;
+        sum += (double)g * g;
+    }
+    f->strength[i] = txm_float(sqrt(sum) / TXI_GRADIENT_UNIT);
+}
+
+static void txi_gradient_band(const txi_field_job *job, int y0, int y1, int32_t *rows) {
+    txi_field *f = job->field;
+    const size_t pitch = 6 * (size_t)f->width;
+    const int taps = TXI_GRADIENT_TAPS;
+    for (int y = y0 - taps; y < y1 + taps; y++) {
+        if (y >= 0 && y < f->height)
+            txi_gradient_row(f, y, rows + (size_t)(y - y0 + taps) * pitch);
+    }
+    for (int y = y0; y < y1; y++) {
+        for (int x = 0; x < f->width; x++) {
+            const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+            if (f->known[i] && (!job->away || job->away[i] <= job->reach))
+                txi_gradient_pixel(f, x, y, rows + (size_t)(y - y0) * pitch, pitch);
+        }
+    }
+}
+
+/* xx, xy, yy of one row, smoothed horizontally by {18, 14, 7, 2} / 64. */
+static void txi_tensor_row(const txi_field *f, int y, int32_t *out, int32_t *raw) {
+    const int16_t *g = f->gradient + 6 * (size_t)y * (size_t)f->width;
+    for (int x = 0; x < f->width; x++) {
+        int32_t *t = raw + 3 * x;
+        t[0] = t[1] = t[2] = 0;
+        for (int c = 0; c < 3; c++) {
+            const int gx = g[6 * x + 2 * c] / 4, gy = g[6 * x + 2 * c + 1] / 4;
+            t[0] += gx * gx;
+            t[1] += gx * gy;
+            t[2] += gy * gy;
+        }
+        for (int k = 0; k < 3; k++) t[k] = t[k] > 16000000 ? 16000000 : t[k];
+    }
+    for (int x = 0; x < f->width; x++) {
+        for (int k = 0; k < 3; k++) {
+            int sum = 18 * raw[3 * x + k];
+            if (x >= 1) sum += 14 * raw[3 * (x - 1) + k];
+            if (x >= 2) sum += 7 * raw[3 * (x - 2) + k];
+            if (x >= 3) sum += 2 * raw[3 * (x - 3) + k];
+            if (x + 1 < f->width) sum += 14 * raw[3 * (x + 1) + k];
+            if (x + 2 < f->width) sum += 7 * raw[3 * (x + 2) + k];
+            if (x + 3 < f->width) sum += 2 * raw[3 * (x + 3) + k];
+            out[3 * x + k] = sum / 64;
+        }
+    }
+}
+
+static void txi_tensor_band(const txi_field_job *job, int y0, int y1, int32_t *rows) {
+    static const int weight[TXI_TENSOR_TAPS + 1] = {18, 14, 7, 2};
+    txi_field *f = job->field;
+    const size_t pitch = 3 * (size_t)f->width;
+    const int taps = TXI_TENSOR_TAPS;
+    int32_t *raw = rows + (size_t)(TXI_BAND_ROWS + 2 * taps) * pitch;
+    for (int y = y0 - taps; y < y1 + taps; y++) {
+        int32_t *out = rows + (size_t)(y - y0 + taps) * pitch;
+        if (y >= 0 && y < f->height) txi_tensor_row(f, y, out, raw);
+        else memset(out, 0, pitch * sizeof *out);
+    }
+    for (int y = y0; y < y1; y++) {
+        int32_t *t = f->tensor + (size_t)y * pitch;
+        for (size_t i = 0; i < pitch; i++) {
+            int sum = 0;
+            for (int k = -taps; k <= taps; k++)
+                sum += weight[k < 0 ? -k : k] * rows[(size_t)(y - y0 + taps + k) * pitch + i];
+            t[i] = sum / 64;
+        }
+    }
+}
+
+static void txi_field_body(void *context, int index) {
+    const txi_field_job *job = (const txi_field_job *)context;
+    const int y0 = index * TXI_BAND_ROWS;
+    const int y1 = y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
+    int32_t *rows = job->rows + (size_t)index * 6 * (size_t)job->field->width * (TXI_BAND_ROWS + 6);
+    if (job->smooth) txi_tensor_band(job, y0, y1, rows);
+    else txi_gradient_band(job, y0, y1, rows);
+}
+
+/* The gradients of a picture where it is known; away and reach as in txi_field_job. */
+static txm_status txi_field_make(txi_field *f, const int32_t *away, int32_t reach, txm_arena *arena,
+                                 txm_env *env) {
+    const size_t count = (size_t)f->width * (size_t)f->height;
+    const int bands = (f->height + TXI_BAND_ROWS - 1) / TXI_BAND_ROWS;
+    txi_field_job job;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    f->gradient = (int16_t *)txm_arena_zero(arena, count, 6 * sizeof *f->gradient);
+    f->strength = (float *)txm_arena_zero(arena, count, sizeof *f->strength);
+    f->tensor = (int32_t *)txm_arena_zero(arena, count, 3 * sizeof *f->tensor);
+    job.rows = (int32_t *)txm_arena_zero(&scratch, (size_t)bands * 6 * (size_t)f->width,
+                                         (TXI_BAND_ROWS + 6) * sizeof *job.rows);
+    if (arena->failed || scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    job.field = f;
+    job.away = away;
+    job.reach = reach;
+    for (job.smooth = 0; job.smooth < 2; job.smooth++)
+        txm_parallel_for(env, bands, txi_field_body, &job);
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* The direction across the edge at a pixel, unit, and how clear it is, 0..1. */
+static double txi_across(const txi_field *f, size_t i, double *nx, double *ny) {
+    const double a = f->tensor[3 * i], b = f->tensor[3 * i + 1], c = f->tensor[3 * i + 2];
+    const double half = 0.5 * (a - c), r = sqrt(half * half + b * b);
+    double x = r + half, y = b;
+    if (half < 0) {
+        x = b;
+        y = r - half;
+    }
+    const double n = sqrt(x * x + y * y);
+    *nx = n > 0 ? x / n : 1;
+    *ny = n > 0 ? y / n : 0;
+    return a + c > 0 ? 2 * r / (a + c) : 0;
+}
+
+/* Bilinear gradient strength; 0 outside of the window. */
+static double txi_strength_at(const txi_field *f, double x, double y) {
+    if (!(x >= 0 && y >= 0 && x < f->width - 1 && y < f->height - 1)) return 0;
+    const int ix = (int)x, iy = (int)y;
+    const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
+    const double u = x - ix, v = y - iy;
+    return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
+}
+
+/* The pixel of a place, or -1 outside of the window. */
+static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
+    if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
+    return (ptrdiff_t)(int)(y + 0.5) * width + (int)(x + 0.5);
+}
+
+/* ---- following a line -------------------------------------------------------------------- */
+
+/* A place on a line that is being followed. */
+typedef struct txi_walk {
+    double x, y, dx, dy; /* place, unit direction                                               */
+    double change[3];    /* derivative of RGB to the right, levels per pixel, a running mean     */
+} txi_walk;
+
+/* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
+static void txi_change_at(const txi_field *f, size_t i, double rx, double ry, double change[3]) {
+    const int16_t *g = f->gradient + 6 * i;
+    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / TXI_GRADIENT_UNIT;
+}
+
+/* Correlation of two colour changes, -1..1. */
+static double txi_agree(const double a[3], const double b[3]) {
+    const double aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    const double bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2];
+    const double ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    return aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
+}
+
+/* Move a place across the direction (rx, ry), by at most 1 pixel, to where the gradient is largest:
+   five samples and a parabola. Returns the gradient there. */
+static double txi_centre(const txi_field *f, double rx, double ry, double *x, double *y) {
+    double s[5], best = -1;
+    int k = 2;
+    static const int order[5] = {2, 1, 3, 0, 4}; /* ties: least movement                         */
+    for (int i = 0; i < 5; i++) {
+        const double o = 0.5 * (order[i] - 2);
+        s[order[i]] = txi_strength_at(f, *x + o * rx, *y + o * ry);
+        if (s[order[i]] > best) {
+            best = s[order[i]];
+            k = order[i];
+        }
+    }
+    double o = 0.5 * (k - 2);
+    if (k > 0 && k < 4) {
+        const double bend = s[k - 1] + s[k + 1] - 2 * s[k];
+        if (bend < 0) o += 0.25 * (s[k - 1] - s[k + 1]) / bend;
+    }
+    *x += o * rx;
+    *y += o * ry;
+    return best;
+}
+
+/* One step along a line; 0: it ends here. least: gradient below which it ends. */
+static int txi_walk_on(const txi_field *f, txi_walk *k, double step, double least) {
+    double x = k->x + step * k->dx, y = k->y + step * k->dy, nx, ny, change[3];
+    const double strength = txi_centre(f, -k->dy, k->dx, &x, &y);
+    const ptrdiff_t at = txi_pixel(f->width, f->height, x, y);
+    if (strength < least || at < 0 || !f->known[at]) return 0;
+    const double clear = txi_across(f, (size_t)at, &nx, &ny);
+    double tx = -ny, ty = nx, turn = tx * k->dx + ty * k->dy;
+    if (turn < 0) {
+        tx = -tx;
+        ty = -ty;
+        turn = -turn;
+    }
+    if (clear < 0.3 || turn < 0.5) { /* a junction: straight on                                   */
+        tx = k->dx;
+        ty = k->dy;
+    }
+    const txm_vec2 d = txi_unit(tx + k->dx, ty + k->dy);
+    txi_change_at(f, (size_t)at, -(double)d.y, d.x, change);
+    if (txi_agree(change, k->change) < 0.5) return 0;
+    for (int c = 0; c < 3; c++) k->change[c] = 0.85 * k->change[c] + 0.15 * change[c];
+    /* it must get on, not slide back and forth                                                   */
+    if ((x - k->x) * k->dx + (y - k->y) * k->dy < 0.5 * step) return 0;
+    k->x = x;
+    k->y = y;
+    k->dx = d.x;
+    k->dy = d.y;
+    return 1;
+}
+
+/* ---- points of lines --------------------------------------------------------------------- */
+
+/* The gradient that 98.5 % of the known pixels near the hole do not reach. */
+static double txi_strong(const txi_field *f, const int32_t *away, int32_t reach) {
+    enum { BINS = 4096 };  /* of a quarter level per pixel                                        */
+    size_t bins[BINS] = {0}, total = 0, sum = 0;
+    const size_t count = (size_t)f->width * (size_t)f->height;
+    for (size_t i = 0; i < count; i++) {
+        if (!f->known[i] || away[i] > reach) continue;
+        bins[txm_clampi((int)(f->strength[i] * 4), 0, BINS - 1)]++;
+        total++;
+    }
+    for (int k = BINS - 1; k > 0; k--) {
+        sum += bins[k];
+        if (sum * 200 >= total * 3) return 0.25 * k;
+    }
+    return 0;
+}
+
+/* Is pixel (x, y) a maximum of the gradient across the edge? Writes the point. */
+static int txi_thin_pixel(const txi_field *f, int x, int y, double least, txi_thin *out) {
+    const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+    double nx, ny;
+    if (f->strength[i] < least) return 0;
+    const double clear = txi_across(f, i, &nx, &ny);
+    const ptrdiff_t a = txi_pixel(f->width, f->height, x + nx, y + ny);
+    const ptrdiff_t b = txi_pixel(f->width, f->height, x - nx, y - ny);
+    if (clear < 0.3 || a < 0 || b < 0 || !f->known[a] || !f->known[b]) return 0;
+    const double s = f->strength[i], before = txi_strength_at(f, x - nx, y - ny);
+    const double after = txi_strength_at(f, x + nx, y + ny);
+    if (before > s || after > s || (before >= s && after >= s)) return 0;
+    const double bend = before + after - 2 * s, o = bend < 0 ? 0.5 * (before - after) / bend : 0;
+    out->place = txm_v2(txm_float(x + o * nx), txm_float(y + o * ny));
+    out->along = txm_v2(txm_float(-ny), txm_float(nx));
+    out->strength = f->strength[i];
+    return 1;
+}
+
+/* All points of lines near the hole, in raster order. */
+static txm_status txi_thin_all(txi_lines *l, int32_t reach, txm_arena *arena, txm_env *env) {
+    const txi_field *f = &l->field;
+    const size_t count = (size_t)f->width * (size_t)f->height;
+    l->thin_at = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->thin_at);
+    if (arena->failed) return txi_no_memory(env);
+    for (int pass = 0; pass < 2; pass++) { /* count, then keep                                     */
+        int n = 0;
+        for (int y = 0; y < f->height; y++) {
+            for (int x = 0; x < f->width; x++) {
+                const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+                txi_thin point;
+                l->thin_at[i] = -1;
+                if (!f->known[i] || l->away[i] > reach) continue;
+                if (!txi_thin_pixel(f, x, y, l->threshold, &point)) continue;
+                if (pass) {
+                    l->thin[n] = point;
+                    l->thin_at[i] = n;
+                }
+                n++;
+            }
+        }
+        l->thin_count = n;
+        if (pass || n == 0) continue;
+        l->thin = (txi_thin *)txm_arena_alloc(arena, (size_t)n, sizeof *l->thin);
+        if (arena->failed) return txi_no_memory(env);
+    }
+    return TXM_OK;
+}
+
+/* ---- ends of lines ----------------------------------------------------------------------- */
+
+/* The direction into the hole at a place outside of it: against the gradient of the distance,
+   averaged over some pixels. */
+static txm_vec2 txi_inwards(const txi_lines *l, int x, int y) {
+    const int w = l->field.width, h = l->field.height;
+    double gx = 0, gy = 0;
+    for (int j = -4; j <= 4; j++) {
+        for (int i = -4; i <= 4; i++) {
+            const int px = x + i, py = y + j;
+            if (px < 0 || py < 0 || px >= w || py >= h) continue;
+            const size_t at = (size_t)py * (size_t)w + (size_t)px;
+            const double k = l->depth[at] > 0 ? 1 : 0;
+            gx += k * i;
+            gy += k * j;
+        }
+    }
+    return txi_unit(gx, gy);
+}
+
+/* Follow a line from a point near the border both ways: points from the border outwards. Returns how
+   many; walk receives the direction inwards at the first point. */
+static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards, txm_vec2 *points,
+                      int capacity, double *strength) {
+    const txi_field *f = &l->field;
+    const double least = 0.5 * l->threshold > 0.25 * from->strength ? 0.5 * l->threshold
+                                                                     : 0.25 * from->strength;
+    txm_vec2 back[8];
+    int n = 0, inner = 0, steps = 0;
+    double sum = 0;
+    for (int way = 0; way < 2; way++) {
+        txi_walk k;
+        const double side = (double)from->along.x * inwards.x + (double)from->along.y * inwards.y;
+        const double sign = (side < 0) == (way == 0) ? -1 : 1; /* way 0: inwards                  */
+        const ptrdiff_t at = txi_pixel(f->width, f->height, from->place.x, from->place.y);
+        k.x = from->place.x;
+        k.y = from->place.y;
+        k.dx = sign * from->along.x;
+        k.dy = sign * from->along.y;
+        if (at < 0) return 0;
+        txi_change_at(f, (size_t)at, -k.dy, k.dx, k.change);
+        if (way == 1) {
+            while (inner > 0) points[n++] = back[--inner];
+            points[n++] = from->place;
+        }
+        while (way == 0 ? inner < 8 : n < capacity) {
+            if (!txi_walk_on(f, &k, 1, least)) break;
+            const ptrdiff_t i = txi_pixel(f->width, f->height, k.x, k.y);
+            if (way == 0) {
+                if (l->away[i] < 2) break;
+                back[inner++] = txm_v2(txm_float(k.x), txm_float(k.y));
+            } else {
+                /* back at the border of the hole: it does not lead away from it                  */
+                if (l->away[i] < 4) break;
+                points[n++] = txm_v2(txm_float(k.x), txm_float(k.y));
+                sum += f->strength[i];
+                steps++;
+            }
+        }
+    }
+    *strength = steps ? sum / steps : from->strength;
+    return n;
+}
+
+/* Fit x = a + b s + c s^2 by weighted least squares to points 0..n-1, s their distances along the
+   line from the first, weights 1 / (1 + s / 16); degree 1: c = 0. Returns the root mean square
+   distance. */
+static double txi_fit(const txm_vec2 *points, int n, int degree, double fit[6]) {
+    double m[5] = {0}, v[2][3] = {{0}}, error = 0, s = 0, total = 0;
+    const double scale = n > 1 ? n - 1 : 1; /* s / scale is about 0..1                            */
+    for (int i = 0; i < n; i++) {
+        if (i) s += txi_distance(points[i], points[i - 1]);
+        const double t = s / scale, w = 1 / (1 + s / 16);
+        const double p[2] = {points[i].x - (double)points[0].x, points[i].y - (double)points[0].y};
+        double power = w;
+        for (int k = 0; k < 5; k++, power *= t) {
+            m[k] += power;
+            if (k < 3) {
+                v[0][k] += power * p[0];
+                v[1][k] += power * p[1];
+            }
+        }
+    }
+    for (int d = 0; d < 2; d++) {
+        double *out = fit + 3 * d;
+        const double *r = v[d];
+        const double a = m[2] - m[1] * m[1] / m[0], b = m[3] - m[1] * m[2] / m[0];
+        const double c = m[4] - m[2] * m[2] / m[0];
+        const double q = r[1] - m[1] * r[0] / m[0], u = r[2] - m[2] * r[0] / m[0];
+        const double det = a * c - b * b;
+        const double c2 = degree > 1 && det > 1e-12 ? (a * u - b * q) / det : 0;
+        const double c1 = a > 1e-12 ? (q - b * c2) / a : 0;
+        out[0] = (r[0] - m[1] * c1 - m[2] * c2) / m[0] + (d ? points[0].y : points[0].x);
+        out[1] = c1 / scale;
+        out[2] = c2 / (scale * scale);
+    }
+    s = 0;
+    for (int i = 0; i < n; i++) {
+        if (i) s += txi_distance(points[i], points[i - 1]);
+        const double w = 1 / (1 + s / 16);
+        const double x = fit[0] + fit[1] * s + fit[2] * s * s - points[i].x;
+        const double y = fit[3] + fit[4] * s + fit[5] * s * s - points[i].y;
+        error += w * (x * x + y * y);
+        total += w;
+    }
+    return sqrt(error / total);
+}
+
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
+static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) {
+    double fit[6], line[6], s = 0;
+    int n = e->count, found = 0;
+    for (;;) {
+        const double rms = txi_fit(points, n, 2, fit);
+        if (rms < 0.5 || n <= 8) {
+            /* a straight line unless a bent one is clearly better: the direction is more exact   */
+            if (n <= 8 || txi_fit(points, n, 1, line) < 1.25 * rms + 0.03) {
+                txi_fit(points, n, 1, line);
+                memcpy(fit, line, sizeof fit);
+            }
+            break;
+        }
+        n = n * 3 / 4;
+    }
+    for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels     */
+        s = -0.25 * i;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, fit[0] + fit[1] * s + fit[2] * s * s,
+                                       fit[3] + fit[4] * s + fit[5] * s * s);
+        if (at < 0 || w->state[at] == TXI_VOID) return 0;
+        found = w->state[at] == TXI_HOLE;
+    }
+    if (!found) return 0;
+    const double dx = fit[1] + 2 * fit[2] * s, dy = fit[4] + 2 * fit[5] * s;
+    const double speed = sqrt(dx * dx + dy * dy);
+    if (speed < 0.1) return 0;
+    for (int d = 0; d < 2; d++) { /* from now on s = 0 is the border                               */
+        double *p = fit + 3 * d;
+        p[0] += p[1] * s + p[2] * s * s;
+        p[1] += 2 * p[2] * s;
+    }
+    for (int k = 0; k < 6; k++) e->fit[k] = txm_float(fit[k]);
+    e->fit_length = txm_float(n - s);
+    e->place = txm_v2(e->fit[0], e->fit[3]);
+    e->heading = txi_unit(-dx, -dy);
+    e->curvature = txm_float(-2 * (fit[1] * fit[5] - fit[4] * fit[2]) / (speed * speed * speed));
+    return 1;
+}
+
+/* Colours across the line, a mean over its first pixels. Samples that fall into unknown pixels are
+   left out; where there are none the next one towards the line counts. */
+static void txi_profile(const txi_window *w, const txi_lines *l, txi_end *e) {
+    const txm_vec2 *p = l->points + e->first;
+    const int mid = TXI_PROFILE / 2;
+    double sum[TXI_PROFILE][3] = {{0}}, side[2][3] = {{0}};
+    int hits[TXI_PROFILE] = {0};
+    for (int i = 0; i < e->count && i < 12; i++) {
+        const int a = i > 2 ? i - 2 : 0, b = i + 2 < e->count ? i + 2 : e->count - 1;
+        const txm_vec2 d = txi_unit((double)p[a].x - p[b].x, (double)p[a].y - p[b].y);
+        for (int k = 0; k < TXI_PROFILE; k++) {
+            const double o = 0.5 * (k - mid), x = p[i].x - o * d.y, y = p[i].y + o * d.x;
+            const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
+            if (at < 0 || !l->field.known[at]) continue;
+            for (int c = 0; c < 3; c++) sum[k][c] += w->color[4 * at + c];
+            hits[k]++;
+        }
+    }
+    for (int o = 0; o <= mid; o++) {
+        for (int s = -1; s < 2; s += 2) {
+            const int k = mid + s * o, inner = o ? k - s : k;
+            for (int c = 0; c < 3; c++) {
+                const double outer = hits[k] ? sum[k][c] / hits[k] : o ? e->profile[inner][c] : 128;
+                e->profile[k][c] = txm_float(outer);
+                if (o >= 2 && o <= 6) side[s > 0][c] += outer / 5;
+            }
+        }
+    }
+    double difference = 0;
+    for (int c = 0; c < 3; c++) difference += (side[0][c] - side[1][c]) * (side[0][c] - side[1][c]);
+    e->contrast = txm_float(sqrt(difference / 3));
+}
+
+/* Is there an end already that is the same line? */
+static int txi_end_exists(const txi_lines *l, const txi_end *e) {
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *o = &l->ends[i];
+        if (txi_distance(e->place, o->place) > 2.5) continue;
+        const double d = (double)e->heading.x * o->heading.x + (double)e->heading.y * o->heading.y;
+        double a[3], b[3];
+        for (int c = 0; c < 3; c++) {
+            a[c] = (double)e->profile[12][c] - e->profile[8][c];
+            b[c] = (double)o->profile[12][c] - o->profile[8][c];
+        }
+        if (d > 0.5 && txi_agree(a, b) > 0.3) return 1;
+        if (txi_distance(e->place, o->place) < 1 && d > 0.5) return 1;
+    }
+    return 0;
+}
+
+/* Ends from points 2.6 to 4.2 pixels outside of the hole, the strongest first. */
+static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
+                                txm_arena *scratch, txm_env *env) {
+    const int room = (int)l->limit + 10; /* points of one end                                      */
+    txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
+    size_t count = 0;
+    if (l->thin_count == 0) return TXM_OK;
+    l->ends = (txi_end *)txm_arena_zero(arena, TXI_MAX_ENDS, sizeof *l->ends);
+    l->points = (txm_vec2 *)txm_arena_alloc(arena, TXI_MAX_ENDS * (size_t)room, sizeof *l->points);
+    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    for (int i = 0; i < l->thin_count; i++) {
+        const txm_vec2 p = l->thin[i].place;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
+        if (at < 0 || l->away[at] < 7 || l->away[at] > 17) continue;
+        order[count].key = ~txm_sort_key(l->thin[i].strength);
+        order[count++].value = (uint32_t)i;
+    }
+    txm_sort_pairs(order, order + l->thin_count, count);
+    for (size_t k = 0; k < count && l->end_count < TXI_MAX_ENDS; k++) {
+        const txi_thin *t = &l->thin[order[k].value];
+        txi_end *e = &l->ends[l->end_count];
+        const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
+        double strength;
+        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.35) continue;
+        e->first = l->point_count;
+        e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
+        if (e->count < 5 || !txi_fit_end(w, l->points + e->first, e)) continue;
+        e->strength = txm_float(strength);
+        e->length = (float)e->count;
+        e->is_long = e->length >= 24 || e->length >= 0.8f * l->limit;
+        txi_profile(w, l, e);
+        if (txi_end_exists(l, e)) continue;
+        l->point_count += e->count;
+        l->end_count++;
+    }
+    return TXM_OK;
+}
+
+/* ---- the border of the hole -------------------------------------------------------------- */
+
+/* Number the pixel sides between hole and rest along the border's loops: side 4 i + k is the upper,
+   right, lower, left side of hole pixel i. Each end gets the loop and the place of the side that is
+   nearest. Loops follow the border with the hole to their right. */
+static txm_status txi_order_ends(const txi_window *w, txi_lines *l, txm_arena *scratch, txm_env *env) {
+    static const int sx[4] = {0, 1, 0, -1}, sy[4] = {-1, 0, 1, 0}; /* to the pixel beyond a side   */
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    int32_t *loop_of = (int32_t *)txm_arena_zero(scratch, count, 4 * sizeof *loop_of);
+    int32_t *along = (int32_t *)txm_arena_alloc(scratch, count, 4 * sizeof *along);
+    int loops = 0;
+    if (scratch->failed) return txi_no_memory(env);
+    for (size_t begin = 0; begin < 4 * count; begin++) {
+        const size_t pixel = begin / 4;
+        int x = (int)(pixel % (size_t)w->width), y = (int)(pixel / (size_t)w->width);
+        int side = (int)(begin % 4), n = 0;
+        size_t at = begin;
+        if (w->state[pixel] != TXI_HOLE || loop_of[begin]) continue;
+        const int bx = x + sx[side], by = y + sy[side];
+        if (bx >= 0 && by >= 0 && bx < w->width && by < w->height &&
+            w->state[(size_t)by * (size_t)w->width + (size_t)bx] == TXI_HOLE)
+            continue;
+        loops++;
+        while (!loop_of[at]) { /* forwards along a side is the direction of the next side's normal   */
+            loop_of[at] = loops;
+            along[at] = n++;
+            const int f = (side + 1) % 4;
+            int px = x + sx[f] + sx[side], py = y + sy[f] + sy[side]; /* diagonally ahead: turn left */
+            int turn = 3;
+            for (int k = 0; k < 2; k++) {
+                if (px >= 0 && py >= 0 && px < w->width && py < w->height &&
+                    w->state[(size_t)py * (size_t)w->width + (size_t)px] == TXI_HOLE)
+                    break;
+                px = k ? x : x + sx[f]; /* then straight on, then round the corner                */
+                py = k ? y : y + sy[f];
+                turn = k ? 1 : 0;
+            }
+            x = px;
+            y = py;
+            side = (side + turn) % 4;
+            at = 4 * ((size_t)y * (size_t)w->width + (size_t)x) + (size_t)side;
+        }
+    }
+    for (int i = 0; i < l->end_count; i++) {
+        txi_end *e = &l->ends[i];
+        double best = 1e9;
+        const int cx = (int)(e->place.x + 0.5f), cy = (int)(e->place.y + 0.5f);
+        for (int y = cy - 3; y <= cy + 3; y++) {
+            for (int x = cx - 3; x <= cx + 3; x++) {
+                if (x < 0 || y < 0 || x >= w->width || y >= w->height) continue;
+                for (int k = 0; k < 4; k++) {
+                    const size_t at = 4 * ((size_t)y * (size_t)w->width + (size_t)x) + (size_t)k;
+                    const double dx = x + 0.5 * sx[k] - e->place.x, dy = y + 0.5 * sy[k] - e->place.y;
+                    if (!loop_of[at] || dx * dx + dy * dy >= best) continue;
+                    best = dx * dx + dy * dy;
+                    e->loop = loop_of[at];
+                    e->along = along[at];
+                }
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- all of it --------------------------------------------------------------------------- */
+
+/* known pixels, distances, the width of the hole */
+static txm_status txi_lines_begin(const txi_window *w, txm_arena *arena, txm_arena *scratch,
+                                  txm_env *env, txi_lines *l) {
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    const int longer = w->width > w->height ? w->width : w->height;
+    int32_t deepest = 0;
+    uint8_t *mark = (uint8_t *)txm_arena_alloc(scratch, count, 1);
+    int32_t *row = (int32_t *)txm_arena_alloc(scratch, (size_t)longer, 3 * sizeof *row);
+    l->field.width = w->width;
+    l->field.height = w->height;
+    l->field.color = w->color;
+    l->field.known = (uint8_t *)txm_arena_alloc(arena, count, 1);
+    l->field.gap = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->field.gap);
+    l->away = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->away);
+    l->depth = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->depth);
+    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) {
+        l->field.known[i] = w->state[i] == TXI_KNOWN || w->state[i] == TXI_FOREIGN;
+        mark[i] = !l->field.known[i];
+    }
+    txi_distances(mark, w->width, w->height, row, l->field.gap);
+    for (size_t i = 0; i < count; i++) mark[i] = w->state[i] == TXI_HOLE;
+    txi_distances(mark, w->width, w->height, row, l->away);
+    for (size_t i = 0; i < count; i++) mark[i] = w->state[i] != TXI_HOLE;
+    txi_distances(mark, w->width, w->height, row, l->depth);
+    for (size_t i = 0; i < count; i++) {
+        if (l->depth[i] > deepest && l->depth[i] < TXI_FAR) deepest = l->depth[i];
+    }
+    l->width = txm_float(2 * sqrt((double)deepest));
+    l->limit = txm_clampf(0.8f * l->width, TXI_TRACE_LEAST, TXI_TRACE_MOST);
+    return TXM_OK;
+}
+
+/* Find the lines that end at the hole of a window.
+
+   arena  holds the results
+   return TXM_OK, also if there are none; TXM_OUT_OF_MEMORY
+   cost   O(pixels) + O(length of lines); about 250 bytes per pixel while it runs, 60 after      */
+static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env, txi_lines *lines) {
+    txm_arena scratch;
+    int longs = 0;
+    txm_arena_init(&scratch, env);
+    memset(lines, 0, sizeof *lines);
+    txm_status status = txi_lines_begin(w, arena, &scratch, env, lines);
+    const int reach = (int)lines->limit + TXI_LOOK_AHEAD;
+    if (status == TXM_OK)
+        status = txi_field_make(&lines->field, lines->away, reach * reach, arena, env);
+    if (status == TXM_OK) {
+        const double strong = 0.35 * txi_strong(&lines->field, lines->away, reach * reach);
+        lines->threshold = txm_float(strong > 6 ? strong : 6);
+        status = txi_thin_all(lines, reach * reach, arena, env);
+    }
+    if (status == TXM_OK) status = txi_find_ends(w, lines, arena, &scratch, env);
+    if (status == TXM_OK) status = txi_order_ends(w, lines, &scratch, env);
+    for (int i = 0; i < lines->end_count && status == TXM_OK; i++) longs += lines->ends[i].is_long;
+    if (lines->end_count && status == TXM_OK)
+        lines->share_long = (float)longs / (float)lines->end_count;
+    txm_arena_free(&scratch);
+    return status;
+}
 
 #endif /* TEXINPAINT_TRACE_H */
