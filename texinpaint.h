@@ -2037,11 +2037,1928 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests) {
 
 /* ---- prior ---- */
 
-/* ---- vote ---- */
+/* ---- tensor voting ----------------------------------------------------------------------------
+   C. Tang, G. Medioni. Inference of integrated surface, curve and junction descriptions from sparse 3D
+   data. PAMI 1998. Each token, a point of a line or surface, tells its neighbours which direction they
+   would have if both were parts of one smooth line or surface. A symmetric tensor collects the votes:
 
-/* ---- trace ---- */
+       T = l1 e1 e1' + l2 e2 e2' + l3 e3 e3',  l1 >= l2 >= l3                             [1, (1)]
+         = (l1 - l2) e1 e1' + (l2 - l3) (e1 e1' + e2 e2') + l3 I
+            stick: a surface        plate: a line along e3    ball: a junction, or no
+            with normal e1                                    preference
 
-/* ---- join ---- */
+   Tensors are stored as xx xy xz yy yz zz.                                                       */
+
+enum {
+    TXI_VOTE_RADII = 40,  /* entries of the tables of the fields along the distance                */
+    TXI_VOTE_ANGLES = 24, /* and along the angle, 0 to 90 degrees                                  */
+    TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn            */
+};
+
+/* A token: where it is, and its tensor taken apart. */
+typedef struct txi_token {
+    txm_dvec3 place;
+    txm_dvec3 normal;  /* e1                                                                     */
+    txm_dvec3 tangent; /* e3                                                                     */
+    double stick, plate, ball; /* l1 - l2, l2 - l3, l3                                            */
+    int next;          /* next token in the same bucket, or -1                                    */
+} txi_token;
+
+/* The voting fields of one scale. */
+typedef struct txi_fields {
+    double sigma;     /* length unit: how far votes reach                                         */
+    double c;         /* penalty of curvature                                                     */
+    double reach;     /* no votes beyond                                                          */
+    double ball[TXI_VOTE_RADII + 1][2];  /* along the connection, across it                       */
+    double plate[TXI_VOTE_RADII + 1][TXI_VOTE_ANGLES + 1][4]; /* tt, tp, pp, qq, see below         */
+} txi_fields;
+
+/* Tokens in buckets, for the search of neighbours. */
+typedef struct txi_tokens {
+    txi_token *at;
+    int count, room;
+    int *bucket;      /* first token of each bucket, or -1                                        */
+    uint32_t mask;    /* number of buckets less one                                               */
+    double cell;      /* side of a cell of the grid                                               */
+} txi_tokens;
+
+/* theta / sin(theta) for s = sin(theta)^2 <= 1/2, by the series of the arc sine, to 1e-7. */
+static double txi_arc(double s) {
+    double sum = 1, term = 1;
+    for (int k = 1; k <= 18; k++) {
+        term *= s * (2 * k - 1) / (2 * k);
+        sum += term / (2 * k + 1);
+    }
+    return sum;
+}
+
+/* The decay of a stick's vote over distance l at an angle theta between the connection and the
+   tangent plane: along the arc of length s = l theta / sin(theta) and curvature k = 2 sin(theta) / l
+
+       D = exp(-(s^2 + c k^2) / sigma^2)                                                          */
+static double txi_decay(const txi_fields *f, double l, double sine) {
+    const double s = l * txi_arc(sine * sine), k = 2 * sine / l;
+    const double e = (s * s + f->c * k * k) / (f->sigma * f->sigma);
+    return e < 600 ? txm_exp2(-e * 1.4426950408889634) : 0;
+}
+
+static inline void txi_outer(double t[6], txm_dvec3 v, double weight) {
+    t[0] += weight * v.x * v.x;
+    t[1] += weight * v.x * v.y;
+    t[2] += weight * v.x * v.z;
+    t[3] += weight * v.y * v.y;
+    t[4] += weight * v.y * v.z;
+    t[5] += weight * v.z * v.z;
+}
+
+/* The vote of a stick with unit normal n at v from it: the normal of the circle that touches the
+   stick's tangent plane and goes through v. Nothing beyond 45 degrees. */
+static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double weight, double t[6]) {
+    const double l = txm_d3_len(v);
+    if (!(l > 0) || l > f->reach) return;
+    const txm_dvec3 u = txm_d3_scale(v, 1 / l);
+    const double sine = txm_d3_dot(n, u);
+    if (sine * sine > 0.5) return;
+    /* the reflection of n in the plane at a right angle to the connection                        */
+    txi_outer(t, txm_d3_mad(n, u, -2 * sine), weight * txi_decay(f, l, sine));
+}
+
+/* The tables. A ball's vote is the integral over the sphere of sticks; with s the sine of a stick's
+   angle to the plane across the connection u it is, as sticks are reflected,
+
+       3/2 int D s^2 ds  along u,  3/4 int D (1 - s^2) ds  across,  |s| <= sqrt(1/2)
+
+   A plate's vote is the integral of sticks over the circle around its tangent t. In the frame t, p
+   (across t in the plane of t and u), q = t x p it has the entries tt, tp, pp, qq.                */
+static void txi_fields_make(txi_fields *f, double sigma) {
+    f->sigma = sigma;
+    /* so that an eighth of a circle and a straight line of the same length differ as in the paper */
+    f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
+    f->reach = 2.5 * sigma;
+    for (int i = 0; i <= TXI_VOTE_RADII; i++) {
+        const double l = f->reach * (i > 0 ? i : 0.01) / TXI_VOTE_RADII;
+        f->ball[i][0] = f->ball[i][1] = 0;
+        for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                             */
+            const double width = 0.70710678118654752 / TXI_VOTE_STICKS, s = width * (k + 0.5);
+            const double d = 2 * width * txi_decay(f, l, s);
+            f->ball[i][0] += 1.5 * d * s * s;
+            f->ball[i][1] += 0.75 * d * (1 - s * s);
+        }
+        for (int j = 0; j <= TXI_VOTE_ANGLES; j++) {
+            double sine, cosine, *e = f->plate[i][j];
+            txm_sincos(0.5 * TXM_PI * j / TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
+            e[0] = e[1] = e[2] = e[3] = 0;
+            for (int k = 0; k < TXI_VOTE_STICKS; k++) {
+                double np, nq;
+                txm_sincos(0.5 * TXM_PI * (k + 0.5) / TXI_VOTE_STICKS, &nq, &np);
+                const double s = np * sine;
+                if (s * s > 0.5) continue;
+                const double d = 2 * txi_decay(f, l, s) / TXI_VOTE_STICKS;
+                const double rt = -2 * s * cosine, rp = np - 2 * s * sine;
+                e[0] += d * rt * rt;
+                e[1] += d * rt * rp;
+                e[2] += d * rp * rp;
+                e[3] += d * nq * nq;
+            }
+        }
+    }
+}
+
+/* The vote of a ball at v from it. */
+static void txi_vote_ball(const txi_fields *f, txm_dvec3 v, double weight, double t[6]) {
+    const double l = txm_d3_len(v), at = l * TXI_VOTE_RADII / f->reach;
+    if (!(l > 0) || l >= f->reach) return;
+    const int i = (int)at;
+    const double r = at - i;
+    const double along = weight * (f->ball[i][0] * (1 - r) + f->ball[i + 1][0] * r);
+    const double across = weight * (f->ball[i][1] * (1 - r) + f->ball[i + 1][1] * r);
+    txi_outer(t, txm_d3_scale(v, 1 / l), along - across);
+    t[0] += across;
+    t[3] += across;
+    t[5] += across;
+}
+
+/* The vote of a plate, a line in direction tangent (unit), at v from it. */
+static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, double weight,
+                           double t[6]) {
+    const double l = txm_d3_len(v), at = l * TXI_VOTE_RADII / f->reach;
+    double e[4], cosine = txm_d3_dot(tangent, v) / (l > 0 ? l : 1);
+    if (!(l > 0) || l >= f->reach) return;
+    if (cosine < 0) { /* the field is the same behind                                             */
+        tangent = txm_d3_scale(tangent, -1);
+        cosine = -cosine;
+    }
+    txm_dvec3 p = txm_d3_mad(v, tangent, -cosine * l);
+    const double far_off = txm_d3_len(p);
+    if (far_off > 1e-9 * l) {
+        p = txm_d3_scale(p, 1 / far_off);
+    } else {
+        const txm_vec3 any = txm_vec3_perpendicular(txm_v3(
+            txm_float(tangent.x), txm_float(tangent.y), txm_float(tangent.z)));
+        p = txm_d3_unit(txm_d3(any.x, any.y, any.z));
+    }
+    const txm_dvec3 q = txm_d3_cross(tangent, p);
+    /* the angle from its sine or cosine, whichever is less: theta = x * arc(x^2)                 */
+    const double sine = far_off / l;
+    const double angle = sine < cosine ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
+                                       : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
+    const double across = angle * TXI_VOTE_ANGLES / (0.5 * TXM_PI);
+    const int i = (int)at, j = txm_clampi((int)across, 0, TXI_VOTE_ANGLES - 1);
+    const double r = at - i, a = across - j;
+    for (int k = 0; k < 4; k++) {
+        e[k] = weight * ((f->plate[i][j][k] * (1 - a) + f->plate[i][j + 1][k] * a) * (1 - r) +
+                         (f->plate[i + 1][j][k] * (1 - a) + f->plate[i + 1][j + 1][k] * a) * r);
+    }
+    txi_outer(t, tangent, e[0] - e[1]); /* e1 (tp' + pt') = e1 ((t + p)(t + p)' - tt' - pp')       */
+    txi_outer(t, p, e[2] - e[1]);
+    txi_outer(t, txm_d3_add(tangent, p), e[1]);
+    txi_outer(t, q, e[3]);
+}
+
+/* All of a token's vote at a place. */
+static void txi_token_vote(const txi_fields *f, const txi_token *k, txm_dvec3 place, double t[6]) {
+    const txm_dvec3 v = txm_d3_sub(place, k->place);
+    if (txm_d3_len2(v) >= f->reach * f->reach) return;
+    if (k->stick > 0) txi_vote_stick(f, k->normal, v, k->stick, t);
+    if (k->plate > 0) txi_vote_plate(f, k->tangent, v, k->plate, t);
+    if (k->ball > 0) txi_vote_ball(f, v, k->ball, t);
+}
+
+/* ---- tensors ----------------------------------------------------------------------------- */
+
+/* Take a tensor apart. */
+static void txi_token_set(txi_token *k, const double t[6]) {
+    double value[3], e[3][3];
+    k->stick = k->plate = k->ball = 0;
+    k->normal = txm_d3(0, 0, 1);
+    k->tangent = txm_d3(1, 0, 0);
+    if (txm_eigen3(t, value, e) != TXM_OK) return;
+    k->normal = txm_d3(e[0][0], e[0][1], e[0][2]);
+    k->tangent = txm_d3(e[2][0], e[2][1], e[2][2]);
+    k->stick = value[0] - value[1];
+    k->plate = value[1] - value[2];
+    k->ball = value[2] > 0 ? value[2] : 0;
+}
+
+/* The surface as a constraint: lines lie in it, so that only the part of a tensor in the tangent plane
+   counts, P T P with P = I - n n'. A line in direction d, which is a plate (I - d d'), becomes the
+   stick m m' with m = n x d, which votes within the surface only. */
+static void txi_onto_surface(double t[6], txm_dvec3 n) {
+    const txm_dvec3 tn = txm_d3(t[0] * n.x + t[1] * n.y + t[2] * n.z, t[1] * n.x + t[3] * n.y + t[4] * n.z,
+                                t[2] * n.x + t[4] * n.y + t[5] * n.z);
+    const double nn = txm_d3_dot(n, tn);
+    /* T - n (Tn)' - (Tn) n' + (n'Tn) n n'                                                         */
+    t[0] += -2 * n.x * tn.x + nn * n.x * n.x;
+    t[1] += -n.x * tn.y - n.y * tn.x + nn * n.x * n.y;
+    t[2] += -n.x * tn.z - n.z * tn.x + nn * n.x * n.z;
+    t[3] += -2 * n.y * tn.y + nn * n.y * n.y;
+    t[4] += -n.y * tn.z - n.z * tn.y + nn * n.y * n.z;
+    t[5] += -2 * n.z * tn.z + nn * n.z * n.z;
+}
+
+/* ---- buckets ----------------------------------------------------------------------------- */
+
+static uint32_t txi_bucket(const txi_tokens *k, int64_t x, int64_t y, int64_t z) {
+    const uint64_t h = (uint64_t)x * 0x9e3779b97f4a7c15u + (uint64_t)y * 0xc2b2ae3d27d4eb4fu +
+                       (uint64_t)z * 0x165667b19e3779f9u;
+    return (uint32_t)(txm_hash(h) & k->mask);
+}
+
+static int64_t txi_cell(const txi_tokens *k, double x) {
+    return (int64_t)floor(txm_clampf(txm_float(x / k->cell), -1e9f, 1e9f));
+}
+
+/* No tokens; room for that many. */
+static txm_status txi_tokens_make(txi_tokens *k, int room, double reach, txm_arena *arena,
+                                  txm_env *env) {
+    uint32_t buckets = 16;
+    while (buckets < (uint32_t)room) buckets *= 2;
+    k->at = (txi_token *)txm_arena_alloc(arena, (size_t)(room > 0 ? room : 1), sizeof *k->at);
+    k->bucket = (int *)txm_arena_alloc(arena, buckets, sizeof *k->bucket);
+    if (arena->failed) return txi_no_memory(env);
+    k->count = 0;
+    k->room = room;
+    k->mask = buckets - 1;
+    k->cell = reach > 1e-9 ? reach : 1e-9;
+    for (uint32_t i = 0; i < buckets; i++) k->bucket[i] = -1;
+    return TXM_OK;
+}
+
+/* Add a token of tensor t; nothing happens if there is no room. */
+static void txi_tokens_add(txi_tokens *k, txm_dvec3 place, const double t[6]) {
+    if (k->count >= k->room) return;
+    txi_token *token = &k->at[k->count];
+    txi_token_set(token, t);
+    token->place = place;
+    const uint32_t b =
+        txi_bucket(k, txi_cell(k, place.x), txi_cell(k, place.y), txi_cell(k, place.z));
+    token->next = k->bucket[b];
+    k->bucket[b] = k->count++;
+}
+
+/* The sum of all votes at a place, with balls: as if all tokens were unit balls. cost: O(tokens
+   within reach) */
+static void txi_votes_at(const txi_fields *f, const txi_tokens *k, txm_dvec3 place, int balls,
+                         double t[6]) {
+    const int64_t cx = txi_cell(k, place.x), cy = txi_cell(k, place.y), cz = txi_cell(k, place.z);
+    for (int i = 0; i < 6; i++) t[i] = 0;
+    for (int i = 0; i < 27; i++) {
+        const int64_t x = cx + i % 3 - 1, y = cy + i / 3 % 3 - 1, z = cz + i / 9 - 1;
+        for (int j = k->bucket[txi_bucket(k, x, y, z)]; j >= 0; j = k->at[j].next) {
+            const txi_token *o = &k->at[j];
+            /* another cell may share the bucket                                                  */
+            if (txi_cell(k, o->place.x) != x || txi_cell(k, o->place.y) != y ||
+                txi_cell(k, o->place.z) != z)
+                continue;
+            if (balls) txi_vote_ball(f, txm_d3_sub(place, o->place), 1, t);
+            else txi_token_vote(f, o, place, t);
+        }
+    }
+}
+
+/* Sparse voting: each token receives the votes of the others, which replace its tensor. balls: the
+   first round, in which only the places are known. normals: one per token, the surface on which lines
+   lie, or NULL. scratch: 6 numbers per token. */
+static void txi_vote_sparse(const txi_fields *f, txi_tokens *k, int balls, const txm_dvec3 *normals,
+                            double *scratch) {
+    for (int i = 0; i < k->count; i++) {
+        double *t = scratch + 6 * (size_t)i;
+        txi_votes_at(f, k, k->at[i].place, balls, t);
+        if (normals) txi_onto_surface(t, normals[i]);
+    }
+    for (int i = 0; i < k->count; i++) txi_token_set(&k->at[i], scratch + 6 * (size_t)i);
+}
+
+/* ---- lines near a hole ------------------------------------------------------------------------
+   The structure of [1, II.A]: points of strong colour gradient near the hole, thinned to lines, and
+   the ends of these lines at the border of the hole. A window is almost isometric to the surface, so
+   the gradient in the window is the gradient on the surface.                                       */
+
+enum {
+    TXI_GRADIENT_UNIT = 64, /* stored gradients are in 1/64 of a level per pixel               */
+    TXI_GRADIENT_TAPS = 3,  /* pixels; radius of the derivative of a Gaussian of sigma 1.2       */
+    TXI_TENSOR_TAPS = 3,    /* pixels; radius of the Gaussian of sigma 1.5 over the tensor      */
+    TXI_BAND_ROWS = 32,     /* rows that one call of a parallel loop computes                   */
+    TXI_PROFILE = 21,       /* samples of the colours across a line, half a pixel apart          */
+    TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
+    TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
+    TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
+    TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
+};
+
+/* A point of a thinned line. */
+typedef struct txi_thin {
+    txm_vec2 place;   /* window pixels                                                          */
+    txm_vec2 along;   /* direction of the line, unit, either way                                */
+    float strength;   /* gradient, levels per pixel                                             */
+} txi_thin;
+
+/* The end of a line at the border of the hole. */
+typedef struct txi_end {
+    txm_vec2 place;   /* where it enters the hole, window pixels                                */
+    txm_vec2 heading; /* unit, into the hole                                                    */
+    float curvature;  /* 1 / pixels, positive: it turns to the right (towards (-y, x) of heading) */
+    float strength;   /* mean gradient along it, levels per pixel                               */
+    float contrast;   /* difference of the colours of both sides, levels                        */
+    float length;     /* pixels over which it was followed outwards                             */
+    int is_long;      /* long enough to be a line and not grain                                 */
+    int first, count; /* its points in txi_lines.points, from the border outwards, 1 pixel apart */
+    int loop;         /* which loop of the border of the hole it lies on                        */
+    int along;        /* where on the loop, in pixel sides from its start                       */
+    float profile[TXI_PROFILE][3]; /* RGB across it from left to right, 5 pixels to each side   */
+    float fit[6];     /* x = fit[0] + fit[1] s + fit[2] s^2, y with fit[3..5], s = pixels outwards
+                         from place                                                             */
+    float fit_length; /* over how many pixels that holds                                        */
+} txi_end;
+
+/* Gradients of a window. */
+typedef struct txi_slopes {
+    int width, height;
+    const uint8_t *color; /* 4 per pixel                                                        */
+    uint8_t *known;      /* 1: the colour counts                                                */
+    int32_t *gap;        /* squared distance to the nearest pixel that is not known             */
+    int16_t *gradient;   /* 6 per pixel: x and y of R, G, B; 0 where unknown                     */
+    float *strength;     /* root of the sum of their squares, levels per pixel                  */
+    int32_t *tensor;     /* sums of xx, xy, yy over RGB, smoothed, (1/16 level per pixel)^2       */
+} txi_slopes;
+
+/* What is known about the lines of a window. */
+typedef struct txi_lines {
+    txi_end *ends;
+    int end_count;
+    txm_vec2 *points; /* of the ends                                                            */
+    int point_count;
+    txi_thin *thin;   /* all points of lines near the hole                                      */
+    int thin_count;
+    int32_t *thin_at; /* one per pixel: the point in it, or -1                                  */
+    int32_t *away;    /* one per pixel: squared distance to the nearest pixel of the hole        */
+    int32_t *depth;   /* one per pixel: squared distance to the nearest pixel outside of the hole */
+    txi_slopes field;
+    float threshold;  /* least gradient of a line, levels per pixel                             */
+    float width;      /* of the hole: twice the radius of the largest disc in it, pixels        */
+    float limit;      /* pixels over which lines were followed                                  */
+    float share_long; /* share of ends that are long; 0.45 or more: there is structure          */
+} txi_lines;
+
+static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
+    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
+}
+
+static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
+    const double x = (double)a.x - b.x, y = (double)a.y - b.y;
+    return sqrt(x * x + y * y);
+}
+
+static inline txm_vec2 txi_unit(double x, double y) {
+    const double n = sqrt(x * x + y * y);
+    return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
+}
+
+/* ---- distances --------------------------------------------------------------------------- */
+
+enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
+
+/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
+   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
+   row (Meijster, Roerdink, Hesselink 2000).
+   scratch  3 * max(width, height) numbers
+   cost     O(width * height)                                                                     */
+static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
+    int32_t *row = scratch, *hull = row + width, *from = hull + width;
+    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
+    for (int x = 0; x < width; x++) {
+        for (int pass = 0; pass < 2; pass++) {
+            int d = beyond;
+            for (int k = 0; k < height; k++) {
+                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
+                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
+                if (!pass || d < out[i]) out[i] = d;
+            }
+        }
+    }
+    for (int y = 0; y < height; y++) {
+        int32_t *o = out + (size_t)y * (size_t)width;
+        int top = 0;
+        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
+        hull[0] = from[0] = 0;
+        for (int x = 1; x < width; x++) {
+            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
+            for (; top >= 0; top--) {
+                const int h = hull[top], t = from[top];
+                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
+            }
+            if (top < 0) {
+                top = 0;
+                hull[0] = x;
+                from[0] = 0;
+                continue;
+            }
+            const int64_t h = hull[top];
+            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
+            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
+            if (at < width) {
+                hull[++top] = x;
+                from[top] = (int32_t)at;
+            }
+        }
+        for (int x = width - 1; x >= 0; x--) {
+            const int h = hull[top];
+            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
+            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
+            if (x == from[top] && top > 0) top--;
+        }
+    }
+}
+
+/* ---- gradients --------------------------------------------------------------------------- */
+
+/* 64 exp(-k^2 / 2 / 1.2^2): the derivative of a Gaussian is the slope of the plane that fits best
+   with these weights. Next to pixels that are not known the plane is fitted to the known ones, so
+   that the borders of the hole and of the surface are no edges. */
+static const int txi_gradient_weight[TXI_GRADIENT_TAPS + 1] = {64, 45, 16, 3};
+
+/* The slopes of the planes through the known pixels around (x, y): 6 numbers, levels per pixel. */
+static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
+    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x, y */
+    for (int j = -TXI_GRADIENT_TAPS; j <= TXI_GRADIENT_TAPS; j++) {
+        for (int i = -TXI_GRADIENT_TAPS; i <= TXI_GRADIENT_TAPS; i++) {
+            const int px = x + i, py = y + j;
+            if (px < 0 || py < 0 || px >= f->width || py >= f->height) continue;
+            const size_t at = (size_t)py * (size_t)f->width + (size_t)px;
+            if (!f->known[at]) continue;
+            const double w = txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
+            m[0] += w;
+            m[1] += w * i;
+            m[2] += w * j;
+            m[3] += w * i * i;
+            m[4] += w * i * j;
+            m[5] += w * j * j;
+            for (int c = 0; c < 3; c++) {
+                const double value = w * f->color[4 * at + (size_t)c];
+                v[c][0] += value;
+                v[c][1] += value * i;
+                v[c][2] += value * j;
+            }
+        }
+    }
+    for (int c = 0; c < 6; c++) slope[c] = 0;
+    if (m[0] <= 0) return;
+    const double xx = m[3] - m[1] * m[1] / m[0], xy = m[4] - m[1] * m[2] / m[0];
+    const double yy = m[5] - m[2] * m[2] / m[0], det = xx * yy - xy * xy;
+    if (det < 0.05 * m[0] * m[0]) return; /* pixels in one line, or too few: no slope             */
+    for (int c = 0; c < 3; c++) {
+        const double gx = v[c][1] - m[1] * v[c][0] / m[0], gy = v[c][2] - m[2] * v[c][0] / m[0];
+        slope[2 * c] = (yy * gx - xy * gy) / det;
+        slope[2 * c + 1] = (xx * gy - xy * gx) / det;
+    }
+}
+
+static int16_t txi_gradient_round(double slope) {
+    const double v = slope * TXI_GRADIENT_UNIT;
+    return (int16_t)(v < -32000 ? -32000 : v > 32000 ? 32000 : v < 0 ? v - 0.5 : v + 0.5);
+}
+
+/* The job of one band of rows. rows: scratch of this band, 6 * width * (TXI_BAND_ROWS + 6) ints */
+typedef struct txi_slopes_job {
+    txi_slopes *field;
+    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere   */
+    int32_t reach;
+    int32_t *rows;
+    int smooth;          /* 0: the gradients, 1: the tensor                                     */
+} txi_slopes_job;
+
+/* Horizontal sums of row y: smoothed and derived, RGB each. */
+static void txi_gradient_row(const txi_slopes *f, int y, int32_t *out) {
+    const uint8_t *c = f->color + 4 * (size_t)y * (size_t)f->width;
+    for (int x = TXI_GRADIENT_TAPS; x < f->width - TXI_GRADIENT_TAPS; x++) {
+        const uint8_t *p = c + 4 * x;
+        for (int k = 0; k < 3; k++) {
+            out[6 * x + k] = 64 * p[k] + 45 * (p[k - 4] + p[k + 4]) + 16 * (p[k - 8] + p[k + 8]) +
+                             3 * (p[k - 12] + p[k + 12]);
+            out[6 * x + 3 + k] =
+                45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) + 9 * (p[k + 12] - p[k - 12]);
+        }
+    }
+}
+
+static void txi_gradient_pixel(txi_slopes *f, int x, int y, const int32_t *row0, size_t pitch) {
+    const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+    const int taps = TXI_GRADIENT_TAPS;
+    double slope[6], sum = 0;
+    if (f->gap[i] > 2 * taps * taps && x >= taps && y >= taps && x < f->width - taps &&
+        y < f->height - taps) {
+        /* the sum of the weights is 192, that of weight * k^2 is 272                             */
+        for (int c = 0; c < 3; c++) {
+            int gx = 0, gy = 0;
+            for (int k = -taps; k <= taps; k++) {
+                const int32_t *r = row0 + (size_t)(k + taps) * pitch + 6 * (size_t)x;
+                const int w = txi_gradient_weight[k < 0 ? -k : k];
+                gx += w * r[3 + c];
+                gy += w * k * r[c];
+            }
+            slope[2 * c] = gx / (192.0 * 272.0);
+            slope[2 * c + 1] = gy / (192.0 * 272.0);
+        }
+    } else {
+        txi_slope(f, x, y, slope);
+    }
+    for (int c = 0; c < 6; c++) {
+        const int16_t g = txi_gradient_round(slope[c]);
+        f->gradient[6 * i + (size_t)c] = g;
+        sum += (double)g * g;
+    }
+    f->strength[i] = txm_float(sqrt(sum) / TXI_GRADIENT_UNIT);
+}
+
+static void txi_gradient_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
+    txi_slopes *f = job->field;
+    const size_t pitch = 6 * (size_t)f->width;
+    const int taps = TXI_GRADIENT_TAPS;
+    for (int y = y0 - taps; y < y1 + taps; y++) {
+        if (y >= 0 && y < f->height)
+            txi_gradient_row(f, y, rows + (size_t)(y - y0 + taps) * pitch);
+    }
+    for (int y = y0; y < y1; y++) {
+        for (int x = 0; x < f->width; x++) {
+            const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+            if (f->known[i] && (!job->away || job->away[i] <= job->reach))
+                txi_gradient_pixel(f, x, y, rows + (size_t)(y - y0) * pitch, pitch);
+        }
+    }
+}
+
+/* xx, xy, yy of one row, smoothed horizontally by {18, 14, 7, 2} / 64. */
+static void txi_tensor_row(const txi_slopes *f, int y, int32_t *out, int32_t *raw) {
+    const int16_t *g = f->gradient + 6 * (size_t)y * (size_t)f->width;
+    for (int x = 0; x < f->width; x++) {
+        int32_t *t = raw + 3 * x;
+        t[0] = t[1] = t[2] = 0;
+        for (int c = 0; c < 3; c++) {
+            const int gx = g[6 * x + 2 * c] / 4, gy = g[6 * x + 2 * c + 1] / 4;
+            t[0] += gx * gx;
+            t[1] += gx * gy;
+            t[2] += gy * gy;
+        }
+        for (int k = 0; k < 3; k++) t[k] = t[k] > 16000000 ? 16000000 : t[k];
+    }
+    for (int x = 0; x < f->width; x++) {
+        for (int k = 0; k < 3; k++) {
+            int sum = 18 * raw[3 * x + k];
+            if (x >= 1) sum += 14 * raw[3 * (x - 1) + k];
+            if (x >= 2) sum += 7 * raw[3 * (x - 2) + k];
+            if (x >= 3) sum += 2 * raw[3 * (x - 3) + k];
+            if (x + 1 < f->width) sum += 14 * raw[3 * (x + 1) + k];
+            if (x + 2 < f->width) sum += 7 * raw[3 * (x + 2) + k];
+            if (x + 3 < f->width) sum += 2 * raw[3 * (x + 3) + k];
+            out[3 * x + k] = sum / 64;
+        }
+    }
+}
+
+static void txi_tensor_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
+    static const int weight[TXI_TENSOR_TAPS + 1] = {18, 14, 7, 2};
+    txi_slopes *f = job->field;
+    const size_t pitch = 3 * (size_t)f->width;
+    const int taps = TXI_TENSOR_TAPS;
+    int32_t *raw = rows + (size_t)(TXI_BAND_ROWS + 2 * taps) * pitch;
+    for (int y = y0 - taps; y < y1 + taps; y++) {
+        int32_t *out = rows + (size_t)(y - y0 + taps) * pitch;
+        if (y >= 0 && y < f->height) txi_tensor_row(f, y, out, raw);
+        else memset(out, 0, pitch * sizeof *out);
+    }
+    for (int y = y0; y < y1; y++) {
+        int32_t *t = f->tensor + (size_t)y * pitch;
+        for (size_t i = 0; i < pitch; i++) {
+            int sum = 0;
+            for (int k = -taps; k <= taps; k++)
+                sum += weight[k < 0 ? -k : k] * rows[(size_t)(y - y0 + taps + k) * pitch + i];
+            t[i] = sum / 64;
+        }
+    }
+}
+
+static void txi_slopes_body(void *context, int index) {
+    const txi_slopes_job *job = (const txi_slopes_job *)context;
+    const int y0 = index * TXI_BAND_ROWS;
+    const int y1 = y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
+    int32_t *rows = job->rows + (size_t)index * 6 * (size_t)job->field->width * (TXI_BAND_ROWS + 6);
+    if (job->smooth) txi_tensor_band(job, y0, y1, rows);
+    else txi_gradient_band(job, y0, y1, rows);
+}
+
+/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. */
+static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach, txm_arena *arena,
+                                 txm_env *env) {
+    const size_t count = (size_t)f->width * (size_t)f->height;
+    const int bands = (f->height + TXI_BAND_ROWS - 1) / TXI_BAND_ROWS;
+    txi_slopes_job job;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    f->gradient = (int16_t *)txm_arena_zero(arena, count, 6 * sizeof *f->gradient);
+    f->strength = (float *)txm_arena_zero(arena, count, sizeof *f->strength);
+    f->tensor = (int32_t *)txm_arena_zero(arena, count, 3 * sizeof *f->tensor);
+    job.rows = (int32_t *)txm_arena_zero(&scratch, (size_t)bands * 6 * (size_t)f->width,
+                                         (TXI_BAND_ROWS + 6) * sizeof *job.rows);
+    if (arena->failed || scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    job.field = f;
+    job.away = away;
+    job.reach = reach;
+    for (job.smooth = 0; job.smooth < 2; job.smooth++)
+        txm_parallel_for(env, bands, txi_slopes_body, &job);
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* The direction across the edge at a pixel, unit, and how clear it is, 0..1. */
+static double txi_across(const txi_slopes *f, size_t i, double *nx, double *ny) {
+    const double a = f->tensor[3 * i], b = f->tensor[3 * i + 1], c = f->tensor[3 * i + 2];
+    const double half = 0.5 * (a - c), r = sqrt(half * half + b * b);
+    double x = r + half, y = b;
+    if (half < 0) {
+        x = b;
+        y = r - half;
+    }
+    const double n = sqrt(x * x + y * y);
+    *nx = n > 0 ? x / n : 1;
+    *ny = n > 0 ? y / n : 0;
+    return a + c > 0 ? 2 * r / (a + c) : 0;
+}
+
+/* Bilinear gradient strength; 0 outside of the window. */
+static double txi_strength_at(const txi_slopes *f, double x, double y) {
+    if (!(x >= 0 && y >= 0 && x < f->width - 1 && y < f->height - 1)) return 0;
+    const int ix = (int)x, iy = (int)y;
+    const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
+    const double u = x - ix, v = y - iy;
+    return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
+}
+
+/* The pixel of a place, or -1 outside of the window. */
+static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
+    if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
+    return (ptrdiff_t)(int)(y + 0.5) * width + (int)(x + 0.5);
+}
+
+/* ---- following a line -------------------------------------------------------------------- */
+
+/* A place on a line that is being followed. */
+typedef struct txi_walk {
+    double x, y, dx, dy; /* place, unit direction                                               */
+    double change[3];    /* derivative of RGB to the right, levels per pixel, a running mean     */
+} txi_walk;
+
+/* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
+static void txi_change_at(const txi_slopes *f, size_t i, double rx, double ry, double change[3]) {
+    const int16_t *g = f->gradient + 6 * i;
+    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / TXI_GRADIENT_UNIT;
+}
+
+/* Correlation of two colour changes, -1..1. */
+static double txi_agree(const double a[3], const double b[3]) {
+    const double aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+    const double bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2];
+    const double ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    return aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
+}
+
+/* Move a place across the direction (rx, ry), by at most 1 pixel, to where the gradient is largest:
+   five samples and a parabola. Returns the gradient there. */
+static double txi_centre(const txi_slopes *f, double rx, double ry, double *x, double *y) {
+    double s[5], best = -1;
+    int k = 2;
+    static const int order[5] = {2, 1, 3, 0, 4}; /* ties: least movement                         */
+    for (int i = 0; i < 5; i++) {
+        const double o = 0.5 * (order[i] - 2);
+        s[order[i]] = txi_strength_at(f, *x + o * rx, *y + o * ry);
+        if (s[order[i]] > best) {
+            best = s[order[i]];
+            k = order[i];
+        }
+    }
+    double o = 0.5 * (k - 2);
+    if (k > 0 && k < 4) {
+        const double bend = s[k - 1] + s[k + 1] - 2 * s[k];
+        if (bend < 0) o += 0.25 * (s[k - 1] - s[k + 1]) / bend;
+    }
+    *x += o * rx;
+    *y += o * ry;
+    return best;
+}
+
+/* One step along a line; 0: it ends here. least: gradient below which it ends. */
+static int txi_walk_on(const txi_slopes *f, txi_walk *k, double step, double least) {
+    double x = k->x + step * k->dx, y = k->y + step * k->dy, nx, ny, change[3];
+    const double strength = txi_centre(f, -k->dy, k->dx, &x, &y);
+    const ptrdiff_t at = txi_pixel(f->width, f->height, x, y);
+    if (strength < least || at < 0 || !f->known[at]) return 0;
+    const double clear = txi_across(f, (size_t)at, &nx, &ny);
+    double tx = -ny, ty = nx, turn = tx * k->dx + ty * k->dy;
+    if (turn < 0) {
+        tx = -tx;
+        ty = -ty;
+        turn = -turn;
+    }
+    if (clear < 0.3 || turn < 0.5) { /* a junction: straight on                                   */
+        tx = k->dx;
+        ty = k->dy;
+    }
+    const txm_vec2 d = txi_unit(tx + k->dx, ty + k->dy);
+    txi_change_at(f, (size_t)at, -(double)d.y, d.x, change);
+    if (txi_agree(change, k->change) < 0.5) return 0;
+    for (int c = 0; c < 3; c++) k->change[c] = 0.85 * k->change[c] + 0.15 * change[c];
+    /* it must get on, not slide back and forth                                                   */
+    if ((x - k->x) * k->dx + (y - k->y) * k->dy < 0.5 * step) return 0;
+    k->x = x;
+    k->y = y;
+    k->dx = d.x;
+    k->dy = d.y;
+    return 1;
+}
+
+/* ---- points of lines --------------------------------------------------------------------- */
+
+/* The gradient that 98.5 % of the known pixels near the hole do not reach. */
+static double txi_strong(const txi_slopes *f, const int32_t *away, int32_t reach) {
+    enum { BINS = 4096 };  /* of a quarter level per pixel                                        */
+    size_t bins[BINS] = {0}, total = 0, sum = 0;
+    const size_t count = (size_t)f->width * (size_t)f->height;
+    for (size_t i = 0; i < count; i++) {
+        if (!f->known[i] || away[i] > reach) continue;
+        bins[txm_clampi((int)(f->strength[i] * 4), 0, BINS - 1)]++;
+        total++;
+    }
+    for (int k = BINS - 1; k > 0; k--) {
+        sum += bins[k];
+        if (sum * 200 >= total * 3) return 0.25 * k;
+    }
+    return 0;
+}
+
+/* Is pixel (x, y) a maximum of the gradient across the edge? Writes the point. */
+static int txi_thin_pixel(const txi_slopes *f, int x, int y, double least, txi_thin *out) {
+    const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+    double nx, ny;
+    if (f->strength[i] < least) return 0;
+    const double clear = txi_across(f, i, &nx, &ny);
+    const ptrdiff_t a = txi_pixel(f->width, f->height, x + nx, y + ny);
+    const ptrdiff_t b = txi_pixel(f->width, f->height, x - nx, y - ny);
+    if (clear < 0.3 || a < 0 || b < 0 || !f->known[a] || !f->known[b]) return 0;
+    const double s = f->strength[i], before = txi_strength_at(f, x - nx, y - ny);
+    const double after = txi_strength_at(f, x + nx, y + ny);
+    if (before > s || after > s || (before >= s && after >= s)) return 0;
+    const double bend = before + after - 2 * s, o = bend < 0 ? 0.5 * (before - after) / bend : 0;
+    out->place = txm_v2(txm_float(x + o * nx), txm_float(y + o * ny));
+    out->along = txm_v2(txm_float(-ny), txm_float(nx));
+    out->strength = f->strength[i];
+    return 1;
+}
+
+/* All points of lines near the hole, in raster order. */
+static txm_status txi_thin_all(txi_lines *l, int32_t reach, txm_arena *arena, txm_env *env) {
+    const txi_slopes *f = &l->field;
+    const size_t count = (size_t)f->width * (size_t)f->height;
+    l->thin_at = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->thin_at);
+    if (arena->failed) return txi_no_memory(env);
+    for (int pass = 0; pass < 2; pass++) { /* count, then keep                                     */
+        int n = 0;
+        for (int y = 0; y < f->height; y++) {
+            for (int x = 0; x < f->width; x++) {
+                const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+                txi_thin point;
+                l->thin_at[i] = -1;
+                if (!f->known[i] || l->away[i] > reach) continue;
+                if (!txi_thin_pixel(f, x, y, l->threshold, &point)) continue;
+                if (pass) {
+                    l->thin[n] = point;
+                    l->thin_at[i] = n;
+                }
+                n++;
+            }
+        }
+        l->thin_count = n;
+        if (pass || n == 0) continue;
+        l->thin = (txi_thin *)txm_arena_alloc(arena, (size_t)n, sizeof *l->thin);
+        if (arena->failed) return txi_no_memory(env);
+    }
+    return TXM_OK;
+}
+
+/* ---- ends of lines ----------------------------------------------------------------------- */
+
+/* The direction into the hole at a place outside of it: against the gradient of the distance,
+   averaged over some pixels. */
+static txm_vec2 txi_inwards(const txi_lines *l, int x, int y) {
+    const int w = l->field.width, h = l->field.height;
+    double gx = 0, gy = 0;
+    for (int j = -4; j <= 4; j++) {
+        for (int i = -4; i <= 4; i++) {
+            const int px = x + i, py = y + j;
+            if (px < 0 || py < 0 || px >= w || py >= h) continue;
+            const size_t at = (size_t)py * (size_t)w + (size_t)px;
+            const double k = l->depth[at] > 0 ? 1 : 0;
+            gx += k * i;
+            gy += k * j;
+        }
+    }
+    return txi_unit(gx, gy);
+}
+
+/* Follow a line from a point near the border both ways: points from the border outwards. Returns how
+   many; walk receives the direction inwards at the first point. */
+static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards, txm_vec2 *points,
+                      int capacity, double *strength) {
+    const txi_slopes *f = &l->field;
+    const double least = 0.5 * l->threshold > 0.25 * from->strength ? 0.5 * l->threshold
+                                                                     : 0.25 * from->strength;
+    txm_vec2 back[8];
+    int n = 0, inner = 0, steps = 0;
+    double sum = 0;
+    for (int way = 0; way < 2; way++) {
+        txi_walk k;
+        const double side = (double)from->along.x * inwards.x + (double)from->along.y * inwards.y;
+        const double sign = (side < 0) == (way == 0) ? -1 : 1; /* way 0: inwards                  */
+        const ptrdiff_t at = txi_pixel(f->width, f->height, from->place.x, from->place.y);
+        k.x = from->place.x;
+        k.y = from->place.y;
+        k.dx = sign * from->along.x;
+        k.dy = sign * from->along.y;
+        if (at < 0) return 0;
+        txi_change_at(f, (size_t)at, -k.dy, k.dx, k.change);
+        if (way == 1) {
+            while (inner > 0) points[n++] = back[--inner];
+            points[n++] = from->place;
+        }
+        while (way == 0 ? inner < 8 : n < capacity) {
+            if (!txi_walk_on(f, &k, 1, least)) break;
+            const ptrdiff_t i = txi_pixel(f->width, f->height, k.x, k.y);
+            if (way == 0) {
+                if (l->away[i] < 2) break;
+                back[inner++] = txm_v2(txm_float(k.x), txm_float(k.y));
+            } else {
+                /* back at the border of the hole: it does not lead away from it                  */
+                if (l->away[i] < 4) break;
+                points[n++] = txm_v2(txm_float(k.x), txm_float(k.y));
+                sum += f->strength[i];
+                steps++;
+            }
+        }
+    }
+    *strength = steps ? sum / steps : from->strength;
+    return n;
+}
+
+/* Fit x = a + b s + c s^2 by weighted least squares to points 0..n-1, s their distances along the
+   line from the first, weights 1 / (1 + s / 16); degree 1: c = 0. Returns the root mean square
+   distance. */
+static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit[6]) {
+    double m[5] = {0}, v[2][3] = {{0}}, error = 0, s = 0, total = 0;
+    const double scale = n > 1 ? n - 1 : 1; /* s / scale is about 0..1                            */
+    for (int i = 0; i < n; i++) {
+        if (i) s += txi_distance(points[i], points[i - 1]);
+        const double t = s / scale, w = 1 / (1 + s / 16);
+        const double p[2] = {points[i].x - (double)points[0].x, points[i].y - (double)points[0].y};
+        double power = w;
+        for (int k = 0; k < 5; k++, power *= t) {
+            m[k] += power;
+            if (k < 3) {
+                v[0][k] += power * p[0];
+                v[1][k] += power * p[1];
+            }
+        }
+    }
+    for (int d = 0; d < 2; d++) {
+        double *out = fit + 3 * d;
+        const double *r = v[d];
+        const double a = m[2] - m[1] * m[1] / m[0], b = m[3] - m[1] * m[2] / m[0];
+        const double c = m[4] - m[2] * m[2] / m[0];
+        const double q = r[1] - m[1] * r[0] / m[0], u = r[2] - m[2] * r[0] / m[0];
+        const double det = a * c - b * b;
+        const double c2 = degree > 1 && det > 1e-12 ? (a * u - b * q) / det : 0;
+        const double c1 = a > 1e-12 ? (q - b * c2) / a : 0;
+        out[0] = (r[0] - m[1] * c1 - m[2] * c2) / m[0] + (d ? points[0].y : points[0].x);
+        out[1] = c1 / scale;
+        out[2] = c2 / (scale * scale);
+    }
+    s = 0;
+    for (int i = 0; i < n; i++) {
+        if (i) s += txi_distance(points[i], points[i - 1]);
+        const double w = 1 / (1 + s / 16);
+        const double x = fit[0] + fit[1] * s + fit[2] * s * s - points[i].x;
+        const double y = fit[3] + fit[4] * s + fit[5] * s * s - points[i].y;
+        error += w * (x * x + y * y);
+        total += w;
+    }
+    return sqrt(error / total);
+}
+
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
+static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) {
+    double fit[6], line[6], s = 0;
+    int n = e->count, found = 0;
+    for (;;) {
+        const double rms = txi_fit_line(points, n, 2, fit);
+        if (rms < 0.5 || n <= 8) {
+            /* a straight line unless a bent one is clearly better: the direction is more exact   */
+            if (n <= 8 || txi_fit_line(points, n, 1, line) < 1.25 * rms + 0.03) {
+                txi_fit_line(points, n, 1, line);
+                memcpy(fit, line, sizeof fit);
+            }
+            break;
+        }
+        n = n * 3 / 4;
+    }
+    for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels     */
+        s = -0.25 * i;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, fit[0] + fit[1] * s + fit[2] * s * s,
+                                       fit[3] + fit[4] * s + fit[5] * s * s);
+        if (at < 0 || w->state[at] == TXI_VOID) return 0;
+        found = w->state[at] == TXI_HOLE;
+    }
+    if (!found) return 0;
+    const double dx = fit[1] + 2 * fit[2] * s, dy = fit[4] + 2 * fit[5] * s;
+    const double speed = sqrt(dx * dx + dy * dy);
+    if (speed < 0.1) return 0;
+    for (int d = 0; d < 2; d++) { /* from now on s = 0 is the border                               */
+        double *p = fit + 3 * d;
+        p[0] += p[1] * s + p[2] * s * s;
+        p[1] += 2 * p[2] * s;
+    }
+    for (int k = 0; k < 6; k++) e->fit[k] = txm_float(fit[k]);
+    e->fit_length = txm_float(n - s);
+    e->place = txm_v2(e->fit[0], e->fit[3]);
+    e->heading = txi_unit(-dx, -dy);
+    e->curvature = txm_float(-2 * (fit[1] * fit[5] - fit[4] * fit[2]) / (speed * speed * speed));
+    return 1;
+}
+
+/* Colours across the line, a mean over its first pixels. Samples that fall into unknown pixels are
+   left out; where there are none the next one towards the line counts. */
+static void txi_profile(const txi_window *w, const txi_lines *l, txi_end *e) {
+    const txm_vec2 *p = l->points + e->first;
+    const int mid = TXI_PROFILE / 2;
+    double sum[TXI_PROFILE][3] = {{0}}, side[2][3] = {{0}};
+    int hits[TXI_PROFILE] = {0};
+    for (int i = 0; i < e->count && i < 12; i++) {
+        const int a = i > 2 ? i - 2 : 0, b = i + 2 < e->count ? i + 2 : e->count - 1;
+        const txm_vec2 d = txi_unit((double)p[a].x - p[b].x, (double)p[a].y - p[b].y);
+        for (int k = 0; k < TXI_PROFILE; k++) {
+            const double o = 0.5 * (k - mid), x = p[i].x - o * d.y, y = p[i].y + o * d.x;
+            const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
+            if (at < 0 || !l->field.known[at]) continue;
+            for (int c = 0; c < 3; c++) sum[k][c] += w->color[4 * at + c];
+            hits[k]++;
+        }
+    }
+    for (int o = 0; o <= mid; o++) {
+        for (int s = -1; s < 2; s += 2) {
+            const int k = mid + s * o, inner = o ? k - s : k;
+            for (int c = 0; c < 3; c++) {
+                const double outer = hits[k] ? sum[k][c] / hits[k] : o ? e->profile[inner][c] : 128;
+                e->profile[k][c] = txm_float(outer);
+                if (o >= 2 && o <= 6) side[s > 0][c] += outer / 5;
+            }
+        }
+    }
+    double difference = 0;
+    for (int c = 0; c < 3; c++) difference += (side[0][c] - side[1][c]) * (side[0][c] - side[1][c]);
+    e->contrast = txm_float(sqrt(difference / 3));
+}
+
+/* Is there an end already that is the same line? */
+static int txi_end_exists(const txi_lines *l, const txi_end *e) {
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *o = &l->ends[i];
+        if (txi_distance(e->place, o->place) > 2.5) continue;
+        const double d = (double)e->heading.x * o->heading.x + (double)e->heading.y * o->heading.y;
+        double a[3], b[3];
+        for (int c = 0; c < 3; c++) {
+            a[c] = (double)e->profile[12][c] - e->profile[8][c];
+            b[c] = (double)o->profile[12][c] - o->profile[8][c];
+        }
+        if (d > 0.5 && txi_agree(a, b) > 0.3) return 1;
+        if (txi_distance(e->place, o->place) < 1 && d > 0.5) return 1;
+    }
+    return 0;
+}
+
+/* Ends from points 2.6 to 4.2 pixels outside of the hole, the strongest first. */
+static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
+                                txm_arena *scratch, txm_env *env) {
+    const int room = (int)l->limit + 10; /* points of one end                                      */
+    txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
+    size_t count = 0;
+    if (l->thin_count == 0) return TXM_OK;
+    l->ends = (txi_end *)txm_arena_zero(arena, TXI_MAX_ENDS, sizeof *l->ends);
+    l->points = (txm_vec2 *)txm_arena_alloc(arena, TXI_MAX_ENDS * (size_t)room, sizeof *l->points);
+    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    for (int i = 0; i < l->thin_count; i++) {
+        const txm_vec2 p = l->thin[i].place;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
+        if (at < 0 || l->away[at] < 7 || l->away[at] > 17) continue;
+        order[count].key = ~txm_sort_key(l->thin[i].strength);
+        order[count++].value = (uint32_t)i;
+    }
+    txm_sort_pairs(order, order + l->thin_count, count);
+    for (size_t k = 0; k < count && l->end_count < TXI_MAX_ENDS; k++) {
+        const txi_thin *t = &l->thin[order[k].value];
+        txi_end *e = &l->ends[l->end_count];
+        const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
+        double strength;
+        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.35) continue;
+        e->first = l->point_count;
+        e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
+        if (e->count < 5 || !txi_fit_end(w, l->points + e->first, e)) continue;
+        e->strength = txm_float(strength);
+        e->length = (float)e->count;
+        e->is_long = e->length >= 24 || e->length >= 0.8f * l->limit;
+        txi_profile(w, l, e);
+        if (txi_end_exists(l, e)) continue;
+        l->point_count += e->count;
+        l->end_count++;
+    }
+    return TXM_OK;
+}
+
+/* ---- the border of the hole -------------------------------------------------------------- */
+
+/* Number the pixel sides between hole and rest along the border's loops: side 4 i + k is the upper,
+   right, lower, left side of hole pixel i. Each end gets the loop and the place of the side that is
+   nearest. Loops follow the border with the hole to their right. */
+static txm_status txi_order_ends(const txi_window *w, txi_lines *l, txm_arena *scratch, txm_env *env) {
+    static const int sx[4] = {0, 1, 0, -1}, sy[4] = {-1, 0, 1, 0}; /* to the pixel beyond a side   */
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    int32_t *loop_of = (int32_t *)txm_arena_zero(scratch, count, 4 * sizeof *loop_of);
+    int32_t *along = (int32_t *)txm_arena_alloc(scratch, count, 4 * sizeof *along);
+    int loops = 0;
+    if (scratch->failed) return txi_no_memory(env);
+    for (size_t begin = 0; begin < 4 * count; begin++) {
+        const size_t pixel = begin / 4;
+        int x = (int)(pixel % (size_t)w->width), y = (int)(pixel / (size_t)w->width);
+        int side = (int)(begin % 4), n = 0;
+        size_t at = begin;
+        if (w->state[pixel] != TXI_HOLE || loop_of[begin]) continue;
+        const int bx = x + sx[side], by = y + sy[side];
+        if (bx >= 0 && by >= 0 && bx < w->width && by < w->height &&
+            w->state[(size_t)by * (size_t)w->width + (size_t)bx] == TXI_HOLE)
+            continue;
+        loops++;
+        while (!loop_of[at]) { /* forwards along a side is the direction of the next side's normal   */
+            loop_of[at] = loops;
+            along[at] = n++;
+            const int f = (side + 1) % 4;
+            int px = x + sx[f] + sx[side], py = y + sy[f] + sy[side]; /* diagonally ahead: turn left */
+            int turn = 3;
+            for (int k = 0; k < 2; k++) {
+                if (px >= 0 && py >= 0 && px < w->width && py < w->height &&
+                    w->state[(size_t)py * (size_t)w->width + (size_t)px] == TXI_HOLE)
+                    break;
+                px = k ? x : x + sx[f]; /* then straight on, then round the corner                */
+                py = k ? y : y + sy[f];
+                turn = k ? 1 : 0;
+            }
+            x = px;
+            y = py;
+            side = (side + turn) % 4;
+            at = 4 * ((size_t)y * (size_t)w->width + (size_t)x) + (size_t)side;
+        }
+    }
+    for (int i = 0; i < l->end_count; i++) {
+        txi_end *e = &l->ends[i];
+        double best = 1e9;
+        const int cx = (int)(e->place.x + 0.5f), cy = (int)(e->place.y + 0.5f);
+        for (int y = cy - 3; y <= cy + 3; y++) {
+            for (int x = cx - 3; x <= cx + 3; x++) {
+                if (x < 0 || y < 0 || x >= w->width || y >= w->height) continue;
+                for (int k = 0; k < 4; k++) {
+                    const size_t at = 4 * ((size_t)y * (size_t)w->width + (size_t)x) + (size_t)k;
+                    const double dx = x + 0.5 * sx[k] - e->place.x, dy = y + 0.5 * sy[k] - e->place.y;
+                    if (!loop_of[at] || dx * dx + dy * dy >= best) continue;
+                    best = dx * dx + dy * dy;
+                    e->loop = loop_of[at];
+                    e->along = along[at];
+                }
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- all of it --------------------------------------------------------------------------- */
+
+/* known pixels, distances, the width of the hole */
+static txm_status txi_lines_begin(const txi_window *w, txm_arena *arena, txm_arena *scratch,
+                                  txm_env *env, txi_lines *l) {
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    const int longer = w->width > w->height ? w->width : w->height;
+    int32_t deepest = 0;
+    uint8_t *mark = (uint8_t *)txm_arena_alloc(scratch, count, 1);
+    int32_t *row = (int32_t *)txm_arena_alloc(scratch, (size_t)longer, 3 * sizeof *row);
+    l->field.width = w->width;
+    l->field.height = w->height;
+    l->field.color = w->color;
+    l->field.known = (uint8_t *)txm_arena_alloc(arena, count, 1);
+    l->field.gap = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->field.gap);
+    l->away = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->away);
+    l->depth = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->depth);
+    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) {
+        l->field.known[i] = w->state[i] == TXI_KNOWN || w->state[i] == TXI_FOREIGN;
+        mark[i] = !l->field.known[i];
+    }
+    txi_distances(mark, w->width, w->height, row, l->field.gap);
+    for (size_t i = 0; i < count; i++) mark[i] = w->state[i] == TXI_HOLE;
+    txi_distances(mark, w->width, w->height, row, l->away);
+    for (size_t i = 0; i < count; i++) mark[i] = w->state[i] != TXI_HOLE;
+    txi_distances(mark, w->width, w->height, row, l->depth);
+    for (size_t i = 0; i < count; i++) {
+        if (l->depth[i] > deepest && l->depth[i] < TXI_FAR) deepest = l->depth[i];
+    }
+    l->width = txm_float(2 * sqrt((double)deepest));
+    l->limit = txm_clampf(0.8f * l->width, TXI_TRACE_LEAST, TXI_TRACE_MOST);
+    return TXM_OK;
+}
+
+/* Find the lines that end at the hole of a window.
+
+   arena  holds the results
+   return TXM_OK, also if there are none; TXM_OUT_OF_MEMORY
+   cost   O(pixels) + O(length of lines); about 250 bytes per pixel while it runs, 60 after      */
+static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env, txi_lines *lines) {
+    txm_arena scratch;
+    int longs = 0;
+    txm_arena_init(&scratch, env);
+    memset(lines, 0, sizeof *lines);
+    txm_status status = txi_lines_begin(w, arena, &scratch, env, lines);
+    const int reach = (int)lines->limit + TXI_LOOK_AHEAD;
+    if (status == TXM_OK)
+        status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, env);
+    if (status == TXM_OK) {
+        const double strong = 0.35 * txi_strong(&lines->field, lines->away, reach * reach);
+        lines->threshold = txm_float(strong > 6 ? strong : 6);
+        status = txi_thin_all(lines, reach * reach, arena, env);
+    }
+    if (status == TXM_OK) status = txi_find_ends(w, lines, arena, &scratch, env);
+    if (status == TXM_OK) status = txi_order_ends(w, lines, &scratch, env);
+    for (int i = 0; i < lines->end_count && status == TXM_OK; i++) longs += lines->ends[i].is_long;
+    if (lines->end_count && status == TXM_OK)
+        lines->share_long = (float)longs / (float)lines->end_count;
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* ---- which ends belong together ---------------------------------------------------------------
+   The structure of [1, II.B]: lines that end at the hole are continued through it and joined. The
+   paper lets lines grow by tensor voting and joins those that come near each other; growth drifts, and
+   the order of the joins matters. Here the votes are one of several costs of a pair of ends, and the
+   pairs are chosen together, as the matching of least cost.                                         */
+
+enum {
+    TXI_STEPS = 24,        /* pieces of the curve of a candidate                                 */
+    TXI_PER_END = 12,      /* candidates kept for each end, the best ones; ours                   */
+    TXI_MAX_LINKS = 3000,  /* candidates in all; ours                                            */
+    TXI_MOVES = 60000,     /* of the annealing; ours                                             */
+    TXI_KNOWN_PART = 32    /* pixels of a curve outside of the hole, on each side                */
+};
+
+/* A candidate: two ends and the curve between them, or one end and a place where it leaves the hole. */
+typedef struct txi_link {
+    int a, b;          /* ends; b = -1: no end there                                             */
+    float cost, bend, length;
+    txm_vec2 leave;    /* with b = -1: where it leaves the hole,                                  */
+    txm_vec2 backwards; /* and the direction there, into the hole, unit                           */
+    txm_vec2 low, high; /* bounding box                                                          */
+    txm_vec2 points[TXI_STEPS + 1];
+} txi_link;
+
+/* What a way of joining costs. All without unit; ours, from the recipe's experiments. */
+typedef struct txi_rules {
+    double unmatched; /* an end that is not joined                                               */
+    double crossing;  /* two curves that cross                                                   */
+    double bend;      /* factor of the bending energy                                            */
+    int look_ahead;   /* long ends may leave the hole without another end                        */
+} txi_rules;
+
+static txi_rules txi_rules_of(int structure) {
+    txi_rules picture = {2.2, 0.3, 1, 1}, pattern = {6, 2, 0.6, 0};
+    return structure == TEXINPAINT_PATTERN ? pattern : picture;
+}
+
+/* ---- curves ------------------------------------------------------------------------------ */
+
+/* The cubic from p in direction d to q, where it arrives against direction e (e points back into the
+   hole). Speeds at both ends: chord * 2 / (1 + cos of the angle to the chord), which makes a good
+   circle of a circle's ends. */
+static void txi_hermite(txm_vec2 p, txm_vec2 d, txm_vec2 q, txm_vec2 e, int steps, txm_vec2 *out) {
+    const double cx = (double)q.x - p.x, cy = (double)q.y - p.y, chord = sqrt(cx * cx + cy * cy);
+    const double n = chord > 0 ? chord : 1;
+    const double cd = (d.x * cx + d.y * cy) / n, ce = -(e.x * cx + e.y * cy) / n;
+    const double sd = chord * 2 / (1 + (cd > 0 ? cd : 0)), se = chord * 2 / (1 + (ce > 0 ? ce : 0));
+    for (int i = 0; i <= steps; i++) {
+        const double t = (double)i / steps, u = 1 - t;
+        const double h0 = u * u * (1 + 2 * t), h1 = t * u * u * sd, g0 = t * t * (3 - 2 * t);
+        const double g1 = t * t * u * se;
+        out[i] = txm_v2(txm_float(h0 * p.x + h1 * d.x + g0 * q.x + g1 * e.x),
+                        txm_float(h0 * p.y + h1 * d.y + g0 * q.y + g1 * e.y));
+    }
+}
+
+/* Length of a line, and its bending energy: length times the integral of squared curvature, which is
+   the squared angle for an arc, whatever its size. */
+static void txi_bend(const txm_vec2 *p, int count, double *length, double *bend) {
+    double sum = 0, energy = 0;
+    for (int i = 1; i < count; i++) {
+        const double step = txi_distance(p[i], p[i - 1]);
+        sum += step;
+        if (i < 2 || step <= 0) continue;
+        const double before = txi_distance(p[i - 1], p[i - 2]);
+        if (before <= 0) continue;
+        const double dot = ((double)p[i].x - p[i - 1].x) * ((double)p[i - 1].x - p[i - 2].x) +
+                           ((double)p[i].y - p[i - 1].y) * ((double)p[i - 1].y - p[i - 2].y);
+        /* squared angle, to second order 2 (1 - cos); over a half turn it is 4, enough          */
+        energy += 2 * (1 - dot / (step * before)) / (0.5 * (step + before));
+    }
+    *length = sum;
+    *bend = energy > 0 ? sum * energy : 0;
+}
+
+/* How far a line runs outside of the hole, more than a pixel from it, as a share of its length. */
+static double txi_outside(const txi_window *w, const txi_lines *l, const txm_vec2 *p, int count) {
+    int out = 0;
+    for (int i = 0; i < count; i++) {
+        const ptrdiff_t at = txi_pixel(w->width, w->height, p[i].x, p[i].y);
+        out += at < 0 || (w->state[at] != TXI_HOLE && l->away[at] > 4);
+    }
+    return (double)out / count;
+}
+
+/* ---- costs ------------------------------------------------------------------------------- */
+
+/* How well the colours of two ends go together: one enters the hole where the other leaves it, so
+   left is right. correlation -1..1; mismatch: difference over contrast; sides: difference of the
+   colours left and right, levels. */
+static void txi_compare(const txi_end *a, const txi_end *b, double *correlation, double *mismatch,
+                        double sides[2]) {
+    const int mid = TXI_PROFILE / 2;
+    double mean[2][3] = {{0}}, aa = 0, bb = 0, ab = 0, difference = 0, total = 0;
+    double side[2][3] = {{0}};
+    for (int k = 0; k < TXI_PROFILE; k++) {
+        const double o = 0.5 * (k - mid), w = 1 / (1 + o * o / 6); /* less far from the line       */
+        total += w;
+        for (int c = 0; c < 3; c++) {
+            mean[0][c] += w * a->profile[k][c];
+            mean[1][c] += w * b->profile[TXI_PROFILE - 1 - k][c];
+        }
+    }
+    for (int k = 0; k < TXI_PROFILE; k++) {
+        const double o = 0.5 * (k - mid), w = 1 / (1 + o * o / 6);
+        for (int c = 0; c < 3; c++) {
+            const double p = a->profile[k][c], q = b->profile[TXI_PROFILE - 1 - k][c];
+            const double u = p - mean[0][c] / total, v = q - mean[1][c] / total;
+            aa += w * u * u;
+            bb += w * v * v;
+            ab += w * u * v;
+            difference += w * fabs(p - q);
+            if (k < mid - 1 && k > mid - 8) side[0][c] += (p - q) / 6;
+            if (k > mid + 1 && k < mid + 8) side[1][c] += (p - q) / 6;
+        }
+    }
+    *correlation = aa > 0 && bb > 0 ? ab / sqrt(aa * bb) : 0;
+    *mismatch = difference / (3 * total) / (0.5 * ((double)a->contrast + b->contrast) + 10);
+    for (int s = 0; s < 2; s++)
+        sides[s] = sqrt((side[s][0] * side[s][0] + side[s][1] * side[s][1] + side[s][2] * side[s][2]) / 3);
+}
+
+/* The mean curvature of an arc from a to b, to compare with the curvatures of the ends. */
+static double txi_turn(const txi_link *k) {
+    const txm_vec2 *p = k->points;
+    double sum = 0;
+    for (int i = 2; i <= TXI_STEPS; i++) {
+        const double ax = (double)p[i - 1].x - p[i - 2].x, ay = (double)p[i - 1].y - p[i - 2].y;
+        const double bx = (double)p[i].x - p[i - 1].x, by = (double)p[i].y - p[i - 1].y;
+        const double n = sqrt((ax * ax + ay * ay) * (bx * bx + by * by));
+        if (n > 0) sum += (ax * by - ay * bx) / n; /* sine of the angle                            */
+    }
+    return k->length > 0 ? sum / k->length : 0;
+}
+
+static void txi_link_box(txi_link *k) {
+    k->low = k->high = k->points[0];
+    for (int i = 1; i <= TXI_STEPS; i++) {
+        k->low.x = txm_minf(k->low.x, k->points[i].x);
+        k->low.y = txm_minf(k->low.y, k->points[i].y);
+        k->high.x = txm_maxf(k->high.x, k->points[i].x);
+        k->high.y = txm_maxf(k->high.y, k->points[i].y);
+    }
+}
+
+/* The candidate of ends a and b; 0 if they cannot belong together. */
+static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rules *rules, int a, int b,
+                         txi_link *k) {
+    const txi_end *p = &l->ends[a], *q = &l->ends[b];
+    double correlation, mismatch, sides[2], length, bend;
+    txi_compare(p, q, &correlation, &mismatch, sides);
+    if (correlation < 0.3 && sides[0] > 30 && sides[1] > 30) return 0;
+    if (correlation < -0.2) return 0;
+    txi_hermite(p->place, p->heading, q->place, q->heading, TXI_STEPS, k->points);
+    txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
+    if (length < 2 || txi_outside(w, l, k->points, TXI_STEPS + 1) > 0.12) return 0;
+    k->a = a;
+    k->b = b;
+    k->length = txm_float(length);
+    k->bend = txm_float(bend);
+    const double turn = txi_turn(k);
+    const double curvature = (fabs(p->curvature - turn) + fabs(-q->curvature - turn)) * 0.5 * length;
+    const double u = (double)p->contrast + 2, v = (double)q->contrast + 2;
+    k->cost = txm_float(rules->bend * bend + 3 * (1 - correlation) + 1.5 * (mismatch < 2 ? mismatch : 2) +
+                        0.6 * fabs(u - v) / (u + v) + 0.6 * length / (l->width > 8 ? l->width : 8) +
+                        0.3 * (curvature < 3 ? curvature : 3) + 0.3 * !p->is_long + 0.3 * !q->is_long);
+    txi_link_box(k);
+    return 1;
+}
+
+/* ---- looking ahead ----------------------------------------------------------------------- */
+
+/* Continue end a straight on (along its fitted curve) to the other side of the hole, and look for a
+   line there that could be its continuation although it does not end at the hole, as other lines
+   cross it there: at least 10 of 45 pixels on which a point lies within 6 pixels, in its direction and
+   with the same polarity. 0: there is none. */
+static int txi_look_ahead(const txi_window *w, const txi_lines *l, const txi_rules *rules, int a,
+                          txi_link *k) {
+    const txi_end *e = &l->ends[a];
+    const double turn = fabs(e->curvature) * l->width < 1.5 ? e->curvature : 0;
+    double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y, change[3];
+    double offset = 0, offsets[TXI_LOOK_AHEAD];
+    int inside = 0, beyond = 0, hits = 0, first = 0;
+    txm_vec2 exit = e->place, direction = e->heading;
+    for (int c = 0; c < 3; c++) change[c] = (double)e->profile[13][c] - e->profile[7][c];
+    for (int i = 0; i < 4 * (w->width + w->height) && beyond < TXI_LOOK_AHEAD; i++) {
+        x += dx;
+        y += dy;
+        const txm_vec2 d = txi_unit(dx - turn * dy, dy + turn * dx);
+        dx = d.x;
+        dy = d.y;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
+        if (at < 0 || w->state[at] == TXI_VOID) break;
+        if (w->state[at] == TXI_HOLE) {
+            if (beyond) break;
+            inside++;
+            exit = txm_v2(txm_float(x), txm_float(y));
+            direction = d;
+            continue;
+        }
+        if (inside < 4) {
+            if (i > 4) return 0;
+            continue;
+        }
+        double best = 6.5;
+        for (int o = 0; o <= 12; o++) { /* the nearest fitting point to either side                 */
+            const int s = o & 1 ? -(o + 1) / 2 : o / 2;
+            const ptrdiff_t i2 = txi_pixel(w->width, w->height, x - s * dy, y + s * dx);
+            if (i2 < 0 || l->thin_at[i2] < 0 || fabs(best) < 6.5) continue;
+            const txi_thin *t = &l->thin[l->thin_at[i2]];
+            double other[3];
+            txi_change_at(&l->field, (size_t)i2, -dy, dx, other);
+            if (fabs(t->along.x * dx + t->along.y * dy) < 0.94 || txi_agree(change, other) < 0.7) continue;
+            best = (t->place.x - x) * -dy + (t->place.y - y) * dx;
+        }
+        if (fabs(best) < 6.5) {
+            if (!hits) first = beyond;
+            offsets[hits++] = best;
+        }
+        beyond++;
+    }
+    if (hits < 10 || first > 25 || inside < 6) return 0;
+    for (int i = 0; i < hits; i++) offset += offsets[i] / hits;
+    k->a = a;
+    k->b = -1;
+    k->leave = txm_v2(txm_float(exit.x - offset * direction.y), txm_float(exit.y + offset * direction.x));
+    k->backwards = txm_v2(-direction.x, -direction.y);
+    double length, bend;
+    txi_hermite(e->place, e->heading, k->leave, k->backwards, TXI_STEPS, k->points);
+    txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
+    k->length = txm_float(length);
+    k->bend = txm_float(bend);
+    k->cost = txm_float(rules->bend * bend + 0.6 * length / (l->width > 8 ? l->width : 8) +
+                        0.9 - 0.02 * hits + 0.05 * fabs(offset));
+    txi_link_box(k);
+    return 1;
+}
+
+/* ---- matching ---------------------------------------------------------------------------- */
+
+/* The state of the search for the matching of least cost. */
+typedef struct txi_pairing {
+    const txi_link *links;
+    int link_count, end_count;
+    double unmatched, crossing;
+    uint8_t *crosses;  /* link_count squared: 0 not known yet, 1 no, 2 yes                         */
+    int *chosen;       /* one per end: its link, or -1                                           */
+    int *active;       /* the chosen links                                                       */
+    int *slot;         /* one per link: where it is in active, or -1                             */
+    int active_count;
+    int *of_end, *of_start; /* links of end i: of_end[of_start[i]] .. of_end[of_start[i + 1] - 1]    */
+} txi_pairing;
+
+static int txi_segments_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d) {
+    const double ux = (double)b.x - a.x, uy = (double)b.y - a.y;
+    const double vx = (double)d.x - c.x, vy = (double)d.y - c.y;
+    const double s = ux * ((double)c.y - a.y) - uy * ((double)c.x - a.x);
+    const double t = ux * ((double)d.y - a.y) - uy * ((double)d.x - a.x);
+    const double p = vx * ((double)a.y - c.y) - vy * ((double)a.x - c.x);
+    const double q = vx * ((double)b.y - c.y) - vy * ((double)b.x - c.x);
+    return ((s < 0) != (t < 0)) && ((p < 0) != (q < 0));
+}
+
+static int txi_links_cross(const txi_link *a, const txi_link *b) {
+    if (a->low.x > b->high.x || b->low.x > a->high.x || a->low.y > b->high.y || b->low.y > a->high.y)
+        return 0;
+    for (int i = 0; i < TXI_STEPS; i++) {
+        const float x0 = txm_minf(a->points[i].x, a->points[i + 1].x);
+        const float x1 = txm_maxf(a->points[i].x, a->points[i + 1].x);
+        const float y0 = txm_minf(a->points[i].y, a->points[i + 1].y);
+        const float y1 = txm_maxf(a->points[i].y, a->points[i + 1].y);
+        if (x0 > b->high.x || x1 < b->low.x || y0 > b->high.y || y1 < b->low.y) continue;
+        for (int j = 0; j < TXI_STEPS; j++) {
+            if (txi_segments_cross(a->points[i], a->points[i + 1], b->points[j], b->points[j + 1]))
+                return 1;
+        }
+    }
+    return 0;
+}
+
+static int txi_crosses(txi_pairing *m, int a, int b) {
+    const size_t n = (size_t)m->link_count;
+    uint8_t *c = &m->crosses[(size_t)a * n + (size_t)b];
+    if (!*c) {
+        *c = txi_links_cross(&m->links[a], &m->links[b]) ? 2 : 1;
+        m->crosses[(size_t)b * n + (size_t)a] = *c;
+    }
+    return *c == 2;
+}
+
+/* What link k costs beside the active ones, apart from being matched or not. */
+static double txi_link_energy(txi_pairing *m, int k) {
+    double sum = m->links[k].cost;
+    for (int i = 0; i < m->active_count; i++) {
+        if (m->active[i] != k && txi_crosses(m, k, m->active[i])) sum += m->crossing;
+    }
+    return sum;
+}
+
+static void txi_activate(txi_pairing *m, int k) {
+    m->slot[k] = m->active_count;
+    m->active[m->active_count++] = k;
+    m->chosen[m->links[k].a] = k;
+    if (m->links[k].b >= 0) m->chosen[m->links[k].b] = k;
+}
+
+static void txi_deactivate(txi_pairing *m, int k) {
+    const int s = m->slot[k], last = m->active[--m->active_count];
+    m->active[s] = last;
+    m->slot[last] = s;
+    m->slot[k] = -1;
+    m->chosen[m->links[k].a] = -1;
+    if (m->links[k].b >= 0) m->chosen[m->links[k].b] = -1;
+}
+
+/* How much matching link k saves: its ends are no longer unmatched. */
+static double txi_saved(const txi_pairing *m, int k) {
+    return m->unmatched * (m->links[k].b >= 0 ? 2 : 1);
+}
+
+static double txi_remove(txi_pairing *m, int k) {
+    const double change = txi_saved(m, k) - txi_link_energy(m, k);
+    txi_deactivate(m, k);
+    return change;
+}
+
+static double txi_insert(txi_pairing *m, int k) {
+    const double change = txi_link_energy(m, k) - txi_saved(m, k);
+    txi_activate(m, k);
+    return change;
+}
+
+/* The link between two ends, or -1. */
+static int txi_link_between(const txi_pairing *m, int a, int b) {
+    for (int i = m->of_start[a]; i < m->of_start[a + 1]; i++) {
+        const txi_link *k = &m->links[m->of_end[i]];
+        if ((k->a == a && k->b == b) || (k->b == a && k->a == b)) return m->of_end[i];
+    }
+    return -1;
+}
+
+/* Try link k: it goes if it is there; else it replaces the links of its two ends, and the two ends that
+   become free are joined if they can be. Kept if the energy changes by less than allowed; returns the
+   change, or 0 if it was not kept. */
+static double txi_pairing_try(txi_pairing *m, int k, double allowed) {
+    int gone[2] = {-1, -1}, free_end[2] = {-1, -1}, extra = -1;
+    double change = 0;
+    if (m->slot[k] >= 0) {
+        change = txi_remove(m, k);
+        if (change < allowed) return change;
+        txi_activate(m, k);
+        return 0;
+    }
+    for (int s = 0; s < 2; s++) {
+        const int end = s ? m->links[k].b : m->links[k].a;
+        const int old = end >= 0 ? m->chosen[end] : -1;
+        if (old < 0) continue;
+        gone[s] = old;
+        free_end[s] = m->links[old].a == end ? m->links[old].b : m->links[old].a;
+        change += txi_remove(m, old);
+    }
+    change += txi_insert(m, k);
+    if (free_end[0] >= 0 && free_end[1] >= 0) {
+        extra = txi_link_between(m, free_end[0], free_end[1]);
+        if (extra >= 0) {
+            const double more = txi_insert(m, extra);
+            if (more < 0) change += more;
+            else {
+                txi_deactivate(m, extra);
+                extra = -1;
+            }
+        }
+    }
+    if (change < allowed) return change;
+    if (extra >= 0) txi_deactivate(m, extra);
+    txi_deactivate(m, k);
+    for (int s = 0; s < 2; s++) {
+        if (gone[s] >= 0) txi_activate(m, gone[s]);
+    }
+    return 0;
+}
+
+/* Simulated annealing from no joins at all; then every link is tried until none improves. best: room
+   for end_count numbers. */
+static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
+    txm_rng rng = txm_rng_make(seed, 0x6a6f696e);
+    double energy = 0, least = 0;
+    for (int i = 0; i < m->end_count; i++) best[i] = -1;
+    for (int i = 0; i < TXI_MOVES && m->link_count; i++) {
+        const double heat = 1.5 * txm_exp2(-7.0 * i / TXI_MOVES);
+        const int k = (int)txm_rng_below(&rng, (uint32_t)m->link_count);
+        const double u = txm_rng_double(&rng);
+        /* accepted with probability exp(-change / heat): a change below -heat log(u)             */
+        double bits = 0, v = u > 1e-9 ? u : 1e-9;
+        while (v < 0.5) {
+            v *= 2;
+            bits += 1;
+        }
+        const double allowed = heat * (bits * 0.6931471805599453 + 1.4 * (1 - v) * (1.5 - 0.5 * v));
+        energy += txi_pairing_try(m, k, allowed);
+        if (energy < least - 1e-9) {
+            least = energy;
+            memcpy(best, m->chosen, (size_t)m->end_count * sizeof *best);
+        }
+    }
+    while (m->active_count) txi_deactivate(m, m->active[m->active_count - 1]);
+    for (int i = 0; i < m->end_count; i++) {
+        if (best[i] >= 0 && m->slot[best[i]] < 0) txi_activate(m, best[i]);
+    }
+    for (int round = 0, better = 1; better && round < 50; round++) {
+        better = 0;
+        for (int k = 0; k < m->link_count; k++) better |= txi_pairing_try(m, k, -1e-7) < 0;
+    }
+}
+
+/* ---- candidates -------------------------------------------------------------------------- */
+
+/* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
+   they are better than no join. Returns how many. */
+static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
+                          txi_link *links) {
+    int count = 0;
+    for (int a = 0; a < l->end_count; a++) {
+        int kept = 0;
+        const int start = count;
+        for (int b = a + 1; b <= l->end_count && count < TXI_MAX_LINKS; b++) {
+            txi_link k;
+            memset(&k, 0, sizeof k);
+            if (b < l->end_count) {
+                if (alpha > 0 && txi_distance(l->ends[a].place, l->ends[b].place) > alpha) continue;
+                if (!txi_link_ends(w, l, rules, a, b, &k)) continue;
+            } else if (!rules->look_ahead || !l->ends[a].is_long ||
+                       !txi_look_ahead(w, l, rules, a, &k)) {
+                continue;
+            }
+            if (k.cost >= rules->unmatched * (k.b >= 0 ? 2 : 1)) continue;
+            if (kept < TXI_PER_END) {
+                links[count++] = k;
+                kept++;
+                continue;
+            }
+            int worst = start;
+            for (int i = start; i < count; i++) {
+                if (links[i].cost > links[worst].cost) worst = i;
+            }
+            if (k.cost < links[worst].cost) links[worst] = k;
+        }
+    }
+    return count;
+}
+
+static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int count, int ends,
+                                 const txi_rules *rules, txm_arena *scratch, txm_env *env) {
+    const size_t n = (size_t)count, e = (size_t)ends;
+    memset(m, 0, sizeof *m);
+    m->links = links;
+    m->link_count = count;
+    m->end_count = ends;
+    m->unmatched = rules->unmatched;
+    m->crossing = rules->crossing;
+    m->crosses = (uint8_t *)txm_arena_zero(scratch, n, n);
+    m->chosen = (int *)txm_arena_alloc(scratch, e, sizeof(int));
+    m->active = (int *)txm_arena_alloc(scratch, n, sizeof(int));
+    m->slot = (int *)txm_arena_alloc(scratch, n, sizeof(int));
+    m->of_end = (int *)txm_arena_alloc(scratch, n, 2 * sizeof(int));
+    m->of_start = (int *)txm_arena_zero(scratch, e + 2, sizeof(int));
+    if (scratch->failed) return txi_no_memory(env);
+    for (int i = 0; i < ends; i++) m->chosen[i] = -1;
+    for (int k = 0; k < count; k++) {
+        m->slot[k] = -1;
+        m->of_start[links[k].a + 2]++;
+        if (links[k].b >= 0) m->of_start[links[k].b + 2]++;
+    }
+    for (int i = 0; i < ends; i++) m->of_start[i + 2] += m->of_start[i + 1];
+    for (int k = 0; k < count; k++) {
+        m->of_end[m->of_start[links[k].a + 1]++] = k;
+        if (links[k].b >= 0) m->of_end[m->of_start[links[k].b + 1]++] = k;
+    }
+    return TXM_OK;
+}
+
+/* ---- the curves -------------------------------------------------------------------------- */
+
+/* Points about a pixel apart along a line into out; returns how many, at most room. */
+static int txi_resample(const txm_vec2 *p, int count, txm_vec2 *out, int room) {
+    double length = 0, at = 0;
+    for (int i = 1; i < count; i++) length += txi_distance(p[i], p[i - 1]);
+    int n = (int)(length + 0.5) + 1;
+    n = n < 2 ? 2 : n > room ? room : n;
+    const double step = length / (n - 1);
+    int k = 0;
+    for (int i = 0; i < n; i++) {
+        const double target = i * step;
+        double piece = k + 1 < count ? txi_distance(p[k], p[k + 1]) : 0;
+        while (k + 2 < count && at + piece < target) {
+            at += piece;
+            k++;
+            piece = txi_distance(p[k], p[k + 1]);
+        }
+        const double t = piece > 0 ? (target - at) / piece : 0;
+        out[i] = k + 1 < count ? txi_between(p[k], p[k + 1], t < 0 ? 0 : t > 1 ? 1 : t) : p[k];
+    }
+    return n;
+}
+
+/* The known part of the line of an end: point s pixels outwards from the border. First the fitted
+   curve, so that it goes into the hole without a kink, further out the points as traced. */
+static txm_vec2 txi_known_point(const txi_lines *l, const txi_end *e, int s) {
+    const txm_vec2 *p = l->points + e->first;
+    const double gap = txi_distance(p[0], e->place); /* the first traced point is that far out     */
+    const double x = (double)e->fit[0] + e->fit[1] * (double)s + e->fit[2] * (double)s * s;
+    const double y = (double)e->fit[3] + e->fit[4] * (double)s + e->fit[5] * (double)s * s;
+    const double at = s - gap;
+    int i = at > 0 ? (int)at : 0;
+    if (i > e->count - 2) i = e->count - 2;
+    const txm_vec2 traced = txi_between(p[i], p[i + 1], at - i < 0 ? 0 : at - i > 1 ? 1 : at - i);
+    const double t = s < 4 ? 0 : s > 12 ? 1 : (s - 4) / 8.0;
+    return txi_between(txm_v2(txm_float(x), txm_float(y)), traced, t * t * (3 - 2 * t));
+}
+
+static int txi_known_count(const txi_end *e) {
+    const int n = e->count - 1;
+    return n < TXI_KNOWN_PART ? n : TXI_KNOWN_PART;
+}
+
+/* A chosen link as a curve with its known parts. dense, fine: room for room points */
+static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const txi_link *k,
+                                 txm_vec2 *dense, txm_vec2 *fine, int room, txm_arena *arena,
+                                 txm_env *env, txi_curve *c) {
+    const txi_end *a = &l->ends[k->a], *b = k->b >= 0 ? &l->ends[k->b] : NULL;
+    int n = 0, m;
+    const int head = txi_known_count(a), tail = b ? txi_known_count(b) : 0;
+    for (int s = head; s > 0; s--) dense[n++] = txi_known_point(l, a, s);
+    txi_hermite(a->place, a->heading, b ? b->place : k->leave, b ? b->heading : k->backwards, 4 * TXI_STEPS,
+              fine);
+    m = txi_resample(fine, 4 * TXI_STEPS + 1, dense + n, room - n - TXI_KNOWN_PART);
+    n += m;
+    for (int s = 1; s <= tail; s++) dense[n++] = txi_known_point(l, b, s);
+    c->points = (txm_vec2 *)txm_arena_alloc(arena, (size_t)n, sizeof *c->points);
+    if (!c->points) return txi_no_memory(env);
+    memcpy(c->points, dense, (size_t)n * sizeof *dense);
+    c->count = n;
+    c->first = -1;
+    c->last = -1;
+    for (int i = 0; i < n; i++) {
+        const ptrdiff_t at = txi_pixel(w->width, w->height, dense[i].x, dense[i].y);
+        if (at < 0 || w->state[at] != TXI_HOLE) continue;
+        if (c->first < 0) c->first = i;
+        c->last = i;
+    }
+    c->ends[0] = k->a;
+    c->ends[1] = k->b;
+    c->strength = b ? 0.5f * (a->contrast + b->contrast) : a->contrast;
+    c->partner = -1;
+    return TXM_OK;
+}
+
+/* Join the lines that end at the hole.
+
+   prior      lines that attract, or NULL
+   structure  TEXINPAINT_PICTURE or TEXINPAINT_PATTERN; TEXINPAINT_TEXTURE: no curves
+   alpha      the largest distance of two ends that are joined, pixels; 0 = no limit
+   beta       rounds over which lines grow by votes; 0 = as many as it takes
+   curves     receives *count curves, in the arena                                             */
+static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_prior *prior, int structure,
+                           float alpha, int beta, uint64_t seed, txm_arena *arena, txm_env *env,
+                           txi_curve **curves, int *count) {
+    const txi_rules rules = txi_rules_of(structure);
+    const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
+    txm_arena scratch;
+    txi_pairing match;
+    txm_status status = TXM_OK;
+    (void)prior;
+    (void)beta;
+    *curves = NULL;
+    *count = 0;
+    if (structure == TEXINPAINT_TEXTURE || l->end_count == 0) return TXM_OK;
+    txm_arena_init(&scratch, env);
+    txi_link *links = (txi_link *)txm_arena_alloc(&scratch, TXI_MAX_LINKS, sizeof *links);
+    int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
+    txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)room, 2 * sizeof *dense);
+    if (scratch.failed) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        const int n = txi_candidates(w, l, &rules, alpha, links);
+        status = n ? txi_pairing_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
+        if (status == TXM_OK && n) {
+            txi_anneal(&match, seed, best);
+            *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)match.active_count, sizeof **curves);
+            if (arena->failed) status = txi_no_memory(env);
+            for (int k = 0; k < n && status == TXM_OK; k++) {
+                if (match.slot[k] < 0) continue;
+                txi_curve c;
+                status = txi_curve_make(w, l, &links[k], dense, dense + room, room, arena, env, &c);
+                if (status == TXM_OK && c.first >= 0) (*curves)[(*count)++] = c;
+            }
+        }
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* ---- what a result keeps of the lines ---------------------------------------------------- */
+
+enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go on                */
+
+/* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an end:
+   no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
+   strength. */
+static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *e) {
+    txi_walk k;
+    int n = 0;
+    k.x = (double)e->fit[0] + 2.0 * e->fit[1] + 4.0 * e->fit[2];
+    k.y = (double)e->fit[3] + 2.0 * e->fit[4] + 4.0 * e->fit[5];
+    const txm_vec2 d = txi_unit(-e->fit[1] - 4.0 * e->fit[2], -e->fit[4] - 4.0 * e->fit[5]);
+    k.dx = d.x;
+    k.dy = d.y;
+    txi_centre(f, -k.dy, k.dx, &k.x, &k.y);
+    const ptrdiff_t from = txi_pixel(w->width, w->height, k.x, k.y);
+    if (from < 0) return 0;
+    txi_change_at(f, (size_t)from, -k.dy, k.dx, k.change);
+    for (int i = 0; i < 12 && n < TXI_GO_ON; i++) {
+        if (!txi_walk_on(f, &k, 1, 0.45 * e->strength)) break;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, k.x, k.y);
+        if (w->state[at] != TXI_HOLE) continue;
+        const double s = -(n + 0.5), dx = -(e->fit[1] + 2 * e->fit[2] * s);
+        const double dy = -(e->fit[4] + 2 * e->fit[5] * s), speed = sqrt(dx * dx + dy * dy);
+        const double ox = k.x - (e->fit[0] + e->fit[1] * s + e->fit[2] * s * s);
+        const double oy = k.y - (e->fit[3] + e->fit[4] * s + e->fit[5] * s * s);
+        if (speed <= 0 || fabs(ox * dy - oy * dx) > 2.5 * speed) break;
+        if (k.dx * dx + k.dy * dy < 0.906 * speed || f->strength[at] > 2.2f * e->strength) break;
+        n++;
+    }
+    return n;
+}
+
+/* The mean share of 8 pixels over which the line ends go on in a picture of the window with its hole
+   filled; 1 if there are no ends.
+   color  4 per pixel
+   share  receives 0..1
+   cost   O(pixels)                                                                            */
+static txm_status txi_continued(const txi_window *w, const txi_lines *l, const uint8_t *color,
+                                txm_env *env, double *share) {
+    const size_t count = (size_t)w->width * (size_t)w->height;
+    const int longer = w->width > w->height ? w->width : w->height;
+    txi_slopes f;
+    txm_arena arena;
+    double sum = 0;
+    txm_arena_init(&arena, env);
+    memset(&f, 0, sizeof f);
+    f.width = w->width;
+    f.height = w->height;
+    f.color = color;
+    f.known = (uint8_t *)txm_arena_alloc(&arena, count, 1);
+    f.gap = (int32_t *)txm_arena_alloc(&arena, count, sizeof *f.gap);
+    int32_t *from = (int32_t *)txm_arena_alloc(&arena, count, sizeof *from);
+    int32_t *row = (int32_t *)txm_arena_alloc(&arena, (size_t)longer, 3 * sizeof *row);
+    uint8_t *mark = (uint8_t *)txm_arena_alloc(&arena, count, 1);
+    txm_status status = arena.failed ? txi_no_memory(env) : TXM_OK;
+    if (status == TXM_OK) {
+        for (size_t i = 0; i < count; i++) {
+            f.known[i] = w->state[i] != TXI_VOID;
+            mark[i] = !f.known[i];
+            from[i] = w->state[i] == TXI_HOLE ? l->depth[i] : l->away[i];
+        }
+        txi_distances(mark, w->width, w->height, row, f.gap);
+        status = txi_slopes_make(&f, from, 15 * 15, &arena, env);
+    }
+    for (int i = 0; i < l->end_count && status == TXM_OK; i++)
+        sum += txi_goes_on(w, &f, &l->ends[i]) / (double)TXI_GO_ON;
+    *share = l->end_count && status == TXM_OK ? sum / l->end_count : 1;
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* The bending energy of the part of a curve in the hole: the squared angle for an arc. */
+static double txi_curve_bend(const txi_curve *c) {
+    double length, bend;
+    txm_vec2 coarse[TXI_STEPS + 1];
+    const int n = c->last - c->first;
+    if (n < 2) return 0;
+    for (int i = 0; i <= TXI_STEPS; i++) /* coarse, so that steps of a pixel do not count           */
+        coarse[i] = c->points[c->first + (n * i + TXI_STEPS / 2) / TXI_STEPS];
+    if (n <= TXI_STEPS) txi_bend(c->points + c->first, n + 1, &length, &bend);
+    else txi_bend(coarse, TXI_STEPS + 1, &length, &bend);
+    return bend;
+}
+
+/* Share of the line ends on curves that are nearly straight (bending energy below 0.15); 0 without
+   ends. */
+static double txi_straight_share(const txi_lines *l, const txi_curve *curves, int count) {
+    int ends = 0;
+    for (int i = 0; i < count; i++) {
+        if (txi_curve_bend(&curves[i]) < 0.15) ends += 1 + (curves[i].ends[1] >= 0);
+    }
+    return l->end_count ? (double)ends / l->end_count : 0;
+}
+
+/* The mean bending energy of the curves, each counted as at most 4; 0 without curves. */
+static double txi_mean_bend(const txi_curve *curves, int count) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) {
+        const double b = txi_curve_bend(&curves[i]);
+        sum += b < 4 ? b : 4;
+    }
+    return count ? sum / count : 0;
+}
+
+/* ---- pictures ---------------------------------------------------------------------------- */
+
+static void txi_dot(const txi_window *w, int scale, double x, double y, const uint8_t ink[3],
+                    uint8_t *rgb) {
+    const double px = (x + 0.5) * scale, py = (y + 0.5) * scale;
+    const int width = w->width * scale;
+    if (!(px >= 0 && py >= 0 && px < width && py < w->height * scale)) return;
+    memcpy(rgb + 3 * ((size_t)(int)py * (size_t)width + (size_t)(int)px), ink, 3);
+}
+
+/* Draw what was found over the colours of the window, enlarged scale times: points of lines in orange;
+   the traced ends in cyan (long) or yellow; curves in green, in red where they end in the hole.
+   rgb  3 * width * height * scale^2 bytes                                                      */
+static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_curve *curves, int count,
+                           int scale, uint8_t *rgb) {
+    static const uint8_t orange[3] = {255, 150, 0}, cyan[3] = {0, 220, 255}, yellow[3] = {255, 255, 0};
+    static const uint8_t green[3] = {0, 255, 0}, red[3] = {255, 0, 0};
+    for (int y = 0; y < w->height * scale; y++) {
+        for (int x = 0; x < w->width * scale; x++) {
+            const size_t i = (size_t)(y / scale) * (size_t)w->width + (size_t)(x / scale);
+            uint8_t *p = rgb + 3 * ((size_t)y * (size_t)w->width * (size_t)scale + (size_t)x);
+            for (int c = 0; c < 3; c++) p[c] = w->state[i] == TXI_VOID ? 0 : w->color[4 * i + (size_t)c];
+        }
+    }
+    for (int i = 0; i < l->thin_count; i++)
+        txi_dot(w, scale, l->thin[i].place.x, l->thin[i].place.y, orange, rgb);
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *e = &l->ends[i];
+        for (int k = 0; k < e->count; k++) {
+            const txm_vec2 p = l->points[e->first + k];
+            txi_dot(w, scale, p.x, p.y, e->is_long ? cyan : yellow, rgb);
+        }
+    }
+    for (int i = 0; i < count; i++) {
+        for (int k = curves[i].first; k < curves[i].last; k++) {
+            for (int s = 0; s < 2 * scale; s++) {
+                const txm_vec2 p = txi_between(curves[i].points[k], curves[i].points[k + 1],
+                                               0.5 * s / scale);
+                txi_dot(w, scale, p.x, p.y, curves[i].ends[1] < 0 ? red : green, rgb);
+            }
+        }
+    }
+}
 
 /* ---- belief ---- */
 

@@ -45,7 +45,7 @@ static txi_rules txi_rules_of(int structure) {
 /* The cubic from p in direction d to q, where it arrives against direction e (e points back into the
    hole). Speeds at both ends: chord * 2 / (1 + cos of the angle to the chord), which makes a good
    circle of a circle's ends. */
-static void txi_cubic(txm_vec2 p, txm_vec2 d, txm_vec2 q, txm_vec2 e, int steps, txm_vec2 *out) {
+static void txi_hermite(txm_vec2 p, txm_vec2 d, txm_vec2 q, txm_vec2 e, int steps, txm_vec2 *out) {
     const double cx = (double)q.x - p.x, cy = (double)q.y - p.y, chord = sqrt(cx * cx + cy * cy);
     const double n = chord > 0 ? chord : 1;
     const double cd = (d.x * cx + d.y * cy) / n, ce = -(e.x * cx + e.y * cy) / n;
@@ -138,7 +138,7 @@ static double txi_turn(const txi_link *k) {
     return k->length > 0 ? sum / k->length : 0;
 }
 
-static void txi_box(txi_link *k) {
+static void txi_link_box(txi_link *k) {
     k->low = k->high = k->points[0];
     for (int i = 1; i <= TXI_STEPS; i++) {
         k->low.x = txm_minf(k->low.x, k->points[i].x);
@@ -156,7 +156,7 @@ static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rule
     txi_compare(p, q, &correlation, &mismatch, sides);
     if (correlation < 0.3 && sides[0] > 30 && sides[1] > 30) return 0;
     if (correlation < -0.2) return 0;
-    txi_cubic(p->place, p->heading, q->place, q->heading, TXI_STEPS, k->points);
+    txi_hermite(p->place, p->heading, q->place, q->heading, TXI_STEPS, k->points);
     txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
     if (length < 2 || txi_outside(w, l, k->points, TXI_STEPS + 1) > 0.12) return 0;
     k->a = a;
@@ -169,7 +169,7 @@ static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rule
     k->cost = txm_float(rules->bend * bend + 3 * (1 - correlation) + 1.5 * (mismatch < 2 ? mismatch : 2) +
                         0.6 * fabs(u - v) / (u + v) + 0.6 * length / (l->width > 8 ? l->width : 8) +
                         0.3 * (curvature < 3 ? curvature : 3) + 0.3 * !p->is_long + 0.3 * !q->is_long);
-    txi_box(k);
+    txi_link_box(k);
     return 1;
 }
 
@@ -231,20 +231,20 @@ static int txi_look_ahead(const txi_window *w, const txi_lines *l, const txi_rul
     k->leave = txm_v2(txm_float(exit.x - offset * direction.y), txm_float(exit.y + offset * direction.x));
     k->backwards = txm_v2(-direction.x, -direction.y);
     double length, bend;
-    txi_cubic(e->place, e->heading, k->leave, k->backwards, TXI_STEPS, k->points);
+    txi_hermite(e->place, e->heading, k->leave, k->backwards, TXI_STEPS, k->points);
     txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
     k->length = txm_float(length);
     k->bend = txm_float(bend);
     k->cost = txm_float(rules->bend * bend + 0.6 * length / (l->width > 8 ? l->width : 8) +
                         0.9 - 0.02 * hits + 0.05 * fabs(offset));
-    txi_box(k);
+    txi_link_box(k);
     return 1;
 }
 
 /* ---- matching ---------------------------------------------------------------------------- */
 
 /* The state of the search for the matching of least cost. */
-typedef struct txi_match {
+typedef struct txi_pairing {
     const txi_link *links;
     int link_count, end_count;
     double unmatched, crossing;
@@ -254,7 +254,7 @@ typedef struct txi_match {
     int *slot;         /* one per link: where it is in active, or -1                             */
     int active_count;
     int *of_end, *of_start; /* links of end i: of_end[of_start[i]] .. of_end[of_start[i + 1] - 1]    */
-} txi_match;
+} txi_pairing;
 
 static int txi_segments_cross(txm_vec2 a, txm_vec2 b, txm_vec2 c, txm_vec2 d) {
     const double ux = (double)b.x - a.x, uy = (double)b.y - a.y;
@@ -283,7 +283,7 @@ static int txi_links_cross(const txi_link *a, const txi_link *b) {
     return 0;
 }
 
-static int txi_crosses(txi_match *m, int a, int b) {
+static int txi_crosses(txi_pairing *m, int a, int b) {
     const size_t n = (size_t)m->link_count;
     uint8_t *c = &m->crosses[(size_t)a * n + (size_t)b];
     if (!*c) {
@@ -294,7 +294,7 @@ static int txi_crosses(txi_match *m, int a, int b) {
 }
 
 /* What link k costs beside the active ones, apart from being matched or not. */
-static double txi_link_energy(txi_match *m, int k) {
+static double txi_link_energy(txi_pairing *m, int k) {
     double sum = m->links[k].cost;
     for (int i = 0; i < m->active_count; i++) {
         if (m->active[i] != k && txi_crosses(m, k, m->active[i])) sum += m->crossing;
@@ -302,14 +302,14 @@ static double txi_link_energy(txi_match *m, int k) {
     return sum;
 }
 
-static void txi_activate(txi_match *m, int k) {
+static void txi_activate(txi_pairing *m, int k) {
     m->slot[k] = m->active_count;
     m->active[m->active_count++] = k;
     m->chosen[m->links[k].a] = k;
     if (m->links[k].b >= 0) m->chosen[m->links[k].b] = k;
 }
 
-static void txi_deactivate(txi_match *m, int k) {
+static void txi_deactivate(txi_pairing *m, int k) {
     const int s = m->slot[k], last = m->active[--m->active_count];
     m->active[s] = last;
     m->slot[last] = s;
@@ -319,24 +319,24 @@ static void txi_deactivate(txi_match *m, int k) {
 }
 
 /* How much matching link k saves: its ends are no longer unmatched. */
-static double txi_saved(const txi_match *m, int k) {
+static double txi_saved(const txi_pairing *m, int k) {
     return m->unmatched * (m->links[k].b >= 0 ? 2 : 1);
 }
 
-static double txi_remove(txi_match *m, int k) {
+static double txi_remove(txi_pairing *m, int k) {
     const double change = txi_saved(m, k) - txi_link_energy(m, k);
     txi_deactivate(m, k);
     return change;
 }
 
-static double txi_insert(txi_match *m, int k) {
+static double txi_insert(txi_pairing *m, int k) {
     const double change = txi_link_energy(m, k) - txi_saved(m, k);
     txi_activate(m, k);
     return change;
 }
 
 /* The link between two ends, or -1. */
-static int txi_link_between(const txi_match *m, int a, int b) {
+static int txi_link_between(const txi_pairing *m, int a, int b) {
     for (int i = m->of_start[a]; i < m->of_start[a + 1]; i++) {
         const txi_link *k = &m->links[m->of_end[i]];
         if ((k->a == a && k->b == b) || (k->b == a && k->a == b)) return m->of_end[i];
@@ -347,7 +347,7 @@ static int txi_link_between(const txi_match *m, int a, int b) {
 /* Try link k: it goes if it is there; else it replaces the links of its two ends, and the two ends that
    become free are joined if they can be. Kept if the energy changes by less than allowed; returns the
    change, or 0 if it was not kept. */
-static double txi_try(txi_match *m, int k, double allowed) {
+static double txi_pairing_try(txi_pairing *m, int k, double allowed) {
     int gone[2] = {-1, -1}, free_end[2] = {-1, -1}, extra = -1;
     double change = 0;
     if (m->slot[k] >= 0) {
@@ -387,7 +387,7 @@ static double txi_try(txi_match *m, int k, double allowed) {
 
 /* Simulated annealing from no joins at all; then every link is tried until none improves. best: room
    for end_count numbers. */
-static void txi_anneal(txi_match *m, uint64_t seed, int *best) {
+static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
     txm_rng rng = txm_rng_make(seed, 0x6a6f696e);
     double energy = 0, least = 0;
     for (int i = 0; i < m->end_count; i++) best[i] = -1;
@@ -402,7 +402,7 @@ static void txi_anneal(txi_match *m, uint64_t seed, int *best) {
             bits += 1;
         }
         const double allowed = heat * (bits * 0.6931471805599453 + 1.4 * (1 - v) * (1.5 - 0.5 * v));
-        energy += txi_try(m, k, allowed);
+        energy += txi_pairing_try(m, k, allowed);
         if (energy < least - 1e-9) {
             least = energy;
             memcpy(best, m->chosen, (size_t)m->end_count * sizeof *best);
@@ -414,7 +414,7 @@ static void txi_anneal(txi_match *m, uint64_t seed, int *best) {
     }
     for (int round = 0, better = 1; better && round < 50; round++) {
         better = 0;
-        for (int k = 0; k < m->link_count; k++) better |= txi_try(m, k, -1e-7) < 0;
+        for (int k = 0; k < m->link_count; k++) better |= txi_pairing_try(m, k, -1e-7) < 0;
     }
 }
 
@@ -454,7 +454,7 @@ static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rul
     return count;
 }
 
-static txm_status txi_match_make(txi_match *m, const txi_link *links, int count, int ends,
+static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int count, int ends,
                                  const txi_rules *rules, txm_arena *scratch, txm_env *env) {
     const size_t n = (size_t)count, e = (size_t)ends;
     memset(m, 0, sizeof *m);
@@ -536,7 +536,7 @@ static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const 
     int n = 0, m;
     const int head = txi_known_count(a), tail = b ? txi_known_count(b) : 0;
     for (int s = head; s > 0; s--) dense[n++] = txi_known_point(l, a, s);
-    txi_cubic(a->place, a->heading, b ? b->place : k->leave, b ? b->heading : k->backwards, 4 * TXI_STEPS,
+    txi_hermite(a->place, a->heading, b ? b->place : k->leave, b ? b->heading : k->backwards, 4 * TXI_STEPS,
               fine);
     m = txi_resample(fine, 4 * TXI_STEPS + 1, dense + n, room - n - TXI_KNOWN_PART);
     n += m;
@@ -573,7 +573,7 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     const txi_rules rules = txi_rules_of(structure);
     const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
     txm_arena scratch;
-    txi_match match;
+    txi_pairing match;
     txm_status status = TXM_OK;
     (void)prior;
     (void)beta;
@@ -587,7 +587,7 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     if (scratch.failed) status = txi_no_memory(env);
     if (status == TXM_OK) {
         const int n = txi_candidates(w, l, &rules, alpha, links);
-        status = n ? txi_match_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
+        status = n ? txi_pairing_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
         if (status == TXM_OK && n) {
             txi_anneal(&match, seed, best);
             *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)match.active_count, sizeof **curves);
@@ -611,7 +611,7 @@ enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go
 /* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an end:
    no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
    strength. */
-static int txi_goes_on(const txi_window *w, const txi_field *f, const txi_end *e) {
+static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *e) {
     txi_walk k;
     int n = 0;
     k.x = (double)e->fit[0] + 2.0 * e->fit[1] + 4.0 * e->fit[2];
@@ -647,7 +647,7 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
                                 txm_env *env, double *share) {
     const size_t count = (size_t)w->width * (size_t)w->height;
     const int longer = w->width > w->height ? w->width : w->height;
-    txi_field f;
+    txi_slopes f;
     txm_arena arena;
     double sum = 0;
     txm_arena_init(&arena, env);
@@ -668,7 +668,7 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
             from[i] = w->state[i] == TXI_HOLE ? l->depth[i] : l->away[i];
         }
         txi_distances(mark, w->width, w->height, row, f.gap);
-        status = txi_field_make(&f, from, 15 * 15, &arena, env);
+        status = txi_slopes_make(&f, from, 15 * 15, &arena, env);
     }
     for (int i = 0; i < l->end_count && status == TXM_OK; i++)
         sum += txi_goes_on(w, &f, &l->ends[i]) / (double)TXI_GO_ON;

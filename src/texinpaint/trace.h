@@ -46,7 +46,7 @@ typedef struct txi_end {
 } txi_end;
 
 /* Gradients of a window. */
-typedef struct txi_field {
+typedef struct txi_slopes {
     int width, height;
     const uint8_t *color; /* 4 per pixel                                                        */
     uint8_t *known;      /* 1: the colour counts                                                */
@@ -54,7 +54,7 @@ typedef struct txi_field {
     int16_t *gradient;   /* 6 per pixel: x and y of R, G, B; 0 where unknown                     */
     float *strength;     /* root of the sum of their squares, levels per pixel                  */
     int32_t *tensor;     /* sums of xx, xy, yy over RGB, smoothed, (1/16 level per pixel)^2       */
-} txi_field;
+} txi_slopes;
 
 /* What is known about the lines of a window. */
 typedef struct txi_lines {
@@ -67,7 +67,7 @@ typedef struct txi_lines {
     int32_t *thin_at; /* one per pixel: the point in it, or -1                                  */
     int32_t *away;    /* one per pixel: squared distance to the nearest pixel of the hole        */
     int32_t *depth;   /* one per pixel: squared distance to the nearest pixel outside of the hole */
-    txi_field field;
+    txi_slopes field;
     float threshold;  /* least gradient of a line, levels per pixel                             */
     float width;      /* of the hole: twice the radius of the largest disc in it, pixels        */
     float limit;      /* pixels over which lines were followed                                  */
@@ -152,7 +152,7 @@ static void txi_distances(const uint8_t *of, int width, int height, int32_t *scr
 static const int txi_gradient_weight[TXI_GRADIENT_TAPS + 1] = {64, 45, 16, 3};
 
 /* The slopes of the planes through the known pixels around (x, y): 6 numbers, levels per pixel. */
-static void txi_slope(const txi_field *f, int x, int y, double slope[6]) {
+static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
     double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x, y */
     for (int j = -TXI_GRADIENT_TAPS; j <= TXI_GRADIENT_TAPS; j++) {
         for (int i = -TXI_GRADIENT_TAPS; i <= TXI_GRADIENT_TAPS; i++) {
@@ -193,16 +193,16 @@ static int16_t txi_gradient_round(double slope) {
 }
 
 /* The job of one band of rows. rows: scratch of this band, 6 * width * (TXI_BAND_ROWS + 6) ints */
-typedef struct txi_field_job {
-    txi_field *field;
+typedef struct txi_slopes_job {
+    txi_slopes *field;
     const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere   */
     int32_t reach;
     int32_t *rows;
     int smooth;          /* 0: the gradients, 1: the tensor                                     */
-} txi_field_job;
+} txi_slopes_job;
 
 /* Horizontal sums of row y: smoothed and derived, RGB each. */
-static void txi_gradient_row(const txi_field *f, int y, int32_t *out) {
+static void txi_gradient_row(const txi_slopes *f, int y, int32_t *out) {
     const uint8_t *c = f->color + 4 * (size_t)y * (size_t)f->width;
     for (int x = TXI_GRADIENT_TAPS; x < f->width - TXI_GRADIENT_TAPS; x++) {
         const uint8_t *p = c + 4 * x;
@@ -215,7 +215,7 @@ static void txi_gradient_row(const txi_field *f, int y, int32_t *out) {
     }
 }
 
-static void txi_gradient_pixel(txi_field *f, int x, int y, const int32_t *row0, size_t pitch) {
+static void txi_gradient_pixel(txi_slopes *f, int x, int y, const int32_t *row0, size_t pitch) {
     const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
     const int taps = TXI_GRADIENT_TAPS;
     double slope[6], sum = 0;
@@ -244,8 +244,8 @@ static void txi_gradient_pixel(txi_field *f, int x, int y, const int32_t *row0, 
     f->strength[i] = txm_float(sqrt(sum) / TXI_GRADIENT_UNIT);
 }
 
-static void txi_gradient_band(const txi_field_job *job, int y0, int y1, int32_t *rows) {
-    txi_field *f = job->field;
+static void txi_gradient_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
+    txi_slopes *f = job->field;
     const size_t pitch = 6 * (size_t)f->width;
     const int taps = TXI_GRADIENT_TAPS;
     for (int y = y0 - taps; y < y1 + taps; y++) {
@@ -262,7 +262,7 @@ static void txi_gradient_band(const txi_field_job *job, int y0, int y1, int32_t 
 }
 
 /* xx, xy, yy of one row, smoothed horizontally by {18, 14, 7, 2} / 64. */
-static void txi_tensor_row(const txi_field *f, int y, int32_t *out, int32_t *raw) {
+static void txi_tensor_row(const txi_slopes *f, int y, int32_t *out, int32_t *raw) {
     const int16_t *g = f->gradient + 6 * (size_t)y * (size_t)f->width;
     for (int x = 0; x < f->width; x++) {
         int32_t *t = raw + 3 * x;
@@ -289,9 +289,9 @@ static void txi_tensor_row(const txi_field *f, int y, int32_t *out, int32_t *raw
     }
 }
 
-static void txi_tensor_band(const txi_field_job *job, int y0, int y1, int32_t *rows) {
+static void txi_tensor_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
     static const int weight[TXI_TENSOR_TAPS + 1] = {18, 14, 7, 2};
-    txi_field *f = job->field;
+    txi_slopes *f = job->field;
     const size_t pitch = 3 * (size_t)f->width;
     const int taps = TXI_TENSOR_TAPS;
     int32_t *raw = rows + (size_t)(TXI_BAND_ROWS + 2 * taps) * pitch;
@@ -311,8 +311,8 @@ static void txi_tensor_band(const txi_field_job *job, int y0, int y1, int32_t *r
     }
 }
 
-static void txi_field_body(void *context, int index) {
-    const txi_field_job *job = (const txi_field_job *)context;
+static void txi_slopes_body(void *context, int index) {
+    const txi_slopes_job *job = (const txi_slopes_job *)context;
     const int y0 = index * TXI_BAND_ROWS;
     const int y1 = y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
     int32_t *rows = job->rows + (size_t)index * 6 * (size_t)job->field->width * (TXI_BAND_ROWS + 6);
@@ -320,12 +320,12 @@ static void txi_field_body(void *context, int index) {
     else txi_gradient_band(job, y0, y1, rows);
 }
 
-/* The gradients of a picture where it is known; away and reach as in txi_field_job. */
-static txm_status txi_field_make(txi_field *f, const int32_t *away, int32_t reach, txm_arena *arena,
+/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. */
+static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach, txm_arena *arena,
                                  txm_env *env) {
     const size_t count = (size_t)f->width * (size_t)f->height;
     const int bands = (f->height + TXI_BAND_ROWS - 1) / TXI_BAND_ROWS;
-    txi_field_job job;
+    txi_slopes_job job;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     f->gradient = (int16_t *)txm_arena_zero(arena, count, 6 * sizeof *f->gradient);
@@ -341,13 +341,13 @@ static txm_status txi_field_make(txi_field *f, const int32_t *away, int32_t reac
     job.away = away;
     job.reach = reach;
     for (job.smooth = 0; job.smooth < 2; job.smooth++)
-        txm_parallel_for(env, bands, txi_field_body, &job);
+        txm_parallel_for(env, bands, txi_slopes_body, &job);
     txm_arena_free(&scratch);
     return TXM_OK;
 }
 
 /* The direction across the edge at a pixel, unit, and how clear it is, 0..1. */
-static double txi_across(const txi_field *f, size_t i, double *nx, double *ny) {
+static double txi_across(const txi_slopes *f, size_t i, double *nx, double *ny) {
     const double a = f->tensor[3 * i], b = f->tensor[3 * i + 1], c = f->tensor[3 * i + 2];
     const double half = 0.5 * (a - c), r = sqrt(half * half + b * b);
     double x = r + half, y = b;
@@ -362,7 +362,7 @@ static double txi_across(const txi_field *f, size_t i, double *nx, double *ny) {
 }
 
 /* Bilinear gradient strength; 0 outside of the window. */
-static double txi_strength_at(const txi_field *f, double x, double y) {
+static double txi_strength_at(const txi_slopes *f, double x, double y) {
     if (!(x >= 0 && y >= 0 && x < f->width - 1 && y < f->height - 1)) return 0;
     const int ix = (int)x, iy = (int)y;
     const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
@@ -385,7 +385,7 @@ typedef struct txi_walk {
 } txi_walk;
 
 /* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
-static void txi_change_at(const txi_field *f, size_t i, double rx, double ry, double change[3]) {
+static void txi_change_at(const txi_slopes *f, size_t i, double rx, double ry, double change[3]) {
     const int16_t *g = f->gradient + 6 * i;
     for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / TXI_GRADIENT_UNIT;
 }
@@ -400,7 +400,7 @@ static double txi_agree(const double a[3], const double b[3]) {
 
 /* Move a place across the direction (rx, ry), by at most 1 pixel, to where the gradient is largest:
    five samples and a parabola. Returns the gradient there. */
-static double txi_centre(const txi_field *f, double rx, double ry, double *x, double *y) {
+static double txi_centre(const txi_slopes *f, double rx, double ry, double *x, double *y) {
     double s[5], best = -1;
     int k = 2;
     static const int order[5] = {2, 1, 3, 0, 4}; /* ties: least movement                         */
@@ -423,7 +423,7 @@ static double txi_centre(const txi_field *f, double rx, double ry, double *x, do
 }
 
 /* One step along a line; 0: it ends here. least: gradient below which it ends. */
-static int txi_walk_on(const txi_field *f, txi_walk *k, double step, double least) {
+static int txi_walk_on(const txi_slopes *f, txi_walk *k, double step, double least) {
     double x = k->x + step * k->dx, y = k->y + step * k->dy, nx, ny, change[3];
     const double strength = txi_centre(f, -k->dy, k->dx, &x, &y);
     const ptrdiff_t at = txi_pixel(f->width, f->height, x, y);
@@ -455,7 +455,7 @@ static int txi_walk_on(const txi_field *f, txi_walk *k, double step, double leas
 /* ---- points of lines --------------------------------------------------------------------- */
 
 /* The gradient that 98.5 % of the known pixels near the hole do not reach. */
-static double txi_strong(const txi_field *f, const int32_t *away, int32_t reach) {
+static double txi_strong(const txi_slopes *f, const int32_t *away, int32_t reach) {
     enum { BINS = 4096 };  /* of a quarter level per pixel                                        */
     size_t bins[BINS] = {0}, total = 0, sum = 0;
     const size_t count = (size_t)f->width * (size_t)f->height;
@@ -472,7 +472,7 @@ static double txi_strong(const txi_field *f, const int32_t *away, int32_t reach)
 }
 
 /* Is pixel (x, y) a maximum of the gradient across the edge? Writes the point. */
-static int txi_thin_pixel(const txi_field *f, int x, int y, double least, txi_thin *out) {
+static int txi_thin_pixel(const txi_slopes *f, int x, int y, double least, txi_thin *out) {
     const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
     double nx, ny;
     if (f->strength[i] < least) return 0;
@@ -492,7 +492,7 @@ static int txi_thin_pixel(const txi_field *f, int x, int y, double least, txi_th
 
 /* All points of lines near the hole, in raster order. */
 static txm_status txi_thin_all(txi_lines *l, int32_t reach, txm_arena *arena, txm_env *env) {
-    const txi_field *f = &l->field;
+    const txi_slopes *f = &l->field;
     const size_t count = (size_t)f->width * (size_t)f->height;
     l->thin_at = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->thin_at);
     if (arena->failed) return txi_no_memory(env);
@@ -544,7 +544,7 @@ static txm_vec2 txi_inwards(const txi_lines *l, int x, int y) {
    many; walk receives the direction inwards at the first point. */
 static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards, txm_vec2 *points,
                       int capacity, double *strength) {
-    const txi_field *f = &l->field;
+    const txi_slopes *f = &l->field;
     const double least = 0.5 * l->threshold > 0.25 * from->strength ? 0.5 * l->threshold
                                                                      : 0.25 * from->strength;
     txm_vec2 back[8];
@@ -587,7 +587,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
 /* Fit x = a + b s + c s^2 by weighted least squares to points 0..n-1, s their distances along the
    line from the first, weights 1 / (1 + s / 16); degree 1: c = 0. Returns the root mean square
    distance. */
-static double txi_fit(const txm_vec2 *points, int n, int degree, double fit[6]) {
+static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit[6]) {
     double m[5] = {0}, v[2][3] = {{0}}, error = 0, s = 0, total = 0;
     const double scale = n > 1 ? n - 1 : 1; /* s / scale is about 0..1                            */
     for (int i = 0; i < n; i++) {
@@ -633,11 +633,11 @@ static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) 
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
-        const double rms = txi_fit(points, n, 2, fit);
+        const double rms = txi_fit_line(points, n, 2, fit);
         if (rms < 0.5 || n <= 8) {
             /* a straight line unless a bent one is clearly better: the direction is more exact   */
-            if (n <= 8 || txi_fit(points, n, 1, line) < 1.25 * rms + 0.03) {
-                txi_fit(points, n, 1, line);
+            if (n <= 8 || txi_fit_line(points, n, 1, line) < 1.25 * rms + 0.03) {
+                txi_fit_line(points, n, 1, line);
                 memcpy(fit, line, sizeof fit);
             }
             break;
@@ -868,7 +868,7 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     txm_status status = txi_lines_begin(w, arena, &scratch, env, lines);
     const int reach = (int)lines->limit + TXI_LOOK_AHEAD;
     if (status == TXM_OK)
-        status = txi_field_make(&lines->field, lines->away, reach * reach, arena, env);
+        status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, env);
     if (status == TXM_OK) {
         const double strong = 0.35 * txi_strong(&lines->field, lines->away, reach * reach);
         lines->threshold = txm_float(strong > 6 ? strong : 6);

@@ -182,7 +182,7 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
 }
 
 /* All of a token's vote at a place. */
-static void txi_vote(const txi_fields *f, const txi_token *k, txm_dvec3 place, double t[6]) {
+static void txi_token_vote(const txi_fields *f, const txi_token *k, txm_dvec3 place, double t[6]) {
     const txm_dvec3 v = txm_d3_sub(place, k->place);
     if (txm_d3_len2(v) >= f->reach * f->reach) return;
     if (k->stick > 0) txi_vote_stick(f, k->normal, v, k->stick, t);
@@ -277,7 +277,7 @@ static void txi_votes_at(const txi_fields *f, const txi_tokens *k, txm_dvec3 pla
                 txi_cell(k, o->place.z) != z)
                 continue;
             if (balls) txi_vote_ball(f, txm_d3_sub(place, o->place), 1, t);
-            else txi_vote(f, o, place, t);
+            else txi_token_vote(f, o, place, t);
         }
     }
 }
