@@ -568,6 +568,19 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
     return TXM_OK;
 }
 
+/* Deliver an intermediate result to the caller, if wanted. */
+static void txi_show(const txi_domain *domain, const char *name, uint8_t *pixels, int width,
+                     int height, int channels) {
+    txm_image picture;
+    if (!domain->desc->show) return;
+    memset(&picture, 0, sizeof picture);
+    picture.pixels = pixels;
+    picture.width = width;
+    picture.height = height;
+    picture.channels = channels;
+    domain->desc->show(domain->desc->show_user, name, &picture);
+}
+
 /* ---- a mesh without duplicates ---------------------------------------------------------------
    Meshes with texture coordinates often repeat a vertex for each chart that it lies in. Geometry is
    computed on a mesh in which vertices in equal places are one.                                */
@@ -6217,9 +6230,417 @@ static void txi_normal_out(float *v, txm_vec2 axis, int mirrored, int y_is_down)
     v[2] = txm_float(0.5 * (z + 1));
 }
 
-/* ---- choose ---- */
+/* ---- stubs: whoever lands the real function takes its stub away here --------------------------- */
 
-/* ---- job ---- */
+static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
+                                int count, uint64_t seed, txm_arena *arena, txm_env *env,
+                                txi_plan *plan, const txi_pose **poses, int *pose_count) {
+    (void)w, (void)lines, (void)curves, (void)count, (void)seed, (void)arena, (void)env;
+    memset(plan, 0, sizeof *plan);
+    *poses = NULL;
+    *pose_count = 0;
+    return TXM_OK;
+}
+
+static txm_status txi_harmonic_fill(txi_domain *d, txm_env *env) {
+    (void)d, (void)env;
+    return TXM_OK;
+}
+
+static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *crests,
+                                 const txi_window *w, txm_arena *arena, txm_env *env,
+                                 txi_prior *prior) {
+    (void)d, (void)crests, (void)w, (void)arena, (void)env;
+    memset(prior, 0, sizeof *prior);
+    return TXM_OK;
+}
+
+/* ---- hypotheses -------------------------------------------------------------------------------
+   Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
+   stripes and ruin labyrinths. So a window is completed to half its resolution without lines, with
+   the lines of a picture and with those of a pattern, and the one that goes on best where the known
+   texture ends wins. Only the winner is completed at full resolution.                             */
+
+enum { TXI_HYPOTHESES = 3 };
+#define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all   */
+#define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture       */
+#define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried          */
+
+/* A hypothesis at half resolution. */
+typedef struct txi_hypothesis {
+    int structure;      /* TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN                              */
+    txi_curve *curves;
+    int curve_count;
+    txi_plan plan;
+    const txi_pose *plan_poses;
+    int plan_pose_count;
+    txi_field field;
+    uint8_t *preview;   /* 4 per window pixel                                                    */
+    double energy, detail, score;
+} txi_hypothesis;
+
+/* What is known about a window that is being completed. */
+typedef struct txi_choice {
+    const txi_window *w;
+    const txi_domain *domain;
+    const txi_prior *prior; /* or NULL */
+    uint64_t seed;
+    txi_lines lines;
+    txi_style style;
+    txi_filler *filler;
+    txi_hypothesis tried[TXI_HYPOTHESES];
+    int count, best;
+} txi_choice;
+
+/* Which hypotheses to try, and how strongly detail is asked for. */
+static void txi_choose_style(txi_choice *c, double grain) {
+    const int has_lines = c->lines.end_count > 0 && c->lines.share_long >= TXI_SHARE_LONG;
+    const int forced = c->domain->desc->structure;
+    memset(&c->style, 0, sizeof c->style);
+    c->style.is_picture = c->domain->surface == NULL;
+    if (!has_lines && grain > TXI_GRAIN_TEXTURE) {
+        c->style.detail_offset = 0;
+        c->style.detail_clamp = 6;
+        c->style.detail_weight = 1.5f;
+        c->style.start = 10;
+    } else if (has_lines && grain > TXI_GRAIN_NO_PATTERN) {
+        c->style.detail_offset = 0.35f;
+        c->style.detail_clamp = 4;
+        c->style.detail_weight = 1.2f;
+        c->style.start = 14;
+    } else {
+        c->style.detail_offset = 0.7f;
+        c->style.detail_clamp = 3;
+        c->style.detail_weight = 1;
+        c->style.start = 14;
+    }
+    c->count = 0;
+    if (forced != TEXINPAINT_AUTO) {
+        c->tried[c->count++].structure = forced;
+        return;
+    }
+    c->tried[c->count++].structure = TEXINPAINT_TEXTURE;
+    if (has_lines || c->prior) c->tried[c->count++].structure = TEXINPAINT_PICTURE;
+    if (has_lines && grain <= TXI_GRAIN_NO_PATTERN)
+        c->tried[c->count++].structure = TEXINPAINT_PATTERN;
+}
+
+/* Complete one hypothesis to half resolution. */
+static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena *arena, txm_env *env) {
+    const size_t pixels = (size_t)c->w->width * (size_t)c->w->height;
+    const texinpaint_desc *desc = c->domain->desc;
+    const txi_plan *plan = NULL;
+    txm_status status = TXM_OK;
+    if (h->structure != TEXINPAINT_TEXTURE) {
+        status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
+                          arena, env, &h->curves, &h->curve_count);
+        if (status == TXM_OK && h->curve_count > 0) {
+            status = txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena, env,
+                                   &h->plan, &h->plan_poses, &h->plan_pose_count);
+            plan = &h->plan;
+        }
+    }
+    h->preview = (uint8_t *)txm_arena_alloc(arena, pixels, 4);
+    if (!h->preview) return txi_no_memory(env);
+    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, env, &h->field);
+    if (status != TXM_OK) return status;
+    memcpy(h->preview, c->w->color, 4 * pixels);
+    txi_fill_preview(c->filler, &h->field, h->preview, &h->energy, &h->detail);
+    return TXM_OK;
+}
+
+/* How well a hypothesis goes on; `plain` is the one without lines, or the first. */
+static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, txi_hypothesis *h,
+                            txm_env *env) {
+    const int is_picture = c->style.is_picture;
+    const double ratio = (h->energy + 1) / (plain->energy + 1);
+    double score = 0;
+    const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
+    if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
+    score -= 0.04 * log(ratio) / log(2.0);
+    if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
+    if (is_picture && h->curve_count > 0) {
+        score += 0.15 * txi_straight_share(&c->lines, h->curves, h->curve_count);
+        score -= 0.08 * txi_mean_bend(h->curves, h->curve_count);
+    }
+    h->score = txm_float(score); /* rounded: the same choice with any C library */
+    return status;
+}
+
+/* Show what was found and tried. */
+static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
+    static const char *const lines[] = {"", "lines-texture", "lines-picture", "lines-pattern"};
+    static const char *const names[] = {"", "half-texture", "half-picture", "half-pattern"};
+    enum { SCALE = 3 };
+    const txi_window *w = c->w;
+    if (!c->domain->desc->show) return TXM_OK;
+    uint8_t *rgb = (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
+    if (!rgb) return txi_no_memory(env);
+    for (int i = 0; i < c->count; i++) {
+        const txi_hypothesis *h = &c->tried[i];
+        txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
+        txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
+        for (size_t p = 0; p < (size_t)w->width * (size_t)w->height; p++) {
+            const uint8_t *from = (w->state[p] == TXI_HOLE ? h->preview : w->color) + 4 * p;
+            for (int k = 0; k < 3; k++) rgb[3 * p + (size_t)k] = from[k];
+        }
+        txi_show(c->domain, names[h->structure], rgb, w->width, w->height, 3);
+    }
+    txm_free(env, rgb);
+    return TXM_OK;
+}
+
+/* Complete a window to half its resolution; c->w, domain, prior and seed are set. */
+static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
+    txi_stage stage;
+    txm_status status = txi_trace(c->w, arena, env, &c->lines);
+    if (status != TXM_OK) return status;
+    const double grain = txi_grain(c->w, env);
+    if (grain < 0) return txi_no_memory(env);
+    txi_choose_style(c, grain);
+    txi_stage_begin(&stage, env, 0, 0.1f);
+    status = txi_stage_end(&stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env,
+                                                   &c->filler));
+    for (int i = 0; i < c->count && status == TXM_OK; i++) {
+        txi_stage_begin(&stage, env, 0.1f + 0.9f * (float)i / (float)c->count,
+                        0.1f + 0.9f * (float)(i + 1) / (float)c->count);
+        status = txi_stage_end(&stage, txi_try_hypothesis(c, &c->tried[i], arena, &stage.env));
+    }
+    if (status != TXM_OK) return status;
+    c->best = 0;
+    for (int i = 0; i < c->count && status == TXM_OK; i++) {
+        status = txi_judge(c, &c->tried[0], &c->tried[i], env);
+        if (c->tried[i].score > c->tried[c->best].score) c->best = i;
+    }
+    return status == TXM_OK ? txi_choose_show(c, env) : status;
+}
+
+/* ---- jobs ------------------------------------------------------------------------------------ */
+
+enum { TXI_PREVIEW, TXI_COARSE, TXI_FINE, TXI_GUTTER, TXI_DONE }; /* what the next step does */
+
+struct texinpaint_job {
+    texinpaint_desc desc;
+    txi_domain domain;
+    texinpaint_crests *crests; /* with TEXINPAINT_PRIOR_CREST                                    */
+    texinpaint_info info;
+    int phase, steps;
+    size_t left;         /* missing texels that are not completed yet                            */
+    size_t largest;      /* targets of the largest window so far                                 */
+    txm_arena memory;    /* holds the job                                                        */
+    txm_arena of_window; /* what is known about the current window                              */
+    txi_window window;
+    txi_prior prior;
+    txi_choice choice;
+};
+
+TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env *env,
+                                           texinpaint_job **out) {
+    txm_arena memory;
+    texinpaint_job *job;
+    size_t count, known = 0;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    txm_status status = txi_check(desc, env);
+    if (status != TXM_OK) return status;
+    txm_arena_init(&memory, env);
+    job = (texinpaint_job *)txm_arena_zero(&memory, 1, sizeof *job);
+    if (!job) return txi_no_memory(env);
+    job->desc = *desc;
+    job->memory = memory;
+    txm_arena_init(&job->of_window, env);
+    status = txi_domain_make(&job->domain, &job->desc, &job->memory, env);
+    if (status == TXM_OK && desc->mesh.face_count)
+        status = txi_surface_make(&job->domain, &job->memory, env);
+    if (status == TXM_OK && desc->prior == TEXINPAINT_PRIOR_CREST) {
+        texinpaint_crest_desc crest;
+        memset(&crest, 0, sizeof crest);
+        crest.mesh = desc->mesh;
+        status = texinpaint_crest(&crest, env, &job->crests);
+    }
+    count = (size_t)desc->image.width * (size_t)desc->image.height;
+    for (size_t i = 0; i < count && status == TXM_OK; i++) {
+        if (!job->domain.covered[i]) continue;
+        if (job->domain.missing[i]) job->info.missing++;
+        else if (job->domain.usable[i]) known++;
+    }
+    job->left = job->info.missing;
+    if (status == TXM_OK && job->left && !known)
+        status = txm_fail(env, TXM_TOO_SMALL, "no known texel to copy from: all are missing");
+    if (status != TXM_OK) {
+        texinpaint_free(job);
+        return status;
+    }
+    *out = job;
+    return TXM_OK;
+}
+
+TEXINPAINT_API void texinpaint_free(texinpaint_job *job) {
+    if (!job) return;
+    txm_arena memory = job->memory;
+    texinpaint_crests_free(job->crests);
+    txm_arena_free(&job->of_window);
+    txm_arena_free(&memory);
+}
+
+/* ---- steps ------------------------------------------------------------------------------------ */
+
+/* Lay out the next window and complete it to half its resolution. */
+static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
+    txi_domain *domain = &job->domain;
+    txi_window *w = &job->window;
+    txi_choice *choice = &job->choice;
+    int found = 0;
+    txm_arena_free(&job->of_window);
+    txm_status status = txi_windows_next(domain, &job->of_window, env, w, &found);
+    if (status != TXM_OK) return status;
+    if (!found) {
+        job->phase = TXI_GUTTER;
+        return TXM_OK;
+    }
+    txi_window_colors(domain, w);
+    memset(choice, 0, sizeof *choice);
+    choice->w = w;
+    choice->domain = domain;
+    choice->seed = txm_hash(job->desc.seed + (uint64_t)job->info.windows);
+    if (job->desc.prior != TEXINPAINT_PRIOR_NONE) {
+        status = txi_prior_make(domain, job->crests, w, &job->of_window, env, &job->prior);
+        if (status != TXM_OK) return status;
+        if (job->prior.line_count) choice->prior = &job->prior;
+    }
+    status = txi_choose(choice, &job->of_window, env);
+    if (status == TXM_TOO_SMALL) { /* nothing to copy from: it stays smooth */
+        txi_window_done(domain, w);
+        return TXM_OK;
+    }
+    if (status == TXM_OK) job->phase = TXI_FINE;
+    return status;
+}
+
+/* Read, blend and write one map of the current window. */
+static txm_status txi_write_map(texinpaint_job *job, int map, const txi_copy *copies,
+                                const txi_pose *poses, float *values, txm_env *env) {
+    const txi_window *w = &job->window;
+    const texinpaint_map *kind = map ? &job->desc.maps[map - 1] : NULL;
+    const int channels = job->domain.maps[map].channels, is_label = kind && kind->is_label;
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    const int is_normal = kind && kind->is_normal;
+    txi_window_read(&job->domain, w, map, values);
+    if (!is_normal && !is_label) txi_premultiply(values, pixels, channels, 0);
+    const txm_status status =
+        txi_blend_map(w, copies, poses, values, channels, is_label, is_normal, env);
+    if (status != TXM_OK) return status;
+    if (!is_normal && !is_label) txi_premultiply(values, pixels, channels, 1);
+    return TXM_OK;
+}
+
+/* Complete the current window at full resolution and write it back: all maps or none. */
+static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
+    const txi_window *w = &job->window;
+    txi_choice *choice = &job->choice;
+    txi_hypothesis *h = &choice->tried[choice->best];
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    txm_arena arena;
+    const txi_pose *poses = NULL;
+    int pose_count = 0;
+    float *values[TEXINPAINT_MAX_MAPS] = {NULL};
+    txm_arena_init(&arena, env);
+    txi_copy *copies = (txi_copy *)txm_arena_alloc(&arena, pixels, sizeof *copies);
+    for (int i = 0; i < job->domain.map_count; i++)
+        values[i] = (float *)txm_arena_alloc(&arena, pixels, (size_t)job->domain.maps[i].channels *
+                                                                 sizeof(float));
+    txm_status status = arena.failed ? txi_no_memory(env) : TXM_OK;
+    if (status == TXM_OK)
+        status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field, copies,
+                                 &poses, &pose_count, env);
+    for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
+        status = txi_write_map(job, i, copies, poses, values[i], env);
+    if (status == TXM_OK) {
+        for (int i = 0; i < job->domain.map_count; i++)
+            txi_window_write(&job->domain, w, i, values[i]);
+        txi_window_done(&job->domain, w);
+        job->info.windows++;
+        job->info.line_ends += choice->lines.end_count;
+        job->info.joins += h->curve_count;
+        job->info.written += w->target_count;
+        if (w->target_count >= job->largest) {
+            job->largest = w->target_count;
+            job->info.structure = h->structure;
+        }
+        job->left -= w->target_count < job->left ? w->target_count : job->left;
+        job->phase = TXI_COARSE;
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* The share of the work that is done before the next step. */
+static float txi_done(const texinpaint_job *job) {
+    if (job->phase == TXI_PREVIEW) return 0;
+    if (job->phase >= TXI_GUTTER || !job->info.missing) return 0.98f;
+    const float window = (float)job->window.target_count / (float)job->info.missing;
+    const float done = 1 - (float)job->left / (float)job->info.missing;
+    return 0.04f + 0.94f * (done + (job->phase == TXI_FINE ? 0.6f * window : 0));
+}
+
+TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int *more) {
+    txm_status status = TXM_OK;
+    txi_stage stage;
+    if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
+    const float from = txi_done(job);
+    if (txm_progress(env, from, "complete")) return txi_stopped(env);
+    txi_stage_begin(&stage, env, from, from);
+    switch (job->phase) {
+    case TXI_PREVIEW:
+        status = txi_harmonic_fill(&job->domain, &stage.env);
+        if (status == TXM_OK) job->phase = TXI_COARSE;
+        break;
+    case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;
+    case TXI_FINE: status = txi_step_fine(job, &stage.env); break;
+    case TXI_GUTTER:
+        status = txi_gutter(&job->domain, &job->of_window, &stage.env);
+        if (status == TXM_OK) job->phase = TXI_DONE;
+        break;
+    default: break;
+    }
+    status = txi_stage_end(&stage, status);
+    if (status == TXM_OK) job->steps++;
+    if (status == TXM_OK && more) *more = job->phase != TXI_DONE;
+    return status;
+}
+
+TEXINPAINT_API txm_status texinpaint_draw(const texinpaint_job *job, int map, txm_env *env,
+                                          const txm_image *out) {
+    if (!job || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "job or out is NULL");
+    if (job->steps == 0) return txm_fail(env, TXM_BAD_ARGUMENT, "no step has been done yet");
+    if (map < 0 || map >= job->domain.map_count)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "map must be 0 to map_count");
+    const txm_image *picture = &job->domain.maps[map];
+    const txm_status status = txi_check_size(out, "out", picture, env);
+    if (status != TXM_OK) return status;
+    if (txm_image_resolve(*out).channels != picture->channels || out->sample != picture->sample)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: channels and sample must be those of the map");
+    txi_copy_picture(picture, out);
+    return TXM_OK;
+}
+
+TEXINPAINT_API texinpaint_info texinpaint_info_of(const texinpaint_job *job) {
+    return job->info;
+}
+
+TEXINPAINT_API txm_status texinpaint_complete(const texinpaint_desc *desc, txm_env *env,
+                                              const txm_image *out) {
+    texinpaint_job *job = NULL;
+    int more = 1;
+    txm_status status = txi_check(desc, env);
+    if (status == TXM_OK) status = txi_check_outputs(desc, out, 1 + desc->map_count, env);
+    if (status == TXM_OK) status = texinpaint_begin(desc, env, &job);
+    while (status == TXM_OK && more) status = texinpaint_step(job, env, &more);
+    for (int i = 0; status == TXM_OK && i <= desc->map_count; i++)
+        status = texinpaint_draw(job, i, env, &out[i]);
+    texinpaint_free(job);
+    return status;
+}
 
 #endif /* TEXINPAINT_IMPLEMENTATION */
 

@@ -271,6 +271,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/assemble.h"
 #include "texinpaint/fill.h"
 #include "texinpaint/blend.h"
+#include "texinpaint/stub.h"
 #include "texinpaint/choose.h"
 #include "texinpaint/job.h"
 #endif /* TEXINPAINT_IMPLEMENTATION */

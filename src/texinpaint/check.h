@@ -193,4 +193,17 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
     return TXM_OK;
 }
 
+/* Deliver an intermediate result to the caller, if wanted. */
+static void txi_show(const txi_domain *domain, const char *name, uint8_t *pixels, int width,
+                     int height, int channels) {
+    txm_image picture;
+    if (!domain->desc->show) return;
+    memset(&picture, 0, sizeof picture);
+    picture.pixels = pixels;
+    picture.width = width;
+    picture.height = height;
+    picture.channels = channels;
+    domain->desc->show(domain->desc->show_user, name, &picture);
+}
+
 #endif /* TEXINPAINT_CHECK_H */

@@ -1,8 +1,170 @@
 #ifndef TEXINPAINT_CHOOSE_H
 #define TEXINPAINT_CHOOSE_H
 
-#include "config.h"
+#include "blend.h"
+#include "fill.h"
+#include "join.h"
+#include "strip.h"
+#include "stub.h"
 
-/* ---- choose ---- */
+/* ---- hypotheses -------------------------------------------------------------------------------
+   Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
+   stripes and ruin labyrinths. So a window is completed to half its resolution without lines, with
+   the lines of a picture and with those of a pattern, and the one that goes on best where the known
+   texture ends wins. Only the winner is completed at full resolution.                             */
+
+enum { TXI_HYPOTHESES = 3 };
+#define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all   */
+#define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture       */
+#define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried          */
+
+/* A hypothesis at half resolution. */
+typedef struct txi_hypothesis {
+    int structure;      /* TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN                              */
+    txi_curve *curves;
+    int curve_count;
+    txi_plan plan;
+    const txi_pose *plan_poses;
+    int plan_pose_count;
+    txi_field field;
+    uint8_t *preview;   /* 4 per window pixel                                                    */
+    double energy, detail, score;
+} txi_hypothesis;
+
+/* What is known about a window that is being completed. */
+typedef struct txi_choice {
+    const txi_window *w;
+    const txi_domain *domain;
+    const txi_prior *prior; /* or NULL */
+    uint64_t seed;
+    txi_lines lines;
+    txi_style style;
+    txi_filler *filler;
+    txi_hypothesis tried[TXI_HYPOTHESES];
+    int count, best;
+} txi_choice;
+
+/* Which hypotheses to try, and how strongly detail is asked for. */
+static void txi_choose_style(txi_choice *c, double grain) {
+    const int has_lines = c->lines.end_count > 0 && c->lines.share_long >= TXI_SHARE_LONG;
+    const int forced = c->domain->desc->structure;
+    memset(&c->style, 0, sizeof c->style);
+    c->style.is_picture = c->domain->surface == NULL;
+    if (!has_lines && grain > TXI_GRAIN_TEXTURE) {
+        c->style.detail_offset = 0;
+        c->style.detail_clamp = 6;
+        c->style.detail_weight = 1.5f;
+        c->style.start = 10;
+    } else if (has_lines && grain > TXI_GRAIN_NO_PATTERN) {
+        c->style.detail_offset = 0.35f;
+        c->style.detail_clamp = 4;
+        c->style.detail_weight = 1.2f;
+        c->style.start = 14;
+    } else {
+        c->style.detail_offset = 0.7f;
+        c->style.detail_clamp = 3;
+        c->style.detail_weight = 1;
+        c->style.start = 14;
+    }
+    c->count = 0;
+    if (forced != TEXINPAINT_AUTO) {
+        c->tried[c->count++].structure = forced;
+        return;
+    }
+    c->tried[c->count++].structure = TEXINPAINT_TEXTURE;
+    if (has_lines || c->prior) c->tried[c->count++].structure = TEXINPAINT_PICTURE;
+    if (has_lines && grain <= TXI_GRAIN_NO_PATTERN)
+        c->tried[c->count++].structure = TEXINPAINT_PATTERN;
+}
+
+/* Complete one hypothesis to half resolution. */
+static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena *arena, txm_env *env) {
+    const size_t pixels = (size_t)c->w->width * (size_t)c->w->height;
+    const texinpaint_desc *desc = c->domain->desc;
+    const txi_plan *plan = NULL;
+    txm_status status = TXM_OK;
+    if (h->structure != TEXINPAINT_TEXTURE) {
+        status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
+                          arena, env, &h->curves, &h->curve_count);
+        if (status == TXM_OK && h->curve_count > 0) {
+            status = txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena, env,
+                                   &h->plan, &h->plan_poses, &h->plan_pose_count);
+            plan = &h->plan;
+        }
+    }
+    h->preview = (uint8_t *)txm_arena_alloc(arena, pixels, 4);
+    if (!h->preview) return txi_no_memory(env);
+    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, env, &h->field);
+    if (status != TXM_OK) return status;
+    memcpy(h->preview, c->w->color, 4 * pixels);
+    txi_fill_preview(c->filler, &h->field, h->preview, &h->energy, &h->detail);
+    return TXM_OK;
+}
+
+/* How well a hypothesis goes on; `plain` is the one without lines, or the first. */
+static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, txi_hypothesis *h,
+                            txm_env *env) {
+    const int is_picture = c->style.is_picture;
+    const double ratio = (h->energy + 1) / (plain->energy + 1);
+    double score = 0;
+    const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
+    if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
+    score -= 0.04 * log(ratio) / log(2.0);
+    if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
+    if (is_picture && h->curve_count > 0) {
+        score += 0.15 * txi_straight_share(&c->lines, h->curves, h->curve_count);
+        score -= 0.08 * txi_mean_bend(h->curves, h->curve_count);
+    }
+    h->score = txm_float(score); /* rounded: the same choice with any C library */
+    return status;
+}
+
+/* Show what was found and tried. */
+static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
+    static const char *const lines[] = {"", "lines-texture", "lines-picture", "lines-pattern"};
+    static const char *const names[] = {"", "half-texture", "half-picture", "half-pattern"};
+    enum { SCALE = 3 };
+    const txi_window *w = c->w;
+    if (!c->domain->desc->show) return TXM_OK;
+    uint8_t *rgb = (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
+    if (!rgb) return txi_no_memory(env);
+    for (int i = 0; i < c->count; i++) {
+        const txi_hypothesis *h = &c->tried[i];
+        txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
+        txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
+        for (size_t p = 0; p < (size_t)w->width * (size_t)w->height; p++) {
+            const uint8_t *from = (w->state[p] == TXI_HOLE ? h->preview : w->color) + 4 * p;
+            for (int k = 0; k < 3; k++) rgb[3 * p + (size_t)k] = from[k];
+        }
+        txi_show(c->domain, names[h->structure], rgb, w->width, w->height, 3);
+    }
+    txm_free(env, rgb);
+    return TXM_OK;
+}
+
+/* Complete a window to half its resolution; c->w, domain, prior and seed are set. */
+static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
+    txi_stage stage;
+    txm_status status = txi_trace(c->w, arena, env, &c->lines);
+    if (status != TXM_OK) return status;
+    const double grain = txi_grain(c->w, env);
+    if (grain < 0) return txi_no_memory(env);
+    txi_choose_style(c, grain);
+    txi_stage_begin(&stage, env, 0, 0.1f);
+    status = txi_stage_end(&stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env,
+                                                   &c->filler));
+    for (int i = 0; i < c->count && status == TXM_OK; i++) {
+        txi_stage_begin(&stage, env, 0.1f + 0.9f * (float)i / (float)c->count,
+                        0.1f + 0.9f * (float)(i + 1) / (float)c->count);
+        status = txi_stage_end(&stage, txi_try_hypothesis(c, &c->tried[i], arena, &stage.env));
+    }
+    if (status != TXM_OK) return status;
+    c->best = 0;
+    for (int i = 0; i < c->count && status == TXM_OK; i++) {
+        status = txi_judge(c, &c->tried[0], &c->tried[i], env);
+        if (c->tried[i].score > c->tried[c->best].score) c->best = i;
+    }
+    return status == TXM_OK ? txi_choose_show(c, env) : status;
+}
 
 #endif /* TEXINPAINT_CHOOSE_H */
