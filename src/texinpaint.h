@@ -262,6 +262,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/join.h"
 #include "texinpaint/belief.h"
 #include "texinpaint/strip.h"
+#include "texinpaint/lay.h"
 #include "texinpaint/picture.h"
 #include "texinpaint/detail.h"
 #include "texinpaint/pose.h"

@@ -1,0 +1,569 @@
+#ifndef TEXINPAINT_LAY_H
+#define TEXINPAINT_LAY_H
+
+#include "strip.h"
+
+/* ---- laying the strips ---------------------------------------------------------------------- */
+
+enum {
+    TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
+    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
+    TXI_LAY_OFFSET = 32,     /* levels; most that a strip's colours are changed                    */
+    TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
+    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
+    TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
+};
+#define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
+
+/* The strips of a window, and the graph of their patches. */
+typedef struct txi_strips {
+    const txi_window *w;
+    txi_strip *strips;
+    int count;
+    int *order;        /* strips, the one that is on top first                                    */
+    int node_count, link_count;
+    int *counts, *ends; /* of the graph                                                          */
+    size_t *firsts;
+    int32_t *unary;
+    int *link_strip;   /* which strip a link belongs to                                          */
+    int *labels;       /* per node: the index of the label chosen                                 */
+    int *cuts;         /* rows_most per node: the column from which on the next patch counts       */
+    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                        */
+} txi_strips;
+
+/* Strips of all curves; the sides of a stroke are one. */
+static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, int count,
+                                  txi_strips *all, txm_arena *arena, txm_env *env) {
+    all->w = w;
+    all->strips = (txi_strip *)txm_arena_zero(arena, (size_t)count, sizeof *all->strips);
+    all->order = (int *)txm_arena_alloc(arena, (size_t)count, sizeof *all->order);
+    txi_ribbon *lines = (txi_ribbon *)txm_arena_zero(arena, (size_t)count, sizeof *lines);
+    uint8_t *done = (uint8_t *)txm_arena_zero(arena, (size_t)count, 1);
+    if (arena->failed) return txi_no_memory(env);
+    int most = 1;
+    for (int i = 0; i < count; i++) {
+        if (curves[i].count < 2) continue;
+        most = curves[i].count > most ? curves[i].count : most;
+        txm_status status = txi_ribbon_make(curves[i].points, curves[i].count, arena, &lines[i], env);
+        if (status == TXM_OK) status = txi_ribbon_register(w, &lines[i], arena, env);
+        if (status != TXM_OK) return status;
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    float *width = (float *)txm_arena_alloc(arena, (size_t)most, sizeof *width);
+    if (!width) return txi_no_memory(env);
+    for (int i = 0; i < count; i++) {
+        const int p = curves[i].partner;
+        txi_strip *s = &all->strips[all->count];
+        if (done[i] || lines[i].count < 2) continue;
+        s->curve = i;
+        s->partner = -1;
+        s->line = lines[i];
+        if (p >= 0 && p < count && p != i && !done[p] && lines[p].count >= 2 &&
+            txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {
+            double sum = 0;
+            for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
+            s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
+            s->partner = p;
+            done[p] = 1;
+        }
+        done[i] = 1;
+        s->rows = 2 * TXI_STRIP_MARGIN + 1 + s->inside;
+        const txm_status status = txi_strip_sample(w, s, arena, env);
+        if (status != TXM_OK) return status;
+        if (s->last >= 0) all->count++; /* else there is nothing to complete */
+        else memset(s, 0, sizeof *s);
+    }
+    return TXM_OK;
+}
+
+/* The order in which strips cover each other: strokes over single lines, lines that go through over
+   those that end in the hole, then the stronger ones. */
+static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
+                                   txm_env *env) {
+    const size_t count = (size_t)all->count;
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, 2 * count, sizeof *pairs);
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) {
+        const txi_strip *s = &all->strips[i];
+        const txi_curve *c = &curves[s->curve];
+        const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
+        const uint32_t bonus = (s->partner >= 0 ? 1u << 29 : 0) +
+                               (c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0);
+        pairs[i].key = UINT32_MAX - bonus - strength;
+        pairs[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(pairs, pairs + count, count);
+    for (size_t i = 0; i < count; i++) all->order[i] = (int)pairs[i].value;
+    return TXM_OK;
+}
+
+/* ---- choosing patches ---- */
+
+static int32_t txi_strips_pair(const void *context, int link, int a, int b) {
+    const txi_strips *all = (const txi_strips *)context;
+    const txi_strip *s = &all->strips[all->link_strip[link]];
+    const int p = s->labels[a] + s->hop - s->reach, q = s->labels[b] - s->reach;
+    return s->overlap[(size_t)p * (size_t)s->source_count + (size_t)q];
+}
+
+/* The costs of a strip: the table of overlaps and the unary costs of its patches. */
+static void txi_strips_body(void *context, int index) {
+    const txi_strips *all = (const txi_strips *)context;
+    txi_strip *s = &all->strips[index];
+    int16_t feature[TXI_STRIP_FEATURES], mask[TXI_STRIP_FEATURES];
+    int32_t values[TXI_STRIP_COLUMNS];
+    if (!s->node_count) return;
+    for (int i = 0; i < s->features; i++) mask[i] = -1;
+    txi_strip_overlaps(s, mask, values);
+    for (int k = 0; k < s->node_count; k++)
+        txi_strip_unary(s, k, feature, mask, all->unary + all->firsts[s->node + k]);
+}
+
+/* The sources of all strips, and the graph of all patches. */
+static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
+                                   txm_arena *arena, txm_env *env) {
+    size_t labels = 0;
+    for (int i = 0; i < all->count; i++) {
+        txi_strip *s = &all->strips[i];
+        txm_status status = txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
+        if (status != TXM_OK) return status;
+        txi_strip_labels(s);
+        s->node = all->node_count;
+        all->node_count += s->node_count;
+        all->link_count += s->node_count ? s->node_count - 1 : 0;
+        labels += (size_t)s->node_count * (size_t)s->label_count;
+        if (s->node_count)
+            s->overlap = (int32_t *)txm_arena_alloc(arena, (size_t)s->source_count,
+                                                    (size_t)s->source_count * sizeof *s->overlap);
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    const size_t nodes = (size_t)all->node_count, links = (size_t)all->link_count;
+    all->counts = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->counts);
+    all->firsts = (size_t *)txm_arena_alloc(arena, nodes + 1, sizeof *all->firsts);
+    all->unary = (int32_t *)txm_arena_alloc(arena, labels + 1, sizeof *all->unary);
+    all->ends = (int *)txm_arena_alloc(arena, links + 1, 2 * sizeof *all->ends);
+    all->link_strip = (int *)txm_arena_alloc(arena, links + 1, sizeof *all->link_strip);
+    all->labels = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->labels);
+    if (arena->failed) return txi_no_memory(env);
+    size_t first = 0;
+    int link = 0;
+    for (int i = 0; i < all->count; i++) {
+        const txi_strip *s = &all->strips[i];
+        for (int k = 0; k < s->node_count; k++) {
+            const int node = s->node + k;
+            all->counts[node] = s->label_count;
+            all->firsts[node] = first;
+            first += (size_t)s->label_count;
+            if (k == 0) continue;
+            all->ends[2 * link] = node - 1;
+            all->ends[2 * link + 1] = node;
+            all->link_strip[link++] = i;
+        }
+    }
+    txm_parallel_for(env, all->count, txi_strips_body, all);
+    return TXM_OK;
+}
+
+static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena, txm_env *env) {
+    txi_graph g;
+    memset(&g, 0, sizeof g);
+    g.node_count = all->node_count;
+    g.link_count = all->link_count;
+    g.counts = all->counts;
+    g.firsts = all->firsts;
+    g.unary = all->unary;
+    g.ends = all->ends;
+    g.pair = txi_strips_pair;
+    g.context = all;
+    const txm_status status = txi_belief(&g, TXI_STRIP_KEEP, seed, arena, all->labels, NULL, env);
+    for (int i = 0; i < all->count && status == TXM_OK; i++) {
+        txi_strip *s = &all->strips[i];
+        s->chosen = all->labels + s->node;
+        for (int k = 0; k < s->node_count; k++) s->chosen[k] = s->labels[s->chosen[k]];
+    }
+    return status;
+}
+
+/* ---- cuts and colours between patches ---- */
+
+/* Colour of row j of the patch's source, `offset` columns from its centre. */
+static const uint8_t *txi_patch_color(const txi_strip *s, int patch, int offset, int j) {
+    const int column = s->chosen[patch] + offset;
+    return s->source_color + 3 * ((size_t)column * (size_t)s->rows + (size_t)j);
+}
+
+/* Where patch k ends and the next one begins, row by row: a minimum-error cut through the columns
+   between their centres. */
+static void txi_patch_cut(const txi_strip *s, int k, int *cut) {
+    float error[TXI_STRIP_ROWS * TXI_STRIP_HOP];
+    double scratch[TXI_STRIP_ROWS * TXI_STRIP_HOP];
+    const int width = s->hop > 1 ? s->hop - 1 : 1;
+    for (int j = 0; j < s->rows; j++) {
+        for (int m = 0; m < width; m++) {
+            const uint8_t *a = txi_patch_color(s, k, m + 1, j);
+            const uint8_t *b = txi_patch_color(s, k + 1, m + 1 - s->hop, j);
+            int sum = 0;
+            for (int c = 0; c < 3; c++) sum += (a[c] - b[c]) * (a[c] - b[c]);
+            error[j * width + m] = (float)sum;
+        }
+    }
+    txm_cut(error, s->rows, width, width, 1, cut, scratch);
+    for (int j = 0; j < s->rows; j++) cut[j] += s->first + k * s->hop + 1;
+}
+
+/* What is to be added to the colours of row j in each patch, so that patches meet without a step and
+   the ends meet the known part: the offsets e minimise
+
+       sum over k of (e(k+1) - e(k) - d(k))^2 + sum over k of w(k) (e(k) - g(k))^2 + 0.0001 e(k)^2
+
+   d: mean difference of neighbours in their overlap, g: of the known part, w: known share of the
+   patch's row. The matrix has three diagonals and is solved by elimination. e: 2 * node_count. */
+static void txi_row_offsets(const txi_strip *s, int j, int c, double *e, float *offsets) {
+    const int n = s->node_count;
+    double *factor = e + n, d_before = 0;
+    for (int k = 0; k < n; k++) {
+        double load = 0, diagonal = 1e-4, d = 0;
+        int hits = 0, sum = 0;
+        for (int m = -s->reach; m <= s->reach; m++) {
+            const int column = s->first + k * s->hop + m;
+            const size_t at = (size_t)(column < 0 ? 0 : column) * (size_t)s->rows + (size_t)j;
+            if (column < 0 || column >= s->line.count || !s->known[at]) continue;
+            sum += s->color[3 * at + (size_t)c] - txi_patch_color(s, k, m, j)[c];
+            hits++;
+        }
+        diagonal += (double)hits / (2 * s->reach + 1);
+        load += (double)sum / (2 * s->reach + 1);
+        sum = 0;
+        for (int m = s->hop - s->reach; m <= s->reach && k + 1 < n; m++)
+            sum += txi_patch_color(s, k, m, j)[c] - txi_patch_color(s, k + 1, m - s->hop, j)[c];
+        if (k + 1 < n) {
+            d = (double)sum / (2 * s->reach - s->hop + 1);
+            load -= d;
+            diagonal += 1;
+        }
+        if (k) { /* eliminate e(k-1): its row is e(k-1) - factor(k-1) e(k) = e[k-1] */
+            load += d_before + e[k - 1];
+            diagonal += 1 - factor[k - 1];
+        }
+        factor[k] = k + 1 < n ? 1 / diagonal : 0;
+        e[k] = load / diagonal;
+        d_before = d;
+    }
+    for (int k = n - 1; k >= 0; k--) {
+        if (k + 1 < n) e[k] += factor[k] * e[k + 1];
+        offsets[(size_t)k * 3 * TXI_STRIP_ROWS + (size_t)(3 * j + c)] = txm_float(e[k]);
+    }
+}
+
+/* Cuts and offsets of all strips; the offsets are smoothed across the rows. */
+static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *env) {
+    const size_t nodes = (size_t)all->node_count;
+    all->cuts = (int *)txm_arena_zero(arena, nodes + 1, TXI_STRIP_ROWS * sizeof *all->cuts);
+    all->offsets =
+        (float *)txm_arena_zero(arena, nodes + 1, 3 * TXI_STRIP_ROWS * sizeof *all->offsets);
+    double *e = (double *)txm_arena_alloc(arena, nodes + 1, 2 * sizeof *e);
+    if (arena->failed) return txi_no_memory(env);
+    for (int i = 0; i < all->count; i++) {
+        const txi_strip *s = &all->strips[i];
+        float *offsets = all->offsets + (size_t)s->node * 3 * TXI_STRIP_ROWS;
+        for (int k = 0; k + 1 < s->node_count; k++)
+            txi_patch_cut(s, k, all->cuts + (size_t)(s->node + k) * TXI_STRIP_ROWS);
+        for (int j = 0; j < 3 * s->rows && s->node_count; j++)
+            txi_row_offsets(s, j / 3, j % 3, e, offsets);
+        for (int k = 0; k < s->node_count; k++) {
+            float *row = offsets + (size_t)k * 3 * TXI_STRIP_ROWS, smooth[3 * TXI_STRIP_ROWS];
+            for (int j = 0; j < 3 * s->rows; j++)
+                smooth[j] = txm_clampf(
+                    txm_float(txi_running_mean(row + j % 3, s->rows, 3, j / 3, 2)),
+                    -TXI_LAY_OFFSET, TXI_LAY_OFFSET);
+            memcpy(row, smooth, (size_t)(3 * s->rows) * sizeof *row);
+        }
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* ---- pixels ---- */
+
+/* Catmull-Rom weights at t = 0..1 between the middle two of four samples */
+static void txi_lay_weights(double t, double weights[4]) {
+    weights[0] = 0.5 * t * (t * (2 - t) - 1);
+    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
+    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
+    weights[3] = 0.5 * t * t * (t - 1);
+}
+
+/* RGB at a place, Catmull-Rom, or bilinear where not all of its 16 pixels may be copied from; 0 if
+   not even that is possible. */
+static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3]) {
+    const int bx = (int)floor(x), by = (int)floor(y);
+    int coarse[3];
+    double wx[4], wy[4];
+    if (txi_strip_pixel(w, x, y, coarse) != 2) return 0;
+    for (int c = 0; c < 3; c++) rgb[c] = coarse[c];
+    if (bx < 1 || by < 1 || bx + 2 >= w->width || by + 2 >= w->height) return 1;
+    const size_t corner = (size_t)(by - 1) * (size_t)w->width + (size_t)(bx - 1);
+    for (int k = 0; k < 16; k++) {
+        if (w->state[corner + (size_t)(k / 4) * (size_t)w->width + (size_t)(k % 4)] != TXI_KNOWN)
+            return 1;
+    }
+    txi_lay_weights(x - bx, wx);
+    txi_lay_weights(y - by, wy);
+    for (int c = 0; c < 3; c++) {
+        rgb[c] = 0;
+        for (int k = 0; k < 16; k++)
+            rgb[c] += wx[k % 4] * wy[k / 4] *
+                      w->color[4 * (corner + (size_t)(k / 4) * (size_t)w->width + (size_t)(k % 4)) +
+                               (size_t)c];
+    }
+    return 1;
+}
+
+/* Which columns of a strip the pixels near it belong to. Arrays of one item per window pixel. */
+typedef struct txi_lay {
+    txi_strips *all;
+    const txi_curve *curves;
+    txi_plan *plan;
+    txi_pose *poses;
+    float *squares;   /* squared distance to the nearest column of the current strip               */
+    int32_t *columns; /* that column, or -1                                                      */
+    float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
+} txi_lay;
+
+/* For each hole pixel near a strip its nearest column. box: x0, y0, x1, y1, inclusive. */
+static void txi_lay_nearest(txi_lay *lay, const txi_strip *s, int box[4]) {
+    const txi_window *w = lay->all->w;
+    float widest = 0;
+    box[0] = w->width, box[1] = w->height, box[2] = box[3] = -1;
+    for (int i = 0; i < s->line.count; i++) widest = txm_maxf(widest, s->line.half[i]);
+    const int radius = (int)widest + TXI_STRIP_MARGIN + 2;
+    for (int pass = 0; pass < 2; pass++) { /* clear, then find */
+        for (int i = s->first; i <= s->last; i++) {
+            const txm_vec2 p = s->line.place[i];
+            const int x0 = txm_clampi((int)p.x - radius, 0, w->width - 1);
+            const int x1 = txm_clampi((int)p.x + radius + 1, 0, w->width - 1);
+            const int y0 = txm_clampi((int)p.y - radius, 0, w->height - 1);
+            const int y1 = txm_clampi((int)p.y + radius + 1, 0, w->height - 1);
+            for (int y = y0; y <= y1; y++) {
+                for (int x = x0; x <= x1; x++) {
+                    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+                    const double dx = x - (double)p.x, dy = y - (double)p.y;
+                    const float square = txm_float(dx * dx + dy * dy);
+                    if (!pass) {
+                        lay->columns[at] = -1;
+                    } else if (w->state[at] == TXI_HOLE &&
+                               (lay->columns[at] < 0 || square < lay->squares[at])) {
+                        lay->squares[at] = square;
+                        lay->columns[at] = i;
+                    }
+                }
+            }
+            box[0] = x0 < box[0] ? x0 : box[0];
+            box[1] = y0 < box[1] ? y0 : box[1];
+            box[2] = x1 > box[2] ? x1 : box[2];
+            box[3] = y1 > box[3] ? y1 : box[3];
+        }
+    }
+}
+
+/* The patch that has a place of the strip. */
+static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, int row) {
+    const int k = txm_clampi((int)((column - s->first) / s->hop), 0, s->node_count - 1);
+    if (k + 1 == s->node_count) return k;
+    const int *cut = lay->all->cuts + (size_t)(s->node + k) * TXI_STRIP_ROWS;
+    return column >= cut[row] ? k + 1 : k;
+}
+
+/* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
+   less towards the end of a line that ends in the hole. */
+static int txi_lay_pull(const txi_lay *lay, const txi_strip *s, double away, int column) {
+    const txi_curve *c = &lay->curves[s->curve];
+    double pull = away <= TXI_LAY_CORE
+                      ? 1
+                      : (TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
+    if (c->ends[1] < 0 && s->line.count - 1 - column < TXI_LAY_FADE)
+        pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
+    if (c->ends[0] < 0 && column < TXI_LAY_FADE) pull *= (double)(column + 1) / (TXI_LAY_FADE + 1);
+    return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
+}
+
+/* One pixel of a strip, if no other strip has a better claim to it. */
+static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
+    const txi_window *w = lay->all->w;
+    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+    const int i = lay->columns[at];
+    const txm_vec2 t = s->line.along[i];
+    const double dx = x - (double)s->line.place[i].x, dy = y - (double)s->line.place[i].y;
+    const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
+    const double half = s->line.half[i];
+    const double away = (across < 0 ? -across : across) - half;
+    const double claim = away > TXI_LAY_CORE ? away - TXI_LAY_CORE : 0;
+    double rgb[3];
+    if (ahead > 1.5 || ahead < -1.5 || away >= TXI_STRIP_MARGIN || claim >= lay->claims[at]) return;
+    const double row = txi_offset_row(across, s->inside, half), column = i + ahead;
+    const int j = txm_clampi((int)(row + 0.5), 0, s->rows - 1);
+    const int k = txi_lay_patch(lay, s, column, j), centre = s->first + k * s->hop;
+    const txi_source from = txi_source_at(s, s->chosen[k], column - centre);
+    const txm_vec2 p = txi_source_place(&from, txi_row_offset(row, s->inside, (double)from.half));
+    const int pull = txi_lay_pull(lay, s, away, i);
+    if (!pull || !txi_lay_pixel(w, (double)p.x, (double)p.y, rgb)) return;
+    const float *offset = lay->all->offsets + (size_t)(s->node + k) * 3 * TXI_STRIP_ROWS + 3 * j;
+    const int next = column >= centre ? (k + 1 < s->node_count ? 1 : 0) : k > 0 ? -1 : 0;
+    const double mix = (column >= centre ? column - centre : centre - column) / s->hop;
+    for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
+        const double there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
+        const double value = rgb[c] + (double)offset[c] + (there - (double)offset[c]) * mix + 0.5;
+        lay->plan->color[4 * at + (size_t)c] =
+            (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : (int)value);
+    }
+    lay->claims[at] = txm_float(claim);
+    lay->plan->pull[at] = (uint8_t)pull;
+    lay->plan->copies[at].x = p.x;
+    lay->plan->copies[at].y = p.y;
+    lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
+}
+
+/* The pose of a patch: both frames at its centre. */
+static txi_pose txi_lay_pose(const txi_strip *s, int k) {
+    const int column = s->first + k * s->hop;
+    const txm_vec2 t = s->line.along[column < s->line.count ? column : s->line.count - 1];
+    const txi_source *from = &s->sources[s->chosen[k]];
+    const txm_vec2 u = from->along;
+    const txm_vec2 v = txm_v2(-u.y * from->side, u.x * from->side);
+    txi_pose pose; /* to the right is t.x along the line and -t.y across it; down t.y and t.x */
+    pose.a = txm_float((double)t.x * u.x - (double)t.y * v.x);
+    pose.b = txm_float((double)t.x * u.y - (double)t.y * v.y);
+    pose.c = txm_float((double)t.y * u.x + (double)t.x * v.x);
+    pose.d = txm_float((double)t.y * u.y + (double)t.x * v.y);
+    return pose;
+}
+
+static void txi_lay_all(txi_lay *lay) {
+    for (int k = 0; k < lay->all->count; k++) {
+        const txi_strip *s = &lay->all->strips[lay->all->order[k]];
+        int box[4];
+        if (!s->node_count) continue;
+        for (int n = 0; n < s->node_count; n++) lay->poses[s->node + n] = txi_lay_pose(s, n);
+        txi_lay_nearest(lay, s, box);
+        for (int y = box[1]; y <= box[3]; y++) {
+            for (int x = box[0]; x <= box[2]; x++) {
+                const ptrdiff_t at = (ptrdiff_t)y * lay->all->w->width + x;
+                if (lay->all->w->state[at] == TXI_HOLE && lay->columns[at] >= 0)
+                    txi_lay_at(lay, s, x, y);
+            }
+        }
+    }
+}
+
+/* ---- the guide channel ---- */
+
+/* Raise the guide channel near a place on a line, in the hole or outside of it. */
+static void txi_guide_at(const txi_window *w, txi_plan *plan, const uint8_t *table, double px,
+                         double py, int in_hole) {
+    const int r = TXI_GUIDE_RADIUS;
+    if (!(px > -r && py > -r && px < w->width + r && py < w->height + r)) return;
+    const int cx = (int)(px + 0.5 + r) - r, cy = (int)(py + 0.5 + r) - r;
+    for (int y = cy > r ? cy - r : 0; y <= cy + r && y < w->height; y++) {
+        for (int x = cx > r ? cx - r : 0; x <= cx + r && x < w->width; x++) {
+            const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+            const double dx = x - px, dy = y - py, distance = sqrt(dx * dx + dy * dy);
+            if ((w->state[at] == TXI_HOLE) != in_hole || distance >= r) continue;
+            const uint8_t value = table[(int)(distance * TXI_GUIDE_STEPS + 0.5)];
+            if (plan->color[4 * at + 3] < value) plan->color[4 * at + 3] = value;
+        }
+    }
+}
+
+/* 100 exp(-d^2 / (2 * 1.5^2)) near known lines, outside of the hole, and near the completed ones. */
+static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *plan) {
+    uint8_t table[TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS + 1];
+    const txi_window *w = all->w;
+    for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
+        const double d = (double)i / (TXI_GUIDE_STEPS * TXI_GUIDE_SIGMA);
+        table[i] = (uint8_t)(TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+    }
+    for (int i = 0; lines && i < lines->thin_count; i++)
+        txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,
+                     0);
+    for (int k = 0; k < all->count; k++) {
+        const txi_ribbon *r = &all->strips[k].line;
+        for (int i = 0; i < r->count; i++) {
+            const double half = r->half[i], nx = -r->along[i].y, ny = r->along[i].x;
+            for (int side = half > 0 ? -1 : 1; side < 2; side += 2) {
+                const double x = (double)r->place[i].x + side * half * nx;
+                const double y = (double)r->place[i].y + side * half * ny;
+                txi_guide_at(w, plan, table, x, y, 1);
+                txi_guide_at(w, plan, table, x, y, 0);
+            }
+        }
+    }
+}
+
+/* ---- the plan ---- */
+
+static txm_status txi_plan_run(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
+                               int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
+                               txm_env *env, txi_plan *plan, txi_pose **poses) {
+    const txi_window *w = all->w;
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    txi_lay lay;
+    txm_status status = txi_strips_make(w, curves, count, all, scratch, env);
+    if (status == TXM_OK) status = txi_strips_order(all, curves, scratch, env);
+    if (status == TXM_OK) status = txi_strips_graph(all, lines, curves, scratch, env);
+    if (status == TXM_OK) status = txi_strips_choose(all, seed, scratch, env);
+    if (status == TXM_OK) status = txi_strips_finish(all, scratch, env);
+    if (status != TXM_OK) return status;
+
+    lay.all = all;
+    lay.curves = curves;
+    lay.plan = plan;
+    lay.squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.squares);
+    lay.columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay.columns);
+    lay.claims = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.claims);
+    lay.poses = *poses = (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
+    plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
+    plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
+    plan->copies = (txi_copy *)txm_arena_alloc(arena, pixels, sizeof *plan->copies);
+    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < pixels; i++) {
+        lay.claims[i] = TXI_STRIP_MARGIN;
+        plan->copies[i].x = plan->copies[i].y = 0;
+        plan->copies[i].piece = -1;
+        plan->copies[i].pose = 0;
+    }
+    txi_lay_all(&lay);
+    txi_guide(all, lines, plan);
+    return txm_progress(env, 0, "strips") ? txi_stopped(env) : TXM_OK;
+}
+
+/* Lay strips of texture along the completed lines of a window [1, III.A].
+
+   lines   of the window: other lines to take texture from, and the known lines of the guide channel;
+           NULL: none
+   curves  the completed lines, count of them; may be none
+   arena   holds plan and poses
+   plan    receives the strips: color and pull in the hole, the guide channel near all lines. Copies
+           have one piece and one pose per patch
+   poses   receives pose_count poses
+   return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED; after a failure *plan and *poses are NULL
+   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61        */
+static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
+                                int count, uint64_t seed, txm_arena *arena, txm_env *env,
+                                txi_plan *plan, const txi_pose **poses, int *pose_count) {
+    txi_strips all;
+    txi_pose *made = NULL;
+    txm_arena scratch;
+    memset(&all, 0, sizeof all);
+    memset(plan, 0, sizeof *plan);
+    all.w = w;
+    txm_arena_init(&scratch, env);
+    const txm_status status =
+        txi_plan_run(&all, lines, curves, count, seed, arena, &scratch, env, plan, &made);
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
+    *poses = status == TXM_OK ? made : NULL;
+    *pose_count = status == TXM_OK ? all.node_count : 0;
+    return status;
+}
+
+#endif /* TEXINPAINT_LAY_H */
