@@ -403,8 +403,8 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
     const double row = txi_offset_row(across, s->inside, half), column = i + ahead;
     const int j = txm_clampi((int)(row + 0.5), 0, s->rows - 1);
     const int k = txi_lay_patch(lay, s, column, j), centre = s->first + k * s->hop;
-    const txi_source from = txi_source_at(s, s->chosen[k], column - centre);
-    const txm_vec2 p = txi_source_place(&from, txi_row_offset(row, s->inside, (double)from.half));
+    const txi_column from = txi_column_at(s, s->chosen[k], column - centre);
+    const txm_vec2 p = txi_column_place(&from, txi_row_offset(row, s->inside, (double)from.half));
     const int pull = txi_lay_pull(lay, s, away, i);
     if (!pull || !txi_lay_pixel(w, (double)p.x, (double)p.y, rgb)) return;
     const float *offset = lay->all->offsets + (size_t)(s->node + k) * 3 * TXI_STRIP_ROWS + 3 * j;
@@ -427,7 +427,7 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
 static txi_pose txi_lay_pose(const txi_strip *s, int k) {
     const int column = s->first + k * s->hop;
     const txm_vec2 t = s->line.along[column < s->line.count ? column : s->line.count - 1];
-    const txi_source *from = &s->sources[s->chosen[k]];
+    const txi_column *from = &s->sources[s->chosen[k]];
     const txm_vec2 u = from->along;
     const txm_vec2 v = txm_v2(-u.y * from->side, u.x * from->side);
     txi_pose pose; /* to the right is t.x along the line and -t.y across it; down t.y and t.x */

@@ -40,13 +40,13 @@ typedef struct txi_ribbon {
 } txi_ribbon;
 
 /* A column of texture to copy from. */
-typedef struct txi_source {
+typedef struct txi_column {
     txm_vec2 place, along;
     float half;
     float side;        /* 1, or -1: mirrored, rows grow along (t.y, -t.x)                        */
     int run;           /* columns next to each other on the same line have the same number        */
     int before, after; /* columns of the run in front of and behind it; -1: not usable            */
-} txi_source;
+} txi_column;
 
 typedef struct txi_strip {
     int curve, partner; /* indices of the curves; partner -1: a single line                       */
@@ -55,7 +55,7 @@ typedef struct txi_strip {
     txi_ribbon line;
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
-    txi_source *sources;
+    txi_column *sources;
     int source_count;
     uint8_t *source_color; /* 3 per source column and row                                         */
     int16_t *source_feature; /* features per source column: colours, weighted                      */
@@ -333,8 +333,8 @@ static txm_status txi_strip_sample(const txi_window *w, txi_strip *s, txm_arena 
 /* ---- sources ---- */
 
 /* The column of a source at which a target's column is laid; c may have a fraction. */
-static txi_source txi_source_at(const txi_strip *s, int column, double offset) {
-    txi_source a = s->sources[column];
+static txi_column txi_column_at(const txi_strip *s, int column, double offset) {
+    txi_column a = s->sources[column];
     int whole = (int)(offset + 1024) - 1024;
     if (whole > a.after) whole = a.after;
     if (whole < -a.before) whole = -a.before;
@@ -346,7 +346,7 @@ static txi_source txi_source_at(const txi_strip *s, int column, double offset) {
 }
 
 /* Where row offset t of a source's column lies. */
-static txm_vec2 txi_source_place(const txi_source *a, double t) {
+static txm_vec2 txi_column_place(const txi_column *a, double t) {
     const double u = t * (double)a->side;
     return txm_v2(txm_float((double)a->place.x - u * (double)a->along.y),
                   txm_float((double)a->place.y + u * (double)a->along.x));
@@ -354,13 +354,13 @@ static txm_vec2 txi_source_place(const txi_source *a, double t) {
 
 /* Add columns from..to of a line to a strip's sources: forwards, or backwards (turned by half a turn),
    or mirrored (backwards, but with the rows as they are). */
-static void txi_source_add(txi_strip *s, const txi_ribbon *r, int from, int to, int backwards,
+static void txi_columns_add(txi_strip *s, const txi_ribbon *r, int from, int to, int backwards,
                            int mirrored) {
     const int room = TXI_STRIP_COLUMNS - s->source_count;
     const int count = to - from + 1 < room ? to - from + 1 : room;
     for (int k = 0; k < count; k++) {
         const int i = backwards || mirrored ? to - k : from + k;
-        txi_source *a = &s->sources[s->source_count + k];
+        txi_column *a = &s->sources[s->source_count + k];
         a->place = r->place[i];
         a->along = r->along[i];
         if (backwards || mirrored) a->along = txm_v2(-a->along.x, -a->along.y);
@@ -373,12 +373,12 @@ static void txi_source_add(txi_strip *s, const txi_ribbon *r, int from, int to, 
 
 /* The strip's own known columns, those next to the hole first: both sides of the hole in turn would
    only matter beyond TXI_STRIP_COLUMNS / 2 columns each. Returns how many. */
-static int txi_source_add_own(txi_strip *s, int mirrored) {
+static int txi_columns_own(txi_strip *s, int mirrored) {
     const int most = TXI_STRIP_COLUMNS / 2, before = s->source_count;
     const int from = s->first > most ? s->first - most : 0;
     const int to = s->line.count - 1 - s->last > most ? s->last + most : s->line.count - 1;
-    if (s->first > 0) txi_source_add(s, &s->line, from, s->first - 1, 0, mirrored);
-    if (to > s->last) txi_source_add(s, &s->line, s->last + 1, to, 0, mirrored);
+    if (s->first > 0) txi_columns_add(s, &s->line, from, s->first - 1, 0, mirrored);
+    if (to > s->last) txi_columns_add(s, &s->line, s->last + 1, to, 0, mirrored);
     return s->source_count - before;
 }
 
@@ -396,7 +396,7 @@ static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t 
 
 /* Colours and features of the sources. Where a row is not known the nearest known one towards the line
    counts. A column whose middle is not known, or less than two thirds, breaks its run. */
-static txm_status txi_source_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
+static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     const size_t rows = (size_t)s->rows, count = (size_t)s->source_count;
     const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
@@ -406,12 +406,12 @@ static txm_status txi_source_sample(const txi_window *w, txi_strip *s, txm_arena
         (int16_t *)txm_arena_zero(arena, count * (size_t)s->features, sizeof(int16_t));
     if (arena->failed) return txi_no_memory(env);
     for (size_t i = 0; i < count; i++) {
-        txi_source *a = &s->sources[i];
+        txi_column *a = &s->sources[i];
         uint8_t *color = s->source_color + 3 * i * rows;
         int known[TXI_STRIP_ROWS], n = 0, whole = 1;
         for (int j = 0; j < s->rows; j++) {
             const txm_vec2 p =
-                txi_source_place(a, txi_row_offset(j, s->inside, (double)a->half));
+                txi_column_place(a, txi_row_offset(j, s->inside, (double)a->half));
             int rgb[3];
             known[j] = txi_strip_pixel(w, (double)p.x, (double)p.y, rgb) == 2;
             n += known[j];
@@ -425,7 +425,7 @@ static txm_status txi_source_sample(const txi_window *w, txi_strip *s, txm_arena
         txi_strip_feature(s, color, s->source_feature + i * (size_t)s->features);
         a->before = whole && 3 * n >= 2 * s->rows ? 0 : -1;
     }
-    txi_source *a = s->sources;
+    txi_column *a = s->sources;
     for (int i = 1; i < s->source_count; i++)
         if (a[i].before == 0 && a[i].run == a[i - 1].run) a[i].before = a[i - 1].before + 1;
     for (int i = s->source_count - 1; i >= 0; i--) {
@@ -582,12 +582,12 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
                                     const txi_curve *curve, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     int best[TXI_STRIP_OTHERS], others = 0;
-    s->sources = (txi_source *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->sources);
+    s->sources = (txi_column *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->sources);
     s->labels = (int *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->labels);
     if (arena->failed) return txi_no_memory(env);
     s->source_count = 0;
-    const int own = txi_source_add_own(s, 0);
-    txm_status status = txi_source_sample(w, s, arena, env);
+    const int own = txi_columns_own(s, 0);
+    txm_status status = txi_columns_sample(w, s, arena, env);
     if (status != TXM_OK) return status;
     if (s->partner < 0 && lines && own > 0 && own < TXI_STRIP_COLUMNS / 4)
         others = txi_strip_others(s, lines, curve->ends, best);
@@ -597,10 +597,10 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
         status = txi_ribbon_make(lines->points + e->first, e->count, arena, &r, env);
         if (status != TXM_OK) return status;
         /* points run outwards, the profile is that seen on the way inwards */
-        txi_source_add(s, &r, 0, r.count - 1, !(best[k] & 1), 0);
+        txi_columns_add(s, &r, 0, r.count - 1, !(best[k] & 1), 0);
     }
-    if (own < TXI_STRIP_COLUMNS / 8) txi_source_add_own(s, 1);
-    return s->source_count > own ? txi_source_sample(w, s, arena, env) : TXM_OK;
+    if (own < TXI_STRIP_COLUMNS / 8) txi_columns_own(s, 1);
+    return s->source_count > own ? txi_columns_sample(w, s, arena, env) : TXM_OK;
 }
 
 #endif /* TEXINPAINT_STRIP_H */
