@@ -3233,7 +3233,7 @@ enum {
     TXI_PER_END = 12,      /* candidates kept for each end, the best ones; ours                   */
     TXI_MAX_LINKS = 3000,  /* candidates in all; ours                                            */
     TXI_MOVES = 60000,     /* of the annealing; ours                                             */
-    TXI_KNOWN_PART = 32    /* pixels of a curve outside of the hole, on each side                */
+    TXI_KNOWN_PART = 120   /* pixels of a curve outside of the hole, on each side                */
 };
 
 /* A candidate: two ends and the curve between them, or one end and a place where it leaves the hole. */
@@ -3973,9 +3973,1688 @@ static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_cu
     }
 }
 
-/* ---- belief ---- */
+/* ---- belief propagation ---------------------------------------------------------------------
+   Labels x for the nodes of a graph that minimise
 
-/* ---- strip ---- */
+       E(x) = sum over nodes of unary(n, x_n) + sum over links of pair(l, x_a, x_b)   [1, eq. 2]
+
+   by min-sum belief propagation. All costs are integers, so that every build decides alike.
+
+   1. Pruning, as in priority belief propagation [5]: the nodes are visited in the order of how few of
+      their labels are plausible, then in the opposite order. Each one sends its cheapest labels only,
+      and keeps those that are cheapest by the messages from both visits.
+   2. A graph without cycles: the exact minimum by dynamic programming.
+   3. Else messages with damping, from which the labels are read node by node; then moves that fix
+      some nodes, so that the others form a forest, and optimise all of these at once. The result
+      is never worse than that of optimising one node at a time (ICM) from the cheapest labels. */
+
+enum {
+    TXI_COST_MOST = 1 << 30,     /* of one unary or pair cost; may be used as "forbidden"        */
+    TXI_BELIEF_ROUNDS = 24,      /* of messages on a graph with cycles; ours                     */
+    TXI_BELIEF_MOVES = 16        /* of forests on a graph with cycles; ours                      */
+};
+
+typedef struct txi_graph {
+    int node_count, link_count;
+    const int *counts;    /* labels per node, 1 or more                                        */
+    const size_t *firsts; /* per node, where its costs begin in unary                          */
+    const int32_t *unary; /* 0..TXI_COST_MOST                                                   */
+    const int *ends;      /* 2 per link: different nodes                                        */
+    const uint8_t *late;  /* per link, non-zero: too expensive for pruning, not used there; NULL: 0 */
+    /* the cost of label a of the link's first node beside label b of its second, 0..TXI_COST_MOST */
+    int32_t (*pair)(const void *context, int link, int a, int b);
+    const void *context;
+} txi_graph;
+
+/* What both steps need to know of the graph. */
+typedef struct txi_beliefs {
+    const txi_graph *graph;
+    size_t *arms;        /* node_count + 1: where a node's links begin in arm                     */
+    int *arm;            /* links, each twice                                                    */
+    int *kept_counts;    /* labels kept per node                                                 */
+    size_t *kept_firsts; /* node_count + 1: where they begin in kept and sums                    */
+    int *kept;           /* labels, ascending for each node                                      */
+    int64_t *unary;      /* of the kept labels                                                   */
+    size_t *table_firsts; /* per link, where its table begins                                     */
+    int32_t *tables;     /* pair costs of kept labels, rows are labels of the first node         */
+    int *order, *parent; /* of the forest: nodes in the order of visits, link to the parent or -1 */
+    int *group, *shuffled; /* union of nodes, and a random order of them                         */
+    uint8_t *is_free;    /* per node, 1: optimised in this move                                  */
+    int64_t *sums;       /* per kept label                                                       */
+    size_t *back_firsts; /* per node, where its labels begin in back                             */
+    int *back;           /* for each label of the parent, the best label of the node             */
+} txi_beliefs;
+
+static int txi_other_end(const txi_graph *g, int link, int node) {
+    return g->ends[2 * link] == node ? g->ends[2 * link + 1] : g->ends[2 * link];
+}
+
+/* Lists the links of each node. */
+static void txi_belief_link(txi_beliefs *t, txm_arena *arena) {
+    const txi_graph *g = t->graph;
+    const size_t nodes = (size_t)g->node_count;
+    t->arms = (size_t *)txm_arena_zero(arena, nodes + 1, sizeof *t->arms);
+    t->arm = (int *)txm_arena_alloc(arena, 2 * (size_t)g->link_count + 1, sizeof *t->arm);
+    if (arena->failed) return;
+    for (int i = 0; i < 2 * g->link_count; i++) t->arms[g->ends[i]]++;
+    for (size_t n = 0, sum = 0; n <= nodes; n++) { /* where they end, then moved to the front */
+        sum += n < nodes ? t->arms[n] : 0;
+        t->arms[n] = sum;
+    }
+    for (int i = 2 * g->link_count - 1; i >= 0; i--) t->arm[--t->arms[g->ends[i]]] = i / 2;
+}
+
+/* ---- pruning ---- */
+
+/* A cost as a sort key. */
+static uint32_t txi_cost_key(int64_t cost) {
+    return cost < 0 ? 0 : cost > UINT32_MAX ? UINT32_MAX : (uint32_t)cost;
+}
+
+/* The `keep` cheapest of count costs, as pairs of key and index; of equal ones the first. Returns how
+   many. scratch: count pairs. */
+static int txi_cheapest(const int64_t *costs, int count, int keep, txm_pair *pairs,
+                        txm_pair *scratch) {
+    int64_t least = costs[0];
+    for (int i = 1; i < count; i++) least = costs[i] < least ? costs[i] : least;
+    for (int i = 0; i < count; i++) {
+        pairs[i].key = txi_cost_key(costs[i] - least);
+        pairs[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(pairs, scratch, (size_t)count);
+    return count < keep ? count : keep;
+}
+
+/* How many labels of a node cost less than the least plus an eighth of the range: the fewer, the surer
+   the node is of its label. */
+static int txi_plausible(const int64_t *costs, int count) {
+    int64_t least = costs[0], most = costs[0];
+    int plausible = 0;
+    for (int i = 1; i < count; i++) {
+        least = costs[i] < least ? costs[i] : least;
+        most = costs[i] > most ? costs[i] : most;
+    }
+    for (int i = 0; i < count; i++) plausible += costs[i] - least <= (most - least) / 8;
+    return plausible;
+}
+
+/* Messages from the chosen labels of a node along its links to nodes not yet visited. */
+static void txi_send_chosen(const txi_beliefs *t, int node, const txm_pair *chosen, int chosen_count,
+                            const uint8_t *visited, int64_t *costs) {
+    const txi_graph *g = t->graph;
+    for (size_t i = t->arms[node]; i < t->arms[node + 1]; i++) {
+        const int link = t->arm[i], other = txi_other_end(g, link, node);
+        int64_t *to = costs + g->firsts[other];
+        if (visited[other] || (g->late && g->late[link])) continue;
+        for (int b = 0; b < g->counts[other]; b++) {
+            int64_t least = INT64_MAX;
+            for (int k = 0; k < chosen_count; k++) {
+                const int a = (int)chosen[k].value;
+                const int64_t pair = g->ends[2 * link] == node ? g->pair(g->context, link, a, b)
+                                                               : g->pair(g->context, link, b, a);
+                const int64_t sum = (int64_t)chosen[k].key + pair;
+                least = sum < least ? sum : least;
+            }
+            to[b] += least;
+        }
+    }
+}
+
+/* Keep at most `keep` labels of each node. cost: O(links * keep * labels) calls of pair. */
+static txm_status txi_belief_prune(txi_beliefs *t, int keep, txm_arena *arena, txm_env *env) {
+    const txi_graph *g = t->graph;
+    const int nodes = g->node_count;
+    size_t labels = 0, kept = 0;
+    int most = 1;
+    for (int n = 0; n < nodes; n++) {
+        labels += (size_t)g->counts[n];
+        most = g->counts[n] > most ? g->counts[n] : most;
+    }
+    int64_t *costs = (int64_t *)txm_arena_alloc(arena, 2 * labels + 1, sizeof *costs);
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, 2 * (size_t)most, sizeof *pairs);
+    uint8_t *visited = (uint8_t *)txm_arena_zero(arena, (size_t)nodes + 1, 1);
+    int *order = (int *)txm_arena_alloc(arena, (size_t)nodes + 1, sizeof *order);
+    int *plausible = (int *)txm_arena_alloc(arena, (size_t)nodes + 1, sizeof *plausible);
+    t->kept_counts = (int *)txm_arena_alloc(arena, (size_t)nodes + 1, sizeof *t->kept_counts);
+    t->kept_firsts = (size_t *)txm_arena_alloc(arena, (size_t)nodes + 1, sizeof *t->kept_firsts);
+    t->kept = (int *)txm_arena_alloc(arena, labels + 1, sizeof *t->kept);
+    if (arena->failed) return txi_no_memory(env);
+
+    for (int pass = 0; pass < 2; pass++) {
+        for (int n = 0; n < nodes; n++) {
+            for (int i = 0; i < g->counts[n]; i++)
+                costs[(size_t)pass * labels + g->firsts[n] + (size_t)i] =
+                    g->unary[g->firsts[n] + (size_t)i];
+            visited[n] = 0;
+            plausible[n] = -1;
+        }
+        for (int k = 0; k < nodes; k++) {
+            int64_t *mine = costs + (size_t)pass * labels;
+            int node = pass ? order[nodes - 1 - k] : -1;
+            for (int n = 0; n < nodes && !pass; n++) {
+                if (visited[n]) continue;
+                if (plausible[n] < 0)
+                    plausible[n] = txi_plausible(mine + g->firsts[n], g->counts[n]);
+                if (node < 0 || plausible[n] < plausible[node]) node = n;
+            }
+            if (!pass) order[k] = node;
+            visited[node] = 1;
+            for (size_t i = t->arms[node]; i < t->arms[node + 1]; i++)
+                plausible[txi_other_end(g, t->arm[i], node)] = -1; /* its costs change now */
+            const int chosen =
+                txi_cheapest(mine + g->firsts[node], g->counts[node], keep, pairs, pairs + most);
+            txi_send_chosen(t, node, pairs, chosen, visited, mine);
+        }
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    for (int n = 0; n < nodes; n++) {
+        int64_t *a = costs + g->firsts[n], *b = a + labels;
+        for (int i = 0; i < g->counts[n]; i++) a[i] += b[i] - g->unary[g->firsts[n] + (size_t)i];
+        t->kept_firsts[n] = kept;
+        t->kept_counts[n] = txi_cheapest(a, g->counts[n], keep, pairs, pairs + most);
+        for (int i = 0; i < t->kept_counts[n]; i++) pairs[i].key = pairs[i].value;
+        txm_sort_pairs(pairs, pairs + most, (size_t)t->kept_counts[n]);
+        for (int i = 0; i < t->kept_counts[n]; i++) t->kept[kept++] = (int)pairs[i].value;
+    }
+    t->kept_firsts[nodes] = kept;
+    return TXM_OK;
+}
+
+/* ---- one move: the free nodes form a forest, the others keep their labels ---- */
+
+/* The cost of a kept label of `node` (index x) beside a kept label of the other end (index y). */
+static int32_t txi_pair_of(const txi_beliefs *t, int link, int node, int x, int y) {
+    const int *ends = t->graph->ends + 2 * link;
+    const int row = ends[0] == node ? x : y, column = ends[0] == node ? y : x;
+    return t->tables[t->table_firsts[link] + (size_t)row * (size_t)t->kept_counts[ends[1]] +
+                     (size_t)column];
+}
+
+/* E(x), x as indices into the kept labels */
+static int64_t txi_belief_energy(const txi_beliefs *t, const int *x) {
+    const txi_graph *g = t->graph;
+    int64_t sum = 0;
+    for (int n = 0; n < g->node_count; n++) sum += t->unary[t->kept_firsts[n] + (size_t)x[n]];
+    for (int l = 0; l < g->link_count; l++)
+        sum += txi_pair_of(t, l, g->ends[2 * l], x[g->ends[2 * l]], x[g->ends[2 * l + 1]]);
+    return sum;
+}
+
+/* The node that stands for the set of nodes that n has been united with. */
+static int txi_group_of(int *group, int n) {
+    while (group[n] != n) n = group[n] = group[group[n]];
+    return n;
+}
+
+/* Frees nodes in the order `shuffled` as long as no cycle arises among them. Returns how many. */
+static int txi_belief_free(txi_beliefs *t) {
+    const txi_graph *g = t->graph;
+    int count = 0;
+    for (int n = 0; n < g->node_count; n++) {
+        t->group[n] = n;
+        t->is_free[n] = 0;
+    }
+    for (int k = 0; k < g->node_count; k++) {
+        const int n = t->shuffled[k];
+        int cycle = 0;
+        for (size_t i = t->arms[n]; i < t->arms[n + 1] && !cycle; i++) {
+            const int m = txi_other_end(g, t->arm[i], n);
+            if (!t->is_free[m]) continue;
+            for (size_t j = t->arms[n]; j < i && !cycle; j++) { /* two links to one tree */
+                const int o = txi_other_end(g, t->arm[j], n);
+                cycle = t->is_free[o] && txi_group_of(t->group, o) == txi_group_of(t->group, m);
+            }
+        }
+        if (cycle) continue;
+        t->is_free[n] = 1;
+        count++;
+        for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++) {
+            const int m = txi_other_end(g, t->arm[i], n);
+            if (t->is_free[m]) t->group[txi_group_of(t->group, m)] = n;
+        }
+    }
+    return count;
+}
+
+/* Orders the free nodes so that each stands behind its parent. Returns how many. */
+static int txi_belief_order(txi_beliefs *t) {
+    const txi_graph *g = t->graph;
+    int count = 0;
+    for (int n = 0; n < g->node_count; n++) t->parent[n] = -2; /* not reached */
+    for (int root = 0; root < g->node_count; root++) {
+        if (!t->is_free[root] || t->parent[root] != -2) continue;
+        t->parent[root] = -1;
+        t->order[count++] = root;
+        for (int k = count - 1; k < count; k++) {
+            const int n = t->order[k];
+            for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++) {
+                const int m = txi_other_end(g, t->arm[i], n);
+                if (!t->is_free[m] || t->parent[m] != -2) continue;
+                t->parent[m] = t->arm[i];
+                t->order[count++] = m;
+            }
+        }
+    }
+    return count;
+}
+
+/* The best labels of all free nodes, the others' given: exact. */
+static void txi_belief_move(txi_beliefs *t, int *x) {
+    const txi_graph *g = t->graph;
+    const int count = txi_belief_order(t);
+    for (int k = 0; k < count; k++) {
+        const int n = t->order[k];
+        int64_t *sums = t->sums + t->kept_firsts[n];
+        for (int a = 0; a < t->kept_counts[n]; a++)
+            sums[a] = t->unary[t->kept_firsts[n] + (size_t)a];
+        for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++) {
+            const int m = txi_other_end(g, t->arm[i], n);
+            for (int a = 0; a < t->kept_counts[n] && !t->is_free[m]; a++)
+                sums[a] += txi_pair_of(t, t->arm[i], n, a, x[m]);
+        }
+    }
+    size_t back = 0;
+    for (int k = count - 1; k >= 0; k--) { /* leaves first */
+        const int n = t->order[k], link = t->parent[n];
+        if (link < 0) continue;
+        const int up = txi_other_end(g, link, n);
+        const int64_t *sums = t->sums + t->kept_firsts[n];
+        t->back_firsts[n] = back;
+        for (int b = 0; b < t->kept_counts[up]; b++) {
+            int64_t least = INT64_MAX;
+            int best = 0;
+            for (int a = 0; a < t->kept_counts[n]; a++) {
+                const int64_t sum = sums[a] + txi_pair_of(t, link, n, a, b);
+                if (sum < least) least = sum, best = a;
+            }
+            t->back[back++] = best;
+            t->sums[t->kept_firsts[up] + (size_t)b] += least;
+        }
+    }
+    for (int k = 0; k < count; k++) { /* roots first */
+        const int n = t->order[k], link = t->parent[n];
+        const int64_t *sums = t->sums + t->kept_firsts[n];
+        if (link >= 0) {
+            x[n] = t->back[t->back_firsts[n] + (size_t)x[txi_other_end(g, link, n)]];
+            continue;
+        }
+        x[n] = 0;
+        for (int a = 1; a < t->kept_counts[n]; a++)
+            if (sums[a] < sums[x[n]]) x[n] = a;
+    }
+}
+
+/* ---- graphs with cycles ---- */
+
+/* One node at a time, until nothing changes (ICM). */
+static void txi_belief_single(txi_beliefs *t, int *x) {
+    const txi_graph *g = t->graph;
+    int changed = 1;
+    for (int round = 0; round < 100 && changed; round++) {
+        changed = 0;
+        for (int n = 0; n < g->node_count; n++) {
+            int64_t *sums = t->sums + t->kept_firsts[n];
+            int best = x[n];
+            for (int a = 0; a < t->kept_counts[n]; a++) {
+                sums[a] = t->unary[t->kept_firsts[n] + (size_t)a];
+                for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++)
+                    sums[a] += txi_pair_of(t, t->arm[i], n, a,
+                                           x[txi_other_end(g, t->arm[i], n)]);
+            }
+            for (int a = 0; a < t->kept_counts[n]; a++)
+                if (sums[a] < sums[best]) best = a;
+            changed |= best != x[n];
+            x[n] = best;
+        }
+    }
+}
+
+/* Where a link's messages to its first (side 0) or second end lie. */
+static int64_t *txi_message(int64_t *messages, const size_t *firsts, const txi_beliefs *t, int link,
+                            int side) {
+    const int *ends = t->graph->ends + 2 * link;
+    return messages + firsts[link] + (side ? (size_t)t->kept_counts[ends[0]] : 0);
+}
+
+/* The unary costs of a node and all messages to it, into its place in sums. */
+static int64_t *txi_belief_gather(txi_beliefs *t, int n, int64_t *messages, const size_t *firsts) {
+    const txi_graph *g = t->graph;
+    int64_t *sums = t->sums + t->kept_firsts[n];
+    for (int a = 0; a < t->kept_counts[n]; a++) sums[a] = t->unary[t->kept_firsts[n] + (size_t)a];
+    for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++) {
+        const int64_t *in =
+            txi_message(messages, firsts, t, t->arm[i], g->ends[2 * t->arm[i] + 1] == n);
+        for (int a = 0; a < t->kept_counts[n]; a++) sums[a] += in[a];
+    }
+    return sums;
+}
+
+/* New messages from a node along one link: half the old one, half the new one, the least of them 0. */
+static void txi_belief_send(txi_beliefs *t, int n, int link, int64_t *messages,
+                            const size_t *firsts) {
+    const txi_graph *g = t->graph;
+    const int side = g->ends[2 * link] == n; /* of the receiver */
+    const int m = txi_other_end(g, link, n);
+    const int64_t *sums = t->sums + t->kept_firsts[n];
+    const int64_t *in = txi_message(messages, firsts, t, link, !side);
+    int64_t *out = txi_message(messages, firsts, t, link, side), base = INT64_MAX;
+    for (int b = 0; b < t->kept_counts[m]; b++) {
+        int64_t least = INT64_MAX;
+        for (int a = 0; a < t->kept_counts[n]; a++) {
+            const int64_t sum = sums[a] - in[a] + txi_pair_of(t, link, n, a, b);
+            least = sum < least ? sum : least;
+        }
+        out[b] = (out[b] + least) / 2;
+        base = out[b] < base ? out[b] : base;
+    }
+    for (int b = 0; b < t->kept_counts[m]; b++) out[b] -= base;
+}
+
+/* Reads labels node by node: the least sum of the unary cost, the pair costs with nodes already read
+   and the messages from the others. */
+static void txi_belief_read(txi_beliefs *t, int *x, int64_t *messages, const size_t *firsts) {
+    const txi_graph *g = t->graph;
+    for (int n = 0; n < g->node_count; n++) {
+        int64_t *sums = txi_belief_gather(t, n, messages, firsts);
+        x[n] = 0;
+        for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++) {
+            const int link = t->arm[i], m = txi_other_end(g, link, n);
+            const int64_t *in = txi_message(messages, firsts, t, link, g->ends[2 * link + 1] == n);
+            for (int a = 0; a < t->kept_counts[n] && m < n; a++)
+                sums[a] += txi_pair_of(t, link, n, a, x[m]) - in[a];
+        }
+        for (int a = 1; a < t->kept_counts[n]; a++)
+            if (sums[a] < sums[x[n]]) x[n] = a;
+    }
+}
+
+/* Messages for some rounds; x receives the best labels read after any of them. y: room for labels. */
+static txm_status txi_belief_loopy(txi_beliefs *t, int *x, int *y, txm_arena *arena, txm_env *env) {
+    const txi_graph *g = t->graph;
+    size_t size = 0;
+    size_t *firsts = (size_t *)txm_arena_alloc(arena, (size_t)g->link_count + 1, sizeof *firsts);
+    for (int l = 0; l < g->link_count && firsts; l++) {
+        firsts[l] = size;
+        size += (size_t)(t->kept_counts[g->ends[2 * l]] + t->kept_counts[g->ends[2 * l + 1]]);
+    }
+    int64_t *messages = (int64_t *)txm_arena_zero(arena, size + 1, sizeof *messages);
+    if (arena->failed) return txi_no_memory(env);
+    int64_t best = txi_belief_energy(t, x);
+    for (int round = 0; round < TXI_BELIEF_ROUNDS; round++) {
+        for (int k = 0; k < g->node_count; k++) { /* forwards and backwards alternately */
+            const int n = round & 1 ? g->node_count - 1 - k : k;
+            txi_belief_gather(t, n, messages, firsts);
+            for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++)
+                txi_belief_send(t, n, t->arm[i], messages, firsts);
+        }
+        txi_belief_read(t, y, messages, firsts);
+        const int64_t energy = txi_belief_energy(t, y);
+        if (energy < best) {
+            best = energy;
+            memcpy(x, y, (size_t)g->node_count * sizeof *x);
+        }
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* Moves on random forests from x; the energy never rises. */
+static void txi_belief_improve(txi_beliefs *t, int *x, txm_rng *rng) {
+    for (int move = 0; move < TXI_BELIEF_MOVES; move++) {
+        txm_shuffle(rng, t->shuffled, t->graph->node_count);
+        txi_belief_free(t);
+        txi_belief_move(t, x);
+    }
+}
+
+/* ---- the whole ---- */
+
+/* Tables of the pair costs of kept labels, and room for moves. */
+static txm_status txi_belief_tables(txi_beliefs *t, txm_arena *arena, txm_env *env) {
+    const txi_graph *g = t->graph;
+    const size_t nodes = (size_t)g->node_count, kept = t->kept_firsts[nodes];
+    size_t cells = 0, backs = 0;
+    t->table_firsts =
+        (size_t *)txm_arena_alloc(arena, (size_t)g->link_count + 1, sizeof *t->table_firsts);
+    for (int l = 0; l < g->link_count && t->table_firsts; l++) {
+        const int a = t->kept_counts[g->ends[2 * l]], b = t->kept_counts[g->ends[2 * l + 1]];
+        t->table_firsts[l] = cells;
+        cells += (size_t)a * (size_t)b;
+        backs += (size_t)(a > b ? a : b); /* one of the two is the parent */
+    }
+    t->tables = (int32_t *)txm_arena_alloc(arena, cells + 1, sizeof *t->tables);
+    t->unary = (int64_t *)txm_arena_alloc(arena, kept + 1, sizeof *t->unary);
+    t->sums = (int64_t *)txm_arena_alloc(arena, kept + 1, sizeof *t->sums);
+    t->order = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->order);
+    t->parent = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->parent);
+    t->group = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->group);
+    t->shuffled = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->shuffled);
+    t->is_free = (uint8_t *)txm_arena_alloc(arena, nodes + 1, 1);
+    t->back_firsts = (size_t *)txm_arena_alloc(arena, nodes + 1, sizeof *t->back_firsts);
+    t->back = (int *)txm_arena_alloc(arena, backs + 1, sizeof *t->back);
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t n = 0; n < nodes; n++) {
+        t->shuffled[n] = (int)n;
+        for (size_t i = t->kept_firsts[n]; i < t->kept_firsts[n + 1]; i++)
+            t->unary[i] = g->unary[g->firsts[n] + (size_t)t->kept[i]];
+    }
+    for (int l = 0; l < g->link_count; l++) {
+        const int a = g->ends[2 * l], b = g->ends[2 * l + 1];
+        int32_t *cell = t->tables + t->table_firsts[l];
+        for (int i = 0; i < t->kept_counts[a]; i++)
+            for (int j = 0; j < t->kept_counts[b]; j++)
+                *cell++ = g->pair(g->context, l, t->kept[t->kept_firsts[a] + (size_t)i],
+                                  t->kept[t->kept_firsts[b] + (size_t)j]);
+        if (l % 16 == 15 && txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* Labels of low energy.
+
+   keep    labels of a node that are left after pruning, 1 or more; those of late links are only found
+           if they survive it
+   labels  receives one label per node
+   energy  receives E of them; may be NULL
+   return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost    O(links * keep * (labels + keep * rounds)); memory of the arena                      */
+static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_arena *arena, int *labels,
+                             int64_t *energy, txm_env *env) {
+    const size_t nodes = (size_t)g->node_count;
+    txi_beliefs t;
+    memset(&t, 0, sizeof t);
+    t.graph = g;
+    txi_belief_link(&t, arena);
+    if (arena->failed) return txi_no_memory(env);
+    txm_status status = txi_belief_prune(&t, keep, arena, env);
+    if (status == TXM_OK) status = txi_belief_tables(&t, arena, env);
+    if (status != TXM_OK) return status;
+    int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x), *y = x + nodes;
+    if (!x) return txi_no_memory(env);
+
+    if (txi_belief_free(&t) == g->node_count) {
+        txi_belief_move(&t, x);
+    } else {
+        txm_rng rng = txm_rng_make(seed, 0);
+        for (size_t n = 0; n < nodes; n++) {
+            const int64_t *unary = t.unary + t.kept_firsts[n];
+            for (int a = 1; a < t.kept_counts[n]; a++)
+                if (unary[a] < unary[y[n]]) y[n] = a;
+        }
+        txi_belief_single(&t, y);
+        memcpy(x, y, nodes * sizeof *x);
+        status = txi_belief_loopy(&t, x, y + nodes, arena, env);
+        if (status != TXM_OK) return status;
+        txi_belief_improve(&t, x, &rng);
+        txi_belief_improve(&t, y, &rng);
+        if (txi_belief_energy(&t, y) < txi_belief_energy(&t, x)) memcpy(x, y, nodes * sizeof *x);
+    }
+    for (size_t n = 0; n < nodes; n++) labels[n] = t.kept[t.kept_firsts[n] + (size_t)x[n]];
+    if (energy) *energy = txi_belief_energy(&t, x);
+    return TXM_OK;
+}
+
+/* ---- strips: lines made straight ---------------------------------------------------------------
+   The texture along a line is treated in the line's own frame: column c is a place on the line, row j
+   lies across it, along the normal [1, III.A: frame v, d, n]. Two lines with the same contrast close
+   to each other, the sides of a stroke, are one strip; its rows between the lines are stretched to the
+   width that the stroke has at each column:
+
+       margin rows  |  inside + 1 rows from line to line (1 row: a single line)  |  margin rows
+
+   In this frame the paper's rotated candidates (each source patch turned so that its line has the
+   direction of the target's) need no search: every source is turned exactly, at each column, and laid
+   with its line on the target's line. The paper's search over +-10 degrees makes up for lines that are
+   known roughly; here they are registered to a fraction of a pixel against the mean profile of the
+   line. And the costs of all pairs of candidates become sums along diagonals of one table.       */
+
+enum {
+    TXI_STRIP_MARGIN = 10,   /* rows on each side, pixels; ours                                  */
+    TXI_STRIP_INSIDE = 40,   /* most pixels between the lines of a stroke; ours                   */
+    TXI_STRIP_ROWS = 2 * TXI_STRIP_MARGIN + 1 + TXI_STRIP_INSIDE,
+    TXI_STRIP_REACH = 8,     /* columns of a patch on each side of its centre: radius r [1, III.A] */
+    TXI_STRIP_HOP = 6,       /* columns between neighbouring patches, so that they overlap        */
+    TXI_STRIP_REACH_LEAST = 3, /* of patches where little of a line is known                       */
+    TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
+    TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
+    TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
+    TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
+};
+
+/* Columns of a line. */
+typedef struct txi_ribbon {
+    int count;
+    txm_vec2 *place; /* the middle between the two lines, or the line, window pixels              */
+    txm_vec2 *along; /* unit tangent t; rows grow along (-t.y, t.x)                               */
+    float *half;     /* half of the distance between the two lines, 0 for a single line          */
+} txi_ribbon;
+
+/* A column of texture to copy from. */
+typedef struct txi_column {
+    txm_vec2 place, along;
+    float half;
+    float side;        /* 1, or -1: mirrored, rows grow along (t.y, -t.x)                        */
+    int run;           /* columns next to each other on the same line have the same number        */
+    int before, after; /* columns of the run in front of and behind it; -1: not usable            */
+} txi_column;
+
+typedef struct txi_strip {
+    int curve, partner; /* indices of the curves; partner -1: a single line                       */
+    int inside, rows;
+    int first, last;    /* columns with hole pixels                                              */
+    txi_ribbon line;
+    uint8_t *color;     /* 3 per column and row                                                  */
+    uint8_t *known;     /* 1 per column and row: the colour is known                             */
+    txi_column *sources;
+    int source_count;
+    uint8_t *source_color; /* 3 per source column and row                                         */
+    int16_t *source_feature; /* features per source column: colours, weighted                      */
+    int features;        /* 3 * rows, rounded up to a multiple of 16                               */
+    int reach, hop;
+    int *labels;         /* source columns that are centres of whole patches                      */
+    int label_count;
+    int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                 */
+    int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop       */
+    int *chosen;         /* per patch: the source column chosen                                   */
+} txi_strip;
+
+static txm_vec2 txi_normal_of(txm_vec2 along) {
+    return txm_v2(-along.y, along.x);
+}
+
+/* RGB at a place, bilinear, from 16 bits of fraction. Returns 0 if a pixel needed is not known, 1 if
+   all are, 2 if all may be copied from; rgb is black for 0. */
+static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) {
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!(x >= 0 && y >= 0 && x <= w->width - 1 && y <= w->height - 1)) return 0;
+    const int fx = (int)(x * 256 + 0.5), fy = (int)(y * 256 + 0.5);
+    const int u = fx & 255, v = fy & 255;
+    const size_t i = (size_t)(fy >> 8) * (size_t)w->width + (size_t)(fx >> 8);
+    const size_t right = u ? 1 : 0, below = v ? (size_t)w->width : 0;
+    const size_t at[4] = {i, i + right, i + below, i + below + right};
+    const int weight[4] = {(256 - u) * (256 - v), u * (256 - v), (256 - u) * v, u * v};
+    int best = 2;
+    for (int k = 0; k < 4; k++) {
+        const uint8_t s = w->state[at[k]];
+        if (s == TXI_FOREIGN) best = 1;
+        else if (s != TXI_KNOWN) return 0;
+    }
+    for (int c = 0; c < 3; c++) {
+        int sum = 1 << 15;
+        for (int k = 0; k < 4; k++) sum += weight[k] * w->color[4 * at[k] + (size_t)c];
+        rgb[c] = sum >> 16;
+    }
+    return best;
+}
+
+/* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width, along
+   the normal. */
+static double txi_row_offset(double row, int inside, double half) {
+    const double k = row - TXI_STRIP_MARGIN;
+    if (k <= 0) return k - half;
+    if (k >= inside) return k - inside + half;
+    return half * (2 * k / inside - 1);
+}
+
+/* The row, with fraction, at an offset from the middle: the inverse. */
+static double txi_offset_row(double offset, int inside, double half) {
+    if (offset <= -half) return TXI_STRIP_MARGIN + offset + half;
+    if (offset >= half) return TXI_STRIP_MARGIN + inside + offset - half;
+    return TXI_STRIP_MARGIN + inside * (0.5 * offset / half + 0.5);
+}
+
+/* ---- the frame of a line ---- */
+
+/* Mean of values[i - radius .. i + radius], the window made smaller at the ends so that it stays
+   symmetric; count values, `step` floats apart. */
+static double txi_running_mean(const float *values, int count, int step, int i, int radius) {
+    double sum = 0;
+    if (i < radius) radius = i;
+    if (count - 1 - i < radius) radius = count - 1 - i;
+    for (int k = i - radius; k <= i + radius; k++) sum += (double)values[k * step];
+    return sum / (2 * radius + 1);
+}
+
+/* Columns at points of a line about one pixel apart. */
+static txm_status txi_ribbon_make(const txm_vec2 *points, int count, txm_arena *arena,
+                                  txi_ribbon *r, txm_env *env) {
+    r->count = count;
+    r->place = (txm_vec2 *)txm_arena_alloc(arena, (size_t)count, sizeof *r->place);
+    r->along = (txm_vec2 *)txm_arena_alloc(arena, (size_t)count, sizeof *r->along);
+    r->half = (float *)txm_arena_zero(arena, (size_t)count, sizeof *r->half);
+    if (arena->failed) return txi_no_memory(env);
+    for (int i = 0; i < count; i++) {
+        r->place[i].x = txm_float(txi_running_mean(&points[0].x, count, 2, i, 3));
+        r->place[i].y = txm_float(txi_running_mean(&points[0].y, count, 2, i, 3));
+    }
+    for (int i = 0; i < count; i++) {
+        const txm_vec2 a = r->place[i > 2 ? i - 2 : 0];
+        const txm_vec2 b = r->place[i + 2 < count ? i + 2 : count - 1];
+        r->along[i] = txi_unit((double)b.x - a.x, (double)b.y - a.y);
+    }
+    return TXM_OK;
+}
+
+enum {
+    TXI_REGISTER_TAPS = 25,  /* samples across a line, half a pixel apart: -6 .. 6 pixels          */
+    TXI_REGISTER_SHIFT = 3   /* most samples that a line is moved                                 */
+};
+
+/* The profile across column i, 3 per tap; 0 if part of it is not known. */
+static int txi_register_profile(const txi_window *w, const txi_ribbon *r, int i, float *profile) {
+    const txm_vec2 n = txi_normal_of(r->along[i]);
+    for (int k = 0; k < TXI_REGISTER_TAPS; k++) {
+        const double t = 0.5 * (k - TXI_REGISTER_TAPS / 2);
+        int rgb[3];
+        if (!txi_strip_pixel(w, (double)r->place[i].x + t * (double)n.x,
+                             (double)r->place[i].y + t * (double)n.y, rgb))
+            return 0;
+        for (int c = 0; c < 3; c++) profile[3 * k + c] = (float)rgb[c];
+    }
+    return 1;
+}
+
+/* By how many pixels a profile is displaced against the mean one: least squares over shifts of half
+   pixels, then a parabola. */
+static double txi_register_shift(const double *mean, const double *profile) {
+    const int most = TXI_REGISTER_SHIFT;
+    double cost[2 * TXI_REGISTER_SHIFT + 1];
+    int best = most;
+    for (int s = -most; s <= most; s++) {
+        double sum = 0;
+        for (int k = most; k < TXI_REGISTER_TAPS - most; k++) {
+            for (int c = 0; c < 3; c++) {
+                const double d = mean[3 * k + c] - profile[3 * (k + s) + c];
+                sum += d * d;
+            }
+        }
+        cost[s + most] = sum;
+    }
+    for (int s = 0; s <= 2 * most; s++)
+        if (cost[s] < cost[best]) best = s;
+    if (best == 0 || best == 2 * most) return 0; /* no minimum: not registered */
+    const double bend = cost[best - 1] - 2 * cost[best] + cost[best + 1];
+    const double off = bend > 0 ? 0.5 * (cost[best - 1] - cost[best + 1]) / bend : 0;
+    return 0.5 * (best - most + off);
+}
+
+/* Shifts where they are not known, by linear interpolation between the nearest known ones. */
+static void txi_register_fill(float *shift, const uint8_t *known, int count) {
+    int before = -1;
+    for (int i = 0; i <= count; i++) {
+        if (i < count && !known[i]) continue;
+        for (int k = before + 1; k < i; k++) {
+            if (before < 0 && i == count) shift[k] = 0;
+            else if (before < 0) shift[k] = shift[i];
+            else if (i == count) shift[k] = shift[before];
+            else
+                shift[k] = txm_lerpf(shift[before], shift[i],
+                                     (float)(k - before) / (float)(i - before));
+        }
+        before = i;
+    }
+}
+
+/* Move the columns of a single line across it, so that its known part looks alike everywhere: each
+   column is registered against the mean profile. Missing columns are moved as those at their ends. */
+static txm_status txi_ribbon_register(const txi_window *w, txi_ribbon *r, txm_arena *scratch,
+                                      txm_env *env) {
+    enum { SIZE = 3 * TXI_REGISTER_TAPS };
+    const int count = r->count;
+    float *profiles = (float *)txm_arena_alloc(scratch, (size_t)count, SIZE * sizeof *profiles);
+    float *shift = (float *)txm_arena_alloc(scratch, 2 * (size_t)count, sizeof *shift);
+    uint8_t *known = (uint8_t *)txm_arena_alloc(scratch, (size_t)count, 1);
+    if (scratch->failed) return txi_no_memory(env);
+    for (int round = 0; round < 2; round++) {
+        double mean[SIZE] = {0}, sum = 0;
+        int n = 0;
+        for (int i = 0; i < count; i++) {
+            known[i] = (uint8_t)txi_register_profile(w, r, i, profiles + (size_t)i * SIZE);
+            for (int k = 0; k < SIZE && known[i]; k++)
+                mean[k] += (double)profiles[(size_t)i * SIZE + (size_t)k];
+            n += known[i];
+        }
+        if (n < 8) return TXM_OK;
+        for (int k = 0; k < SIZE; k++) mean[k] /= n;
+        for (int i = 0; i < count; i++) {
+            double profile[SIZE] = {0};
+            int m = 0;
+            shift[i] = 0;
+            for (int j = i > 4 ? i - 4 : 0; j <= i + 4 && j < count && known[i]; j++) {
+                for (int k = 0; k < SIZE && known[j]; k++)
+                    profile[k] += (double)profiles[(size_t)j * SIZE + (size_t)k];
+                m += known[j];
+            }
+            for (int k = 0; k < SIZE && m; k++) profile[k] /= m;
+            if (m) shift[i] = txm_float(txi_register_shift(mean, profile));
+            sum += (double)shift[i];
+        }
+        for (int i = 0; i < count; i++)
+            if (known[i]) shift[i] = txm_float((double)shift[i] - sum / n);
+        txi_register_fill(shift, known, count);
+        for (int i = 0; i < count; i++) {
+            const txm_vec2 across = txi_normal_of(r->along[i]);
+            const double s = txi_running_mean(shift, count, 1, i, 4);
+            r->place[i].x = txm_float((double)r->place[i].x + s * (double)across.x);
+            r->place[i].y = txm_float((double)r->place[i].y + s * (double)across.y);
+        }
+    }
+    return TXM_OK;
+}
+
+/* Keep the columns lo .. hi - 1 only. */
+static void txi_ribbon_crop(txi_ribbon *r, int lo, int hi) {
+    r->place += lo;
+    r->along += lo;
+    r->half += lo;
+    r->count = hi - lo;
+}
+
+/* Widen a line to the stroke between it and its partner, where both run along each other. 0: they do
+   not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then unchanged.
+   width  room for a float per column                                                            */
+static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first, int last,
+                            float *width) {
+    int lo = 0, hi = r->count;
+    for (int i = 0; i < r->count; i++) {
+        const txm_vec2 t = r->along[i], p = r->place[i];
+        double best = 1e30, x = 0, y = 0;
+        for (int k = 0; k < partner->count; k++) {
+            const double d = txi_distance(partner->place[k], p);
+            if (d >= best) continue;
+            best = d;
+            x = (double)partner->place[k].x - p.x;
+            y = (double)partner->place[k].y - p.y;
+        }
+        const double ahead = x * t.x + y * t.y;
+        width[i] = txm_float(y * t.x - x * t.y);
+        if (ahead > 2 || ahead < -2) { /* the partner has no column beside this one */
+            if (i <= first) lo = i + 1;
+            else if (i < hi) hi = i;
+        }
+    }
+    if (lo > first || hi <= last || hi - lo < 2) return 0;
+    const double sign = width[lo] > 0 ? 1 : -1;
+    for (int i = lo; i < hi; i++) {
+        const double d = sign * (double)width[i];
+        if (!(d >= 1 && d <= TXI_STRIP_INSIDE)) return 0;
+    }
+    for (int i = lo; i < hi; i++) {
+        const txm_vec2 n = txi_normal_of(r->along[i]);
+        const double half = 0.5 * txi_running_mean(width + lo, hi - lo, 1, i - lo, 4);
+        r->place[i].x = txm_float((double)r->place[i].x + half * (double)n.x);
+        r->place[i].y = txm_float((double)r->place[i].y + half * (double)n.y);
+        r->half[i] = txm_float(half < 0 ? -half : half);
+    }
+    txi_ribbon_crop(r, lo, hi);
+    return 1;
+}
+
+/* ---- the strip's own columns ---- */
+
+/* Sample the columns of a strip: colours, what is known, and which columns touch the hole. */
+static txm_status txi_strip_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
+                                   txm_env *env) {
+    const size_t cells = (size_t)s->line.count * (size_t)s->rows;
+    s->color = (uint8_t *)txm_arena_alloc(arena, cells, 3);
+    s->known = (uint8_t *)txm_arena_alloc(arena, cells, 1);
+    if (arena->failed) return txi_no_memory(env);
+    s->first = s->line.count;
+    s->last = -1;
+    for (int i = 0; i < s->line.count; i++) {
+        const txm_vec2 n = txi_normal_of(s->line.along[i]), p = s->line.place[i];
+        int touches = 0;
+        for (int j = 0; j < s->rows; j++) {
+            const double t = txi_row_offset(j, s->inside, (double)s->line.half[i]);
+            const double x = (double)p.x + t * (double)n.x, y = (double)p.y + t * (double)n.y;
+            const size_t at = (size_t)i * (size_t)s->rows + (size_t)j;
+            const ptrdiff_t pixel = txi_pixel(w->width, w->height, x, y);
+            int rgb[3];
+            s->known[at] = txi_strip_pixel(w, x, y, rgb) != 0;
+            for (int c = 0; c < 3; c++) s->color[3 * at + (size_t)c] = (uint8_t)rgb[c];
+            touches |= pixel >= 0 && w->state[pixel] == TXI_HOLE;
+        }
+        if (touches && s->first > i) s->first = i;
+        if (touches) s->last = i;
+    }
+    return TXM_OK;
+}
+
+/* ---- sources ---- */
+
+/* The column of a source at which a target's column is laid; c may have a fraction. */
+static txi_column txi_column_at(const txi_strip *s, int column, double offset) {
+    txi_column a = s->sources[column];
+    int whole = (int)(offset + 1024) - 1024;
+    if (whole > a.after) whole = a.after;
+    if (whole < -a.before) whole = -a.before;
+    a = s->sources[column + whole];
+    const double rest = offset - whole;
+    a.place.x = txm_float((double)a.place.x + rest * (double)a.along.x);
+    a.place.y = txm_float((double)a.place.y + rest * (double)a.along.y);
+    return a;
+}
+
+/* Where row offset t of a source's column lies. */
+static txm_vec2 txi_column_place(const txi_column *a, double t) {
+    const double u = t * (double)a->side;
+    return txm_v2(txm_float((double)a->place.x - u * (double)a->along.y),
+                  txm_float((double)a->place.y + u * (double)a->along.x));
+}
+
+/* Add columns from..to of a line to a strip's sources: forwards, or backwards (turned by half a turn),
+   or mirrored (backwards, but with the rows as they are). */
+static void txi_columns_add(txi_strip *s, const txi_ribbon *r, int from, int to, int backwards,
+                           int mirrored) {
+    const int room = TXI_STRIP_COLUMNS - s->source_count;
+    const int count = to - from + 1 < room ? to - from + 1 : room;
+    for (int k = 0; k < count; k++) {
+        const int i = backwards || mirrored ? to - k : from + k;
+        txi_column *a = &s->sources[s->source_count + k];
+        a->place = r->place[i];
+        a->along = r->along[i];
+        if (backwards || mirrored) a->along = txm_v2(-a->along.x, -a->along.y);
+        a->half = r->half[i];
+        a->side = mirrored ? -1 : 1;
+        a->run = s->source_count;
+    }
+    s->source_count += count > 0 ? count : 0;
+}
+
+/* The strip's own known columns, those next to the hole first: both sides of the hole in turn would
+   only matter beyond TXI_STRIP_COLUMNS / 2 columns each. Returns how many. */
+static int txi_columns_own(txi_strip *s, int mirrored) {
+    const int most = TXI_STRIP_COLUMNS / 2, before = s->source_count;
+    const int from = s->first > most ? s->first - most : 0;
+    const int to = s->line.count - 1 - s->last > most ? s->last + most : s->line.count - 1;
+    if (s->first > 0) txi_columns_add(s, &s->line, from, s->first - 1, 0, mirrored);
+    if (to > s->last) txi_columns_add(s, &s->line, s->last + 1, to, 0, mirrored);
+    return s->source_count - before;
+}
+
+/* The weight of a row's colours in costs, in quarters: rows far from the lines count less. */
+static int txi_row_weight(int j, int inside) {
+    const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > inside ? k - inside : 0;
+    return out <= 3 ? 4 : out <= 6 ? 3 : 2;
+}
+
+static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t *feature) {
+    for (int j = 0; j < s->rows; j++)
+        for (int c = 0; c < 3; c++)
+            feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(j, s->inside) / 4);
+}
+
+/* Colours and features of the sources. Where a row is not known the nearest known one towards the line
+   counts. A column whose middle is not known, or less than two thirds, breaks its run. */
+static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
+                                    txm_env *env) {
+    const size_t rows = (size_t)s->rows, count = (size_t)s->source_count;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
+    s->features = (3 * s->rows + 15) / 16 * 16;
+    s->source_color = (uint8_t *)txm_arena_alloc(arena, count * rows, 3);
+    s->source_feature =
+        (int16_t *)txm_arena_zero(arena, count * (size_t)s->features, sizeof(int16_t));
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) {
+        txi_column *a = &s->sources[i];
+        uint8_t *color = s->source_color + 3 * i * rows;
+        int known[TXI_STRIP_ROWS], n = 0, whole = 1;
+        for (int j = 0; j < s->rows; j++) {
+            const txm_vec2 p =
+                txi_column_place(a, txi_row_offset(j, s->inside, (double)a->half));
+            int rgb[3];
+            known[j] = txi_strip_pixel(w, (double)p.x, (double)p.y, rgb) == 2;
+            n += known[j];
+            if (j >= low - 2 && j <= high + 2) whole &= known[j];
+            for (int c = 0; c < 3; c++) color[3 * j + c] = (uint8_t)rgb[c];
+        }
+        for (int j = low - 1; j >= 0; j--)
+            if (!known[j]) memcpy(color + 3 * j, color + 3 * (j + 1), 3);
+        for (int j = high + 1; j < s->rows; j++)
+            if (!known[j]) memcpy(color + 3 * j, color + 3 * (j - 1), 3);
+        txi_strip_feature(s, color, s->source_feature + i * (size_t)s->features);
+        a->before = whole && 3 * n >= 2 * s->rows ? 0 : -1;
+    }
+    txi_column *a = s->sources;
+    for (int i = 1; i < s->source_count; i++)
+        if (a[i].before == 0 && a[i].run == a[i - 1].run) a[i].before = a[i - 1].before + 1;
+    for (int i = s->source_count - 1; i >= 0; i--) {
+        const int goes_on = i + 1 < s->source_count && a[i].run == a[i + 1].run;
+        a[i].after = a[i].before < 0 ? -1 : goes_on ? a[i + 1].after + 1 : 0;
+    }
+    return TXM_OK;
+}
+
+/* Squared distance of two columns of features; mask: all bits set where they count. */
+static int32_t txi_feature_ssd(const int16_t *a, const int16_t *b, const int16_t *mask, int count) {
+    int32_t sum = 0;
+    for (int i = 0; i < count; i += 16) {
+        for (int k = 0; k < 16; k++) {
+            const int d = (a[i + k] - b[i + k]) & mask[i + k];
+            sum += d * d;
+        }
+    }
+    return sum;
+}
+
+/* Eq. 4 for all pairs at once. With C(p, q) the squared distance of source columns p and q, a patch
+   centred at source column a and the next one, at b, overlap in 2 reach - hop + 1 columns:
+
+       E(a, b) = sum of C(a + k, b - hop + k), k = hop - reach .. reach
+               = S(a + hop - reach, b - reach),  S(p, q) = sum of C(p + m, q + m), m = 0 .. 2 reach - hop
+
+   overlap receives S, by running sums along diagonals.
+   values  room for source_count int32                                                           */
+static void txi_strip_overlaps(txi_strip *s, const int16_t *mask, int32_t *values) {
+    const int n = s->source_count, length = 2 * s->reach - s->hop + 1;
+    const size_t width = (size_t)s->features;
+    for (int d = 0; d < n; d++) { /* q = p + d */
+        int64_t sum = 0;
+        for (int p = 0; p + d < n; p++) {
+            values[p] = d ? txi_feature_ssd(s->source_feature + (size_t)p * width,
+                                            s->source_feature + (size_t)(p + d) * width, mask,
+                                            s->features)
+                          : 0;
+            sum += values[p];
+            if (p >= length) sum -= values[p - length];
+            const int from = p - length + 1;
+            if (from < 0) continue;
+            const int32_t cost = (int32_t)(sum < TXI_COST_MOST ? sum : (int64_t)TXI_COST_MOST);
+            s->overlap[(size_t)from * (size_t)n + (size_t)(from + d)] = cost;
+            s->overlap[(size_t)(from + d) * (size_t)n + (size_t)from] = cost;
+        }
+    }
+}
+
+/* Which source columns can be centres of patches; reach and hop as the longest run allows. */
+static void txi_strip_labels(txi_strip *s) {
+    int longest = 0;
+    for (int i = 0; i < s->source_count; i++) {
+        const int run = s->sources[i].before + s->sources[i].after + 1;
+        longest = run > longest ? run : longest;
+    }
+    s->reach = txm_clampi((longest - 1) / 4, TXI_STRIP_REACH_LEAST, TXI_STRIP_REACH);
+    s->hop = s->reach * TXI_STRIP_HOP / TXI_STRIP_REACH;
+    s->label_count = 0;
+    for (int i = 0; i < s->source_count; i++)
+        if (s->sources[i].before >= s->reach && s->sources[i].after >= s->reach)
+            s->labels[s->label_count++] = i;
+    s->node_count = s->label_count ? (s->last - s->first) / s->hop + 2 : 0;
+}
+
+/* Eq. 3: the squared distance of each label of a patch from the colours known in it. */
+static void txi_strip_unary(const txi_strip *s, int patch, int16_t *feature, int16_t *mask,
+                            int32_t *unary) {
+    const int centre = s->first + patch * s->hop, width = s->features;
+    for (int i = 0; i < s->label_count; i++) unary[i] = 0;
+    for (int k = -s->reach; k <= s->reach; k++) {
+        const int column = centre + k;
+        int any = 0;
+        if (column < 0 || column >= s->line.count) continue;
+        const size_t at = (size_t)column * (size_t)s->rows;
+        memset(mask, 0, (size_t)width * sizeof *mask);
+        for (int j = 0; j < s->rows; j++) {
+            if (!s->known[at + (size_t)j]) continue;
+            any = 1;
+            for (int c = 0; c < 3; c++) mask[3 * j + c] = -1;
+        }
+        if (!any) continue;
+        memset(feature, 0, (size_t)width * sizeof *feature);
+        txi_strip_feature(s, s->color + 3 * at, feature);
+        for (int i = 0; i < s->label_count; i++) {
+            const int64_t sum =
+                (int64_t)unary[i] +
+                txi_feature_ssd(feature,
+                                s->source_feature + (size_t)(s->labels[i] + k) * (size_t)width, mask,
+                                width);
+            unary[i] = (int32_t)(sum < TXI_COST_MOST ? sum : (int64_t)TXI_COST_MOST);
+        }
+    }
+}
+
+/* ---- other lines as sources ---- */
+
+/* Mean squared difference between the mean of a strip's known columns and the profile of an end of a
+   line, read from left to right (turned 0) or from right to left. */
+static double txi_strip_unlike(const double *mean, const txi_end *e, int turned) {
+    double sum = 0;
+    for (int t = -5; t <= 5; t++) {
+        for (int c = 0; c < 3; c++) {
+            const double d = mean[3 * (TXI_STRIP_MARGIN + t) + c] -
+                             (double)e->profile[TXI_PROFILE / 2 + (turned ? -2 * t : 2 * t)][c];
+            sum += d * d / 33;
+        }
+    }
+    return sum;
+}
+
+/* The mean of the strip's own sources, 3 per row. */
+static void txi_strip_mean(const txi_strip *s, double *mean) {
+    int n = 0;
+    for (int j = 0; j < 3 * s->rows; j++) mean[j] = 0;
+    for (int i = 0; i < s->source_count; i++) {
+        if (s->sources[i].before < 0) continue;
+        n++;
+        for (int j = 0; j < 3 * s->rows; j++)
+            mean[j] += s->source_color[3 * i * s->rows + j];
+    }
+    for (int j = 0; j < 3 * s->rows && n; j++) mean[j] /= n;
+}
+
+/* The ends of other lines whose colours are most like those of a single line, best first, as
+   2 * end + turned. Returns how many. */
+static int txi_strip_others(const txi_strip *s, const txi_lines *lines, const int own[2],
+                            int best[TXI_STRIP_OTHERS]) {
+    double mean[3 * TXI_STRIP_ROWS], cost[TXI_STRIP_OTHERS];
+    int n = 0;
+    txi_strip_mean(s, mean);
+    for (int i = 0; i < 2 * lines->end_count; i++) {
+        const txi_end *e = &lines->ends[i / 2];
+        if (i / 2 == own[0] || i / 2 == own[1] || e->count < 2 * TXI_STRIP_REACH + 1) continue;
+        const double unlike = txi_strip_unlike(mean, e, i & 1);
+        if (unlike > 15 * 15) continue; /* levels of 8 bits */
+        int k = n < TXI_STRIP_OTHERS ? n++ : TXI_STRIP_OTHERS;
+        for (; k > 0 && unlike < cost[k - 1]; k--) {
+            if (k == TXI_STRIP_OTHERS) continue;
+            cost[k] = cost[k - 1];
+            best[k] = best[k - 1];
+        }
+        if (k == TXI_STRIP_OTHERS) continue;
+        cost[k] = unlike;
+        best[k] = i;
+    }
+    return n;
+}
+
+/* All sources of a strip: its own known columns; where these are few, columns of similar other lines,
+   and its own mirrored. */
+static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
+                                    const txi_curve *curve, txi_strip *s, txm_arena *arena,
+                                    txm_env *env) {
+    int best[TXI_STRIP_OTHERS], others = 0;
+    s->sources = (txi_column *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->sources);
+    s->labels = (int *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->labels);
+    if (arena->failed) return txi_no_memory(env);
+    s->source_count = 0;
+    const int own = txi_columns_own(s, 0);
+    txm_status status = txi_columns_sample(w, s, arena, env);
+    if (status != TXM_OK) return status;
+    if (s->partner < 0 && lines && own > 0 && own < TXI_STRIP_COLUMNS / 4)
+        others = txi_strip_others(s, lines, curve->ends, best);
+    for (int k = 0; k < others; k++) {
+        const txi_end *e = &lines->ends[best[k] / 2];
+        txi_ribbon r;
+        status = txi_ribbon_make(lines->points + e->first, e->count, arena, &r, env);
+        if (status != TXM_OK) return status;
+        /* points run outwards, the profile is that seen on the way inwards */
+        txi_columns_add(s, &r, 0, r.count - 1, !(best[k] & 1), 0);
+    }
+    if (own < TXI_STRIP_COLUMNS / 8) txi_columns_own(s, 1);
+    return s->source_count > own ? txi_columns_sample(w, s, arena, env) : TXM_OK;
+}
+
+/* ---- laying the strips ---------------------------------------------------------------------- */
+
+enum {
+    TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
+    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
+    TXI_LAY_OFFSET = 32,     /* levels; most that a strip's colours are changed                    */
+    TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
+    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
+    TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
+};
+#define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
+
+/* The strips of a window, and the graph of their patches. */
+typedef struct txi_strips {
+    const txi_window *w;
+    txi_strip *strips;
+    int count;
+    int *order;        /* strips, the one that is on top first                                    */
+    int node_count, link_count;
+    int *counts, *ends; /* of the graph                                                          */
+    size_t *firsts;
+    int32_t *unary;
+    int *link_strip;   /* which strip a link belongs to                                          */
+    int *labels;       /* per node: the index of the label chosen                                 */
+    int *cuts;         /* rows_most per node: the column from which on the next patch counts       */
+    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                        */
+} txi_strips;
+
+/* Strips of all curves; the sides of a stroke are one. */
+static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, int count,
+                                  txi_strips *all, txm_arena *arena, txm_env *env) {
+    all->w = w;
+    all->strips = (txi_strip *)txm_arena_zero(arena, (size_t)count, sizeof *all->strips);
+    all->order = (int *)txm_arena_alloc(arena, (size_t)count, sizeof *all->order);
+    txi_ribbon *lines = (txi_ribbon *)txm_arena_zero(arena, (size_t)count, sizeof *lines);
+    uint8_t *done = (uint8_t *)txm_arena_zero(arena, (size_t)count, 1);
+    if (arena->failed) return txi_no_memory(env);
+    int most = 1;
+    for (int i = 0; i < count; i++) {
+        if (curves[i].count < 2) continue;
+        most = curves[i].count > most ? curves[i].count : most;
+        txm_status status = txi_ribbon_make(curves[i].points, curves[i].count, arena, &lines[i], env);
+        if (status == TXM_OK) status = txi_ribbon_register(w, &lines[i], arena, env);
+        if (status != TXM_OK) return status;
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    float *width = (float *)txm_arena_alloc(arena, (size_t)most, sizeof *width);
+    if (!width) return txi_no_memory(env);
+    for (int i = 0; i < count; i++) {
+        const int p = curves[i].partner;
+        txi_strip *s = &all->strips[all->count];
+        if (done[i] || lines[i].count < 2) continue;
+        s->curve = i;
+        s->partner = -1;
+        s->line = lines[i];
+        if (p >= 0 && p < count && p != i && !done[p] && lines[p].count >= 2 &&
+            txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {
+            double sum = 0;
+            for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
+            s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
+            s->partner = p;
+            done[p] = 1;
+        }
+        done[i] = 1;
+        s->rows = 2 * TXI_STRIP_MARGIN + 1 + s->inside;
+        const txm_status status = txi_strip_sample(w, s, arena, env);
+        if (status != TXM_OK) return status;
+        if (s->last >= 0) all->count++; /* else there is nothing to complete */
+        else memset(s, 0, sizeof *s);
+    }
+    return TXM_OK;
+}
+
+/* The order in which strips cover each other: strokes over single lines, lines that go through over
+   those that end in the hole, then the stronger ones. */
+static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
+                                   txm_env *env) {
+    const size_t count = (size_t)all->count;
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, 2 * count, sizeof *pairs);
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < count; i++) {
+        const txi_strip *s = &all->strips[i];
+        const txi_curve *c = &curves[s->curve];
+        const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
+        const uint32_t bonus = (s->partner >= 0 ? 1u << 29 : 0) +
+                               (c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0);
+        pairs[i].key = UINT32_MAX - bonus - strength;
+        pairs[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(pairs, pairs + count, count);
+    for (size_t i = 0; i < count; i++) all->order[i] = (int)pairs[i].value;
+    return TXM_OK;
+}
+
+/* ---- choosing patches ---- */
+
+static int32_t txi_strips_pair(const void *context, int link, int a, int b) {
+    const txi_strips *all = (const txi_strips *)context;
+    const txi_strip *s = &all->strips[all->link_strip[link]];
+    const int p = s->labels[a] + s->hop - s->reach, q = s->labels[b] - s->reach;
+    return s->overlap[(size_t)p * (size_t)s->source_count + (size_t)q];
+}
+
+/* The costs of a strip: the table of overlaps and the unary costs of its patches. */
+static void txi_strips_body(void *context, int index) {
+    const txi_strips *all = (const txi_strips *)context;
+    txi_strip *s = &all->strips[index];
+    int16_t feature[TXI_STRIP_FEATURES], mask[TXI_STRIP_FEATURES];
+    int32_t values[TXI_STRIP_COLUMNS];
+    if (!s->node_count) return;
+    for (int i = 0; i < s->features; i++) mask[i] = -1;
+    txi_strip_overlaps(s, mask, values);
+    for (int k = 0; k < s->node_count; k++)
+        txi_strip_unary(s, k, feature, mask, all->unary + all->firsts[s->node + k]);
+}
+
+/* The sources of all strips, and the graph of all patches. */
+static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
+                                   txm_arena *arena, txm_env *env) {
+    size_t labels = 0;
+    for (int i = 0; i < all->count; i++) {
+        txi_strip *s = &all->strips[i];
+        txm_status status = txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
+        if (status != TXM_OK) return status;
+        txi_strip_labels(s);
+        s->node = all->node_count;
+        all->node_count += s->node_count;
+        all->link_count += s->node_count ? s->node_count - 1 : 0;
+        labels += (size_t)s->node_count * (size_t)s->label_count;
+        if (s->node_count)
+            s->overlap = (int32_t *)txm_arena_alloc(arena, (size_t)s->source_count,
+                                                    (size_t)s->source_count * sizeof *s->overlap);
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    const size_t nodes = (size_t)all->node_count, links = (size_t)all->link_count;
+    all->counts = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->counts);
+    all->firsts = (size_t *)txm_arena_alloc(arena, nodes + 1, sizeof *all->firsts);
+    all->unary = (int32_t *)txm_arena_alloc(arena, labels + 1, sizeof *all->unary);
+    all->ends = (int *)txm_arena_alloc(arena, links + 1, 2 * sizeof *all->ends);
+    all->link_strip = (int *)txm_arena_alloc(arena, links + 1, sizeof *all->link_strip);
+    all->labels = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->labels);
+    if (arena->failed) return txi_no_memory(env);
+    size_t first = 0;
+    int link = 0;
+    for (int i = 0; i < all->count; i++) {
+        const txi_strip *s = &all->strips[i];
+        for (int k = 0; k < s->node_count; k++) {
+            const int node = s->node + k;
+            all->counts[node] = s->label_count;
+            all->firsts[node] = first;
+            first += (size_t)s->label_count;
+            if (k == 0) continue;
+            all->ends[2 * link] = node - 1;
+            all->ends[2 * link + 1] = node;
+            all->link_strip[link++] = i;
+        }
+    }
+    txm_parallel_for(env, all->count, txi_strips_body, all);
+    return TXM_OK;
+}
+
+static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena, txm_env *env) {
+    txi_graph g;
+    memset(&g, 0, sizeof g);
+    g.node_count = all->node_count;
+    g.link_count = all->link_count;
+    g.counts = all->counts;
+    g.firsts = all->firsts;
+    g.unary = all->unary;
+    g.ends = all->ends;
+    g.pair = txi_strips_pair;
+    g.context = all;
+    const txm_status status = txi_belief(&g, TXI_STRIP_KEEP, seed, arena, all->labels, NULL, env);
+    for (int i = 0; i < all->count && status == TXM_OK; i++) {
+        txi_strip *s = &all->strips[i];
+        s->chosen = all->labels + s->node;
+        for (int k = 0; k < s->node_count; k++) s->chosen[k] = s->labels[s->chosen[k]];
+    }
+    return status;
+}
+
+/* ---- cuts and colours between patches ---- */
+
+/* Colour of row j of the patch's source, `offset` columns from its centre. */
+static const uint8_t *txi_patch_color(const txi_strip *s, int patch, int offset, int j) {
+    const int column = s->chosen[patch] + offset;
+    return s->source_color + 3 * ((size_t)column * (size_t)s->rows + (size_t)j);
+}
+
+/* Where patch k ends and the next one begins, row by row: a minimum-error cut through the columns
+   between their centres. */
+static void txi_patch_cut(const txi_strip *s, int k, int *cut) {
+    float error[TXI_STRIP_ROWS * TXI_STRIP_HOP];
+    double scratch[TXI_STRIP_ROWS * TXI_STRIP_HOP];
+    const int width = s->hop > 1 ? s->hop - 1 : 1;
+    for (int j = 0; j < s->rows; j++) {
+        for (int m = 0; m < width; m++) {
+            const uint8_t *a = txi_patch_color(s, k, m + 1, j);
+            const uint8_t *b = txi_patch_color(s, k + 1, m + 1 - s->hop, j);
+            int sum = 0;
+            for (int c = 0; c < 3; c++) sum += (a[c] - b[c]) * (a[c] - b[c]);
+            error[j * width + m] = (float)sum;
+        }
+    }
+    txm_cut(error, s->rows, width, width, 1, cut, scratch);
+    for (int j = 0; j < s->rows; j++) cut[j] += s->first + k * s->hop + 1;
+}
+
+/* What is to be added to the colours of row j in each patch, so that patches meet without a step and
+   the ends meet the known part: the offsets e minimise
+
+       sum over k of (e(k+1) - e(k) - d(k))^2 + sum over k of w(k) (e(k) - g(k))^2 + 0.0001 e(k)^2
+
+   d: mean difference of neighbours in their overlap, g: of the known part, w: known share of the
+   patch's row. The matrix has three diagonals and is solved by elimination. e: 2 * node_count. */
+static void txi_row_offsets(const txi_strip *s, int j, int c, double *e, float *offsets) {
+    const int n = s->node_count;
+    double *factor = e + n, d_before = 0;
+    for (int k = 0; k < n; k++) {
+        double load = 0, diagonal = 1e-4, d = 0;
+        int hits = 0, sum = 0;
+        for (int m = -s->reach; m <= s->reach; m++) {
+            const int column = s->first + k * s->hop + m;
+            const size_t at = (size_t)(column < 0 ? 0 : column) * (size_t)s->rows + (size_t)j;
+            if (column < 0 || column >= s->line.count || !s->known[at]) continue;
+            sum += s->color[3 * at + (size_t)c] - txi_patch_color(s, k, m, j)[c];
+            hits++;
+        }
+        diagonal += (double)hits / (2 * s->reach + 1);
+        load += (double)sum / (2 * s->reach + 1);
+        sum = 0;
+        for (int m = s->hop - s->reach; m <= s->reach && k + 1 < n; m++)
+            sum += txi_patch_color(s, k, m, j)[c] - txi_patch_color(s, k + 1, m - s->hop, j)[c];
+        if (k + 1 < n) {
+            d = (double)sum / (2 * s->reach - s->hop + 1);
+            load -= d;
+            diagonal += 1;
+        }
+        if (k) { /* eliminate e(k-1): its row is e(k-1) - factor(k-1) e(k) = e[k-1] */
+            load += d_before + e[k - 1];
+            diagonal += 1 - factor[k - 1];
+        }
+        factor[k] = k + 1 < n ? 1 / diagonal : 0;
+        e[k] = load / diagonal;
+        d_before = d;
+    }
+    for (int k = n - 1; k >= 0; k--) {
+        if (k + 1 < n) e[k] += factor[k] * e[k + 1];
+        offsets[(size_t)k * 3 * TXI_STRIP_ROWS + (size_t)(3 * j + c)] = txm_float(e[k]);
+    }
+}
+
+/* Cuts and offsets of all strips; the offsets are smoothed across the rows. */
+static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *env) {
+    const size_t nodes = (size_t)all->node_count;
+    all->cuts = (int *)txm_arena_zero(arena, nodes + 1, TXI_STRIP_ROWS * sizeof *all->cuts);
+    all->offsets =
+        (float *)txm_arena_zero(arena, nodes + 1, 3 * TXI_STRIP_ROWS * sizeof *all->offsets);
+    double *e = (double *)txm_arena_alloc(arena, nodes + 1, 2 * sizeof *e);
+    if (arena->failed) return txi_no_memory(env);
+    for (int i = 0; i < all->count; i++) {
+        const txi_strip *s = &all->strips[i];
+        float *offsets = all->offsets + (size_t)s->node * 3 * TXI_STRIP_ROWS;
+        for (int k = 0; k + 1 < s->node_count; k++)
+            txi_patch_cut(s, k, all->cuts + (size_t)(s->node + k) * TXI_STRIP_ROWS);
+        for (int j = 0; j < 3 * s->rows && s->node_count; j++)
+            txi_row_offsets(s, j / 3, j % 3, e, offsets);
+        for (int k = 0; k < s->node_count; k++) {
+            float *row = offsets + (size_t)k * 3 * TXI_STRIP_ROWS, smooth[3 * TXI_STRIP_ROWS];
+            for (int j = 0; j < 3 * s->rows; j++)
+                smooth[j] = txm_clampf(
+                    txm_float(txi_running_mean(row + j % 3, s->rows, 3, j / 3, 2)),
+                    -TXI_LAY_OFFSET, TXI_LAY_OFFSET);
+            memcpy(row, smooth, (size_t)(3 * s->rows) * sizeof *row);
+        }
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    return TXM_OK;
+}
+
+/* ---- pixels ---- */
+
+/* Catmull-Rom weights at t = 0..1 between the middle two of four samples */
+static void txi_lay_weights(double t, double weights[4]) {
+    weights[0] = 0.5 * t * (t * (2 - t) - 1);
+    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
+    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
+    weights[3] = 0.5 * t * t * (t - 1);
+}
+
+/* RGB at a place, Catmull-Rom, or bilinear where not all of its 16 pixels may be copied from; 0 if
+   not even that is possible. */
+static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3]) {
+    const int bx = (int)floor(x), by = (int)floor(y);
+    int coarse[3];
+    double wx[4], wy[4];
+    if (txi_strip_pixel(w, x, y, coarse) != 2) return 0;
+    for (int c = 0; c < 3; c++) rgb[c] = coarse[c];
+    if (bx < 1 || by < 1 || bx + 2 >= w->width || by + 2 >= w->height) return 1;
+    const size_t corner = (size_t)(by - 1) * (size_t)w->width + (size_t)(bx - 1);
+    for (int k = 0; k < 16; k++) {
+        if (w->state[corner + (size_t)(k / 4) * (size_t)w->width + (size_t)(k % 4)] != TXI_KNOWN)
+            return 1;
+    }
+    txi_lay_weights(x - bx, wx);
+    txi_lay_weights(y - by, wy);
+    for (int c = 0; c < 3; c++) {
+        rgb[c] = 0;
+        for (int k = 0; k < 16; k++)
+            rgb[c] += wx[k % 4] * wy[k / 4] *
+                      w->color[4 * (corner + (size_t)(k / 4) * (size_t)w->width + (size_t)(k % 4)) +
+                               (size_t)c];
+    }
+    return 1;
+}
+
+/* Which columns of a strip the pixels near it belong to. Arrays of one item per window pixel. */
+typedef struct txi_lay {
+    txi_strips *all;
+    const txi_curve *curves;
+    txi_plan *plan;
+    txi_pose *poses;
+    float *squares;   /* squared distance to the nearest column of the current strip               */
+    int32_t *columns; /* that column, or -1                                                      */
+    float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
+} txi_lay;
+
+/* For each hole pixel near a strip its nearest column. box: x0, y0, x1, y1, inclusive. */
+static void txi_lay_nearest(txi_lay *lay, const txi_strip *s, int box[4]) {
+    const txi_window *w = lay->all->w;
+    float widest = 0;
+    box[0] = w->width, box[1] = w->height, box[2] = box[3] = -1;
+    for (int i = 0; i < s->line.count; i++) widest = txm_maxf(widest, s->line.half[i]);
+    const int radius = (int)widest + TXI_STRIP_MARGIN + 2;
+    for (int pass = 0; pass < 2; pass++) { /* clear, then find */
+        for (int i = s->first; i <= s->last; i++) {
+            const txm_vec2 p = s->line.place[i];
+            const int x0 = txm_clampi((int)p.x - radius, 0, w->width - 1);
+            const int x1 = txm_clampi((int)p.x + radius + 1, 0, w->width - 1);
+            const int y0 = txm_clampi((int)p.y - radius, 0, w->height - 1);
+            const int y1 = txm_clampi((int)p.y + radius + 1, 0, w->height - 1);
+            for (int y = y0; y <= y1; y++) {
+                for (int x = x0; x <= x1; x++) {
+                    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+                    const double dx = x - (double)p.x, dy = y - (double)p.y;
+                    const float square = txm_float(dx * dx + dy * dy);
+                    if (!pass) {
+                        lay->columns[at] = -1;
+                    } else if (w->state[at] == TXI_HOLE &&
+                               (lay->columns[at] < 0 || square < lay->squares[at])) {
+                        lay->squares[at] = square;
+                        lay->columns[at] = i;
+                    }
+                }
+            }
+            box[0] = x0 < box[0] ? x0 : box[0];
+            box[1] = y0 < box[1] ? y0 : box[1];
+            box[2] = x1 > box[2] ? x1 : box[2];
+            box[3] = y1 > box[3] ? y1 : box[3];
+        }
+    }
+}
+
+/* The patch that has a place of the strip. */
+static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, int row) {
+    const int k = txm_clampi((int)((column - s->first) / s->hop), 0, s->node_count - 1);
+    if (k + 1 == s->node_count) return k;
+    const int *cut = lay->all->cuts + (size_t)(s->node + k) * TXI_STRIP_ROWS;
+    return column >= cut[row] ? k + 1 : k;
+}
+
+/* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
+   less towards the end of a line that ends in the hole. */
+static int txi_lay_pull(const txi_lay *lay, const txi_strip *s, double away, int column) {
+    const txi_curve *c = &lay->curves[s->curve];
+    double pull = away <= TXI_LAY_CORE
+                      ? 1
+                      : (TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
+    if (c->ends[1] < 0 && s->line.count - 1 - column < TXI_LAY_FADE)
+        pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
+    if (c->ends[0] < 0 && column < TXI_LAY_FADE) pull *= (double)(column + 1) / (TXI_LAY_FADE + 1);
+    return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
+}
+
+/* One pixel of a strip, if no other strip has a better claim to it. */
+static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
+    const txi_window *w = lay->all->w;
+    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+    const int i = lay->columns[at];
+    const txm_vec2 t = s->line.along[i];
+    const double dx = x - (double)s->line.place[i].x, dy = y - (double)s->line.place[i].y;
+    const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
+    const double half = s->line.half[i];
+    const double away = (across < 0 ? -across : across) - half;
+    const double claim = away > TXI_LAY_CORE ? away - TXI_LAY_CORE : 0;
+    double rgb[3];
+    if (ahead > 1.5 || ahead < -1.5 || away >= TXI_STRIP_MARGIN || claim >= lay->claims[at]) return;
+    const double row = txi_offset_row(across, s->inside, half), column = i + ahead;
+    const int j = txm_clampi((int)(row + 0.5), 0, s->rows - 1);
+    const int k = txi_lay_patch(lay, s, column, j), centre = s->first + k * s->hop;
+    const txi_column from = txi_column_at(s, s->chosen[k], column - centre);
+    const txm_vec2 p = txi_column_place(&from, txi_row_offset(row, s->inside, (double)from.half));
+    const int pull = txi_lay_pull(lay, s, away, i);
+    if (!pull || !txi_lay_pixel(w, (double)p.x, (double)p.y, rgb)) return;
+    const float *offset = lay->all->offsets + (size_t)(s->node + k) * 3 * TXI_STRIP_ROWS + 3 * j;
+    const int next = column >= centre ? (k + 1 < s->node_count ? 1 : 0) : k > 0 ? -1 : 0;
+    const double mix = (column >= centre ? column - centre : centre - column) / s->hop;
+    for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
+        const double there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
+        const double value = rgb[c] + (double)offset[c] + (there - (double)offset[c]) * mix + 0.5;
+        lay->plan->color[4 * at + (size_t)c] =
+            (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : (int)value);
+    }
+    lay->claims[at] = txm_float(claim);
+    lay->plan->pull[at] = (uint8_t)pull;
+    lay->plan->copies[at].x = p.x;
+    lay->plan->copies[at].y = p.y;
+    lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
+}
+
+/* The pose of a patch: both frames at its centre. */
+static txi_pose txi_lay_pose(const txi_strip *s, int k) {
+    const int column = s->first + k * s->hop;
+    const txm_vec2 t = s->line.along[column < s->line.count ? column : s->line.count - 1];
+    const txi_column *from = &s->sources[s->chosen[k]];
+    const txm_vec2 u = from->along;
+    const txm_vec2 v = txm_v2(-u.y * from->side, u.x * from->side);
+    txi_pose pose; /* to the right is t.x along the line and -t.y across it; down t.y and t.x */
+    pose.a = txm_float((double)t.x * u.x - (double)t.y * v.x);
+    pose.b = txm_float((double)t.x * u.y - (double)t.y * v.y);
+    pose.c = txm_float((double)t.y * u.x + (double)t.x * v.x);
+    pose.d = txm_float((double)t.y * u.y + (double)t.x * v.y);
+    return pose;
+}
+
+static void txi_lay_all(txi_lay *lay) {
+    for (int k = 0; k < lay->all->count; k++) {
+        const txi_strip *s = &lay->all->strips[lay->all->order[k]];
+        int box[4];
+        if (!s->node_count) continue;
+        for (int n = 0; n < s->node_count; n++) lay->poses[s->node + n] = txi_lay_pose(s, n);
+        txi_lay_nearest(lay, s, box);
+        for (int y = box[1]; y <= box[3]; y++) {
+            for (int x = box[0]; x <= box[2]; x++) {
+                const ptrdiff_t at = (ptrdiff_t)y * lay->all->w->width + x;
+                if (lay->all->w->state[at] == TXI_HOLE && lay->columns[at] >= 0)
+                    txi_lay_at(lay, s, x, y);
+            }
+        }
+    }
+}
+
+/* ---- the guide channel ---- */
+
+/* Raise the guide channel near a place on a line, in the hole or outside of it. */
+static void txi_guide_at(const txi_window *w, txi_plan *plan, const uint8_t *table, double px,
+                         double py, int in_hole) {
+    const int r = TXI_GUIDE_RADIUS;
+    if (!(px > -r && py > -r && px < w->width + r && py < w->height + r)) return;
+    const int cx = (int)(px + 0.5 + r) - r, cy = (int)(py + 0.5 + r) - r;
+    for (int y = cy > r ? cy - r : 0; y <= cy + r && y < w->height; y++) {
+        for (int x = cx > r ? cx - r : 0; x <= cx + r && x < w->width; x++) {
+            const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+            const double dx = x - px, dy = y - py, distance = sqrt(dx * dx + dy * dy);
+            if ((w->state[at] == TXI_HOLE) != in_hole || distance >= r) continue;
+            const uint8_t value = table[(int)(distance * TXI_GUIDE_STEPS + 0.5)];
+            if (plan->color[4 * at + 3] < value) plan->color[4 * at + 3] = value;
+        }
+    }
+}
+
+/* 100 exp(-d^2 / (2 * 1.5^2)) near known lines, outside of the hole, and near the completed ones. */
+static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *plan) {
+    uint8_t table[TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS + 1];
+    const txi_window *w = all->w;
+    for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
+        const double d = (double)i / (TXI_GUIDE_STEPS * TXI_GUIDE_SIGMA);
+        table[i] = (uint8_t)(TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+    }
+    for (int i = 0; lines && i < lines->thin_count; i++)
+        txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,
+                     0);
+    for (int k = 0; k < all->count; k++) {
+        const txi_ribbon *r = &all->strips[k].line;
+        for (int i = 0; i < r->count; i++) {
+            const double half = r->half[i], nx = -r->along[i].y, ny = r->along[i].x;
+            for (int side = half > 0 ? -1 : 1; side < 2; side += 2) {
+                const double x = (double)r->place[i].x + side * half * nx;
+                const double y = (double)r->place[i].y + side * half * ny;
+                txi_guide_at(w, plan, table, x, y, 1);
+                txi_guide_at(w, plan, table, x, y, 0);
+            }
+        }
+    }
+}
+
+/* ---- the plan ---- */
+
+static txm_status txi_plan_run(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
+                               int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
+                               txm_env *env, txi_plan *plan, txi_pose **poses) {
+    const txi_window *w = all->w;
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    txi_lay lay;
+    txm_status status = txi_strips_make(w, curves, count, all, scratch, env);
+    if (status == TXM_OK) status = txi_strips_order(all, curves, scratch, env);
+    if (status == TXM_OK) status = txi_strips_graph(all, lines, curves, scratch, env);
+    if (status == TXM_OK) status = txi_strips_choose(all, seed, scratch, env);
+    if (status == TXM_OK) status = txi_strips_finish(all, scratch, env);
+    if (status != TXM_OK) return status;
+
+    lay.all = all;
+    lay.curves = curves;
+    lay.plan = plan;
+    lay.squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.squares);
+    lay.columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay.columns);
+    lay.claims = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.claims);
+    lay.poses = *poses = (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
+    plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
+    plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
+    plan->copies = (txi_copy *)txm_arena_alloc(arena, pixels, sizeof *plan->copies);
+    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < pixels; i++) {
+        lay.claims[i] = TXI_STRIP_MARGIN;
+        plan->copies[i].x = plan->copies[i].y = 0;
+        plan->copies[i].piece = -1;
+        plan->copies[i].pose = 0;
+    }
+    txi_lay_all(&lay);
+    txi_guide(all, lines, plan);
+    return txm_progress(env, 0, "strips") ? txi_stopped(env) : TXM_OK;
+}
+
+/* Lay strips of texture along the completed lines of a window [1, III.A].
+
+   lines   of the window: other lines to take texture from, and the known lines of the guide channel;
+           NULL: none
+   curves  the completed lines, count of them; may be none
+   arena   holds plan and poses
+   plan    receives the strips: color and pull in the hole, the guide channel near all lines. Copies
+           have one piece and one pose per patch
+   poses   receives pose_count poses
+   return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED; after a failure *plan and *poses are NULL
+   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61        */
+static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
+                                int count, uint64_t seed, txm_arena *arena, txm_env *env,
+                                txi_plan *plan, const txi_pose **poses, int *pose_count) {
+    txi_strips all;
+    txi_pose *made = NULL;
+    txm_arena scratch;
+    memset(&all, 0, sizeof all);
+    memset(plan, 0, sizeof *plan);
+    all.w = w;
+    txm_arena_init(&scratch, env);
+    const txm_status status =
+        txi_plan_run(&all, lines, curves, count, seed, arena, &scratch, env, plan, &made);
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
+    *poses = status == TXM_OK ? made : NULL;
+    *pose_count = status == TXM_OK ? all.node_count : 0;
+    return status;
+}
 
 /* ---- levels of a window -------------------------------------------------------------------- */
 

@@ -14,7 +14,7 @@ enum {
     TXI_PER_END = 12,      /* candidates kept for each end, the best ones; ours                   */
     TXI_MAX_LINKS = 3000,  /* candidates in all; ours                                            */
     TXI_MOVES = 60000,     /* of the annealing; ours                                             */
-    TXI_KNOWN_PART = 32    /* pixels of a curve outside of the hole, on each side                */
+    TXI_KNOWN_PART = 120   /* pixels of a curve outside of the hole, on each side                */
 };
 
 /* A candidate: two ends and the curve between them, or one end and a place where it leaves the hole. */

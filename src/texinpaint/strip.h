@@ -469,7 +469,7 @@ static void txi_strip_overlaps(txi_strip *s, const int16_t *mask, int32_t *value
             if (p >= length) sum -= values[p - length];
             const int from = p - length + 1;
             if (from < 0) continue;
-            const int32_t cost = (int32_t)(sum < TXI_COST_MOST ? sum : TXI_COST_MOST);
+            const int32_t cost = (int32_t)(sum < TXI_COST_MOST ? sum : (int64_t)TXI_COST_MOST);
             s->overlap[(size_t)from * (size_t)n + (size_t)(from + d)] = cost;
             s->overlap[(size_t)(from + d) * (size_t)n + (size_t)from] = cost;
         }
@@ -517,7 +517,7 @@ static void txi_strip_unary(const txi_strip *s, int patch, int16_t *feature, int
                 txi_feature_ssd(feature,
                                 s->source_feature + (size_t)(s->labels[i] + k) * (size_t)width, mask,
                                 width);
-            unary[i] = (int32_t)(sum < TXI_COST_MOST ? sum : TXI_COST_MOST);
+            unary[i] = (int32_t)(sum < TXI_COST_MOST ? sum : (int64_t)TXI_COST_MOST);
         }
     }
 }

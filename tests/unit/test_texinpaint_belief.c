@@ -9,9 +9,7 @@
 
 #include <cmocka.h>
 
-#define TEXINPAINT_IMPLEMENTATION
-#define TEXINPAINT_STATIC
-#include "texinpaint.h"
+#include "texinpaint/belief.h"
 #include "testkit.h"
 
 /* ---- small random graphs ---------------------------------------------------------------- */
