@@ -4,7 +4,7 @@
 #include "blend.h"
 #include "fill.h"
 #include "join.h"
-#include "strip.h"
+#include "lay.h"
 #include "stub.h"
 
 /* ---- hypotheses -------------------------------------------------------------------------------

@@ -6,16 +6,6 @@
 
 /* ---- stubs: whoever lands the real function takes its stub away here --------------------------- */
 
-static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
-                                int count, uint64_t seed, txm_arena *arena, txm_env *env,
-                                txi_plan *plan, const txi_pose **poses, int *pose_count) {
-    (void)w, (void)lines, (void)curves, (void)count, (void)seed, (void)arena, (void)env;
-    memset(plan, 0, sizeof *plan);
-    *poses = NULL;
-    *pose_count = 0;
-    return TXM_OK;
-}
-
 static txm_status txi_harmonic_fill(txi_domain *d, txm_env *env) {
     (void)d, (void)env;
     return TXM_OK;
