@@ -189,7 +189,7 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
         *status = fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
         return 1;
     }
-    if (count < manual->inputs) {
+    if (count < manual->inputs && manual->input) {
         *status = cli_fail(run, CLI_USAGE, "no %s given; see 'texkit %s --help'", manual->input,
                            manual->name);
     } else if (!run->output) {

@@ -54,7 +54,7 @@ typedef struct cli_manual {
     const char *details; /* lines of at most 100 columns, each ending in \n   */
     const char *example; /* the same                                        */
     int inputs;          /* how many input files it takes                   */
-    const char *input;   /* what the first is called in messages            */
+    const char *input;   /* what the first is called in messages; NULL: they may be left out */
     int makes_folder;    /* the output is a folder of files                 */
     const char *smaller; /* what to do if memory runs out                   */
 } cli_manual;
@@ -145,6 +145,15 @@ int cli_finish_files(cli *run, const cli_file *files, int count);
 
 /* The same for files in the output folder, which is made if it does not exist. */
 int cli_finish_folder(cli *run, const cli_file *files, int count);
+
+/* Before any work: can files be written to this folder, or can it be made? An exit status. */
+int cli_checks_folder(cli *run, const char *path);
+
+/* Make a folder unless it exists; *made tells whether it is new. An exit status. */
+int cli_makes_folder(cli *run, const char *path, int *made);
+
+/* Remove an empty folder. */
+void cli_removes_folder(const char *path);
 
 /* ---- between cli.c, progress.c, stats.c and outputs.c --------------------------------------- */
 

@@ -41,6 +41,13 @@ int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_
     return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
 }
 
+int check_extent(cli *run, const char *what, const char *path, const txm_image *image, int width,
+                 int height, const char *like) {
+    if (image->width == width && image->height == height) return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "%s '%s' is %d x %d; make it %d x %d like %s", what, path,
+                    image->width, image->height, width, height, like);
+}
+
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size) {
     const char *why;
@@ -98,6 +105,23 @@ int find_name(cli *run, const char *option, const char *name, const char *const 
     return -1;
 }
 
+int mark_maps(cli *run, const char *option, const char *list, int low, int high, int mark,
+              int *marks) {
+    enum { MOST = 16 };
+    double numbers[MOST];
+    if (!list) return CLI_DONE;
+    const int n = parse_numbers(run, option, list, MOST, low, high, numbers);
+    if (!n) return CLI_USAGE;
+    for (int i = 0; i < n; i++) {
+        const int m = (int)numbers[i];
+        if ((double)m != numbers[i])
+            return cli_fail(run, CLI_USAGE, "%s '%s': give whole numbers, 0 for the picture itself, "
+                            "1 for the first of --maps", option, list);
+        marks[m] = mark;
+    }
+    return CLI_DONE;
+}
+
 /* ---- outputs ------------------------------------------------------------------------------ */
 
 int check_picture_path(cli *run, const char *path, int width, int height, int channels) {
@@ -106,6 +130,16 @@ int check_picture_path(cli *run, const char *path, int width, int height, int ch
     file_extension(path, extension);
     if (image_can_write(extension, width, height, channels, &why)) return CLI_DONE;
     return cli_fail(run, CLI_USAGE, "cannot write '%s': %s", path, why);
+}
+
+int check_picture_fits(cli *run, const char *path, int width, int height, const txm_image *image) {
+    char extension[8];
+    file_extension(path, extension);
+    const int status = check_picture_path(run, path, width, height, image->channels);
+    if (!status && image->sample == TXM_U16 && strcmp(extension, ".png") != 0)
+        return cli_fail(run, CLI_USAGE, "cannot write '%s': of these formats only PNG takes 16 bits "
+                        "a sample; use .png", path);
+    return status;
 }
 
 int finish_with_picture(cli *run, const txm_image *image) {
@@ -129,6 +163,48 @@ int path_beside(cli *run, const char *ending, char path[MAX_PATH]) {
     snprintf(path, n + 1, "%s", run->output); /* without its extension */
     snprintf(path + n, MAX_PATH - n, "%s", ending);
     return cli_writes(run, path);
+}
+
+static int is_separator(char c) {
+    return c == '-' || c == '_' || c == '.' || c == ' ';
+}
+
+/* The length of a file's name without its extension; *name begins after the last slash. */
+static size_t stem_of(const char *path, const char **name) {
+    const char *slash = strrchr(path, '/'), *dot;
+    *name = slash ? slash + 1 : path;
+    dot = strrchr(*name, '.');
+    return dot && dot > *name ? (size_t)(dot - *name) : strlen(*name);
+}
+
+/* What distinguishes a map's name from its exemplar's: "normal" for bricks_normal.png beside
+   bricks.png or bricks_albedo.png. The whole stem if that leaves nothing. */
+static size_t own_name(const char *path, const char *exemplar, const char **name) {
+    const char *other;
+    const size_t n = stem_of(path, name), m = stem_of(exemplar, &other);
+    size_t same = 0, cut = 0;
+    while (same < n && same < m && (*name)[same] == other[same]) {
+        same++;
+        if (is_separator(other[same - 1])) cut = same;
+    }
+    if (same == m && same < n && is_separator((*name)[same])) cut = same + 1;
+    if (cut >= n) cut = 0;
+    *name += cut;
+    return n - cut;
+}
+
+int path_of_map(cli *run, const char *map, const char *picture, const char *ending,
+                char path[MAX_PATH]) {
+    char extension[8];
+    file_extension(run->output, extension);
+    const size_t n = strlen(run->output) - strlen(extension);
+    const char *name = "";
+    size_t length = 0;
+    if (map) length = own_name(map, picture, &name);
+    const int size = snprintf(path, MAX_PATH, "%.*s%s%.*s%s%s", (int)n, run->output, map ? "-" : "",
+                              (int)length, name, ending, run->output + n);
+    if (size < MAX_PATH) return CLI_DONE;
+    return cli_fail(run, CLI_USAGE, "'%s': the path is too long", run->output);
 }
 
 const char *name_in(const char *path) {

@@ -18,6 +18,7 @@ extern const command patch_command;                /* patch.c  */
 extern const command edges_command;                /* edges.c  */
 extern const command tiles_command;                /* tiles.c  */
 extern const command retile_command;               /* retile.c */
+extern const command inpaint_command;              /* inpaint.c */
 extern const command tree_command, forest_command; /* tree.c   */
 
 /* ---- failures: each prints a message and returns an exit status --------------------------- */
@@ -39,6 +40,10 @@ int new_picture(cli *run, int width, int height, int channels, txm_sample sample
    the file has them. An exit status. */
 int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image);
 
+/* Refuse a picture of another size. what: "the mask"; like: whose size it must have. */
+int check_extent(cli *run, const char *what, const char *path, const txm_image *image, int width,
+                 int height, const char *like);
+
 /* Encode a picture in the format of the path's extension; *bytes is for free(). An exit status. */
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size);
@@ -57,11 +62,19 @@ int parse_number(cli *run, const char *option, const char *text, double low, dou
 /* The index of a name in a list that ends in NULL; -1 after a message that lists the names. */
 int find_name(cli *run, const char *option, const char *name, const char *const *names);
 
+/* "1,3": give these of --maps a mark; the numbers are low..high, high at most 15. A list that is NULL
+   marks none. An exit status. */
+int mark_maps(cli *run, const char *option, const char *list, int low, int high, int mark,
+              int *marks);
+
 /* ---- outputs ------------------------------------------------------------------------------ */
 
 /* Refuse, before any work, an output path whose format cannot hold such a picture. 0: size or
    channels not known yet. */
 int check_picture_path(cli *run, const char *path, int width, int height, int channels);
+
+/* The same for a picture of such channels and depth. */
+int check_picture_fits(cli *run, const char *path, int width, int height, const txm_image *image);
 
 /* Encode the picture for the output's extension and write it. */
 int finish_with_picture(cli *run, const txm_image *image);
@@ -70,6 +83,11 @@ int finish_with_picture(cli *run, const txm_image *image);
    status. */
 enum { MAX_PATH = CLI_MAX_PATH };
 int path_beside(cli *run, const char *ending, char path[MAX_PATH]);
+
+/* The path of a map's result: OUT-normal.png for bricks-normal.png, a map of the picture bricks.png. The
+   ending stands before the extension; map NULL: the picture's own. An exit status. */
+int path_of_map(cli *run, const char *map, const char *picture, const char *ending,
+                char path[MAX_PATH]);
 
 /* What follows the last '/'. */
 const char *name_in(const char *path);

@@ -55,8 +55,7 @@ static int check_output(cli *run, const char *path) {
                     path, strerror(errno));
 }
 
-/* The same for a folder: is it there and writable, or can it be made? */
-static int check_folder(cli *run, const char *path) {
+int cli_checks_folder(cli *run, const char *path) {
     struct stat info;
     char place[PATH_MAX + 2];
     size_t n = strlen(path);
@@ -203,9 +202,10 @@ static int announce_options(cli *run, const cli_option *table) {
 
 int cli_announce(cli *run, const cli_option *own, const cli_option *common) {
     int status = CLI_DONE;
-    for (int i = 0; i < run->manual->inputs && !status; i++) status = cli_reads(run, run->inputs[i]);
+    for (int i = 0; i < run->manual->inputs && run->inputs[i] && !status; i++)
+        status = cli_reads(run, run->inputs[i]);
     if (!status)
-        status = run->manual->makes_folder ? check_folder(run, run->output)
+        status = run->manual->makes_folder ? cli_checks_folder(run, run->output)
                                            : cli_writes(run, run->output);
     if (!status) status = announce_options(run, own);
     return status ? status : announce_options(run, common);
@@ -282,6 +282,16 @@ int cli_finish_files(cli *run, const cli_file *files, int count) {
     return status;
 }
 
+int cli_makes_folder(cli *run, const char *path, int *made) {
+    *made = mkdir(path, 0777) == 0;
+    if (*made || errno == EEXIST) return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", path, strerror(errno));
+}
+
+void cli_removes_folder(const char *path) {
+    rmdir(path);
+}
+
 int cli_finish_folder(cli *run, const cli_file *files, int count) {
     cli_file *inside = (cli_file *)calloc((size_t)count, sizeof *inside);
     char(*paths)[CLI_MAX_PATH] = (char(*)[CLI_MAX_PATH])calloc((size_t)count, CLI_MAX_PATH);
@@ -292,14 +302,9 @@ int cli_finish_folder(cli *run, const cli_file *files, int count) {
         inside[i].name = paths[i];
         status = path_inside(run, run->output, files[i].name, paths[i]);
     }
-    if (!status) {
-        made = mkdir(run->output, 0777) == 0;
-        if (!made && errno != EEXIST)
-            status = cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", run->output,
-                              strerror(errno));
-    }
+    if (!status) status = cli_makes_folder(run, run->output, &made);
     if (!status) status = cli_finish_files(run, inside, count);
-    if (status && made) rmdir(run->output);
+    if (status && made) cli_removes_folder(run->output);
     free(paths);
     free(inside);
     return status;

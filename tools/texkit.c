@@ -8,6 +8,7 @@
 #include "command.h"
 
 #include "texedges.h"
+#include "texinpaint.h"
 #include "texpatch.h"
 #include "texsyn.h"
 #include "textiles.h"
@@ -21,13 +22,14 @@ const char cli_versions[] =
     TEXKIT_VERSION " (texmath " TEXMATH_VERSION ", texsyn " TEXSYN_VERSION
                    ", texpatch " TEXPATCH_VERSION ", texedges " TEXEDGES_VERSION
                    ", textiles " TEXTILES_VERSION ", trimesh_relax " TRIMESH_RELAX_VERSION
-                   ", trimesh_cover " TRIMESH_COVER_VERSION ", treepieces " TREEPIECES_VERSION ")";
+                   ", trimesh_cover " TRIMESH_COVER_VERSION ", texinpaint " TEXINPAINT_VERSION
+                   ", treepieces " TREEPIECES_VERSION ")";
 
 /* ---- the table of commands ---------------------------------------------------------------- */
 
 static const command *const commands[] = {&learn_command, &synth_command, &patch_command,
                                          &edges_command, &tiles_command, &retile_command,
-                                         &tree_command,  &forest_command};
+                                         &inpaint_command, &tree_command, &forest_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 

@@ -7,46 +7,12 @@
 
 /* ---- the outputs' names ------------------------------------------------------------------- */
 
-static int is_separator(char c) {
-    return c == '-' || c == '_' || c == '.' || c == ' ';
-}
-
-/* The length of a file's name without its extension; *name begins after the last slash. */
-static size_t stem_of(const char *path, const char **name) {
-    const char *slash = strrchr(path, '/'), *dot;
-    *name = slash ? slash + 1 : path;
-    dot = strrchr(*name, '.');
-    return dot && dot > *name ? (size_t)(dot - *name) : strlen(*name);
-}
-
-/* What distinguishes a map's name from its exemplar's: "normal" for bricks_normal.png beside
-   bricks.png or bricks_albedo.png. The whole stem if that leaves nothing. */
-static size_t own_name(const char *path, const char *exemplar, const char **name) {
-    const char *other;
-    const size_t n = stem_of(path, name), m = stem_of(exemplar, &other);
-    size_t same = 0, cut = 0;
-    while (same < n && same < m && (*name)[same] == other[same]) {
-        same++;
-        if (is_separator(other[same - 1])) cut = same;
-    }
-    if (same == m && same < n && is_separator((*name)[same])) cut = same + 1;
-    if (cut >= n) cut = 0;
-    *name += cut;
-    return n - cut;
-}
-
 /* OUT-normal-2.png: level 2 of a map. */
 static int name_output(patch_job *j, int map, int level, char path[MAX_PATH]) {
-    const size_t n = strlen(j->run.output) - strlen(j->extension);
-    const char *name = "";
-    size_t length = 0;
     char number[16] = "";
     if (level) snprintf(number, sizeof number, "-%d", level);
-    if (map) length = own_name(j->map_names[0].at[map - 1], j->run.inputs[0], &name);
-    const int size = snprintf(path, MAX_PATH, "%.*s%s%.*s%s%s", (int)n, j->run.output,
-                              map ? "-" : "", (int)length, name, number, j->run.output + n);
-    if (size < MAX_PATH) return CLI_DONE;
-    return cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->run.output);
+    return path_of_map(&j->run, map ? j->map_names[0].at[map - 1] : NULL, j->run.inputs[0], number,
+                       path);
 }
 
 int patch_name_outputs(patch_job *j) {
@@ -94,13 +60,6 @@ static int read_as(patch_job *j, const char *path, int channels, txm_sample samp
     return !status && image->sample != sample ? widen(j, image) : status;
 }
 
-static int check_extent(patch_job *j, const char *what, const char *path, const txm_image *image,
-                        int width, int height, const char *like) {
-    if (image->width == width && image->height == height) return CLI_DONE;
-    return cli_fail(&j->run, CLI_FAILED, "%s '%s' is %d x %d; make it %d x %d like %s", what, path,
-                    image->width, image->height, width, height, like);
-}
-
 /* Exemplar e and its maps; all exemplars have the channels and the depths of the first. */
 static int read_exemplar(patch_job *j, int e) {
     texpatch_exemplar *x = &j->exemplars[e];
@@ -114,7 +73,7 @@ static int read_exemplar(patch_job *j, int e) {
         if (e) status = read_as(j, name, first->channels, first->sample, image);
         else status = read_picture(&j->run, name, 0, TXM_U16, image);
         if (!status && m)
-            status = check_extent(j, "the map", name, image, x->maps[0].width, x->maps[0].height,
+            status = check_extent(&j->run, "the map", name, image, x->maps[0].width, x->maps[0].height,
                                   path);
     }
     return status;
@@ -133,7 +92,7 @@ static int read_for_exemplars(patch_job *j, const char *option, const char *list
         const int as_first = channels ? channels : j->exemplars[0].guide.channels; /* 0: as it is */
         status = read_as(j, n.at[e], as_first, TXM_U8, image);
         if (!status)
-            status = check_extent(j, channels ? "the mask" : "the guide", n.at[e], image,
+            status = check_extent(&j->run, channels ? "the mask" : "the guide", n.at[e], image,
                                   x->maps[0].width, x->maps[0].height, j->exemplar_names.at[e]);
     }
     free(n.storage);
@@ -144,7 +103,7 @@ static int read_sized(patch_job *j, const char *what, const char *path, int chan
                       txm_sample sample, txm_image *image) {
     const int status = read_as(j, path, channels, sample, image);
     if (status) return status;
-    return check_extent(j, what, path, image, j->desc.width, j->desc.height, "--size");
+    return check_extent(&j->run, what, path, image, j->desc.width, j->desc.height, "--size");
 }
 
 static int read_kept(patch_job *j) {
@@ -170,10 +129,7 @@ int patch_read_all(patch_job *j) {
     for (int m = 0; m < d->map_count && !status; m++) {
         const txm_image *image = &j->pictures[0][m];
         const char *path = j->paths[m * (1 + j->lod)];
-        status = check_picture_path(&j->run, path, d->width, d->height, image->channels);
-        if (!status && image->sample == TXM_U16 && strcmp(j->extension, ".png") != 0)
-            status = cli_fail(&j->run, CLI_USAGE, "cannot write '%s': of these formats only PNG "
-                              "takes 16 bits a sample; use .png", path);
+        status = check_picture_fits(&j->run, path, d->width, d->height, image);
     }
     if (!status && j->masks) status = read_for_exemplars(j, "--mask", j->masks, 1);
     if (!status && j->guides) status = read_for_exemplars(j, "--guide", j->guides, 0);

@@ -28,24 +28,6 @@ int patch_split(patch_job *j, const char *option, const char *list, char separat
     return CLI_DONE;
 }
 
-/* "1,3": mark these maps. */
-static int mark_maps(patch_job *j, const char *option, const char *list, int mark,
-                     int marks[TEXPATCH_MAX_MAPS]) {
-    double numbers[TEXPATCH_MAX_MAPS];
-    if (!list) return CLI_DONE;
-    const int last = j->desc.map_count - 1;
-    const int n = parse_numbers(&j->run, option, list, TEXPATCH_MAX_MAPS, 0, last, numbers);
-    if (!n) return CLI_USAGE;
-    for (int i = 0; i < n; i++) {
-        const int m = (int)numbers[i];
-        if ((double)m != numbers[i])
-            return cli_fail(&j->run, CLI_USAGE, "%s '%s': give whole numbers, 0 for '%s', 1 for "
-                            "the first of --maps", option, list, j->run.inputs[0]);
-        marks[m] = mark;
-    }
-    return CLI_DONE;
-}
-
 /* ---- options ------------------------------------------------------------------------------ */
 
 /* The maps of all exemplars, and how each is treated. */
@@ -90,9 +72,10 @@ static int parse_maps(patch_job *j) {
         if (!parse_numbers(&j->run, "--weights", j->weights, d->map_count, 0, 16, weights))
             return CLI_USAGE;
     }
-    status = mark_maps(j, "--normal", j->normals, j->directx ? 2 : 1, normals);
-    if (!status) status = mark_maps(j, "--label", j->labels, 1, labels);
-    if (!status) status = mark_maps(j, "--data", j->data, 1, data);
+    const int last = d->map_count - 1;
+    status = mark_maps(&j->run, "--normal", j->normals, 0, last, j->directx ? 2 : 1, normals);
+    if (!status) status = mark_maps(&j->run, "--label", j->labels, 0, last, 1, labels);
+    if (!status) status = mark_maps(&j->run, "--data", j->data, 0, last, 1, data);
     if (status) return status;
     double sum = 0;
     for (int m = 0; m < d->map_count; m++) {

@@ -115,6 +115,20 @@ int mesh_read(const char *path, int points_too, mesh_data *mesh, const char **wh
 /* Release what the mesh owns; the message stays. */
 void mesh_free(mesh_data *mesh);
 
+/* Polylines. */
+typedef struct mesh_lines {
+    size_t count;   /* of lines                                                          */
+    float *points;  /* 3 per point, finite                                               */
+    size_t *first;  /* count + 1: line i has points first[i] .. first[i + 1] - 1, 2 or more */
+    char message[120];
+} mesh_lines;
+
+/* Read the polylines of the bytes of an OBJ file, its `l` elements. 1 if all went well. */
+int mesh_decode_lines(const unsigned char *bytes, size_t size, mesh_lines *lines, const char **why);
+
+/* Release what the lines own; the message stays. */
+void mesh_lines_free(mesh_lines *lines);
+
 /* Can a mesh be written to a path with this extension (".glb")? */
 int mesh_can_write(const char *extension, const char **why);
 

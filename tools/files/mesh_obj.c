@@ -141,6 +141,82 @@ int mesh_read_obj(builder *b, text *in) {
     return ok;
 }
 
+/* ---- reading lines ------------------------------------------------------------------------ */
+
+/* l v v v ..., or l v/vt v/vt ... */
+static int read_obj_line(builder *b, text *in, list *points, list *firsts) {
+    const size_t line = in->line, before = points->count;
+    for (;;) {
+        uint32_t vertex, uv;
+        text_skip_blanks(in);
+        if (in->at == in->end || *in->at == '\n' || *in->at == '#') break;
+        int ok = read_obj_index(in, b->positions.count, &vertex) && vertex < b->positions.count;
+        if (ok && in->at < in->end && *in->at == '/') {
+            in->at++;
+            ok = read_obj_index(in, SIZE_MAX, &uv);
+        }
+        if (!ok || !text_at_word_end(in->at, in->end))
+            return builder_fail(b, line, "a line with an index that is out of range or no number");
+        float *p = (float *)list_add(points, 1);
+        if (!p) return builder_fail_memory(b);
+        memcpy(p, (const float *)b->positions.items + 3 * (size_t)vertex, 3 * sizeof(float));
+    }
+    if (points->count < before + 2) return builder_fail(b, line, "a line with less than two points");
+    size_t *first = (size_t *)list_add(firsts, 1);
+    if (!first) return builder_fail_memory(b);
+    *first = points->count;
+    return 1;
+}
+
+int mesh_decode_lines(const unsigned char *bytes, size_t size, mesh_lines *lines,
+                      const char **why) {
+    builder b;
+    mesh_data message;
+    text in = {(const char *)bytes, (const char *)bytes + size, 1};
+    list colors = list_of(3 * sizeof(float)), points = list_of(3 * sizeof(float));
+    list firsts = list_of(sizeof(size_t));
+    memset(lines, 0, sizeof *lines);
+    memset(&message, 0, sizeof message);
+    builder_init(&b, &message, why);
+    size_t *first = (size_t *)list_add(&firsts, 1);
+    int ok = first ? 1 : builder_fail_memory(&b);
+    if (first) *first = 0;
+    while (ok && in.at < in.end) {
+        text_skip_blanks(&in);
+        const char *word = in.at;
+        while (!text_at_word_end(in.at, in.end)) in.at++;
+        const ptrdiff_t n = in.at - word;
+        if (n == 1 && word[0] == 'v') ok = read_obj_vertex(&b, &in, &colors);
+        else if (n == 1 && word[0] == 'l') ok = read_obj_line(&b, &in, &points, &firsts);
+        if (ok) text_skip_line(&in);
+    }
+    if (ok && firsts.count == 1) ok = builder_fail(&b, 0, "no lines in it; lines begin with an l");
+    if (ok) {
+        lines->count = firsts.count - 1;
+        lines->points = (float *)points.items;
+        lines->first = (size_t *)firsts.items;
+    } else {
+        list_free(&points);
+        list_free(&firsts);
+        if (*why == message.message) {
+            memcpy(lines->message, message.message, sizeof lines->message);
+            *why = lines->message;
+        }
+    }
+    list_free(&colors);
+    builder_free(&b);
+    mesh_free(&message);
+    return ok;
+}
+
+void mesh_lines_free(mesh_lines *lines) {
+    free(lines->points);
+    free(lines->first);
+    lines->points = NULL;
+    lines->first = NULL;
+    lines->count = 0;
+}
+
 /* ---- writing ----------------------------------------------------------------------------- */
 
 /* A name on a line of its own: no control characters. */

@@ -1,0 +1,123 @@
+/* inpaint_files.c - the files of 'texkit inpaint', in and out
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "inpaint.h"
+
+#include <stdio.h>
+
+/* ---- the outputs' names ----------------------------------------------------------------------- */
+
+int inpaint_name_outputs(inpaint_job *j) {
+    int status = CLI_DONE;
+    j->paths = (char(*)[MAX_PATH])new_array(TEXINPAINT_MAX_MAPS, MAX_PATH);
+    if (!j->paths) return fail_memory(&j->run);
+    for (int m = 0; m <= j->desc.map_count && !status; m++) {
+        status = path_of_map(&j->run, m ? j->names[m - 1] : NULL, j->picture, "", j->paths[m]);
+        if (!status && m) status = cli_writes(&j->run, j->paths[m]); /* the first is -o */
+    }
+    return status ? status : check_picture_path(&j->run, j->run.output, 0, 0, 0);
+}
+
+/* ---- reading --------------------------------------------------------------------------------- */
+
+static int read_mesh(inpaint_job *j) {
+    texinpaint_desc *d = &j->desc;
+    const char *why;
+    if (!mesh_read(j->mesh_path, 0, &j->mesh, &why))
+        return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", j->mesh_path, why);
+    if (!j->mesh.uvs)
+        return cli_fail(&j->run, CLI_FAILED, "'%s' has no texture coordinates", j->mesh_path);
+    const size_t corners = 3 * j->mesh.triangle_count;
+    j->corners = (uint32_t *)new_array(corners, sizeof *j->corners);
+    if (!j->corners) return fail_memory(&j->run);
+    for (size_t c = 0; c < corners; c++) j->corners[c] = (uint32_t)c;
+    d->mesh = mesh_view(&j->mesh);
+    d->uv = j->mesh.uvs;
+    d->uv_count = corners;
+    d->uv_indices = j->corners;
+    return CLI_DONE;
+}
+
+/* A picture of the first one's size. */
+static int read_like(inpaint_job *j, const char *what, const char *path, txm_sample most,
+                     txm_image *image) {
+    const txm_image *first = &j->desc.image;
+    const int status = read_picture(&j->run, path, 0, most, image);
+    if (status) return status;
+    return check_extent(&j->run, what, path, image, first->width, first->height, j->picture);
+}
+
+int inpaint_read_all(inpaint_job *j) {
+    texinpaint_desc *d = &j->desc;
+    int status = read_picture(&j->run, j->picture, 0, TXM_U16, &d->image);
+    if (!status && j->mask) status = read_like(j, "the mask", j->mask, TXM_U8, &d->mask);
+    if (!status && j->source) status = read_like(j, "the source mask", j->source, TXM_U8, &d->source);
+    for (int m = 0; m < d->map_count && !status; m++)
+        status = read_like(j, "the map", j->names[m], TXM_U16, &j->maps[m].image);
+    for (int m = 0; m <= d->map_count && !status; m++) {
+        const txm_image *in = m ? &j->maps[m - 1].image : &d->image;
+        status = check_picture_fits(&j->run, j->paths[m], in->width, in->height, in);
+        if (!status)
+            status = new_picture(&j->run, in->width, in->height, in->channels, in->sample, &j->out[m]);
+    }
+    if (!status && j->mesh_path) status = read_mesh(j);
+    return status;
+}
+
+/* ---- the pictures of --debug ------------------------------------------------------------------ */
+
+void inpaint_show(void *user, const char *name, const txm_image *picture) {
+    inpaint_job *j = (inpaint_job *)user;
+    const size_t n = j->shown_count;
+    const char *why;
+    if (j->show_status) return;
+    if ((n & (n - 1)) == 0) { /* room for 1, 2, 4, 8, ... */
+        void *grown = realloc(j->shown, (n ? 2 * n : 1) * sizeof *j->shown);
+        if (!grown) {
+            j->show_status = fail_memory(&j->run);
+            return;
+        }
+        memcpy(&j->shown, &grown, sizeof grown);
+    }
+    if (snprintf(j->shown[n].path, MAX_PATH, "%s/%02lu-%s.png", j->debug, (unsigned long)n + 1,
+                 name) >= MAX_PATH)
+        j->show_status = cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->debug);
+    else if (!image_encode(".png", picture, &j->shown[n].bytes, &j->shown[n].size, &why))
+        j->show_status = cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->shown[n].path, why);
+    else j->shown_count++;
+}
+
+/* ---- writing --------------------------------------------------------------------------------- */
+
+/* Announce the pictures of --debug, whose names were not known before. */
+static int add_shown(inpaint_job *j, cli_file *files, int *is_new) {
+    int status = cli_makes_folder(&j->run, j->debug, is_new);
+    for (size_t i = 0; i < j->shown_count && !status; i++) {
+        files[i].name = j->shown[i].path;
+        files[i].bytes = j->shown[i].bytes;
+        files[i].size = j->shown[i].size;
+        status = cli_writes(&j->run, j->shown[i].path);
+    }
+    return status;
+}
+
+int inpaint_write_outputs(inpaint_job *j) {
+    const size_t maps = 1 + (size_t)j->desc.map_count, count = maps + j->shown_count;
+    cli_file *files = (cli_file *)new_array(count, sizeof *files);
+    unsigned char *bytes[TEXINPAINT_MAX_MAPS] = {NULL};
+    double sum = 0;
+    int is_new = 0, status = files ? CLI_DONE : fail_memory(&j->run);
+    cli_stage(&j->run, "encode");
+    for (size_t m = 0; m < maps && !status; m++) {
+        files[m].name = m ? j->paths[m] : j->run.output;
+        status = encode_picture(&j->run, files[m].name, &j->out[m], &bytes[m], &files[m].size);
+        files[m].bytes = bytes[m];
+        sum += (double)files[m].size;
+    }
+    cli_figure(&j->run, "file_bytes", sum);
+    if (!status && j->debug) status = add_shown(j, files + maps, &is_new);
+    if (!status) status = cli_finish_files(&j->run, files, (int)count);
+    if (status && is_new) cli_removes_folder(j->debug);
+    for (size_t m = 0; m < maps; m++) free(bytes[m]);
+    free(files);
+    return status;
+}
