@@ -19,4 +19,16 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
     return TXM_OK;
 }
 
+TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_env *env,
+                                              const txm_image *out) {
+    (void)desc, (void)out;
+    return txm_fail(env, TXM_BAD_ARGUMENT, "not there yet");
+}
+
+TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,
+                                            const txm_image *out) {
+    (void)desc, (void)out;
+    return txm_fail(env, TXM_BAD_ARGUMENT, "not there yet");
+}
+
 #endif /* TEXINPAINT_STUB_H */
