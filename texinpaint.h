@@ -644,36 +644,1100 @@ static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_e
     return TXM_OK;
 }
 
-/* ---- surface ---- */
+/* ---- surface: a mesh across the seams of its atlas ------------------------------------------- */
 
 #define TXI_NO_FACE 0xffffffffu
 
-/* The mesh as a surface, across the seams of its atlas. */
+enum {
+    TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel     */
+    TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
+};
+
+/* The mesh as a surface. Faces that name a vertex twice belong to nothing: their neighbours are
+   linked across them. */
 struct txi_surface {
     size_t face_count, vertex_count; /* vertices: welded, those at equal positions are one      */
     txm_dvec3 *point;    /* 1 per vertex                                                       */
     uint32_t *vertex;    /* 3 per face: its vertices                                           */
-    uint32_t *opposite;  /* 3 per face: the side on the other side of side k, from corner k to the
-                            next; TXM_NO_SIDE at borders                                       */
-    float *uv;           /* 6 per face: its corners in texels, texel centres are whole numbers; not
+    uint32_t *opposite;  /* 3 per face: the side beyond side k, which runs from corner k to the next;
+                            TXM_NO_SIDE at borders                                             */
+    txm_vec2 *uv;        /* 3 per face: its corners in texels, texel centres are whole numbers; not
                             wrapped                                                            */
-    uint32_t *chart;     /* 1 per face: faces that are connected in the atlas or overlap in it */
-    uint32_t *owner;     /* 1 per texel: the first face whose chart covers its centre, or TXI_NO_FACE */
+    uint32_t *chart;     /* 1 per face: faces that are connected in the atlas, or that overlap
+                            there, have the same number                                        */
+    uint32_t *owner;     /* 1 per texel: the first face that covers its centre, or TXI_NO_FACE  */
     uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] - 1] */
-    uint32_t *hole_first, *hole; /* the missing texels of face f: hole[hole_first[f]] .. as first */
-    size_t cursor;       /* no texel in front of this one is missing and covered               */
+    uint32_t *hole_first, *hole; /* the texels of face f that were missing, in the same form     */
+    size_t cursor;       /* no texel before this one is missing and covered                    */
 };
 
-static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env) {
-    (void)arena;
-    (void)env;
-    d->surface = NULL;
+static uint32_t txi_next_corner(uint32_t c) {
+    return c % 3 == 2 ? c - 2 : c + 1;
+}
+
+/* Does the face name a vertex twice? */
+static int txi_is_flat_face(const txi_surface *s, uint32_t face) {
+    const uint32_t *v = s->vertex + 3 * (size_t)face;
+    return v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
+}
+
+static txm_dvec3 txi_corner_point(const txi_surface *s, uint32_t corner) {
+    return s->point[s->vertex[corner]];
+}
+
+/* twice the area of a face times its unit normal */
+static txm_dvec3 txi_face_area2(const txi_surface *s, uint32_t face) {
+    return txm_d3_area2(txi_corner_point(s, 3 * face), txi_corner_point(s, 3 * face + 1),
+                        txi_corner_point(s, 3 * face + 2));
+}
+
+/* twice the signed area of a b c in the plane */
+static double txi_cross2(txm_vec2 a, txm_vec2 b, txm_vec2 c) {
+    return ((double)b.x - a.x) * ((double)c.y - a.y) - ((double)c.x - a.x) * ((double)b.y - a.y);
+}
+
+/* The three weights of p in the triangle t. 0: it has no area. */
+static int txi_weights(const txm_vec2 t[3], double x, double y, double weight[3]) {
+    const double area = txi_cross2(t[0], t[1], t[2]);
+    if (!(fabs(area) > 1e-12)) return 0;
+    weight[1] = ((x - t[0].x) * ((double)t[2].y - t[0].y) -
+                 ((double)t[2].x - t[0].x) * (y - t[0].y)) / area;
+    weight[2] = (((double)t[1].x - t[0].x) * (y - t[0].y) -
+                 (x - t[0].x) * ((double)t[1].y - t[0].y)) / area;
+    weight[0] = 1 - weight[1] - weight[2];
+    return 1;
+}
+
+/* ---- surface: vertices and sides ------------------------------------------------------------- */
+
+/* -0 is 0 */
+static uint32_t txi_float_bits(float x) {
+    uint32_t bits;
+    const float plain = x + 0.0f;
+    memcpy(&bits, &plain, sizeof bits);
+    return bits == 0x80000000u ? 0 : bits;
+}
+
+/* Give vertices at equal positions one number, in the order in which they come first. weld receives
+   one number for each vertex of the mesh. */
+static txm_status txi_weld(const txm_mesh *mesh, txi_surface *s, uint32_t *weld, txm_arena *arena,
+                           txm_env *env) {
+    size_t slots = 16;
+    txm_arena scratch;
+    while (slots < 2 * mesh->vertex_count) slots *= 2;
+    txm_arena_init(&scratch, env);
+    uint32_t *table = (uint32_t *)txm_arena_alloc(&scratch, slots, sizeof(uint32_t));
+    s->point = (txm_dvec3 *)txm_arena_alloc(arena, mesh->vertex_count, sizeof(txm_dvec3));
+    if (!table || !s->point) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    memset(table, 0xff, slots * sizeof *table);
+    s->vertex_count = 0;
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+        const float *p = mesh->positions + 3 * v;
+        const uint64_t xy = (uint64_t)txi_float_bits(p[0]) << 32 | txi_float_bits(p[1]);
+        size_t slot = (size_t)txm_hash(txm_hash(xy) + txi_float_bits(p[2])) & (slots - 1);
+        for (; table[slot] != UINT32_MAX; slot = (slot + 1) & (slots - 1)) {
+            const txm_dvec3 q = s->point[table[slot]];
+            if (!(q.x < p[0] || q.x > p[0] || q.y < p[1] || q.y > p[1] || q.z < p[2] || q.z > p[2]))
+                break;
+        }
+        if (table[slot] == UINT32_MAX) {
+            table[slot] = (uint32_t)s->vertex_count;
+            s->point[s->vertex_count++] = txm_d3_load(p);
+        }
+        weld[v] = table[slot];
+    }
+    txm_arena_free(&scratch);
     return TXM_OK;
 }
 
-/* ---- geodesic ---- */
+/* Do two sides that run against one another also lie together in the atlas? */
+static int txi_is_sewn(const txi_surface *s, uint32_t a, uint32_t b) {
+    const txm_vec2 p = s->uv[a], q = s->uv[txi_next_corner(a)];
+    const txm_vec2 r = s->uv[txi_next_corner(b)], t = s->uv[b];
+    return fabs((double)p.x - r.x) + fabs((double)p.y - r.y) + fabs((double)q.x - t.x) +
+               fabs((double)q.y - t.y) < 1e-2;
+}
 
-/* ---- unfold ---- */
+/* Link those of the sides of an edge that have no opposite yet: two that run against one another, or
+   where there are more, pairs that also lie together in the atlas. */
+static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_t *sides,
+                          size_t count) {
+    uint32_t open[TXI_FINS];
+    int n = 0;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t side = sides[i];
+        if (s->opposite[side] != TXM_NO_SIDE || txi_is_flat_face(s, side / 3)) continue;
+        if (n == TXI_FINS) return;
+        open[n++] = side;
+    }
+    for (int i = 0; i < n; i++) {
+        for (int j = i + 1; j < n && s->opposite[open[i]] == TXM_NO_SIDE; j++) {
+            if (indices[open[i]] == indices[open[j]] || s->opposite[open[j]] != TXM_NO_SIDE) continue;
+            if (n > 2 && !txi_is_sewn(s, open[i], open[j])) continue;
+            s->opposite[open[i]] = open[j];
+            s->opposite[open[j]] = open[i];
+        }
+    }
+}
+
+/* Fill opposite: first by the vertices that the mesh names, then by those at equal positions, as files
+   are often cut along seams. Sides of neighbours that run the same way stay unlinked. */
+static txm_status txi_link_sides(const txm_mesh *mesh, txi_surface *s, txm_env *env) {
+    const size_t sides = 3 * s->face_count;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    uint32_t *sorted = (uint32_t *)txm_arena_alloc(&scratch, sides, 2 * sizeof(uint32_t));
+    if (!sorted) return txi_no_memory(env);
+    for (size_t i = 0; i < sides; i++) s->opposite[i] = TXM_NO_SIDE;
+    for (int pass = 0; pass < 2; pass++) {
+        txm_mesh part = *mesh;
+        if (pass) {
+            part.indices = s->vertex;
+            part.vertex_count = s->vertex_count;
+        }
+        txm_mesh_sort_sides(&part, sorted);
+        for (size_t i = 0, end; i < sides; i = end) {
+            end = txm_mesh_edge_end(&part, sorted, i);
+            txi_link_edge(s, part.indices, sorted + i, end - i);
+        }
+    }
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* ---- surface: texels ------------------------------------------------------------------------- */
+
+static uint32_t txi_root(uint32_t *parent, uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+static void txi_join_sets(uint32_t *parent, uint32_t a, uint32_t b) {
+    a = txi_root(parent, a);
+    b = txi_root(parent, b);
+    if (a < b) parent[b] = a;
+    else parent[a] = b;
+}
+
+/* The corners of all faces in texels. Those that lie repeats away from the picture are moved, face by
+   face, near to it, where numbers are exact. */
+static void txi_load_uv(const txi_domain *d, txi_surface *s) {
+    const texinpaint_desc *desc = d->desc;
+    for (size_t f = 0; f < s->face_count; f++) {
+        double u[3], v[3], du = 0, dv = 0;
+        for (size_t k = 0; k < 3; k++) {
+            const size_t c = 3 * f + k;
+            const size_t entry = desc->uv_indices ? desc->uv_indices[c] : desc->mesh.indices[c];
+            u[k] = desc->uv[2 * entry];
+            v[k] = desc->uv[2 * entry + 1];
+        }
+        if (fabs(u[0]) > TXI_REPEATS) du = floor(u[0]);
+        if (fabs(v[0]) > TXI_REPEATS) dv = floor(v[0]);
+        for (size_t k = 0; k < 3; k++)
+            s->uv[3 * f + k] = txm_v2(txm_float((u[k] - du) * d->width - 0.5),
+                                      txm_float((v[k] - dv) * d->height - 0.5));
+    }
+}
+
+static int txi_wrap(int i, int n) {
+    const int r = i % n;
+    return r < 0 ? r + n : r;
+}
+
+/* A face meets a texel: it owns it if none before it does; else, if both lie well over the texel, their
+   charts overlap. */
+static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texel, int x, int y, int width,
+                    int height) {
+    const uint32_t owner = s->owner[texel];
+    double mine[3], theirs[3];
+    if (owner == TXI_NO_FACE) {
+        s->owner[texel] = face;
+        return;
+    }
+    if (txi_root(charts, owner) == txi_root(charts, face)) return;
+    if (!txi_weights(s->uv + 3 * (size_t)face, x, y, mine)) return;
+    /* where the owner has this texel: shifted by whole pictures */
+    const txm_vec2 *t = s->uv + 3 * (size_t)owner;
+    const double cx = ((double)t[0].x + t[1].x + t[2].x) / 3, cy = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const double sx = floor((cx - x) / width + 0.5) * width, sy = floor((cy - y) / height + 0.5) * height;
+    if (!txi_weights(t, x + sx, y + sy, theirs)) return;
+    for (int k = 0; k < 3; k++) {
+        if (mine[k] < 0.02 || theirs[k] < 0.02) return;
+    }
+    txi_join_sets(charts, owner, face);
+}
+
+/* Give a face the texels whose centres it covers, its border included, row by row. */
+static void txi_cover_face(const txi_domain *d, txi_surface *s, uint32_t *charts, uint32_t face) {
+    const txm_vec2 *t = s->uv + 3 * (size_t)face;
+    const double area = txi_cross2(t[0], t[1], t[2]), turn = area < 0 ? -1 : 1;
+    double left = t[0].x, right = t[0].x, top = t[0].y, bottom = t[0].y;
+    for (int k = 1; k < 3; k++) {
+        left = fmin(left, t[k].x);
+        right = fmax(right, t[k].x);
+        top = fmin(top, t[k].y);
+        bottom = fmax(bottom, t[k].y);
+    }
+    if (!(fabs(area) > 1e-9) || right - left > (double)TXI_REPEATS * d->width ||
+        bottom - top > (double)TXI_REPEATS * d->height)
+        return;
+    for (int y = (int)ceil(top - 1e-6); y <= (int)floor(bottom + 1e-6); y++) {
+        double from = left, to = right;
+        for (int k = 0; k < 3; k++) { /* a x + b >= 0 inside of side k */
+            const txm_vec2 p = t[k], q = t[(k + 1) % 3];
+            const double a = turn * ((double)p.y - q.y);
+            const double b = turn * (((double)q.x - p.x) * (y - (double)p.y) -
+                                     (double)p.x * ((double)p.y - q.y)) + 1e-6 * fabs(area);
+            if (a > 0) from = fmax(from, -b / a);
+            else if (a < 0) to = fmin(to, -b / a);
+            else if (b < 0) to = from - 2;
+        }
+        const size_t row = (size_t)txi_wrap(y, d->height) * (size_t)d->width;
+        const int begin = (int)ceil(from - 1e-6);
+        int end = (int)floor(to + 1e-6) + 1;
+        if (end - begin > d->width) end = begin + d->width;
+        for (int x = begin; x < end; x++)
+            txi_own(s, charts, face, row + (size_t)txi_wrap(x, d->width), x, y, d->width, d->height);
+    }
+}
+
+/* Fill owner, chart and d->covered. */
+static void txi_cover(txi_domain *d, txi_surface *s) {
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    for (size_t i = 0; i < texels; i++) s->owner[i] = TXI_NO_FACE;
+    for (uint32_t f = 0; f < s->face_count; f++) s->chart[f] = f;
+    for (uint32_t side = 0; side < 3 * s->face_count; side++) {
+        const uint32_t other = s->opposite[side];
+        if (other < side && txi_is_sewn(s, side, other)) txi_join_sets(s->chart, side / 3, other / 3);
+    }
+    for (uint32_t f = 0; f < s->face_count; f++) txi_cover_face(d, s, s->chart, f);
+    for (uint32_t f = 0; f < s->face_count; f++) s->chart[f] = txi_root(s->chart, f);
+    for (size_t i = 0; i < texels; i++) d->covered[i] = s->owner[i] != TXI_NO_FACE;
+}
+
+/* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at first[k] ..
+   first[k + 1] - 1. Only those with a mark, if there are marks. first: room for count + 1. */
+static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks, size_t count,
+                    uint32_t *first, uint32_t *items) {
+    memset(first, 0, (count + 1) * sizeof *first);
+    for (size_t i = 0; i < key_count; i++) {
+        if (keys[i] < count && (!marks || marks[i])) first[keys[i] + 1]++;
+    }
+    for (size_t k = 1; k <= count; k++) first[k] += first[k - 1];
+    const uint32_t total = first[count];
+    for (size_t i = key_count; i-- > 0;) { /* backwards, which leaves in first[k + 1] where k begins */
+        if (keys[i] < count && (!marks || marks[i])) items[--first[keys[i] + 1]] = (uint32_t)i;
+    }
+    for (size_t k = 0; k < count; k++) first[k] = first[k + 1];
+    first[count] = total;
+}
+
+/* Make d->surface, if desc has a mesh, and d->covered. d->missing must be set. A picture is covered
+   everywhere.
+   cost    O(faces + texels), faces * log of the corners of a vertex; 80 bytes per face, 5 per texel */
+static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env) {
+    const txm_mesh *mesh = &d->desc->mesh;
+    const size_t texels = (size_t)d->width * (size_t)d->height, faces = mesh->face_count;
+    size_t holes = 0;
+    d->surface = NULL;
+    d->covered = (uint8_t *)txm_arena_alloc(arena, texels, 1);
+    if (!d->covered) return txi_no_memory(env);
+    memset(d->covered, 1, texels);
+    if (faces == 0) return TXM_OK;
+
+    txi_surface *s = (txi_surface *)txm_arena_zero(arena, 1, sizeof *s);
+    uint32_t *weld = (uint32_t *)txm_arena_alloc(arena, mesh->vertex_count, sizeof(uint32_t));
+    if (!s || !weld) return txi_no_memory(env);
+    s->face_count = faces;
+    s->vertex = (uint32_t *)txm_arena_alloc(arena, faces, 3 * sizeof(uint32_t));
+    s->opposite = (uint32_t *)txm_arena_alloc(arena, faces, 3 * sizeof(uint32_t));
+    s->corners = (uint32_t *)txm_arena_alloc(arena, faces, 3 * sizeof(uint32_t));
+    s->uv = (txm_vec2 *)txm_arena_alloc(arena, faces, 3 * sizeof(txm_vec2));
+    s->chart = (uint32_t *)txm_arena_alloc(arena, faces, sizeof(uint32_t));
+    s->owner = (uint32_t *)txm_arena_alloc(arena, texels, sizeof(uint32_t));
+    s->hole_first = (uint32_t *)txm_arena_alloc(arena, faces + 1, sizeof(uint32_t));
+    s->first = (uint32_t *)txm_arena_alloc(arena, mesh->vertex_count + 1, sizeof(uint32_t));
+    if (arena->failed) return txi_no_memory(env);
+
+    txm_status status = txi_weld(mesh, s, weld, arena, env);
+    if (status != TXM_OK) return status;
+    for (size_t c = 0; c < 3 * faces; c++) s->vertex[c] = weld[mesh->indices[c]];
+    txi_load_uv(d, s);
+    status = txi_link_sides(mesh, s, env);
+    if (status != TXM_OK) return status;
+    txi_cover(d, s);
+    txi_bin(s->vertex, 3 * faces, NULL, s->vertex_count, s->first, s->corners);
+    for (size_t i = 0; i < texels; i++) holes += d->missing[i] && d->covered[i];
+    s->hole = (uint32_t *)txm_arena_alloc(arena, holes + 1, sizeof(uint32_t));
+    if (!s->hole) return txi_no_memory(env);
+    txi_bin(s->owner, texels, d->missing, faces, s->hole_first, s->hole);
+    d->surface = s;
+    return TXM_OK;
+}
+
+/* ---- geodesic: distances along the surface --------------------------------------------------- */
+
+/* not reached */
+#define TXI_UNREACHED 1e300
+
+/* A vertex waits with the distance that it had when it was put in; the heap has the least on top. */
+typedef struct txi_wait {
+    double distance;
+    uint32_t vertex;
+} txi_wait;
+
+typedef struct txi_heap {
+    txi_wait *items;
+    size_t count, room;
+} txi_heap;
+
+static int txi_wait_before(txi_wait a, txi_wait b) {
+    if (a.distance < b.distance || b.distance < a.distance) return a.distance < b.distance;
+    return a.vertex < b.vertex;
+}
+
+/* 0: no memory. */
+static int txi_heap_push(txi_heap *heap, txm_arena *arena, double distance, uint32_t vertex) {
+    const txi_wait item = {distance, vertex};
+    size_t at = heap->count;
+    if (heap->count == heap->room) {
+        const size_t room = heap->room ? 2 * heap->room : 256;
+        txi_wait *items = (txi_wait *)txm_arena_alloc(arena, room, sizeof(txi_wait));
+        if (!items) return 0;
+        if (heap->count) memcpy(items, heap->items, heap->count * sizeof(txi_wait));
+        heap->items = items;
+        heap->room = room;
+    }
+    for (heap->count++; at > 0; at = (at - 1) / 2) {
+        const txi_wait parent = heap->items[(at - 1) / 2];
+        if (!txi_wait_before(item, parent)) break;
+        heap->items[at] = parent;
+    }
+    heap->items[at] = item;
+    return 1;
+}
+
+static txi_wait txi_heap_pop(txi_heap *heap) {
+    const txi_wait top = heap->items[0], last = heap->items[--heap->count];
+    size_t at = 0;
+    for (size_t child = 1; child < heap->count; child = 2 * at + 1) {
+        if (child + 1 < heap->count && txi_wait_before(heap->items[child + 1], heap->items[child])) child++;
+        if (!txi_wait_before(heap->items[child], last)) break;
+        heap->items[at] = heap->items[child];
+        at = child;
+    }
+    heap->items[at] = last;
+    return top;
+}
+
+/* The distance of c from a source whose distances from a and b are known, along straight lines through
+   the triangle a b c: unfolded into its plane, the source is where the circles about a and b with
+   these radii meet beyond a b.
+
+                c            With a at 0 and b at (l, 0), the source is at (x, -y):
+               / \               x = (l^2 + da^2 - db^2) / 2l,  y^2 = da^2 - x^2.
+              a---b          If its line to c misses a b, the way leads through a or b.
+               \ ' |
+                 ' s                                                                        */
+static double txi_unfold_distance(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, double da, double db) {
+    const txm_dvec3 ab = txm_d3_sub(b, a), ac = txm_d3_sub(c, a);
+    const double l = txm_d3_len(ab), around = fmin(da + txm_d3_len(ac), db + txm_d3_dist(b, c));
+    if (!(l > 0)) return around;
+    const double cx = txm_d3_dot(ac, ab) / l;
+    const double cy = sqrt(fmax(0, txm_d3_len2(ac) - cx * cx));
+    if (da <= 0 && db <= 0) return cx >= 0 && cx <= l ? cy : around; /* the edge is the source */
+    const double x = (l * l + da * da - db * db) / (2 * l), yy = da * da - x * x;
+    if (!(yy >= 0)) return around;
+    const double y = sqrt(yy), cross = y + cy > 0 ? x + (cx - x) * (y / (y + cy)) : x;
+    if (!(cross >= 0 && cross <= l)) return around;
+    return fmin(around, sqrt((cx - x) * (cx - x) + (cy + y) * (cy + y)));
+}
+
+/* Lower the distance of the third corner of the triangle after those of corners i and j. */
+static int txi_geodesic_update(const txi_surface *s, txi_heap *heap, txm_arena *arena, double limit,
+                               uint32_t i, uint32_t j, uint32_t k, double *distance) {
+    const uint32_t a = s->vertex[i], b = s->vertex[j], c = s->vertex[k];
+    const double da = distance[a], db = distance[b];
+    const double d = db < TXI_UNREACHED
+                         ? txi_unfold_distance(s->point[a], s->point[b], s->point[c], da, db)
+                         : da + txm_d3_dist(s->point[a], s->point[c]);
+    /* by more than rounding, or it might go on for ever */
+    if (d > limit || d >= distance[c] * (1 - 1e-9)) return 1;
+    distance[c] = d;
+    return txi_heap_push(heap, arena, d, c);
+}
+
+/* Distances along the surface from sources, by label correcting in the order of a heap; each triangle
+   unfolds the source that lies behind two of its corners into its plane, which is exact as long as
+   the unfolded triangles are: on planes, however the triangles are shaped. Elsewhere distances are
+   too long by a fraction of a percent. (Exact algorithms keep intervals of edges instead, which costs
+   ten times as much.)
+
+   sources   vertices, start their distances (NULL = 0). For a place inside a triangle: its corners,
+             with their distances from it. Two corners at 0 make their whole edge a source
+   limit     vertices farther away are not reached
+   distance  receives one for each vertex of the surface, TXI_UNREACHED beyond limit
+   cost      O(n log n) for n vertices within limit                                       */
+static txm_status txi_geodesic(const txi_surface *s, const uint32_t *sources, const double *start,
+                               size_t source_count, double limit, txm_env *env, double *distance) {
+    txm_arena scratch;
+    txi_heap heap;
+    int good = 1;
+    memset(&heap, 0, sizeof heap);
+    txm_arena_init(&scratch, env);
+    for (size_t v = 0; v < s->vertex_count; v++) distance[v] = TXI_UNREACHED;
+    for (size_t i = 0; i < source_count && good; i++) {
+        const double d = start ? start[i] : 0;
+        if (d > limit || d >= distance[sources[i]]) continue;
+        distance[sources[i]] = d;
+        good = txi_heap_push(&heap, &scratch, d, sources[i]);
+    }
+    while (heap.count && good) {
+        const txi_wait next = txi_heap_pop(&heap);
+        if (next.distance > distance[next.vertex]) continue;
+        for (uint32_t i = s->first[next.vertex]; i < s->first[next.vertex + 1] && good; i++) {
+            const uint32_t c = s->corners[i], p = txi_next_corner(c), q = txi_next_corner(p);
+            if (txi_is_flat_face(s, c / 3)) continue;
+            good = txi_geodesic_update(s, &heap, &scratch, limit, c, p, q, distance) &&
+                   txi_geodesic_update(s, &heap, &scratch, limit, c, q, p, distance);
+        }
+    }
+    txm_arena_free(&scratch);
+    return good ? TXM_OK : txi_no_memory(env);
+}
+
+/* ---- factor: sparse linear systems of flattening --------------------------------------------- */
+
+enum { TXI_LEAF = 48 /* ours: unknowns that are not divided further */ };
+
+/* A symmetric positive definite matrix whose pattern is a graph: A = P^T L D L^T P. Rows that are solved
+   early have few entries; see txi_dissect. */
+typedef struct txi_factor {
+    size_t count, edge_count;
+    const uint32_t *low, *high; /* the two unknowns of each edge                                  */
+    uint32_t *order;    /* row k of L is unknown order[k]                                      */
+    uint32_t *up_first, *up_row, *up_edge; /* entries A(up_row, k) above the diagonal, by column */
+    uint32_t *parent;   /* elimination tree                                                    */
+    size_t *first;      /* columns of L                                                        */
+    size_t *filled;     /* entries of a column so far                                          */
+    uint32_t *row;
+    double *value;
+    double *diagonal;   /* D                                                                   */
+    double *work;       /* 2 per unknown                                                       */
+    uint32_t *flag, *stack, *path;
+} txi_factor;
+
+/* The order of elimination: nested dissection by coordinates. The points are divided at the median along
+   the longest side of their bounding box; those beyond it that have neighbours before it separate the
+   rest and come last; so on with both halves. On surfaces L has O(n log n) entries.
+
+   first, next  the neighbours of point i: next[first[i]] .. next[first[i + 1] - 1]
+   order        receives the points
+   pairs        scratch, 2 per point; side: scratch, 1 per point                            */
+static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *first, const uint32_t *next,
+                        uint32_t *order, txm_pair *pairs, uint32_t *side) {
+    size_t begins[128], ends[128];
+    int depth = 1;
+    uint32_t stamp = 0;
+    for (size_t i = 0; i < count; i++) {
+        order[i] = (uint32_t)i;
+        side[i] = 0;
+    }
+    begins[0] = 0;
+    ends[0] = count;
+    while (depth > 0) {
+        const size_t begin = begins[--depth], end = ends[depth], n = end - begin, half = n / 2;
+        if (n <= TXI_LEAF || depth + 2 > 128) continue;
+        txm_dvec3 least = point[order[begin]], most = least;
+        for (size_t k = begin; k < end; k++) {
+            const txm_dvec3 p = point[order[k]];
+            least = txm_d3(fmin(least.x, p.x), fmin(least.y, p.y), fmin(least.z, p.z));
+            most = txm_d3(fmax(most.x, p.x), fmax(most.y, p.y), fmax(most.z, p.z));
+        }
+        const txm_dvec3 size = txm_d3_sub(most, least);
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        for (size_t k = 0; k < n; k++) {
+            const txm_dvec3 p = point[order[begin + k]];
+            const double at = axis == 0 ? p.x - least.x : axis == 1 ? p.y - least.y : p.z - least.z;
+            pairs[k].key = txm_sort_key(txm_float(at));
+            pairs[k].value = order[begin + k];
+        }
+        txm_sort_pairs(pairs, pairs + n, n);
+        stamp++;
+        for (size_t k = 0; k < half; k++) {
+            order[begin + k] = pairs[k].value;
+            side[pairs[k].value] = stamp;
+        }
+        size_t to = begin + half, last = 0; /* the separator is gathered in the scratch half of pairs */
+        for (size_t k = half; k < n; k++) {
+            const uint32_t v = pairs[k].value;
+            int divides = 0;
+            for (uint32_t e = first[v]; e < first[v + 1] && !divides; e++) divides = side[next[e]] == stamp;
+            if (divides) pairs[n + last++].value = v;
+            else order[to++] = v;
+        }
+        for (size_t k = 0; k < last; k++) order[to + k] = pairs[n + k].value;
+        begins[depth] = begin;
+        ends[depth++] = begin + half;
+        begins[depth] = begin + half;
+        ends[depth++] = to;
+    }
+}
+
+/* Entries of row k of L: the nodes on the paths of the elimination tree from the entries of A above the
+   diagonal of column k towards k. Fills stack from top, in an order in which children come before
+   their parents; returns where it begins. */
+static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
+    size_t top = f->count;
+    f->flag[k] = k;
+    for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
+        size_t length = 0;
+        for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
+            f->path[length++] = i;
+            f->flag[i] = k;
+        }
+        while (length > 0) f->stack[--top] = f->path[--length];
+    }
+    return top;
+}
+
+/* Find the order and the pattern of L for a graph of count unknowns at these points. */
+static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *point,
+                                  size_t edge_count, const uint32_t *low, const uint32_t *high,
+                                  txm_arena *arena, txm_env *env) {
+    memset(f, 0, sizeof *f);
+    f->count = count;
+    f->edge_count = edge_count;
+    f->low = low;
+    f->high = high;
+    uint32_t *first = (uint32_t *)txm_arena_zero(arena, count + 2, sizeof(uint32_t));
+    uint32_t *next = (uint32_t *)txm_arena_alloc(arena, 2 * edge_count + 1, sizeof(uint32_t));
+    uint32_t *place = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, count, 2 * sizeof(txm_pair));
+    f->order = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    f->up_first = (uint32_t *)txm_arena_zero(arena, count + 2, sizeof(uint32_t));
+    f->up_row = (uint32_t *)txm_arena_alloc(arena, edge_count + 1, sizeof(uint32_t));
+    f->up_edge = (uint32_t *)txm_arena_alloc(arena, edge_count + 1, sizeof(uint32_t));
+    f->parent = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    f->first = (size_t *)txm_arena_alloc(arena, count + 1, sizeof(size_t));
+    f->filled = (size_t *)txm_arena_zero(arena, count, sizeof(size_t));
+    f->diagonal = (double *)txm_arena_alloc(arena, count, sizeof(double));
+    f->work = (double *)txm_arena_zero(arena, count, 2 * sizeof(double));
+    f->flag = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    f->stack = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    f->path = (uint32_t *)txm_arena_alloc(arena, count, sizeof(uint32_t));
+    if (arena->failed) return txi_no_memory(env);
+
+    for (size_t e = 0; e < edge_count; e++) {
+        first[low[e] + 2]++;
+        first[high[e] + 2]++;
+    }
+    for (size_t i = 2; i < count + 2; i++) first[i] += first[i - 1];
+    for (size_t e = 0; e < edge_count; e++) {
+        next[first[low[e] + 1]++] = high[e];
+        next[first[high[e] + 1]++] = low[e];
+    }
+    txi_dissect(count, point, first, next, f->order, pairs, f->flag);
+    for (size_t k = 0; k < count; k++) place[f->order[k]] = (uint32_t)k;
+
+    for (size_t e = 0; e < edge_count; e++) {
+        const uint32_t a = place[low[e]], b = place[high[e]];
+        f->up_first[(a > b ? a : b) + 2]++;
+    }
+    for (size_t k = 2; k < count + 2; k++) f->up_first[k] += f->up_first[k - 1];
+    for (size_t e = 0; e < edge_count; e++) {
+        const uint32_t a = place[low[e]], b = place[high[e]];
+        const uint32_t at = f->up_first[(a > b ? a : b) + 1]++;
+        f->up_row[at] = a > b ? b : a;
+        f->up_edge[at] = (uint32_t)e;
+    }
+    /* elimination tree, and how long the columns of L become */
+    for (uint32_t k = 0; k < count; k++) {
+        f->parent[k] = UINT32_MAX;
+        f->flag[k] = k;
+        for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
+            for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
+                if (f->parent[i] == UINT32_MAX) f->parent[i] = k;
+                f->filled[i]++;
+                f->flag[i] = k;
+            }
+        }
+    }
+    f->first[0] = 0;
+    for (size_t k = 0; k < count; k++) f->first[k + 1] = f->first[k] + f->filled[k];
+    f->row = (uint32_t *)txm_arena_alloc(arena, f->first[count] + 1, sizeof(uint32_t));
+    f->value = (double *)txm_arena_alloc(arena, f->first[count] + 1, sizeof(double));
+    return arena->failed ? txi_no_memory(env) : TXM_OK;
+}
+
+/* Compute L and D, row by row, of the matrix with diagonal[i] and, for each edge, -weight[edge] in both
+   its places. */
+static void txi_factor_make(txi_factor *f, const double *weight, const double *diagonal) {
+    double *y = f->work;
+    memset(f->filled, 0, f->count * sizeof *f->filled);
+    for (size_t i = 0; i < f->count; i++) {
+        y[i] = 0;
+        f->flag[i] = UINT32_MAX;
+    }
+    for (uint32_t k = 0; k < f->count; k++) {
+        const size_t top = txi_row_pattern(f, k);
+        double d = diagonal[f->order[k]];
+        for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++)
+            y[f->up_row[e]] = -weight[f->up_edge[e]];
+        for (size_t s = top; s < f->count; s++) {
+            const uint32_t i = f->stack[s];
+            const double yi = y[i];
+            const size_t begin = f->first[i], end = begin + f->filled[i];
+            y[i] = 0;
+            for (size_t p = begin; p < end; p++) y[f->row[p]] -= f->value[p] * yi;
+            const double l = yi / f->diagonal[i];
+            d -= l * yi;
+            f->row[end] = k;
+            f->value[end] = l;
+            f->filled[i]++;
+        }
+        f->diagonal[k] = d > 1e-30 ? d : 1e-30; /* positive but for rounding */
+    }
+}
+
+/* Solve for two right sides at once: xy holds them, 2 numbers for each unknown, and receives the
+   solutions. */
+static void txi_factor_solve(const txi_factor *f, double *xy) {
+    double *z = f->work;
+    for (size_t k = 0; k < f->count; k++) {
+        z[2 * k] = xy[2 * (size_t)f->order[k]];
+        z[2 * k + 1] = xy[2 * (size_t)f->order[k] + 1];
+    }
+    for (size_t k = 0; k < f->count; k++) {
+        const double x = z[2 * k], y = z[2 * k + 1];
+        for (size_t p = f->first[k]; p < f->first[k + 1]; p++) {
+            z[2 * (size_t)f->row[p]] -= f->value[p] * x;
+            z[2 * (size_t)f->row[p] + 1] -= f->value[p] * y;
+        }
+    }
+    for (size_t k = f->count; k-- > 0;) {
+        double x = z[2 * k] / f->diagonal[k], y = z[2 * k + 1] / f->diagonal[k];
+        for (size_t p = f->first[k]; p < f->first[k + 1]; p++) {
+            x -= f->value[p] * z[2 * (size_t)f->row[p]];
+            y -= f->value[p] * z[2 * (size_t)f->row[p] + 1];
+        }
+        z[2 * k] = x;
+        z[2 * k + 1] = y;
+    }
+    for (size_t k = 0; k < f->count; k++) {
+        xy[2 * (size_t)f->order[k]] = z[2 * k];
+        xy[2 * (size_t)f->order[k] + 1] = z[2 * k + 1];
+    }
+}
+
+/* ---- unfold: a disk of faces ----------------------------------------------------------------- */
+
+/* Faces that form a topological disk, glued along their sides. A vertex of the surface that the disk
+   meets from several parts of its border has a copy in each. */
+typedef struct txi_disk {
+    uint32_t *faces;        /* of the surface                                                    */
+    size_t face_count, room;
+    uint32_t *corner;       /* 3 per face: its vertices, of the disk; while it grows, to be resolved
+                               by txi_root                                                       */
+    size_t vertex_count;
+    uint32_t *parent;       /* while it grows: vertices that are one                             */
+    uint32_t *next, *prev;  /* the loop of sides that are the border; side k of face i is 3 i + k */
+    uint8_t *is_border;     /* 1 per side                                                        */
+    size_t loop;            /* sides of the border                                               */
+    uint32_t border;        /* one of them                                                       */
+    uint32_t *slot;         /* 1 per face of the surface: its place in faces, or TXI_NO_FACE     */
+} txi_disk;
+
+/* Room for so many faces. */
+static txm_status txi_disk_init(txi_disk *disk, const txi_surface *s, size_t room, txm_arena *arena,
+                                txm_env *env) {
+    memset(disk, 0, sizeof *disk);
+    disk->room = room;
+    disk->faces = (uint32_t *)txm_arena_alloc(arena, room, sizeof(uint32_t));
+    disk->corner = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
+    disk->parent = (uint32_t *)txm_arena_alloc(arena, room + 2, sizeof(uint32_t));
+    disk->next = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
+    disk->prev = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
+    disk->is_border = (uint8_t *)txm_arena_zero(arena, room, 3);
+    disk->slot = (uint32_t *)txm_arena_alloc(arena, s->face_count, sizeof(uint32_t));
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t f = 0; f < s->face_count; f++) disk->slot[f] = TXI_NO_FACE;
+    return TXM_OK;
+}
+
+static uint32_t txi_new_vertex(txi_disk *disk) {
+    disk->parent[disk->vertex_count] = (uint32_t)disk->vertex_count;
+    return (uint32_t)disk->vertex_count++;
+}
+
+/* the side of the disk that this side of the surface is, TXM_NO_SIDE if its face is not in the disk */
+static uint32_t txi_disk_side(const txi_disk *disk, uint32_t side) {
+    if (side == TXM_NO_SIDE || disk->slot[side / 3] == TXI_NO_FACE) return TXM_NO_SIDE;
+    return 3 * disk->slot[side / 3] + side % 3;
+}
+/* the side of the surface that this side of the disk is */
+static uint32_t txi_surface_side(const txi_disk *disk, uint32_t side) {
+    return 3 * disk->faces[side / 3] + side % 3;
+}
+
+static void txi_disk_link(txi_disk *disk, uint32_t side, uint32_t next) {
+    disk->next[side] = next;
+    disk->prev[next] = side;
+}
+
+/* The first face. */
+static void txi_disk_begin(txi_disk *disk, uint32_t face) {
+    disk->faces[0] = face;
+    disk->slot[face] = 0;
+    disk->face_count = 1;
+    disk->loop = 3;
+    disk->border = 0;
+    for (uint32_t k = 0; k < 3; k++) {
+        disk->corner[k] = txi_new_vertex(disk);
+        disk->is_border[k] = 1;
+        txi_disk_link(disk, k, (k + 1) % 3);
+    }
+}
+
+/* Glue the border's side with the next one as long as they are the two sides of one edge, then the
+   sides before and behind them, and so on. At least three sides stay. */
+static void txi_disk_zip(txi_disk *disk, const txi_surface *s, uint32_t side) {
+    while (disk->loop >= 5) {
+        const uint32_t other = disk->next[side], before = disk->prev[side], behind = disk->next[other];
+        if (txi_disk_side(disk, s->opposite[txi_surface_side(disk, side)]) != other) return;
+        txi_join_sets(disk->parent, disk->corner[side], disk->corner[txi_next_corner(other)]);
+        disk->is_border[side] = disk->is_border[other] = 0;
+        txi_disk_link(disk, before, behind);
+        disk->loop -= 2;
+        disk->border = before;
+        side = before;
+    }
+}
+
+/* Add the face beyond a side of the border, which must not be in the disk yet:
+
+           c              The border runs  p, a b, q  before,  p, a c, c b, q  after. Where p and a c
+       n1 / \ n2          are the two sides of one edge they are glued, and a lies within; so are c b
+         /   \            and q. Where an edge returns to another part of the border it is not: that
+    p > a --> b > q       would make a ring. It stays a cut.                                        */
+static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
+    const uint32_t o = s->opposite[txi_surface_side(disk, side)];
+    const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side], behind = disk->next[side];
+    const uint32_t base = 3 * i + o % 3, n1 = txi_next_corner(base), n2 = txi_next_corner(n1);
+    disk->faces[i] = o / 3;
+    disk->slot[o / 3] = i;
+    disk->corner[base] = disk->corner[txi_next_corner(side)];
+    disk->corner[n1] = disk->corner[side];
+    disk->corner[n2] = txi_new_vertex(disk);
+    disk->is_border[side] = 0;
+    disk->is_border[n1] = disk->is_border[n2] = 1;
+    txi_disk_link(disk, before, n1);
+    txi_disk_link(disk, n1, n2);
+    txi_disk_link(disk, n2, behind);
+    disk->loop++;
+    disk->border = n1;
+    txi_disk_zip(disk, s, n2);
+    if (disk->is_border[n1] && disk->is_border[disk->prev[n1]]) txi_disk_zip(disk, s, disk->prev[n1]);
+}
+
+/* Number the vertices from 0 and resolve the corners. point receives one for each. */
+static void txi_disk_finish(txi_disk *disk, const txi_surface *s, uint32_t *number, txm_dvec3 *point) {
+    uint32_t count = 0;
+    for (size_t v = 0; v < disk->vertex_count; v++) number[v] = TXI_NO_FACE;
+    for (size_t c = 0; c < 3 * disk->face_count; c++) {
+        const uint32_t v = txi_root(disk->parent, disk->corner[c]);
+        if (number[v] == TXI_NO_FACE) {
+            point[count] = txi_corner_point(s, txi_surface_side(disk, (uint32_t)c));
+            number[v] = count++;
+        }
+        disk->corner[c] = number[v];
+    }
+    disk->vertex_count = count;
+}
+
+/* How far the disk grows. Keys of faces: what lies deeper is added first. */
+typedef struct txi_growth {
+    const double *key;     /* 1 per face of the surface; faces above stop are not added          */
+    double stop;
+    const double *size;    /* 1 per face: how much it counts                                     */
+    double wanted;         /* beyond stop_least it stops once so much has been added             */
+    double stop_least;
+    double most;           /* of all faces: stop in any case                                     */
+    const double *weight;  /* 1 per face: how much it counts for most                            */
+} txi_growth;
+
+/* Grow a disk from a face, always by the face with the least key that touches it. */
+static txm_status txi_disk_grow(txi_disk *disk, const txi_surface *s, uint32_t seed,
+                                const txi_growth *g, txm_env *env) {
+    txm_arena scratch;
+    txi_heap heap;
+    int good = 1;
+    double size = g->size[seed], weight = g->weight[seed];
+    memset(&heap, 0, sizeof heap);
+    txm_arena_init(&scratch, env);
+    txi_disk_begin(disk, seed);
+    for (uint32_t at = 0; good && disk->face_count < disk->room;) {
+        for (uint32_t side = 3 * at; side < 3 * at + 3 && good; side++) {
+            const uint32_t o = s->opposite[txi_surface_side(disk, side)];
+            if (o != TXM_NO_SIDE && disk->slot[o / 3] == TXI_NO_FACE)
+                good = txi_heap_push(&heap, &scratch, g->key[o / 3], side);
+        }
+        uint32_t side = TXM_NO_SIDE, face = 0;
+        while (heap.count && side == TXM_NO_SIDE) {
+            const txi_wait next = txi_heap_pop(&heap);
+            face = s->opposite[txi_surface_side(disk, next.vertex)] / 3;
+            if (disk->slot[face] == TXI_NO_FACE) side = next.vertex;
+        }
+        if (side == TXM_NO_SIDE || g->key[face] > g->stop || weight + g->weight[face] > g->most ||
+            (g->key[face] > g->stop_least && size >= g->wanted))
+            break;
+        at = (uint32_t)disk->face_count;
+        txi_disk_add(disk, s, side);
+        size += g->size[face];
+        weight += g->weight[face];
+    }
+    txm_arena_free(&scratch);
+    return good ? TXM_OK : txi_no_memory(env);
+}
+
+/* ---- flatten: a disk of faces in the plane ---------------------------------------------------- */
+
+enum {
+    TXI_ARAP_ROUNDS = 60 /* RECIPES; it ends earlier when nothing moves any more */
+};
+
+/* A disk laid out in the plane. */
+typedef struct txi_flat {
+    const txi_disk *disk;
+    txm_dvec3 *point;       /* 1 per vertex                                                      */
+    double *xy;             /* 2 per vertex, in the unit of the surface; faces counter-clockwise  */
+    double *shape;          /* 3 per face: in its own plane the corners are (0, 0), (s0, 0), (s1, s2) */
+    double *cot;            /* 3 per face: the cotangent of the angle opposite of side k          */
+    size_t edge_count;
+    uint32_t *low, *high;   /* the vertices of each edge                                         */
+    uint32_t *edge;         /* 3 per face: the edge of side k                                    */
+} txi_flat;
+
+/* Number the edges. */
+static void txi_flat_edges(txi_flat *flat, uint32_t *first, uint32_t *sides, uint32_t *lows,
+                           uint32_t *seen, uint32_t *seen_edge) {
+    const txi_disk *disk = flat->disk;
+    const size_t count = 3 * disk->face_count;
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t a = disk->corner[i], b = disk->corner[txi_next_corner(i)];
+        lows[i] = a < b ? a : b;
+    }
+    txi_bin(lows, count, NULL, disk->vertex_count, first, sides);
+    for (size_t v = 0; v < disk->vertex_count; v++) seen[v] = UINT32_MAX;
+    flat->edge_count = 0;
+    for (uint32_t v = 0; v < disk->vertex_count; v++) {
+        for (uint32_t i = first[v]; i < first[v + 1]; i++) {
+            const uint32_t a = disk->corner[sides[i]], b = disk->corner[txi_next_corner(sides[i])];
+            const uint32_t other = a == v ? b : a;
+            if (seen[other] != v) {
+                seen[other] = v;
+                seen_edge[other] = (uint32_t)flat->edge_count;
+                flat->low[flat->edge_count] = v;
+                flat->high[flat->edge_count++] = other;
+            }
+            flat->edge[sides[i]] = seen_edge[other];
+        }
+    }
+}
+
+/* The shapes of the faces and their cotangents, these between .05 and 20 so that thin faces do not
+   upset the system. */
+static void txi_flat_shapes(txi_flat *flat, const txi_surface *s) {
+    const txi_disk *disk = flat->disk;
+    for (size_t i = 0; i < disk->face_count; i++) {
+        txm_dvec3 p[3];
+        double *shape = flat->shape + 3 * i;
+        for (uint32_t k = 0; k < 3; k++) p[k] = txi_corner_point(s, 3 * disk->faces[i] + k);
+        const txm_dvec3 ab = txm_d3_sub(p[1], p[0]), ac = txm_d3_sub(p[2], p[0]);
+        const double l = txm_d3_len(ab), area = txm_d3_len(txm_d3_cross(ab, ac));
+        shape[0] = l;
+        shape[1] = l > 0 ? txm_d3_dot(ab, ac) / l : 0;
+        shape[2] = l > 0 ? area / l : txm_d3_len(ac);
+        for (int k = 0; k < 3; k++) {
+            const txm_dvec3 at = p[(k + 2) % 3];
+            const double dot = txm_d3_dot(txm_d3_sub(p[k], at), txm_d3_sub(p[(k + 1) % 3], at));
+            const double c = area > 0 ? dot / area : 20;
+            flat->cot[3 * i + (size_t)k] = c < 0.05 ? 0.05 : c > 20 ? 20 : c;
+        }
+    }
+}
+
+static txm_status txi_flat_init(txi_flat *flat, const txi_surface *s, const txi_disk *disk,
+                                const txm_dvec3 *point, txm_arena *arena, txm_env *env) {
+    const size_t faces = disk->face_count, vertices = disk->vertex_count;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    memset(flat, 0, sizeof *flat);
+    flat->disk = disk;
+    flat->point = (txm_dvec3 *)txm_arena_alloc(arena, vertices, sizeof(txm_dvec3));
+    flat->xy = (double *)txm_arena_zero(arena, vertices, 2 * sizeof(double));
+    flat->shape = (double *)txm_arena_alloc(arena, faces, 3 * sizeof(double));
+    flat->cot = (double *)txm_arena_alloc(arena, faces, 3 * sizeof(double));
+    flat->low = (uint32_t *)txm_arena_alloc(arena, faces, 3 * sizeof(uint32_t));
+    flat->high = (uint32_t *)txm_arena_alloc(arena, faces, 3 * sizeof(uint32_t));
+    flat->edge = (uint32_t *)txm_arena_alloc(arena, faces, 3 * sizeof(uint32_t));
+    uint32_t *first = (uint32_t *)txm_arena_alloc(&scratch, vertices + 1, sizeof(uint32_t));
+    uint32_t *sides = (uint32_t *)txm_arena_alloc(&scratch, faces, 3 * sizeof(uint32_t));
+    uint32_t *lows = (uint32_t *)txm_arena_alloc(&scratch, faces, 3 * sizeof(uint32_t));
+    uint32_t *seen = (uint32_t *)txm_arena_alloc(&scratch, vertices, 2 * sizeof(uint32_t));
+    const int good = !arena->failed && !scratch.failed;
+    if (good) {
+        memcpy(flat->point, point, vertices * sizeof *point);
+        txi_flat_edges(flat, first, sides, lows, seen, seen + vertices);
+        txi_flat_shapes(flat, s);
+    }
+    txm_arena_free(&scratch);
+    return good ? TXM_OK : txi_no_memory(env);
+}
+
+/* The border on a circle, each vertex at its share of the length, the rest where each is the mean of
+   its neighbours, weighted by positive cotangents: no face is turned over (Tutte). The circle has the
+   area of the surface. weight and diagonal: scratch, 1 per edge and vertex. */
+static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double *diagonal,
+                      uint8_t *fixed) {
+    const txi_disk *disk = flat->disk;
+    const size_t vertices = disk->vertex_count;
+    double length = 0, area = 0, at = 0;
+    uint32_t side = disk->border;
+    memset(weight, 0, flat->edge_count * sizeof *weight);
+    memset(diagonal, 0, vertices * sizeof *diagonal);
+    memset(fixed, 0, vertices);
+    for (size_t i = 0; i < disk->face_count; i++) area += flat->shape[3 * i] * flat->shape[3 * i + 2] / 2;
+    for (size_t k = 0; k < disk->loop; k++, side = disk->next[side])
+        length += txm_d3_dist(flat->point[disk->corner[side]],
+                              flat->point[disk->corner[txi_next_corner(side)]]) + 1e-12;
+    const double radius = sqrt(area / TXM_PI);
+    for (size_t k = 0; k < disk->loop; k++, side = disk->next[side]) {
+        const uint32_t v = disk->corner[side], to = disk->corner[txi_next_corner(side)];
+        double sine, cosine;
+        txm_sincos(2 * TXM_PI * at / length, &sine, &cosine);
+        at += txm_d3_dist(flat->point[v], flat->point[to]) + 1e-12;
+        fixed[v] = 1;
+        flat->xy[2 * (size_t)v] = radius * cosine;
+        flat->xy[2 * (size_t)v + 1] = radius * sine;
+    }
+    for (size_t i = 0; i < 3 * disk->face_count; i++) weight[flat->edge[i]] += flat->cot[i];
+    for (size_t v = 0; v < vertices; v++) {
+        if (fixed[v]) diagonal[v] = 1;
+        else flat->xy[2 * v] = flat->xy[2 * v + 1] = 0;
+    }
+    for (size_t e = 0; e < flat->edge_count; e++) {
+        for (int turn = 0; turn < 2; turn++) {
+            const size_t a = turn ? flat->high[e] : flat->low[e], b = turn ? flat->low[e] : flat->high[e];
+            if (fixed[a]) continue;
+            diagonal[a] += weight[e];
+            if (!fixed[b]) continue;
+            flat->xy[2 * a] += weight[e] * flat->xy[2 * b];
+            flat->xy[2 * a + 1] += weight[e] * flat->xy[2 * b + 1];
+        }
+        if (fixed[flat->low[e]] || fixed[flat->high[e]]) weight[e] = 0;
+    }
+    txi_factor_make(factor, weight, diagonal);
+    txi_factor_solve(factor, flat->xy);
+}
+
+/* Corner k of face i in its own plane. */
+static void txi_shape_corner(const double *shape, int k, double *x, double *y) {
+    *x = k == 0 ? 0 : k == 1 ? shape[0] : shape[1];
+    *y = k == 2 ? shape[2] : 0;
+}
+
+/* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over the
+   sides of
+
+       weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
+
+   is least, q being the face in its own plane; again and again.
+   rotation, right  scratch, 2 per face and 2 per vertex
+   small_step       of vertices, in the unit of the surface: end when none moves farther      */
+static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weight, double *weight,
+                     double *diagonal, double *right, double small_step) {
+    const txi_disk *disk = flat->disk;
+    const size_t vertices = disk->vertex_count;
+    memset(weight, 0, flat->edge_count * sizeof *weight);
+    memset(diagonal, 0, vertices * sizeof *diagonal);
+    for (size_t i = 0; i < 3 * disk->face_count; i++)
+        weight[flat->edge[i]] += flat->cot[i] * face_weight[i / 3];
+    for (size_t e = 0; e < flat->edge_count; e++) {
+        diagonal[flat->low[e]] += weight[e];
+        diagonal[flat->high[e]] += weight[e];
+    }
+    /* one vertex is held weakly where it lies: the sum does not depend on where the whole lies */
+    const double hold = diagonal[0] * 1e-3;
+    diagonal[0] += hold;
+    txi_factor_make(factor, weight, diagonal);
+    for (int round = 0; round < TXI_ARAP_ROUNDS; round++) {
+        memset(right, 0, vertices * 2 * sizeof *right);
+        right[0] = hold * flat->xy[0];
+        right[1] = hold * flat->xy[1];
+        for (size_t i = 0; i < disk->face_count; i++) {
+            double qx[3], qy[3], a = 0, b = 0;
+            size_t v[3];
+            for (int k = 0; k < 3; k++) {
+                txi_shape_corner(flat->shape + 3 * i, k, &qx[k], &qy[k]);
+                v[k] = disk->corner[3 * i + (size_t)k];
+            }
+            for (int k = 0; k < 3; k++) {
+                const int j = (k + 1) % 3;
+                const double c = flat->cot[3 * i + (size_t)k];
+                const double px = flat->xy[2 * v[j]] - flat->xy[2 * v[k]];
+                const double py = flat->xy[2 * v[j] + 1] - flat->xy[2 * v[k] + 1];
+                a += c * (px * (qx[j] - qx[k]) + py * (qy[j] - qy[k]));
+                b += c * (py * (qx[j] - qx[k]) - px * (qy[j] - qy[k]));
+            }
+            const double n = sqrt(a * a + b * b);
+            a = n > 0 ? a / n : 1;
+            b = n > 0 ? b / n : 0;
+            for (int k = 0; k < 3; k++) {
+                const int j = (k + 1) % 3;
+                const double c = flat->cot[3 * i + (size_t)k] * face_weight[i];
+                const double x = c * (a * (qx[j] - qx[k]) - b * (qy[j] - qy[k]));
+                const double y = c * (b * (qx[j] - qx[k]) + a * (qy[j] - qy[k]));
+                right[2 * v[j]] += x;
+                right[2 * v[j] + 1] += y;
+                right[2 * v[k]] -= x;
+                right[2 * v[k] + 1] -= y;
+            }
+        }
+        txi_factor_solve(factor, right);
+        double moved = 0;
+        for (size_t v = 0; v < 2 * vertices; v++) {
+            moved = fmax(moved, fabs(right[v] - flat->xy[v]));
+            flat->xy[v] = right[v];
+        }
+        if (moved < small_step) break;
+    }
+}
+
+/* Lay the disk out. face_weight: 1 per face of the disk, how rigid it is to be, above 0. */
+static txm_status txi_flatten(txi_flat *flat, const double *face_weight, double small_step,
+                              txm_env *env) {
+    const size_t vertices = flat->disk->vertex_count;
+    txm_arena scratch;
+    txi_factor factor;
+    txm_arena_init(&scratch, env);
+    double *weight = (double *)txm_arena_alloc(&scratch, flat->edge_count, sizeof(double));
+    double *diagonal = (double *)txm_arena_alloc(&scratch, vertices, sizeof(double));
+    double *right = (double *)txm_arena_alloc(&scratch, vertices, 2 * sizeof(double));
+    uint8_t *fixed = (uint8_t *)txm_arena_alloc(&scratch, vertices, 1);
+    txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
+    if (status == TXM_OK)
+        status = txi_factor_plan(&factor, vertices, flat->point, flat->edge_count, flat->low, flat->high,
+                                 &scratch, env);
+    if (status == TXM_OK) {
+        txi_tutte(flat, &factor, weight, diagonal, fixed);
+        txi_arap(flat, &factor, face_weight, weight, diagonal, right, small_step);
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
 
 /* ---- resample: between maps and windows ------------------------------------------------------ */
 
@@ -710,10 +1774,6 @@ static void txi_spline(double t, double weight[TXI_TAPS]) {
     weight[3] = t * t * (-0.5 + 0.5 * t);
 }
 
-static int txi_wrap(int i, int n) {
-    const int r = i % n;
-    return r < 0 ? r + n : r;
-}
 
 /* May a pixel on this face take texel (x, y), not wrapped yet? Its number, or -1: there is none, or
    it belongs to another chart. */
@@ -1288,13 +2348,801 @@ static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *e
     return status;
 }
 
-/* ---- window: the next one -------------------------------------------------------------------- */
+/* ---- layout: parts of surfaces --------------------------------------------------------------- */
 
-/* Lay out the next window with missing texels. found receives 0 if there are none left; else at least
-   one texel is a target. */
+enum {
+    TXI_GAP = 24,              /* pixels: holes that are so near are laid out together; ours   */
+    TXI_GROUP_MOST = 150000,   /* pixels of holes that are joined                              */
+    TXI_WHOLE_MOST = 300000,   /* pixels of a hole that is tried in one window                 */
+    TXI_DISK_MOST = 700000,    /* pixels of a disk                                             */
+    TXI_REACH_MOST = 400,      /* pixels: radius of a window at the rim of a larger hole       */
+    TXI_REACH_LEAST = 64,      /* ... the smallest that is tried                               */
+    TXI_SEAM = 16,             /* pixels: what lies nearer to a cut through the hole is left to the
+                                  next window                                                  */
+    TXI_FLAT_SIDE = 512,       /* pixels: side of a window of a face that cannot be laid out   */
+    TXI_SMALL_HOLE = 400       /* texels: however it is distorted, it is done at once          */
+};
+
+/* Faces whose scale differs from 1 by more in any direction are left to the next window. */
+#define TXI_STRETCH 1.6
+
+/* A window in the making. Per face or vertex of the surface, all of its memory is scratch. */
+typedef struct txi_sheet {
+    txi_domain *d;
+    const txi_surface *s;
+    txm_env *env;
+    txm_arena *scratch;
+    uint8_t *state;        /* by face: what txi_is_hole has found out, or TXI_SHEET_...             */
+    txi_list group;        /* the faces of the hole that is to be completed                       */
+    size_t texels;         /* missing texels of the group                                         */
+    double pixel;          /* side of a pixel, in the unit of the surface                         */
+    uint32_t centre;       /* face that the disk grows from                                       */
+    double *from_hole, *from_centre; /* by vertex: distances                                      */
+    double *key, *size, *weight;     /* by face, for txi_growth                                   */
+    txi_disk disk;
+    txi_flat flat;
+    double *rigid;         /* by face of the disk                                                 */
+    txm_vec2 *at;          /* by vertex of the disk: where it lies in the window                  */
+    txm_vec3 *normal;      /* by vertex of the disk                                               */
+    int width, height;     /* of the window                                                       */
+    int reach;             /* pixels around the centre that are laid out; 0: the whole hole       */
+} txi_sheet;
+
+enum { TXI_SHEET_UNSEEN = 0, TXI_SHEET_KNOWN, TXI_SHEET_HOLE, TXI_SHEET_GROUP, TXI_SHEET_TAKEN, TXI_SHEET_REFUSED };
+
+/* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing any
+   longer */
+static const uint32_t *txi_face_texels(const txi_surface *s, uint32_t face, size_t *count) {
+    *count = s->hole_first[face + 1] - s->hole_first[face];
+    return s->hole + s->hole_first[face];
+}
+
+/* Is something missing on a face? Small ones may own no texel: the one at their middle counts. */
+static int txi_is_hole(txi_sheet *l, uint32_t face) {
+    const txi_domain *d = l->d;
+    size_t count;
+    if (l->state[face] != TXI_SHEET_UNSEEN) return l->state[face] != TXI_SHEET_KNOWN;
+    const uint32_t *texels = txi_face_texels(l->s, face, &count);
+    int is_hole = 0;
+    for (size_t i = 0; i < count && !is_hole; i++) is_hole = d->missing[texels[i]];
+    if (!is_hole) {
+        const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
+        const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+        const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+        const size_t i = (size_t)py * (size_t)d->width + (size_t)px;
+        is_hole = d->missing[i] &&
+                  (!d->covered[i] || l->s->chart[l->s->owner[i]] == l->s->chart[face]);
+    }
+    l->state[face] = (uint8_t)(is_hole ? TXI_SHEET_HOLE : TXI_SHEET_KNOWN);
+    return is_hole;
+}
+
+/* Where texel i lies in a face that owns it, in texels that are not wrapped, and its weights there. */
+static void txi_texel_weights(const txi_domain *d, uint32_t face, uint32_t texel, double weight[3]) {
+    const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
+    const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
+    double least_x = t[0].x, least_y = t[0].y, most_x = t[0].x, most_y = t[0].y, best = -1e300;
+    weight[0] = weight[1] = weight[2] = 1.0 / 3;
+    for (int k = 1; k < 3; k++) {
+        least_x = fmin(least_x, t[k].x);
+        least_y = fmin(least_y, t[k].y);
+        most_x = fmax(most_x, t[k].x);
+        most_y = fmax(most_y, t[k].y);
+    }
+    const int from_x = (int)ceil((least_x - x - 0.5) / d->width);
+    const int from_y = (int)ceil((least_y - y - 0.5) / d->height);
+    const int to_x = (int)floor((most_x - x + 0.5) / d->width);
+    const int to_y = (int)floor((most_y - y + 0.5) / d->height);
+    for (int j = from_y; j <= to_y && best < -1e-5; j++) {
+        for (int i = from_x; i <= to_x && best < -1e-5; i++) {
+            double w[3];
+            if (!txi_weights(t, x + (double)i * d->width, y + (double)j * d->height, w)) return;
+            const double least = fmin(w[0], fmin(w[1], w[2]));
+            if (least <= best) continue;
+            best = least;
+            memcpy(weight, w, sizeof w);
+        }
+    }
+}
+
+/* where the texel lies on the surface */
+static txm_dvec3 txi_texel_point(const txi_domain *d, uint32_t face, uint32_t texel) {
+    double w[3];
+    txm_dvec3 p = txm_d3(0, 0, 0);
+    txi_texel_weights(d, face, texel, w);
+    for (uint32_t k = 0; k < 3; k++) p = txm_d3_mad(p, txi_corner_point(d->surface, 3 * face + k), w[k]);
+    return p;
+}
+
+static size_t txi_missing_count(const txi_domain *d, uint32_t face) {
+    size_t count, missing = 0;
+    const uint32_t *texels = txi_face_texels(d->surface, face, &count);
+    for (size_t i = 0; i < count; i++) missing += d->missing[texels[i]] != 0;
+    return missing;
+}
+
+/* ---- layout: the hole ------------------------------------------------------------------------ */
+
+/* Add to list the hole that a face belongs to, connected across sides; its faces get this state. Faces
+   outside the disk, if there is one, end it: 0. -1: no memory. */
+static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi_disk *disk, txi_list *list) {
+    size_t at = list->count;
+    int inside = 1;
+    if (!txi_push(list, l->scratch, face)) return -1;
+    l->state[face] = state;
+    for (; at < list->count; at++) {
+        const uint32_t f = list->items[at];
+        if (disk && disk->slot[f] == TXI_NO_FACE) inside = 0;
+        for (uint32_t k = 0; k < 3 && inside; k++) {
+            const uint32_t o = l->s->opposite[3 * f + k];
+            if (o == TXM_NO_SIDE || !txi_is_hole(l, o / 3) || l->state[o / 3] != TXI_SHEET_HOLE) continue;
+            if (!txi_push(list, l->scratch, o / 3)) return -1;
+            l->state[o / 3] = state;
+        }
+    }
+    return inside;
+}
+
+/* The side of a pixel: that of a texel in the hole, in the mean. 0 if it has no area. */
+static void txi_measure(txi_sheet *l) {
+    double area = 0;
+    l->texels = 0;
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        const size_t missing = txi_missing_count(l->d, f);
+        const txm_vec2 *t = l->s->uv + 3 * (size_t)f;
+        if (!missing) continue;
+        area += (double)missing * txm_d3_len(txi_face_area2(l->s, f)) / fabs(txi_cross2(t[0], t[1], t[2]));
+        l->texels += missing;
+    }
+    l->pixel = l->texels ? sqrt(area / (double)l->texels) : 0;
+}
+
+/* Distances of the vertices from the missing texels of the group. */
+static txm_status txi_measure_from_hole(txi_sheet *l, double limit) {
+    const size_t count = 3 * l->group.count;
+    uint32_t *sources = (uint32_t *)txm_arena_alloc(l->scratch, count, sizeof(uint32_t));
+    double *start = (double *)txm_arena_alloc(l->scratch, count, sizeof(double));
+    if (!sources || !start) return txi_no_memory(l->env);
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        size_t texels;
+        const uint32_t *texel = txi_face_texels(l->s, f, &texels);
+        double *least = start + 3 * i;
+        least[0] = least[1] = least[2] = TXI_UNREACHED;
+        for (size_t k = 0; k < texels; k++) {
+            if (!l->d->missing[texel[k]]) continue;
+            const txm_dvec3 p = txi_texel_point(l->d, f, texel[k]);
+            for (uint32_t c = 0; c < 3; c++)
+                least[c] = fmin(least[c], txm_d3_dist(p, txi_corner_point(l->s, 3 * f + c)));
+        }
+        for (uint32_t c = 0; c < 3; c++) {
+            sources[3 * i + c] = l->s->vertex[3 * f + c];
+            if (least[c] >= TXI_UNREACHED) least[c] = 0; /* a face without texels */
+        }
+    }
+    return txi_geodesic(l->s, sources, start, count, limit, l->env, l->from_hole);
+}
+
+/* The first hole, and those within TXI_GAP of it or of one another. */
+static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
+    txm_status status = TXM_OK;
+    txi_is_hole(l, seed);
+    if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+    txi_measure(l);
+    for (int round = 0, grown = 1; round < 4 && grown && l->pixel > 0; round++) {
+        grown = 0;
+        status = txi_measure_from_hole(l, TXI_GAP * l->pixel);
+        for (uint32_t v = 0; v < l->s->vertex_count && status == TXM_OK; v++) {
+            if (l->from_hole[v] >= TXI_UNREACHED) continue;
+            for (uint32_t i = l->s->first[v]; i < l->s->first[v + 1]; i++) {
+                const uint32_t f = l->s->corners[i] / 3;
+                const size_t before = l->group.count;
+                if (!txi_is_hole(l, f) || l->state[f] != TXI_SHEET_HOLE) continue;
+                if (txi_flood_faces(l, f, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+                size_t more = l->texels;
+                for (size_t k = before; k < l->group.count; k++)
+                    more += txi_missing_count(l->d, l->group.items[k]);
+                if (more > TXI_GROUP_MOST) { /* too large: left to a later window */
+                    for (size_t k = before; k < l->group.count; k++)
+                        l->state[l->group.items[k]] = TXI_SHEET_REFUSED;
+                    l->group.count = before;
+                    continue;
+                }
+                l->texels = more;
+                grown = 1;
+            }
+        }
+        if (status != TXM_OK) return status;
+        txi_measure(l);
+    }
+    return TXM_OK;
+}
+
+/* The face that the disk grows from: in the middle of the hole, or, if only a part of it is laid out, at
+   its rim. */
+static void txi_find_centre(txi_sheet *l) {
+    txm_dvec3 middle = txm_d3(0, 0, 0);
+    double count = 0, least = 0;
+    int found = 0;
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        const double n = (double)txi_missing_count(l->d, f);
+        for (uint32_t k = 0; k < 3; k++) middle = txm_d3_mad(middle, txi_corner_point(l->s, 3 * f + k), n / 3);
+        count += n;
+    }
+    middle = txm_d3_scale(middle, 1 / count);
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        txm_dvec3 p = txm_d3(0, 0, 0);
+        int is_rim = 0;
+        if (!txi_missing_count(l->d, f)) continue;
+        for (uint32_t k = 0; k < 3; k++) {
+            const uint32_t o = l->s->opposite[3 * f + k];
+            p = txm_d3_mad(p, txi_corner_point(l->s, 3 * f + k), 1.0 / 3);
+            is_rim |= o != TXM_NO_SIDE && !txi_is_hole(l, o / 3);
+        }
+        const double apart = l->reach ? (is_rim ? 0 : 1) : txm_d3_dist2(p, middle);
+        if (found && apart >= least) continue;
+        found = 1;
+        least = apart;
+        l->centre = f;
+    }
+}
+
+/* ---- layout: the disk ------------------------------------------------------------------------ */
+
+/* Is the middle of a face texture that may be copied? */
+static int txi_is_usable_face(const txi_domain *d, uint32_t face) {
+    const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
+    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+    return d->usable[(size_t)py * (size_t)d->width + (size_t)px];
+}
+
+static double txi_mean_of(const txi_surface *s, uint32_t face, const double *value) {
+    const uint32_t *v = s->vertex + 3 * (size_t)face;
+    return (value[v[0]] + value[v[1]] + value[v[2]]) / 3;
+}
+static double txi_least_of(const txi_surface *s, uint32_t face, const double *value) {
+    const uint32_t *v = s->vertex + 3 * (size_t)face;
+    return fmin(value[v[0]], fmin(value[v[1]], value[v[2]]));
+}
+
+/* Grow the disk: the hole from its centre, then what is known around it; or everything around the centre
+   up to l->reach. */
+static txm_status txi_sheet_disk(txi_sheet *l) {
+    const txi_surface *s = l->s;
+    const double pixel = l->pixel, band = txi_band(l->texels) * pixel;
+    txi_growth g;
+    double start[3], extent = 0;
+    const txm_dvec3 a = txi_corner_point(s, 3 * l->centre);
+    const txm_dvec3 b = txi_corner_point(s, 3 * l->centre + 1), c = txi_corner_point(s, 3 * l->centre + 2);
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(a, b), c), 1.0 / 3);
+    start[0] = txm_d3_dist(a, middle);
+    start[1] = txm_d3_dist(b, middle);
+    start[2] = txm_d3_dist(c, middle);
+    for (size_t i = 0; i < 3 * l->group.count; i++) {
+        const uint32_t corner = 3 * l->group.items[i / 3] + (uint32_t)(i % 3);
+        extent = fmax(extent, txm_d3_dist(middle, txi_corner_point(s, corner)));
+    }
+    const double limit = l->reach ? 1.5 * l->reach * pixel : 2 * extent + pixel;
+    txm_status status = txi_geodesic(s, s->vertex + 3 * (size_t)l->centre, start, 3, limit, l->env,
+                                     l->from_centre);
+    if (status == TXM_OK) status = txi_measure_from_hole(l, 4 * band);
+    if (status != TXM_OK) return status;
+    for (size_t v = 0; v < s->vertex_count; v++) {
+        if (l->from_centre[v] >= TXI_UNREACHED)
+            l->from_centre[v] = limit + txm_d3_dist(s->point[v], middle);
+        l->from_hole[v] = fmin(l->from_hole[v], 4 * band);
+    }
+    const double outside = 4 * (limit + extent); /* above all keys of the hole's faces */
+    for (uint32_t f = 0; f < s->face_count; f++) {
+        const int is_group = l->state[f] == TXI_SHEET_GROUP;
+        l->weight[f] = txm_d3_len(txi_face_area2(s, f)) / (2 * pixel * pixel);
+        l->size[f] = !is_group && txi_is_usable_face(l->d, f) ? l->weight[f] : 0;
+        l->key[f] = l->reach || is_group ? txi_mean_of(s, f, l->from_centre)
+                                         : outside + txi_least_of(s, f, l->from_hole);
+    }
+    const double wanted = 1.5 * (double)l->texels;
+    g.key = l->key;
+    g.size = l->size;
+    g.weight = l->weight;
+    g.most = TXI_DISK_MOST;
+    g.stop_least = l->reach ? l->reach * pixel : outside + band;
+    g.stop = l->reach ? l->reach * pixel : outside + 3 * band;
+    g.wanted = l->reach ? 1e300 : wanted > 8000 ? wanted : 8000;
+    return txi_disk_grow(&l->disk, s, l->centre, &g, l->env);
+}
+
+/* Lay the disk out. The hole is kept rigid, what is known gives way the more the farther it is. */
+static txm_status txi_sheet_flat(txi_sheet *l) {
+    const size_t faces = l->disk.face_count;
+    uint32_t *number = (uint32_t *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(uint32_t));
+    txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_dvec3));
+    l->rigid = (double *)txm_arena_alloc(l->scratch, faces, sizeof(double));
+    if (!number || !point || !l->rigid) return txi_no_memory(l->env);
+    txi_disk_finish(&l->disk, l->s, number, point);
+    for (size_t i = 0; i < faces; i++) {
+        const uint32_t f = l->disk.faces[i];
+        const double apart = txi_mean_of(l->s, f, l->from_hole) / (40 * l->pixel);
+        l->rigid[i] = 1;
+        if (!l->reach && l->state[f] != TXI_SHEET_GROUP)
+            l->rigid[i] = 0.02 + 0.98 * txm_exp2(-fmin(apart * apart, 100) * 1.44269504088896341);
+    }
+    txm_status status = txi_flat_init(&l->flat, l->s, &l->disk, point, l->scratch, l->env);
+    if (status == TXM_OK) status = txi_flatten(&l->flat, l->rigid, 0.02 * l->pixel, l->env);
+    return status;
+}
+
+/* The step in the window, y downwards, for a step of one texel to the right and one down, on face i of
+   the disk. 0: the face has no area in the atlas. */
+static int txi_texel_steps(const txi_sheet *l, size_t i, double right[2], double down[2]) {
+    const txm_vec2 *t = l->s->uv + 3 * (size_t)l->disk.faces[i];
+    const uint32_t *c = l->disk.corner + 3 * i;
+    const double area = txi_cross2(t[0], t[1], t[2]);
+    if (!(fabs(area) > 1e-12)) return 0;
+    const double u1 = (double)t[1].x - t[0].x, v1 = (double)t[1].y - t[0].y;
+    const double u2 = (double)t[2].x - t[0].x, v2 = (double)t[2].y - t[0].y;
+    for (int axis = 0; axis < 2; axis++) {
+        const double p0 = axis ? l->at[c[0]].y : l->at[c[0]].x;
+        const double p1 = (axis ? l->at[c[1]].y : l->at[c[1]].x) - p0;
+        const double p2 = (axis ? l->at[c[2]].y : l->at[c[2]].x) - p0;
+        right[axis] = (p1 * v2 - p2 * v1) / area;
+        down[axis] = (p2 * u1 - p1 * u2) / area;
+    }
+    return 1;
+}
+
+/* The chart that has most of the missing texels. */
+static uint32_t txi_main_chart(const txi_sheet *l, uint32_t *counts) {
+    uint32_t best = l->s->chart[l->centre];
+    memset(counts, 0, l->s->face_count * sizeof *counts);
+    for (size_t i = 0; i < l->group.count; i++)
+        counts[l->s->chart[l->group.items[i]]] += (uint32_t)txi_missing_count(l->d, l->group.items[i]);
+    for (uint32_t c = 0; c < l->s->face_count; c++) {
+        if (counts[c] > counts[best]) best = c;
+    }
+    return best;
+}
+
+/* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that on the
+   main chart texels and pixels coincide as well as they can, so that little is lost by interpolation.
+   0: it is not finite, or too large for a window. */
+static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
+    const txi_disk *disk = &l->disk;
+    const uint32_t chart = txi_main_chart(l, counts);
+    double c = 0, s = 0, left = 0, top = 0, right = 0, bottom = 0, off[2] = {0, 0};
+    int64_t reference = -1;
+    for (size_t v = 0; v < disk->vertex_count; v++) {
+        const double x = l->flat.xy[2 * v] / l->pixel, y = -l->flat.xy[2 * v + 1] / l->pixel;
+        if (!(fabs(x) < 1e6 && fabs(y) < 1e6)) return 0;
+        l->at[v] = txm_v2(txm_float(x), txm_float(y));
+    }
+    for (size_t i = 0; i < disk->face_count; i++) {
+        double u[2], v[2];
+        const double n = (double)txi_missing_count(l->d, disk->faces[i]);
+        if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v)) continue;
+        c += n * u[0];
+        s += n * u[1];
+        if (reference < 0) reference = (int64_t)i;
+    }
+    const double length = sqrt(c * c + s * s);
+    c = length > 0 ? c / length : 1;
+    s = length > 0 ? s / length : 0;
+    for (size_t v = 0; v < disk->vertex_count; v++) {
+        const double x = c * l->at[v].x + s * l->at[v].y, y = c * l->at[v].y - s * l->at[v].x;
+        l->at[v] = txm_v2(txm_float(x), txm_float(y));
+        left = v ? fmin(left, x) : x;
+        top = v ? fmin(top, y) : y;
+        right = v ? fmax(right, x) : x;
+        bottom = v ? fmax(bottom, y) : y;
+    }
+    if ((right - left + 4) * (bottom - top + 4) > TXI_WINDOW_MOST) return 0;
+    if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
+        size_t count, k = 0;
+        const uint32_t face = disk->faces[reference], *texels = txi_face_texels(l->s, face, &count);
+        double w[3];
+        while (k + 1 < count && !l->d->missing[texels[k]]) k++;
+        txi_texel_weights(l->d, face, texels[k], w);
+        for (size_t i = 0; i < 3; i++) {
+            const txm_vec2 p = l->at[disk->corner[3 * (size_t)reference + i]];
+            off[0] += w[i] * p.x;
+            off[1] += w[i] * p.y;
+        }
+    }
+    off[0] += floor(left - off[0]) - 1;
+    off[1] += floor(top - off[1]) - 1;
+    for (size_t v = 0; v < disk->vertex_count; v++)
+        l->at[v] = txm_v2(txm_float(l->at[v].x - off[0]), txm_float(l->at[v].y - off[1]));
+    l->width = (int)(right - off[0]) + 3;
+    l->height = (int)(bottom - off[1]) + 3;
+    return 1;
+}
+
+/* ---- layout: pixels -------------------------------------------------------------------------- */
+
+static void txi_sheet_normals(txi_sheet *l) {
+    const txi_disk *disk = &l->disk;
+    const double unit = 1 / (l->pixel * l->pixel);
+    for (size_t v = 0; v < disk->vertex_count; v++) l->normal[v] = txm_v3(0, 0, 0);
+    for (size_t i = 0; i < 3 * disk->face_count; i++) {
+        const txm_dvec3 n = txm_d3_scale(txi_face_area2(l->s, disk->faces[i / 3]), unit);
+        const txm_vec3 add = txm_v3(txm_float(n.x), txm_float(n.y), txm_float(n.z));
+        l->normal[disk->corner[i]] = txm_vec3_add(l->normal[disk->corner[i]], add);
+    }
+    for (size_t v = 0; v < disk->vertex_count; v++) l->normal[v] = txm_vec3_normalize(l->normal[v]);
+}
+
+/* Fill a pixel that lies on face i of the disk. */
+static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, size_t i, const double weight[3],
+                          const double right[2], int mirrored) {
+    const uint32_t face = l->disk.faces[i], *c = l->disk.corner + 3 * i;
+    const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
+    double x = 0, y = 0;
+    txm_dvec3 p = txm_d3(0, 0, 0);
+    txm_vec3 n = txm_v3(0, 0, 0);
+    for (int k = 0; k < 3; k++) {
+        x += weight[k] * t[k].x;
+        y += weight[k] * t[k].y;
+        p = txm_d3_mad(p, txm_d3_sub(l->flat.point[c[k]], l->flat.point[0]), weight[k] / l->pixel);
+        n = txm_vec3_add(n, txm_vec3_scale(l->normal[c[k]], txm_float(weight[k])));
+    }
+    const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
+    w->state[pixel] = TXI_KNOWN;
+    w->face[pixel] = face;
+    w->texel[pixel] = txm_v2(txm_float(x), txm_float(y));
+    w->place[pixel] = txm_v3(txm_float(p.x), txm_float(p.y), txm_float(p.z));
+    w->normal[pixel] = txm_vec3_normalize(n);
+    w->axis[pixel] = length > 0 ? txm_v2(txm_float(right[0] / length), txm_float(right[1] / length))
+                                : txm_v2(1, 0);
+    w->mirrored[pixel] = (uint8_t)mirrored;
+}
+
+/* Is face i of the disk the right way round in the window, where y runs downwards? */
+static int txi_lies_right(const txi_sheet *l, size_t i) {
+    const uint32_t *c = l->disk.corner + 3 * i;
+    return txi_cross2(l->at[c[0]], l->at[c[1]], l->at[c[2]]) < -1e-9;
+}
+
+/* Fill the pixels whose centres the faces of the disk cover. Where the disk overlaps itself the face that
+   came first stays, which is the one nearer to the hole. */
+static void txi_sheet_pixels(const txi_sheet *l, txi_window *w) {
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        txm_vec2 t[3];
+        double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
+        if (!txi_lies_right(l, i)) continue;
+        for (size_t k = 0; k < 3; k++) t[k] = l->at[l->disk.corner[3 * i + k]];
+        txi_texel_steps(l, i, right, down);
+        const int mirrored = right[0] * down[1] - right[1] * down[0] < 0;
+        const float top = txm_minf(t[0].y, txm_minf(t[1].y, t[2].y));
+        const float bottom = txm_maxf(t[0].y, txm_maxf(t[1].y, t[2].y));
+        const float from = txm_minf(t[0].x, txm_minf(t[1].x, t[2].x));
+        const float to = txm_maxf(t[0].x, txm_maxf(t[1].x, t[2].x));
+        const int x0 = txm_clampi((int)ceil((double)from - 1e-4), 0, w->width - 1);
+        const int x1 = txm_clampi((int)floor((double)to + 1e-4), 0, w->width - 1);
+        const int y0 = txm_clampi((int)ceil((double)top - 1e-4), 0, w->height - 1);
+        const int y1 = txm_clampi((int)floor((double)bottom + 1e-4), 0, w->height - 1);
+        for (int y = y0; y <= y1; y++) {
+            for (int x = x0; x <= x1; x++) {
+                const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
+                if (w->face[pixel] != TXI_NO_FACE || !txi_weights(t, x, y, weight)) continue;
+                if (weight[0] < -1e-6 || weight[1] < -1e-6 || weight[2] < -1e-6) continue;
+                txi_sheet_pixel(l, w, pixel, i, weight, right, mirrored);
+            }
+        }
+    }
+}
+
+/* ---- layout: targets ------------------------------------------------------------------------- */
+
+/* Is face i of the disk laid out with little distortion: its singular values between 1 / TXI_STRETCH
+   and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
+
+       Q = |(a + d, c - b)| / 2,   R = |(a - d, c + b)| / 2.                                   */
+static int txi_is_true(const txi_sheet *l, size_t i) {
+    const double *shape = l->flat.shape + 3 * i;
+    const uint32_t *v = l->disk.corner + 3 * i;
+    const double *p = l->flat.xy + 2 * (size_t)v[0], *q = l->flat.xy + 2 * (size_t)v[1];
+    const double *r = l->flat.xy + 2 * (size_t)v[2];
+    if (!txi_lies_right(l, i)) return 0;
+    if (!(shape[0] > 0 && shape[2] > 0)) return 1;
+    const double a = (q[0] - p[0]) / shape[0], c = (q[1] - p[1]) / shape[0];
+    const double b = (r[0] - p[0] - a * shape[1]) / shape[2], d = (r[1] - p[1] - c * shape[1]) / shape[2];
+    const double m = sqrt((a + d) * (a + d) + (c - b) * (c - b)) / 2;
+    const double n = sqrt((a - d) * (a - d) + (c + b) * (c + b)) / 2;
+    return m + n < TXI_STRETCH && fabs(m - n) > 1 / TXI_STRETCH;
+}
+
+/* Mark the pixels along the border of the disk where the surface goes on: all of it, or only where it
+   goes through the hole. Returns how many sides that were. */
+static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, uint8_t *marks) {
+    uint32_t side = l->disk.border;
+    size_t count = 0;
+    for (size_t k = 0; k < l->disk.loop; k++, side = l->disk.next[side]) {
+        const uint32_t here = txi_surface_side(&l->disk, side), beyond = l->s->opposite[here];
+        if (beyond == TXM_NO_SIDE) continue;
+        if (only_holes && (!txi_is_hole(l, here / 3) || !txi_is_hole(l, beyond / 3))) continue;
+        const txm_vec2 a = l->at[l->disk.corner[side]], b = l->at[l->disk.corner[txi_next_corner(side)]];
+        const double dx = (double)b.x - a.x, dy = (double)b.y - a.y;
+        const int steps = (int)(2 * sqrt(dx * dx + dy * dy)) + 1;
+        for (int i = 0; i <= steps; i++) {
+            const int x = txm_clampi((int)(a.x + dx * i / steps + 0.5), 0, w->width - 1);
+            const int y = txm_clampi((int)(a.y + dy * i / steps + 0.5), 0, w->height - 1);
+            marks[(size_t)y * (size_t)w->width + (size_t)x] = 1;
+        }
+        count++;
+    }
+    return count;
+}
+
+/* The distance of a place in the window from the nearest mark. */
+static double txi_from_marks(const txi_window *w, const int32_t *nearest, double x, double y) {
+    const int px = txm_clampi((int)(x + 0.5), 0, w->width - 1), py = txm_clampi((int)(y + 0.5), 0, w->height - 1);
+    const int32_t at = nearest[(size_t)py * (size_t)w->width + (size_t)px];
+    const double dx = at % w->width - x, dy = at / w->width - y;
+    return at < 0 ? 1e30 : sqrt(dx * dx + dy * dy);
+}
+
+/* The target for a texel on face i of the disk. */
+static txi_target txi_make_target(const txi_sheet *l, size_t i, uint32_t texel) {
+    txi_target t;
+    double w[3], right[2] = {1, 0}, down[2] = {0, 1}, x = 0, y = 0;
+    txi_texel_weights(l->d, l->disk.faces[i], texel, w);
+    for (size_t k = 0; k < 3; k++) {
+        x += w[k] * l->at[l->disk.corner[3 * i + k]].x;
+        y += w[k] * l->at[l->disk.corner[3 * i + k]].y;
+    }
+    txi_texel_steps(l, i, right, down);
+    const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
+    t.texel = texel;
+    t.x = txm_float(x);
+    t.y = txm_float(y);
+    t.axis = length > 0 ? txm_v2(txm_float(right[0] / length), txm_float(right[1] / length)) : txm_v2(1, 0);
+    t.mirrored = right[0] * down[1] - right[1] * down[0] < 0;
+    return t;
+}
+
+/* Does the window show the target where it is, and not another part of the disk that lies over it? */
+static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const txi_target *t) {
+    const int x = txm_clampi((int)((double)t->x + 0.5), 0, w->width - 1);
+    const int y = txm_clampi((int)((double)t->y + 0.5), 0, w->height - 1);
+    const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
+    if (w->face[pixel] == TXI_NO_FACE || w->face[pixel] == l->disk.faces[i]) return 1;
+    const txm_dvec3 p = txm_d3_scale(txm_d3_sub(txi_texel_point(l->d, l->disk.faces[i], t->texel),
+                                                l->flat.point[0]), 1 / l->pixel);
+    const txm_vec3 q = w->place[pixel];
+    return txm_d3_dist(p, txm_d3(q.x, q.y, q.z)) < 4;
+}
+
+/* Collect the targets of the hole: those that lie well away from cuts through it, are hardly distorted and
+   not covered; all if that is none. Returns 0 if that is too few and a smaller part of the hole should be
+   tried. marks, nearest: scratch, 1 per pixel. */
+static int txi_sheet_targets(txi_sheet *l, txi_window *w, uint8_t *marks, int32_t *nearest,
+                           txm_status *status) {
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    size_t total = 0, good = 0, bent = 0;
+    double deepest = 0;
+    memset(marks, 0, pixels);
+    const size_t cuts = txi_mark_cuts(l, w, 1, marks);
+    if (cuts) *status = txi_nearest(marks, w->width, w->height, l->env, nearest);
+    if (*status != TXM_OK) return 1;
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        const uint32_t f = l->disk.faces[i];
+        size_t count;
+        const uint32_t *texels = txi_face_texels(l->s, f, &count);
+        if (l->state[f] != TXI_SHEET_GROUP) continue;
+        for (size_t k = 0; k < count; k++) {
+            if (!l->d->missing[texels[k]]) continue;
+            const txi_target t = txi_make_target(l, i, texels[k]);
+            w->targets[total++] = t;
+            if (cuts) deepest = fmax(deepest, txi_from_marks(w, nearest, t.x, t.y));
+        }
+    }
+    const int margin = l->reach ? (int)TXI_MARGIN : (int)TXI_SEAM;
+    const double seam = cuts ? fmin(margin, 0.4 * deepest) : 0;
+    size_t at = 0;
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        const uint32_t f = l->disk.faces[i];
+        if (l->state[f] != TXI_SHEET_GROUP) continue;
+        const int is_true = txi_is_true(l, i);
+        for (size_t n = txi_missing_count(l->d, f); n > 0; n--) {
+            const txi_target t = w->targets[at++];
+            const int is_away = !cuts || txi_from_marks(w, nearest, t.x, t.y) >= seam;
+            const int is_fine = is_true && txi_is_shown(l, w, i, &t);
+            bent += is_away && !is_fine;
+            /* the refused ones are swapped behind the others */
+            if (!is_away || !is_fine) continue;
+            w->targets[at - 1] = w->targets[good];
+            w->targets[good++] = t;
+        }
+    }
+    w->target_count = good;
+    if (!cuts && (total <= TXI_SMALL_HOLE || 10 * bent <= total)) w->target_count = total;
+    if (5 * w->target_count >= 2 * total) return 1;
+    if (l->reach != TXI_REACH_LEAST && total > TXI_SMALL_HOLE) return 0;
+    if (2 * good < total) w->target_count = total;
+    return 1;
+}
+
+/* Other holes that lie wholly in the disk, well away from its border, are completed along. */
+static txm_status txi_sheet_others(txi_sheet *l, txi_window *w, uint8_t *marks, int32_t *nearest,
+                                 size_t room) {
+    txi_list hole;
+    int ready = 0;
+    txm_status status = TXM_OK;
+    memset(&hole, 0, sizeof hole);
+    for (size_t i = 0; i < l->disk.face_count && status == TXM_OK; i++) {
+        const uint32_t f = l->disk.faces[i];
+        const size_t before = w->target_count;
+        if (!txi_is_hole(l, f) || l->state[f] != TXI_SHEET_HOLE) continue;
+        if (!ready) {
+            memset(marks, 0, (size_t)w->width * (size_t)w->height);
+            txi_mark_cuts(l, w, 0, marks);
+            status = txi_nearest(marks, w->width, w->height, l->env, nearest);
+            if (status != TXM_OK) return status;
+            ready = 1;
+        }
+        hole.count = 0;
+        int good = txi_flood_faces(l, f, TXI_SHEET_TAKEN, &l->disk, &hole);
+        if (good < 0) return txi_no_memory(l->env);
+        for (size_t k = 0; k < hole.count && good; k++) {
+            const uint32_t slot = l->disk.slot[hole.items[k]];
+            size_t count;
+            const uint32_t *texels = txi_face_texels(l->s, hole.items[k], &count);
+            good = txi_is_true(l, slot);
+            for (size_t n = 0; n < count && good; n++) {
+                if (!l->d->missing[texels[n]]) continue;
+                const txi_target t = txi_make_target(l, slot, texels[n]);
+                good = w->target_count < room && txi_is_shown(l, w, slot, &t) &&
+                       txi_from_marks(w, nearest, t.x, t.y) >= TXI_GAP;
+                if (good) w->targets[w->target_count++] = t;
+            }
+        }
+        if (!good) w->target_count = before;
+    }
+    return status;
+}
+
+/* ---- layout: one window ---------------------------------------------------------------------- */
+
+/* The window of a face that cannot be laid out, as neither it nor what is around it has an area: its
+   part of the atlas. */
+static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w) {
+    const txm_vec2 *t = l->s->uv + 3 * (size_t)l->centre;
+    size_t count, k = 0;
+    double weight[3], x = 0, y = 0;
+    const uint32_t *texels = txi_face_texels(l->s, l->centre, &count);
+    while (k + 1 < count && !l->d->missing[texels[k]]) k++;
+    txi_texel_weights(l->d, l->centre, texels[k], weight);
+    for (int i = 0; i < 3; i++) {
+        x += weight[i] * t[i].x;
+        y += weight[i] * t[i].y;
+    }
+    /* the window's pixels are texels, its middle is the first of the missing ones */
+    const int left = (int)floor(x + 0.5) - TXI_FLAT_SIDE / 2, top = (int)floor(y + 0.5) - TXI_FLAT_SIDE / 2;
+    txm_status status = txi_window_alloc(w, TXI_FLAT_SIDE, TXI_FLAT_SIDE, arena, l->env);
+    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
+    if (!w->targets) return txi_no_memory(l->env);
+    for (size_t i = 0; i < (size_t)TXI_FLAT_SIDE * TXI_FLAT_SIDE; i++) {
+        const int px = left + (int)(i % TXI_FLAT_SIDE), py = top + (int)(i / TXI_FLAT_SIDE);
+        if (!txi_weights(t, px, py, weight)) continue;
+        if (weight[0] < -1e-6 || weight[1] < -1e-6 || weight[2] < -1e-6) continue;
+        w->state[i] = TXI_KNOWN;
+        w->face[i] = l->centre;
+        w->texel[i] = txm_v2((float)px, (float)py);
+        w->place[i] = txm_v3((float)px, (float)py, 0);
+        w->normal[i] = txm_v3(0, 0, 1);
+        w->axis[i] = txm_v2(1, 0);
+    }
+    for (size_t n = 0; n < count; n++) {
+        txi_target target;
+        if (!l->d->missing[texels[n]]) continue;
+        txi_texel_weights(l->d, l->centre, texels[n], weight);
+        x = weight[0] * t[0].x + weight[1] * t[1].x + weight[2] * t[2].x - left;
+        y = weight[0] * t[0].y + weight[1] * t[1].y + weight[2] * t[2].y - top;
+        if (!(x >= 0 && y >= 0 && x < TXI_FLAT_SIDE && y < TXI_FLAT_SIDE)) continue;
+        target.texel = texels[n];
+        target.x = txm_float(x);
+        target.y = txm_float(y);
+        target.axis = txm_v2(1, 0);
+        target.mirrored = 0;
+        w->targets[w->target_count++] = target;
+    }
+    return TXM_OK;
+}
+
+/* Lay out the hole with l->reach. *again: it should be tried with a smaller one. */
+static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, int *again) {
+    const size_t faces = l->s->face_count;
+    const int is_last = l->reach == TXI_REACH_LEAST;
+    *again = 0;
+    txi_find_centre(l);
+    txm_status status = txi_disk_init(&l->disk, l->s, faces, l->scratch, l->env);
+    if (status == TXM_OK) status = txi_sheet_disk(l);
+    if (status == TXM_OK) status = txi_sheet_flat(l);
+    if (status != TXM_OK) return status;
+    l->at = (txm_vec2 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec2));
+    l->normal = (txm_vec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec3));
+    uint32_t *counts = (uint32_t *)txm_arena_alloc(l->scratch, faces, sizeof(uint32_t));
+    if (l->scratch->failed) return txi_no_memory(l->env);
+    if (!txi_sheet_place(l, counts)) {
+        if (is_last) return txi_sheet_alone(l, arena, w);
+        *again = 1;
+        return TXM_OK;
+    }
+    const size_t pixels = (size_t)l->width * (size_t)l->height;
+    size_t room = 0;
+    for (size_t i = 0; i < l->disk.face_count; i++) room += txi_missing_count(l->d, l->disk.faces[i]);
+    uint8_t *marks = (uint8_t *)txm_arena_alloc(l->scratch, pixels, 1);
+    int32_t *nearest = (int32_t *)txm_arena_alloc(l->scratch, pixels, sizeof(int32_t));
+    if (!marks || !nearest) return txi_no_memory(l->env);
+    status = txi_window_alloc(w, l->width, l->height, arena, l->env);
+    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, room, sizeof(txi_target));
+    if (status != TXM_OK || !w->targets) return txi_no_memory(l->env);
+    txi_sheet_normals(l);
+    txi_sheet_pixels(l, w);
+    *again = !txi_sheet_targets(l, w, marks, nearest, &status);
+    if (status == TXM_OK && !*again) status = txi_sheet_others(l, w, marks, nearest, room);
+    return status;
+}
+
+/* Lay out the hole of a face: all of it in one window if that can be done; else a disk at its rim, smaller
+   and smaller until it lies flat enough. */
+static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch, txm_arena *arena,
+                                 txm_env *env, txi_window *w) {
+    const txi_surface *s = d->surface;
+    txi_sheet l;
+    int again = 1;
+    memset(&l, 0, sizeof l);
+    l.d = d;
+    l.s = s;
+    l.env = env;
+    l.scratch = scratch;
+    l.state = (uint8_t *)txm_arena_zero(scratch, s->face_count, 1);
+    l.from_hole = (double *)txm_arena_alloc(scratch, s->vertex_count, sizeof(double));
+    l.from_centre = (double *)txm_arena_alloc(scratch, s->vertex_count, sizeof(double));
+    l.key = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
+    l.size = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
+    l.weight = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
+    if (scratch->failed) return txi_no_memory(env);
+    txm_status status = txi_find_group(&l, seed);
+    if (status == TXM_OK && !(l.pixel > 0)) {
+        l.centre = seed;
+        return txi_sheet_alone(&l, arena, w);
+    }
+    if (l.texels > TXI_WHOLE_MOST) l.reach = TXI_REACH_MOST;
+    while (status == TXM_OK && again) {
+        txm_arena inner, *outer = l.scratch;
+        txm_arena_init(&inner, env);
+        l.scratch = &inner;
+        status = txi_sheet_try(&l, arena, w, &again);
+        txm_arena_free(&inner);
+        l.scratch = outer;
+        if (!again) break;
+        l.reach = l.reach ? l.reach / 2 : (int)(0.75 * sqrt((double)l.texels));
+        l.reach = txm_clampi(l.reach, TXI_REACH_LEAST, TXI_REACH_MOST);
+    }
+    return status;
+}
+
+/* Lay out the next window with missing texels: of the first hole, in the order of the texture, or of a
+   part of it. found receives 0 if none are left; else the window has one target or more. Its memory is
+   the arena's. */
 static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
                                    int *found) {
-    return txi_picture_window(d, arena, env, w, found);
+    txi_surface *s = d->surface;
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    txm_arena scratch;
+    if (!s) return txi_picture_window(d, arena, env, w, found);
+    while (s->cursor < texels && !(d->missing[s->cursor] && d->covered[s->cursor])) s->cursor++;
+    *found = s->cursor < texels;
+    if (!*found) return TXM_OK;
+    txm_arena_init(&scratch, env);
+    const txm_status status = txi_sheet_window(d, s->owner[s->cursor], &scratch, arena, env, w);
+    txm_arena_free(&scratch);
+    if (status == TXM_OK) txi_window_colors(d, w);
+    return status;
 }
 
 /* ---- harmonic ---- */

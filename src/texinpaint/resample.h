@@ -38,10 +38,6 @@ static void txi_spline(double t, double weight[TXI_TAPS]) {
     weight[3] = t * t * (-0.5 + 0.5 * t);
 }
 
-static int txi_wrap(int i, int n) {
-    const int r = i % n;
-    return r < 0 ? r + n : r;
-}
 
 /* May a pixel on this face take texel (x, y), not wrapped yet? Its number, or -1: there is none, or
    it belongs to another chart. */

@@ -237,13 +237,4 @@ static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *e
     return status;
 }
 
-/* ---- window: the next one -------------------------------------------------------------------- */
-
-/* Lay out the next window with missing texels. found receives 0 if there are none left; else at least
-   one texel is a target. */
-static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
-                                   int *found) {
-    return txi_picture_window(d, arena, env, w, found);
-}
-
 #endif /* TEXINPAINT_WINDOW_H */

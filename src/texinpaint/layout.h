@@ -1,0 +1,804 @@
+#ifndef TEXINPAINT_LAYOUT_H
+#define TEXINPAINT_LAYOUT_H
+
+#include "flatten.h"
+#include "window.h"
+
+/* ---- layout: parts of surfaces --------------------------------------------------------------- */
+
+enum {
+    TXI_GAP = 24,              /* pixels: holes that are so near are laid out together; ours   */
+    TXI_GROUP_MOST = 150000,   /* pixels of holes that are joined                              */
+    TXI_WHOLE_MOST = 300000,   /* pixels of a hole that is tried in one window                 */
+    TXI_DISK_MOST = 700000,    /* pixels of a disk                                             */
+    TXI_REACH_MOST = 400,      /* pixels: radius of a window at the rim of a larger hole       */
+    TXI_REACH_LEAST = 64,      /* ... the smallest that is tried                               */
+    TXI_SEAM = 16,             /* pixels: what lies nearer to a cut through the hole is left to the
+                                  next window                                                  */
+    TXI_FLAT_SIDE = 512,       /* pixels: side of a window of a face that cannot be laid out   */
+    TXI_SMALL_HOLE = 400       /* texels: however it is distorted, it is done at once          */
+};
+
+/* Faces whose scale differs from 1 by more in any direction are left to the next window. */
+#define TXI_STRETCH 1.6
+
+/* A window in the making. Per face or vertex of the surface, all of its memory is scratch. */
+typedef struct txi_sheet {
+    txi_domain *d;
+    const txi_surface *s;
+    txm_env *env;
+    txm_arena *scratch;
+    uint8_t *state;        /* by face: what txi_is_hole has found out, or TXI_SHEET_...             */
+    txi_list group;        /* the faces of the hole that is to be completed                       */
+    size_t texels;         /* missing texels of the group                                         */
+    double pixel;          /* side of a pixel, in the unit of the surface                         */
+    uint32_t centre;       /* face that the disk grows from                                       */
+    double *from_hole, *from_centre; /* by vertex: distances                                      */
+    double *key, *size, *weight;     /* by face, for txi_growth                                   */
+    txi_disk disk;
+    txi_flat flat;
+    double *rigid;         /* by face of the disk                                                 */
+    txm_vec2 *at;          /* by vertex of the disk: where it lies in the window                  */
+    txm_vec3 *normal;      /* by vertex of the disk                                               */
+    int width, height;     /* of the window                                                       */
+    int reach;             /* pixels around the centre that are laid out; 0: the whole hole       */
+} txi_sheet;
+
+enum { TXI_SHEET_UNSEEN = 0, TXI_SHEET_KNOWN, TXI_SHEET_HOLE, TXI_SHEET_GROUP, TXI_SHEET_TAKEN, TXI_SHEET_REFUSED };
+
+/* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing any
+   longer */
+static const uint32_t *txi_face_texels(const txi_surface *s, uint32_t face, size_t *count) {
+    *count = s->hole_first[face + 1] - s->hole_first[face];
+    return s->hole + s->hole_first[face];
+}
+
+/* Is something missing on a face? Small ones may own no texel: the one at their middle counts. */
+static int txi_is_hole(txi_sheet *l, uint32_t face) {
+    const txi_domain *d = l->d;
+    size_t count;
+    if (l->state[face] != TXI_SHEET_UNSEEN) return l->state[face] != TXI_SHEET_KNOWN;
+    const uint32_t *texels = txi_face_texels(l->s, face, &count);
+    int is_hole = 0;
+    for (size_t i = 0; i < count && !is_hole; i++) is_hole = d->missing[texels[i]];
+    if (!is_hole) {
+        const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
+        const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+        const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+        const size_t i = (size_t)py * (size_t)d->width + (size_t)px;
+        is_hole = d->missing[i] &&
+                  (!d->covered[i] || l->s->chart[l->s->owner[i]] == l->s->chart[face]);
+    }
+    l->state[face] = (uint8_t)(is_hole ? TXI_SHEET_HOLE : TXI_SHEET_KNOWN);
+    return is_hole;
+}
+
+/* Where texel i lies in a face that owns it, in texels that are not wrapped, and its weights there. */
+static void txi_texel_weights(const txi_domain *d, uint32_t face, uint32_t texel, double weight[3]) {
+    const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
+    const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
+    double least_x = t[0].x, least_y = t[0].y, most_x = t[0].x, most_y = t[0].y, best = -1e300;
+    weight[0] = weight[1] = weight[2] = 1.0 / 3;
+    for (int k = 1; k < 3; k++) {
+        least_x = fmin(least_x, t[k].x);
+        least_y = fmin(least_y, t[k].y);
+        most_x = fmax(most_x, t[k].x);
+        most_y = fmax(most_y, t[k].y);
+    }
+    const int from_x = (int)ceil((least_x - x - 0.5) / d->width);
+    const int from_y = (int)ceil((least_y - y - 0.5) / d->height);
+    const int to_x = (int)floor((most_x - x + 0.5) / d->width);
+    const int to_y = (int)floor((most_y - y + 0.5) / d->height);
+    for (int j = from_y; j <= to_y && best < -1e-5; j++) {
+        for (int i = from_x; i <= to_x && best < -1e-5; i++) {
+            double w[3];
+            if (!txi_weights(t, x + (double)i * d->width, y + (double)j * d->height, w)) return;
+            const double least = fmin(w[0], fmin(w[1], w[2]));
+            if (least <= best) continue;
+            best = least;
+            memcpy(weight, w, sizeof w);
+        }
+    }
+}
+
+/* where the texel lies on the surface */
+static txm_dvec3 txi_texel_point(const txi_domain *d, uint32_t face, uint32_t texel) {
+    double w[3];
+    txm_dvec3 p = txm_d3(0, 0, 0);
+    txi_texel_weights(d, face, texel, w);
+    for (uint32_t k = 0; k < 3; k++) p = txm_d3_mad(p, txi_corner_point(d->surface, 3 * face + k), w[k]);
+    return p;
+}
+
+static size_t txi_missing_count(const txi_domain *d, uint32_t face) {
+    size_t count, missing = 0;
+    const uint32_t *texels = txi_face_texels(d->surface, face, &count);
+    for (size_t i = 0; i < count; i++) missing += d->missing[texels[i]] != 0;
+    return missing;
+}
+
+/* ---- layout: the hole ------------------------------------------------------------------------ */
+
+/* Add to list the hole that a face belongs to, connected across sides; its faces get this state. Faces
+   outside the disk, if there is one, end it: 0. -1: no memory. */
+static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi_disk *disk, txi_list *list) {
+    size_t at = list->count;
+    int inside = 1;
+    if (!txi_push(list, l->scratch, face)) return -1;
+    l->state[face] = state;
+    for (; at < list->count; at++) {
+        const uint32_t f = list->items[at];
+        if (disk && disk->slot[f] == TXI_NO_FACE) inside = 0;
+        for (uint32_t k = 0; k < 3 && inside; k++) {
+            const uint32_t o = l->s->opposite[3 * f + k];
+            if (o == TXM_NO_SIDE || !txi_is_hole(l, o / 3) || l->state[o / 3] != TXI_SHEET_HOLE) continue;
+            if (!txi_push(list, l->scratch, o / 3)) return -1;
+            l->state[o / 3] = state;
+        }
+    }
+    return inside;
+}
+
+/* The side of a pixel: that of a texel in the hole, in the mean. 0 if it has no area. */
+static void txi_measure(txi_sheet *l) {
+    double area = 0;
+    l->texels = 0;
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        const size_t missing = txi_missing_count(l->d, f);
+        const txm_vec2 *t = l->s->uv + 3 * (size_t)f;
+        if (!missing) continue;
+        area += (double)missing * txm_d3_len(txi_face_area2(l->s, f)) / fabs(txi_cross2(t[0], t[1], t[2]));
+        l->texels += missing;
+    }
+    l->pixel = l->texels ? sqrt(area / (double)l->texels) : 0;
+}
+
+/* Distances of the vertices from the missing texels of the group. */
+static txm_status txi_measure_from_hole(txi_sheet *l, double limit) {
+    const size_t count = 3 * l->group.count;
+    uint32_t *sources = (uint32_t *)txm_arena_alloc(l->scratch, count, sizeof(uint32_t));
+    double *start = (double *)txm_arena_alloc(l->scratch, count, sizeof(double));
+    if (!sources || !start) return txi_no_memory(l->env);
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        size_t texels;
+        const uint32_t *texel = txi_face_texels(l->s, f, &texels);
+        double *least = start + 3 * i;
+        least[0] = least[1] = least[2] = TXI_UNREACHED;
+        for (size_t k = 0; k < texels; k++) {
+            if (!l->d->missing[texel[k]]) continue;
+            const txm_dvec3 p = txi_texel_point(l->d, f, texel[k]);
+            for (uint32_t c = 0; c < 3; c++)
+                least[c] = fmin(least[c], txm_d3_dist(p, txi_corner_point(l->s, 3 * f + c)));
+        }
+        for (uint32_t c = 0; c < 3; c++) {
+            sources[3 * i + c] = l->s->vertex[3 * f + c];
+            if (least[c] >= TXI_UNREACHED) least[c] = 0; /* a face without texels */
+        }
+    }
+    return txi_geodesic(l->s, sources, start, count, limit, l->env, l->from_hole);
+}
+
+/* The first hole, and those within TXI_GAP of it or of one another. */
+static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
+    txm_status status = TXM_OK;
+    txi_is_hole(l, seed);
+    if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+    txi_measure(l);
+    for (int round = 0, grown = 1; round < 4 && grown && l->pixel > 0; round++) {
+        grown = 0;
+        status = txi_measure_from_hole(l, TXI_GAP * l->pixel);
+        for (uint32_t v = 0; v < l->s->vertex_count && status == TXM_OK; v++) {
+            if (l->from_hole[v] >= TXI_UNREACHED) continue;
+            for (uint32_t i = l->s->first[v]; i < l->s->first[v + 1]; i++) {
+                const uint32_t f = l->s->corners[i] / 3;
+                const size_t before = l->group.count;
+                if (!txi_is_hole(l, f) || l->state[f] != TXI_SHEET_HOLE) continue;
+                if (txi_flood_faces(l, f, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+                size_t more = l->texels;
+                for (size_t k = before; k < l->group.count; k++)
+                    more += txi_missing_count(l->d, l->group.items[k]);
+                if (more > TXI_GROUP_MOST) { /* too large: left to a later window */
+                    for (size_t k = before; k < l->group.count; k++)
+                        l->state[l->group.items[k]] = TXI_SHEET_REFUSED;
+                    l->group.count = before;
+                    continue;
+                }
+                l->texels = more;
+                grown = 1;
+            }
+        }
+        if (status != TXM_OK) return status;
+        txi_measure(l);
+    }
+    return TXM_OK;
+}
+
+/* The face that the disk grows from: in the middle of the hole, or, if only a part of it is laid out, at
+   its rim. */
+static void txi_find_centre(txi_sheet *l) {
+    txm_dvec3 middle = txm_d3(0, 0, 0);
+    double count = 0, least = 0;
+    int found = 0;
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        const double n = (double)txi_missing_count(l->d, f);
+        for (uint32_t k = 0; k < 3; k++) middle = txm_d3_mad(middle, txi_corner_point(l->s, 3 * f + k), n / 3);
+        count += n;
+    }
+    middle = txm_d3_scale(middle, 1 / count);
+    for (size_t i = 0; i < l->group.count; i++) {
+        const uint32_t f = l->group.items[i];
+        txm_dvec3 p = txm_d3(0, 0, 0);
+        int is_rim = 0;
+        if (!txi_missing_count(l->d, f)) continue;
+        for (uint32_t k = 0; k < 3; k++) {
+            const uint32_t o = l->s->opposite[3 * f + k];
+            p = txm_d3_mad(p, txi_corner_point(l->s, 3 * f + k), 1.0 / 3);
+            is_rim |= o != TXM_NO_SIDE && !txi_is_hole(l, o / 3);
+        }
+        const double apart = l->reach ? (is_rim ? 0 : 1) : txm_d3_dist2(p, middle);
+        if (found && apart >= least) continue;
+        found = 1;
+        least = apart;
+        l->centre = f;
+    }
+}
+
+/* ---- layout: the disk ------------------------------------------------------------------------ */
+
+/* Is the middle of a face texture that may be copied? */
+static int txi_is_usable_face(const txi_domain *d, uint32_t face) {
+    const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
+    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+    return d->usable[(size_t)py * (size_t)d->width + (size_t)px];
+}
+
+static double txi_mean_of(const txi_surface *s, uint32_t face, const double *value) {
+    const uint32_t *v = s->vertex + 3 * (size_t)face;
+    return (value[v[0]] + value[v[1]] + value[v[2]]) / 3;
+}
+static double txi_least_of(const txi_surface *s, uint32_t face, const double *value) {
+    const uint32_t *v = s->vertex + 3 * (size_t)face;
+    return fmin(value[v[0]], fmin(value[v[1]], value[v[2]]));
+}
+
+/* Grow the disk: the hole from its centre, then what is known around it; or everything around the centre
+   up to l->reach. */
+static txm_status txi_sheet_disk(txi_sheet *l) {
+    const txi_surface *s = l->s;
+    const double pixel = l->pixel, band = txi_band(l->texels) * pixel;
+    txi_growth g;
+    double start[3], extent = 0;
+    const txm_dvec3 a = txi_corner_point(s, 3 * l->centre);
+    const txm_dvec3 b = txi_corner_point(s, 3 * l->centre + 1), c = txi_corner_point(s, 3 * l->centre + 2);
+    const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(a, b), c), 1.0 / 3);
+    start[0] = txm_d3_dist(a, middle);
+    start[1] = txm_d3_dist(b, middle);
+    start[2] = txm_d3_dist(c, middle);
+    for (size_t i = 0; i < 3 * l->group.count; i++) {
+        const uint32_t corner = 3 * l->group.items[i / 3] + (uint32_t)(i % 3);
+        extent = fmax(extent, txm_d3_dist(middle, txi_corner_point(s, corner)));
+    }
+    const double limit = l->reach ? 1.5 * l->reach * pixel : 2 * extent + pixel;
+    txm_status status = txi_geodesic(s, s->vertex + 3 * (size_t)l->centre, start, 3, limit, l->env,
+                                     l->from_centre);
+    if (status == TXM_OK) status = txi_measure_from_hole(l, 4 * band);
+    if (status != TXM_OK) return status;
+    for (size_t v = 0; v < s->vertex_count; v++) {
+        if (l->from_centre[v] >= TXI_UNREACHED)
+            l->from_centre[v] = limit + txm_d3_dist(s->point[v], middle);
+        l->from_hole[v] = fmin(l->from_hole[v], 4 * band);
+    }
+    const double outside = 4 * (limit + extent); /* above all keys of the hole's faces */
+    for (uint32_t f = 0; f < s->face_count; f++) {
+        const int is_group = l->state[f] == TXI_SHEET_GROUP;
+        l->weight[f] = txm_d3_len(txi_face_area2(s, f)) / (2 * pixel * pixel);
+        l->size[f] = !is_group && txi_is_usable_face(l->d, f) ? l->weight[f] : 0;
+        l->key[f] = l->reach || is_group ? txi_mean_of(s, f, l->from_centre)
+                                         : outside + txi_least_of(s, f, l->from_hole);
+    }
+    const double wanted = 1.5 * (double)l->texels;
+    g.key = l->key;
+    g.size = l->size;
+    g.weight = l->weight;
+    g.most = TXI_DISK_MOST;
+    g.stop_least = l->reach ? l->reach * pixel : outside + band;
+    g.stop = l->reach ? l->reach * pixel : outside + 3 * band;
+    g.wanted = l->reach ? 1e300 : wanted > 8000 ? wanted : 8000;
+    return txi_disk_grow(&l->disk, s, l->centre, &g, l->env);
+}
+
+/* Lay the disk out. The hole is kept rigid, what is known gives way the more the farther it is. */
+static txm_status txi_sheet_flat(txi_sheet *l) {
+    const size_t faces = l->disk.face_count;
+    uint32_t *number = (uint32_t *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(uint32_t));
+    txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_dvec3));
+    l->rigid = (double *)txm_arena_alloc(l->scratch, faces, sizeof(double));
+    if (!number || !point || !l->rigid) return txi_no_memory(l->env);
+    txi_disk_finish(&l->disk, l->s, number, point);
+    for (size_t i = 0; i < faces; i++) {
+        const uint32_t f = l->disk.faces[i];
+        const double apart = txi_mean_of(l->s, f, l->from_hole) / (40 * l->pixel);
+        l->rigid[i] = 1;
+        if (!l->reach && l->state[f] != TXI_SHEET_GROUP)
+            l->rigid[i] = 0.02 + 0.98 * txm_exp2(-fmin(apart * apart, 100) * 1.44269504088896341);
+    }
+    txm_status status = txi_flat_init(&l->flat, l->s, &l->disk, point, l->scratch, l->env);
+    if (status == TXM_OK) status = txi_flatten(&l->flat, l->rigid, 0.02 * l->pixel, l->env);
+    return status;
+}
+
+/* The step in the window, y downwards, for a step of one texel to the right and one down, on face i of
+   the disk. 0: the face has no area in the atlas. */
+static int txi_texel_steps(const txi_sheet *l, size_t i, double right[2], double down[2]) {
+    const txm_vec2 *t = l->s->uv + 3 * (size_t)l->disk.faces[i];
+    const uint32_t *c = l->disk.corner + 3 * i;
+    const double area = txi_cross2(t[0], t[1], t[2]);
+    if (!(fabs(area) > 1e-12)) return 0;
+    const double u1 = (double)t[1].x - t[0].x, v1 = (double)t[1].y - t[0].y;
+    const double u2 = (double)t[2].x - t[0].x, v2 = (double)t[2].y - t[0].y;
+    for (int axis = 0; axis < 2; axis++) {
+        const double p0 = axis ? l->at[c[0]].y : l->at[c[0]].x;
+        const double p1 = (axis ? l->at[c[1]].y : l->at[c[1]].x) - p0;
+        const double p2 = (axis ? l->at[c[2]].y : l->at[c[2]].x) - p0;
+        right[axis] = (p1 * v2 - p2 * v1) / area;
+        down[axis] = (p2 * u1 - p1 * u2) / area;
+    }
+    return 1;
+}
+
+/* The chart that has most of the missing texels. */
+static uint32_t txi_main_chart(const txi_sheet *l, uint32_t *counts) {
+    uint32_t best = l->s->chart[l->centre];
+    memset(counts, 0, l->s->face_count * sizeof *counts);
+    for (size_t i = 0; i < l->group.count; i++)
+        counts[l->s->chart[l->group.items[i]]] += (uint32_t)txi_missing_count(l->d, l->group.items[i]);
+    for (uint32_t c = 0; c < l->s->face_count; c++) {
+        if (counts[c] > counts[best]) best = c;
+    }
+    return best;
+}
+
+/* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that on the
+   main chart texels and pixels coincide as well as they can, so that little is lost by interpolation.
+   0: it is not finite, or too large for a window. */
+static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
+    const txi_disk *disk = &l->disk;
+    const uint32_t chart = txi_main_chart(l, counts);
+    double c = 0, s = 0, left = 0, top = 0, right = 0, bottom = 0, off[2] = {0, 0};
+    int64_t reference = -1;
+    for (size_t v = 0; v < disk->vertex_count; v++) {
+        const double x = l->flat.xy[2 * v] / l->pixel, y = -l->flat.xy[2 * v + 1] / l->pixel;
+        if (!(fabs(x) < 1e6 && fabs(y) < 1e6)) return 0;
+        l->at[v] = txm_v2(txm_float(x), txm_float(y));
+    }
+    for (size_t i = 0; i < disk->face_count; i++) {
+        double u[2], v[2];
+        const double n = (double)txi_missing_count(l->d, disk->faces[i]);
+        if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v)) continue;
+        c += n * u[0];
+        s += n * u[1];
+        if (reference < 0) reference = (int64_t)i;
+    }
+    const double length = sqrt(c * c + s * s);
+    c = length > 0 ? c / length : 1;
+    s = length > 0 ? s / length : 0;
+    for (size_t v = 0; v < disk->vertex_count; v++) {
+        const double x = c * l->at[v].x + s * l->at[v].y, y = c * l->at[v].y - s * l->at[v].x;
+        l->at[v] = txm_v2(txm_float(x), txm_float(y));
+        left = v ? fmin(left, x) : x;
+        top = v ? fmin(top, y) : y;
+        right = v ? fmax(right, x) : x;
+        bottom = v ? fmax(bottom, y) : y;
+    }
+    if ((right - left + 4) * (bottom - top + 4) > TXI_WINDOW_MOST) return 0;
+    if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
+        size_t count, k = 0;
+        const uint32_t face = disk->faces[reference], *texels = txi_face_texels(l->s, face, &count);
+        double w[3];
+        while (k + 1 < count && !l->d->missing[texels[k]]) k++;
+        txi_texel_weights(l->d, face, texels[k], w);
+        for (size_t i = 0; i < 3; i++) {
+            const txm_vec2 p = l->at[disk->corner[3 * (size_t)reference + i]];
+            off[0] += w[i] * p.x;
+            off[1] += w[i] * p.y;
+        }
+    }
+    off[0] += floor(left - off[0]) - 1;
+    off[1] += floor(top - off[1]) - 1;
+    for (size_t v = 0; v < disk->vertex_count; v++)
+        l->at[v] = txm_v2(txm_float(l->at[v].x - off[0]), txm_float(l->at[v].y - off[1]));
+    l->width = (int)(right - off[0]) + 3;
+    l->height = (int)(bottom - off[1]) + 3;
+    return 1;
+}
+
+/* ---- layout: pixels -------------------------------------------------------------------------- */
+
+static void txi_sheet_normals(txi_sheet *l) {
+    const txi_disk *disk = &l->disk;
+    const double unit = 1 / (l->pixel * l->pixel);
+    for (size_t v = 0; v < disk->vertex_count; v++) l->normal[v] = txm_v3(0, 0, 0);
+    for (size_t i = 0; i < 3 * disk->face_count; i++) {
+        const txm_dvec3 n = txm_d3_scale(txi_face_area2(l->s, disk->faces[i / 3]), unit);
+        const txm_vec3 add = txm_v3(txm_float(n.x), txm_float(n.y), txm_float(n.z));
+        l->normal[disk->corner[i]] = txm_vec3_add(l->normal[disk->corner[i]], add);
+    }
+    for (size_t v = 0; v < disk->vertex_count; v++) l->normal[v] = txm_vec3_normalize(l->normal[v]);
+}
+
+/* Fill a pixel that lies on face i of the disk. */
+static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, size_t i, const double weight[3],
+                          const double right[2], int mirrored) {
+    const uint32_t face = l->disk.faces[i], *c = l->disk.corner + 3 * i;
+    const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
+    double x = 0, y = 0;
+    txm_dvec3 p = txm_d3(0, 0, 0);
+    txm_vec3 n = txm_v3(0, 0, 0);
+    for (int k = 0; k < 3; k++) {
+        x += weight[k] * t[k].x;
+        y += weight[k] * t[k].y;
+        p = txm_d3_mad(p, txm_d3_sub(l->flat.point[c[k]], l->flat.point[0]), weight[k] / l->pixel);
+        n = txm_vec3_add(n, txm_vec3_scale(l->normal[c[k]], txm_float(weight[k])));
+    }
+    const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
+    w->state[pixel] = TXI_KNOWN;
+    w->face[pixel] = face;
+    w->texel[pixel] = txm_v2(txm_float(x), txm_float(y));
+    w->place[pixel] = txm_v3(txm_float(p.x), txm_float(p.y), txm_float(p.z));
+    w->normal[pixel] = txm_vec3_normalize(n);
+    w->axis[pixel] = length > 0 ? txm_v2(txm_float(right[0] / length), txm_float(right[1] / length))
+                                : txm_v2(1, 0);
+    w->mirrored[pixel] = (uint8_t)mirrored;
+}
+
+/* Is face i of the disk the right way round in the window, where y runs downwards? */
+static int txi_lies_right(const txi_sheet *l, size_t i) {
+    const uint32_t *c = l->disk.corner + 3 * i;
+    return txi_cross2(l->at[c[0]], l->at[c[1]], l->at[c[2]]) < -1e-9;
+}
+
+/* Fill the pixels whose centres the faces of the disk cover. Where the disk overlaps itself the face that
+   came first stays, which is the one nearer to the hole. */
+static void txi_sheet_pixels(const txi_sheet *l, txi_window *w) {
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        txm_vec2 t[3];
+        double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
+        if (!txi_lies_right(l, i)) continue;
+        for (size_t k = 0; k < 3; k++) t[k] = l->at[l->disk.corner[3 * i + k]];
+        txi_texel_steps(l, i, right, down);
+        const int mirrored = right[0] * down[1] - right[1] * down[0] < 0;
+        const float top = txm_minf(t[0].y, txm_minf(t[1].y, t[2].y));
+        const float bottom = txm_maxf(t[0].y, txm_maxf(t[1].y, t[2].y));
+        const float from = txm_minf(t[0].x, txm_minf(t[1].x, t[2].x));
+        const float to = txm_maxf(t[0].x, txm_maxf(t[1].x, t[2].x));
+        const int x0 = txm_clampi((int)ceil((double)from - 1e-4), 0, w->width - 1);
+        const int x1 = txm_clampi((int)floor((double)to + 1e-4), 0, w->width - 1);
+        const int y0 = txm_clampi((int)ceil((double)top - 1e-4), 0, w->height - 1);
+        const int y1 = txm_clampi((int)floor((double)bottom + 1e-4), 0, w->height - 1);
+        for (int y = y0; y <= y1; y++) {
+            for (int x = x0; x <= x1; x++) {
+                const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
+                if (w->face[pixel] != TXI_NO_FACE || !txi_weights(t, x, y, weight)) continue;
+                if (weight[0] < -1e-6 || weight[1] < -1e-6 || weight[2] < -1e-6) continue;
+                txi_sheet_pixel(l, w, pixel, i, weight, right, mirrored);
+            }
+        }
+    }
+}
+
+/* ---- layout: targets ------------------------------------------------------------------------- */
+
+/* Is face i of the disk laid out with little distortion: its singular values between 1 / TXI_STRETCH
+   and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
+
+       Q = |(a + d, c - b)| / 2,   R = |(a - d, c + b)| / 2.                                   */
+static int txi_is_true(const txi_sheet *l, size_t i) {
+    const double *shape = l->flat.shape + 3 * i;
+    const uint32_t *v = l->disk.corner + 3 * i;
+    const double *p = l->flat.xy + 2 * (size_t)v[0], *q = l->flat.xy + 2 * (size_t)v[1];
+    const double *r = l->flat.xy + 2 * (size_t)v[2];
+    if (!txi_lies_right(l, i)) return 0;
+    if (!(shape[0] > 0 && shape[2] > 0)) return 1;
+    const double a = (q[0] - p[0]) / shape[0], c = (q[1] - p[1]) / shape[0];
+    const double b = (r[0] - p[0] - a * shape[1]) / shape[2], d = (r[1] - p[1] - c * shape[1]) / shape[2];
+    const double m = sqrt((a + d) * (a + d) + (c - b) * (c - b)) / 2;
+    const double n = sqrt((a - d) * (a - d) + (c + b) * (c + b)) / 2;
+    return m + n < TXI_STRETCH && fabs(m - n) > 1 / TXI_STRETCH;
+}
+
+/* Mark the pixels along the border of the disk where the surface goes on: all of it, or only where it
+   goes through the hole. Returns how many sides that were. */
+static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, uint8_t *marks) {
+    uint32_t side = l->disk.border;
+    size_t count = 0;
+    for (size_t k = 0; k < l->disk.loop; k++, side = l->disk.next[side]) {
+        const uint32_t here = txi_surface_side(&l->disk, side), beyond = l->s->opposite[here];
+        if (beyond == TXM_NO_SIDE) continue;
+        if (only_holes && (!txi_is_hole(l, here / 3) || !txi_is_hole(l, beyond / 3))) continue;
+        const txm_vec2 a = l->at[l->disk.corner[side]], b = l->at[l->disk.corner[txi_next_corner(side)]];
+        const double dx = (double)b.x - a.x, dy = (double)b.y - a.y;
+        const int steps = (int)(2 * sqrt(dx * dx + dy * dy)) + 1;
+        for (int i = 0; i <= steps; i++) {
+            const int x = txm_clampi((int)(a.x + dx * i / steps + 0.5), 0, w->width - 1);
+            const int y = txm_clampi((int)(a.y + dy * i / steps + 0.5), 0, w->height - 1);
+            marks[(size_t)y * (size_t)w->width + (size_t)x] = 1;
+        }
+        count++;
+    }
+    return count;
+}
+
+/* The distance of a place in the window from the nearest mark. */
+static double txi_from_marks(const txi_window *w, const int32_t *nearest, double x, double y) {
+    const int px = txm_clampi((int)(x + 0.5), 0, w->width - 1), py = txm_clampi((int)(y + 0.5), 0, w->height - 1);
+    const int32_t at = nearest[(size_t)py * (size_t)w->width + (size_t)px];
+    const double dx = at % w->width - x, dy = at / w->width - y;
+    return at < 0 ? 1e30 : sqrt(dx * dx + dy * dy);
+}
+
+/* The target for a texel on face i of the disk. */
+static txi_target txi_make_target(const txi_sheet *l, size_t i, uint32_t texel) {
+    txi_target t;
+    double w[3], right[2] = {1, 0}, down[2] = {0, 1}, x = 0, y = 0;
+    txi_texel_weights(l->d, l->disk.faces[i], texel, w);
+    for (size_t k = 0; k < 3; k++) {
+        x += w[k] * l->at[l->disk.corner[3 * i + k]].x;
+        y += w[k] * l->at[l->disk.corner[3 * i + k]].y;
+    }
+    txi_texel_steps(l, i, right, down);
+    const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
+    t.texel = texel;
+    t.x = txm_float(x);
+    t.y = txm_float(y);
+    t.axis = length > 0 ? txm_v2(txm_float(right[0] / length), txm_float(right[1] / length)) : txm_v2(1, 0);
+    t.mirrored = right[0] * down[1] - right[1] * down[0] < 0;
+    return t;
+}
+
+/* Does the window show the target where it is, and not another part of the disk that lies over it? */
+static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const txi_target *t) {
+    const int x = txm_clampi((int)((double)t->x + 0.5), 0, w->width - 1);
+    const int y = txm_clampi((int)((double)t->y + 0.5), 0, w->height - 1);
+    const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
+    if (w->face[pixel] == TXI_NO_FACE || w->face[pixel] == l->disk.faces[i]) return 1;
+    const txm_dvec3 p = txm_d3_scale(txm_d3_sub(txi_texel_point(l->d, l->disk.faces[i], t->texel),
+                                                l->flat.point[0]), 1 / l->pixel);
+    const txm_vec3 q = w->place[pixel];
+    return txm_d3_dist(p, txm_d3(q.x, q.y, q.z)) < 4;
+}
+
+/* Collect the targets of the hole: those that lie well away from cuts through it, are hardly distorted and
+   not covered; all if that is none. Returns 0 if that is too few and a smaller part of the hole should be
+   tried. marks, nearest: scratch, 1 per pixel. */
+static int txi_sheet_targets(txi_sheet *l, txi_window *w, uint8_t *marks, int32_t *nearest,
+                           txm_status *status) {
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    size_t total = 0, good = 0, bent = 0;
+    double deepest = 0;
+    memset(marks, 0, pixels);
+    const size_t cuts = txi_mark_cuts(l, w, 1, marks);
+    if (cuts) *status = txi_nearest(marks, w->width, w->height, l->env, nearest);
+    if (*status != TXM_OK) return 1;
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        const uint32_t f = l->disk.faces[i];
+        size_t count;
+        const uint32_t *texels = txi_face_texels(l->s, f, &count);
+        if (l->state[f] != TXI_SHEET_GROUP) continue;
+        for (size_t k = 0; k < count; k++) {
+            if (!l->d->missing[texels[k]]) continue;
+            const txi_target t = txi_make_target(l, i, texels[k]);
+            w->targets[total++] = t;
+            if (cuts) deepest = fmax(deepest, txi_from_marks(w, nearest, t.x, t.y));
+        }
+    }
+    const int margin = l->reach ? (int)TXI_MARGIN : (int)TXI_SEAM;
+    const double seam = cuts ? fmin(margin, 0.4 * deepest) : 0;
+    size_t at = 0;
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        const uint32_t f = l->disk.faces[i];
+        if (l->state[f] != TXI_SHEET_GROUP) continue;
+        const int is_true = txi_is_true(l, i);
+        for (size_t n = txi_missing_count(l->d, f); n > 0; n--) {
+            const txi_target t = w->targets[at++];
+            const int is_away = !cuts || txi_from_marks(w, nearest, t.x, t.y) >= seam;
+            const int is_fine = is_true && txi_is_shown(l, w, i, &t);
+            bent += is_away && !is_fine;
+            /* the refused ones are swapped behind the others */
+            if (!is_away || !is_fine) continue;
+            w->targets[at - 1] = w->targets[good];
+            w->targets[good++] = t;
+        }
+    }
+    w->target_count = good;
+    if (!cuts && (total <= TXI_SMALL_HOLE || 10 * bent <= total)) w->target_count = total;
+    if (5 * w->target_count >= 2 * total) return 1;
+    if (l->reach != TXI_REACH_LEAST && total > TXI_SMALL_HOLE) return 0;
+    if (2 * good < total) w->target_count = total;
+    return 1;
+}
+
+/* Other holes that lie wholly in the disk, well away from its border, are completed along. */
+static txm_status txi_sheet_others(txi_sheet *l, txi_window *w, uint8_t *marks, int32_t *nearest,
+                                 size_t room) {
+    txi_list hole;
+    int ready = 0;
+    txm_status status = TXM_OK;
+    memset(&hole, 0, sizeof hole);
+    for (size_t i = 0; i < l->disk.face_count && status == TXM_OK; i++) {
+        const uint32_t f = l->disk.faces[i];
+        const size_t before = w->target_count;
+        if (!txi_is_hole(l, f) || l->state[f] != TXI_SHEET_HOLE) continue;
+        if (!ready) {
+            memset(marks, 0, (size_t)w->width * (size_t)w->height);
+            txi_mark_cuts(l, w, 0, marks);
+            status = txi_nearest(marks, w->width, w->height, l->env, nearest);
+            if (status != TXM_OK) return status;
+            ready = 1;
+        }
+        hole.count = 0;
+        int good = txi_flood_faces(l, f, TXI_SHEET_TAKEN, &l->disk, &hole);
+        if (good < 0) return txi_no_memory(l->env);
+        for (size_t k = 0; k < hole.count && good; k++) {
+            const uint32_t slot = l->disk.slot[hole.items[k]];
+            size_t count;
+            const uint32_t *texels = txi_face_texels(l->s, hole.items[k], &count);
+            good = txi_is_true(l, slot);
+            for (size_t n = 0; n < count && good; n++) {
+                if (!l->d->missing[texels[n]]) continue;
+                const txi_target t = txi_make_target(l, slot, texels[n]);
+                good = w->target_count < room && txi_is_shown(l, w, slot, &t) &&
+                       txi_from_marks(w, nearest, t.x, t.y) >= TXI_GAP;
+                if (good) w->targets[w->target_count++] = t;
+            }
+        }
+        if (!good) w->target_count = before;
+    }
+    return status;
+}
+
+/* ---- layout: one window ---------------------------------------------------------------------- */
+
+/* The window of a face that cannot be laid out, as neither it nor what is around it has an area: its
+   part of the atlas. */
+static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w) {
+    const txm_vec2 *t = l->s->uv + 3 * (size_t)l->centre;
+    size_t count, k = 0;
+    double weight[3], x = 0, y = 0;
+    const uint32_t *texels = txi_face_texels(l->s, l->centre, &count);
+    while (k + 1 < count && !l->d->missing[texels[k]]) k++;
+    txi_texel_weights(l->d, l->centre, texels[k], weight);
+    for (int i = 0; i < 3; i++) {
+        x += weight[i] * t[i].x;
+        y += weight[i] * t[i].y;
+    }
+    /* the window's pixels are texels, its middle is the first of the missing ones */
+    const int left = (int)floor(x + 0.5) - TXI_FLAT_SIDE / 2, top = (int)floor(y + 0.5) - TXI_FLAT_SIDE / 2;
+    txm_status status = txi_window_alloc(w, TXI_FLAT_SIDE, TXI_FLAT_SIDE, arena, l->env);
+    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
+    if (!w->targets) return txi_no_memory(l->env);
+    for (size_t i = 0; i < (size_t)TXI_FLAT_SIDE * TXI_FLAT_SIDE; i++) {
+        const int px = left + (int)(i % TXI_FLAT_SIDE), py = top + (int)(i / TXI_FLAT_SIDE);
+        if (!txi_weights(t, px, py, weight)) continue;
+        if (weight[0] < -1e-6 || weight[1] < -1e-6 || weight[2] < -1e-6) continue;
+        w->state[i] = TXI_KNOWN;
+        w->face[i] = l->centre;
+        w->texel[i] = txm_v2((float)px, (float)py);
+        w->place[i] = txm_v3((float)px, (float)py, 0);
+        w->normal[i] = txm_v3(0, 0, 1);
+        w->axis[i] = txm_v2(1, 0);
+    }
+    for (size_t n = 0; n < count; n++) {
+        txi_target target;
+        if (!l->d->missing[texels[n]]) continue;
+        txi_texel_weights(l->d, l->centre, texels[n], weight);
+        x = weight[0] * t[0].x + weight[1] * t[1].x + weight[2] * t[2].x - left;
+        y = weight[0] * t[0].y + weight[1] * t[1].y + weight[2] * t[2].y - top;
+        if (!(x >= 0 && y >= 0 && x < TXI_FLAT_SIDE && y < TXI_FLAT_SIDE)) continue;
+        target.texel = texels[n];
+        target.x = txm_float(x);
+        target.y = txm_float(y);
+        target.axis = txm_v2(1, 0);
+        target.mirrored = 0;
+        w->targets[w->target_count++] = target;
+    }
+    return TXM_OK;
+}
+
+/* Lay out the hole with l->reach. *again: it should be tried with a smaller one. */
+static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, int *again) {
+    const size_t faces = l->s->face_count;
+    const int is_last = l->reach == TXI_REACH_LEAST;
+    *again = 0;
+    txi_find_centre(l);
+    txm_status status = txi_disk_init(&l->disk, l->s, faces, l->scratch, l->env);
+    if (status == TXM_OK) status = txi_sheet_disk(l);
+    if (status == TXM_OK) status = txi_sheet_flat(l);
+    if (status != TXM_OK) return status;
+    l->at = (txm_vec2 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec2));
+    l->normal = (txm_vec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec3));
+    uint32_t *counts = (uint32_t *)txm_arena_alloc(l->scratch, faces, sizeof(uint32_t));
+    if (l->scratch->failed) return txi_no_memory(l->env);
+    if (!txi_sheet_place(l, counts)) {
+        if (is_last) return txi_sheet_alone(l, arena, w);
+        *again = 1;
+        return TXM_OK;
+    }
+    const size_t pixels = (size_t)l->width * (size_t)l->height;
+    size_t room = 0;
+    for (size_t i = 0; i < l->disk.face_count; i++) room += txi_missing_count(l->d, l->disk.faces[i]);
+    uint8_t *marks = (uint8_t *)txm_arena_alloc(l->scratch, pixels, 1);
+    int32_t *nearest = (int32_t *)txm_arena_alloc(l->scratch, pixels, sizeof(int32_t));
+    if (!marks || !nearest) return txi_no_memory(l->env);
+    status = txi_window_alloc(w, l->width, l->height, arena, l->env);
+    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, room, sizeof(txi_target));
+    if (status != TXM_OK || !w->targets) return txi_no_memory(l->env);
+    txi_sheet_normals(l);
+    txi_sheet_pixels(l, w);
+    *again = !txi_sheet_targets(l, w, marks, nearest, &status);
+    if (status == TXM_OK && !*again) status = txi_sheet_others(l, w, marks, nearest, room);
+    return status;
+}
+
+/* Lay out the hole of a face: all of it in one window if that can be done; else a disk at its rim, smaller
+   and smaller until it lies flat enough. */
+static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch, txm_arena *arena,
+                                 txm_env *env, txi_window *w) {
+    const txi_surface *s = d->surface;
+    txi_sheet l;
+    int again = 1;
+    memset(&l, 0, sizeof l);
+    l.d = d;
+    l.s = s;
+    l.env = env;
+    l.scratch = scratch;
+    l.state = (uint8_t *)txm_arena_zero(scratch, s->face_count, 1);
+    l.from_hole = (double *)txm_arena_alloc(scratch, s->vertex_count, sizeof(double));
+    l.from_centre = (double *)txm_arena_alloc(scratch, s->vertex_count, sizeof(double));
+    l.key = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
+    l.size = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
+    l.weight = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
+    if (scratch->failed) return txi_no_memory(env);
+    txm_status status = txi_find_group(&l, seed);
+    if (status == TXM_OK && !(l.pixel > 0)) {
+        l.centre = seed;
+        return txi_sheet_alone(&l, arena, w);
+    }
+    if (l.texels > TXI_WHOLE_MOST) l.reach = TXI_REACH_MOST;
+    while (status == TXM_OK && again) {
+        txm_arena inner, *outer = l.scratch;
+        txm_arena_init(&inner, env);
+        l.scratch = &inner;
+        status = txi_sheet_try(&l, arena, w, &again);
+        txm_arena_free(&inner);
+        l.scratch = outer;
+        if (!again) break;
+        l.reach = l.reach ? l.reach / 2 : (int)(0.75 * sqrt((double)l.texels));
+        l.reach = txm_clampi(l.reach, TXI_REACH_LEAST, TXI_REACH_MOST);
+    }
+    return status;
+}
+
+/* Lay out the next window with missing texels: of the first hole, in the order of the texture, or of a
+   part of it. found receives 0 if none are left; else the window has one target or more. Its memory is
+   the arena's. */
+static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
+                                   int *found) {
+    txi_surface *s = d->surface;
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    txm_arena scratch;
+    if (!s) return txi_picture_window(d, arena, env, w, found);
+    while (s->cursor < texels && !(d->missing[s->cursor] && d->covered[s->cursor])) s->cursor++;
+    *found = s->cursor < texels;
+    if (!*found) return TXM_OK;
+    txm_arena_init(&scratch, env);
+    const txm_status status = txi_sheet_window(d, s->owner[s->cursor], &scratch, arena, env, w);
+    txm_arena_free(&scratch);
+    if (status == TXM_OK) txi_window_colors(d, w);
+    return status;
+}
+
+#endif /* TEXINPAINT_LAYOUT_H */
