@@ -9870,7 +9870,7 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena
         }
     }
     h->preview = (uint8_t *)txm_arena_alloc(arena, pixels, 4);
-    if (!h->preview) return txi_no_memory(env);
+    if (!h->preview || !txi_field_make(c->filler, arena, &h->field)) return txi_no_memory(env);
     if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
