@@ -7268,38 +7268,46 @@ typedef struct txi_lay {
     float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
 } txi_lay;
 
-/* For each hole pixel near a strip its nearest column. box: x0, y0, x1, y1, inclusive. */
+/* The pixels within `radius` of a place, clipped to the window: x0, y0, x1, y1, inclusive. */
+static void txi_lay_around(const txi_window *w, txm_vec2 p, int radius, int box[4]) {
+    box[0] = txm_clampi((int)p.x - radius, 0, w->width - 1);
+    box[1] = txm_clampi((int)p.y - radius, 0, w->height - 1);
+    box[2] = txm_clampi((int)p.x + radius + 1, 0, w->width - 1);
+    box[3] = txm_clampi((int)p.y + radius + 1, 0, w->height - 1);
+}
+
+/* For each hole pixel near a strip its nearest column; -1 for all others in the box of the strip. */
 static void txi_lay_nearest(txi_lay *lay, const txi_strip *s, int box[4]) {
     const txi_window *w = lay->all->w;
     float widest = 0;
+    int b[4];
     box[0] = w->width, box[1] = w->height, box[2] = box[3] = -1;
     for (int i = 0; i < s->line.count; i++) widest = txm_maxf(widest, s->line.half[i]);
     const int radius = (int)widest + TXI_STRIP_MARGIN + 2;
-    for (int pass = 0; pass < 2; pass++) { /* clear, then find */
-        for (int i = s->first; i <= s->last; i++) {
-            const txm_vec2 p = s->line.place[i];
-            const int x0 = txm_clampi((int)p.x - radius, 0, w->width - 1);
-            const int x1 = txm_clampi((int)p.x + radius + 1, 0, w->width - 1);
-            const int y0 = txm_clampi((int)p.y - radius, 0, w->height - 1);
-            const int y1 = txm_clampi((int)p.y + radius + 1, 0, w->height - 1);
-            for (int y = y0; y <= y1; y++) {
-                for (int x = x0; x <= x1; x++) {
-                    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
-                    const double dx = x - (double)p.x, dy = y - (double)p.y;
-                    const float square = txm_float(dx * dx + dy * dy);
-                    if (!pass) {
-                        lay->columns[at] = -1;
-                    } else if (w->state[at] == TXI_HOLE &&
-                               (lay->columns[at] < 0 || square < lay->squares[at])) {
-                        lay->squares[at] = square;
-                        lay->columns[at] = i;
-                    }
-                }
+    for (int i = s->first; i <= s->last; i++) {
+        txi_lay_around(w, s->line.place[i], radius, b);
+        for (int k = 0; k < 2; k++) {
+            box[k] = b[k] < box[k] ? b[k] : box[k];
+            box[k + 2] = b[k + 2] > box[k + 2] ? b[k + 2] : box[k + 2];
+        }
+    }
+    for (int y = box[1]; y <= box[3]; y++)
+        for (int x = box[0]; x <= box[2]; x++)
+            lay->columns[(size_t)y * (size_t)w->width + (size_t)x] = -1;
+    for (int i = s->first; i <= s->last; i++) {
+        const txm_vec2 p = s->line.place[i];
+        txi_lay_around(w, p, radius, b);
+        for (int y = b[1]; y <= b[3]; y++) {
+            for (int x = b[0]; x <= b[2]; x++) {
+                const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+                const double dx = x - (double)p.x, dy = y - (double)p.y;
+                const float square = txm_float(dx * dx + dy * dy);
+                if (w->state[at] != TXI_HOLE ||
+                    (lay->columns[at] >= 0 && square >= lay->squares[at]))
+                    continue;
+                lay->squares[at] = square;
+                lay->columns[at] = i;
             }
-            box[0] = x0 < box[0] ? x0 : box[0];
-            box[1] = y0 < box[1] ? y0 : box[1];
-            box[2] = x1 > box[2] ? x1 : box[2];
-            box[3] = y1 > box[3] ? y1 : box[3];
         }
     }
 }
