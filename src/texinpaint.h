@@ -43,7 +43,9 @@
      [1] K. Guo, X. Chen, Y. Liu, B. Zhou, Y. Guo. Geometric based structure propagation and texture
          matching for 3D texture completion. 2013.
      [2] S. Yoshizawa, A. Belyaev, H.-P. Seidel. Fast and robust detection of crest lines on meshes.
-         ACM Symposium on Solid and Physical Modeling 2005.                                     */
+         ACM Symposium on Solid and Physical Modeling 2005.
+     [3] Y. Notay. An aggregation-based algebraic multigrid method. Electronic Transactions on
+         Numerical Analysis 37, 2010.                                                          */
 #ifndef TEXINPAINT_H
 #define TEXINPAINT_H
 
@@ -256,6 +258,8 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/resample.h"
 #include "texinpaint/window.h"
 #include "texinpaint/layout.h"
+#include "texinpaint/graph.h"
+#include "texinpaint/multigrid.h"
 #include "texinpaint/harmonic.h"
 #include "texinpaint/curvature.h"
 #include "texinpaint/crest.h"
