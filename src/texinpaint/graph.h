@@ -29,14 +29,14 @@ enum {
 
 /* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each in the
    rows of both its nodes; those to known texels in `rim`. */
-typedef struct txi_graph {
+typedef struct txi_texel_graph {
     size_t count;
     uint32_t *texel;       /* 1 per node                                                        */
     uint32_t *first, *to;  /* links of node i: to[first[i]] .. to[first[i + 1] - 1], nodes      */
     float *weight;         /* 1 per link                                                        */
     uint32_t *rim_first, *rim; /* the same for known neighbours, which are texels               */
     float *rim_weight;
-} txi_graph;
+} txi_texel_graph;
 
 /* The links of a texel: offsets e and weights w_e. */
 typedef struct txi_stencil {
@@ -134,7 +134,7 @@ static int txi_cross_side(const txi_surface *s, uint32_t side, double along, dou
 
 /* Walk on the surface: from a place on a face, in its own texels, by a step. face and place receive
    where it ends. 0: at a border of the surface, or where a face has no area. */
-static int txi_walk(const txi_surface *s, uint32_t *face, double place[2], const double by[2]) {
+static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2], const double by[2]) {
     double step[2] = {by[0], by[1]};
     uint32_t entry = TXM_NO_SIDE;
     for (int count = 0; count < TXI_WALK_MOST; count++) {
@@ -248,7 +248,7 @@ static void txi_links_step(const txi_domain *d, uint32_t texel, uint32_t face, i
     double place[2];
     const double by[2] = {(double)x, (double)y};
     txi_texel_place(d, face, texel, place);
-    if (!txi_walk(d->surface, &face, place, by)) return;
+    if (!txi_walk_surface(d->surface, &face, place, by)) return;
     const double rx = floor(place[0] + 0.5), ry = floor(place[1] + 0.5);
     if (fabs(place[0] - rx) < 1e-3 && fabs(place[1] - ry) < 1e-3) { /* within a chart: at a texel */
         const int64_t t = txi_tap(d, face, (int)rx, (int)ry);
@@ -304,7 +304,7 @@ enum { TXI_NODE_NONE = 0, TXI_NODE_KNOWN = 1, TXI_NODE_UNKNOWN = 2 };
 
 /* Count the links of all nodes, or (filling) store them. node: 1 per texel, the node of unknown ones. */
 static void txi_graph_pass(const txi_domain *d, const uint8_t *marks, const uint32_t *node,
-                           int filling, txi_graph *g, size_t total[2]) {
+                           int filling, txi_texel_graph *g, size_t total[2]) {
     total[0] = total[1] = 0;
     for (size_t i = 0; i < g->count; i++) {
         txi_links links;
@@ -357,7 +357,7 @@ static void txi_graph_merge(size_t count, uint32_t total, uint32_t *first, uint3
    return  TXM_OK, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED
    cost    about 0.3 us and 100 bytes per unknown texel, 4 bytes per texel                  */
 static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_arena *arena,
-                                 txm_env *env, txi_graph *g) {
+                                 txm_env *env, txi_texel_graph *g) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
     size_t total[2], count = 0;
     memset(g, 0, sizeof *g);
@@ -391,7 +391,7 @@ static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_
 }
 
 /* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per node. */
-static void txi_graph_islands(const txi_graph *g, uint32_t *queue, uint8_t *island) {
+static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t *island) {
     size_t count = 0;
     memset(island, 1, g->count);
     for (size_t i = 0; i < g->count; i++) {

@@ -130,7 +130,7 @@ static txm_dvec3 txi_texel_point(const txi_domain *d, uint32_t texel) {
 /* For each node the known texel that is nearest, of those that its neighbours have: distances in a
    straight line, spread from the rim along the links until nothing changes. Nodes of islands get
    UINT32_MAX. */
-static txm_status txi_nearest_known(const txi_domain *d, const txi_graph *g, uint32_t *source,
+static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *g, uint32_t *source,
                                     txm_env *env) {
     txm_arena scratch;
     size_t head = 0, waiting = 0;
@@ -181,7 +181,7 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_graph *g, uin
 }
 
 /* The label of the nearest known texel; the first known one of the map where there is none. */
-static void txi_fill_labels(const txi_domain *d, const txi_graph *g, int map, const uint32_t *source,
+static void txi_fill_labels(const txi_domain *d, const txi_texel_graph *g, int map, const uint32_t *source,
                             const uint8_t *marks) {
     const txm_image *image = &d->maps[map];
     const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
@@ -202,16 +202,8 @@ static double txi_fill_tolerance(txm_sample sample) {
     return sample == TXM_U8 ? 1e-4 : sample == TXM_U16 ? 1e-6 : 1e-7;
 }
 
-/* The quantities of one map while they are solved for. */
-typedef struct txi_filling {
-    const txi_grid *grid;
-    double *b, *x; /* count of each quantity, one quantity after the other                      */
-    size_t count;
-    double tolerance;
-} txi_filling;
-
 /* Fill one map of the nodes. b, x: room for TXI_FILL_MOST per node. */
-static txm_status txi_fill_map(const txi_domain *d, const txi_graph *g, const txi_grid *grid, int map,
+static txm_status txi_fill_map(const txi_domain *d, const txi_texel_graph *g, const txi_grid *grid, int map,
                                const uint8_t *marks, const uint8_t *island, double *b, double *x,
                                txm_env *env) {
     const txi_quantities q = txi_quantities_of(d, map);
@@ -248,7 +240,7 @@ static txm_status txi_fill_map(const txi_domain *d, const txi_graph *g, const tx
 /* Fill the unknown texels of all maps. */
 static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, txm_arena *arena,
                                  txm_env *env) {
-    txi_graph g;
+    txi_texel_graph g;
     txi_grid grid;
     int labels = 0;
     const txm_status made = txi_graph_make(d, marks, arena, env, &g);
@@ -288,7 +280,7 @@ static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, txm_
    return  TXM_OK, TXM_TOO_SMALL if nothing is known, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY,
            TXM_CANCELLED; after these the missing texels of some maps may be filled
    cost    about 3 us per missing texel for three channels, 300 bytes                       */
-static txm_status txi_harmonic_fill(const txi_domain *d, const uint8_t *given, txm_env *env) {
+static txm_status txi_harmonic_around(const txi_domain *d, const uint8_t *given, txm_env *env) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
     size_t known = 0, unknown = 0;
     txm_arena arena;
@@ -312,6 +304,11 @@ static txm_status txi_harmonic_fill(const txi_domain *d, const uint8_t *given, t
     return status;
 }
 
+/* The same with nothing given. */
+static txm_status txi_harmonic_fill(const txi_domain *d, txm_env *env) {
+    return txi_harmonic_around(d, NULL, env);
+}
+
 /* ---- smooth fill: public calls --------------------------------------------------------------- */
 
 /* Copy the maps out. */
@@ -333,7 +330,7 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
     if (status == TXM_OK) status = txi_surface_make(&d, &arena, env);
     if (status == TXM_OK) {
         txi_stage_begin(&stage, env, 0, 0.95f);
-        status = txi_stage_end(&stage, txi_harmonic_fill(&d, NULL, &stage.env));
+        status = txi_stage_end(&stage, txi_harmonic_fill(&d, &stage.env));
     }
     if (status == TXM_OK && txm_progress(env, 0.95f, "gutters")) status = txi_stopped(env);
     if (status == TXM_OK) {

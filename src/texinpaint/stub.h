@@ -6,11 +6,6 @@
 
 /* ---- stubs: whoever lands the real function takes its stub away here --------------------------- */
 
-static txm_status txi_harmonic_fill(txi_domain *d, txm_env *env) {
-    (void)d, (void)env;
-    return TXM_OK;
-}
-
 static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *crests,
                                  const txi_window *w, txm_arena *arena, txm_env *env,
                                  txi_prior *prior) {
