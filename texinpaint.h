@@ -43,7 +43,9 @@
      [1] K. Guo, X. Chen, Y. Liu, B. Zhou, Y. Guo. Geometric based structure propagation and texture
          matching for 3D texture completion. 2013.
      [2] S. Yoshizawa, A. Belyaev, H.-P. Seidel. Fast and robust detection of crest lines on meshes.
-         ACM Symposium on Solid and Physical Modeling 2005.                                     */
+         ACM Symposium on Solid and Physical Modeling 2005.
+     [3] Y. Notay. An aggregation-based algebraic multigrid method. Electronic Transactions on
+         Numerical Analysis 37, 2010.                                                          */
 #ifndef TEXINPAINT_H
 #define TEXINPAINT_H
 
@@ -579,69 +581,6 @@ static void txi_show(const txi_domain *domain, const char *name, uint8_t *pixels
     picture.height = height;
     picture.channels = channels;
     domain->desc->show(domain->desc->show_user, name, &picture);
-}
-
-/* ---- a mesh without duplicates ---------------------------------------------------------------
-   Meshes with texture coordinates often repeat a vertex for each chart that it lies in. Geometry is
-   computed on a mesh in which vertices in equal places are one.                                */
-
-typedef struct txi_welded {
-    uint32_t *vertex; /* 1 per vertex of the input: the first vertex in the same place          */
-    txm_mesh mesh;    /* the positions of the input, faces of welded vertices                   */
-    uint32_t *face;   /* 1 per face of mesh: its number in the input                            */
-} txi_welded;
-
-/* For each vertex the lowest one in the same place (-0 is 0). pairs: room for 2 per vertex. */
-static void txi_weld_vertices(const txm_mesh *input, txm_pair *pairs, uint32_t *first) {
-    const size_t n = input->vertex_count;
-    for (size_t i = 0; i < n; i++) pairs[i].value = (uint32_t)i;
-    for (size_t axis = 3; axis-- > 0;) {
-        for (size_t i = 0; i < n; i++) /* + 0: -0 becomes 0 */
-            pairs[i].key = txm_sort_key(input->positions[3 * (size_t)pairs[i].value + axis] + 0.0f);
-        txm_sort_pairs(pairs, pairs + n, n); /* stable: equal places stay in order of number */
-    }
-    for (size_t i = 0; i < n; i++) {
-        const size_t v = pairs[i].value, before = i ? pairs[i - 1].value : v;
-        const float *p = input->positions + 3 * v, *q = input->positions + 3 * before;
-        int equal = i > 0;
-        for (int k = 0; k < 3; k++) equal &= p[k] >= q[k] && p[k] <= q[k];
-        first[v] = equal ? first[before] : (uint32_t)v;
-    }
-}
-
-/* Weld a checked mesh of triangles; faces of which two corners are in one place are left out.
-   return  TXM_OK, TXM_TOO_LARGE or TXM_OUT_OF_MEMORY
-   cost    O(vertices + faces)                                                              */
-static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
-                                txi_welded *weld) {
-    const size_t n = input->vertex_count;
-    size_t count = 0;
-    txm_arena scratch;
-    txm_arena_init(&scratch, env);
-    memset(weld, 0, sizeof *weld);
-    weld->mesh = *input;
-    weld->mesh.face_count = 0;
-    if (input->face_count == 0) return TXM_OK;
-    if (n > UINT32_MAX) return txm_fail(env, TXM_TOO_LARGE, "mesh: more than 2^32 - 1 vertices");
-    uint32_t *indices = (uint32_t *)txm_arena_alloc(arena, input->face_count, 3 * sizeof(uint32_t));
-    weld->face = (uint32_t *)txm_arena_alloc(arena, input->face_count, sizeof(uint32_t));
-    weld->vertex = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
-    if (arena->failed || !pairs) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
-    txi_weld_vertices(input, pairs, weld->vertex);
-    txm_arena_free(&scratch);
-    for (size_t f = 0; f < input->face_count; f++) {
-        uint32_t *t = indices + 3 * count;
-        for (size_t k = 0; k < 3; k++) t[k] = weld->vertex[input->indices[3 * f + k]];
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        weld->face[count++] = (uint32_t)f;
-    }
-    weld->mesh.indices = indices;
-    weld->mesh.face_count = count;
-    return TXM_OK;
 }
 
 /* ---- surface: a mesh across the seams of its atlas ------------------------------------------- */
@@ -3145,7 +3084,1136 @@ static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env
     return status;
 }
 
-/* ---- harmonic ---- */
+/* ---- graph of texels -------------------------------------------------------------------------
+   The unknown texels of a map as nodes of a graph, with links to their neighbours on the surface,
+   across the seams of the atlas too. Weights are such that
+
+       sum over links  w (u_i - u_j)^2   approximates   integral over the surface of |grad u|^2
+
+   so that its minimum is harmonic on the surface, however the atlas is stretched or sheared. With the
+   metric G of a face (per texel) the integral over a texel is  grad u . D grad u,  D = sqrt(det G) G^-1;
+   D is written as a sum of  w_e e e^T  with weights w_e >= 0 and three whole offsets e, which are the
+   links (Selling's reduction; for squares: right and down, both of weight 1). No weight is negative,
+   so that u never leaves the range of its boundary values.
+
+   An offset that leaves the face of a texel is walked along the surface. Where the walk crosses a seam
+   it ends between texels of another chart; the link is then shared out to the four around, bilinearly,
+   so that functions that are linear on the surface pass seams unchanged.                      */
+
+enum {
+    TXI_WALK_MOST = 64,    /* faces that one walk may cross; ours                               */
+    TXI_STENCIL = 3,       /* offsets                                                           */
+    TXI_MERGE_MOST = 256,  /* links of a row that are merged; ours: the time is quadratic       */
+    TXI_LINKS_MOST = 24    /* links made by one node: 3 offsets, to and fro, 4 texels each      */
+};
+#define TXI_SHEAR 64.0   /* ratio of the eigenvalues of D at most: offsets stay below 9 texels */
+
+/* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each in the
+   rows of both its nodes; those to known texels in `rim`. */
+typedef struct txi_texel_graph {
+    size_t count;
+    uint32_t *texel;       /* 1 per node                                                        */
+    uint32_t *first, *to;  /* links of node i: to[first[i]] .. to[first[i + 1] - 1], nodes      */
+    float *weight;         /* 1 per link                                                        */
+    uint32_t *rim_first, *rim; /* the same for known neighbours, which are texels               */
+    float *rim_weight;
+} txi_texel_graph;
+
+/* The links of a texel: offsets e and weights w_e. */
+typedef struct txi_stencil {
+    int x[TXI_STENCIL], y[TXI_STENCIL];
+    double weight[TXI_STENCIL];
+} txi_stencil;
+
+/* D = (a b; b c), positive definite, as a sum of w e e^T. Starting with the superbase (1, 0), (0, 1),
+   (-1, -1), two vectors u, v of it with u . D v > 0 are replaced by -u, v, and u - v, until no two
+   are left; then  D = sum over pairs of  -(u . D v) (third vector, turned by 90 degrees) (...)^T. */
+static txi_stencil txi_stencil_of(double a, double b, double c) {
+    txi_stencil s = {{1, 0, -1}, {0, 1, -1}, {0, 0, 0}};
+    for (int round = 0, k = 0; round < 64 && k < 3; round++) {
+        for (k = 0; k < 3; k++) {
+            const int i = (k + 1) % 3, j = (k + 2) % 3;
+            const double dot = a * s.x[i] * s.x[j] + c * s.y[i] * s.y[j] +
+                               b * (s.x[i] * s.y[j] + s.y[i] * s.x[j]);
+            s.weight[k] = -dot;
+            if (dot > 1e-12 * (a + c)) {
+                s.x[k] = s.x[i] - s.x[j];
+                s.y[k] = s.y[i] - s.y[j];
+                s.x[i] = -s.x[i];
+                s.y[i] = -s.y[i];
+                break;
+            }
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        const int x = s.x[k];
+        s.x[k] = -s.y[k];
+        s.y[k] = x;
+        if (s.weight[k] < 0) s.weight[k] = 0;
+    }
+    return s;
+}
+
+/* The derivatives of the place on a face by u and v, per texel. 0: it has no area in the atlas. */
+static int txi_face_axes(const txi_surface *s, uint32_t face, txm_dvec3 *pu, txm_dvec3 *pv) {
+    const txm_vec2 *t = s->uv + 3 * (size_t)face;
+    const double area = txi_cross2(t[0], t[1], t[2]);
+    const txm_dvec3 p = txi_corner_point(s, 3 * face);
+    const txm_dvec3 q = txm_d3_sub(txi_corner_point(s, 3 * face + 1), p);
+    const txm_dvec3 r = txm_d3_sub(txi_corner_point(s, 3 * face + 2), p);
+    if (!(fabs(area) > 1e-9)) return 0;
+    *pu = txm_d3_scale(txm_d3_sub(txm_d3_scale(q, (double)t[2].y - t[0].y),
+                                  txm_d3_scale(r, (double)t[1].y - t[0].y)), 1 / area);
+    *pv = txm_d3_scale(txm_d3_sub(txm_d3_scale(r, (double)t[1].x - t[0].x),
+                                  txm_d3_scale(q, (double)t[2].x - t[0].x)), 1 / area);
+    return 1;
+}
+
+/* The links of the texels of a face; of a picture: its four neighbours. */
+static txi_stencil txi_face_stencil(const txi_domain *d, uint32_t face) {
+    txm_dvec3 pu, pv;
+    if (!d->surface || !txi_face_axes(d->surface, face, &pu, &pv)) return txi_stencil_of(1, 0, 1);
+    const double e = txm_d3_len2(pu), f = txm_d3_dot(pu, pv), g = txm_d3_len2(pv);
+    const double det = e * g - f * f;
+    if (!(e + g > 0)) return txi_stencil_of(1, 0, 1);
+    /* ratio of the eigenvalues about (e + g)^2 / det: what is more is taken off the larger one */
+    const double least = (e + g) * (e + g) / TXI_SHEAR;
+    const double more = det < least ? (e + g) / TXI_SHEAR : 0;
+    const double root = sqrt((e + more) * (g + more) - f * f);
+    return txi_stencil_of((g + more) / root, -f / root, (e + more) / root);
+}
+
+/* ---- graph: walks ------------------------------------------------------------------------- */
+
+/* The face on the other side of a side, and a place on the side, s of the way along it, and a step in
+   the plane of the first face turned into the plane of the second: place and step in texels of that
+   face. Sewn sides change neither. 0: the second face has no area. */
+static int txi_cross_side(const txi_surface *s, uint32_t side, double along, double place[2],
+                          double step[2]) {
+    const uint32_t other = s->opposite[side], next = txi_next_corner(other);
+    const txm_vec2 from = s->uv[next], to = s->uv[other]; /* the side as the first face runs along it */
+    txm_dvec3 pu, pv, qu, qv;
+    if (txi_is_sewn(s, side, other)) return 1;
+    if (!txi_face_axes(s, side / 3, &pu, &pv) || !txi_face_axes(s, other / 3, &qu, &qv)) return 0;
+    const txm_dvec3 edge = txm_d3_unit(
+        txm_d3_sub(txi_corner_point(s, txi_next_corner(side)), txi_corner_point(s, side)));
+    const txm_dvec3 out = txm_d3_unit(txm_d3_cross(edge, txi_face_area2(s, side / 3)));
+    const txm_dvec3 in = txm_d3_unit(txm_d3_cross(edge, txi_face_area2(s, other / 3)));
+    const txm_dvec3 move = txm_d3_add(txm_d3_scale(pu, step[0]), txm_d3_scale(pv, step[1]));
+    const txm_dvec3 turned = txm_d3_add(txm_d3_scale(edge, txm_d3_dot(move, edge)),
+                                        txm_d3_scale(in, txm_d3_dot(move, out)));
+    /* turned = x qu + y qv */
+    const double e = txm_d3_len2(qu), f = txm_d3_dot(qu, qv), g = txm_d3_len2(qv);
+    const double det = e * g - f * f, u = txm_d3_dot(turned, qu), v = txm_d3_dot(turned, qv);
+    if (!(det > 1e-12 * e * g)) return 0;
+    step[0] = (g * u - f * v) / det;
+    step[1] = (e * v - f * u) / det;
+    place[0] = from.x + ((double)to.x - from.x) * along;
+    place[1] = from.y + ((double)to.y - from.y) * along;
+    return 1;
+}
+
+/* Walk on the surface: from a place on a face, in its own texels, by a step. face and place receive
+   where it ends. 0: at a border of the surface, or where a face has no area. */
+static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2], const double by[2]) {
+    double step[2] = {by[0], by[1]};
+    uint32_t entry = TXM_NO_SIDE;
+    for (int count = 0; count < TXI_WALK_MOST; count++) {
+        const txm_vec2 *t = s->uv + 3 * (size_t)*face;
+        double here[3], there[3], first = 1;
+        int exit = -1;
+        if (!txi_weights(t, place[0], place[1], here)) return 0;
+        if (!txi_weights(t, place[0] + step[0], place[1] + step[1], there)) return 0;
+        for (int k = 0; k < 3; k++) { /* side k is where the weight of corner k + 2 is 0 */
+            const int c = (k + 2) % 3;
+            if (3 * *face + (uint32_t)k == entry || there[c] >= -1e-9 || !(here[c] > there[c])) continue;
+            const double at = here[c] > 0 ? here[c] / (here[c] - there[c]) : 0;
+            if (exit >= 0 && at >= first) continue;
+            first = at;
+            exit = k;
+        }
+        if (exit < 0) {
+            place[0] += step[0];
+            place[1] += step[1];
+            return 1;
+        }
+        const uint32_t side = 3 * *face + (uint32_t)exit;
+        if (s->opposite[side] == TXM_NO_SIDE) return 0;
+        const txm_vec2 a = t[exit], b = t[(exit + 1) % 3];
+        const double dx = (double)b.x - a.x, dy = (double)b.y - a.y;
+        place[0] += step[0] * first;
+        place[1] += step[1] * first;
+        const double along = ((place[0] - a.x) * dx + (place[1] - a.y) * dy) / (dx * dx + dy * dy);
+        for (int k = 0; k < 2; k++) step[k] *= 1 - first;
+        if (!txi_cross_side(s, side, fmin(fmax(along, 0), 1), place, step)) return 0;
+        entry = s->opposite[side];
+        *face = entry / 3;
+    }
+    return 0;
+}
+
+/* Where the texel lies on its face, in the texels of that. */
+static void txi_texel_place(const txi_domain *d, uint32_t face, uint32_t texel, double place[2]) {
+    const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
+    double w[3];
+    txi_texel_weights(d, face, texel, w);
+    place[0] = w[0] * t[0].x + w[1] * t[1].x + w[2] * t[2].x;
+    place[1] = w[0] * t[0].y + w[1] * t[1].y + w[2] * t[2].y;
+}
+
+/* ---- graph: links ------------------------------------------------------------------------- */
+
+/* the links that one node makes */
+typedef struct txi_links {
+    uint32_t texel[TXI_LINKS_MOST];
+    double weight[TXI_LINKS_MOST];
+    int count;
+} txi_links;
+
+static void txi_links_add(txi_links *links, int64_t texel, double weight) {
+    if (texel < 0 || !(weight > 0)) return;
+    links->texel[links->count] = (uint32_t)texel;
+    links->weight[links->count++] = weight;
+}
+
+/* A link to a place between texels: to the four around it that exist, bilinearly, else to the nearest. */
+static void txi_links_share(const txi_domain *d, uint32_t face, const double place[2], double weight,
+                            txi_links *links) {
+    const double fx = floor(place[0]), fy = floor(place[1]);
+    double share[4], sum = 0;
+    int64_t texel[4];
+    for (int k = 0; k < 4; k++) {
+        const double u = place[0] - fx, v = place[1] - fy;
+        texel[k] = txi_tap(d, face, (int)fx + k % 2, (int)fy + k / 2);
+        share[k] = (k % 2 ? u : 1 - u) * (k / 2 ? v : 1 - v);
+        if (texel[k] >= 0 && share[k] > 0.01) sum += share[k];
+    }
+    if (sum > 0.05) {
+        for (int k = 0; k < 4; k++) {
+            if (share[k] > 0.01) txi_links_add(links, texel[k], weight * share[k] / sum);
+        }
+        return;
+    }
+    const txm_vec2 p = txm_v2(txm_float(place[0]), txm_float(place[1]));
+    txi_links_add(links, txi_nearest_tap(d, face, p, 0), weight);
+}
+
+/* The link of a texel by an offset. */
+static void txi_links_step(const txi_domain *d, uint32_t texel, uint32_t face, int x, int y,
+                           double weight, txi_links *links) {
+    const int tx = (int)(texel % (uint32_t)d->width) + x, ty = (int)(texel / (uint32_t)d->width) + y;
+    if (!d->surface) {
+        txi_links_add(links, txi_tap(d, face, tx, ty), weight);
+        return;
+    }
+    const size_t direct = (size_t)txi_wrap(ty, d->height) * (size_t)d->width +
+                          (size_t)txi_wrap(tx, d->width);
+    if (d->surface->owner[direct] == face) {
+        txi_links_add(links, (int64_t)direct, weight);
+        return;
+    }
+    double place[2];
+    const double by[2] = {(double)x, (double)y};
+    txi_texel_place(d, face, texel, place);
+    if (!txi_walk_surface(d->surface, &face, place, by)) return;
+    const double rx = floor(place[0] + 0.5), ry = floor(place[1] + 0.5);
+    if (fabs(place[0] - rx) < 1e-3 && fabs(place[1] - ry) < 1e-3) { /* within a chart: at a texel */
+        const int64_t t = txi_tap(d, face, (int)rx, (int)ry);
+        txi_links_add(links, t, weight);
+        if (t >= 0) return;
+    }
+    txi_links_share(d, face, place, weight, links);
+}
+
+/* All links that a texel makes; `weight` counts half for each of two unknown texels, as both make the
+   link between them, but in full where the other is known. */
+static void txi_links_of(const txi_domain *d, uint32_t texel, txi_links *links) {
+    const uint32_t face = d->surface ? d->surface->owner[texel] : TXI_NO_FACE;
+    const txi_stencil s = txi_face_stencil(d, face);
+    links->count = 0;
+    for (int k = 0; k < 2 * TXI_STENCIL; k++) {
+        const int sign = k % 2 ? -1 : 1;
+        if (s.weight[k / 2] > 1e-6)
+            txi_links_step(d, texel, face, sign * s.x[k / 2], sign * s.y[k / 2], s.weight[k / 2],
+                           links);
+    }
+}
+
+/* Merge the links of one row that go to the same node: sorted by node. Returns their number. Rows of
+   very many links (where texels differ much in size) are left as they are. */
+static uint32_t txi_merge_links(uint32_t *to, float *weight, uint32_t count) {
+    uint32_t kept = 0;
+    if (count > TXI_MERGE_MOST) return count;
+    for (uint32_t i = 1; i < count; i++) {
+        const uint32_t t = to[i];
+        const float w = weight[i];
+        uint32_t k = i;
+        for (; k > 0 && to[k - 1] > t; k--) {
+            to[k] = to[k - 1];
+            weight[k] = weight[k - 1];
+        }
+        to[k] = t;
+        weight[k] = w;
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        if (kept && to[kept - 1] == to[i]) {
+            weight[kept - 1] += weight[i];
+        } else {
+            to[kept] = to[i];
+            weight[kept++] = weight[i];
+        }
+    }
+    return kept;
+}
+
+/* What a texel is to a graph. */
+enum { TXI_NODE_NONE = 0, TXI_NODE_KNOWN = 1, TXI_NODE_UNKNOWN = 2 };
+
+/* Count the links of all nodes, or (filling) store them. node: 1 per texel, the node of unknown ones. */
+static void txi_graph_pass(const txi_domain *d, const uint8_t *marks, const uint32_t *node,
+                           int filling, txi_texel_graph *g, size_t total[2]) {
+    total[0] = total[1] = 0;
+    for (size_t i = 0; i < g->count; i++) {
+        txi_links links;
+        txi_links_of(d, g->texel[i], &links);
+        for (int k = 0; k < links.count; k++) {
+            const uint32_t texel = links.texel[k];
+            if (marks[texel] == TXI_NODE_NONE || texel == g->texel[i]) continue;
+            if (marks[texel] == TXI_NODE_KNOWN) {
+                total[1]++;
+                if (!filling) {
+                    g->rim_first[i + 1]++;
+                    continue;
+                }
+                const uint32_t at = --g->rim_first[i + 1];
+                g->rim[at] = texel;
+                g->rim_weight[at] = txm_float(links.weight[k]);
+                continue;
+            }
+            for (int end = 0; end < 2; end++) {
+                const size_t row = end ? node[texel] : i;
+                total[0]++;
+                if (!filling) {
+                    g->first[row + 1]++;
+                    continue;
+                }
+                const uint32_t at = --g->first[row + 1];
+                g->to[at] = end ? (uint32_t)i : node[texel];
+                g->weight[at] = txm_float(links.weight[k] / 2);
+            }
+        }
+    }
+}
+
+/* From ends of rows, as a filling pass leaves them, to merged rows. */
+static void txi_graph_merge(size_t count, uint32_t total, uint32_t *first, uint32_t *to,
+                            float *weight) {
+    uint32_t kept = 0;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t begin = first[i + 1], end = i + 1 < count ? first[i + 2] : total;
+        memmove(to + kept, to + begin, (end - begin) * sizeof *to);
+        memmove(weight + kept, weight + begin, (end - begin) * sizeof *weight);
+        first[i] = kept;
+        kept += txi_merge_links(to + kept, weight + kept, end - begin);
+    }
+    first[count] = kept;
+}
+
+/* The graph of the unknown texels.
+   marks   1 per texel: TXI_NODE_...
+   return  TXM_OK, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost    about 0.3 us and 100 bytes per unknown texel, 4 bytes per texel                  */
+static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_arena *arena,
+                                 txm_env *env, txi_texel_graph *g) {
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    size_t total[2], count = 0;
+    memset(g, 0, sizeof *g);
+    for (size_t i = 0; i < texels; i++) g->count += marks[i] == TXI_NODE_UNKNOWN;
+    g->texel = (uint32_t *)txm_arena_alloc(arena, g->count + 1, sizeof(uint32_t));
+    g->first = (uint32_t *)txm_arena_zero(arena, g->count + 1, sizeof(uint32_t));
+    g->rim_first = (uint32_t *)txm_arena_zero(arena, g->count + 1, sizeof(uint32_t));
+    uint32_t *node = (uint32_t *)txm_arena_alloc(arena, texels, sizeof(uint32_t));
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < texels; i++) {
+        node[i] = (uint32_t)count;
+        if (marks[i] == TXI_NODE_UNKNOWN) g->texel[count++] = (uint32_t)i;
+    }
+    txi_graph_pass(d, marks, node, 0, g, total);
+    if (total[0] > UINT32_MAX || total[1] > UINT32_MAX)
+        return txm_fail(env, TXM_TOO_LARGE, "too many missing texels for one system of equations");
+    if (txm_progress(env, 0, "smooth fill")) return txi_stopped(env);
+    for (size_t i = 0; i < g->count; i++) {
+        g->first[i + 1] += g->first[i];
+        g->rim_first[i + 1] += g->rim_first[i];
+    }
+    g->to = (uint32_t *)txm_arena_alloc(arena, total[0] + 1, sizeof(uint32_t));
+    g->weight = (float *)txm_arena_alloc(arena, total[0] + 1, sizeof(float));
+    g->rim = (uint32_t *)txm_arena_alloc(arena, total[1] + 1, sizeof(uint32_t));
+    g->rim_weight = (float *)txm_arena_alloc(arena, total[1] + 1, sizeof(float));
+    if (arena->failed) return txi_no_memory(env);
+    txi_graph_pass(d, marks, node, 1, g, total);
+    txi_graph_merge(g->count, (uint32_t)total[0], g->first, g->to, g->weight);
+    txi_graph_merge(g->count, (uint32_t)total[1], g->rim_first, g->rim, g->rim_weight);
+    return TXM_OK;
+}
+
+/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per node. */
+static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t *island) {
+    size_t count = 0;
+    memset(island, 1, g->count);
+    for (size_t i = 0; i < g->count; i++) {
+        if (g->rim_first[i] == g->rim_first[i + 1]) continue;
+        island[i] = 0;
+        queue[count++] = (uint32_t)i;
+    }
+    for (size_t k = 0; k < count; k++) {
+        for (uint32_t l = g->first[queue[k]]; l < g->first[queue[k] + 1]; l++) {
+            if (!island[g->to[l]]) continue;
+            island[g->to[l]] = 0;
+            queue[count++] = g->to[l];
+        }
+    }
+}
+
+/* ---- multigrid on graphs ---------------------------------------------------------------------
+   Solves A x = b where A is the Laplacian of a weighted graph with some nodes tied to ground,
+
+       (A x)_i = ground_i x_i + sum over links  w_ij (x_i - x_j),
+
+   by conjugate gradients, preconditioned by a cycle over coarser graphs [3]. A coarser graph has one node
+   for each group of about four nodes that strong links connect; the weights between groups are the sums
+   of those between their members (Galerkin's product with piecewise constant interpolation). Each
+   level is solved by two steps of conjugate gradients, preconditioned by the next level: this "K cycle"
+   makes the number of iterations independent of the size, also for graphs without any regularity. */
+
+enum {
+    TXI_GRID_LEVELS = 24,
+    TXI_GRID_DIRECT = 96,     /* nodes up to which a system is solved directly; ours            */
+    TXI_GRID_ITERATIONS = 200 /* at most; then the result is taken as it is. 5 to 20 are usual  */
+};
+
+typedef struct txi_grid_level {
+    size_t count;
+    const uint32_t *first, *to; /* links in rows, each in both                                  */
+    const float *weight;
+    double *inverse; /* 1 / diagonal of A                                                       */
+    uint32_t *group; /* 1 per node: its node on the next level; NULL on the last                */
+    double *r, *x;   /* the system of this level: right side, solution (not on the first)       */
+    double *q;       /* scratch                                                                 */
+    double *c, *v;   /* of the first of two steps: correction, A times it (not on the first)    */
+} txi_grid_level;
+
+typedef struct txi_grid {
+    txi_grid_level level[TXI_GRID_LEVELS];
+    int levels;
+    double *direct; /* Cholesky factor of the last level, in rows; NULL: too large, it is smoothed */
+} txi_grid;
+
+/* Group the nodes of a level in pairs: each with the free neighbour of the strongest link. Returns the
+   number of groups. */
+static uint32_t txi_grid_pair(size_t count, const uint32_t *first, const uint32_t *to,
+                              const float *weight, uint32_t *group) {
+    uint32_t groups = 0;
+    for (size_t i = 0; i < count; i++) group[i] = UINT32_MAX;
+    for (size_t i = 0; i < count; i++) {
+        uint32_t mate = UINT32_MAX;
+        float most = 0;
+        if (group[i] != UINT32_MAX) continue;
+        for (uint32_t k = first[i]; k < first[i + 1]; k++) {
+            if (to[k] == i || group[to[k]] != UINT32_MAX || !(weight[k] > most)) continue;
+            most = weight[k];
+            mate = to[k];
+        }
+        group[i] = groups;
+        if (mate != UINT32_MAX) group[mate] = groups;
+        groups++;
+    }
+    return groups;
+}
+
+/* The links between groups. members: the nodes in the order of their group, those of group g are
+   members[start[g]] .. members[start[g + 1] - 1]; place: scratch, 1 per group. Returns their number. */
+static uint32_t txi_grid_sum(const uint32_t *first, const uint32_t *to, const float *weight,
+                             const uint32_t *group, uint32_t groups, const uint32_t *start,
+                             const uint32_t *members, uint32_t *place, uint32_t *out_first,
+                             uint32_t *out_to, float *out_weight) {
+    uint32_t total = 0;
+    for (uint32_t g = 0; g < groups; g++) place[g] = UINT32_MAX;
+    for (uint32_t g = 0; g < groups; g++) {
+        out_first[g] = total;
+        for (uint32_t m = start[g]; m < start[g + 1]; m++) {
+            for (uint32_t k = first[members[m]]; k < first[members[m] + 1]; k++) {
+                const uint32_t other = group[to[k]];
+                if (other == g) continue;
+                if (place[other] == UINT32_MAX || place[other] < out_first[g]) {
+                    place[other] = total;
+                    out_to[total] = other;
+                    out_weight[total++] = weight[k];
+                } else {
+                    out_weight[place[other]] += weight[k];
+                }
+            }
+        }
+    }
+    out_first[groups] = total;
+    return total;
+}
+
+/* Sort the nodes by group. */
+static void txi_grid_members(size_t count, const uint32_t *group, uint32_t groups, uint32_t *start,
+                             uint32_t *members) {
+    memset(start, 0, ((size_t)groups + 1) * sizeof *start);
+    for (size_t i = 0; i < count; i++) start[group[i] + 1]++;
+    for (uint32_t g = 0; g < groups; g++) start[g + 1] += start[g];
+    for (size_t i = count; i-- > 0;) members[--start[group[i] + 1]] = (uint32_t)i;
+    for (uint32_t g = 0; g < groups; g++) start[g] = start[g + 1];
+    start[groups] = (uint32_t)count;
+}
+
+/* One level from the one above it, whose links are replaced by those of the coarser graph: twice
+   grouped in pairs. fine->group receives the groups. 0: no memory. */
+static int txi_grid_coarsen(txi_grid_level *fine, txi_grid_level *coarse, txm_arena *arena,
+                            txm_arena *scratch) {
+    const size_t n = fine->count, links = fine->first[n];
+    fine->group = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
+    uint32_t *group = (uint32_t *)txm_arena_alloc(scratch, n, 3 * sizeof(uint32_t));
+    uint32_t *start = (uint32_t *)txm_arena_alloc(scratch, n + 1, sizeof(uint32_t));
+    uint32_t *first = (uint32_t *)txm_arena_alloc(scratch, n + 1, sizeof(uint32_t));
+    uint32_t *to = (uint32_t *)txm_arena_alloc(scratch, links + 1, sizeof(uint32_t));
+    float *weight = (float *)txm_arena_alloc(scratch, links + 1, sizeof(float));
+    if (!fine->group || scratch->failed) return 0;
+    uint32_t *members = group + n, *place = members + n;
+    const uint32_t pairs = txi_grid_pair(n, fine->first, fine->to, fine->weight, fine->group);
+    txi_grid_members(n, fine->group, pairs, start, members);
+    txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, pairs, start, members, place, first,
+                 to, weight);
+    const uint32_t groups = txi_grid_pair(pairs, first, to, weight, group);
+    for (size_t i = 0; i < n; i++) fine->group[i] = group[fine->group[i]];
+    /* from the links of the fine graph again: those of the pairs are overwritten */
+    txi_grid_members(n, fine->group, groups, start, members);
+    const uint32_t total = txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, groups, start,
+                                        members, place, first, to, weight);
+    uint32_t *kept = (uint32_t *)txm_arena_alloc(arena, (size_t)groups + 1, sizeof(uint32_t));
+    uint32_t *kept_to = (uint32_t *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(uint32_t));
+    float *kept_weight = (float *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(float));
+    if (arena->failed) return 0;
+    memcpy(kept, first, ((size_t)groups + 1) * sizeof *kept);
+    memcpy(kept_to, to, total * sizeof *to);
+    memcpy(kept_weight, weight, total * sizeof *weight);
+    coarse->count = groups;
+    coarse->first = kept;
+    coarse->to = kept_to;
+    coarse->weight = kept_weight;
+    return 1;
+}
+
+/* y = A x */
+static void txi_grid_apply(const txi_grid_level *l, const double *x, double *y) {
+    for (size_t i = 0; i < l->count; i++) {
+        double sum = 0;
+        for (uint32_t k = l->first[i]; k < l->first[i + 1]; k++)
+            sum += (double)l->weight[k] * x[l->to[k]];
+        y[i] = x[i] / l->inverse[i] - sum;
+    }
+}
+
+/* The Cholesky factor of the last level. */
+static void txi_grid_factor(const txi_grid_level *l, double *a) {
+    const size_t n = l->count;
+    memset(a, 0, n * n * sizeof *a);
+    for (size_t i = 0; i < n; i++) {
+        a[i * n + i] += 1 / l->inverse[i];
+        for (uint32_t k = l->first[i]; k < l->first[i + 1]; k++)
+            a[i * n + l->to[k]] -= (double)l->weight[k];
+    }
+    for (size_t i = 0; i < n; i++) {
+        const double whole = a[i * n + i];
+        for (size_t j = 0; j <= i; j++) {
+            double sum = a[i * n + j];
+            for (size_t k = 0; k < j; k++) sum -= a[i * n + k] * a[j * n + k];
+            if (j < i) a[i * n + j] = sum / a[j * n + j];
+            else a[i * n + i] = sqrt(fmax(sum, 1e-14 * whole)); /* rounding may leave nothing */
+        }
+    }
+}
+
+static void txi_grid_direct(const txi_grid *g, const txi_grid_level *l, const double *r, double *x) {
+    const size_t n = l->count;
+    const double *a = g->direct;
+    for (size_t i = 0; i < n; i++) {
+        double sum = r[i];
+        for (size_t k = 0; k < i; k++) sum -= a[i * n + k] * x[k];
+        x[i] = sum / a[i * n + i];
+    }
+    for (size_t i = n; i-- > 0;) {
+        double sum = x[i];
+        for (size_t k = i + 1; k < n; k++) sum -= a[k * n + i] * x[k];
+        x[i] = sum / a[i * n + i];
+    }
+}
+
+/* One sweep of Gauss and Seidel, up or down the nodes. */
+static void txi_grid_sweep(const txi_grid_level *l, const double *r, double *x, int down) {
+    for (size_t n = 0; n < l->count; n++) {
+        const size_t i = down ? l->count - 1 - n : n;
+        double sum = r[i];
+        for (uint32_t k = l->first[i]; k < l->first[i + 1]; k++)
+            sum += (double)l->weight[k] * x[l->to[k]];
+        x[i] = sum * l->inverse[i];
+    }
+}
+
+static double txi_grid_dot(const double *a, const double *b, size_t count) {
+    double sum = 0;
+    for (size_t i = 0; i < count; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+static void txi_grid_coarse(const txi_grid *g, int level);
+
+/* x = about A^-1 r, by smoothing before and after a correction from the next level. */
+static void txi_grid_cycle(const txi_grid *g, int level, const double *r, double *x) {
+    const txi_grid_level *l = &g->level[level];
+    const size_t n = l->count;
+    memset(x, 0, n * sizeof *x);
+    if (level + 1 == g->levels) {
+        if (g->direct) {
+            txi_grid_direct(g, l, r, x);
+            return;
+        }
+        for (int k = 0; k < 4; k++) {
+            txi_grid_sweep(l, r, x, 0);
+            txi_grid_sweep(l, r, x, 1);
+        }
+        return;
+    }
+    const txi_grid_level *next = l + 1;
+    txi_grid_sweep(l, r, x, 0);
+    txi_grid_apply(l, x, l->q);
+    memset(next->r, 0, next->count * sizeof *next->r);
+    for (size_t i = 0; i < n; i++) next->r[l->group[i]] += r[i] - l->q[i];
+    txi_grid_coarse(g, level + 1);
+    for (size_t i = 0; i < n; i++) x[i] += next->x[l->group[i]];
+    txi_grid_sweep(l, r, x, 1);
+}
+
+/* Solve the system of a level below the first, r, by two steps of conjugate gradients; one if that is good
+   enough. r is lost. With c1, r1, v1 = A c1 of the first step, c2, r2, v2 of the second [3]:
+
+       x = (a1 / p1 - f a2 / (p1 p2)) c1 + (a2 / p2) c2,
+       p1 = c1.v1, a1 = c1.r1, f = c2.v1, p2 = c2.v2 - f^2 / p1, a2 = c2.r2                     */
+static void txi_grid_coarse(const txi_grid *g, int level) {
+    const txi_grid_level *l = &g->level[level];
+    const size_t n = l->count;
+    if (level + 1 == g->levels) {
+        txi_grid_cycle(g, level, l->r, l->x);
+        return;
+    }
+    const double norm = txi_grid_dot(l->r, l->r, n);
+    txi_grid_cycle(g, level, l->r, l->c);
+    txi_grid_apply(l, l->c, l->v);
+    const double p1 = txi_grid_dot(l->c, l->v, n), a1 = txi_grid_dot(l->c, l->r, n);
+    const double step = p1 > 0 ? a1 / p1 : 0;
+    for (size_t i = 0; i < n; i++) l->r[i] -= step * l->v[i];
+    if (!(p1 > 0) || txi_grid_dot(l->r, l->r, n) <= 0.0625 * norm) {
+        for (size_t i = 0; i < n; i++) l->x[i] = step * l->c[i];
+        return;
+    }
+    txi_grid_cycle(g, level, l->r, l->x);
+    const double f = txi_grid_dot(l->x, l->v, n), a2 = txi_grid_dot(l->x, l->r, n);
+    txi_grid_apply(l, l->x, l->q);
+    const double p2 = txi_grid_dot(l->x, l->q, n) - f * f / p1;
+    const double second = p2 > 0 ? a2 / p2 : 0;
+    for (size_t i = 0; i < n; i++) l->x[i] = (step - f * second / p1) * l->c[i] + second * l->x[i];
+}
+
+/* The levels for a graph.
+   first, to, weight  its links in rows; they are used as long as the grid is
+   ground             1 per node, 0 or more; each connected part needs one that is not 0
+   cost               about 0.2 us and 130 bytes per node                                   */
+static txm_status txi_grid_make(size_t count, const uint32_t *first, const uint32_t *to,
+                                const float *weight, const double *ground, txm_arena *arena,
+                                txm_env *env, txi_grid *g) {
+    txm_arena scratch;
+    memset(g, 0, sizeof *g);
+    g->level[0].count = count;
+    g->level[0].first = first;
+    g->level[0].to = to;
+    g->level[0].weight = weight;
+    const double *earth = ground;
+    for (int k = 0; k < TXI_GRID_LEVELS; k++) {
+        txi_grid_level *l = &g->level[k];
+        const size_t n = l->count;
+        g->levels = k + 1;
+        l->inverse = (double *)txm_arena_alloc(arena, n, sizeof(double));
+        l->q = (double *)txm_arena_alloc(arena, n, sizeof(double));
+        if (k > 0) {
+            l->r = (double *)txm_arena_alloc(arena, n, 4 * sizeof(double));
+            if (l->r) {
+                l->x = l->r + n;
+                l->c = l->x + n;
+                l->v = l->c + n;
+            }
+        }
+        if (arena->failed) return txi_no_memory(env);
+        for (size_t i = 0; i < n; i++) {
+            double sum = earth[i];
+            for (uint32_t j = l->first[i]; j < l->first[i + 1]; j++)
+                sum += l->to[j] == i ? 0 : (double)l->weight[j];
+            l->inverse[i] = sum > 0 ? 1 / sum : 1; /* 0: a node by itself, without ground */
+        }
+        if (n <= TXI_GRID_DIRECT || k + 1 == TXI_GRID_LEVELS) break;
+        txm_arena_init(&scratch, env);
+        const int ok = txi_grid_coarsen(l, l + 1, arena, &scratch);
+        txm_arena_free(&scratch);
+        double *sums = ok ? (double *)txm_arena_zero(arena, l[1].count, sizeof(double)) : NULL;
+        if (!sums) return txi_no_memory(env);
+        for (size_t i = 0; i < n; i++) sums[l->group[i]] += earth[i];
+        earth = sums;
+        if (l[1].count > n - n / 8) break; /* hardly any links: smoothing is enough */
+    }
+    const size_t n = g->level[g->levels - 1].count;
+    if (n > TXI_GRID_DIRECT) return TXM_OK;
+    g->direct = (double *)txm_arena_alloc(arena, n, n * sizeof(double));
+    if (!g->direct) return txi_no_memory(env);
+    txi_grid_factor(&g->level[g->levels - 1], g->direct);
+    return TXM_OK;
+}
+
+/* Solve A x = b. x holds a guess and receives the solution; b is lost.
+   tolerance  of the residual, relative to that of x = 0
+   return     TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost       some 10 iterations of about 0.15 us per node; 24 bytes per node               */
+static txm_status txi_grid_solve(const txi_grid *g, double *b, double *x, double tolerance,
+                                 const char *stage, txm_env *env) {
+    const txi_grid_level *l = &g->level[0];
+    const size_t n = l->count;
+    txm_status status = TXM_OK;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    double *z = (double *)txm_arena_alloc(&arena, n, sizeof(double));
+    double *p = (double *)txm_arena_alloc(&arena, n, sizeof(double));
+    double *v = (double *)txm_arena_alloc(&arena, n, sizeof(double));
+    if (arena.failed) {
+        txm_arena_free(&arena);
+        return txi_no_memory(env);
+    }
+    const double goal = txi_grid_dot(b, b, n) * tolerance * tolerance;
+    double *r = b, first = 0, rest, curve = 0;
+    txi_grid_apply(l, x, v);
+    for (size_t i = 0; i < n; i++) r[i] -= v[i];
+    rest = first = txi_grid_dot(r, r, n);
+    float reached = 0;
+    for (int k = 0; k < TXI_GRID_ITERATIONS && rest > goal; k++) {
+        /* the digits gained, of those wanted */
+        if (rest < first && goal > 0)
+            reached = txm_maxf(reached, txm_float(log(first / rest) / log(first / goal)));
+        if (txm_progress(env, txm_minf(reached, 1), stage)) {
+            status = txi_stopped(env);
+            break;
+        }
+        txi_grid_cycle(g, 0, r, z);
+        /* the cycle is not the same linear map each time: z is made conjugate to the last p */
+        const double back = curve > 0 ? -txi_grid_dot(z, v, n) / curve : 0;
+        for (size_t i = 0; i < n; i++) p[i] = z[i] + (curve > 0 ? back * p[i] : 0);
+        txi_grid_apply(l, p, v);
+        curve = txi_grid_dot(p, v, n);
+        if (!(curve > 0)) break; /* nothing left but rounding */
+        const double step = txi_grid_dot(p, r, n) / curve;
+        for (size_t i = 0; i < n; i++) {
+            x[i] += step * p[i];
+            r[i] -= step * v[i];
+        }
+        rest = txi_grid_dot(r, r, n);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- smooth fill ----------------------------------------------------------------------------
+   Each map becomes a harmonic function on the missing part of the surface. Quantities are chosen so
+   that they may be averaged: colours are multiplied by their alpha; the vectors of normal maps are
+   turned from the axes of the texture, which differ from chart to chart, into space. Labels are not
+   averaged: each texel gets that of the nearest known one.                                     */
+
+enum { TXI_FILL_MOST = 5 }; /* quantities of a map */
+
+/* How the samples of a map are treated. */
+typedef struct txi_quantities {
+    const txm_image *image;
+    int count;     /* of quantities                                                            */
+    int is_normal; /* 1 or 2, as in texinpaint_map                                             */
+    int has_alpha; /* the last channel is alpha, and the others are multiplied by it           */
+} txi_quantities;
+
+static txi_quantities txi_quantities_of(const txi_domain *d, int map) {
+    const texinpaint_map *m = map ? &d->desc->maps[map - 1] : NULL;
+    txi_quantities q;
+    q.image = &d->maps[map];
+    q.is_normal = m ? m->is_normal : 0;
+    q.has_alpha = !q.is_normal && q.image->channels % 2 == 0;
+    q.count = q.image->channels + (q.is_normal && d->surface ? 1 : 0);
+    return q;
+}
+
+static int txi_is_label(const txi_domain *d, int map) {
+    return map > 0 && d->desc->maps[map - 1].is_label;
+}
+
+/* The directions in space of the x and y axes of a normal map at a texel: unit. */
+static void txi_tangents(const txi_domain *d, uint32_t texel, int is_normal, txm_dvec3 axis[2]) {
+    const uint32_t face = d->surface->owner[texel];
+    txm_dvec3 pu, pv;
+    axis[0] = txm_d3(1, 0, 0);
+    axis[1] = txm_d3(0, 1, 0);
+    if (face == TXI_NO_FACE || !txi_face_axes(d->surface, face, &pu, &pv)) return;
+    const txm_dvec3 n = txm_d3_unit(txi_face_area2(d->surface, face));
+    const txm_dvec3 y = txm_d3_cross(n, txm_d3_unit(pu));
+    if (!(txm_d3_len2(y) > 0.5)) return;
+    /* at a right angle to x, on the side of v, which runs downwards */
+    const int down = txm_d3_dot(y, pv) > 0;
+    axis[0] = txm_d3_unit(pu);
+    axis[1] = txm_d3_scale(y, down == (is_normal == 2) ? 1 : -1);
+}
+
+/* The quantities of a texel. */
+static void txi_quantities_get(const txi_domain *d, const txi_quantities *q, uint32_t texel,
+                               double out[TXI_FILL_MOST]) {
+    const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
+    const int channels = q->image->channels;
+    for (int c = 0; c < channels; c++) out[c] = (double)txm_image_get(q->image, x, y, c);
+    for (int c = 0; c + 1 < channels && q->has_alpha; c++) out[c] *= out[channels - 1];
+    for (int c = 0; c < 3 && q->is_normal; c++) out[c] = 2 * out[c] - 1;
+    if (q->is_normal && d->surface) { /* the vector in the tangent plane, as one in space */
+        txm_dvec3 axis[2];
+        txi_tangents(d, texel, q->is_normal, axis);
+        const txm_dvec3 v = txm_d3_mad(txm_d3_scale(axis[0], out[0]), axis[1], out[1]);
+        const double height = out[2], rest = out[3];
+        out[0] = v.x;
+        out[1] = v.y;
+        out[2] = v.z;
+        out[3] = height;
+        out[4] = rest;
+    }
+}
+
+/* Store a texel by its quantities. */
+static void txi_quantities_set(const txi_domain *d, const txi_quantities *q, uint32_t texel,
+                               double in[TXI_FILL_MOST]) {
+    const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
+    const int channels = q->image->channels;
+    if (q->is_normal) {
+        if (d->surface) {
+            txm_dvec3 axis[2];
+            const txm_dvec3 v = txm_d3(in[0], in[1], in[2]);
+            txi_tangents(d, texel, q->is_normal, axis);
+            in[0] = txm_d3_dot(v, axis[0]);
+            in[1] = txm_d3_dot(v, axis[1]);
+            in[2] = in[3];
+            in[3] = in[4];
+        }
+        const double n = sqrt(in[0] * in[0] + in[1] * in[1] + in[2] * in[2]);
+        for (int c = 0; c < 3; c++) in[c] = n > 1e-6 ? (in[c] / n + 1) / 2 : c == 2 ? 1 : 0.5;
+    }
+    for (int c = 0; c + 1 < channels && q->has_alpha; c++)
+        in[c] = in[channels - 1] > 1e-6 ? in[c] / in[channels - 1] : 0;
+    for (int c = 0; c < channels; c++) txm_image_set(q->image, x, y, c, txm_float(in[c]));
+}
+
+/* The mean quantities of all known texels, for holes without any around them. */
+static void txi_quantities_mean(const txi_domain *d, const txi_quantities *q, const uint8_t *marks,
+                                double mean[TXI_FILL_MOST]) {
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    size_t count = 0;
+    memset(mean, 0, TXI_FILL_MOST * sizeof *mean);
+    for (size_t i = 0; i < texels; i++) {
+        double value[TXI_FILL_MOST];
+        if (marks[i] != TXI_NODE_KNOWN) continue;
+        txi_quantities_get(d, q, (uint32_t)i, value);
+        for (int c = 0; c < q->count; c++) mean[c] += value[c];
+        count++;
+    }
+    for (int c = 0; c < q->count && count; c++) mean[c] /= (double)count;
+}
+
+/* ---- smooth fill: labels -------------------------------------------------------------------- */
+
+/* where a texel lies: in space, or in the picture */
+static txm_dvec3 txi_fill_point(const txi_domain *d, uint32_t texel) {
+    if (d->surface) return txi_texel_point(d, d->surface->owner[texel], texel);
+    return txm_d3(texel % (uint32_t)d->width, texel / (uint32_t)d->width, 0);
+}
+
+/* For each node the known texel that is nearest, of those that its neighbours have: distances in a
+   straight line, spread from the rim along the links until nothing changes. Nodes of islands get
+   UINT32_MAX. */
+static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *g, uint32_t *source,
+                                    txm_env *env) {
+    txm_arena scratch;
+    size_t head = 0, waiting = 0;
+    txm_arena_init(&scratch, env);
+    txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(&scratch, g->count, sizeof(txm_dvec3));
+    double *least = (double *)txm_arena_alloc(&scratch, g->count, sizeof(double));
+    uint32_t *queue = (uint32_t *)txm_arena_alloc(&scratch, g->count, sizeof(uint32_t)); /* a ring */
+    uint8_t *queued = (uint8_t *)txm_arena_zero(&scratch, g->count, 1);
+    if (scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    for (size_t i = 0; i < g->count; i++) {
+        point[i] = txi_fill_point(d, g->texel[i]);
+        source[i] = UINT32_MAX;
+        least[i] = 0;
+        for (uint32_t k = g->rim_first[i]; k < g->rim_first[i + 1]; k++) {
+            const double apart = txm_d3_dist2(point[i], txi_fill_point(d, g->rim[k]));
+            if (source[i] != UINT32_MAX && !(apart < least[i])) continue;
+            source[i] = g->rim[k];
+            least[i] = apart;
+        }
+        if (source[i] == UINT32_MAX) continue;
+        queue[waiting++] = (uint32_t)i;
+        queued[i] = 1;
+    }
+    while (waiting > 0) {
+        const uint32_t i = queue[head];
+        head = head + 1 < g->count ? head + 1 : 0;
+        waiting--;
+        queued[i] = 0;
+        const txm_dvec3 from = txi_fill_point(d, source[i]);
+        for (uint32_t k = g->first[i]; k < g->first[i + 1]; k++) {
+            const uint32_t j = g->to[k];
+            const double apart = txm_d3_dist2(point[j], from);
+            if (source[j] != UINT32_MAX && !(apart < least[j])) continue;
+            source[j] = source[i];
+            least[j] = apart;
+            if (queued[j]) continue;
+            queued[j] = 1;
+            const size_t end = head + waiting;
+            queue[end < g->count ? end : end - g->count] = j;
+            waiting++;
+        }
+    }
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
+/* The label of the nearest known texel; the first known one of the map where there is none. */
+static void txi_fill_labels(const txi_domain *d, const txi_texel_graph *g, int map, const uint32_t *source,
+                            const uint8_t *marks) {
+    const txm_image *image = &d->maps[map];
+    const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    uint8_t *pixels = (uint8_t *)image->pixels; /* packed rows */
+    size_t any = 0;
+    while (any + 1 < texels && marks[any] != TXI_NODE_KNOWN) any++;
+    for (size_t i = 0; i < g->count; i++) {
+        const size_t from = source[i] == UINT32_MAX ? any : source[i];
+        memcpy(pixels + bytes * g->texel[i], pixels + bytes * from, bytes);
+    }
+}
+
+/* ---- smooth fill: equations ------------------------------------------------------------------ */
+
+/* The error that is left, relative to the right side: well below a step of the samples. */
+static double txi_fill_tolerance(txm_sample sample) {
+    return sample == TXM_U8 ? 1e-4 : sample == TXM_U16 ? 1e-6 : 1e-7;
+}
+
+/* Fill one map of the nodes. b, x: room for TXI_FILL_MOST per node. */
+static txm_status txi_fill_map(const txi_domain *d, const txi_texel_graph *g, const txi_grid *grid, int map,
+                               const uint8_t *marks, const uint8_t *island, double *b, double *x,
+                               txm_env *env) {
+    const txi_quantities q = txi_quantities_of(d, map);
+    const size_t n = g->count;
+    double mean[TXI_FILL_MOST], value[TXI_FILL_MOST];
+    txi_quantities_mean(d, &q, marks, mean);
+    memset(b, 0, n * (size_t)q.count * sizeof *b);
+    for (size_t i = 0; i < n; i++) {
+        for (uint32_t k = g->rim_first[i]; k < g->rim_first[i + 1]; k++) {
+            txi_quantities_get(d, &q, g->rim[k], value);
+            for (int c = 0; c < q.count; c++)
+                b[(size_t)c * n + i] += (double)g->rim_weight[k] * value[c];
+        }
+        for (int c = 0; c < q.count; c++) {
+            if (island[i]) b[(size_t)c * n + i] = mean[c]; /* their ground is 1 */
+            x[(size_t)c * n + i] = mean[c];
+        }
+    }
+    for (int c = 0; c < q.count; c++) {
+        txi_stage stage;
+        txi_stage_begin(&stage, env, (float)c / (float)q.count, (float)(c + 1) / (float)q.count);
+        const txm_status status =
+            txi_grid_solve(grid, b + (size_t)c * n, x + (size_t)c * n,
+                           txi_fill_tolerance(q.image->sample), "smooth fill", &stage.env);
+        if (status != TXM_OK) return txi_stage_end(&stage, status);
+    }
+    for (size_t i = 0; i < n; i++) {
+        for (int c = 0; c < q.count; c++) value[c] = x[(size_t)c * n + i];
+        txi_quantities_set(d, &q, g->texel[i], value);
+    }
+    return TXM_OK;
+}
+
+/* Fill the unknown texels of all maps. */
+static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, txm_arena *arena,
+                                 txm_env *env) {
+    txi_texel_graph g;
+    txi_grid grid;
+    int labels = 0;
+    const txm_status made = txi_graph_make(d, marks, arena, env, &g);
+    if (made != TXM_OK || g.count == 0) return made;
+    for (int map = 0; map < d->map_count; map++) labels += txi_is_label(d, map);
+    uint32_t *queue = (uint32_t *)txm_arena_alloc(arena, g.count, sizeof(uint32_t));
+    uint8_t *island = (uint8_t *)txm_arena_alloc(arena, g.count, 1);
+    double *ground = (double *)txm_arena_zero(arena, g.count, sizeof(double));
+    double *b = (double *)txm_arena_alloc(arena, g.count, TXI_FILL_MOST * sizeof(double));
+    double *x = (double *)txm_arena_alloc(arena, g.count, TXI_FILL_MOST * sizeof(double));
+    if (arena->failed) return txi_no_memory(env);
+    txi_graph_islands(&g, queue, island);
+    for (size_t i = 0; i < g.count; i++) {
+        for (uint32_t k = g.rim_first[i]; k < g.rim_first[i + 1]; k++)
+            ground[i] += (double)g.rim_weight[k];
+        if (island[i]) ground[i] = 1;
+    }
+    txm_status status =
+        txi_grid_make(g.count, g.first, g.to, g.weight, ground, arena, env, &grid);
+    if (status == TXM_OK && labels) status = txi_nearest_known(d, &g, queue, env);
+    for (int map = 0; map < d->map_count && status == TXM_OK; map++) {
+        txi_stage stage;
+        if (txi_is_label(d, map)) {
+            txi_fill_labels(d, &g, map, queue, marks);
+            continue;
+        }
+        txi_stage_begin(&stage, env, (float)map / (float)d->map_count,
+                        (float)(map + 1) / (float)d->map_count);
+        status = txi_fill_map(d, &g, &grid, map, marks, island, b, x, &stage.env);
+        status = txi_stage_end(&stage, status);
+    }
+    return status;
+}
+
+/* Fill the missing texels that a chart covers smoothly, in all maps. d->missing is not changed.
+   given   NULL, or 1 per texel: missing texels that already have their values
+   return  TXM_OK, TXM_TOO_SMALL if nothing is known, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY,
+           TXM_CANCELLED; after these the missing texels of some maps may be filled
+   cost    about 3 us per missing texel for three channels, 300 bytes                       */
+static txm_status txi_harmonic_around(const txi_domain *d, const uint8_t *given, txm_env *env) {
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    size_t known = 0, unknown = 0;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint8_t *marks = (uint8_t *)txm_arena_alloc(&arena, texels, 1);
+    if (!marks) return txi_no_memory(env);
+    for (size_t i = 0; i < texels; i++) {
+        const int is_known = !d->missing[i] || (given && given[i]);
+        marks[i] = (uint8_t)(!d->covered[i] ? TXI_NODE_NONE
+                             : is_known     ? TXI_NODE_KNOWN
+                                            : TXI_NODE_UNKNOWN);
+        known += marks[i] == TXI_NODE_KNOWN;
+        unknown += marks[i] == TXI_NODE_UNKNOWN;
+    }
+    txm_status status = TXM_OK;
+    if (unknown > 0 && known == 0)
+        status = txm_fail(env, TXM_TOO_SMALL, "nothing in the charts is known");
+    else if (unknown > 0)
+        status = txi_fill_nodes(d, marks, &arena, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* The same with nothing given. */
+static txm_status txi_harmonic_fill(const txi_domain *d, txm_env *env) {
+    return txi_harmonic_around(d, NULL, env);
+}
+
+/* ---- smooth fill: public calls --------------------------------------------------------------- */
+
+/* Copy the maps out. */
+static void txi_deliver(const txi_domain *d, const txm_image *out) {
+    for (int map = 0; map < d->map_count; map++) txi_copy_picture(&d->maps[map], &out[map]);
+}
+
+TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_env *env,
+                                              const txm_image *out) {
+    txi_domain d;
+    txi_stage stage;
+    txm_arena arena;
+    txm_status status = txi_check_common(desc, env);
+    if (status == TXM_OK) status = txi_check_mask(&desc->mask, "mask", &desc->image, env);
+    if (status == TXM_OK) status = txi_check_outputs(desc, out, 1 + desc->map_count, env);
+    if (status != TXM_OK) return status;
+    txm_arena_init(&arena, env);
+    status = txi_domain_make(&d, desc, &arena, env);
+    if (status == TXM_OK) status = txi_surface_make(&d, &arena, env);
+    if (status == TXM_OK) {
+        txi_stage_begin(&stage, env, 0, 0.95f);
+        status = txi_stage_end(&stage, txi_harmonic_fill(&d, &stage.env));
+    }
+    if (status == TXM_OK && txm_progress(env, 0.95f, "gutters")) status = txi_stopped(env);
+    if (status == TXM_OK) {
+        const size_t texels = (size_t)d.width * (size_t)d.height;
+        for (size_t i = 0; i < texels; i++) {
+            if (d.covered[i]) d.missing[i] = 0;
+        }
+        status = txi_gutter(&d, &arena, env);
+    }
+    if (status == TXM_OK) txi_deliver(&d, out);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* Texels without marks get the values of the nearest one with a mark, at most `reach` away. */
+static txm_status txi_dilate(const txi_domain *d, const uint8_t *marks, const uint8_t *wanted,
+                             int reach, txm_env *env) {
+    const size_t texels = (size_t)d->width * (size_t)d->height;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    int32_t *nearest = (int32_t *)txm_arena_alloc(&scratch, texels, sizeof(int32_t));
+    txm_status status = nearest ? txi_nearest(marks, d->width, d->height, env, nearest)
+                                : txi_no_memory(env);
+    for (size_t i = 0; i < texels && status == TXM_OK; i++) {
+        if (!wanted[i] || nearest[i] < 0) continue;
+        const int64_t dx = (int64_t)(i % (size_t)d->width) - nearest[i] % d->width;
+        const int64_t dy = (int64_t)(i / (size_t)d->width) - nearest[i] / d->width;
+        if (reach > 0 && dx * dx + dy * dy > (int64_t)reach * reach) continue;
+        txi_copy_texel(d, (size_t)nearest[i], i);
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
+TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,
+                                            const txm_image *out) {
+    txi_domain d;
+    txm_arena arena;
+    size_t known = 0;
+    txm_status status = txi_check_common(desc, env);
+    if (status == TXM_OK && desc->mask.pixels)
+        status = txi_check_mask(&desc->mask, "mask", &desc->image, env);
+    if (status == TXM_OK) status = txi_check_outputs(desc, out, 1 + desc->map_count, env);
+    if (status != TXM_OK) return status;
+    txm_arena_init(&arena, env);
+    status = txi_domain_make(&d, desc, &arena, env);
+    if (status == TXM_OK && txm_progress(env, 0, "gutters")) status = txi_stopped(env);
+    if (status == TXM_OK) status = txi_surface_make(&d, &arena, env);
+    const size_t texels = (size_t)d.width * (size_t)d.height;
+    uint8_t *marks = status == TXM_OK ? (uint8_t *)txm_arena_alloc(&arena, texels, 2) : NULL;
+    if (status == TXM_OK && !marks) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        for (size_t i = 0; i < texels; i++) {
+            marks[i] = d.covered[i] && !d.missing[i];
+            marks[texels + i] = d.surface ? !d.covered[i] : d.missing[i];
+            known += marks[i];
+        }
+        if (known == 0) status = txm_fail(env, TXM_TOO_SMALL, "no texel in a chart has a colour");
+    }
+    if (status == TXM_OK && txm_progress(env, 0.5f, "gutters")) status = txi_stopped(env);
+    if (status == TXM_OK && desc->gutter >= 0)
+        status = txi_dilate(&d, marks, marks + texels, desc->gutter, env);
+    if (status == TXM_OK) txi_deliver(&d, out);
+    txm_arena_free(&arena);
+    return status;
+}
 
 /* ---- curvature ------------------------------------------------------------------------------
    Principal curvatures, their directions, and their derivatives along these, at the vertices of a
@@ -3193,6 +4261,35 @@ typedef struct txi_shape {
     txi_curvature *curvature; /* 1 per vertex                                                  */
     int rings;
 } txi_shape;
+
+/* A mesh of triangles as one whose vertices in equal places are one (files repeat them for each chart),
+   without the faces of which two corners are in one place. The input is checked. */
+static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
+                                  txm_mesh *welded) {
+    txi_surface points;
+    size_t count = 0;
+    memset(&points, 0, sizeof points);
+    memset(welded, 0, sizeof *welded);
+    if (input->face_count == 0) return TXM_OK;
+    uint32_t *number = (uint32_t *)txm_arena_alloc(arena, input->vertex_count, sizeof(uint32_t));
+    uint32_t *indices = (uint32_t *)txm_arena_alloc(arena, input->face_count, 3 * sizeof(uint32_t));
+    float *place = (float *)txm_arena_alloc(arena, input->vertex_count, 3 * sizeof(float));
+    if (arena->failed) return txi_no_memory(env);
+    const txm_status status = txi_weld(input, &points, number, arena, env);
+    if (status != TXM_OK) return status;
+    for (size_t v = 0; v < input->vertex_count; v++)
+        memcpy(place + 3 * (size_t)number[v], input->positions + 3 * v, 3 * sizeof(float));
+    for (size_t f = 0; f < input->face_count; f++) {
+        uint32_t *t = indices + 3 * count;
+        for (size_t k = 0; k < 3; k++) t[k] = number[input->indices[3 * f + k]];
+        count += t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    }
+    welded->positions = place;
+    welded->indices = indices;
+    welded->vertex_count = points.vertex_count;
+    welded->face_count = count;
+    return TXM_OK;
+}
 
 /* Number the edges and collect the neighbours. sorted: room for 2 per side. */
 static void txi_shape_edges(txi_shape *s, uint32_t *sorted) {
@@ -3848,14 +4945,14 @@ static txm_status txi_crest_deliver(const txi_crest_net nets[2], txi_crest_run *
 /* Everything but the checks. */
 static txm_status txi_crest_find(const texinpaint_crest_desc *desc, txm_arena *arena, txm_env *env,
                                  texinpaint_crests **out) {
-    txi_welded weld;
+    txm_mesh welded;
     txi_shape shape;
     txi_crest_net nets[2];
     txi_crest_run *runs[2] = {NULL, NULL};
     size_t counts[2] = {0, 0};
     memset(nets, 0, sizeof nets);
-    txm_status status = txi_welded_make(&desc->mesh, arena, env, &weld);
-    if (status == TXM_OK) status = txi_shape_make(&weld.mesh, desc->rings, arena, env, &shape);
+    txm_status status = txi_welded_make(&desc->mesh, arena, env, &welded);
+    if (status == TXM_OK) status = txi_shape_make(&welded, desc->rings, arena, env, &shape);
     for (int i = 0; i < 2 && status == TXM_OK && shape.edge_count; i++) {
         if (desc->kinds && !(desc->kinds & (i ? TEXINPAINT_VALLEY : TEXINPAINT_RIDGE))) continue;
         if (txm_progress(env, i ? 0.95f : 0.9f, "crest lines")) return txi_stopped(env);
@@ -3896,7 +4993,386 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests) {
     txm_arena_free(&memory);
 }
 
-/* ---- prior ---- */
+/* ---- prior lines [1, II.C] --------------------------------------------------------------------
+   Lines on the surface, crests or the caller's, as polylines in a window. To each belong up to two
+   assistant lines on either side, at a constant distance: where the known texture has edges that run
+   along the line, as a stripe that follows a crest has. [1] does not say how far away they are; here
+   that is measured in the window.                                                              */
+
+enum {
+    TXI_PRIOR_REACH = 4,   /* window pixels: a line may be so far from the surface; ours        */
+    TXI_PRIOR_JUMP = 4,    /* window pixels: farther apart in the window, the line was cut; ours */
+    TXI_PRIOR_SHORT = 6,   /* points, about pixels: shorter pieces are left out; ours           */
+    TXI_PRIOR_WIDTH = 40,  /* window pixels: the farthest assistant line; ours                  */
+    TXI_PRIOR_LEAST = 24,  /* known pixels along a line that a distance is measured at; ours    */
+    TXI_PRIOR_CHORD = 6,   /* points to either side that give the direction of a line; ours     */
+    TXI_PRIOR_STEP = 12,   /* levels of 8 bits: the mean step across an assistant line; ours    */
+    TXI_PRIOR_AIDS = 2     /* assistant lines on each side; [1]                                 */
+};
+#define TXI_PRIOR_SURE 0.5 /* mean step over mean size of the steps: of one sign along the line; ours */
+
+/* The lines of a window while they are collected. */
+typedef struct txi_prior_list {
+    txm_vec2 *points;
+    int *starts;
+    size_t point_room, line_room;
+    int count; /* lines                                                                         */
+    int open;  /* points so far, those of the line that is being made included                  */
+} txi_prior_list;
+
+/* Room for more points in the open line; 0: no memory. */
+static int txi_prior_reserve(txi_prior_list *list, size_t more, txm_arena *arena) {
+    const size_t wanted = (size_t)list->open + more;
+    if (wanted > INT32_MAX) return 0;
+    if (wanted > list->point_room) {
+        const size_t room = 2 * wanted + 1024;
+        txm_vec2 *points = (txm_vec2 *)txm_arena_alloc(arena, room, sizeof(txm_vec2));
+        if (!points) return 0;
+        if (list->open) memcpy(points, list->points, (size_t)list->open * sizeof *points);
+        list->points = points;
+        list->point_room = room;
+    }
+    if ((size_t)list->count + 2 > list->line_room) {
+        const size_t room = 2 * list->line_room + 64;
+        int *starts = (int *)txm_arena_alloc(arena, room, sizeof(int));
+        if (!starts) return 0;
+        if (list->count) memcpy(starts, list->starts, (size_t)list->count * sizeof *starts);
+        starts[list->count] = list->count ? list->starts[list->count] : 0;
+        list->starts = starts;
+        list->line_room = room;
+    }
+    return 1;
+}
+
+/* End the open line; it is dropped if it is short. There is room for the next. */
+static void txi_prior_close(txi_prior_list *list) {
+    const int first = list->starts[list->count];
+    if (list->open - first < TXI_PRIOR_SHORT) list->open = first;
+    else list->starts[++list->count] = list->open;
+}
+
+/* Add a point, at least .75 pixels from the last one; a jump ends the line. */
+static int txi_prior_add(txi_prior_list *list, txm_vec2 p, txm_arena *arena) {
+    if (!txi_prior_reserve(list, 1, arena)) return 0;
+    if (list->open > list->starts[list->count]) {
+        const txm_vec2 last = list->points[list->open - 1];
+        const double dx = (double)p.x - last.x, dy = (double)p.y - last.y, apart = dx * dx + dy * dy;
+        if (apart < 0.5625) return 1;
+        if (apart > TXI_PRIOR_JUMP * TXI_PRIOR_JUMP) {
+            txi_prior_close(list);
+            if (!txi_prior_reserve(list, 1, arena)) return 0;
+        }
+    }
+    list->points[list->open++] = p;
+    return 1;
+}
+
+/* ---- prior lines: from the surface into the window ------------------------------------------- */
+
+/* The pixels of a window by their place on the surface: chains for cells of a grid. */
+typedef struct txi_places {
+    const txi_window *w;
+    uint32_t *head, *next; /* pixels, UINT32_MAX ends a chain; head: 1 per slot, next: per pixel */
+    size_t slots;          /* a power of two                                                    */
+    double low[3], high[3]; /* a box around all places, with the reach, in window pixels        */
+} txi_places;
+
+static size_t txi_places_slot(const txi_places *s, int64_t x, int64_t y, int64_t z) {
+    const uint64_t xy = ((uint64_t)x & 0xffffffffu) << 32 | ((uint64_t)y & 0xffffffffu);
+    return (size_t)txm_hash(txm_hash(xy) + (uint64_t)z) & (s->slots - 1);
+}
+
+static int64_t txi_places_cell(double x) {
+    return (int64_t)floor(x / TXI_PRIOR_REACH);
+}
+
+/* 0: no memory. */
+static int txi_places_make(const txi_window *w, txm_arena *arena, txi_places *s) {
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    memset(s, 0, sizeof *s);
+    s->w = w;
+    for (s->slots = 64; s->slots < pixels / 4;) s->slots *= 2;
+    s->head = (uint32_t *)txm_arena_alloc(arena, s->slots, sizeof(uint32_t));
+    s->next = (uint32_t *)txm_arena_alloc(arena, pixels, sizeof(uint32_t));
+    if (!s->head || !s->next) return 0;
+    memset(s->head, 0xff, s->slots * sizeof *s->head);
+    for (int k = 0; k < 3; k++) {
+        s->low[k] = 1e30;
+        s->high[k] = -1e30;
+    }
+    for (size_t i = pixels; i-- > 0;) { /* backwards, so that chains run forwards */
+        if (w->state[i] == TXI_VOID) continue;
+        const double p[3] = {(double)w->place[i].x, (double)w->place[i].y, (double)w->place[i].z};
+        if (!(fabs(p[0]) < 1e9 && fabs(p[1]) < 1e9 && fabs(p[2]) < 1e9)) continue;
+        const size_t slot = txi_places_slot(s, txi_places_cell(p[0]), txi_places_cell(p[1]),
+                                            txi_places_cell(p[2]));
+        s->next[i] = s->head[slot];
+        s->head[slot] = (uint32_t)i;
+        for (int k = 0; k < 3; k++) {
+            s->low[k] = fmin(s->low[k], p[k] - TXI_PRIOR_REACH);
+            s->high[k] = fmax(s->high[k], p[k] + TXI_PRIOR_REACH);
+        }
+    }
+    return 1;
+}
+
+/* The pixel nearest to a place, within reach; -1: none. */
+static int64_t txi_places_nearest(const txi_places *s, txm_dvec3 p) {
+    const int64_t x = txi_places_cell(p.x), y = txi_places_cell(p.y), z = txi_places_cell(p.z);
+    double least = TXI_PRIOR_REACH * TXI_PRIOR_REACH;
+    int64_t best = -1;
+    for (int k = 0; k < 27; k++) {
+        const size_t slot = txi_places_slot(s, x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1);
+        for (uint32_t i = s->head[slot]; i != UINT32_MAX; i = s->next[i]) {
+            const txm_vec3 q = s->w->place[i];
+            const double apart = txm_d3_dist2(p, txm_d3(q.x, q.y, q.z));
+            if (apart > least || (best >= 0 && (apart >= least && (int64_t)i >= best))) continue;
+            least = apart;
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* The derivative of the place along x (axis 0) or y, from the neighbours that there are. */
+static txm_dvec3 txi_places_slope(const txi_window *w, size_t i, int axis) {
+    const size_t step = axis ? (size_t)w->width : 1;
+    const size_t at = axis ? i / (size_t)w->width : i % (size_t)w->width;
+    const size_t end = axis ? (size_t)w->height : (size_t)w->width;
+    const int before = at > 0 && w->state[i - step] != TXI_VOID;
+    const int after = at + 1 < end && w->state[i + step] != TXI_VOID;
+    const txm_vec3 a = w->place[before ? i - step : i], b = w->place[after ? i + step : i];
+    const txm_dvec3 d = txm_d3((double)b.x - a.x, (double)b.y - a.y, (double)b.z - a.z);
+    return before && after ? txm_d3_scale(d, 0.5) : d;
+}
+
+/* Where a place of the surface lies in the window. 0: outside. */
+static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
+    const int64_t i = txi_places_nearest(s, p);
+    if (i < 0) return 0;
+    const txm_vec3 q = s->w->place[i];
+    const txm_dvec3 u = txi_places_slope(s->w, (size_t)i, 0), v = txi_places_slope(s->w, (size_t)i, 1);
+    const txm_dvec3 d = txm_d3_sub(p, txm_d3(q.x, q.y, q.z));
+    const double e = txm_d3_len2(u), f = txm_d3_dot(u, v), g = txm_d3_len2(v);
+    const double det = e * g - f * f, a = txm_d3_dot(d, u), b = txm_d3_dot(d, v);
+    double x = 0, y = 0;
+    if (det > 0.01) {
+        x = (g * a - f * b) / det;
+        y = (e * b - f * a) / det;
+    }
+    if (fabs(x) > 1.5 || fabs(y) > 1.5) return 0; /* beyond the edge of what the window shows */
+    *out = txm_v2(txm_float((double)(i % s->w->width) + x), txm_float((double)(i / s->w->width) + y));
+    return 1;
+}
+
+/* The part of a segment, from..to of 0..1, in the box. 0: none. */
+static int txi_places_clip(const txi_places *s, txm_dvec3 a, txm_dvec3 d, double *from, double *to) {
+    const double p[3] = {a.x, a.y, a.z}, q[3] = {d.x, d.y, d.z};
+    *from = 0;
+    *to = 1;
+    for (int k = 0; k < 3; k++) {
+        if (!(fabs(q[k]) > 1e-12)) {
+            if (p[k] < s->low[k] || p[k] > s->high[k]) return 0;
+            continue;
+        }
+        const double u = (s->low[k] - p[k]) / q[k], v = (s->high[k] - p[k]) / q[k];
+        *from = fmax(*from, fmin(u, v));
+        *to = fmin(*to, fmax(u, v));
+    }
+    return *from < *to;
+}
+
+/* Lay a line of the surface into the window, in steps of half a pixel. 0: no memory. */
+static int txi_prior_lay(const txi_places *s, const texinpaint_line *line, txi_prior_list *list,
+                         txm_arena *arena) {
+    const double unit = s->w->spacing > 0 ? 1 / s->w->spacing : 1;
+    if (!txi_prior_reserve(list, 1, arena)) return 0;
+    for (int k = 0; k + 1 < line->count; k++) {
+        const txm_dvec3 a = txm_d3_scale(txm_d3_load(line->points + 3 * (size_t)k), unit);
+        const txm_dvec3 b = txm_d3_scale(txm_d3_load(line->points + 3 * (size_t)k + 3), unit);
+        const txm_dvec3 d = txm_d3_sub(b, a);
+        double from, to;
+        if (!txi_places_clip(s, a, d, &from, &to)) {
+            txi_prior_close(list);
+            continue;
+        }
+        const int steps = 1 + (int)fmin(2 * (to - from) * txm_d3_len(d), 1e6);
+        for (int i = 0; i <= steps; i++) {
+            txm_vec2 p;
+            if (!txi_places_find(s, txm_d3_mad(a, d, from + (to - from) * i / steps), &p)) {
+                txi_prior_close(list);
+            } else if (!txi_prior_add(list, p, arena)) {
+                return 0;
+            }
+            if (!txi_prior_reserve(list, 1, arena)) return 0;
+        }
+    }
+    txi_prior_close(list);
+    return 1;
+}
+
+/* The same for a line of a plain picture, whose window is a part of it: points are x, y in pixels, pixel
+   centres at one half. */
+static int txi_prior_copy(const txi_window *w, const texinpaint_line *line, txi_prior_list *list,
+                          txm_arena *arena) {
+    const double left = (double)w->place[0].x + 0.5, top = (double)w->place[0].y + 0.5;
+    txi_places box;
+    memset(&box, 0, sizeof box);
+    box.low[2] = -1;
+    box.high[0] = w->width - 1;
+    box.high[1] = w->height - 1;
+    box.high[2] = 1;
+    if (!txi_prior_reserve(list, 1, arena)) return 0;
+    for (int k = 0; k + 1 < line->count; k++) {
+        const float *p = line->points + 3 * (size_t)k;
+        const txm_dvec3 a = txm_d3(p[0] - left, p[1] - top, 0);
+        const txm_dvec3 d = txm_d3((double)p[3] - p[0], (double)p[4] - p[1], 0);
+        double from, to;
+        if (!txi_places_clip(&box, a, d, &from, &to)) {
+            txi_prior_close(list);
+            continue;
+        }
+        const int steps = 1 + (int)((to - from) * txm_d3_len(d));
+        for (int i = 0; i <= steps; i++) {
+            const txm_dvec3 q = txm_d3_mad(a, d, from + (to - from) * i / steps);
+            if (!txi_prior_add(list, txm_v2(txm_float(q.x), txm_float(q.y)), arena)) return 0;
+        }
+    }
+    txi_prior_close(list);
+    return 1;
+}
+
+/* ---- prior lines: assistants ------------------------------------------------------------------ */
+
+/* the unit vector to the left of a line at point k of n, as y runs downwards; 0, 0: it has no direction */
+static txm_vec2 txi_prior_left(const txm_vec2 *points, int n, int k) {
+    const txm_vec2 a = points[k > TXI_PRIOR_CHORD ? k - TXI_PRIOR_CHORD : 0];
+    const txm_vec2 b = points[k + TXI_PRIOR_CHORD < n ? k + TXI_PRIOR_CHORD : n - 1];
+    const double dx = (double)b.x - a.x, dy = (double)b.y - a.y, length = sqrt(dx * dx + dy * dy);
+    return length > 0 ? txm_v2(txm_float(dy / length), txm_float(-dx / length)) : txm_v2(0, 0);
+}
+
+/* the known pixel at a place, or -1 */
+static int64_t txi_prior_known(const txi_window *w, double x, double y) {
+    const int px = (int)floor(x + 0.5), py = (int)floor(y + 0.5);
+    if (px < 0 || py < 0 || px >= w->width || py >= w->height) return -1;
+    const int64_t i = (int64_t)py * w->width + px;
+    return w->state[i] == TXI_KNOWN || w->state[i] == TXI_FOREIGN ? i : -1;
+}
+
+/* How strong an edge runs along the line at a distance to its left (negative: right): the mean step
+   across, summed over the colours, in levels; 0 where it is not of one sign. */
+static double txi_prior_edge(const txi_window *w, const txm_vec2 *points, int n, int distance) {
+    double sum[3] = {0, 0, 0}, size = 0;
+    int count = 0;
+    for (int k = 0; k < n; k++) {
+        const txm_vec2 left = txi_prior_left(points, n, k);
+        const double x = points[k].x + (double)left.x * distance;
+        const double y = points[k].y + (double)left.y * distance;
+        const int64_t a = txi_prior_known(w, x + 1.5 * (double)left.x, y + 1.5 * (double)left.y);
+        const int64_t b = txi_prior_known(w, x - 1.5 * (double)left.x, y - 1.5 * (double)left.y);
+        if (a < 0 || b < 0) continue;
+        count++;
+        for (int c = 0; c < 3; c++) {
+            const int step = w->color[4 * a + c] - w->color[4 * b + c];
+            sum[c] += step;
+            size += step < 0 ? -step : step;
+        }
+    }
+    const double mean = fabs(sum[0]) + fabs(sum[1]) + fabs(sum[2]);
+    if (count < TXI_PRIOR_LEAST || mean < TXI_PRIOR_STEP * count || mean < TXI_PRIOR_SURE * size) return 0;
+    return mean / count;
+}
+
+/* The line at a distance to the left of line k, where that lies in the window. 0: no memory. */
+static int txi_prior_offset(const txi_window *w, txi_prior_list *list, int k, int distance,
+                            txm_arena *arena) {
+    const int first = list->starts[k], n = list->starts[k + 1] - first;
+    if (!txi_prior_reserve(list, 1, arena)) return 0;
+    for (int i = 0; i < n; i++) {
+        const txm_vec2 p = list->points[first + i];
+        const txm_vec2 left = txi_prior_left(list->points + first, n, i);
+        const txm_vec2 q = txm_v2(txm_float(p.x + (double)left.x * distance),
+                                  txm_float(p.y + (double)left.y * distance));
+        const int x = (int)floor((double)q.x + 0.5), y = (int)floor((double)q.y + 0.5);
+        const int inside = x >= 0 && y >= 0 && x < w->width && y < w->height &&
+                           w->state[(size_t)y * (size_t)w->width + (size_t)x] != TXI_VOID;
+        const int open = list->open > list->starts[list->count];
+        if (!inside) {
+            txi_prior_close(list);
+            if (!txi_prior_reserve(list, 1, arena)) return 0;
+            continue;
+        }
+        if (open) { /* where the line bends more than the distance allows, its parallel turns back */
+            const txm_vec2 last = list->points[list->open - 1];
+            if (((double)q.x - last.x) * -left.y + ((double)q.y - last.y) * left.x <= 0) continue;
+        }
+        if (!txi_prior_add(list, q, arena)) return 0;
+    }
+    txi_prior_close(list);
+    return 1;
+}
+
+/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges, which are maxima
+   over the distance. 0: no memory. */
+static int txi_prior_assist(const txi_window *w, txi_prior_list *list, int k, int side,
+                            txm_arena *arena) {
+    enum { FIRST = 2, SLOTS = TXI_PRIOR_WIDTH - FIRST };
+    double edge[SLOTS];
+    const txm_vec2 *points = list->points + list->starts[k];
+    const int n = list->starts[k + 1] - list->starts[k];
+    for (int i = 0; i < SLOTS; i++) edge[i] = txi_prior_edge(w, points, n, side * (FIRST + i));
+    for (int found = 0; found < TXI_PRIOR_AIDS; found++) {
+        int best = -1;
+        for (int i = 0; i < SLOTS; i++) {
+            const double before = i > 0 ? edge[i - 1] : 0, after = i + 1 < SLOTS ? edge[i + 1] : 0;
+            if (edge[i] > 0 && edge[i] >= before && edge[i] > after && (best < 0 || edge[i] > edge[best]))
+                best = i;
+        }
+        if (best < 0) return 1;
+        if (!txi_prior_offset(w, list, k, side * (FIRST + best), arena)) return 0;
+        for (int i = best - 3; i <= best + 3; i++) { /* an edge is that wide */
+            if (i >= 0 && i < SLOTS) edge[i] = 0;
+        }
+    }
+    return 1;
+}
+
+/* The prior lines of a window, each followed by its assistants if it has any, those of pieces of one
+   line after all of these.
+   crests  NULL: the lines of the description
+   prior   lies in the arena
+   return  TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost    O(pixels of the window + length of the lines in it)                              */
+static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *crests,
+                                 const txi_window *w, txm_arena *arena, txm_env *env,
+                                 txi_prior *prior) {
+    const texinpaint_line *lines = crests ? crests->lines : d->desc->lines;
+    const size_t count = crests ? crests->line_count : (size_t)d->desc->line_count;
+    txi_prior_list list;
+    txi_places places;
+    txm_arena scratch;
+    int ok = 1;
+    memset(prior, 0, sizeof *prior);
+    memset(&list, 0, sizeof list);
+    if (count == 0) return TXM_OK;
+    if (txm_progress(env, 0, "prior lines")) return txi_stopped(env);
+    txm_arena_init(&scratch, env);
+    if (d->surface) ok = txi_places_make(w, &scratch, &places);
+    for (size_t i = 0; i < count && ok; i++) {
+        if (d->surface) ok = txi_prior_lay(&places, &lines[i], &list, arena);
+        else ok = txi_prior_copy(w, &lines[i], &list, arena);
+    }
+    const int own = list.count;
+    for (int k = 0; k < own && ok; k++)
+        ok = txi_prior_assist(w, &list, k, 1, arena) && txi_prior_assist(w, &list, k, -1, arena);
+    txm_arena_free(&scratch);
+    if (!ok) return txi_no_memory(env);
+    prior->points = list.points;
+    prior->starts = list.starts;
+    prior->line_count = list.count;
+    return TXM_OK;
+}
 
 /* ---- tensor voting ----------------------------------------------------------------------------
    C. Tang, G. Medioni. Inference of integrated surface, curve and junction descriptions from sparse 3D
@@ -9763,33 +11239,6 @@ static void txi_normal_out(float *v, txm_vec2 axis, int mirrored, int y_is_down)
     v[0] = txm_float(0.5 * (x + 1));
     v[1] = txm_float(0.5 * (y * (y_is_down ? 1 : -1) * (mirrored ? -1 : 1) + 1));
     v[2] = txm_float(0.5 * (z + 1));
-}
-
-/* ---- stubs: whoever lands the real function takes its stub away here --------------------------- */
-
-static txm_status txi_harmonic_fill(txi_domain *d, txm_env *env) {
-    (void)d, (void)env;
-    return TXM_OK;
-}
-
-static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *crests,
-                                 const txi_window *w, txm_arena *arena, txm_env *env,
-                                 txi_prior *prior) {
-    (void)d, (void)crests, (void)w, (void)arena, (void)env;
-    memset(prior, 0, sizeof *prior);
-    return TXM_OK;
-}
-
-TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_env *env,
-                                              const txm_image *out) {
-    (void)desc, (void)out;
-    return txm_fail(env, TXM_BAD_ARGUMENT, "not there yet");
-}
-
-TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,
-                                            const txm_image *out) {
-    (void)desc, (void)out;
-    return txm_fail(env, TXM_BAD_ARGUMENT, "not there yet");
 }
 
 /* ---- hypotheses -------------------------------------------------------------------------------

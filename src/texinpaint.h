@@ -249,7 +249,6 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 
 #include "texinpaint/config.h"
 #include "texinpaint/check.h"
-#include "texinpaint/weld.h"
 #include "texinpaint/surface.h"
 #include "texinpaint/geodesic.h"
 #include "texinpaint/factor.h"
@@ -279,7 +278,6 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/assemble.h"
 #include "texinpaint/fill.h"
 #include "texinpaint/blend.h"
-#include "texinpaint/stub.h"
 #include "texinpaint/choose.h"
 #include "texinpaint/job.h"
 #endif /* TEXINPAINT_IMPLEMENTATION */

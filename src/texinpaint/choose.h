@@ -5,7 +5,7 @@
 #include "fill.h"
 #include "join.h"
 #include "lay.h"
-#include "stub.h"
+#include "prior.h"
 
 /* ---- hypotheses -------------------------------------------------------------------------------
    Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue

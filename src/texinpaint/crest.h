@@ -342,14 +342,14 @@ static txm_status txi_crest_deliver(const txi_crest_net nets[2], txi_crest_run *
 /* Everything but the checks. */
 static txm_status txi_crest_find(const texinpaint_crest_desc *desc, txm_arena *arena, txm_env *env,
                                  texinpaint_crests **out) {
-    txi_welded weld;
+    txm_mesh welded;
     txi_shape shape;
     txi_crest_net nets[2];
     txi_crest_run *runs[2] = {NULL, NULL};
     size_t counts[2] = {0, 0};
     memset(nets, 0, sizeof nets);
-    txm_status status = txi_welded_make(&desc->mesh, arena, env, &weld);
-    if (status == TXM_OK) status = txi_shape_make(&weld.mesh, desc->rings, arena, env, &shape);
+    txm_status status = txi_welded_make(&desc->mesh, arena, env, &welded);
+    if (status == TXM_OK) status = txi_shape_make(&welded, desc->rings, arena, env, &shape);
     for (int i = 0; i < 2 && status == TXM_OK && shape.edge_count; i++) {
         if (desc->kinds && !(desc->kinds & (i ? TEXINPAINT_VALLEY : TEXINPAINT_RIDGE))) continue;
         if (txm_progress(env, i ? 0.95f : 0.9f, "crest lines")) return txi_stopped(env);

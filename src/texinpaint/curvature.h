@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_CURVATURE_H
 #define TEXINPAINT_CURVATURE_H
 
-#include "weld.h"
+#include "surface.h"
 
 /* ---- curvature ------------------------------------------------------------------------------
    Principal curvatures, their directions, and their derivatives along these, at the vertices of a
@@ -49,6 +49,35 @@ typedef struct txi_shape {
     txi_curvature *curvature; /* 1 per vertex                                                  */
     int rings;
 } txi_shape;
+
+/* A mesh of triangles as one whose vertices in equal places are one (files repeat them for each chart),
+   without the faces of which two corners are in one place. The input is checked. */
+static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
+                                  txm_mesh *welded) {
+    txi_surface points;
+    size_t count = 0;
+    memset(&points, 0, sizeof points);
+    memset(welded, 0, sizeof *welded);
+    if (input->face_count == 0) return TXM_OK;
+    uint32_t *number = (uint32_t *)txm_arena_alloc(arena, input->vertex_count, sizeof(uint32_t));
+    uint32_t *indices = (uint32_t *)txm_arena_alloc(arena, input->face_count, 3 * sizeof(uint32_t));
+    float *place = (float *)txm_arena_alloc(arena, input->vertex_count, 3 * sizeof(float));
+    if (arena->failed) return txi_no_memory(env);
+    const txm_status status = txi_weld(input, &points, number, arena, env);
+    if (status != TXM_OK) return status;
+    for (size_t v = 0; v < input->vertex_count; v++)
+        memcpy(place + 3 * (size_t)number[v], input->positions + 3 * v, 3 * sizeof(float));
+    for (size_t f = 0; f < input->face_count; f++) {
+        uint32_t *t = indices + 3 * count;
+        for (size_t k = 0; k < 3; k++) t[k] = number[input->indices[3 * f + k]];
+        count += t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    }
+    welded->positions = place;
+    welded->indices = indices;
+    welded->vertex_count = points.vertex_count;
+    welded->face_count = count;
+    return TXM_OK;
+}
 
 /* Number the edges and collect the neighbours. sorted: room for 2 per side. */
 static void txi_shape_edges(txi_shape *s, uint32_t *sorted) {

@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_GRAPH_H
 #define TEXINPAINT_GRAPH_H
 
-#include "resample.h"
+#include "layout.h"
 
 /* ---- graph of texels -------------------------------------------------------------------------
    The unknown texels of a map as nodes of a graph, with links to their neighbours on the surface,
@@ -25,7 +25,7 @@ enum {
     TXI_MERGE_MOST = 256,  /* links of a row that are merged; ours: the time is quadratic       */
     TXI_LINKS_MOST = 24    /* links made by one node: 3 offsets, to and fro, 4 texels each      */
 };
-#define TXI_STRETCH 64.0   /* ratio of the eigenvalues of D at most: offsets stay below 9 texels */
+#define TXI_SHEAR 64.0   /* ratio of the eigenvalues of D at most: offsets stay below 9 texels */
 
 /* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each in the
    rows of both its nodes; those to known texels in `rim`. */
@@ -96,8 +96,8 @@ static txi_stencil txi_face_stencil(const txi_domain *d, uint32_t face) {
     const double det = e * g - f * f;
     if (!(e + g > 0)) return txi_stencil_of(1, 0, 1);
     /* ratio of the eigenvalues about (e + g)^2 / det: what is more is taken off the larger one */
-    const double least = (e + g) * (e + g) / TXI_STRETCH;
-    const double more = det < least ? (e + g) / TXI_STRETCH : 0;
+    const double least = (e + g) * (e + g) / TXI_SHEAR;
+    const double more = det < least ? (e + g) / TXI_SHEAR : 0;
     const double root = sqrt((e + more) * (g + more) - f * f);
     return txi_stencil_of((g + more) / root, -f / root, (e + more) / root);
 }
@@ -171,27 +171,13 @@ static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2
     return 0;
 }
 
-/* Where the texel lies on its face: whole pictures are added until it lies in it. */
+/* Where the texel lies on its face, in the texels of that. */
 static void txi_texel_place(const txi_domain *d, uint32_t face, uint32_t texel, double place[2]) {
     const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
-    const double x = texel % (uint32_t)d->width, y = texel / (uint32_t)d->width;
-    const double cx = ((double)t[0].x + t[1].x + t[2].x) / 3, cy = ((double)t[0].y + t[1].y + t[2].y) / 3;
-    const double sx = floor((cx - x) / d->width + 0.5), sy = floor((cy - y) / d->height + 0.5);
-    double best = -1e30;
-    place[0] = x;
-    place[1] = y;
-    for (int k = 0; k < 9 && best < -1e-5; k++) { /* the nearest first; faces may be wider than a picture */
-        static const int shift[9][2] = {{0, 0},  {1, 0},  {-1, 0}, {0, 1},  {0, -1},
-                                        {1, 1},  {-1, 1}, {1, -1}, {-1, -1}};
-        const double px = x + (sx + shift[k][0]) * d->width, py = y + (sy + shift[k][1]) * d->height;
-        double w[3];
-        if (!txi_weights(t, px, py, w)) return;
-        const double least = fmin(w[0], fmin(w[1], w[2]));
-        if (least <= best) continue;
-        best = least;
-        place[0] = px;
-        place[1] = py;
-    }
+    double w[3];
+    txi_texel_weights(d, face, texel, w);
+    place[0] = w[0] * t[0].x + w[1] * t[1].x + w[2] * t[2].x;
+    place[1] = w[0] * t[0].y + w[1] * t[1].y + w[2] * t[2].y;
 }
 
 /* ---- graph: links ------------------------------------------------------------------------- */

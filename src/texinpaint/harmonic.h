@@ -113,18 +113,9 @@ static void txi_quantities_mean(const txi_domain *d, const txi_quantities *q, co
 /* ---- smooth fill: labels -------------------------------------------------------------------- */
 
 /* where a texel lies: in space, or in the picture */
-static txm_dvec3 txi_texel_point(const txi_domain *d, uint32_t texel) {
-    const txi_surface *s = d->surface;
-    double place[2], w[3];
-    if (!s || s->owner[texel] == TXI_NO_FACE)
-        return txm_d3(texel % (uint32_t)d->width, texel / (uint32_t)d->width, 0);
-    const uint32_t face = s->owner[texel];
-    txi_texel_place(d, face, texel, place);
-    if (!txi_weights(s->uv + 3 * (size_t)face, place[0], place[1], w))
-        return txi_corner_point(s, 3 * face);
-    txm_dvec3 p = txm_d3(0, 0, 0);
-    for (uint32_t k = 0; k < 3; k++) p = txm_d3_mad(p, txi_corner_point(s, 3 * face + k), w[k]);
-    return p;
+static txm_dvec3 txi_fill_point(const txi_domain *d, uint32_t texel) {
+    if (d->surface) return txi_texel_point(d, d->surface->owner[texel], texel);
+    return txm_d3(texel % (uint32_t)d->width, texel / (uint32_t)d->width, 0);
 }
 
 /* For each node the known texel that is nearest, of those that its neighbours have: distances in a
@@ -144,11 +135,11 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
         return txi_no_memory(env);
     }
     for (size_t i = 0; i < g->count; i++) {
-        point[i] = txi_texel_point(d, g->texel[i]);
+        point[i] = txi_fill_point(d, g->texel[i]);
         source[i] = UINT32_MAX;
         least[i] = 0;
         for (uint32_t k = g->rim_first[i]; k < g->rim_first[i + 1]; k++) {
-            const double apart = txm_d3_dist2(point[i], txi_texel_point(d, g->rim[k]));
+            const double apart = txm_d3_dist2(point[i], txi_fill_point(d, g->rim[k]));
             if (source[i] != UINT32_MAX && !(apart < least[i])) continue;
             source[i] = g->rim[k];
             least[i] = apart;
@@ -162,7 +153,7 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
         head = head + 1 < g->count ? head + 1 : 0;
         waiting--;
         queued[i] = 0;
-        const txm_dvec3 from = txi_texel_point(d, source[i]);
+        const txm_dvec3 from = txi_fill_point(d, source[i]);
         for (uint32_t k = g->first[i]; k < g->first[i + 1]; k++) {
             const uint32_t j = g->to[k];
             const double apart = txm_d3_dist2(point[j], from);
