@@ -265,6 +265,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/prior.h"
 #include "texinpaint/vote.h"
 #include "texinpaint/trace.h"
+#include "texinpaint/grow.h"
 #include "texinpaint/join.h"
 #include "texinpaint/belief.h"
 #include "texinpaint/strip.h"

@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_JOIN_H
 #define TEXINPAINT_JOIN_H
 
-#include "trace.h"
+#include "grow.h"
 
 /* ---- which ends belong together ---------------------------------------------------------------
    The structure of [1, II.B]: lines that end at the hole are continued through it and joined. The
@@ -32,11 +32,13 @@ typedef struct txi_rules {
     double unmatched; /* an end that is not joined                                               */
     double crossing;  /* two curves that cross                                                   */
     double bend;      /* factor of the bending energy                                            */
+    double votes;     /* less for votes that agree with the curve                                */
+    double met;       /* less for lines that met when they grew                                  */
     int look_ahead;   /* long ends may leave the hole without another end                        */
 } txi_rules;
 
 static txi_rules txi_rules_of(int structure) {
-    txi_rules picture = {2.2, 0.3, 1, 1}, pattern = {6, 2, 0.6, 0};
+    txi_rules picture = {3, 0.3, 1, 1, 0.25, 1}, pattern = {6, 2, 0.6, 1, 0.25, 0};
     return structure == TEXINPAINT_PATTERN ? pattern : picture;
 }
 
@@ -171,6 +173,17 @@ static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rule
                         0.3 * (curvature < 3 ? curvature : 3) + 0.3 * !p->is_long + 0.3 * !q->is_long);
     txi_link_box(k);
     return 1;
+}
+
+/* What the votes say about a candidate, -1..1: how far they agree with its curve, on average. */
+static double txi_affinity(txi_growth *g, const txi_link *k) {
+    double sum = 0;
+    for (int i = 2; i <= TXI_STEPS - 2; i += 2) {
+        const txm_vec2 p = k->points[i - 1], q = k->points[i + 1];
+        const txm_vec2 d = txi_unit((double)q.x - p.x, (double)q.y - p.y);
+        sum += txi_votes_agree(g, k->points[i].x, k->points[i].y, d.x, d.y);
+    }
+    return sum / (TXI_STEPS / 2 - 1);
 }
 
 /* ---- looking ahead ----------------------------------------------------------------------- */
@@ -423,7 +436,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
 /* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
    they are better than no join. Returns how many. */
 static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
-                          txi_link *links) {
+                          txi_growth *growth, txi_link *links) {
     int count = 0;
     for (int a = 0; a < l->end_count; a++) {
         int kept = 0;
@@ -438,6 +451,8 @@ static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rul
                        !txi_look_ahead(w, l, rules, a, &k)) {
                 continue;
             }
+            k.cost = txm_float(k.cost - rules->votes * txi_affinity(growth, &k) -
+                               (k.b >= 0 && growth->met[a * l->end_count + k.b] ? rules->met : 0));
             if (k.cost >= rules->unmatched * (k.b >= 0 ? 2 : 1)) continue;
             if (kept < TXI_PER_END) {
                 links[count++] = k;
@@ -574,9 +589,9 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
     txm_arena scratch;
     txi_pairing match;
+    txi_growth growth;
     txm_status status = TXM_OK;
     (void)prior;
-    (void)beta;
     *curves = NULL;
     *count = 0;
     if (structure == TEXINPAINT_TEXTURE || l->end_count == 0) return TXM_OK;
@@ -585,8 +600,9 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
     txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)room, 2 * sizeof *dense);
     if (scratch.failed) status = txi_no_memory(env);
+    if (status == TXM_OK) status = txi_grow(&growth, w, l, alpha, beta, &scratch, env);
     if (status == TXM_OK) {
-        const int n = txi_candidates(w, l, &rules, alpha, links);
+        const int n = txi_candidates(w, l, &rules, alpha, &growth, links);
         status = n ? txi_pairing_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
         if (status == TXM_OK && n) {
             txi_anneal(&match, seed, best);

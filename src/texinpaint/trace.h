@@ -17,6 +17,7 @@ enum {
     TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
+    TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
 
@@ -547,7 +548,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
     const txi_slopes *f = &l->field;
     const double least = 0.5 * l->threshold > 0.25 * from->strength ? 0.5 * l->threshold
                                                                      : 0.25 * from->strength;
-    txm_vec2 back[8];
+    txm_vec2 back[TXI_INNER];
     int n = 0, inner = 0, steps = 0;
     double sum = 0;
     for (int way = 0; way < 2; way++) {
@@ -565,11 +566,12 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
             while (inner > 0) points[n++] = back[--inner];
             points[n++] = from->place;
         }
-        while (way == 0 ? inner < 8 : n < capacity) {
+        while (way == 0 ? inner < TXI_INNER : n < capacity) {
             if (!txi_walk_on(f, &k, 1, least)) break;
             const ptrdiff_t i = txi_pixel(f->width, f->height, k.x, k.y);
             if (way == 0) {
                 if (l->away[i] < 2) break;
+                if (l->away[i] > 36) return 0; /* it passes by                                     */
                 back[inner++] = txm_v2(txm_float(k.x), txm_float(k.y));
             } else {
                 /* back at the border of the hole: it does not lead away from it                  */
@@ -721,7 +723,7 @@ static int txi_end_exists(const txi_lines *l, const txi_end *e) {
 /* Ends from points 2.6 to 4.2 pixels outside of the hole, the strongest first. */
 static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
                                 txm_arena *scratch, txm_env *env) {
-    const int room = (int)l->limit + 10; /* points of one end                                      */
+    const int room = (int)l->limit + TXI_INNER; /* points of one end                               */
     txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
     size_t count = 0;
     if (l->thin_count == 0) return TXM_OK;
@@ -741,7 +743,7 @@ static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *ar
         txi_end *e = &l->ends[l->end_count];
         const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
         double strength;
-        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.35) continue;
+        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.12) continue;
         e->first = l->point_count;
         e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
         if (e->count < 5 || !txi_fit_end(w, l->points + e->first, e)) continue;

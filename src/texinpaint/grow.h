@@ -1,0 +1,249 @@
+#ifndef TEXINPAINT_GROW_H
+#define TEXINPAINT_GROW_H
+
+#include "trace.h"
+
+/* ---- lines grow into the hole -----------------------------------------------------------------
+   [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places are
+   known. Then, round by round, each line takes the place of most saliency ahead of it as a new point,
+   whose tensor is set anew, until it is as near to another line as alpha, leaves the hole, has no
+   votes left, or beta rounds are over.
+
+   The paper joins the two lines then. Here growth and the field of votes only say how well two ends go
+   together: lines that grow drift where there is a gap to bridge, and which ones meet first is
+   chance.                                                                                         */
+
+enum {
+    TXI_TOKEN_STEP = 3,   /* pixels between the points of a line that vote                        */
+    TXI_TOKENS_OF_END = 14, /* points of each line                                                */
+    TXI_GROW_STEP = 3,    /* pixels that a line grows in one round                                */
+    TXI_FIELD_STEP = 4    /* pixels between the places at which the field of votes is computed     */
+};
+
+/* How lines grow; ours: over the width of a large hole, lines that are some pixels apart meet. */
+static const int txi_grow_rounds = 64;      /* at most, if beta is 0                              */
+
+typedef struct txi_growth {
+    const txi_window *window;
+    txi_fields fields;
+    txi_tokens tokens;
+    int *owner;        /* one per token: the end of its line                                      */
+    float *field;      /* at every 4th pixel in both directions: xx, xy, yy of the votes in the window's
+                          tangent plane, of trace 1; xx = -1: not computed yet                    */
+    int field_width, field_height;
+    uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                      */
+    txm_vec2 *tips;    /* where each end's line stopped                                           */
+    int end_count;
+} txi_growth;
+
+/* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
+   that are void count as flat. */
+typedef struct txi_spot {
+    txm_dvec3 place, normal, ex, ey;
+} txi_spot;
+
+static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
+    txi_spot s;
+    const int ix = txm_clampi((int)floor(x + 0.5), 0, w->width - 1);
+    const int iy = txm_clampi((int)floor(y + 0.5), 0, w->height - 1);
+    const size_t i = (size_t)iy * (size_t)w->width + (size_t)ix;
+    txm_dvec3 e[2];
+    s.place = txm_d3(x, y, 0);
+    s.normal = txm_d3(0, 0, 1);
+    s.ex = txm_d3(1, 0, 0);
+    s.ey = txm_d3(0, 1, 0);
+    if (w->state[i] == TXI_VOID) return s;
+    for (int d = 0; d < 2; d++) { /* differences to the neighbours that exist                      */
+        const int at = d ? iy : ix, limit = d ? w->height : w->width;
+        const size_t step = d ? (size_t)w->width : 1;
+        const size_t low = at > 0 && w->state[i - step] != TXI_VOID ? i - step : i;
+        const size_t high = at + 1 < limit && w->state[i + step] != TXI_VOID ? i + step : i;
+        const txm_vec3 p = w->place[low], q = w->place[high];
+        e[d] = txm_d3((double)q.x - p.x, (double)q.y - p.y, (double)q.z - p.z);
+        if (low != i && high != i) e[d] = txm_d3_scale(e[d], 0.5);
+        if (low == high || txm_d3_len2(e[d]) < 1e-4 || txm_d3_len2(e[d]) > 9) return s;
+    }
+    const txm_vec3 p = w->place[i], n = w->normal[i];
+    s.place = txm_d3(p.x, p.y, p.z);
+    s.place = txm_d3_mad(txm_d3_mad(s.place, e[0], x - ix), e[1], y - iy);
+    s.normal = txm_d3_unit(txm_d3(n.x, n.y, n.z));
+    s.ex = txm_d3_unit(txm_d3_mad(e[0], s.normal, -txm_d3_dot(e[0], s.normal)));
+    s.ey = txm_d3_unit(txm_d3_mad(e[1], s.normal, -txm_d3_dot(e[1], s.normal)));
+    return s;
+}
+
+static double txi_form(const double t[6], txm_dvec3 a, txm_dvec3 b) {
+    return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) + a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
+           a.z * (t[2] * b.x + t[4] * b.y + t[5] * b.z);
+}
+
+/* The votes at a place of the window: a tensor in the window's axes, xx xy yy. */
+static void txi_votes_in_window(const txi_growth *g, double x, double y, double t[3]) {
+    const txi_spot s = txi_spot_at(g->window, x, y);
+    double votes[6];
+    txi_votes_at(&g->fields, &g->tokens, s.place, 0, votes);
+    t[0] = txi_form(votes, s.ex, s.ex);
+    t[1] = txi_form(votes, s.ex, s.ey);
+    t[2] = txi_form(votes, s.ey, s.ey);
+}
+
+/* A token of a line in direction (dx, dy) of the window: a stick across it, in the surface. */
+static void txi_grow_token(txi_growth *g, double x, double y, double dx, double dy, double weight,
+                           int owner) {
+    const txi_spot s = txi_spot_at(g->window, x, y);
+    double t[6] = {0};
+    if (g->tokens.count >= g->tokens.room) return;
+    txi_outer(t, txm_d3_unit(txm_d3_mad(txm_d3_scale(s.ex, -dy), s.ey, dx)), weight);
+    g->owner[g->tokens.count] = owner;
+    txi_tokens_add(&g->tokens, s.place, t);
+}
+
+/* The lines' points as tokens: balls vote, then sticks of length one in the directions found. */
+static txm_status txi_grow_begin(txi_growth *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
+    const int room = l->end_count * TXI_TOKENS_OF_END;
+    static const double unit[6] = {1, 0, 0, 1, 0, 1};
+    txi_fields balls;
+    txi_tokens points;
+    int *owner = (int *)txm_arena_alloc(scratch, (size_t)room, sizeof *owner);
+    txm_dvec3 *normals = (txm_dvec3 *)txm_arena_alloc(scratch, (size_t)room, sizeof *normals);
+    double *votes = (double *)txm_arena_alloc(scratch, (size_t)room, 6 * sizeof *votes);
+    if (scratch->failed) return txi_no_memory(env);
+    txi_fields_make(&balls, 4);
+    txm_status status = txi_tokens_make(&points, room, balls.reach, scratch, env);
+    if (status != TXM_OK) return status;
+    for (int e = 0; e < l->end_count; e++) {
+        for (int i = 0; i < TXI_TOKENS_OF_END && i * TXI_TOKEN_STEP < l->ends[e].count; i++) {
+            const txm_vec2 p = l->points[l->ends[e].first + i * TXI_TOKEN_STEP];
+            const txi_spot s = txi_spot_at(g->window, p.x, p.y);
+            normals[points.count] = s.normal;
+            owner[points.count] = e;
+            txi_tokens_add(&points, s.place, unit);
+        }
+    }
+    txi_vote_sparse(&balls, &points, 1, normals, votes);
+    for (int i = 0; i < points.count; i++) {
+        double t[6] = {0};
+        if (points.at[i].stick <= 0) continue; /* it is alone                                      */
+        txi_outer(t, points.at[i].normal, 1);
+        g->owner[g->tokens.count] = owner[i];
+        txi_tokens_add(&g->tokens, points.at[i].place, t);
+    }
+    return TXM_OK;
+}
+
+/* The line of another end that has come within alpha of a place, or -1. */
+static int txi_grow_meets(const txi_growth *g, int end, txm_dvec3 place, double alpha) {
+    const txi_tokens *k = &g->tokens;
+    const int64_t cx = txi_cell(k, place.x), cy = txi_cell(k, place.y), cz = txi_cell(k, place.z);
+    int best = -1;
+    double least = alpha * alpha;
+    for (int i = 0; i < 27; i++) {
+        const int64_t x = cx + i % 3 - 1, y = cy + i / 3 % 3 - 1, z = cz + i / 9 - 1;
+        for (int j = k->bucket[txi_bucket(k, x, y, z)]; j >= 0; j = k->at[j].next) {
+            const double d = txm_d3_dist2(k->at[j].place, place);
+            if (g->owner[j] == end || d > least || (d >= least && j > best)) continue;
+            least = d;
+            best = j;
+        }
+    }
+    return best < 0 ? -1 : g->owner[best];
+}
+
+/* One round of the line of an end: a step in that of seven directions, up to 45 degrees to either side,
+   which has the most votes for a line in this direction. 0: it has stopped. */
+static int txi_grow_step(txi_growth *g, int end, double least, txm_vec2 *tip, txm_vec2 *heading) {
+    const txi_window *w = g->window;
+    double best = least, bx = 0, by = 0, hx = 0, hy = 0;
+    for (int i = 0; i < 7; i++) {
+        const int k = i & 1 ? (i + 1) / 2 : -(i / 2); /* straight on first                         */
+        double sine, cosine, t[3];
+        txm_sincos(k * (TXM_PI / 12), &sine, &cosine);
+        const double dx = heading->x * cosine - heading->y * sine;
+        const double dy = heading->x * sine + heading->y * cosine;
+        const double x = tip->x + TXI_GROW_STEP * dx, y = tip->y + TXI_GROW_STEP * dy;
+        txi_votes_in_window(g, x, y, t);
+        const double across = dy * dy * t[0] - 2 * dx * dy * t[1] + dx * dx * t[2];
+        const double along = dx * dx * t[0] + 2 * dx * dy * t[1] + dy * dy * t[2];
+        if (across - along <= best) continue;
+        best = across - along;
+        bx = x;
+        by = y;
+        hx = dx;
+        hy = dy;
+    }
+    if (best <= least) return 0;
+    const ptrdiff_t at = txi_pixel(w->width, w->height, bx, by);
+    if (at < 0 || w->state[at] != TXI_HOLE) return 0;
+    *tip = txm_v2(txm_float(bx), txm_float(by));
+    *heading = txi_unit(heading->x + hx, heading->y + hy);
+    txi_grow_token(g, bx, by, heading->x, heading->y, 0.8, end);
+    return 1;
+}
+
+/* Let the lines grow.
+   alpha  pixels; lines as near as that have met; 0: 3
+   beta   rounds at most; 0: 64
+   cost   O(rounds * ends * tokens in reach)                                                    */
+static txm_status txi_grow(txi_growth *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
+                           txm_arena *scratch, txm_env *env) {
+    const int ends = l->end_count;
+    const double meet = alpha > 0 && alpha < 3 ? alpha : 3;
+    int rounds = beta > 0 ? beta : txi_grow_rounds;
+    if (rounds > 1 + (int)(l->width / TXI_GROW_STEP)) rounds = 1 + (int)(l->width / TXI_GROW_STEP);
+    memset(g, 0, sizeof *g);
+    g->window = w;
+    g->end_count = ends;
+    g->field_width = w->width / TXI_FIELD_STEP + 2;
+    g->field_height = w->height / TXI_FIELD_STEP + 2;
+    /* far enough for votes to bridge the hole                                                     */
+    txi_fields_make(&g->fields, txm_clampf(0.25f * l->width, 6, 30));
+    const int room = ends * (TXI_TOKENS_OF_END + rounds);
+    const size_t spots = (size_t)g->field_width * (size_t)g->field_height;
+    txm_status status = txi_tokens_make(&g->tokens, room, g->fields.reach, scratch, env);
+    if (status != TXM_OK) return status;
+    g->owner = (int *)txm_arena_alloc(scratch, (size_t)room, sizeof *g->owner);
+    g->field = (float *)txm_arena_alloc(scratch, spots, 3 * sizeof *g->field);
+    g->met = (uint8_t *)txm_arena_zero(scratch, (size_t)ends, (size_t)ends);
+    g->tips = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)ends, 2 * sizeof *g->tips);
+    uint8_t *going = (uint8_t *)txm_arena_alloc(scratch, (size_t)ends, 1);
+    if (scratch->failed) return txi_no_memory(env);
+    txm_vec2 *headings = g->tips + ends;
+    for (size_t i = 0; i < spots; i++) g->field[3 * i] = -1;
+    status = txi_grow_begin(g, l, scratch, env);
+    if (status != TXM_OK) return status;
+    for (int e = 0; e < ends; e++) {
+        g->tips[e] = l->ends[e].place;
+        headings[e] = l->ends[e].heading;
+        going[e] = 1;
+    }
+    for (int round = 0; round < rounds; round++) {
+        for (int e = 0; e < ends; e++) {
+            if (!going[e]) continue;
+            going[e] = (uint8_t)txi_grow_step(g, e, 0.05, &g->tips[e], &headings[e]);
+            if (!going[e] || round < 2) continue;
+            const int other = txi_grow_meets(g, e, txi_spot_at(w, g->tips[e].x, g->tips[e].y).place, meet);
+            if (other < 0) continue;
+            g->met[(size_t)e * (size_t)ends + (size_t)other] = 1;
+            g->met[(size_t)other * (size_t)ends + (size_t)e] = 1;
+        }
+    }
+    return TXM_OK;
+}
+
+/* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along) / sum;
+   0 where there are no votes. */
+static double txi_votes_agree(txi_growth *g, double x, double y, double dx, double dy) {
+    const int ix = txm_clampi((int)(x / TXI_FIELD_STEP + 0.5), 0, g->field_width - 1);
+    const int iy = txm_clampi((int)(y / TXI_FIELD_STEP + 0.5), 0, g->field_height - 1);
+    float *f = g->field + 3 * ((size_t)iy * (size_t)g->field_width + (size_t)ix);
+    if (f[0] < 0) {
+        double t[3];
+        txi_votes_in_window(g, ix * TXI_FIELD_STEP, iy * TXI_FIELD_STEP, t);
+        const double sum = t[0] + t[2];
+        for (int k = 0; k < 3; k++) f[k] = sum > 1e-3 ? txm_float(t[k] / sum) : 0;
+    }
+    return dy * dy * f[0] - 2 * dx * dy * f[1] + dx * dx * f[2] -
+           (dx * dx * f[0] + 2 * dx * dy * f[1] + dy * dy * f[2]);
+}
+
+#endif /* TEXINPAINT_GROW_H */
