@@ -5680,6 +5680,7 @@ enum {
     TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
+    TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
 
@@ -6210,7 +6211,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
     const txi_slopes *f = &l->field;
     const double least = 0.5 * l->threshold > 0.25 * from->strength ? 0.5 * l->threshold
                                                                      : 0.25 * from->strength;
-    txm_vec2 back[8];
+    txm_vec2 back[TXI_INNER];
     int n = 0, inner = 0, steps = 0;
     double sum = 0;
     for (int way = 0; way < 2; way++) {
@@ -6228,11 +6229,12 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
             while (inner > 0) points[n++] = back[--inner];
             points[n++] = from->place;
         }
-        while (way == 0 ? inner < 8 : n < capacity) {
+        while (way == 0 ? inner < TXI_INNER : n < capacity) {
             if (!txi_walk_on(f, &k, 1, least)) break;
             const ptrdiff_t i = txi_pixel(f->width, f->height, k.x, k.y);
             if (way == 0) {
                 if (l->away[i] < 2) break;
+                if (l->away[i] > 36) return 0; /* it passes by                                     */
                 back[inner++] = txm_v2(txm_float(k.x), txm_float(k.y));
             } else {
                 /* back at the border of the hole: it does not lead away from it                  */
@@ -6384,7 +6386,7 @@ static int txi_end_exists(const txi_lines *l, const txi_end *e) {
 /* Ends from points 2.6 to 4.2 pixels outside of the hole, the strongest first. */
 static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
                                 txm_arena *scratch, txm_env *env) {
-    const int room = (int)l->limit + 10; /* points of one end                                      */
+    const int room = (int)l->limit + TXI_INNER; /* points of one end                               */
     txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
     size_t count = 0;
     if (l->thin_count == 0) return TXM_OK;
@@ -6404,7 +6406,7 @@ static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *ar
         txi_end *e = &l->ends[l->end_count];
         const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
         double strength;
-        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.35) continue;
+        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.12) continue;
         e->first = l->point_count;
         e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
         if (e->count < 5 || !txi_fit_end(w, l->points + e->first, e)) continue;
@@ -6546,6 +6548,249 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     return status;
 }
 
+/* ---- lines grow into the hole -----------------------------------------------------------------
+   [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places are
+   known. Then, round by round, each line takes the place of most saliency ahead of it as a new point,
+   whose tensor is set anew, until it is as near to another line as alpha, leaves the hole, has no
+   votes left, or beta rounds are over.
+
+   The paper joins the two lines then. Here growth and the field of votes only say how well two ends go
+   together: lines that grow drift where there is a gap to bridge, and which ones meet first is
+   chance.                                                                                         */
+
+enum {
+    TXI_TOKEN_STEP = 3,   /* pixels between the points of a line that vote                        */
+    TXI_TOKENS_OF_END = 14, /* points of each line                                                */
+    TXI_GROW_STEP = 3,    /* pixels that a line grows in one round                                */
+    TXI_FIELD_STEP = 4    /* pixels between the places at which the field of votes is computed     */
+};
+
+/* How lines grow; ours: over the width of a large hole, lines that are some pixels apart meet. */
+static const int txi_grow_rounds = 64;      /* at most, if beta is 0                              */
+
+typedef struct txi_growth {
+    const txi_window *window;
+    txi_fields fields;
+    txi_tokens tokens;
+    int *owner;        /* one per token: the end of its line                                      */
+    float *field;      /* at every 4th pixel in both directions: xx, xy, yy of the votes in the window's
+                          tangent plane, of trace 1; xx = -1: not computed yet                    */
+    int field_width, field_height;
+    uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                      */
+    txm_vec2 *tips;    /* where each end's line stopped                                           */
+    int end_count;
+} txi_growth;
+
+/* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
+   that are void count as flat. */
+typedef struct txi_spot {
+    txm_dvec3 place, normal, ex, ey;
+} txi_spot;
+
+static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
+    txi_spot s;
+    const int ix = txm_clampi((int)floor(x + 0.5), 0, w->width - 1);
+    const int iy = txm_clampi((int)floor(y + 0.5), 0, w->height - 1);
+    const size_t i = (size_t)iy * (size_t)w->width + (size_t)ix;
+    txm_dvec3 e[2];
+    s.place = txm_d3(x, y, 0);
+    s.normal = txm_d3(0, 0, 1);
+    s.ex = txm_d3(1, 0, 0);
+    s.ey = txm_d3(0, 1, 0);
+    if (w->state[i] == TXI_VOID) return s;
+    for (int d = 0; d < 2; d++) { /* differences to the neighbours that exist                      */
+        const int at = d ? iy : ix, limit = d ? w->height : w->width;
+        const size_t step = d ? (size_t)w->width : 1;
+        const size_t low = at > 0 && w->state[i - step] != TXI_VOID ? i - step : i;
+        const size_t high = at + 1 < limit && w->state[i + step] != TXI_VOID ? i + step : i;
+        const txm_vec3 p = w->place[low], q = w->place[high];
+        e[d] = txm_d3((double)q.x - p.x, (double)q.y - p.y, (double)q.z - p.z);
+        if (low != i && high != i) e[d] = txm_d3_scale(e[d], 0.5);
+        if (low == high || txm_d3_len2(e[d]) < 1e-4 || txm_d3_len2(e[d]) > 9) return s;
+    }
+    const txm_vec3 p = w->place[i], n = w->normal[i];
+    s.place = txm_d3(p.x, p.y, p.z);
+    s.place = txm_d3_mad(txm_d3_mad(s.place, e[0], x - ix), e[1], y - iy);
+    s.normal = txm_d3_unit(txm_d3(n.x, n.y, n.z));
+    s.ex = txm_d3_unit(txm_d3_mad(e[0], s.normal, -txm_d3_dot(e[0], s.normal)));
+    s.ey = txm_d3_unit(txm_d3_mad(e[1], s.normal, -txm_d3_dot(e[1], s.normal)));
+    return s;
+}
+
+static double txi_form(const double t[6], txm_dvec3 a, txm_dvec3 b) {
+    return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) + a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
+           a.z * (t[2] * b.x + t[4] * b.y + t[5] * b.z);
+}
+
+/* The votes at a place of the window: a tensor in the window's axes, xx xy yy. */
+static void txi_votes_in_window(const txi_growth *g, double x, double y, double t[3]) {
+    const txi_spot s = txi_spot_at(g->window, x, y);
+    double votes[6];
+    txi_votes_at(&g->fields, &g->tokens, s.place, 0, votes);
+    t[0] = txi_form(votes, s.ex, s.ex);
+    t[1] = txi_form(votes, s.ex, s.ey);
+    t[2] = txi_form(votes, s.ey, s.ey);
+}
+
+/* A token of a line in direction (dx, dy) of the window: a stick across it, in the surface. */
+static void txi_grow_token(txi_growth *g, double x, double y, double dx, double dy, double weight,
+                           int owner) {
+    const txi_spot s = txi_spot_at(g->window, x, y);
+    double t[6] = {0};
+    if (g->tokens.count >= g->tokens.room) return;
+    txi_outer(t, txm_d3_unit(txm_d3_mad(txm_d3_scale(s.ex, -dy), s.ey, dx)), weight);
+    g->owner[g->tokens.count] = owner;
+    txi_tokens_add(&g->tokens, s.place, t);
+}
+
+/* The lines' points as tokens: balls vote, then sticks of length one in the directions found. */
+static txm_status txi_grow_begin(txi_growth *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
+    const int room = l->end_count * TXI_TOKENS_OF_END;
+    static const double unit[6] = {1, 0, 0, 1, 0, 1};
+    txi_fields balls;
+    txi_tokens points;
+    int *owner = (int *)txm_arena_alloc(scratch, (size_t)room, sizeof *owner);
+    txm_dvec3 *normals = (txm_dvec3 *)txm_arena_alloc(scratch, (size_t)room, sizeof *normals);
+    double *votes = (double *)txm_arena_alloc(scratch, (size_t)room, 6 * sizeof *votes);
+    if (scratch->failed) return txi_no_memory(env);
+    txi_fields_make(&balls, 4);
+    txm_status status = txi_tokens_make(&points, room, balls.reach, scratch, env);
+    if (status != TXM_OK) return status;
+    for (int e = 0; e < l->end_count; e++) {
+        for (int i = 0; i < TXI_TOKENS_OF_END && i * TXI_TOKEN_STEP < l->ends[e].count; i++) {
+            const txm_vec2 p = l->points[l->ends[e].first + i * TXI_TOKEN_STEP];
+            const txi_spot s = txi_spot_at(g->window, p.x, p.y);
+            normals[points.count] = s.normal;
+            owner[points.count] = e;
+            txi_tokens_add(&points, s.place, unit);
+        }
+    }
+    txi_vote_sparse(&balls, &points, 1, normals, votes);
+    for (int i = 0; i < points.count; i++) {
+        double t[6] = {0};
+        if (points.at[i].stick <= 0) continue; /* it is alone                                      */
+        txi_outer(t, points.at[i].normal, 1);
+        g->owner[g->tokens.count] = owner[i];
+        txi_tokens_add(&g->tokens, points.at[i].place, t);
+    }
+    return TXM_OK;
+}
+
+/* The line of another end that has come within alpha of a place, or -1. */
+static int txi_grow_meets(const txi_growth *g, int end, txm_dvec3 place, double alpha) {
+    const txi_tokens *k = &g->tokens;
+    const int64_t cx = txi_cell(k, place.x), cy = txi_cell(k, place.y), cz = txi_cell(k, place.z);
+    int best = -1;
+    double least = alpha * alpha;
+    for (int i = 0; i < 27; i++) {
+        const int64_t x = cx + i % 3 - 1, y = cy + i / 3 % 3 - 1, z = cz + i / 9 - 1;
+        for (int j = k->bucket[txi_bucket(k, x, y, z)]; j >= 0; j = k->at[j].next) {
+            const double d = txm_d3_dist2(k->at[j].place, place);
+            if (g->owner[j] == end || d > least || (d >= least && j > best)) continue;
+            least = d;
+            best = j;
+        }
+    }
+    return best < 0 ? -1 : g->owner[best];
+}
+
+/* One round of the line of an end: a step in that of seven directions, up to 45 degrees to either side,
+   which has the most votes for a line in this direction. 0: it has stopped. */
+static int txi_grow_step(txi_growth *g, int end, double least, txm_vec2 *tip, txm_vec2 *heading) {
+    const txi_window *w = g->window;
+    double best = least, bx = 0, by = 0, hx = 0, hy = 0;
+    for (int i = 0; i < 7; i++) {
+        const int k = i & 1 ? (i + 1) / 2 : -(i / 2); /* straight on first                         */
+        double sine, cosine, t[3];
+        txm_sincos(k * (TXM_PI / 12), &sine, &cosine);
+        const double dx = heading->x * cosine - heading->y * sine;
+        const double dy = heading->x * sine + heading->y * cosine;
+        const double x = tip->x + TXI_GROW_STEP * dx, y = tip->y + TXI_GROW_STEP * dy;
+        txi_votes_in_window(g, x, y, t);
+        const double across = dy * dy * t[0] - 2 * dx * dy * t[1] + dx * dx * t[2];
+        const double along = dx * dx * t[0] + 2 * dx * dy * t[1] + dy * dy * t[2];
+        if (across - along <= best) continue;
+        best = across - along;
+        bx = x;
+        by = y;
+        hx = dx;
+        hy = dy;
+    }
+    if (best <= least) return 0;
+    const ptrdiff_t at = txi_pixel(w->width, w->height, bx, by);
+    if (at < 0 || w->state[at] != TXI_HOLE) return 0;
+    *tip = txm_v2(txm_float(bx), txm_float(by));
+    *heading = txi_unit(heading->x + hx, heading->y + hy);
+    txi_grow_token(g, bx, by, heading->x, heading->y, 0.8, end);
+    return 1;
+}
+
+/* Let the lines grow.
+   alpha  pixels; lines as near as that have met; 0: 3
+   beta   rounds at most; 0: 64
+   cost   O(rounds * ends * tokens in reach)                                                    */
+static txm_status txi_grow(txi_growth *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
+                           txm_arena *scratch, txm_env *env) {
+    const int ends = l->end_count;
+    const double meet = alpha > 0 && alpha < 3 ? alpha : 3;
+    int rounds = beta > 0 ? beta : txi_grow_rounds;
+    if (rounds > 1 + (int)(l->width / TXI_GROW_STEP)) rounds = 1 + (int)(l->width / TXI_GROW_STEP);
+    memset(g, 0, sizeof *g);
+    g->window = w;
+    g->end_count = ends;
+    g->field_width = w->width / TXI_FIELD_STEP + 2;
+    g->field_height = w->height / TXI_FIELD_STEP + 2;
+    /* far enough for votes to bridge the hole                                                     */
+    txi_fields_make(&g->fields, txm_clampf(0.25f * l->width, 6, 30));
+    const int room = ends * (TXI_TOKENS_OF_END + rounds);
+    const size_t spots = (size_t)g->field_width * (size_t)g->field_height;
+    txm_status status = txi_tokens_make(&g->tokens, room, g->fields.reach, scratch, env);
+    if (status != TXM_OK) return status;
+    g->owner = (int *)txm_arena_alloc(scratch, (size_t)room, sizeof *g->owner);
+    g->field = (float *)txm_arena_alloc(scratch, spots, 3 * sizeof *g->field);
+    g->met = (uint8_t *)txm_arena_zero(scratch, (size_t)ends, (size_t)ends);
+    g->tips = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)ends, 2 * sizeof *g->tips);
+    uint8_t *going = (uint8_t *)txm_arena_alloc(scratch, (size_t)ends, 1);
+    if (scratch->failed) return txi_no_memory(env);
+    txm_vec2 *headings = g->tips + ends;
+    for (size_t i = 0; i < spots; i++) g->field[3 * i] = -1;
+    status = txi_grow_begin(g, l, scratch, env);
+    if (status != TXM_OK) return status;
+    for (int e = 0; e < ends; e++) {
+        g->tips[e] = l->ends[e].place;
+        headings[e] = l->ends[e].heading;
+        going[e] = 1;
+    }
+    for (int round = 0; round < rounds; round++) {
+        for (int e = 0; e < ends; e++) {
+            if (!going[e]) continue;
+            going[e] = (uint8_t)txi_grow_step(g, e, 0.05, &g->tips[e], &headings[e]);
+            if (!going[e] || round < 2) continue;
+            const int other = txi_grow_meets(g, e, txi_spot_at(w, g->tips[e].x, g->tips[e].y).place, meet);
+            if (other < 0) continue;
+            g->met[(size_t)e * (size_t)ends + (size_t)other] = 1;
+            g->met[(size_t)other * (size_t)ends + (size_t)e] = 1;
+        }
+    }
+    return TXM_OK;
+}
+
+/* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along) / sum;
+   0 where there are no votes. */
+static double txi_votes_agree(txi_growth *g, double x, double y, double dx, double dy) {
+    const int ix = txm_clampi((int)(x / TXI_FIELD_STEP + 0.5), 0, g->field_width - 1);
+    const int iy = txm_clampi((int)(y / TXI_FIELD_STEP + 0.5), 0, g->field_height - 1);
+    float *f = g->field + 3 * ((size_t)iy * (size_t)g->field_width + (size_t)ix);
+    if (f[0] < 0) {
+        double t[3];
+        txi_votes_in_window(g, ix * TXI_FIELD_STEP, iy * TXI_FIELD_STEP, t);
+        const double sum = t[0] + t[2];
+        for (int k = 0; k < 3; k++) f[k] = sum > 1e-3 ? txm_float(t[k] / sum) : 0;
+    }
+    return dy * dy * f[0] - 2 * dx * dy * f[1] + dx * dx * f[2] -
+           (dx * dx * f[0] + 2 * dx * dy * f[1] + dy * dy * f[2]);
+}
+
 /* ---- which ends belong together ---------------------------------------------------------------
    The structure of [1, II.B]: lines that end at the hole are continued through it and joined. The
    paper lets lines grow by tensor voting and joins those that come near each other; growth drifts, and
@@ -6575,11 +6820,13 @@ typedef struct txi_rules {
     double unmatched; /* an end that is not joined                                               */
     double crossing;  /* two curves that cross                                                   */
     double bend;      /* factor of the bending energy                                            */
+    double votes;     /* less for votes that agree with the curve                                */
+    double met;       /* less for lines that met when they grew                                  */
     int look_ahead;   /* long ends may leave the hole without another end                        */
 } txi_rules;
 
 static txi_rules txi_rules_of(int structure) {
-    txi_rules picture = {2.2, 0.3, 1, 1}, pattern = {6, 2, 0.6, 0};
+    txi_rules picture = {3, 0.3, 1, 1, 0.25, 1}, pattern = {6, 2, 0.6, 1, 0.25, 0};
     return structure == TEXINPAINT_PATTERN ? pattern : picture;
 }
 
@@ -6714,6 +6961,17 @@ static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rule
                         0.3 * (curvature < 3 ? curvature : 3) + 0.3 * !p->is_long + 0.3 * !q->is_long);
     txi_link_box(k);
     return 1;
+}
+
+/* What the votes say about a candidate, -1..1: how far they agree with its curve, on average. */
+static double txi_affinity(txi_growth *g, const txi_link *k) {
+    double sum = 0;
+    for (int i = 2; i <= TXI_STEPS - 2; i += 2) {
+        const txm_vec2 p = k->points[i - 1], q = k->points[i + 1];
+        const txm_vec2 d = txi_unit((double)q.x - p.x, (double)q.y - p.y);
+        sum += txi_votes_agree(g, k->points[i].x, k->points[i].y, d.x, d.y);
+    }
+    return sum / (TXI_STEPS / 2 - 1);
 }
 
 /* ---- looking ahead ----------------------------------------------------------------------- */
@@ -6966,7 +7224,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
 /* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
    they are better than no join. Returns how many. */
 static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
-                          txi_link *links) {
+                          txi_growth *growth, txi_link *links) {
     int count = 0;
     for (int a = 0; a < l->end_count; a++) {
         int kept = 0;
@@ -6981,6 +7239,8 @@ static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rul
                        !txi_look_ahead(w, l, rules, a, &k)) {
                 continue;
             }
+            k.cost = txm_float(k.cost - rules->votes * txi_affinity(growth, &k) -
+                               (k.b >= 0 && growth->met[a * l->end_count + k.b] ? rules->met : 0));
             if (k.cost >= rules->unmatched * (k.b >= 0 ? 2 : 1)) continue;
             if (kept < TXI_PER_END) {
                 links[count++] = k;
@@ -7117,9 +7377,9 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
     txm_arena scratch;
     txi_pairing match;
+    txi_growth growth;
     txm_status status = TXM_OK;
     (void)prior;
-    (void)beta;
     *curves = NULL;
     *count = 0;
     if (structure == TEXINPAINT_TEXTURE || l->end_count == 0) return TXM_OK;
@@ -7128,8 +7388,9 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
     txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)room, 2 * sizeof *dense);
     if (scratch.failed) status = txi_no_memory(env);
+    if (status == TXM_OK) status = txi_grow(&growth, w, l, alpha, beta, &scratch, env);
     if (status == TXM_OK) {
-        const int n = txi_candidates(w, l, &rules, alpha, links);
+        const int n = txi_candidates(w, l, &rules, alpha, &growth, links);
         status = n ? txi_pairing_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
         if (status == TXM_OK && n) {
             txi_anneal(&match, seed, best);
