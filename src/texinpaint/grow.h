@@ -23,7 +23,7 @@ enum {
 /* How lines grow; ours: over the width of a large hole, lines that are some pixels apart meet. */
 static const int txi_grow_rounds = 64;      /* at most, if beta is 0                              */
 
-typedef struct txi_growth {
+typedef struct txi_grown {
     const txi_window *window;
     txi_fields fields;
     txi_tokens tokens;
@@ -34,7 +34,7 @@ typedef struct txi_growth {
     uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                      */
     txm_vec2 *tips;    /* where each end's line stopped                                           */
     int end_count;
-} txi_growth;
+} txi_grown;
 
 /* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
    that are void count as flat. */
@@ -78,7 +78,7 @@ static double txi_form(const double t[6], txm_dvec3 a, txm_dvec3 b) {
 }
 
 /* The votes at a place of the window: a tensor in the window's axes, xx xy yy. */
-static void txi_votes_in_window(const txi_growth *g, double x, double y, double t[3]) {
+static void txi_votes_in_window(const txi_grown *g, double x, double y, double t[3]) {
     const txi_spot s = txi_spot_at(g->window, x, y);
     double votes[6];
     txi_votes_at(&g->fields, &g->tokens, s.place, 0, votes);
@@ -88,7 +88,7 @@ static void txi_votes_in_window(const txi_growth *g, double x, double y, double 
 }
 
 /* A token of a line in direction (dx, dy) of the window: a stick across it, in the surface. */
-static void txi_grow_token(txi_growth *g, double x, double y, double dx, double dy, double weight,
+static void txi_grow_token(txi_grown *g, double x, double y, double dx, double dy, double weight,
                            int owner) {
     const txi_spot s = txi_spot_at(g->window, x, y);
     double t[6] = {0};
@@ -99,7 +99,7 @@ static void txi_grow_token(txi_growth *g, double x, double y, double dx, double 
 }
 
 /* The lines' points as tokens: balls vote, then sticks of length one in the directions found. */
-static txm_status txi_grow_begin(txi_growth *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
+static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
     const int room = l->end_count * TXI_TOKENS_OF_END;
     static const double unit[6] = {1, 0, 0, 1, 0, 1};
     txi_fields balls;
@@ -132,7 +132,7 @@ static txm_status txi_grow_begin(txi_growth *g, const txi_lines *l, txm_arena *s
 }
 
 /* The line of another end that has come within alpha of a place, or -1. */
-static int txi_grow_meets(const txi_growth *g, int end, txm_dvec3 place, double alpha) {
+static int txi_grow_meets(const txi_grown *g, int end, txm_dvec3 place, double alpha) {
     const txi_tokens *k = &g->tokens;
     const int64_t cx = txi_cell(k, place.x), cy = txi_cell(k, place.y), cz = txi_cell(k, place.z);
     int best = -1;
@@ -151,7 +151,7 @@ static int txi_grow_meets(const txi_growth *g, int end, txm_dvec3 place, double 
 
 /* One round of the line of an end: a step in that of seven directions, up to 45 degrees to either side,
    which has the most votes for a line in this direction. 0: it has stopped. */
-static int txi_grow_step(txi_growth *g, int end, double least, txm_vec2 *tip, txm_vec2 *heading) {
+static int txi_grow_step(txi_grown *g, int end, double least, txm_vec2 *tip, txm_vec2 *heading) {
     const txi_window *w = g->window;
     double best = least, bx = 0, by = 0, hx = 0, hy = 0;
     for (int i = 0; i < 7; i++) {
@@ -184,7 +184,7 @@ static int txi_grow_step(txi_growth *g, int end, double least, txm_vec2 *tip, tx
    alpha  pixels; lines as near as that have met; 0: 3
    beta   rounds at most; 0: 64
    cost   O(rounds * ends * tokens in reach)                                                    */
-static txm_status txi_grow(txi_growth *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
+static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
                            txm_arena *scratch, txm_env *env) {
     const int ends = l->end_count;
     const double meet = alpha > 0 && alpha < 3 ? alpha : 3;
@@ -232,7 +232,7 @@ static txm_status txi_grow(txi_growth *g, const txi_window *w, const txi_lines *
 
 /* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along) / sum;
    0 where there are no votes. */
-static double txi_votes_agree(txi_growth *g, double x, double y, double dx, double dy) {
+static double txi_votes_agree(txi_grown *g, double x, double y, double dx, double dy) {
     const int ix = txm_clampi((int)(x / TXI_FIELD_STEP + 0.5), 0, g->field_width - 1);
     const int iy = txm_clampi((int)(y / TXI_FIELD_STEP + 0.5), 0, g->field_height - 1);
     float *f = g->field + 3 * ((size_t)iy * (size_t)g->field_width + (size_t)ix);
