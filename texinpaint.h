@@ -317,6 +317,8 @@ typedef struct txi_plan {
                         with the distance                                                      */
     uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
+    txi_pose *poses;  /* that copies[].pose counts                                             */
+    int pose_count;
 } txi_plan;
 
 /* Prior knowledge about where lines run [1, II.C], in a window: polylines, clipped to the window. Line k
@@ -9941,6 +9943,8 @@ typedef struct txi_canvas {
     uint64_t seed;
     int sweep;          /* counts the sweeps                                                   */
     int fresh;          /* the costs are up to date                                            */
+    int least;          /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
+                           are                                                                 */
     int radius;         /* pixels: where random tries begin                                    */
 } txi_canvas;
 
@@ -9948,6 +9952,24 @@ typedef struct txi_canvas {
 static inline uint32_t txi_shortfall(const txi_canvas *t, int a, uint32_t worth) {
     const uint32_t want = t->level->want[a];
     return want >= worth ? (uint32_t)(((uint64_t)(want - worth + 1) * t->price) >> 16) : 0;
+}
+
+/* where the centre of a source patch lies in the level, in units */
+static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int32_t *cy) {
+    txi_source_place(s, x, y, cx, cy);
+    *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
+    *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
+}
+
+/* is a source patch so near to the anchor's own place that it does not count? */
+static int txi_too_near(const txi_canvas *t, int a, const txi_source *s, int x, int y) {
+    const int p = t->level->anchor[a], half = (TXI_PATCH - 1) * TXI_UNIT / 2;
+    const int32_t least = t->least * TXI_UNIT;
+    int32_t cx, cy;
+    txi_match_centre(s, x, y, &cx, &cy);
+    cx -= p % t->level->width * TXI_UNIT + half;
+    cy -= p / t->level->width * TXI_UNIT + half;
+    return cx > -least && cx < least && cy > -least && cy < least;
 }
 
 /* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs limit
@@ -9959,6 +9981,7 @@ static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uin
     const size_t q = (size_t)y * (size_t)s->width + (size_t)x, p = (size_t)l->anchor[a];
     const uint32_t worth = s->worth[q];
     if (!worth) return UINT32_MAX;
+    if (t->least && txi_too_near(t, a, s, x, y)) return UINT32_MAX;
     const uint32_t short_of = txi_shortfall(t, a, worth), filled = l->filled[a];
     if (short_of >= limit) return UINT32_MAX;
     const uint32_t rest = limit - short_of;
@@ -9982,16 +10005,6 @@ static inline void txi_try(const txi_canvas *t, int a, int pose, int x, int y, t
     best->y = (int16_t)y;
     best->pose = (int16_t)pose;
     best->cost = cost;
-}
-
-/* half a pixel less than half a patch: from a patch's corner to its centre, in units */
-enum { TXI_TO_CENTRE = (TXI_PATCH - 1) * TXI_UNIT / 2 };
-
-/* where the centre of a source patch lies in the level, in units */
-static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int32_t *cy) {
-    txi_source_place(s, x, y, cx, cy);
-    *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
-    *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
 }
 
 /* the patch of a source whose centre is nearest to a place of its level */
@@ -10588,21 +10601,23 @@ static void txi_vote(txi_ballot *v, txm_env *env) {
     v->canvas->fresh = 0;
 }
 
-/* ---- assembly: from patches to pieces ------------------------------------------------------------
+/* ---- pieces ---------------------------------------------------------------------------------------
 
-   At the finest level each hole pixel gets a label: the source, and the offset from the target to
-   it. Pixels of equal labels are one piece, copied as it is. The labels minimise
+   Each hole pixel gets a label: the source, and the offset from the target to it. Pixels of equal
+   labels are one piece, copied as it is. The labels minimise
 
-       sum over pairs of neighbours with labels A, B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
-     + sum over pixels:  drift * |A(p) - color(p)|^2
+       sum over pairs of neighbours p, q with labels A != B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
+     + sum over pixels:  drift * |A(p) - color(p)|^2 + (difference of the guides)^2
 
-   where A(p) is the colour that A copies to p; next to known pixels it is |A(q) - known(q)|^2. */
+   where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first term is
+   |A(q) - known(q)|^2. This is minimised by expansion moves [7]: one label at a time, a minimum
+   cut finds the best set of pixels that change to it.                                         */
 
 enum {
-    TXI_JOINT = 40,      /* [recipe]                                                           */
-    TXI_DRIFT = 5,       /* in 1/256 [recipe: .02]                                             */
-    TXI_NOWHERE = 60000, /* what a colour costs that cannot be copied; ours                    */
-    TXI_LABEL_NONE = -1, /* not in the hole                                                    */
+    TXI_JOINT = 40,       /* [recipe]                                                          */
+    TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
+    TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
+    TXI_LABEL_NONE = -1,  /* not in the hole                                                   */
     TXI_LABEL_STRIP = -2, /* copied by the plan                                                */
     TXI_LABEL_BIAS = 1 << 12
 };
@@ -10616,17 +10631,24 @@ typedef struct txi_assembly {
     const txi_level *level;
     const uint8_t *color; /* of the canvas                                                     */
     int32_t *label;       /* one per pixel of the level                                        */
+    int drift;            /* in 1/256                                                          */
+    uint32_t price;       /* of missing detail, as in txi_canvas; 0: it costs nothing          */
+    txm_flow flow;        /* room for all pixels of the hole's bounding box with a margin      */
+    int32_t *node;        /* one per pixel of the level: its node in the flow, -1: not in it   */
+    int32_t *region;      /* the pixels of the move                                            */
 } txi_assembly;
 
-/* the source pixel that a label copies to pixel p, or NULL: it is not usable */
-static inline const uint8_t *txi_label_color(const txi_assembly *t, int32_t label, int p) {
-    const txi_level *l = t->level;
-    if (label < 0) return l->pull && l->pull[p] ? l->strip + 4 * (size_t)p : NULL;
+/* the source pixel that a label copies to pixel (x, y), or NULL: it is not usable */
+static inline const uint8_t *txi_label_color(const txi_level *l, int32_t label, int x, int y) {
+    if (label < 0) {
+        const size_t p = (size_t)y * (size_t)l->width + (size_t)x;
+        return label == TXI_LABEL_STRIP && l->pull && l->pull[p] ? l->strip + 4 * p : NULL;
+    }
     const txi_source *s = &l->source[label >> 26];
-    const int x = p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS;
-    const int y = p / l->width + (label & 8191) - TXI_LABEL_BIAS;
-    if (x < 0 || y < 0 || x >= s->width || y >= s->height) return NULL;
-    const size_t q = (size_t)y * (size_t)s->width + (size_t)x;
+    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS;
+    const int j = y + (label & 8191) - TXI_LABEL_BIAS;
+    if (i < 0 || j < 0 || i >= s->width || j >= s->height) return NULL;
+    const size_t q = (size_t)j * (size_t)s->width + (size_t)i;
     return s->usable[q] ? s->color + 4 * q : NULL;
 }
 
@@ -10636,54 +10658,169 @@ static inline int txi_rgb_distance(const uint8_t *a, const uint8_t *b) {
     return r * r + g * g + u * u;
 }
 
-/* What label a at p costs next to q as it is. */
-static int txi_joint_cost(const txi_assembly *t, int32_t a, int p, int q) {
-    const uint8_t state = t->level->state[q];
-    if (state == TXI_VOID) return 0;
-    if (state != TXI_HOLE)
-        return txi_rgb_distance(txi_label_color(t, a, q), t->level->color + 4 * (size_t)q);
-    const int32_t b = t->label[q];
+/* What labels a at (x, y) and b at its neighbour (u, v) cost. */
+static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x, int y, int u, int v) {
     if (a == b) return 0;
-    return txi_rgb_distance(txi_label_color(t, a, p), txi_label_color(t, b, p)) +
-           txi_rgb_distance(txi_label_color(t, a, q), txi_label_color(t, b, q)) + TXI_JOINT;
+    return txi_rgb_distance(txi_label_color(l, a, x, y), txi_label_color(l, b, x, y)) +
+           txi_rgb_distance(txi_label_color(l, a, u, v), txi_label_color(l, b, u, v)) + TXI_JOINT;
 }
 
-static int txi_label_cost(const txi_assembly *t, int32_t a, int p) {
-    const int w = t->level->width;
-    const uint8_t *own = txi_label_color(t, a, p);
-    if (!own) return INT_MAX;
-    return txi_rgb_distance(own, t->color + 4 * (size_t)p) * TXI_DRIFT / 256 +
-           txi_joint_cost(t, a, p, p - 1) + txi_joint_cost(t, a, p, p + 1) +
-           txi_joint_cost(t, a, p, p - w) + txi_joint_cost(t, a, p, p + w);
-}
-
-/* One pass of iterated conditional modes: each pixel takes the best of its neighbours' labels. */
-static int txi_assembly_pass(txi_assembly *t) {
+/* What the missing detail of the patch around (x, y) costs, as the pixel's share. */
+static int txi_label_shortfall(const txi_assembly *t, int32_t label, int x, int y) {
     const txi_level *l = t->level;
-    const int w = l->width;
-    const int side[8] = {-w - 1, -w, -w + 1, -1, 1, w - 1, w, w + 1};
-    int changed = 0;
+    const txi_source *s = &l->source[label >> 26];
+    const int half = TXI_PATCH / 2, a = l->slot[(y - half) * l->width + x - half];
+    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS - half;
+    const int j = y + (label & 8191) - TXI_LABEL_BIAS - half;
+    if (a < 0 || i < 0 || j < 0) return 0;
+    const uint32_t worth = s->worth[(size_t)j * (size_t)s->width + (size_t)i];
+    if (!worth || worth > l->want[a]) return 0;
+    return (int)(((uint64_t)(l->want[a] - worth + 1) * t->price >> 16) / TXI_PATCH_AREA);
+}
+
+/* What a label costs at (x, y) whatever the neighbours in the hole have. */
+static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
+    const txi_level *l = t->level;
+    const size_t p = (size_t)y * (size_t)l->width + (size_t)x;
+    const uint8_t *own = txi_label_color(l, label, x, y);
+    if (!own) return TXI_NEVER;
+    const int guide = label >= 0 ? own[3] - l->color[4 * p + 3] : 0;
+    int cost = txi_rgb_distance(own, t->color + 4 * p) * t->drift / 256 + guide * guide;
+    if (t->price && label >= 0) cost += txi_label_shortfall(t, label, x, y);
+    for (int k = 0; k < 4; k++) {
+        const int u = x + (k == 0) - (k == 1), v = y + (k == 2) - (k == 3);
+        const size_t q = (size_t)v * (size_t)l->width + (size_t)u;
+        if (l->state[q] != TXI_KNOWN && l->state[q] != TXI_FOREIGN) continue;
+        cost += txi_rgb_distance(txi_label_color(l, label, u, v), l->color + 4 * q);
+    }
+    return cost;
+}
+
+/* The pixels within reach of those that have the label, reach < 0: all; sets their nodes, in a grid
+   of the bounding box with a margin. Returns their number. */
+static int txi_expansion_region(txi_assembly *t, int32_t alpha, int reach) {
+    const txi_level *l = t->level;
+    int low[2] = {INT_MAX, INT_MAX}, high[2] = {0, 0}, count = 0;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
-        int32_t best = t->label[p];
-        if (best == TXI_LABEL_STRIP) continue;
-        int cost = best >= 0 ? txi_label_cost(t, best, p) : INT_MAX;
-        for (int k = 0; k < 8; k++) {
-            const int32_t other = t->label[p + side[k]];
-            if (other < 0 || other == best) continue;
-            const int c = txi_label_cost(t, other, p);
-            if (c >= cost) continue;
-            cost = c;
-            best = other;
+        if (reach >= 0 && t->label[p] != alpha) continue;
+        const int x0 = p % l->width - (reach < 0 ? 0 : reach), y0 = p / l->width - (reach < 0 ? 0 : reach);
+        const int side = reach < 0 ? 1 : 2 * reach + 1;
+        for (int y = y0 < 0 ? 0 : y0; y < y0 + side && y < l->height; y++) {
+            for (int x = x0 < 0 ? 0 : x0; x < x0 + side && x < l->width; x++) {
+                const int q = y * l->width + x;
+                if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP) continue;
+                t->node[q] = 0;
+                t->region[count++] = q;
+                if (x < low[0]) low[0] = x;
+                if (y < low[1]) low[1] = y;
+                if (x > high[0]) high[0] = x;
+                if (y > high[1]) high[1] = y;
+            }
         }
-        changed += best != t->label[p];
-        t->label[p] = best;
+    }
+    if (!count) return 0;
+    const int w = high[0] - low[0] + 3;
+    t->flow.count = w * (high[1] - low[1] + 3);
+    t->flow.step[0] = 1;
+    t->flow.step[1] = w;
+    t->flow.step[2] = -1;
+    t->flow.step[3] = -w;
+    for (int k = 0; k < count; k++) {
+        const int p = t->region[k];
+        t->node[p] = (p / l->width - low[1] + 1) * w + p % l->width - low[0] + 1;
+    }
+    return count;
+}
+
+/* Add the costs of a pair of pixels, p in the region: e00 if both keep their labels, e01 if q
+   changes, e10 if p does; 0 if both do. */
+static void txi_expansion_pair(txi_assembly *t, int32_t alpha, int p, int q, int d) {
+    const txi_level *l = t->level;
+    const int x = p % l->width, y = p / l->width, u = q % l->width, v = q / l->width;
+    const int32_t a = t->label[p], b = t->label[q];
+    const int e00 = txi_joint_cost(l, a, b, x, y, u, v), e10 = txi_joint_cost(l, alpha, b, x, y, u, v);
+    const int np = t->node[p], nq = t->node[q];
+    if (nq < 0) { /* q keeps its label */
+        t->flow.excess[np] += e10 - e00;
+        return;
+    }
+    const int e01 = txi_joint_cost(l, a, alpha, x, y, u, v);
+    const int link = e01 + e10 - e00;
+    t->flow.excess[np] += e10 - e00;
+    t->flow.excess[nq] -= e10;
+    if (link > 0) t->flow.arc[d][np] += link; /* else it is cut off: labels may get worse there */
+}
+
+/* Let the label grow where that costs less; returns how many pixels have changed. */
+static int txi_expand(txi_assembly *t, int32_t alpha, int reach) {
+    const txi_level *l = t->level;
+    const int count = txi_expansion_region(t, alpha, reach), w = l->width;
+    if (!count) return 0;
+    const size_t bytes = (size_t)t->flow.count * sizeof(int32_t);
+    for (int d = 0; d < 4; d++) memset(t->flow.arc[d], 0, bytes);
+    memset(t->flow.excess, 0, bytes);
+    for (int k = 0; k < count; k++) {
+        const int p = t->region[k], x = p % w, y = p / w;
+        t->flow.excess[t->node[p]] += txi_own_cost(t, alpha, x, y) - txi_own_cost(t, t->label[p], x, y);
+        if (l->state[p + 1] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + 1, 0);
+        if (l->state[p + w] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + w, 1);
+        if (l->state[p - 1] == TXI_HOLE && t->node[p - 1] < 0) txi_expansion_pair(t, alpha, p, p - 1, 0);
+        if (l->state[p - w] == TXI_HOLE && t->node[p - w] < 0) txi_expansion_pair(t, alpha, p, p - w, 0);
+    }
+    txm_flow_solve(&t->flow);
+    int changed = 0;
+    for (int k = 0; k < count; k++) {
+        const int p = t->region[k];
+        if (t->flow.tree[t->node[p]] == TXM_FLOW_SINK && t->label[p] != alpha) {
+            t->label[p] = alpha;
+            changed++;
+        }
+        t->node[p] = -1;
     }
     return changed;
 }
 
-/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. */
-static void txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
+/* The labels in use, most frequent first, at most most of them. pairs: room for 2 per hole pixel. */
+static int txi_labels_used(const txi_assembly *t, int32_t *labels, int most, txm_pair *pairs) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->hole_count;
+    size_t kinds = 0;
+    for (size_t i = 0; i < n; i++) {
+        const int32_t label = t->label[l->hole[i]];
+        pairs[i].key = label >= 0 ? (uint32_t)label : UINT32_MAX;
+        pairs[i].value = 0;
+    }
+    txm_sort_pairs(pairs, pairs + n, n);
+    for (size_t i = 0; i < n && pairs[i].key != UINT32_MAX;) {
+        size_t j = i;
+        while (j < n && pairs[j].key == pairs[i].key) j++;
+        pairs[kinds].value = pairs[i].key;
+        pairs[kinds++].key = UINT32_MAX - (uint32_t)(j - i);
+        i = j;
+    }
+    txm_sort_pairs(pairs, pairs + n, kinds);
+    const int count = kinds < (size_t)most ? (int)kinds : most;
+    for (int k = 0; k < count; k++) labels[k] = (int32_t)pairs[k].value;
+    return count;
+}
+
+/* Memory of an assembly on a level. 0: there is none. */
+static int txi_assembly_make(txi_assembly *t, const txi_level *l, txm_arena *arena) {
+    const size_t n = (size_t)l->width * (size_t)l->height;
+    memset(t, 0, sizeof *t);
+    t->level = l;
+    t->label = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    t->node = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    t->region = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof(int32_t));
+    if (!txm_flow_make(&t->flow, arena, 4, (int)n) || arena->failed) return 0;
+    for (size_t p = 0; p < n; p++) t->label[p] = t->node[p] = -1;
+    return 1;
+}
+
+/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. Returns how many
+   there are. */
+static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
     const txi_level *l = t->level;
     const int w = l->width;
     const int side[4] = {-1, 1, -w, w};
@@ -10705,6 +10842,190 @@ static void txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *
         }
         count++;
     }
+    return count;
+}
+
+/* ---- coherent completion: few offsets, large pieces ----------------------------------------------
+
+   Patterns repeat at few offsets. They are found by matching the known patches around the hole with
+   patches elsewhere; the most frequent offsets (in each pose) become labels, and the hole is put
+   together from pieces of these [He and Sun 2012].                                             */
+
+enum {
+    TXI_OFFSET_WIDTH = 28,  /* pixels: least width of the hole at the level where this is done */
+    TXI_OFFSETS = 80,       /* labels                                                          */
+    TXI_OFFSET_SWEEPS = 6,
+    TXI_OFFSET_LEAST = 8,   /* pixels: shorter ones are not told from none                     */
+    TXI_OFFSET_PASSES = 3
+};
+
+/* A level whose anchors are its known patches near the hole, for matching these. */
+static int txi_offset_level(const txi_level *l, int reach, txi_level *known, txm_arena *arena) {
+    const int w = l->width, n = l->width * l->height;
+    *known = *l;
+    int low[2] = {INT_MAX, INT_MAX}, high[2] = {0, 0};
+    for (int i = 0; i < l->hole_count; i++) {
+        const int x = l->hole[i] % w, y = l->hole[i] / w;
+        if (x < low[0]) low[0] = x;
+        if (y < low[1]) low[1] = y;
+        if (x > high[0]) high[0] = x;
+        if (y > high[1]) high[1] = y;
+    }
+    known->slot = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
+    known->anchor = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
+    known->anchor_row = (int32_t *)txm_arena_alloc(arena, (size_t)l->height + 1, sizeof(int32_t));
+    known->filled = (uint8_t *)txm_arena_alloc(arena, (size_t)n, 1);
+    known->want = (uint32_t *)txm_arena_zero(arena, (size_t)n, sizeof(uint32_t));
+    if (arena->failed) return 0;
+    known->anchor_count = 0;
+    for (int p = 0; p < n; p++) {
+        const int x = p % w, y = p / w;
+        if (x == 0) known->anchor_row[y] = known->anchor_count;
+        known->slot[p] = -1;
+        if (x < low[0] - reach || y < low[1] - reach || x > high[0] + reach || y > high[1] + reach ||
+            l->slot[p] >= 0 || x > w - TXI_PATCH || y > l->height - TXI_PATCH)
+            continue;
+        int all = 1;
+        for (int k = 0; all && k < TXI_PATCH_AREA; k++) {
+            const uint8_t state = l->state[p + k / TXI_PATCH * w + k % TXI_PATCH];
+            all = state == TXI_KNOWN || state == TXI_FOREIGN;
+        }
+        if (!all) continue;
+        known->slot[p] = known->anchor_count;
+        known->filled[known->anchor_count] = TXI_PATCH_AREA;
+        known->anchor[known->anchor_count++] = p;
+    }
+    known->anchor_row[l->height] = known->anchor_count;
+    return known->anchor_count > 0;
+}
+
+/* The most frequent offsets of the matches, counted over squares of 3x3 offsets.
+   pairs  room for 2 per anchor                                                                */
+static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_arena *arena) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->anchor_count;
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, n, 2 * sizeof(txm_pair));
+    txm_pair *peaks = (txm_pair *)txm_arena_alloc(arena, n, 2 * sizeof(txm_pair));
+    if (arena->failed) return 0;
+    size_t kinds = 0, count = 0;
+    for (size_t a = 0; a < n; a++) {
+        const txi_match *m = &t->match[a];
+        const int p = l->anchor[a];
+        pairs[a].value = 1;
+        pairs[a].key = m->pose < 0 || m->cost == UINT32_MAX
+                           ? UINT32_MAX
+                           : (uint32_t)txi_label(m->pose, m->x - p % l->width, m->y - p / l->width);
+    }
+    txm_sort_pairs(pairs, pairs + n, n);
+    for (size_t i = 0; i < n && pairs[i].key != UINT32_MAX; i++) {
+        if (kinds && pairs[kinds - 1].key == pairs[i].key) {
+            pairs[kinds - 1].value++;
+        } else {
+            pairs[kinds].key = pairs[i].key;
+            pairs[kinds++].value = 1;
+        }
+    }
+    for (size_t i = 0; i < kinds; i++) { /* the sum over 3x3; a peak is the largest of them */
+        uint32_t sum = 0;
+        int is_peak = 1;
+        for (int dx = -1; dx <= 1; dx++) {
+            const uint32_t column = pairs[i].key + (uint32_t)(dx * 8192) - 1;
+            size_t low = 0, high = kinds;
+            while (low < high) {
+                const size_t middle = (low + high) / 2;
+                if (pairs[middle].key < column) low = middle + 1;
+                else high = middle;
+            }
+            for (; low < kinds && pairs[low].key <= column + 2; low++) {
+                sum += pairs[low].value;
+                if (pairs[low].value > pairs[i].value ||
+                    (pairs[low].value == pairs[i].value && low < i))
+                    is_peak = 0;
+            }
+        }
+        if (!is_peak) continue;
+        peaks[count].key = UINT32_MAX - sum;
+        peaks[count++].value = pairs[i].key;
+    }
+    txm_sort_pairs(peaks, peaks + n, count);
+    if (count > (size_t)most) count = (size_t)most;
+    for (size_t k = 0; k < count; k++) labels[k] = (int32_t)peaks[k].value;
+    return (int)count;
+}
+
+/* Fill the canvas' hole from pieces of the level, and set the matches accordingly. */
+static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
+    const txi_level *l = t->level;
+    txm_arena scratch;
+    txi_level around;
+    txi_canvas known;
+    txi_assembly assembly;
+    int32_t labels[TXI_OFFSETS];
+    txm_status status = TXM_OK;
+    txm_arena_init(&scratch, env);
+    const int width = txi_level_hole_width(l);
+    known = *t;
+    known.level = &around;
+    known.least = TXI_OFFSET_LEAST;
+    known.sweep = 0;
+    known.fresh = 0;
+    if (!txi_offset_level(l, 3 * width / 2, &around, &scratch) ||
+        !txi_assembly_make(&assembly, l, &scratch)) {
+        const int failed = scratch.failed;
+        txm_arena_free(&scratch);
+        return failed ? txi_no_memory(env) : TXM_OK;
+    }
+    known.match = (txi_match *)txm_arena_zero(&scratch, (size_t)around.anchor_count, 2 * sizeof(txi_match));
+    if (scratch.failed) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        known.old = known.match + around.anchor_count;
+        for (int a = 0; a < around.anchor_count; a++) known.match[a].pose = -1;
+        for (int k = 0; k < TXI_OFFSET_SWEEPS; k++) txi_search(&known, env);
+    }
+    const int count = status == TXM_OK ? txi_offset_peaks(&known, labels, TXI_OFFSETS, &scratch) : 0;
+    if (scratch.failed) status = txi_no_memory(env);
+    assembly.color = t->color;
+    assembly.drift = 0;
+    assembly.price = t->price;
+    for (int pass = 0, changed = 1; pass < TXI_OFFSET_PASSES && changed && status == TXM_OK; pass++) {
+        changed = 0;
+        for (int k = 0; k < count && status == TXM_OK; k++) {
+            changed += txi_expand(&assembly, labels[k], -1);
+            if (txm_progress(env, 0, "pieces")) status = txi_stopped(env);
+        }
+    }
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i], x = p % l->width, y = p / l->width;
+        const uint8_t *color = txi_label_color(l, assembly.label[p], x, y);
+        if (color) memcpy(t->color + 4 * (size_t)p, color, 3);
+    }
+    for (int a = 0; a < l->anchor_count; a++) { /* the most frequent label of its patch */
+        const int p = l->anchor[a];
+        txi_match best = t->match[a];
+        int most = 0;
+        for (int k = 0; k < TXI_PATCH_AREA; k++) {
+            const int q = p + k / TXI_PATCH * l->width + k % TXI_PATCH;
+            const int32_t label = assembly.label[q];
+            int same = 0;
+            if (label < 0) continue;
+            for (int i = k; i < TXI_PATCH_AREA; i++)
+                same += assembly.label[p + i / TXI_PATCH * l->width + i % TXI_PATCH] == label;
+            if (same <= most) continue;
+            txi_match m;
+            memset(&m, 0, sizeof m);
+            m.pose = (int16_t)(label >> 26);
+            m.x = (int16_t)(p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS);
+            m.y = (int16_t)(p / l->width + (label & 8191) - TXI_LABEL_BIAS);
+            if (!txi_match_mend(l, &m)) continue;
+            most = same;
+            best = m;
+        }
+        if (!most) best.pose = -1;
+        t->match[a] = best;
+    }
+    t->fresh = 0;
+    txm_arena_free(&scratch);
+    return status;
 }
 
 /* ---- texture completion of a window ---------------------------------------------------------- */
@@ -10718,10 +11039,17 @@ typedef struct txi_style {
     int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
+/* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
+enum { TXI_START_ONION = 0, TXI_START_PIECES };
+
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
     TXI_LEAST_ROUNDS = 2, /* at the finest                                                     */
     TXI_GUIDE_MOST = 100, /* of the guide channel where there is a line                        */
+    TXI_ASSEMBLY_LABELS = 1000,
+    TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
+    TXI_ASSEMBLY_PASSES = 2,
+    TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
     TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
@@ -10734,7 +11062,7 @@ typedef struct txi_filler {
     int level_count, pose_count;
     const txi_plan *plan; /* whose guide the levels have                                       */
     txi_level level[TXI_MAX_LEVELS];
-    txi_pose pose[TXI_MAX_POSES];
+    txi_pose *pose; /* pose_count, then those of the last plan that was finished               */
     uint16_t outlier[TXI_OUTLIER_BINS];
 } txi_filler;
 
@@ -10793,6 +11121,8 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
     f->arena = arena;
     f->pose_count = style->is_picture ? TXI_PICTURE_POSES : TXI_MESH_POSES;
     txi_outlier_table(f->outlier);
+    f->pose = (txi_pose *)txm_arena_alloc(arena, (size_t)f->pose_count, sizeof(txi_pose));
+    if (!f->pose) return txi_no_memory(env);
     for (int k = 0; k < f->pose_count; k++) {
         txi_source s;
         txi_pose_axes(style->is_picture, k, &s);
@@ -10928,12 +11258,10 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     return 1;
 }
 
-/* How strongly the plan's strips pull, 0..256: first at the coarsest level, last at the finest. */
-static int txi_pull_at(int level, int level_count, int round, int rounds) {
-    const int last = rounds > 1 ? round * 256 / (rounds - 1) : 256;
-    if (level == level_count - 1 && level > 0) return 230;
-    if (level > 0) return 128 - last * 77 / 256;
-    return 64 - last / 4;
+/* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels; the
+   recipe's strips were averages, and had to fade. */
+static int txi_pull_at(int level) {
+    return level > 1 ? 230 : level ? 200 : 170;
 }
 
 static int txi_rounds(int level, int level_count) {
@@ -10959,7 +11287,7 @@ static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, int3
         const int sweeps = round == 0 ? 4 : 2;
         for (int k = 0; k < sweeps; k++) txi_search(t, env);
         txi_weigh(t, 0.08, pairs, pairs + anchors);
-        ballot.pull = txi_pull_at(level, f->level_count, round, rounds);
+        ballot.pull = txi_pull_at(level);
         txi_vote(&ballot, env);
         if (txm_progress(env, 0, "filling")) status = txi_stopped(env);
     }
@@ -10981,7 +11309,7 @@ static txm_status txi_descend(const txi_filler *f, int level, const txi_match *f
     ballot.canvas = t;
     ballot.outlier = f->outlier;
     ballot.chosen = NULL;
-    ballot.pull = txi_pull_at(level, f->level_count, 0, 2);
+    ballot.pull = txi_pull_at(level);
     txi_vote(&ballot, env);
     txm_arena_free(&scratch);
     return TXM_OK;
@@ -10998,11 +11326,19 @@ static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *fiel
     return !arena->failed;
 }
 
+/* the level where a coherent completion begins */
+static int txi_offset_start(const txi_filler *f) {
+    int k = f->level_count - 1;
+    while (k > 0 && txi_level_hole_width(&f->level[k]) < TXI_OFFSET_WIDTH) k--;
+    return k;
+}
+
 /* Complete the hole at all levels from the coarsest to that of the field.
    plan   lines to follow, or NULL
+   start  TXI_START_ONION or TXI_START_PIECES
    field  from txi_field_make
    return TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED                                              */
-static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *env,
+static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start, txm_env *env,
                                   txi_field *field) {
     txm_arena memory[2];
     txi_canvas canvas[2];
@@ -11010,12 +11346,15 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *
     if (status != TXM_OK) return status;
     txm_arena_init(&memory[0], env);
     txm_arena_init(&memory[1], env);
-    for (int level = f->level_count - 1; level >= field->level && status == TXM_OK; level--) {
+    int first = f->level_count - 1;
+    if (start == TXI_START_PIECES) first = txi_offset_start(f);
+    for (int level = first; level >= field->level && status == TXM_OK; level--) {
         const int now = level & 1;
         txi_canvas *t = &canvas[now];
         txm_arena_free(&memory[now]);
         if (!txi_canvas_make(f, level, t, &memory[now])) status = txi_no_memory(env);
-        else if (level == f->level_count - 1) status = txi_onion_peel(t, env);
+        else if (start == TXI_START_PIECES && level == first) status = txi_offset_fill(t, env);
+        else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
         if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
         if (status == TXM_OK && level == field->level) {
@@ -11088,7 +11427,29 @@ static txm_status txi_finest_sources(txi_filler *f, const txi_field *field, txm_
     return TXM_OK;
 }
 
-/* Labels from the vote's choices, improved; then where each pixel is copied from. */
+/* the plan's copy for pixel p of the finest level, if it is to be kept */
+static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, const txi_level *l,
+                                     int p) {
+    if (!plan || !plan->copies || !plan->pull || !plan->color) return NULL;
+    const int x = p % l->width - TXI_EDGE, y = p / l->width - TXI_EDGE;
+    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+    return plan->copies[at].piece >= 0 && plan->pull[at] >= 128 ? &plan->copies[at] : NULL;
+}
+
+/* The filler's poses and those of the plan after them. */
+static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
+    const int more = plan && plan->copies ? plan->pose_count : 0;
+    if (!more) return 1;
+    txi_pose *all = (txi_pose *)txm_arena_alloc(f->arena, (size_t)(f->pose_count + more), sizeof *all);
+    if (!all) return 0;
+    memcpy(all, f->pose, (size_t)f->pose_count * sizeof *all);
+    memcpy(all + f->pose_count, plan->poses, (size_t)more * sizeof *all);
+    f->pose = all;
+    return 1;
+}
+
+/* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
+   strips pull by more than half they are kept. */
 static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const int32_t *chosen,
                                     const txi_plan *plan, txi_copy *copies, txm_env *env) {
     const txi_level *l = &f->level[0];
@@ -11097,51 +11458,62 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     txm_arena scratch;
     txi_assembly assembly;
     txm_arena_init(&scratch, env);
-    int32_t *label = (int32_t *)txm_arena_alloc(&scratch, n, 2 * sizeof(int32_t));
-    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, (size_t)l->hole_count, sizeof(int32_t));
-    if (!label || !queue) {
+    const size_t holes = (size_t)l->hole_count;
+    int32_t *piece = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
+    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, holes, sizeof(int32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, holes, 2 * sizeof(txm_pair));
+    if (!txi_assembly_make(&assembly, l, &scratch)) {
         txm_arena_free(&scratch);
         return txi_no_memory(env);
     }
-    int32_t *piece = label + n;
-    assembly.level = l;
+    int32_t *label = assembly.label;
     assembly.color = t->color;
-    assembly.label = label;
-    for (size_t p = 0; p < n; p++) label[p] = TXI_LABEL_NONE;
+    assembly.drift = TXI_DRIFT;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
-        if (chosen[i] < 0) continue;
+        if (txi_plan_copy(plan, w, l, p)) label[p] = TXI_LABEL_STRIP;
+        if (chosen[i] < 0 || label[p] == TXI_LABEL_STRIP) continue;
         const txi_match *m = &t->match[chosen[i]];
         const int corner = l->anchor[chosen[i]];
         label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
     }
-    for (int k = 0; k < 4 && txi_assembly_pass(&assembly); k++) {}
-    txi_assembly_pieces(&assembly, piece, queue);
-    for (int y = 0; y < w->height; y++) {
-        for (int x = 0; x < w->width; x++) {
-            txi_copy *copy = &copies[(size_t)y * (size_t)w->width + (size_t)x];
-            const int p = (y + TXI_EDGE) * l->width + x + TXI_EDGE;
-            memset(copy, 0, sizeof *copy);
-            copy->piece = -1;
-            if (l->state[p] != TXI_HOLE || label[p] < 0) continue;
-            const txi_source *s = &l->source[label[p] >> 26];
-            int32_t px, py;
-            txi_source_place(s, x + TXI_EDGE + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
-                             y + TXI_EDGE + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
-            copy->x = (float)px / TXI_UNIT - TXI_EDGE;
-            copy->y = (float)py / TXI_UNIT - TXI_EDGE;
-            copy->pose = label[p] >> 26;
-            copy->piece = piece[p];
-        }
+    const int kinds = txi_labels_used(&assembly, queue, TXI_ASSEMBLY_LABELS, pairs);
+    for (int pass = 0, changed = 1; pass < TXI_ASSEMBLY_PASSES && changed; pass++) {
+        changed = 0;
+        for (int k = 0; k < kinds; k++) changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
     }
-    (void)plan;
+    const int pieces = txi_assembly_pieces(&assembly, piece, queue);
+    for (size_t k = 0; k < (size_t)w->width * (size_t)w->height; k++) {
+        memset(&copies[k], 0, sizeof copies[k]);
+        copies[k].piece = -1;
+    }
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i], x = p % l->width, y = p / l->width;
+        txi_copy *copy = &copies[(y - TXI_EDGE) * w->width + x - TXI_EDGE];
+        const txi_copy *strip = txi_plan_copy(plan, w, l, p);
+        if (strip) {
+            *copy = *strip;
+            copy->pose += f->pose_count;
+            copy->piece += pieces;
+        }
+        if (label[p] < 0) continue;
+        const txi_source *s = &l->source[label[p] >> 26];
+        int32_t px, py;
+        txi_source_place(s, x + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
+                         y + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
+        copy->x = (float)px / TXI_UNIT - TXI_EDGE;
+        copy->y = (float)py / TXI_UNIT - TXI_EDGE;
+        copy->pose = label[p] >> 26;
+        copy->piece = piece[p];
+    }
     txm_arena_free(&scratch);
     return TXM_OK;
 }
 
 /* Complete the finest level, and say where each hole pixel is copied from.
    copies  one per pixel of the window
-   poses   receives the filler's poses, which copies[].pose counts                              */
+   poses   receives the filler's poses and after them the plan's, which copies[].pose counts; they live
+           as long as the filler                                                               */
 static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi_field *field,
                                   txi_copy *copies, const txi_pose **poses, int *pose_count,
                                   txm_env *env) {
@@ -11164,8 +11536,9 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
     }
     if (status == TXM_OK) status = txi_refine(f, 0, &t, chosen, env);
     if (status == TXM_OK) status = txi_finish_pieces(f, &t, chosen, plan, copies, env);
+    if (status == TXM_OK && !txi_finish_poses(f, plan)) status = txi_no_memory(env);
     *poses = f->pose;
-    *pose_count = f->pose_count;
+    *pose_count = f->pose_count + (plan && plan->copies ? plan->pose_count : 0);
     txm_arena_free(&memory);
     return status;
 }

@@ -277,6 +277,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/onion.h"
 #include "texinpaint/ballot.h"
 #include "texinpaint/assemble.h"
+#include "texinpaint/offset.h"
 #include "texinpaint/fill.h"
 #include "texinpaint/blend.h"
 #include "texinpaint/choose.h"

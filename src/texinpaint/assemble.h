@@ -3,21 +3,23 @@
 
 #include "ballot.h"
 
-/* ---- assembly: from patches to pieces ------------------------------------------------------------
+/* ---- pieces ---------------------------------------------------------------------------------------
 
-   At the finest level each hole pixel gets a label: the source, and the offset from the target to
-   it. Pixels of equal labels are one piece, copied as it is. The labels minimise
+   Each hole pixel gets a label: the source, and the offset from the target to it. Pixels of equal
+   labels are one piece, copied as it is. The labels minimise
 
-       sum over pairs of neighbours with labels A, B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
-     + sum over pixels:  drift * |A(p) - color(p)|^2
+       sum over pairs of neighbours p, q with labels A != B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
+     + sum over pixels:  drift * |A(p) - color(p)|^2 + (difference of the guides)^2
 
-   where A(p) is the colour that A copies to p; next to known pixels it is |A(q) - known(q)|^2. */
+   where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first term is
+   |A(q) - known(q)|^2. This is minimised by expansion moves [7]: one label at a time, a minimum
+   cut finds the best set of pixels that change to it.                                         */
 
 enum {
-    TXI_JOINT = 40,      /* [recipe]                                                           */
-    TXI_DRIFT = 5,       /* in 1/256 [recipe: .02]                                             */
-    TXI_NOWHERE = 60000, /* what a colour costs that cannot be copied; ours                    */
-    TXI_LABEL_NONE = -1, /* not in the hole                                                    */
+    TXI_JOINT = 40,       /* [recipe]                                                          */
+    TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
+    TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
+    TXI_LABEL_NONE = -1,  /* not in the hole                                                   */
     TXI_LABEL_STRIP = -2, /* copied by the plan                                                */
     TXI_LABEL_BIAS = 1 << 12
 };
@@ -31,17 +33,24 @@ typedef struct txi_assembly {
     const txi_level *level;
     const uint8_t *color; /* of the canvas                                                     */
     int32_t *label;       /* one per pixel of the level                                        */
+    int drift;            /* in 1/256                                                          */
+    uint32_t price;       /* of missing detail, as in txi_canvas; 0: it costs nothing          */
+    txm_flow flow;        /* room for all pixels of the hole's bounding box with a margin      */
+    int32_t *node;        /* one per pixel of the level: its node in the flow, -1: not in it   */
+    int32_t *region;      /* the pixels of the move                                            */
 } txi_assembly;
 
-/* the source pixel that a label copies to pixel p, or NULL: it is not usable */
-static inline const uint8_t *txi_label_color(const txi_assembly *t, int32_t label, int p) {
-    const txi_level *l = t->level;
-    if (label < 0) return l->pull && l->pull[p] ? l->strip + 4 * (size_t)p : NULL;
+/* the source pixel that a label copies to pixel (x, y), or NULL: it is not usable */
+static inline const uint8_t *txi_label_color(const txi_level *l, int32_t label, int x, int y) {
+    if (label < 0) {
+        const size_t p = (size_t)y * (size_t)l->width + (size_t)x;
+        return label == TXI_LABEL_STRIP && l->pull && l->pull[p] ? l->strip + 4 * p : NULL;
+    }
     const txi_source *s = &l->source[label >> 26];
-    const int x = p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS;
-    const int y = p / l->width + (label & 8191) - TXI_LABEL_BIAS;
-    if (x < 0 || y < 0 || x >= s->width || y >= s->height) return NULL;
-    const size_t q = (size_t)y * (size_t)s->width + (size_t)x;
+    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS;
+    const int j = y + (label & 8191) - TXI_LABEL_BIAS;
+    if (i < 0 || j < 0 || i >= s->width || j >= s->height) return NULL;
+    const size_t q = (size_t)j * (size_t)s->width + (size_t)i;
     return s->usable[q] ? s->color + 4 * q : NULL;
 }
 
@@ -51,54 +60,169 @@ static inline int txi_rgb_distance(const uint8_t *a, const uint8_t *b) {
     return r * r + g * g + u * u;
 }
 
-/* What label a at p costs next to q as it is. */
-static int txi_joint_cost(const txi_assembly *t, int32_t a, int p, int q) {
-    const uint8_t state = t->level->state[q];
-    if (state == TXI_VOID) return 0;
-    if (state != TXI_HOLE)
-        return txi_rgb_distance(txi_label_color(t, a, q), t->level->color + 4 * (size_t)q);
-    const int32_t b = t->label[q];
+/* What labels a at (x, y) and b at its neighbour (u, v) cost. */
+static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x, int y, int u, int v) {
     if (a == b) return 0;
-    return txi_rgb_distance(txi_label_color(t, a, p), txi_label_color(t, b, p)) +
-           txi_rgb_distance(txi_label_color(t, a, q), txi_label_color(t, b, q)) + TXI_JOINT;
+    return txi_rgb_distance(txi_label_color(l, a, x, y), txi_label_color(l, b, x, y)) +
+           txi_rgb_distance(txi_label_color(l, a, u, v), txi_label_color(l, b, u, v)) + TXI_JOINT;
 }
 
-static int txi_label_cost(const txi_assembly *t, int32_t a, int p) {
-    const int w = t->level->width;
-    const uint8_t *own = txi_label_color(t, a, p);
-    if (!own) return INT_MAX;
-    return txi_rgb_distance(own, t->color + 4 * (size_t)p) * TXI_DRIFT / 256 +
-           txi_joint_cost(t, a, p, p - 1) + txi_joint_cost(t, a, p, p + 1) +
-           txi_joint_cost(t, a, p, p - w) + txi_joint_cost(t, a, p, p + w);
-}
-
-/* One pass of iterated conditional modes: each pixel takes the best of its neighbours' labels. */
-static int txi_assembly_pass(txi_assembly *t) {
+/* What the missing detail of the patch around (x, y) costs, as the pixel's share. */
+static int txi_label_shortfall(const txi_assembly *t, int32_t label, int x, int y) {
     const txi_level *l = t->level;
-    const int w = l->width;
-    const int side[8] = {-w - 1, -w, -w + 1, -1, 1, w - 1, w, w + 1};
-    int changed = 0;
+    const txi_source *s = &l->source[label >> 26];
+    const int half = TXI_PATCH / 2, a = l->slot[(y - half) * l->width + x - half];
+    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS - half;
+    const int j = y + (label & 8191) - TXI_LABEL_BIAS - half;
+    if (a < 0 || i < 0 || j < 0) return 0;
+    const uint32_t worth = s->worth[(size_t)j * (size_t)s->width + (size_t)i];
+    if (!worth || worth > l->want[a]) return 0;
+    return (int)(((uint64_t)(l->want[a] - worth + 1) * t->price >> 16) / TXI_PATCH_AREA);
+}
+
+/* What a label costs at (x, y) whatever the neighbours in the hole have. */
+static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
+    const txi_level *l = t->level;
+    const size_t p = (size_t)y * (size_t)l->width + (size_t)x;
+    const uint8_t *own = txi_label_color(l, label, x, y);
+    if (!own) return TXI_NEVER;
+    const int guide = label >= 0 ? own[3] - l->color[4 * p + 3] : 0;
+    int cost = txi_rgb_distance(own, t->color + 4 * p) * t->drift / 256 + guide * guide;
+    if (t->price && label >= 0) cost += txi_label_shortfall(t, label, x, y);
+    for (int k = 0; k < 4; k++) {
+        const int u = x + (k == 0) - (k == 1), v = y + (k == 2) - (k == 3);
+        const size_t q = (size_t)v * (size_t)l->width + (size_t)u;
+        if (l->state[q] != TXI_KNOWN && l->state[q] != TXI_FOREIGN) continue;
+        cost += txi_rgb_distance(txi_label_color(l, label, u, v), l->color + 4 * q);
+    }
+    return cost;
+}
+
+/* The pixels within reach of those that have the label, reach < 0: all; sets their nodes, in a grid
+   of the bounding box with a margin. Returns their number. */
+static int txi_expansion_region(txi_assembly *t, int32_t alpha, int reach) {
+    const txi_level *l = t->level;
+    int low[2] = {INT_MAX, INT_MAX}, high[2] = {0, 0}, count = 0;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
-        int32_t best = t->label[p];
-        if (best == TXI_LABEL_STRIP) continue;
-        int cost = best >= 0 ? txi_label_cost(t, best, p) : INT_MAX;
-        for (int k = 0; k < 8; k++) {
-            const int32_t other = t->label[p + side[k]];
-            if (other < 0 || other == best) continue;
-            const int c = txi_label_cost(t, other, p);
-            if (c >= cost) continue;
-            cost = c;
-            best = other;
+        if (reach >= 0 && t->label[p] != alpha) continue;
+        const int x0 = p % l->width - (reach < 0 ? 0 : reach), y0 = p / l->width - (reach < 0 ? 0 : reach);
+        const int side = reach < 0 ? 1 : 2 * reach + 1;
+        for (int y = y0 < 0 ? 0 : y0; y < y0 + side && y < l->height; y++) {
+            for (int x = x0 < 0 ? 0 : x0; x < x0 + side && x < l->width; x++) {
+                const int q = y * l->width + x;
+                if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP) continue;
+                t->node[q] = 0;
+                t->region[count++] = q;
+                if (x < low[0]) low[0] = x;
+                if (y < low[1]) low[1] = y;
+                if (x > high[0]) high[0] = x;
+                if (y > high[1]) high[1] = y;
+            }
         }
-        changed += best != t->label[p];
-        t->label[p] = best;
+    }
+    if (!count) return 0;
+    const int w = high[0] - low[0] + 3;
+    t->flow.count = w * (high[1] - low[1] + 3);
+    t->flow.step[0] = 1;
+    t->flow.step[1] = w;
+    t->flow.step[2] = -1;
+    t->flow.step[3] = -w;
+    for (int k = 0; k < count; k++) {
+        const int p = t->region[k];
+        t->node[p] = (p / l->width - low[1] + 1) * w + p % l->width - low[0] + 1;
+    }
+    return count;
+}
+
+/* Add the costs of a pair of pixels, p in the region: e00 if both keep their labels, e01 if q
+   changes, e10 if p does; 0 if both do. */
+static void txi_expansion_pair(txi_assembly *t, int32_t alpha, int p, int q, int d) {
+    const txi_level *l = t->level;
+    const int x = p % l->width, y = p / l->width, u = q % l->width, v = q / l->width;
+    const int32_t a = t->label[p], b = t->label[q];
+    const int e00 = txi_joint_cost(l, a, b, x, y, u, v), e10 = txi_joint_cost(l, alpha, b, x, y, u, v);
+    const int np = t->node[p], nq = t->node[q];
+    if (nq < 0) { /* q keeps its label */
+        t->flow.excess[np] += e10 - e00;
+        return;
+    }
+    const int e01 = txi_joint_cost(l, a, alpha, x, y, u, v);
+    const int link = e01 + e10 - e00;
+    t->flow.excess[np] += e10 - e00;
+    t->flow.excess[nq] -= e10;
+    if (link > 0) t->flow.arc[d][np] += link; /* else it is cut off: labels may get worse there */
+}
+
+/* Let the label grow where that costs less; returns how many pixels have changed. */
+static int txi_expand(txi_assembly *t, int32_t alpha, int reach) {
+    const txi_level *l = t->level;
+    const int count = txi_expansion_region(t, alpha, reach), w = l->width;
+    if (!count) return 0;
+    const size_t bytes = (size_t)t->flow.count * sizeof(int32_t);
+    for (int d = 0; d < 4; d++) memset(t->flow.arc[d], 0, bytes);
+    memset(t->flow.excess, 0, bytes);
+    for (int k = 0; k < count; k++) {
+        const int p = t->region[k], x = p % w, y = p / w;
+        t->flow.excess[t->node[p]] += txi_own_cost(t, alpha, x, y) - txi_own_cost(t, t->label[p], x, y);
+        if (l->state[p + 1] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + 1, 0);
+        if (l->state[p + w] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + w, 1);
+        if (l->state[p - 1] == TXI_HOLE && t->node[p - 1] < 0) txi_expansion_pair(t, alpha, p, p - 1, 0);
+        if (l->state[p - w] == TXI_HOLE && t->node[p - w] < 0) txi_expansion_pair(t, alpha, p, p - w, 0);
+    }
+    txm_flow_solve(&t->flow);
+    int changed = 0;
+    for (int k = 0; k < count; k++) {
+        const int p = t->region[k];
+        if (t->flow.tree[t->node[p]] == TXM_FLOW_SINK && t->label[p] != alpha) {
+            t->label[p] = alpha;
+            changed++;
+        }
+        t->node[p] = -1;
     }
     return changed;
 }
 
-/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. */
-static void txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
+/* The labels in use, most frequent first, at most most of them. pairs: room for 2 per hole pixel. */
+static int txi_labels_used(const txi_assembly *t, int32_t *labels, int most, txm_pair *pairs) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->hole_count;
+    size_t kinds = 0;
+    for (size_t i = 0; i < n; i++) {
+        const int32_t label = t->label[l->hole[i]];
+        pairs[i].key = label >= 0 ? (uint32_t)label : UINT32_MAX;
+        pairs[i].value = 0;
+    }
+    txm_sort_pairs(pairs, pairs + n, n);
+    for (size_t i = 0; i < n && pairs[i].key != UINT32_MAX;) {
+        size_t j = i;
+        while (j < n && pairs[j].key == pairs[i].key) j++;
+        pairs[kinds].value = pairs[i].key;
+        pairs[kinds++].key = UINT32_MAX - (uint32_t)(j - i);
+        i = j;
+    }
+    txm_sort_pairs(pairs, pairs + n, kinds);
+    const int count = kinds < (size_t)most ? (int)kinds : most;
+    for (int k = 0; k < count; k++) labels[k] = (int32_t)pairs[k].value;
+    return count;
+}
+
+/* Memory of an assembly on a level. 0: there is none. */
+static int txi_assembly_make(txi_assembly *t, const txi_level *l, txm_arena *arena) {
+    const size_t n = (size_t)l->width * (size_t)l->height;
+    memset(t, 0, sizeof *t);
+    t->level = l;
+    t->label = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    t->node = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    t->region = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof(int32_t));
+    if (!txm_flow_make(&t->flow, arena, 4, (int)n) || arena->failed) return 0;
+    for (size_t p = 0; p < n; p++) t->label[p] = t->node[p] = -1;
+    return 1;
+}
+
+/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. Returns how many
+   there are. */
+static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
     const txi_level *l = t->level;
     const int w = l->width;
     const int side[4] = {-1, 1, -w, w};
@@ -120,6 +244,7 @@ static void txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *
         }
         count++;
     }
+    return count;
 }
 
 #endif /* TEXINPAINT_ASSEMBLE_H */

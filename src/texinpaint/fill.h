@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_FILL_H
 #define TEXINPAINT_FILL_H
 
-#include "assemble.h"
+#include "offset.h"
 #include "onion.h"
 
 /* ---- texture completion of a window ---------------------------------------------------------- */
@@ -15,10 +15,17 @@ typedef struct txi_style {
     int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
+/* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
+enum { TXI_START_ONION = 0, TXI_START_PIECES };
+
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
     TXI_LEAST_ROUNDS = 2, /* at the finest                                                     */
     TXI_GUIDE_MOST = 100, /* of the guide channel where there is a line                        */
+    TXI_ASSEMBLY_LABELS = 1000,
+    TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
+    TXI_ASSEMBLY_PASSES = 2,
+    TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
     TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
@@ -31,7 +38,7 @@ typedef struct txi_filler {
     int level_count, pose_count;
     const txi_plan *plan; /* whose guide the levels have                                       */
     txi_level level[TXI_MAX_LEVELS];
-    txi_pose pose[TXI_MAX_POSES];
+    txi_pose *pose; /* pose_count, then those of the last plan that was finished               */
     uint16_t outlier[TXI_OUTLIER_BINS];
 } txi_filler;
 
@@ -90,6 +97,8 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
     f->arena = arena;
     f->pose_count = style->is_picture ? TXI_PICTURE_POSES : TXI_MESH_POSES;
     txi_outlier_table(f->outlier);
+    f->pose = (txi_pose *)txm_arena_alloc(arena, (size_t)f->pose_count, sizeof(txi_pose));
+    if (!f->pose) return txi_no_memory(env);
     for (int k = 0; k < f->pose_count; k++) {
         txi_source s;
         txi_pose_axes(style->is_picture, k, &s);
@@ -225,12 +234,10 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     return 1;
 }
 
-/* How strongly the plan's strips pull, 0..256: first at the coarsest level, last at the finest. */
-static int txi_pull_at(int level, int level_count, int round, int rounds) {
-    const int last = rounds > 1 ? round * 256 / (rounds - 1) : 256;
-    if (level == level_count - 1 && level > 0) return 230;
-    if (level > 0) return 128 - last * 77 / 256;
-    return 64 - last / 4;
+/* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels; the
+   recipe's strips were averages, and had to fade. */
+static int txi_pull_at(int level) {
+    return level > 1 ? 230 : level ? 200 : 170;
 }
 
 static int txi_rounds(int level, int level_count) {
@@ -256,7 +263,7 @@ static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, int3
         const int sweeps = round == 0 ? 4 : 2;
         for (int k = 0; k < sweeps; k++) txi_search(t, env);
         txi_weigh(t, 0.08, pairs, pairs + anchors);
-        ballot.pull = txi_pull_at(level, f->level_count, round, rounds);
+        ballot.pull = txi_pull_at(level);
         txi_vote(&ballot, env);
         if (txm_progress(env, 0, "filling")) status = txi_stopped(env);
     }
@@ -278,7 +285,7 @@ static txm_status txi_descend(const txi_filler *f, int level, const txi_match *f
     ballot.canvas = t;
     ballot.outlier = f->outlier;
     ballot.chosen = NULL;
-    ballot.pull = txi_pull_at(level, f->level_count, 0, 2);
+    ballot.pull = txi_pull_at(level);
     txi_vote(&ballot, env);
     txm_arena_free(&scratch);
     return TXM_OK;
@@ -295,11 +302,19 @@ static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *fiel
     return !arena->failed;
 }
 
+/* the level where a coherent completion begins */
+static int txi_offset_start(const txi_filler *f) {
+    int k = f->level_count - 1;
+    while (k > 0 && txi_level_hole_width(&f->level[k]) < TXI_OFFSET_WIDTH) k--;
+    return k;
+}
+
 /* Complete the hole at all levels from the coarsest to that of the field.
    plan   lines to follow, or NULL
+   start  TXI_START_ONION or TXI_START_PIECES
    field  from txi_field_make
    return TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED                                              */
-static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *env,
+static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start, txm_env *env,
                                   txi_field *field) {
     txm_arena memory[2];
     txi_canvas canvas[2];
@@ -307,12 +322,15 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *
     if (status != TXM_OK) return status;
     txm_arena_init(&memory[0], env);
     txm_arena_init(&memory[1], env);
-    for (int level = f->level_count - 1; level >= field->level && status == TXM_OK; level--) {
+    int first = f->level_count - 1;
+    if (start == TXI_START_PIECES) first = txi_offset_start(f);
+    for (int level = first; level >= field->level && status == TXM_OK; level--) {
         const int now = level & 1;
         txi_canvas *t = &canvas[now];
         txm_arena_free(&memory[now]);
         if (!txi_canvas_make(f, level, t, &memory[now])) status = txi_no_memory(env);
-        else if (level == f->level_count - 1) status = txi_onion_peel(t, env);
+        else if (start == TXI_START_PIECES && level == first) status = txi_offset_fill(t, env);
+        else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
         if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
         if (status == TXM_OK && level == field->level) {
@@ -385,7 +403,29 @@ static txm_status txi_finest_sources(txi_filler *f, const txi_field *field, txm_
     return TXM_OK;
 }
 
-/* Labels from the vote's choices, improved; then where each pixel is copied from. */
+/* the plan's copy for pixel p of the finest level, if it is to be kept */
+static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, const txi_level *l,
+                                     int p) {
+    if (!plan || !plan->copies || !plan->pull || !plan->color) return NULL;
+    const int x = p % l->width - TXI_EDGE, y = p / l->width - TXI_EDGE;
+    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+    return plan->copies[at].piece >= 0 && plan->pull[at] >= 128 ? &plan->copies[at] : NULL;
+}
+
+/* The filler's poses and those of the plan after them. */
+static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
+    const int more = plan && plan->copies ? plan->pose_count : 0;
+    if (!more) return 1;
+    txi_pose *all = (txi_pose *)txm_arena_alloc(f->arena, (size_t)(f->pose_count + more), sizeof *all);
+    if (!all) return 0;
+    memcpy(all, f->pose, (size_t)f->pose_count * sizeof *all);
+    memcpy(all + f->pose_count, plan->poses, (size_t)more * sizeof *all);
+    f->pose = all;
+    return 1;
+}
+
+/* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
+   strips pull by more than half they are kept. */
 static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const int32_t *chosen,
                                     const txi_plan *plan, txi_copy *copies, txm_env *env) {
     const txi_level *l = &f->level[0];
@@ -394,51 +434,62 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     txm_arena scratch;
     txi_assembly assembly;
     txm_arena_init(&scratch, env);
-    int32_t *label = (int32_t *)txm_arena_alloc(&scratch, n, 2 * sizeof(int32_t));
-    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, (size_t)l->hole_count, sizeof(int32_t));
-    if (!label || !queue) {
+    const size_t holes = (size_t)l->hole_count;
+    int32_t *piece = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
+    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, holes, sizeof(int32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, holes, 2 * sizeof(txm_pair));
+    if (!txi_assembly_make(&assembly, l, &scratch)) {
         txm_arena_free(&scratch);
         return txi_no_memory(env);
     }
-    int32_t *piece = label + n;
-    assembly.level = l;
+    int32_t *label = assembly.label;
     assembly.color = t->color;
-    assembly.label = label;
-    for (size_t p = 0; p < n; p++) label[p] = TXI_LABEL_NONE;
+    assembly.drift = TXI_DRIFT;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
-        if (chosen[i] < 0) continue;
+        if (txi_plan_copy(plan, w, l, p)) label[p] = TXI_LABEL_STRIP;
+        if (chosen[i] < 0 || label[p] == TXI_LABEL_STRIP) continue;
         const txi_match *m = &t->match[chosen[i]];
         const int corner = l->anchor[chosen[i]];
         label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
     }
-    for (int k = 0; k < 4 && txi_assembly_pass(&assembly); k++) {}
-    txi_assembly_pieces(&assembly, piece, queue);
-    for (int y = 0; y < w->height; y++) {
-        for (int x = 0; x < w->width; x++) {
-            txi_copy *copy = &copies[(size_t)y * (size_t)w->width + (size_t)x];
-            const int p = (y + TXI_EDGE) * l->width + x + TXI_EDGE;
-            memset(copy, 0, sizeof *copy);
-            copy->piece = -1;
-            if (l->state[p] != TXI_HOLE || label[p] < 0) continue;
-            const txi_source *s = &l->source[label[p] >> 26];
-            int32_t px, py;
-            txi_source_place(s, x + TXI_EDGE + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
-                             y + TXI_EDGE + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
-            copy->x = (float)px / TXI_UNIT - TXI_EDGE;
-            copy->y = (float)py / TXI_UNIT - TXI_EDGE;
-            copy->pose = label[p] >> 26;
-            copy->piece = piece[p];
-        }
+    const int kinds = txi_labels_used(&assembly, queue, TXI_ASSEMBLY_LABELS, pairs);
+    for (int pass = 0, changed = 1; pass < TXI_ASSEMBLY_PASSES && changed; pass++) {
+        changed = 0;
+        for (int k = 0; k < kinds; k++) changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
     }
-    (void)plan;
+    const int pieces = txi_assembly_pieces(&assembly, piece, queue);
+    for (size_t k = 0; k < (size_t)w->width * (size_t)w->height; k++) {
+        memset(&copies[k], 0, sizeof copies[k]);
+        copies[k].piece = -1;
+    }
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i], x = p % l->width, y = p / l->width;
+        txi_copy *copy = &copies[(y - TXI_EDGE) * w->width + x - TXI_EDGE];
+        const txi_copy *strip = txi_plan_copy(plan, w, l, p);
+        if (strip) {
+            *copy = *strip;
+            copy->pose += f->pose_count;
+            copy->piece += pieces;
+        }
+        if (label[p] < 0) continue;
+        const txi_source *s = &l->source[label[p] >> 26];
+        int32_t px, py;
+        txi_source_place(s, x + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
+                         y + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
+        copy->x = (float)px / TXI_UNIT - TXI_EDGE;
+        copy->y = (float)py / TXI_UNIT - TXI_EDGE;
+        copy->pose = label[p] >> 26;
+        copy->piece = piece[p];
+    }
     txm_arena_free(&scratch);
     return TXM_OK;
 }
 
 /* Complete the finest level, and say where each hole pixel is copied from.
    copies  one per pixel of the window
-   poses   receives the filler's poses, which copies[].pose counts                              */
+   poses   receives the filler's poses and after them the plan's, which copies[].pose counts; they live
+           as long as the filler                                                               */
 static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi_field *field,
                                   txi_copy *copies, const txi_pose **poses, int *pose_count,
                                   txm_env *env) {
@@ -461,8 +512,9 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
     }
     if (status == TXM_OK) status = txi_refine(f, 0, &t, chosen, env);
     if (status == TXM_OK) status = txi_finish_pieces(f, &t, chosen, plan, copies, env);
+    if (status == TXM_OK && !txi_finish_poses(f, plan)) status = txi_no_memory(env);
     *poses = f->pose;
-    *pose_count = f->pose_count;
+    *pose_count = f->pose_count + (plan && plan->copies ? plan->pose_count : 0);
     txm_arena_free(&memory);
     return status;
 }

@@ -29,6 +29,8 @@ typedef struct txi_canvas {
     uint64_t seed;
     int sweep;          /* counts the sweeps                                                   */
     int fresh;          /* the costs are up to date                                            */
+    int least;          /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
+                           are                                                                 */
     int radius;         /* pixels: where random tries begin                                    */
 } txi_canvas;
 
@@ -36,6 +38,24 @@ typedef struct txi_canvas {
 static inline uint32_t txi_shortfall(const txi_canvas *t, int a, uint32_t worth) {
     const uint32_t want = t->level->want[a];
     return want >= worth ? (uint32_t)(((uint64_t)(want - worth + 1) * t->price) >> 16) : 0;
+}
+
+/* where the centre of a source patch lies in the level, in units */
+static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int32_t *cy) {
+    txi_source_place(s, x, y, cx, cy);
+    *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
+    *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
+}
+
+/* is a source patch so near to the anchor's own place that it does not count? */
+static int txi_too_near(const txi_canvas *t, int a, const txi_source *s, int x, int y) {
+    const int p = t->level->anchor[a], half = (TXI_PATCH - 1) * TXI_UNIT / 2;
+    const int32_t least = t->least * TXI_UNIT;
+    int32_t cx, cy;
+    txi_match_centre(s, x, y, &cx, &cy);
+    cx -= p % t->level->width * TXI_UNIT + half;
+    cy -= p / t->level->width * TXI_UNIT + half;
+    return cx > -least && cx < least && cy > -least && cy < least;
 }
 
 /* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs limit
@@ -47,6 +67,7 @@ static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uin
     const size_t q = (size_t)y * (size_t)s->width + (size_t)x, p = (size_t)l->anchor[a];
     const uint32_t worth = s->worth[q];
     if (!worth) return UINT32_MAX;
+    if (t->least && txi_too_near(t, a, s, x, y)) return UINT32_MAX;
     const uint32_t short_of = txi_shortfall(t, a, worth), filled = l->filled[a];
     if (short_of >= limit) return UINT32_MAX;
     const uint32_t rest = limit - short_of;
@@ -70,16 +91,6 @@ static inline void txi_try(const txi_canvas *t, int a, int pose, int x, int y, t
     best->y = (int16_t)y;
     best->pose = (int16_t)pose;
     best->cost = cost;
-}
-
-/* half a pixel less than half a patch: from a patch's corner to its centre, in units */
-enum { TXI_TO_CENTRE = (TXI_PATCH - 1) * TXI_UNIT / 2 };
-
-/* where the centre of a source patch lies in the level, in units */
-static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int32_t *cy) {
-    txi_source_place(s, x, y, cx, cy);
-    *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
-    *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
 }
 
 /* the patch of a source whose centre is nearest to a place of its level */
