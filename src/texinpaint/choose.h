@@ -24,8 +24,7 @@ typedef struct txi_hypothesis {
     txi_curve *curves;
     int curve_count;
     txi_plan plan;
-    const txi_pose *plan_poses;
-    int plan_pose_count;
+    int start;          /* TXI_START_ONION or TXI_START_PIECES                                   */
     txi_field field;
     uint8_t *preview;   /* 4 per window pixel                                                    */
     double energy, detail, score;
@@ -88,13 +87,13 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena
                           arena, env, &h->curves, &h->curve_count);
         if (status == TXM_OK && h->curve_count > 0) {
             status = txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena, env,
-                                   &h->plan, &h->plan_poses, &h->plan_pose_count);
+                                   &h->plan, &h->plan.poses, &h->plan.pose_count);
             plan = &h->plan;
         }
     }
     h->preview = (uint8_t *)txm_arena_alloc(arena, pixels, 4);
     if (!h->preview || !txi_field_make(c->filler, arena, &h->field)) return txi_no_memory(env);
-    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, env, &h->field);
+    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, h->start, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
     txi_fill_preview(c->filler, &h->field, h->preview, &h->energy, &h->detail);

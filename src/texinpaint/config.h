@@ -73,7 +73,7 @@ typedef struct txi_plan {
                         with the distance                                                      */
     uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
-    txi_pose *poses;  /* that copies[].pose counts                                             */
+    const txi_pose *poses; /* that copies[].pose counts                                             */
     int pose_count;
 } txi_plan;
 
