@@ -176,7 +176,7 @@ static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rule
 }
 
 /* What the votes say about a candidate, -1..1: how far they agree with its curve, on average. */
-static double txi_affinity(txi_grown *g, const txi_link *k) {
+static double txi_affinity(const txi_grown *g, const txi_link *k) {
     double sum = 0;
     for (int i = 2; i <= TXI_STEPS - 2; i += 2) {
         const txm_vec2 p = k->points[i - 1], q = k->points[i + 1];
@@ -436,7 +436,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
 /* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
    they are better than no join. Returns how many. */
 static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
-                          txi_grown *growth, txi_link *links) {
+                          const txi_grown *growth, txi_link *links) {
     int count = 0;
     for (int a = 0; a < l->end_count; a++) {
         int kept = 0;

@@ -95,8 +95,11 @@ static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double
        3/2 int D s^2 ds  along u,  3/4 int D (1 - s^2) ds  across,  |s| <= sqrt(1/2)
 
    A plate's vote is the integral of sticks over the circle around its tangent t. In the frame t, p
-   (across t in the plane of t and u), q = t x p it has the entries tt, tp, pp, qq.                */
-static void txi_fields_make(txi_fields *f, double sigma) {
+   (across t in the plane of t and u), q = t x p it has the entries tt, tp, pp, qq.
+
+   sigma   length unit: about half of the gap that votes can bridge
+   plates  0: no plates will vote, which saves most of the time                                  */
+static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->sigma = sigma;
     /* so that an eighth of a circle and a straight line of the same length differ as in the paper */
     f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
@@ -110,7 +113,7 @@ static void txi_fields_make(txi_fields *f, double sigma) {
             f->ball[i][0] += 1.5 * d * s * s;
             f->ball[i][1] += 0.75 * d * (1 - s * s);
         }
-        for (int j = 0; j <= TXI_VOTE_ANGLES; j++) {
+        for (int j = 0; j <= TXI_VOTE_ANGLES && plates; j++) {
             double sine, cosine, *e = f->plate[i][j];
             txm_sincos(0.5 * TXM_PI * j / TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
             e[0] = e[1] = e[2] = e[3] = 0;

@@ -33,7 +33,7 @@ static txm_dvec3 random_unit(txm_rng *rng) {
 static void test_stick_is_tangent_to_circles(void **state) {
     (void)state;
     txi_fields f;
-    txi_fields_make(&f, 10);
+    txi_fields_make(&f, 10, 1);
     for (int i = 1; i < 44; i++) {
         /* a circle of radius r through the origin, its normal there z; the point at angle 2 a      */
         const double a = pi * i / 180, r = 8;
@@ -60,7 +60,7 @@ static void test_plate_and_ball_are_integrals(void **state) {
     (void)state;
     txi_fields f;
     txm_rng rng = txm_rng_make(3, 0);
-    txi_fields_make(&f, 8);
+    txi_fields_make(&f, 8, 1);
     for (int i = 0; i < 12; i++) {
         const txm_dvec3 tangent = random_unit(&rng), v = txm_d3_scale(random_unit(&rng), 1 + i);
         double plate[6] = {0}, ball[6] = {0}, sum[2][6] = {{0}};
@@ -88,7 +88,7 @@ static void test_votes_turn(void **state) {
     (void)state;
     txi_fields f;
     txm_rng rng = txm_rng_make(4, 0);
-    txi_fields_make(&f, 8);
+    txi_fields_make(&f, 8, 1);
     for (int i = 0; i < 200; i++) {
         const txm_dvec3 x = random_unit(&rng), y = txm_d3_unit(txm_d3_cross(x, random_unit(&rng)));
         const txm_dvec3 z = txm_d3_cross(x, y), v = txm_d3_scale(random_unit(&rng), 1 + 0.05 * i);
@@ -146,7 +146,7 @@ static void test_line(void **state) {
     (void)state;
     txi_fields f;
     txm_rng rng = txm_rng_make(5, 0);
-    txi_fields_make(&f, 6);
+    txi_fields_make(&f, 6, 1);
     shape *s = shape_make(f.reach);
     const txm_dvec3 d = txm_d3_unit(txm_d3(1, 2, -0.5));
     for (int i = 0; i < 100; i++) shape_add(s, txm_d3_scale(d, i));
@@ -171,7 +171,7 @@ static void test_line(void **state) {
 static void test_circle(void **state) {
     (void)state;
     txi_fields f;
-    txi_fields_make(&f, 6);
+    txi_fields_make(&f, 6, 1);
     shape *s = shape_make(f.reach);
     const txm_dvec3 x = txm_d3_unit(txm_d3(1, 1, 1)), y = txm_d3_unit(txm_d3(1, -1, 0));
     for (int i = 0; i < 190; i++) {
@@ -205,7 +205,7 @@ static void test_plane_and_sphere(void **state) {
     (void)state;
     txi_fields f;
     txm_rng rng = txm_rng_make(6, 0);
-    txi_fields_make(&f, 6);
+    txi_fields_make(&f, 6, 1);
     shape *plane = shape_make(f.reach), *sphere = shape_make(f.reach);
     const txm_dvec3 n = txm_d3_unit(txm_d3(1, 2, 3)), x = txm_d3_unit(txm_d3(2, -1, 0));
     const txm_dvec3 y = txm_d3_cross(n, x);
@@ -241,7 +241,7 @@ static void test_junction(void **state) {
     (void)state;
     txi_fields f;
     txm_rng rng = txm_rng_make(7, 0);
-    txi_fields_make(&f, 5);
+    txi_fields_make(&f, 5, 1);
     shape *s = shape_make(f.reach);
     for (int i = -30; i <= 30; i++) {
         if (i == 0) continue;
@@ -269,7 +269,7 @@ static void test_junction(void **state) {
 static void test_on_surface(void **state) {
     (void)state;
     txi_fields f;
-    txi_fields_make(&f, 6);
+    txi_fields_make(&f, 6, 1);
     shape *s = shape_make(f.reach);
     txm_dvec3 normals[POINTS];
     double t[6], off[6];
