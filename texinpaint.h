@@ -5468,8 +5468,11 @@ static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double
        3/2 int D s^2 ds  along u,  3/4 int D (1 - s^2) ds  across,  |s| <= sqrt(1/2)
 
    A plate's vote is the integral of sticks over the circle around its tangent t. In the frame t, p
-   (across t in the plane of t and u), q = t x p it has the entries tt, tp, pp, qq.                */
-static void txi_fields_make(txi_fields *f, double sigma) {
+   (across t in the plane of t and u), q = t x p it has the entries tt, tp, pp, qq.
+
+   sigma   length unit: about half of the gap that votes can bridge
+   plates  0: no plates will vote, which saves most of the time                                  */
+static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->sigma = sigma;
     /* so that an eighth of a circle and a straight line of the same length differ as in the paper */
     f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
@@ -5483,7 +5486,7 @@ static void txi_fields_make(txi_fields *f, double sigma) {
             f->ball[i][0] += 1.5 * d * s * s;
             f->ball[i][1] += 0.75 * d * (1 - s * s);
         }
-        for (int j = 0; j <= TXI_VOTE_ANGLES; j++) {
+        for (int j = 0; j <= TXI_VOTE_ANGLES && plates; j++) {
             double sine, cosine, *e = f->plate[i][j];
             txm_sincos(0.5 * TXM_PI * j / TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
             e[0] = e[1] = e[2] = e[3] = 0;
@@ -6561,33 +6564,31 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
    chance.                                                                                         */
 
 enum {
-    TXI_TOKEN_STEP = 3,   /* pixels between the points of a line that vote                        */
+    TXI_TOKEN_STEP = 3,     /* pixels between the points of a line that vote; ours                */
     TXI_TOKENS_OF_END = 14, /* points of each line                                                */
-    TXI_GROW_STEP = 3,    /* pixels that a line grows in one round                                */
-    TXI_FIELD_STEP = 4    /* pixels between the places at which the field of votes is computed     */
+    TXI_GROW_ROUNDS = 64    /* at most, if beta is 0                                              */
 };
 
-/* How lines grow; ours: over the width of a large hole, lines that are some pixels apart meet. */
-static const int txi_grow_rounds = 64;      /* at most, if beta is 0                              */
+/* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
+   that are void count as flat. */
+typedef struct txi_spot {
+    txm_dvec3 place, normal, ex, ey;
+    int used; /* of the dense map: votes are counted here                                         */
+} txi_spot;
 
 typedef struct txi_grown {
     const txi_window *window;
     txi_fields fields;
     txi_tokens tokens;
     int *owner;        /* one per token: the end of its line                                      */
-    float *field;      /* at every 4th pixel in both directions: xx, xy, yy of the votes in the window's
-                          tangent plane, of trace 1; xx = -1: not computed yet                    */
-    int field_width, field_height;
+    int step;          /* pixels between the places of the dense map; a line grows as far in a round */
+    int width, height; /* of the dense map, which covers the hole                                 */
+    int left, top;     /* pixel of its first place                                                */
+    txi_spot *spots; /* the places, NULL tangents outside of the hole                      */
+    double *votes;     /* 6 per place                                                             */
     uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                      */
-    txm_vec2 *tips;    /* where each end's line stopped                                           */
     int end_count;
 } txi_grown;
-
-/* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
-   that are void count as flat. */
-typedef struct txi_spot {
-    txm_dvec3 place, normal, ex, ey;
-} txi_spot;
 
 static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
     txi_spot s;
@@ -6624,25 +6625,49 @@ static double txi_form(const double t[6], txm_dvec3 a, txm_dvec3 b) {
            a.z * (t[2] * b.x + t[4] * b.y + t[5] * b.z);
 }
 
-/* The votes at a place of the window: a tensor in the window's axes, xx xy yy. */
-static void txi_votes_in_window(const txi_grown *g, double x, double y, double t[3]) {
-    const txi_spot s = txi_spot_at(g->window, x, y);
-    double votes[6];
-    txi_votes_at(&g->fields, &g->tokens, s.place, 0, votes);
-    t[0] = txi_form(votes, s.ex, s.ex);
-    t[1] = txi_form(votes, s.ex, s.ey);
-    t[2] = txi_form(votes, s.ey, s.ey);
-}
-
-/* A token of a line in direction (dx, dy) of the window: a stick across it, in the surface. */
-static void txi_grow_token(txi_grown *g, double x, double y, double dx, double dy, double weight,
-                           int owner) {
-    const txi_spot s = txi_spot_at(g->window, x, y);
+/* Add a stick to the tokens, and its votes to the dense map. (x, y): its place in the window */
+static void txi_grow_add(txi_grown *g, double x, double y, txm_dvec3 place, txm_dvec3 normal,
+                         double weight, int owner) {
+    const double reach = g->fields.reach / g->step, cx = (x - g->left) / g->step;
+    const double cy = (y - g->top) / g->step;
     double t[6] = {0};
     if (g->tokens.count >= g->tokens.room) return;
-    txi_outer(t, txm_d3_unit(txm_d3_mad(txm_d3_scale(s.ex, -dy), s.ey, dx)), weight);
+    txi_outer(t, normal, weight);
     g->owner[g->tokens.count] = owner;
-    txi_tokens_add(&g->tokens, s.place, t);
+    txi_tokens_add(&g->tokens, place, t);
+    /* a window is almost isometric: what is in reach on the surface is so in the window, nearly    */
+    const int x0 = txm_clampi((int)(cx - reach), 0, g->width);
+    const int x1 = txm_clampi((int)(cx + reach) + 2, 0, g->width);
+    const int y0 = txm_clampi((int)(cy - reach), 0, g->height);
+    const int y1 = txm_clampi((int)(cy + reach) + 2, 0, g->height);
+    for (int j = y0; j < y1; j++) {
+        for (int i = x0; i < x1; i++) {
+            const size_t at = (size_t)j * (size_t)g->width + (size_t)i;
+            if (g->spots[at].used)
+                txi_vote_stick(&g->fields, normal, txm_d3_sub(g->spots[at].place, place), weight,
+                               g->votes + 6 * at);
+        }
+    }
+}
+
+/* The votes at a place of the window, from the four places of the dense map around it: a tensor in the
+   window's axes, xx xy yy. */
+static void txi_votes_in_window(const txi_grown *g, double x, double y, double t[3]) {
+    const double cx = (x - g->left) / g->step, cy = (y - g->top) / g->step;
+    const int ix = txm_clampi((int)floor(cx), 0, g->width - 2);
+    const int iy = txm_clampi((int)floor(cy), 0, g->height - 2);
+    const double u = cx - ix < 0 ? 0 : cx - ix > 1 ? 1 : cx - ix;
+    const double v = cy - iy < 0 ? 0 : cy - iy > 1 ? 1 : cy - iy;
+    t[0] = t[1] = t[2] = 0;
+    for (int k = 0; k < 4; k++) {
+        const size_t at = (size_t)(iy + k / 2) * (size_t)g->width + (size_t)(ix + k % 2);
+        const txi_spot *s = &g->spots[at];
+        const double w = (k & 1 ? u : 1 - u) * (k & 2 ? v : 1 - v), *votes = g->votes + 6 * at;
+        if (!s->used || w <= 0) continue;
+        t[0] += w * txi_form(votes, s->ex, s->ex);
+        t[1] += w * txi_form(votes, s->ex, s->ey);
+        t[2] += w * txi_form(votes, s->ey, s->ey);
+    }
 }
 
 /* The lines' points as tokens: balls vote, then sticks of length one in the directions found. */
@@ -6654,8 +6679,9 @@ static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *sc
     int *owner = (int *)txm_arena_alloc(scratch, (size_t)room, sizeof *owner);
     txm_dvec3 *normals = (txm_dvec3 *)txm_arena_alloc(scratch, (size_t)room, sizeof *normals);
     double *votes = (double *)txm_arena_alloc(scratch, (size_t)room, 6 * sizeof *votes);
+    txm_vec2 *where = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)room, sizeof *where);
     if (scratch->failed) return txi_no_memory(env);
-    txi_fields_make(&balls, 4);
+    txi_fields_make(&balls, 4, 0);
     txm_status status = txi_tokens_make(&points, room, balls.reach, scratch, env);
     if (status != TXM_OK) return status;
     for (int e = 0; e < l->end_count; e++) {
@@ -6664,16 +6690,15 @@ static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *sc
             const txi_spot s = txi_spot_at(g->window, p.x, p.y);
             normals[points.count] = s.normal;
             owner[points.count] = e;
+            where[points.count] = p;
             txi_tokens_add(&points, s.place, unit);
         }
     }
     txi_vote_sparse(&balls, &points, 1, normals, votes);
     for (int i = 0; i < points.count; i++) {
-        double t[6] = {0};
-        if (points.at[i].stick <= 0) continue; /* it is alone                                      */
-        txi_outer(t, points.at[i].normal, 1);
-        g->owner[g->tokens.count] = owner[i];
-        txi_tokens_add(&g->tokens, points.at[i].place, t);
+        const txi_token *k = &points.at[i];
+        if (k->stick <= 0) continue; /* it is alone                                                */
+        txi_grow_add(g, where[i].x, where[i].y, k->place, k->normal, 1, owner[i]);
     }
     return TXM_OK;
 }
@@ -6707,7 +6732,7 @@ static int txi_grow_step(txi_grown *g, int end, double least, txm_vec2 *tip, txm
         txm_sincos(k * (TXM_PI / 12), &sine, &cosine);
         const double dx = heading->x * cosine - heading->y * sine;
         const double dy = heading->x * sine + heading->y * cosine;
-        const double x = tip->x + TXI_GROW_STEP * dx, y = tip->y + TXI_GROW_STEP * dy;
+        const double x = tip->x + g->step * dx, y = tip->y + g->step * dy;
         txi_votes_in_window(g, x, y, t);
         const double across = dy * dy * t[0] - 2 * dx * dy * t[1] + dx * dx * t[2];
         const double along = dx * dx * t[0] + 2 * dx * dy * t[1] + dy * dy * t[2];
@@ -6723,52 +6748,85 @@ static int txi_grow_step(txi_grown *g, int end, double least, txm_vec2 *tip, txm
     if (at < 0 || w->state[at] != TXI_HOLE) return 0;
     *tip = txm_v2(txm_float(bx), txm_float(by));
     *heading = txi_unit(heading->x + hx, heading->y + hy);
-    txi_grow_token(g, bx, by, heading->x, heading->y, 0.8, end);
+    const txi_spot s = txi_spot_at(w, bx, by);
+    const txm_dvec3 across = txm_d3_mad(txm_d3_scale(s.ex, -(double)heading->y), s.ey, heading->x);
+    txi_grow_add(g, bx, by, s.place, txm_d3_unit(across), 0.8, end);
     return 1;
 }
 
+/* The dense map: places in the hole and next to it, without votes. */
+static txm_status txi_grow_map(txi_grown *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
+    const txi_window *w = g->window;
+    int x0 = w->width, x1 = -1, y0 = w->height, y1 = -1;
+    for (int y = 0; y < w->height; y++) {
+        for (int x = 0; x < w->width; x++) {
+            if (w->state[(size_t)y * (size_t)w->width + (size_t)x] != TXI_HOLE) continue;
+            x0 = x < x0 ? x : x0;
+            x1 = x > x1 ? x : x1;
+            y0 = y < y0 ? y : y0;
+            y1 = y > y1 ? y : y1;
+        }
+    }
+    if (x1 < 0) x0 = x1 = y0 = y1 = 0;
+    g->left = x0;
+    g->top = y0;
+    g->width = (x1 - x0) / g->step + 2;
+    g->height = (y1 - y0) / g->step + 2;
+    const size_t count = (size_t)g->width * (size_t)g->height;
+    g->spots = (txi_spot *)txm_arena_alloc(scratch, count, sizeof *g->spots);
+    g->votes = (double *)txm_arena_zero(scratch, count, 6 * sizeof *g->votes);
+    if (scratch->failed) return txi_no_memory(env);
+    for (int j = 0; j < g->height; j++) {
+        for (int i = 0; i < g->width; i++) {
+            const int x = g->left + i * g->step, y = g->top + j * g->step;
+            txi_spot *s = &g->spots[(size_t)j * (size_t)g->width + (size_t)i];
+            *s = txi_spot_at(w, x, y);
+            s->used = x < w->width && y < w->height &&
+                      l->away[(size_t)y * (size_t)w->width + (size_t)x] <= 4 * g->step * g->step;
+        }
+    }
+    return TXM_OK;
+}
+
 /* Let the lines grow.
-   alpha  pixels; lines as near as that have met; 0: 3
+   alpha  pixels; lines as near as that have met; at most, and with 0, a step
    beta   rounds at most; 0: 64
-   cost   O(rounds * ends * tokens in reach)                                                    */
+   cost   O(tokens * places of the map in reach)                                                */
 static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
                            txm_arena *scratch, txm_env *env) {
     const int ends = l->end_count;
-    const double meet = alpha > 0 && alpha < 3 ? alpha : 3;
-    int rounds = beta > 0 ? beta : txi_grow_rounds;
-    if (rounds > 1 + (int)(l->width / TXI_GROW_STEP)) rounds = 1 + (int)(l->width / TXI_GROW_STEP);
+    int rounds = beta > 0 ? beta : TXI_GROW_ROUNDS;
     memset(g, 0, sizeof *g);
     g->window = w;
     g->end_count = ends;
-    g->field_width = w->width / TXI_FIELD_STEP + 2;
-    g->field_height = w->height / TXI_FIELD_STEP + 2;
     /* far enough for votes to bridge the hole                                                     */
-    txi_fields_make(&g->fields, txm_clampf(0.25f * l->width, 6, 30));
+    txi_fields_make(&g->fields, txm_clampf(0.25f * l->width, 6, 30), 0);
+    g->step = txm_clampi((int)(g->fields.sigma / 5), 2, 6);
+    const double meet = alpha > 0 && alpha < (float)g->step ? (double)alpha : g->step;
+    if (rounds > 1 + (int)(l->width / (float)g->step)) rounds = 1 + (int)(l->width / (float)g->step);
     const int room = ends * (TXI_TOKENS_OF_END + rounds);
-    const size_t spots = (size_t)g->field_width * (size_t)g->field_height;
-    txm_status status = txi_tokens_make(&g->tokens, room, g->fields.reach, scratch, env);
+    txm_status status = txi_tokens_make(&g->tokens, room, g->step + 1.0, scratch, env);
+    if (status == TXM_OK) status = txi_grow_map(g, l, scratch, env);
     if (status != TXM_OK) return status;
     g->owner = (int *)txm_arena_alloc(scratch, (size_t)room, sizeof *g->owner);
-    g->field = (float *)txm_arena_alloc(scratch, spots, 3 * sizeof *g->field);
     g->met = (uint8_t *)txm_arena_zero(scratch, (size_t)ends, (size_t)ends);
-    g->tips = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)ends, 2 * sizeof *g->tips);
+    txm_vec2 *tips = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)ends, 2 * sizeof *tips);
     uint8_t *going = (uint8_t *)txm_arena_alloc(scratch, (size_t)ends, 1);
     if (scratch->failed) return txi_no_memory(env);
-    txm_vec2 *headings = g->tips + ends;
-    for (size_t i = 0; i < spots; i++) g->field[3 * i] = -1;
+    txm_vec2 *headings = tips + ends;
     status = txi_grow_begin(g, l, scratch, env);
     if (status != TXM_OK) return status;
     for (int e = 0; e < ends; e++) {
-        g->tips[e] = l->ends[e].place;
+        tips[e] = l->ends[e].place;
         headings[e] = l->ends[e].heading;
         going[e] = 1;
     }
     for (int round = 0; round < rounds; round++) {
         for (int e = 0; e < ends; e++) {
             if (!going[e]) continue;
-            going[e] = (uint8_t)txi_grow_step(g, e, 0.05, &g->tips[e], &headings[e]);
+            going[e] = (uint8_t)txi_grow_step(g, e, 0.05, &tips[e], &headings[e]);
             if (!going[e] || round < 2) continue;
-            const int other = txi_grow_meets(g, e, txi_spot_at(w, g->tips[e].x, g->tips[e].y).place, meet);
+            const int other = txi_grow_meets(g, e, txi_spot_at(w, tips[e].x, tips[e].y).place, meet);
             if (other < 0) continue;
             g->met[(size_t)e * (size_t)ends + (size_t)other] = 1;
             g->met[(size_t)other * (size_t)ends + (size_t)e] = 1;
@@ -6779,18 +6837,12 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
 
 /* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along) / sum;
    0 where there are no votes. */
-static double txi_votes_agree(txi_grown *g, double x, double y, double dx, double dy) {
-    const int ix = txm_clampi((int)(x / TXI_FIELD_STEP + 0.5), 0, g->field_width - 1);
-    const int iy = txm_clampi((int)(y / TXI_FIELD_STEP + 0.5), 0, g->field_height - 1);
-    float *f = g->field + 3 * ((size_t)iy * (size_t)g->field_width + (size_t)ix);
-    if (f[0] < 0) {
-        double t[3];
-        txi_votes_in_window(g, ix * TXI_FIELD_STEP, iy * TXI_FIELD_STEP, t);
-        const double sum = t[0] + t[2];
-        for (int k = 0; k < 3; k++) f[k] = sum > 1e-3 ? txm_float(t[k] / sum) : 0;
-    }
-    return dy * dy * f[0] - 2 * dx * dy * f[1] + dx * dx * f[2] -
-           (dx * dx * f[0] + 2 * dx * dy * f[1] + dy * dy * f[2]);
+static double txi_votes_agree(const txi_grown *g, double x, double y, double dx, double dy) {
+    double t[3];
+    txi_votes_in_window(g, x, y, t);
+    const double across = dy * dy * t[0] - 2 * dx * dy * t[1] + dx * dx * t[2];
+    const double along = dx * dx * t[0] + 2 * dx * dy * t[1] + dy * dy * t[2];
+    return t[0] + t[2] > 1e-3 ? (across - along) / (t[0] + t[2]) : 0;
 }
 
 /* ---- which ends belong together ---------------------------------------------------------------
@@ -6966,7 +7018,7 @@ static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rule
 }
 
 /* What the votes say about a candidate, -1..1: how far they agree with its curve, on average. */
-static double txi_affinity(txi_grown *g, const txi_link *k) {
+static double txi_affinity(const txi_grown *g, const txi_link *k) {
     double sum = 0;
     for (int i = 2; i <= TXI_STEPS - 2; i += 2) {
         const txm_vec2 p = k->points[i - 1], q = k->points[i + 1];
@@ -7226,7 +7278,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
 /* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
    they are better than no join. Returns how many. */
 static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
-                          txi_grown *growth, txi_link *links) {
+                          const txi_grown *growth, txi_link *links) {
     int count = 0;
     for (int a = 0; a < l->end_count; a++) {
         int kept = 0;
