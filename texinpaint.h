@@ -8133,6 +8133,179 @@ static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_ar
     return TXM_OK;
 }
 
+/* ---- strokes -----------------------------------------------------------------------------------
+   Two curves that run along each other with the same colour between them are the sides of one stroke:
+   a bar, a stripe, a joint. A stroke is completed as a whole, and covers what it crosses.         */
+
+enum {
+    TXI_STROKE_WIDEST = 40, /* pixels; ours                                                       */
+    TXI_STROKE_KNOWN = 24,  /* points of a curve's known part, next to the hole, that are looked at */
+    TXI_STROKE_LEAST = 6    /* so many of them must lie beside the other curve                      */
+};
+
+/* The colours on both sides of a curve in its known part, at each end of the hole. */
+typedef struct txi_sides {
+    double color[2][2][3]; /* end (0 in front of the hole), side (0 left), RGB                     */
+    int hits[2][2];
+} txi_sides;
+
+/* The direction of a curve at point i, over 5 points. */
+static txm_vec2 txi_curve_along(const txi_curve *c, int i) {
+    const txm_vec2 a = c->points[i > 2 ? i - 2 : 0];
+    const txm_vec2 b = c->points[i + 2 < c->count ? i + 2 : c->count - 1];
+    return txi_unit((double)b.x - a.x, (double)b.y - a.y);
+}
+
+/* The known points next to the hole: before it (end 0) or behind it; from > to: none. */
+static void txi_curve_known(const txi_curve *c, int end, int *from, int *to) {
+    *from = end ? c->last + 1 : c->first > TXI_STROKE_KNOWN ? c->first - TXI_STROKE_KNOWN : 0;
+    *to = end ? c->last + TXI_STROKE_KNOWN : c->first - 1;
+    if (*to > c->count - 1) *to = c->count - 1;
+}
+
+static void txi_sides_make(const txi_window *w, const txi_curve *c, double away, txi_sides *s) {
+    memset(s, 0, sizeof *s);
+    for (int end = 0; end < 2; end++) {
+        int from, to;
+        txi_curve_known(c, end, &from, &to);
+        for (int i = from; i <= to; i++) {
+            const txm_vec2 t = txi_curve_along(c, i), p = c->points[i];
+            for (int side = 0; side < 2; side++) {
+                const double u = side ? away : -away; /* right is (-t.y, t.x) */
+                const ptrdiff_t at = txi_pixel(w->width, w->height, (double)p.x - u * (double)t.y,
+                                               (double)p.y + u * (double)t.x);
+                if (at < 0 || (w->state[at] != TXI_KNOWN && w->state[at] != TXI_FOREIGN)) continue;
+                for (int k = 0; k < 3; k++) s->color[end][side][k] += w->color[4 * at + k];
+                s->hits[end][side]++;
+            }
+        }
+        for (int k = 0; k < 6; k++)
+            if (s->hits[end][k / 3]) s->color[end][k / 3][k % 3] /= s->hits[end][k / 3];
+    }
+}
+
+static double txi_sides_distance(const double a[3], const double b[3]) {
+    double sum = 0;
+    for (int c = 0; c < 3; c++) sum += (a[c] - b[c]) * (a[c] - b[c]);
+    return sqrt(sum);
+}
+
+/* Where curve b lies beside point i of curve a: signed distance to the right, and b's point; 0 if it has
+   no point beside it. */
+static int txi_beside(const txi_curve *a, int i, const txi_curve *b, double *across, int *point) {
+    const txm_vec2 t = txi_curve_along(a, i), p = a->points[i];
+    double best = 1e30, ahead = 1e30;
+    for (int k = 0; k < b->count; k++) {
+        const double x = (double)b->points[k].x - p.x, y = (double)b->points[k].y - p.y;
+        const double square = x * x + y * y;
+        if (square >= best) continue;
+        best = square;
+        ahead = x * (double)t.x + y * (double)t.y;
+        *across = y * (double)t.x - x * (double)t.y;
+        *point = k;
+    }
+    return ahead < 2 && ahead > -2;
+}
+
+/* The mean signed width between a and b at one end of a's hole, and which end of b that is. 0: they do
+   not run along each other there. */
+static int txi_stroke_end(const txi_curve *a, const txi_curve *b, int end, double *width, int *of_b) {
+    double sum = 0, squares = 0;
+    int n = 0, from, to, votes = 0;
+    txi_curve_known(a, end, &from, &to);
+    for (int i = from; i <= to; i += 2) {
+        double across;
+        int point;
+        if (!txi_beside(a, i, b, &across, &point)) continue;
+        sum += across;
+        squares += across * across;
+        votes += point < b->first ? -1 : point > b->last ? 1 : 0;
+        n++;
+    }
+    if (2 * n < TXI_STROKE_LEAST) return 0;
+    const double mean = sum / n, spread = squares / n - mean * mean, size = mean < 0 ? -mean : mean;
+    *width = mean;
+    *of_b = votes > 0;
+    return size >= 2 && size <= TXI_STROKE_WIDEST && spread <= 0.04 * size * size + 1;
+}
+
+/* The width of the stroke between two curves; 0: they are not its sides. Both must end alike. */
+static double txi_stroke(const txi_window *w, const txi_curve *a, const txi_curve *b) {
+    double width[2] = {0, 0};
+    int of_b[2] = {0, 1}, ends = 0;
+    for (int end = 0; end < 2; end++) {
+        if (a->ends[end] < 0) continue;
+        if (!txi_stroke_end(a, b, end, &width[end], &of_b[end])) return 0;
+        if (b->ends[of_b[end]] < 0) return 0;
+        ends++;
+    }
+    if (ends == 0 || (ends == 2 && of_b[0] == of_b[1])) return 0;
+    if (ends != (b->ends[0] >= 0) + (b->ends[1] >= 0)) return 0;
+    if (ends == 2 && (width[0] > 0) != (width[1] > 0)) return 0;
+    const double known = width[0] + width[1], mean = (known < 0 ? -known : known) / ends;
+    const int right = known > 0;
+    for (int i = a->first; i <= a->last; i += 2) { /* through the hole, too */
+        double across = 0;
+        int point;
+        if (!txi_beside(a, i, b, &across, &point)) continue;
+        if (!right) across = -across;
+        if (across < 0.4 * mean || across > 2.5 * mean) return 0;
+    }
+    txi_sides sa, sb;
+    const double away = mean < 6 ? 0.5 * mean : 3;
+    txi_sides_make(w, a, away, &sa);
+    txi_sides_make(w, b, away, &sb);
+    for (int end = 0; end < 2; end++) {
+        const int e = of_b[end], same_way = of_b[0] == 0 && of_b[1] == 1;
+        const int inside_a = right, inside_b = same_way ? !right : right;
+        if (a->ends[end] < 0) continue;
+        if (!sa.hits[end][0] || !sa.hits[end][1] || !sb.hits[e][0] || !sb.hits[e][1]) return 0;
+        const double contrast_a = txi_sides_distance(sa.color[end][0], sa.color[end][1]);
+        const double contrast_b = txi_sides_distance(sb.color[e][0], sb.color[e][1]);
+        const double least = contrast_a < contrast_b ? contrast_a : contrast_b;
+        if (txi_sides_distance(sa.color[end][inside_a], sb.color[e][inside_b]) > 0.35 * least + 4)
+            return 0;
+    }
+    return mean;
+}
+
+/* Find the strokes among curves whose partner is not set yet. partners receives the other side of
+   each, or -1: of all pairs the narrowest first. width: room for count * count floats.
+   cost    O(pairs of curves near each other * points^2)                                          */
+static void txi_find_strokes(const txi_window *w, const txi_curve *curves, int count, int *partners,
+                             float *width) {
+    const size_t n = (size_t)count;
+    for (int i = 0; i < count; i++) {
+        const int p = curves[i].partner;
+        partners[i] = p >= 0 && p < count && p != i ? p : -1;
+    }
+    for (int i = 0; i < count; i++) {
+        for (int j = 0; j < count; j++) {
+            width[(size_t)i * n + (size_t)j] = 0;
+            if (j == i || partners[i] >= 0 || partners[j] >= 0) continue;
+            if (curves[i].count < 2 || curves[j].count < 2) continue;
+            width[(size_t)i * n + (size_t)j] = txm_float(txi_stroke(w, &curves[i], &curves[j]));
+        }
+    }
+    for (;;) {
+        int a = -1, b = -1;
+        float least = 0;
+        for (int i = 0; i < count; i++) {
+            for (int j = i + 1; j < count; j++) {
+                const float u = width[(size_t)i * n + (size_t)j], v = width[(size_t)j * n + (size_t)i];
+                if (partners[i] >= 0 || partners[j] >= 0 || u <= 0 || v <= 0) continue;
+                if (a >= 0 && u + v >= least) continue;
+                least = u + v;
+                a = i;
+                b = j;
+            }
+        }
+        if (a < 0) return;
+        partners[a] = b;
+        partners[b] = a;
+    }
+}
+
 /* ---- strips: lines made straight ---------------------------------------------------------------
    The texture along a line is treated in the line's own frame: column c is a place on the line, row j
    lies across it, along the normal [1, III.A: frame v, d, n]. Two lines with the same contrast close
@@ -8149,7 +8322,7 @@ static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_ar
 
 enum {
     TXI_STRIP_MARGIN = 10,   /* rows on each side, pixels; ours                                  */
-    TXI_STRIP_INSIDE = 40,   /* most pixels between the lines of a stroke; ours                   */
+    TXI_STRIP_INSIDE = TXI_STROKE_WIDEST, /* most rows between the lines of a stroke               */
     TXI_STRIP_ROWS = 2 * TXI_STRIP_MARGIN + 1 + TXI_STRIP_INSIDE,
     TXI_STRIP_REACH = 8,     /* columns of a patch on each side of its centre: radius r [1, III.A] */
     TXI_STRIP_HOP = 6,       /* columns between neighbouring patches, so that they overlap        */
@@ -8732,17 +8905,15 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
     return s->source_count > own ? txi_columns_sample(w, s, arena, env) : TXM_OK;
 }
 
-/* ---- laying the strips ---------------------------------------------------------------------- */
+/* ---- the graph of all patches -------------------------------------------------------------------
+   The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with those
+   of the other.                                                                                 */
 
 enum {
-    TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
-    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
-    TXI_LAY_OFFSET = 32,     /* levels; most that a strip's colours are changed                    */
-    TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
-    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
-    TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
+    TXI_MEETING_SAMPLES = 32, /* most places that two patches are compared at                       */
+    TXI_MEETING_STEP = 2,     /* pixels between them                                              */
+    TXI_MEETINGS_MOST = 4096
 };
-#define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
 
 /* The strips of a window, and the graph of their patches. */
 typedef struct txi_strips {
@@ -8754,7 +8925,10 @@ typedef struct txi_strips {
     int *counts, *ends; /* of the graph                                                          */
     size_t *firsts;
     int32_t *unary;
-    int *link_strip;   /* which strip a link belongs to                                          */
+    int *link_strip;   /* which strip a link belongs to; -1 - k: it is meeting k                   */
+    struct txi_meeting *meetings; /* where strips meet                                            */
+    int meeting_count;
+    uint8_t *late;     /* per link: a meeting                                                     */
     int *labels;       /* per node: the index of the label chosen                                 */
     int *cuts;         /* rows_most per node: the column from which on the next patch counts       */
     float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                        */
@@ -8768,8 +8942,11 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     all->order = (int *)txm_arena_alloc(arena, (size_t)count, sizeof *all->order);
     txi_ribbon *lines = (txi_ribbon *)txm_arena_zero(arena, (size_t)count, sizeof *lines);
     uint8_t *done = (uint8_t *)txm_arena_zero(arena, (size_t)count, 1);
+    int *partners = (int *)txm_arena_alloc(arena, (size_t)count, sizeof *partners);
+    float *widths = (float *)txm_arena_alloc(arena, (size_t)count, (size_t)count * sizeof *widths);
     if (arena->failed) return txi_no_memory(env);
     int most = 1;
+    txi_find_strokes(w, curves, count, partners, widths);
     for (int i = 0; i < count; i++) {
         if (curves[i].count < 2) continue;
         most = curves[i].count > most ? curves[i].count : most;
@@ -8781,13 +8958,13 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     float *width = (float *)txm_arena_alloc(arena, (size_t)most, sizeof *width);
     if (!width) return txi_no_memory(env);
     for (int i = 0; i < count; i++) {
-        const int p = curves[i].partner;
+        const int p = partners[i];
         txi_strip *s = &all->strips[all->count];
         if (done[i] || lines[i].count < 2) continue;
         s->curve = i;
         s->partner = -1;
         s->line = lines[i];
-        if (p >= 0 && p < count && p != i && !done[p] && lines[p].count >= 2 &&
+        if (p >= 0 && !done[p] && lines[p].count >= 2 &&
             txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {
             double sum = 0;
             for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
@@ -8826,11 +9003,111 @@ static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm
     return TXM_OK;
 }
 
+/* ---- where strips meet ---- */
+
+/* Two patches of different strips that overlap, and where their colours are compared: near the line on
+   which one strip gives way to the other. */
+typedef struct txi_meeting {
+    int strip[2], patch[2], count;
+    int8_t offset[TXI_MEETING_SAMPLES][2];  /* columns from the centre of each patch               */
+    uint8_t row[TXI_MEETING_SAMPLES][2];
+} txi_meeting;
+
+/* The middle of a patch. */
+static txm_vec2 txi_patch_centre(const txi_strip *s, int patch) {
+    const int column = s->first + patch * s->hop;
+    return s->line.place[column < s->line.count ? column : s->line.count - 1];
+}
+
+/* Where a place lies in a patch: column offset and row, and its distance from the stroke. 0: outside. */
+static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, int *offset, int *row,
+                            double *away) {
+    const int at = s->first + patch * s->hop;
+    const int column = at < s->line.count ? at : s->line.count - 1;
+    const txm_vec2 t = s->line.along[column], p = s->line.place[column];
+    const double dx = x - (double)p.x, dy = y - (double)p.y, half = s->line.half[column];
+    const double ahead = dx * t.x + dy * t.y + (column - at), across = dy * t.x - dx * t.y;
+    *away = (across < 0 ? -across : across) - half;
+    if (ahead < -s->reach || ahead > s->reach || *away > TXI_STRIP_MARGIN) return 0;
+    *offset = (int)(ahead + s->reach + 0.5) - s->reach;
+    *row = txm_clampi((int)(txi_offset_row(across, s->inside, half) + 0.5), 0, s->rows - 1);
+    return 1;
+}
+
+/* Fill in the places at which two patches are compared. */
+static void txi_meeting_make(const txi_strips *all, txi_meeting *m) {
+    const txi_strip *a = &all->strips[m->strip[0]], *b = &all->strips[m->strip[1]];
+    const txm_vec2 p = txi_patch_centre(a, m->patch[0]), q = txi_patch_centre(b, m->patch[1]);
+    const double mx = 0.5 * ((double)p.x + q.x), my = 0.5 * ((double)p.y + q.y);
+    m->count = 0;
+    for (int k = 0; k < 13 * 13 && m->count < TXI_MEETING_SAMPLES; k++) {
+        const double x = mx + TXI_MEETING_STEP * (k % 13 - 6), y = my + TXI_MEETING_STEP * (k / 13 - 6);
+        int offset[2], row[2];
+        double away[2];
+        if (!txi_patch_locate(a, m->patch[0], x, y, &offset[0], &row[0], &away[0]) ||
+            !txi_patch_locate(b, m->patch[1], x, y, &offset[1], &row[1], &away[1]))
+            continue;
+        if (away[0] < 2 || away[1] < 2 || away[0] - away[1] > 3 || away[1] - away[0] > 3) continue;
+        for (int e = 0; e < 2; e++) {
+            m->offset[m->count][e] = (int8_t)offset[e];
+            m->row[m->count][e] = (uint8_t)row[e];
+        }
+        m->count++;
+    }
+}
+
+/* Eq. 4 for patches of two strips: squared differences at the places, as if at all pixels. */
+static int32_t txi_meeting_cost(const txi_strips *all, const txi_meeting *m, int a, int b) {
+    const txi_strip *s = &all->strips[m->strip[0]], *t = &all->strips[m->strip[1]];
+    int32_t sum = 0;
+    for (int k = 0; k < m->count; k++) {
+        const uint8_t *u = s->source_color + 3 * ((s->labels[a] + m->offset[k][0]) * s->rows + m->row[k][0]);
+        const uint8_t *v = t->source_color + 3 * ((t->labels[b] + m->offset[k][1]) * t->rows + m->row[k][1]);
+        for (int c = 0; c < 3; c++) sum += (u[c] - v[c]) * (u[c] - v[c]);
+    }
+    return sum * TXI_MEETING_STEP * TXI_MEETING_STEP / 4; /* rows off the lines count a quarter */
+}
+
+/* All pairs of patches of different strips whose centres are close: of each patch the nearest one of
+   each other strip. */
+static txm_status txi_meetings_find(txi_strips *all, txm_arena *arena, txm_env *env) {
+    all->meetings =
+        (txi_meeting *)txm_arena_alloc(arena, TXI_MEETINGS_MOST, sizeof *all->meetings);
+    if (!all->meetings) return txi_no_memory(env);
+    for (int i = 0; i < all->count; i++) {
+        const txi_strip *a = &all->strips[i];
+        for (int j = i + 1; j < all->count; j++) {
+            const txi_strip *b = &all->strips[j];
+            for (int k = 0; k < a->node_count; k++) {
+                const txm_vec2 p = txi_patch_centre(a, k);
+                double least = a->reach + b->reach;
+                txi_meeting *m = &all->meetings[all->meeting_count];
+                if (all->meeting_count == TXI_MEETINGS_MOST) return TXM_OK;
+                m->patch[1] = -1;
+                for (int n = 0; n < b->node_count; n++) {
+                    const double d = txi_distance(txi_patch_centre(b, n), p);
+                    if (d < least) least = d, m->patch[1] = n;
+                }
+                if (m->patch[1] < 0) continue;
+                m->strip[0] = i;
+                m->strip[1] = j;
+                m->patch[0] = k;
+                txi_meeting_make(all, m);
+                all->meeting_count += m->count > 0;
+            }
+        }
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    return TXM_OK;
+}
+
 /* ---- choosing patches ---- */
 
 static int32_t txi_strips_pair(const void *context, int link, int a, int b) {
     const txi_strips *all = (const txi_strips *)context;
-    const txi_strip *s = &all->strips[all->link_strip[link]];
+    const int of = all->link_strip[link];
+    if (of < 0) return txi_meeting_cost(all, &all->meetings[-1 - of], a, b);
+    const txi_strip *s = &all->strips[of];
     const int p = s->labels[a] + s->hop - s->reach, q = s->labels[b] - s->reach;
     return s->overlap[(size_t)p * (size_t)s->source_count + (size_t)q];
 }
@@ -8866,12 +9143,16 @@ static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, cons
                                                     (size_t)s->source_count * sizeof *s->overlap);
         if (txm_progress(env, 0, "strips")) return txi_stopped(env);
     }
+    const txm_status status = txi_meetings_find(all, arena, env);
+    if (status != TXM_OK) return status;
+    all->link_count += all->meeting_count;
     const size_t nodes = (size_t)all->node_count, links = (size_t)all->link_count;
     all->counts = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->counts);
     all->firsts = (size_t *)txm_arena_alloc(arena, nodes + 1, sizeof *all->firsts);
     all->unary = (int32_t *)txm_arena_alloc(arena, labels + 1, sizeof *all->unary);
     all->ends = (int *)txm_arena_alloc(arena, links + 1, 2 * sizeof *all->ends);
     all->link_strip = (int *)txm_arena_alloc(arena, links + 1, sizeof *all->link_strip);
+    all->late = (uint8_t *)txm_arena_zero(arena, links + 1, 1);
     all->labels = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->labels);
     if (arena->failed) return txi_no_memory(env);
     size_t first = 0;
@@ -8889,6 +9170,13 @@ static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, cons
             all->link_strip[link++] = i;
         }
     }
+    for (int k = 0; k < all->meeting_count; k++, link++) {
+        const txi_meeting *m = &all->meetings[k];
+        for (int e = 0; e < 2; e++)
+            all->ends[2 * link + e] = all->strips[m->strip[e]].node + m->patch[e];
+        all->link_strip[link] = -1 - k;
+        all->late[link] = 1;
+    }
     txm_parallel_for(env, all->count, txi_strips_body, all);
     return TXM_OK;
 }
@@ -8902,6 +9190,7 @@ static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *a
     g.firsts = all->firsts;
     g.unary = all->unary;
     g.ends = all->ends;
+    g.late = all->late;
     g.pair = txi_strips_pair;
     g.context = all;
     const txm_status status = txi_belief(&g, TXI_STRIP_KEEP, seed, arena, all->labels, NULL, env);
@@ -8912,6 +9201,21 @@ static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *a
     }
     return status;
 }
+
+/* ---- laying the strips --------------------------------------------------------------------------
+   Each hole pixel near a completed line belongs to the strip of the nearest line, or of the topmost
+   stroke that it lies in; it is copied from the strip's source columns.                             */
+
+enum {
+    TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
+    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
+    TXI_LAY_OFFSET = 32,     /* levels; most that a strip's colours are changed                    */
+    TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
+    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
+    TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
+};
+#define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
+#define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case              */
 
 /* ---- cuts and colours between patches ---- */
 
@@ -9134,7 +9438,7 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
     const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
     const double half = s->line.half[i];
     const double away = (across < 0 ? -across : across) - half;
-    const double claim = away > TXI_LAY_CORE ? away - TXI_LAY_CORE : 0;
+    const double claim = away > TXI_LAY_CLAIM ? away - TXI_LAY_CLAIM : 0;
     double rgb[3];
     if (ahead > 1.5 || ahead < -1.5 || away >= TXI_STRIP_MARGIN || claim >= lay->claims[at]) return;
     const double row = txi_offset_row(across, s->inside, half), column = i + ahead;

@@ -1,9 +1,11 @@
 #ifndef TEXINPAINT_LAY_H
 #define TEXINPAINT_LAY_H
 
-#include "strip.h"
+#include "chain.h"
 
-/* ---- laying the strips ---------------------------------------------------------------------- */
+/* ---- laying the strips --------------------------------------------------------------------------
+   Each hole pixel near a completed line belongs to the strip of the nearest line, or of the topmost
+   stroke that it lies in; it is copied from the strip's source columns.                             */
 
 enum {
     TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
@@ -14,175 +16,7 @@ enum {
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
 };
 #define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
-
-/* The strips of a window, and the graph of their patches. */
-typedef struct txi_strips {
-    const txi_window *w;
-    txi_strip *strips;
-    int count;
-    int *order;        /* strips, the one that is on top first                                    */
-    int node_count, link_count;
-    int *counts, *ends; /* of the graph                                                          */
-    size_t *firsts;
-    int32_t *unary;
-    int *link_strip;   /* which strip a link belongs to                                          */
-    int *labels;       /* per node: the index of the label chosen                                 */
-    int *cuts;         /* rows_most per node: the column from which on the next patch counts       */
-    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                        */
-} txi_strips;
-
-/* Strips of all curves; the sides of a stroke are one. */
-static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, int count,
-                                  txi_strips *all, txm_arena *arena, txm_env *env) {
-    all->w = w;
-    all->strips = (txi_strip *)txm_arena_zero(arena, (size_t)count, sizeof *all->strips);
-    all->order = (int *)txm_arena_alloc(arena, (size_t)count, sizeof *all->order);
-    txi_ribbon *lines = (txi_ribbon *)txm_arena_zero(arena, (size_t)count, sizeof *lines);
-    uint8_t *done = (uint8_t *)txm_arena_zero(arena, (size_t)count, 1);
-    if (arena->failed) return txi_no_memory(env);
-    int most = 1;
-    for (int i = 0; i < count; i++) {
-        if (curves[i].count < 2) continue;
-        most = curves[i].count > most ? curves[i].count : most;
-        txm_status status = txi_ribbon_make(curves[i].points, curves[i].count, arena, &lines[i], env);
-        if (status == TXM_OK) status = txi_ribbon_register(w, &lines[i], arena, env);
-        if (status != TXM_OK) return status;
-        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
-    }
-    float *width = (float *)txm_arena_alloc(arena, (size_t)most, sizeof *width);
-    if (!width) return txi_no_memory(env);
-    for (int i = 0; i < count; i++) {
-        const int p = curves[i].partner;
-        txi_strip *s = &all->strips[all->count];
-        if (done[i] || lines[i].count < 2) continue;
-        s->curve = i;
-        s->partner = -1;
-        s->line = lines[i];
-        if (p >= 0 && p < count && p != i && !done[p] && lines[p].count >= 2 &&
-            txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {
-            double sum = 0;
-            for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
-            s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
-            s->partner = p;
-            done[p] = 1;
-        }
-        done[i] = 1;
-        s->rows = 2 * TXI_STRIP_MARGIN + 1 + s->inside;
-        const txm_status status = txi_strip_sample(w, s, arena, env);
-        if (status != TXM_OK) return status;
-        if (s->last >= 0) all->count++; /* else there is nothing to complete */
-        else memset(s, 0, sizeof *s);
-    }
-    return TXM_OK;
-}
-
-/* The order in which strips cover each other: strokes over single lines, lines that go through over
-   those that end in the hole, then the stronger ones. */
-static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
-                                   txm_env *env) {
-    const size_t count = (size_t)all->count;
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, 2 * count, sizeof *pairs);
-    if (arena->failed) return txi_no_memory(env);
-    for (size_t i = 0; i < count; i++) {
-        const txi_strip *s = &all->strips[i];
-        const txi_curve *c = &curves[s->curve];
-        const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
-        const uint32_t bonus = (s->partner >= 0 ? 1u << 29 : 0) +
-                               (c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0);
-        pairs[i].key = UINT32_MAX - bonus - strength;
-        pairs[i].value = (uint32_t)i;
-    }
-    txm_sort_pairs(pairs, pairs + count, count);
-    for (size_t i = 0; i < count; i++) all->order[i] = (int)pairs[i].value;
-    return TXM_OK;
-}
-
-/* ---- choosing patches ---- */
-
-static int32_t txi_strips_pair(const void *context, int link, int a, int b) {
-    const txi_strips *all = (const txi_strips *)context;
-    const txi_strip *s = &all->strips[all->link_strip[link]];
-    const int p = s->labels[a] + s->hop - s->reach, q = s->labels[b] - s->reach;
-    return s->overlap[(size_t)p * (size_t)s->source_count + (size_t)q];
-}
-
-/* The costs of a strip: the table of overlaps and the unary costs of its patches. */
-static void txi_strips_body(void *context, int index) {
-    const txi_strips *all = (const txi_strips *)context;
-    txi_strip *s = &all->strips[index];
-    int16_t feature[TXI_STRIP_FEATURES], mask[TXI_STRIP_FEATURES];
-    int32_t values[TXI_STRIP_COLUMNS];
-    if (!s->node_count) return;
-    for (int i = 0; i < s->features; i++) mask[i] = -1;
-    txi_strip_overlaps(s, mask, values);
-    for (int k = 0; k < s->node_count; k++)
-        txi_strip_unary(s, k, feature, mask, all->unary + all->firsts[s->node + k]);
-}
-
-/* The sources of all strips, and the graph of all patches. */
-static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
-                                   txm_arena *arena, txm_env *env) {
-    size_t labels = 0;
-    for (int i = 0; i < all->count; i++) {
-        txi_strip *s = &all->strips[i];
-        txm_status status = txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
-        if (status != TXM_OK) return status;
-        txi_strip_labels(s);
-        s->node = all->node_count;
-        all->node_count += s->node_count;
-        all->link_count += s->node_count ? s->node_count - 1 : 0;
-        labels += (size_t)s->node_count * (size_t)s->label_count;
-        if (s->node_count)
-            s->overlap = (int32_t *)txm_arena_alloc(arena, (size_t)s->source_count,
-                                                    (size_t)s->source_count * sizeof *s->overlap);
-        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
-    }
-    const size_t nodes = (size_t)all->node_count, links = (size_t)all->link_count;
-    all->counts = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->counts);
-    all->firsts = (size_t *)txm_arena_alloc(arena, nodes + 1, sizeof *all->firsts);
-    all->unary = (int32_t *)txm_arena_alloc(arena, labels + 1, sizeof *all->unary);
-    all->ends = (int *)txm_arena_alloc(arena, links + 1, 2 * sizeof *all->ends);
-    all->link_strip = (int *)txm_arena_alloc(arena, links + 1, sizeof *all->link_strip);
-    all->labels = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *all->labels);
-    if (arena->failed) return txi_no_memory(env);
-    size_t first = 0;
-    int link = 0;
-    for (int i = 0; i < all->count; i++) {
-        const txi_strip *s = &all->strips[i];
-        for (int k = 0; k < s->node_count; k++) {
-            const int node = s->node + k;
-            all->counts[node] = s->label_count;
-            all->firsts[node] = first;
-            first += (size_t)s->label_count;
-            if (k == 0) continue;
-            all->ends[2 * link] = node - 1;
-            all->ends[2 * link + 1] = node;
-            all->link_strip[link++] = i;
-        }
-    }
-    txm_parallel_for(env, all->count, txi_strips_body, all);
-    return TXM_OK;
-}
-
-static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena, txm_env *env) {
-    txi_graph g;
-    memset(&g, 0, sizeof g);
-    g.node_count = all->node_count;
-    g.link_count = all->link_count;
-    g.counts = all->counts;
-    g.firsts = all->firsts;
-    g.unary = all->unary;
-    g.ends = all->ends;
-    g.pair = txi_strips_pair;
-    g.context = all;
-    const txm_status status = txi_belief(&g, TXI_STRIP_KEEP, seed, arena, all->labels, NULL, env);
-    for (int i = 0; i < all->count && status == TXM_OK; i++) {
-        txi_strip *s = &all->strips[i];
-        s->chosen = all->labels + s->node;
-        for (int k = 0; k < s->node_count; k++) s->chosen[k] = s->labels[s->chosen[k]];
-    }
-    return status;
-}
+#define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case              */
 
 /* ---- cuts and colours between patches ---- */
 
@@ -405,7 +239,7 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
     const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
     const double half = s->line.half[i];
     const double away = (across < 0 ? -across : across) - half;
-    const double claim = away > TXI_LAY_CORE ? away - TXI_LAY_CORE : 0;
+    const double claim = away > TXI_LAY_CLAIM ? away - TXI_LAY_CLAIM : 0;
     double rgb[3];
     if (ahead > 1.5 || ahead < -1.5 || away >= TXI_STRIP_MARGIN || claim >= lay->claims[at]) return;
     const double row = txi_offset_row(across, s->inside, half), column = i + ahead;

@@ -2,7 +2,7 @@
 #define TEXINPAINT_STRIP_H
 
 #include "belief.h"
-#include "trace.h"
+#include "stroke.h"
 
 /* ---- strips: lines made straight ---------------------------------------------------------------
    The texture along a line is treated in the line's own frame: column c is a place on the line, row j
@@ -20,7 +20,7 @@
 
 enum {
     TXI_STRIP_MARGIN = 10,   /* rows on each side, pixels; ours                                  */
-    TXI_STRIP_INSIDE = 40,   /* most pixels between the lines of a stroke; ours                   */
+    TXI_STRIP_INSIDE = TXI_STROKE_WIDEST, /* most rows between the lines of a stroke               */
     TXI_STRIP_ROWS = 2 * TXI_STRIP_MARGIN + 1 + TXI_STRIP_INSIDE,
     TXI_STRIP_REACH = 8,     /* columns of a patch on each side of its centre: radius r [1, III.A] */
     TXI_STRIP_HOP = 6,       /* columns between neighbouring patches, so that they overlap        */
