@@ -7096,6 +7096,44 @@ static int txi_look_ahead(const txi_window *w, const txi_lines *l, const txi_rul
     return 1;
 }
 
+/* ---- candidates -------------------------------------------------------------------------- */
+
+/* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
+   they are better than no join. Returns how many. */
+static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
+                          const txi_grown *growth, txi_link *links) {
+    int count = 0;
+    for (int a = 0; a < l->end_count; a++) {
+        int kept = 0;
+        const int start = count;
+        for (int b = a + 1; b <= l->end_count && count < TXI_MAX_LINKS; b++) {
+            txi_link k;
+            memset(&k, 0, sizeof k);
+            if (b < l->end_count) {
+                if (alpha > 0 && txi_distance(l->ends[a].place, l->ends[b].place) > alpha) continue;
+                if (!txi_link_ends(w, l, rules, a, b, &k)) continue;
+            } else if (!rules->look_ahead || !l->ends[a].is_long ||
+                       !txi_look_ahead(w, l, rules, a, &k)) {
+                continue;
+            }
+            k.cost = txm_float(k.cost - rules->votes * txi_affinity(growth, &k) -
+                               (k.b >= 0 && growth->met[a * l->end_count + k.b] ? rules->met : 0));
+            if (k.cost >= rules->unmatched * (k.b >= 0 ? 2 : 1)) continue;
+            if (kept < TXI_PER_END) {
+                links[count++] = k;
+                kept++;
+                continue;
+            }
+            int worst = start;
+            for (int i = start; i < count; i++) {
+                if (links[i].cost > links[worst].cost) worst = i;
+            }
+            if (k.cost < links[worst].cost) links[worst] = k;
+        }
+    }
+    return count;
+}
+
 /* ---- matching ---------------------------------------------------------------------------- */
 
 /* The state of the search for the matching of least cost. */
@@ -7240,6 +7278,36 @@ static double txi_pairing_try(txi_pairing *m, int k, double allowed) {
     return 0;
 }
 
+static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int count, int ends,
+                                 const txi_rules *rules, txm_arena *scratch, txm_env *env) {
+    const size_t n = (size_t)count, e = (size_t)ends;
+    memset(m, 0, sizeof *m);
+    m->links = links;
+    m->link_count = count;
+    m->end_count = ends;
+    m->unmatched = rules->unmatched;
+    m->crossing = rules->crossing;
+    m->crosses = (uint8_t *)txm_arena_zero(scratch, n, n);
+    m->chosen = (int *)txm_arena_alloc(scratch, e, sizeof(int));
+    m->active = (int *)txm_arena_alloc(scratch, n, sizeof(int));
+    m->slot = (int *)txm_arena_alloc(scratch, n, sizeof(int));
+    m->of_end = (int *)txm_arena_alloc(scratch, n, 2 * sizeof(int));
+    m->of_start = (int *)txm_arena_zero(scratch, e + 2, sizeof(int));
+    if (scratch->failed) return txi_no_memory(env);
+    for (int i = 0; i < ends; i++) m->chosen[i] = -1;
+    for (int k = 0; k < count; k++) {
+        m->slot[k] = -1;
+        m->of_start[links[k].a + 2]++;
+        if (links[k].b >= 0) m->of_start[links[k].b + 2]++;
+    }
+    for (int i = 0; i < ends; i++) m->of_start[i + 2] += m->of_start[i + 1];
+    for (int k = 0; k < count; k++) {
+        m->of_end[m->of_start[links[k].a + 1]++] = k;
+        if (links[k].b >= 0) m->of_end[m->of_start[links[k].b + 1]++] = k;
+    }
+    return TXM_OK;
+}
+
 /* Simulated annealing from no joins at all; then every link is tried until none improves. best: room
    for end_count numbers. */
 static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
@@ -7271,74 +7339,6 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
         better = 0;
         for (int k = 0; k < m->link_count; k++) better |= txi_pairing_try(m, k, -1e-7) < 0;
     }
-}
-
-/* ---- candidates -------------------------------------------------------------------------- */
-
-/* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
-   they are better than no join. Returns how many. */
-static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
-                          const txi_grown *growth, txi_link *links) {
-    int count = 0;
-    for (int a = 0; a < l->end_count; a++) {
-        int kept = 0;
-        const int start = count;
-        for (int b = a + 1; b <= l->end_count && count < TXI_MAX_LINKS; b++) {
-            txi_link k;
-            memset(&k, 0, sizeof k);
-            if (b < l->end_count) {
-                if (alpha > 0 && txi_distance(l->ends[a].place, l->ends[b].place) > alpha) continue;
-                if (!txi_link_ends(w, l, rules, a, b, &k)) continue;
-            } else if (!rules->look_ahead || !l->ends[a].is_long ||
-                       !txi_look_ahead(w, l, rules, a, &k)) {
-                continue;
-            }
-            k.cost = txm_float(k.cost - rules->votes * txi_affinity(growth, &k) -
-                               (k.b >= 0 && growth->met[a * l->end_count + k.b] ? rules->met : 0));
-            if (k.cost >= rules->unmatched * (k.b >= 0 ? 2 : 1)) continue;
-            if (kept < TXI_PER_END) {
-                links[count++] = k;
-                kept++;
-                continue;
-            }
-            int worst = start;
-            for (int i = start; i < count; i++) {
-                if (links[i].cost > links[worst].cost) worst = i;
-            }
-            if (k.cost < links[worst].cost) links[worst] = k;
-        }
-    }
-    return count;
-}
-
-static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int count, int ends,
-                                 const txi_rules *rules, txm_arena *scratch, txm_env *env) {
-    const size_t n = (size_t)count, e = (size_t)ends;
-    memset(m, 0, sizeof *m);
-    m->links = links;
-    m->link_count = count;
-    m->end_count = ends;
-    m->unmatched = rules->unmatched;
-    m->crossing = rules->crossing;
-    m->crosses = (uint8_t *)txm_arena_zero(scratch, n, n);
-    m->chosen = (int *)txm_arena_alloc(scratch, e, sizeof(int));
-    m->active = (int *)txm_arena_alloc(scratch, n, sizeof(int));
-    m->slot = (int *)txm_arena_alloc(scratch, n, sizeof(int));
-    m->of_end = (int *)txm_arena_alloc(scratch, n, 2 * sizeof(int));
-    m->of_start = (int *)txm_arena_zero(scratch, e + 2, sizeof(int));
-    if (scratch->failed) return txi_no_memory(env);
-    for (int i = 0; i < ends; i++) m->chosen[i] = -1;
-    for (int k = 0; k < count; k++) {
-        m->slot[k] = -1;
-        m->of_start[links[k].a + 2]++;
-        if (links[k].b >= 0) m->of_start[links[k].b + 2]++;
-    }
-    for (int i = 0; i < ends; i++) m->of_start[i + 2] += m->of_start[i + 1];
-    for (int k = 0; k < count; k++) {
-        m->of_end[m->of_start[links[k].a + 1]++] = k;
-        if (links[k].b >= 0) m->of_end[m->of_start[links[k].b + 1]++] = k;
-    }
-    return TXM_OK;
 }
 
 /* ---- the curves -------------------------------------------------------------------------- */

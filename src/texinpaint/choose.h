@@ -3,7 +3,7 @@
 
 #include "blend.h"
 #include "fill.h"
-#include "join.h"
+#include "judge.h"
 #include "lay.h"
 #include "prior.h"
 
