@@ -1804,13 +1804,57 @@ static void txi_read_pixel(const txi_domain *d, const txi_window *w, int map, si
     }
 }
 
+/* ---- resample: values as they are blended ------------------------------------------------------
+   Samples of colours are times their alpha, as a transparent texel has no colour. Normals are vectors
+   in the directions of the window (x right, y down, z out of the surface), so that they keep their
+   direction on the surface across charts of the atlas, and with pieces that are turned.          */
+
+/* A sample of the texture as it is blended. */
+static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
+    const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
+    const int channels = d->maps[map].channels;
+    if (kind && kind->is_normal) {
+        const double x = 2 * (double)v[0] - 1;
+        const double y = (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
+        v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
+        v[2] = txm_float(2 * (double)v[2] - 1);
+    } else if (!(kind && kind->is_label) && (channels == 2 || channels == 4)) {
+        for (int c = 0; c < channels - 1; c++) v[c] = v[c] * v[channels - 1];
+    }
+}
+
+/* The reverse; normals get unit length. */
+static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
+    const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
+    const int channels = d->maps[map].channels;
+    if (kind && kind->is_normal) {
+        double x = (double)v[0] * (double)axis.x + (double)v[1] * (double)axis.y;
+        double y = (double)v[1] * (double)axis.x - (double)v[0] * (double)axis.y;
+        const double length = sqrt(x * x + y * y + (double)v[2] * (double)v[2]);
+        const double scale = length > 0 ? 1 / length : 0;
+        y *= (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        v[0] = txm_float(0.5 * (x * scale + 1));
+        v[1] = txm_float(0.5 * (y * scale + 1));
+        v[2] = length > 0 ? txm_float(0.5 * ((double)v[2] * scale + 1)) : 1;
+    } else if (!(kind && kind->is_label) && (channels == 2 || channels == 4)) {
+        const float alpha = v[channels - 1];
+        for (int c = 0; c < channels - 1 && alpha > 1e-4f; c++) v[c] = v[c] / alpha;
+    }
+}
+
+/* ---- resample: from maps to windows, from windows to maps ---- */
+
 /* Every channel of a map at the window's pixels: values receives width * height * channels numbers,
    in the units of txm_image_get. Interpolated by the spline of Catmull and Rom from known texels of
    the pixel's own chart; labels are those of the nearest texel. 0 where there is no known texel. */
 static void txi_window_read(const txi_domain *d, const txi_window *w, int map, float *values) {
     const size_t count = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[map].channels;
-    for (size_t i = 0; i < count; i++) txi_read_pixel(d, w, map, i, values + i * channels);
+    for (size_t i = 0; i < count; i++) {
+        txi_read_pixel(d, w, map, i, values + i * channels);
+        if (w->state[i] != TXI_VOID) txi_pack(d, map, w->axis[i], w->mirrored[i], values + i * channels);
+    }
 }
 
 /* Is a pixel, that has a surface, known, missing or not to be copied from? A hole if its nearest
@@ -1942,6 +1986,7 @@ static void txi_window_write(txi_domain *d, const txi_window *w, int map, const 
             for (int c = 0; c < channels && pixel >= 0; c++)
                 value[c] = values[pixel * channels + c];
         }
+        txi_unpack(d, map, t->axis, t->mirrored, value);
         for (int c = 0; c < channels; c++) txm_image_set(image, x, y, c, value[c]);
     }
 }
@@ -12188,49 +12233,6 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
     return TXM_OK;
 }
 
-/* ---- maps in register -------------------------------------------------------------------------
-   Colours are blended times their alpha. Normals are blended as vectors, in the directions of the
-   window: across charts of the atlas, and with turned pieces, they keep their direction on the
-   surface.                                                                                       */
-
-/* Multiply colours by alpha (the last of 2 or 4 channels), or divide them by it. */
-static void txi_premultiply(float *values, size_t pixels, int channels, int divide) {
-    if (channels != 2 && channels != 4) return;
-    for (size_t i = 0; i < pixels; i++) {
-        float *v = values + i * (size_t)channels;
-        const float alpha = v[channels - 1];
-        for (int c = 0; c < channels - 1; c++) {
-            if (!divide) v[c] = v[c] * alpha;
-            else if (alpha > 1e-4f) v[c] = v[c] / alpha;
-        }
-    }
-}
-
-/* A normal of the texture (3 samples), turned into the window's directions: x right, y down. */
-static void txi_normal_in(float *v, txm_vec2 axis, int mirrored, int y_is_down) {
-    const double x = 2 * (double)v[0] - 1;
-    const double y = (2 * (double)v[1] - 1) * (y_is_down ? 1 : -1) * (mirrored ? -1 : 1);
-    v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
-    v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
-    v[2] = txm_float(2 * (double)v[2] - 1);
-}
-
-/* The reverse, at unit length. */
-static void txi_normal_out(float *v, txm_vec2 axis, int mirrored, int y_is_down) {
-    double x = (double)v[0] * (double)axis.x + (double)v[1] * (double)axis.y;
-    double y = (double)v[1] * (double)axis.x - (double)v[0] * (double)axis.y;
-    double z = (double)v[2];
-    const double length = sqrt(x * x + y * y + z * z);
-    if (length > 0) {
-        x /= length;
-        y /= length;
-        z /= length;
-    } else z = 1;
-    v[0] = txm_float(0.5 * (x + 1));
-    v[1] = txm_float(0.5 * (y * (y_is_down ? 1 : -1) * (mirrored ? -1 : 1) + 1));
-    v[2] = txm_float(0.5 * (z + 1));
-}
-
 /* ---- hypotheses -------------------------------------------------------------------------------
    Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
    stripes and ruin labyrinths. So a window is completed to half its resolution without lines, with
@@ -12492,21 +12494,13 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     return status;
 }
 
-/* Read, blend and write one map of the current window. */
-static txm_status txi_write_map(texinpaint_job *job, int map, const txi_copy *copies,
-                                const txi_pose *poses, float *values, txm_env *env) {
-    const txi_window *w = &job->window;
+/* Read and blend one map of the current window. */
+static txm_status txi_blend_window(texinpaint_job *job, int map, const txi_copy *copies,
+                                   const txi_pose *poses, float *values, txm_env *env) {
     const texinpaint_map *kind = map ? &job->desc.maps[map - 1] : NULL;
-    const int channels = job->domain.maps[map].channels, is_label = kind && kind->is_label;
-    const size_t pixels = (size_t)w->width * (size_t)w->height;
-    const int is_normal = kind && kind->is_normal;
-    txi_window_read(&job->domain, w, map, values);
-    if (!is_normal && !is_label) txi_premultiply(values, pixels, channels, 0);
-    const txm_status status =
-        txi_blend_map(w, copies, poses, values, channels, is_label, is_normal, env);
-    if (status != TXM_OK) return status;
-    if (!is_normal && !is_label) txi_premultiply(values, pixels, channels, 1);
-    return TXM_OK;
+    txi_window_read(&job->domain, &job->window, map, values);
+    return txi_blend_map(&job->window, copies, poses, values, job->domain.maps[map].channels,
+                         kind && kind->is_label, kind && kind->is_normal, env);
 }
 
 /* Complete the current window at full resolution and write it back: all maps or none. */
@@ -12529,7 +12523,7 @@ static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
         status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field, copies,
                                  &poses, &pose_count, env);
     for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
-        status = txi_write_map(job, i, copies, poses, values[i], env);
+        status = txi_blend_window(job, i, copies, poses, values[i], env);
     if (status == TXM_OK) {
         for (int i = 0; i < job->domain.map_count; i++)
             txi_window_write(&job->domain, w, i, values[i]);

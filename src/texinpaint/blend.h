@@ -292,47 +292,4 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
     return TXM_OK;
 }
 
-/* ---- maps in register -------------------------------------------------------------------------
-   Colours are blended times their alpha. Normals are blended as vectors, in the directions of the
-   window: across charts of the atlas, and with turned pieces, they keep their direction on the
-   surface.                                                                                       */
-
-/* Multiply colours by alpha (the last of 2 or 4 channels), or divide them by it. */
-static void txi_premultiply(float *values, size_t pixels, int channels, int divide) {
-    if (channels != 2 && channels != 4) return;
-    for (size_t i = 0; i < pixels; i++) {
-        float *v = values + i * (size_t)channels;
-        const float alpha = v[channels - 1];
-        for (int c = 0; c < channels - 1; c++) {
-            if (!divide) v[c] = v[c] * alpha;
-            else if (alpha > 1e-4f) v[c] = v[c] / alpha;
-        }
-    }
-}
-
-/* A normal of the texture (3 samples), turned into the window's directions: x right, y down. */
-static void txi_normal_in(float *v, txm_vec2 axis, int mirrored, int y_is_down) {
-    const double x = 2 * (double)v[0] - 1;
-    const double y = (2 * (double)v[1] - 1) * (y_is_down ? 1 : -1) * (mirrored ? -1 : 1);
-    v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
-    v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
-    v[2] = txm_float(2 * (double)v[2] - 1);
-}
-
-/* The reverse, at unit length. */
-static void txi_normal_out(float *v, txm_vec2 axis, int mirrored, int y_is_down) {
-    double x = (double)v[0] * (double)axis.x + (double)v[1] * (double)axis.y;
-    double y = (double)v[1] * (double)axis.x - (double)v[0] * (double)axis.y;
-    double z = (double)v[2];
-    const double length = sqrt(x * x + y * y + z * z);
-    if (length > 0) {
-        x /= length;
-        y /= length;
-        z /= length;
-    } else z = 1;
-    v[0] = txm_float(0.5 * (x + 1));
-    v[1] = txm_float(0.5 * (y * (y_is_down ? 1 : -1) * (mirrored ? -1 : 1) + 1));
-    v[2] = txm_float(0.5 * (z + 1));
-}
-
 #endif /* TEXINPAINT_BLEND_H */

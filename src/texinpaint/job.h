@@ -108,21 +108,13 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     return status;
 }
 
-/* Read, blend and write one map of the current window. */
-static txm_status txi_write_map(texinpaint_job *job, int map, const txi_copy *copies,
-                                const txi_pose *poses, float *values, txm_env *env) {
-    const txi_window *w = &job->window;
+/* Read and blend one map of the current window. */
+static txm_status txi_blend_window(texinpaint_job *job, int map, const txi_copy *copies,
+                                   const txi_pose *poses, float *values, txm_env *env) {
     const texinpaint_map *kind = map ? &job->desc.maps[map - 1] : NULL;
-    const int channels = job->domain.maps[map].channels, is_label = kind && kind->is_label;
-    const size_t pixels = (size_t)w->width * (size_t)w->height;
-    const int is_normal = kind && kind->is_normal;
-    txi_window_read(&job->domain, w, map, values);
-    if (!is_normal && !is_label) txi_premultiply(values, pixels, channels, 0);
-    const txm_status status =
-        txi_blend_map(w, copies, poses, values, channels, is_label, is_normal, env);
-    if (status != TXM_OK) return status;
-    if (!is_normal && !is_label) txi_premultiply(values, pixels, channels, 1);
-    return TXM_OK;
+    txi_window_read(&job->domain, &job->window, map, values);
+    return txi_blend_map(&job->window, copies, poses, values, job->domain.maps[map].channels,
+                         kind && kind->is_label, kind && kind->is_normal, env);
 }
 
 /* Complete the current window at full resolution and write it back: all maps or none. */
@@ -145,7 +137,7 @@ static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
         status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field, copies,
                                  &poses, &pose_count, env);
     for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
-        status = txi_write_map(job, i, copies, poses, values[i], env);
+        status = txi_blend_window(job, i, copies, poses, values[i], env);
     if (status == TXM_OK) {
         for (int i = 0; i < job->domain.map_count; i++)
             txi_window_write(&job->domain, w, i, values[i]);

@@ -127,13 +127,57 @@ static void txi_read_pixel(const txi_domain *d, const txi_window *w, int map, si
     }
 }
 
+/* ---- resample: values as they are blended ------------------------------------------------------
+   Samples of colours are times their alpha, as a transparent texel has no colour. Normals are vectors
+   in the directions of the window (x right, y down, z out of the surface), so that they keep their
+   direction on the surface across charts of the atlas, and with pieces that are turned.          */
+
+/* A sample of the texture as it is blended. */
+static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
+    const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
+    const int channels = d->maps[map].channels;
+    if (kind && kind->is_normal) {
+        const double x = 2 * (double)v[0] - 1;
+        const double y = (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
+        v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
+        v[2] = txm_float(2 * (double)v[2] - 1);
+    } else if (!(kind && kind->is_label) && (channels == 2 || channels == 4)) {
+        for (int c = 0; c < channels - 1; c++) v[c] = v[c] * v[channels - 1];
+    }
+}
+
+/* The reverse; normals get unit length. */
+static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
+    const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
+    const int channels = d->maps[map].channels;
+    if (kind && kind->is_normal) {
+        double x = (double)v[0] * (double)axis.x + (double)v[1] * (double)axis.y;
+        double y = (double)v[1] * (double)axis.x - (double)v[0] * (double)axis.y;
+        const double length = sqrt(x * x + y * y + (double)v[2] * (double)v[2]);
+        const double scale = length > 0 ? 1 / length : 0;
+        y *= (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        v[0] = txm_float(0.5 * (x * scale + 1));
+        v[1] = txm_float(0.5 * (y * scale + 1));
+        v[2] = length > 0 ? txm_float(0.5 * ((double)v[2] * scale + 1)) : 1;
+    } else if (!(kind && kind->is_label) && (channels == 2 || channels == 4)) {
+        const float alpha = v[channels - 1];
+        for (int c = 0; c < channels - 1 && alpha > 1e-4f; c++) v[c] = v[c] / alpha;
+    }
+}
+
+/* ---- resample: from maps to windows, from windows to maps ---- */
+
 /* Every channel of a map at the window's pixels: values receives width * height * channels numbers,
    in the units of txm_image_get. Interpolated by the spline of Catmull and Rom from known texels of
    the pixel's own chart; labels are those of the nearest texel. 0 where there is no known texel. */
 static void txi_window_read(const txi_domain *d, const txi_window *w, int map, float *values) {
     const size_t count = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[map].channels;
-    for (size_t i = 0; i < count; i++) txi_read_pixel(d, w, map, i, values + i * channels);
+    for (size_t i = 0; i < count; i++) {
+        txi_read_pixel(d, w, map, i, values + i * channels);
+        if (w->state[i] != TXI_VOID) txi_pack(d, map, w->axis[i], w->mirrored[i], values + i * channels);
+    }
 }
 
 /* Is a pixel, that has a surface, known, missing or not to be copied from? A hole if its nearest
@@ -265,6 +309,7 @@ static void txi_window_write(txi_domain *d, const txi_window *w, int map, const 
             for (int c = 0; c < channels && pixel >= 0; c++)
                 value[c] = values[pixel * channels + c];
         }
+        txi_unpack(d, map, t->axis, t->mirrored, value);
         for (int c = 0; c < channels; c++) txm_image_set(image, x, y, c, value[c]);
     }
 }
