@@ -213,7 +213,7 @@ typedef struct texinpaint_crest_desc {
                          equal places count as one                                              */
     float threshold;  /* weaker lines are left out, 0..1e6; the strength of a line is the integral of
                          its curvature along it, without unit: 1 for one as long as its radius of
-                         curvature. 0 = 1, or 0.02 of the strongest line if that is more        */
+                         curvature. 0 = 2, or 0.02 of the strongest line if that is more        */
     int kinds;        /* TEXINPAINT_RIDGE, TEXINPAINT_VALLEY, or their sum; 0 = both            */
     int rings;        /* rings of vertices around each that curvature is taken from, 1..8; more for
                          noisy meshes; 0 = 2                                                    */

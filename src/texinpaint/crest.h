@@ -21,12 +21,12 @@ enum {
                                2^-24 coordinate / edge^3; ours                                  */
     TXI_CREST_NONE = -1
 };
-#define TXI_CREST_STRENGTH 1.0  /* default threshold: a line as long as its radius of curvature; ours */
+#define TXI_CREST_STRENGTH 2.0  /* default threshold: a line twice as long as its radius of curvature; ours */
 #define TXI_CREST_SHARE 0.02    /* and this share of the strongest line; ours                   */
 
-#define TXI_CREST_SHARP 0.05    /* least k'' / k^3, the mean along a line; ours: on tori of thousands of
-                                   triangles it stays below 0.03, on true ridges above 0.1      */
-
+#define TXI_CREST_SHARP 0.3     /* least k'' / k^3, the mean along a line; ours: on spheres and tori of
+                                   thousands of triangles it stays below 0.2, on the ridges of animals
+                                   and figures above 0.55                                       */
 #define TXI_CREST_BESIDE 0.25   /* cosine between an edge and t below which it runs along a line; ours */
 
 /* What counts at a vertex for ridges or for valleys. */

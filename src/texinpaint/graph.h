@@ -376,21 +376,26 @@ static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_
     return TXM_OK;
 }
 
-/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per node. */
-static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t *island) {
-    size_t count = 0;
-    memset(island, 1, g->count);
-    for (size_t i = 0; i < g->count; i++) {
-        if (g->rim_first[i] == g->rim_first[i + 1]) continue;
-        island[i] = 0;
-        queue[count++] = (uint32_t)i;
-    }
+/* Set the marks of all nodes that links connect with the one given to 0. queue: room for 1 per node. */
+static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *queue, uint8_t *mark) {
+    size_t count = 1;
+    queue[0] = from;
+    mark[from] = 0;
     for (size_t k = 0; k < count; k++) {
         for (uint32_t l = g->first[queue[k]]; l < g->first[queue[k] + 1]; l++) {
-            if (!island[g->to[l]]) continue;
-            island[g->to[l]] = 0;
+            if (!mark[g->to[l]]) continue;
+            mark[g->to[l]] = 0;
             queue[count++] = g->to[l];
         }
+    }
+}
+
+/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per node. */
+static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t *island) {
+    memset(island, 1, g->count);
+    for (size_t i = 0; i < g->count; i++) {
+        if (island[i] && g->rim_first[i] < g->rim_first[i + 1])
+            txi_graph_spread(g, (uint32_t)i, queue, island);
     }
 }
 

@@ -324,8 +324,7 @@ static int txi_prior_offset(const txi_window *w, txi_prior_list *list, int k, in
     return 1;
 }
 
-/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges, which are maxima
-   over the distance. 0: no memory. */
+/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges. 0: no memory. */
 static int txi_prior_assist(const txi_window *w, txi_prior_list *list, int k, int side,
                             txm_arena *arena) {
     enum { FIRST = 2, SLOTS = TXI_PRIOR_WIDTH - FIRST };
@@ -334,17 +333,18 @@ static int txi_prior_assist(const txi_window *w, txi_prior_list *list, int k, in
     const int n = list->starts[k + 1] - list->starts[k];
     for (int i = 0; i < SLOTS; i++) edge[i] = txi_prior_edge(w, points, n, side * (FIRST + i));
     for (int found = 0; found < TXI_PRIOR_AIDS; found++) {
-        int best = -1;
-        for (int i = 0; i < SLOTS; i++) {
-            const double before = i > 0 ? edge[i - 1] : 0, after = i + 1 < SLOTS ? edge[i + 1] : 0;
-            if (edge[i] > 0 && edge[i] >= before && edge[i] > after && (best < 0 || edge[i] > edge[best]))
-                best = i;
+        int best = 0, first, last;
+        for (int i = 1; i < SLOTS; i++) {
+            if (edge[i] > edge[best]) best = i;
         }
-        if (best < 0) return 1;
-        if (!txi_prior_offset(w, list, k, side * (FIRST + best), arena)) return 0;
-        for (int i = best - 3; i <= best + 3; i++) { /* an edge is that wide */
-            if (i >= 0 && i < SLOTS) edge[i] = 0;
-        }
+        if (!(edge[best] > 0)) return 1;
+        /* an edge is some pixels wide: its middle */
+        for (first = best; first > 0 && edge[first - 1] > 0.9 * edge[best];) first--;
+        for (last = best; last + 1 < SLOTS && edge[last + 1] > 0.9 * edge[best];) last++;
+        if (!txi_prior_offset(w, list, k, side * (FIRST + (first + last) / 2), arena)) return 0;
+        for (; first > 0 && edge[first - 1] <= edge[first]; first--) edge[first] = 0;
+        for (; last + 1 < SLOTS && edge[last + 1] <= edge[last]; last++) edge[last] = 0;
+        for (int i = first; i <= last; i++) edge[i] = 0;
     }
     return 1;
 }
