@@ -255,15 +255,16 @@ static int txi_known_count(const txi_end *e) {
 }
 
 /* A chosen link as a curve with its known parts. dense, fine: room for room points */
-static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const txi_link *k,
-                                 txm_vec2 *dense, txm_vec2 *fine, int room, txm_arena *arena,
-                                 txm_env *env, txi_curve *c) {
+static txm_status txi_curve_make(const txi_pairs *pairs, const txi_link *k, txm_vec2 *dense,
+                                 txm_vec2 *fine, int room, txm_arena *arena, txm_env *env,
+                                 txi_curve *c) {
+    const txi_window *w = pairs->w;
+    const txi_lines *l = pairs->l;
     const txi_end *a = &l->ends[k->a], *b = k->b >= 0 ? &l->ends[k->b] : NULL;
     int n = 0, m;
     const int head = txi_known_count(a), tail = b ? txi_known_count(b) : 0;
     for (int s = head; s > 0; s--) dense[n++] = txi_known_point(l, a, s);
-    txi_hermite(a->place, a->heading, b ? b->place : k->leave, b ? b->heading : k->backwards, 4 * TXI_STEPS,
-              fine);
+    txi_link_curve(pairs, k, 4 * TXI_STEPS, fine);
     m = txi_resample(fine, 4 * TXI_STEPS + 1, dense + n, room - n - TXI_KNOWN_PART);
     n += m;
     for (int s = 1; s <= tail; s++) dense[n++] = txi_known_point(l, b, s);
@@ -286,6 +287,93 @@ static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const 
     return TXM_OK;
 }
 
+/* ---- junctions --------------------------------------------------------------------------- */
+
+/* Mean colour of a side of an end, 1 to 3 pixels from the line; side 0 left, 1 right. */
+static void txi_end_side(const txi_end *e, int side, double color[3]) {
+    const int mid = TXI_PROFILE / 2;
+    for (int c = 0; c < 3; c++) {
+        color[c] = 0;
+        for (int k = 2; k <= 6; k++) color[c] += e->profile[side ? mid + k : mid - k][c] / 5.0;
+    }
+}
+
+static double txi_end_color_distance(const double a[3], const double b[3]) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrt((x * x + y * y + z * z) / 3);
+}
+
+/* Continue an end that is not joined until it meets a curve: the end of a line at another, a
+   T-junction. The colour of one of its sides must be that of the curve on the side where it arrives. 0:
+   it meets none within most pixels. */
+static int txi_meet_curve(const txi_lines *l, const txi_end *e, const txi_curve *curves, int count,
+                          double most, txi_link *k) {
+    const double turn = fabs(e->curvature) * most < 1 ? e->curvature : 0;
+    double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y;
+    for (int i = 0; i < (int)most; i++) {
+        x += dx;
+        y += dy;
+        const txm_vec2 d = txi_unit(dx - turn * dy, dy + turn * dx);
+        dx = d.x;
+        dy = d.y;
+        for (int j = 0; j < count && i >= 2; j++) {
+            const txi_curve *c = &curves[j];
+            for (int n = c->first; n < c->last; n++) {
+                const txm_vec2 p = c->points[n], q = c->points[n + 1];
+                const double ox = x - p.x, oy = y - p.y;
+                if (ox * ox + oy * oy > 1.2) continue;
+                const txm_vec2 t = txi_unit((double)q.x - p.x, (double)q.y - p.y);
+                const double cross = dx * t.y - dy * t.x; /* positive: it comes from the right       */
+                if (fabs(cross) < 0.4) return 0;
+                double arrived[3], left[3], right[3];
+                txi_end_side(&l->ends[c->ends[0]], cross < 0, arrived);
+                txi_end_side(e, 0, left);
+                txi_end_side(e, 1, right);
+                if (txi_end_color_distance(arrived, left) > 40 && txi_end_color_distance(arrived, right) > 40)
+                    return 0;
+                k->leave = txm_v2(txm_float(x), txm_float(y));
+                k->backwards = txm_v2(txm_float(-dx), txm_float(-dy));
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* ---- all of it --------------------------------------------------------------------------- */
+
+/* The chosen candidates as curves, then the ends that meet one of them. */
+static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *match, txm_arena *scratch,
+                                  txm_arena *arena, txm_env *env, txi_curve *curves, int *count) {
+    const txi_window *w = pairs->w;
+    const txi_lines *l = pairs->l;
+    const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
+    txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)room, 2 * sizeof *dense);
+    if (scratch->failed) return txi_no_memory(env);
+    for (int k = 0; k < match->link_count; k++) {
+        txi_curve c;
+        if (match->slot[k] < 0) continue;
+        const txm_status status =
+            txi_curve_make(pairs, &match->links[k], dense, dense + room, room, arena, env, &c);
+        if (status != TXM_OK) return status;
+        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+    }
+    const int whole = *count;
+    for (int e = 0; e < l->end_count; e++) {
+        txi_link k;
+        txi_curve c;
+        memset(&k, 0, sizeof k);
+        k.a = e;
+        k.b = k.line = -1;
+        if (match->chosen[e] >= 0 || !l->ends[e].is_long) continue;
+        if (!txi_meet_curve(l, &l->ends[e], curves, whole, 0.75 * l->width, &k)) continue;
+        const txm_status status = txi_curve_make(pairs, &k, dense, dense + room, room, arena, env, &c);
+        if (status != TXM_OK) return status;
+        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+    }
+    return TXM_OK;
+}
+
 /* Join the lines that end at the hole.
 
    prior      lines that attract, or NULL
@@ -296,36 +384,24 @@ static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const 
 static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_prior *prior, int structure,
                            float alpha, int beta, uint64_t seed, txm_arena *arena, txm_env *env,
                            txi_curve **curves, int *count) {
-    const txi_rules rules = txi_rules_of(structure);
-    const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
     txm_arena scratch;
     txi_pairing match;
-    txi_grown growth;
-    txm_status status = TXM_OK;
-    (void)prior;
+    txi_pairs pairs;
+    int n = 0;
     *curves = NULL;
     *count = 0;
     if (structure == TEXINPAINT_TEXTURE || l->end_count == 0) return TXM_OK;
     txm_arena_init(&scratch, env);
+    txm_status status = txi_pairs_make(&pairs, w, l, prior, structure, alpha, beta, &scratch, env);
     txi_link *links = (txi_link *)txm_arena_alloc(&scratch, TXI_MAX_LINKS, sizeof *links);
     int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
-    txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)room, 2 * sizeof *dense);
-    if (scratch.failed) status = txi_no_memory(env);
-    if (status == TXM_OK) status = txi_grow(&growth, w, l, alpha, beta, &scratch, env);
-    if (status == TXM_OK) {
-        const int n = txi_candidates(w, l, &rules, alpha, &growth, links);
-        status = n ? txi_pairing_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
-        if (status == TXM_OK && n) {
-            txi_anneal(&match, seed, best);
-            *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)match.active_count, sizeof **curves);
-            if (arena->failed) status = txi_no_memory(env);
-            for (int k = 0; k < n && status == TXM_OK; k++) {
-                if (match.slot[k] < 0) continue;
-                txi_curve c;
-                status = txi_curve_make(w, l, &links[k], dense, dense + room, room, arena, env, &c);
-                if (status == TXM_OK && c.first >= 0) (*curves)[(*count)++] = c;
-            }
-        }
+    *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)l->end_count, sizeof **curves);
+    if (status == TXM_OK && (scratch.failed || arena->failed)) status = txi_no_memory(env);
+    if (status == TXM_OK) n = txi_candidates(&pairs, links);
+    if (n) status = txi_pairing_make(&match, links, n, l->end_count, &pairs.rules, &scratch, env);
+    if (n && status == TXM_OK) {
+        txi_anneal(&match, seed, best);
+        status = txi_join_curves(&pairs, &match, &scratch, arena, env, *curves, count);
     }
     txm_arena_free(&scratch);
     return status;
