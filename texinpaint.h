@@ -6971,6 +6971,8 @@ enum {
 /* A candidate: two ends and the curve between them, or one end and a place where it leaves the hole. */
 typedef struct txi_link {
     int a, b;          /* ends; b = -1: no end there                                             */
+    int line;          /* the prior line that it follows, or -1                                   */
+    float from, to;    /* where on that line, an index and fraction of its points                 */
     float cost, bend, length;
     txm_vec2 leave;    /* with b = -1: where it leaves the hole,                                  */
     txm_vec2 backwards; /* and the direction there, into the hole, unit                           */
@@ -6984,12 +6986,30 @@ typedef struct txi_rules {
     double crossing;  /* two curves that cross                                                   */
     double bend;      /* factor of the bending energy                                            */
     double votes;     /* less for votes that agree with the curve                                */
+    double prior;     /* less for lines that follow the same prior line                           */
     double met;       /* less for lines that met when they grew                                  */
     int look_ahead;   /* long ends may leave the hole without another end                        */
 } txi_rules;
 
+/* Where a prior line passes an end. */
+typedef struct txi_near {
+    float at;     /* index and fraction of the line's points; -1: it does not                     */
+    float offset; /* of the end, pixels to the right of the line                                  */
+} txi_near;
+
+/* What pairs are made from. */
+typedef struct txi_pairs {
+    const txi_window *w;
+    const txi_lines *l;
+    const txi_prior *prior; /* or NULL                                                            */
+    txi_near *passes;       /* one per end and prior line                                         */
+    txi_rules rules;
+    txi_grown growth;
+    float alpha;
+} txi_pairs;
+
 static txi_rules txi_rules_of(int structure) {
-    txi_rules picture = {3, 0.3, 1, 1, 0.25, 1}, pattern = {6, 2, 0.6, 1, 0.25, 0};
+    txi_rules picture = {3, 0.3, 1, 1, 1.5, 0.25, 1}, pattern = {6, 2, 0.6, 1, 1.5, 0.25, 0};
     return structure == TEXINPAINT_PATTERN ? pattern : picture;
 }
 
@@ -7039,6 +7059,101 @@ static double txi_outside(const txi_window *w, const txi_lines *l, const txm_vec
         out += at < 0 || (w->state[at] != TXI_HOLE && l->away[at] > 4);
     }
     return (double)out / count;
+}
+
+/* ---- prior lines ------------------------------------------------------------------------- */
+
+enum { TXI_PRIOR_CATCH = 12 }; /* pixels; ends as near as that to a prior line follow it; ours     */
+
+static int txi_prior_points(const txi_prior *prior, int line, const txm_vec2 **points) {
+    *points = prior->points + prior->starts[line];
+    return prior->starts[line + 1] - prior->starts[line];
+}
+
+/* The point of a line at an index and fraction, and its direction there. */
+static txm_vec2 txi_prior_at(const txm_vec2 *p, int count, double at, txm_vec2 *along) {
+    const int i = txm_clampi((int)at, 0, count - 2);
+    const int low = i > 2 ? i - 2 : 0, high = i + 3 < count ? i + 3 : count - 1;
+    *along = txi_unit((double)p[high].x - p[low].x, (double)p[high].y - p[low].y);
+    return txi_between(p[i], p[i + 1], at - i);
+}
+
+/* Where a line passes an end: within 12 pixels and 45 degrees. */
+static txi_near txi_prior_near(const txi_prior *prior, int line, const txi_end *e) {
+    const txm_vec2 *p;
+    const int count = txi_prior_points(prior, line, &p);
+    double best = TXI_PRIOR_CATCH * TXI_PRIOR_CATCH;
+    txi_near near_end = {-1, 0};
+    for (int i = 0; i + 1 < count; i++) {
+        const double ux = (double)p[i + 1].x - p[i].x, uy = (double)p[i + 1].y - p[i].y;
+        const double vx = (double)e->place.x - p[i].x, vy = (double)e->place.y - p[i].y;
+        const double uu = ux * ux + uy * uy;
+        double t = uu > 0 ? (ux * vx + uy * vy) / uu : 0;
+        t = t < 0 ? 0 : t > 1 ? 1 : t;
+        const double dx = vx - t * ux, dy = vy - t * uy, d = dx * dx + dy * dy;
+        if (d >= best) continue;
+        best = d;
+        near_end.at = txm_float(i + t);
+    }
+    if (near_end.at < 0) return near_end;
+    txm_vec2 along;
+    const txm_vec2 foot = txi_prior_at(p, count, near_end.at, &along);
+    const double x = (double)e->place.x - foot.x, y = (double)e->place.y - foot.y;
+    near_end.offset = txm_float(y * along.x - x * along.y);
+    if (fabs((double)along.x * e->heading.x + (double)along.y * e->heading.y) < 0.7) near_end.at = -1;
+    return near_end;
+}
+
+/* The curve of a candidate that follows a prior line from place p, direction d, to place q, direction
+   e (into the hole both): the line, moved by the distance of the ends from it, and the cubic near the
+   ends. */
+static void txi_prior_curve(const txi_prior *prior, const txi_link *k, txm_vec2 p, txm_vec2 d,
+                            txm_vec2 q, txm_vec2 e, int steps, txm_vec2 *out) {
+    const txm_vec2 *line;
+    const int count = txi_prior_points(prior, k->line, &line);
+    txm_vec2 along;
+    txi_hermite(p, d, q, e, steps, out);
+    const txm_vec2 a = txi_prior_at(line, count, k->from, &along);
+    const double oa = ((double)p.y - a.y) * along.x - ((double)p.x - a.x) * along.y;
+    const txm_vec2 b = txi_prior_at(line, count, k->to, &along);
+    const double ob = ((double)q.y - b.y) * along.x - ((double)q.x - b.x) * along.y;
+    const double chord = txi_distance(p, q), length = chord > 1 ? chord : 1;
+    for (int i = 1; i < steps; i++) {
+        const double t = (double)i / steps, offset = oa + (ob - oa) * t;
+        txm_vec2 at = txi_prior_at(line, count, k->from + ((double)k->to - k->from) * t, &along);
+        at = txm_v2(txm_float(at.x - offset * along.y), txm_float(at.y + offset * along.x));
+        double s = (t < 0.5 ? t : 1 - t) * length / TXI_PRIOR_CATCH; /* 1: the line alone          */
+        s = s > 1 ? 1 : s * s * (3 - 2 * s);
+        out[i] = txi_between(out[i], at, s);
+    }
+}
+
+/* The curve of a candidate, steps + 1 points. */
+static void txi_link_curve(const txi_pairs *pairs, const txi_link *k, int steps, txm_vec2 *out) {
+    const txi_end *a = &pairs->l->ends[k->a], *b = k->b >= 0 ? &pairs->l->ends[k->b] : NULL;
+    const txm_vec2 q = b ? b->place : k->leave, e = b ? b->heading : k->backwards;
+    if (k->line >= 0) txi_prior_curve(pairs->prior, k, a->place, a->heading, q, e, steps, out);
+    else txi_hermite(a->place, a->heading, q, e, steps, out);
+}
+
+/* The prior line that passes both ends nearest, into the candidate; 0: none. b = -1: any line near a. */
+static int txi_prior_choose(const txi_pairs *pairs, int a, int b, txi_link *k) {
+    const int lines = pairs->prior ? pairs->prior->line_count : 0;
+    double best = 1e9;
+    k->line = -1;
+    for (int i = 0; i < lines; i++) {
+        const txi_near *p = &pairs->passes[(size_t)a * (size_t)lines + (size_t)i];
+        const txi_near *q = b >= 0 ? &pairs->passes[(size_t)b * (size_t)lines + (size_t)i] : p;
+        if (p->at < 0 || q->at < 0) continue;
+        if (b >= 0 && fabs((double)p->at - q->at) < 2) continue;
+        const double d = fabs(p->offset) + fabs(q->offset) + 2 * fabs((double)p->offset - q->offset);
+        if (d >= best) continue;
+        best = d;
+        k->line = i;
+        k->from = p->at;
+        k->to = q->at;
+    }
+    return k->line >= 0;
 }
 
 /* ---- costs ------------------------------------------------------------------------------- */
@@ -7101,28 +7216,45 @@ static void txi_link_box(txi_link *k) {
     }
 }
 
+/* Length and bending energy of a candidate whose ends are set, and its box. 0: it runs outside of the
+   hole. */
+static int txi_link_measure(const txi_pairs *pairs, txi_link *k) {
+    double length, bend;
+    txi_link_curve(pairs, k, TXI_STEPS, k->points);
+    txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
+    k->length = txm_float(length);
+    k->bend = txm_float(bend);
+    txi_link_box(k);
+    return length >= 2 && txi_outside(pairs->w, pairs->l, k->points, TXI_STEPS + 1) <= 0.12;
+}
+
 /* The candidate of ends a and b; 0 if they cannot belong together. */
-static int txi_link_ends(const txi_window *w, const txi_lines *l, const txi_rules *rules, int a, int b,
-                         txi_link *k) {
+static int txi_link_ends(const txi_pairs *pairs, int a, int b, txi_link *k) {
+    const txi_lines *l = pairs->l;
     const txi_end *p = &l->ends[a], *q = &l->ends[b];
-    double correlation, mismatch, sides[2], length, bend;
+    double correlation, mismatch, sides[2], shape;
     txi_compare(p, q, &correlation, &mismatch, sides);
     if (correlation < 0.3 && sides[0] > 30 && sides[1] > 30) return 0;
     if (correlation < -0.2) return 0;
-    txi_hermite(p->place, p->heading, q->place, q->heading, TXI_STEPS, k->points);
-    txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
-    if (length < 2 || txi_outside(w, l, k->points, TXI_STEPS + 1) > 0.12) return 0;
     k->a = a;
     k->b = b;
-    k->length = txm_float(length);
-    k->bend = txm_float(bend);
-    const double turn = txi_turn(k);
-    const double curvature = (fabs(p->curvature - turn) + fabs(-q->curvature - turn)) * 0.5 * length;
+    if (txi_prior_choose(pairs, a, b, k) && !txi_link_measure(pairs, k)) k->line = -1;
+    if (k->line < 0 && !txi_link_measure(pairs, k)) return 0;
+    if (k->line < 0) {
+        const double turn = txi_turn(k);
+        const double misfit =
+            (fabs(p->curvature - turn) + fabs(-q->curvature - turn)) * 0.5 * k->length;
+        shape = pairs->rules.bend * k->bend + 0.3 * (misfit < 3 ? misfit : 3);
+    } else { /* it bends as the prior line does                                                    */
+        const int lines = pairs->prior->line_count;
+        const txi_near *u = &pairs->passes[(size_t)a * (size_t)lines + (size_t)k->line];
+        const txi_near *v = &pairs->passes[(size_t)b * (size_t)lines + (size_t)k->line];
+        shape = 0.1 * fabs((double)u->offset - v->offset) - pairs->rules.prior;
+    }
     const double u = (double)p->contrast + 2, v = (double)q->contrast + 2;
-    k->cost = txm_float(rules->bend * bend + 3 * (1 - correlation) + 1.5 * (mismatch < 2 ? mismatch : 2) +
-                        0.6 * fabs(u - v) / (u + v) + 0.6 * length / (l->width > 8 ? l->width : 8) +
-                        0.3 * (curvature < 3 ? curvature : 3) + 0.3 * !p->is_long + 0.3 * !q->is_long);
-    txi_link_box(k);
+    k->cost = txm_float(shape + 3 * (1 - correlation) + 1.5 * (mismatch < 2 ? mismatch : 2) +
+                        0.6 * fabs(u - v) / (u + v) + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
+                        0.3 * !p->is_long + 0.3 * !q->is_long);
     return 1;
 }
 
@@ -7143,8 +7275,9 @@ static double txi_affinity(const txi_grown *g, const txi_link *k) {
    line there that could be its continuation although it does not end at the hole, as other lines
    cross it there: at least 10 of 45 pixels on which a point lies within 6 pixels, in its direction and
    with the same polarity. 0: there is none. */
-static int txi_look_ahead(const txi_window *w, const txi_lines *l, const txi_rules *rules, int a,
-                          txi_link *k) {
+static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
+    const txi_window *w = pairs->w;
+    const txi_lines *l = pairs->l;
     const txi_end *e = &l->ends[a];
     const double turn = fabs(e->curvature) * l->width < 1.5 ? e->curvature : 0;
     double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y, change[3];
@@ -7194,51 +7327,108 @@ static int txi_look_ahead(const txi_window *w, const txi_lines *l, const txi_rul
     k->b = -1;
     k->leave = txm_v2(txm_float(exit.x - offset * direction.y), txm_float(exit.y + offset * direction.x));
     k->backwards = txm_v2(-direction.x, -direction.y);
-    double length, bend;
-    txi_hermite(e->place, e->heading, k->leave, k->backwards, TXI_STEPS, k->points);
-    txi_bend(k->points, TXI_STEPS + 1, &length, &bend);
-    k->length = txm_float(length);
-    k->bend = txm_float(bend);
-    k->cost = txm_float(rules->bend * bend + 0.6 * length / (l->width > 8 ? l->width : 8) +
+    k->line = -1;
+    if (!txi_link_measure(pairs, k)) return 0;
+    k->cost = txm_float(pairs->rules.bend * k->bend + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
                         0.9 - 0.02 * hits + 0.05 * fabs(offset));
-    txi_link_box(k);
+    return 1;
+}
+
+/* Let end a follow a prior line to where it leaves the hole, without an end there. 0: there is none. */
+static int txi_follow_prior(const txi_pairs *pairs, int a, txi_link *k) {
+    const txi_window *w = pairs->w;
+    const txi_end *e = &pairs->l->ends[a];
+    const txm_vec2 *line;
+    txm_vec2 along;
+    int inside = 0;
+    if (!txi_prior_choose(pairs, a, -1, k)) return 0;
+    const int count = txi_prior_points(pairs->prior, k->line, &line);
+    const double offset =
+        pairs->passes[(size_t)a * (size_t)pairs->prior->line_count + (size_t)k->line].offset;
+    txi_prior_at(line, count, k->from, &along);
+    const int step = (double)along.x * e->heading.x + (double)along.y * e->heading.y > 0 ? 1 : -1;
+    for (int i = (int)k->from + step; i >= 0 && i < count; i += step) {
+        const txm_vec2 p = txi_prior_at(line, count, i, &along);
+        const double x = p.x - offset * along.y, y = p.y + offset * along.x;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
+        if (at < 0 || w->state[at] != TXI_HOLE) {
+            if (inside || at < 0 || abs(i - (int)k->from) > 8) break;
+            continue;
+        }
+        inside++;
+        k->to = (float)i;
+        k->leave = txm_v2(txm_float(x), txm_float(y));
+        k->backwards = txm_v2(-(float)step * along.x, -(float)step * along.y);
+    }
+    k->a = a;
+    k->b = -1;
+    if (inside < 6 || !txi_link_measure(pairs, k)) return 0;
+    k->cost = txm_float(0.9 + 0.6 * k->length / (pairs->l->width > 8 ? pairs->l->width : 8) -
+                        0.5 * pairs->rules.prior);
     return 1;
 }
 
 /* ---- candidates -------------------------------------------------------------------------- */
 
-/* Candidates of all ends into links (room for TXI_MAX_LINKS): of each end the best TXI_PER_END, if
-   they are better than no join. Returns how many. */
-static int txi_candidates(const txi_window *w, const txi_lines *l, const txi_rules *rules, float alpha,
-                          const txi_grown *growth, txi_link *links) {
+/* Let lines grow, and find out which prior lines pass which ends. */
+static txm_status txi_pairs_make(txi_pairs *pairs, const txi_window *w, const txi_lines *l,
+                                 const txi_prior *prior, int structure, float alpha, int beta,
+                                 txm_arena *scratch, txm_env *env) {
+    const int lines = prior ? prior->line_count : 0;
+    memset(pairs, 0, sizeof *pairs);
+    pairs->w = w;
+    pairs->l = l;
+    pairs->prior = lines > 0 ? prior : NULL;
+    pairs->rules = txi_rules_of(structure);
+    pairs->alpha = alpha;
+    if (lines > 0) {
+        pairs->passes = (txi_near *)txm_arena_alloc(scratch, (size_t)l->end_count * (size_t)lines,
+                                                    sizeof *pairs->passes);
+        if (!pairs->passes) return txi_no_memory(env);
+        for (int i = 0; i < l->end_count * lines; i++)
+            pairs->passes[i] = txi_prior_near(prior, i % lines, &l->ends[i / lines]);
+    }
+    return txi_grow(&pairs->growth, w, l, alpha, beta, scratch, env);
+}
+
+/* Another candidate of an end, which has those from start on: the best TXI_PER_END are kept. */
+static void txi_keep_link(const txi_pairs *pairs, const txi_link *k, txi_link *links, int start,
+                          int *count) {
+    if (k->cost >= pairs->rules.unmatched * (k->b >= 0 ? 2 : 1)) return;
+    if (*count - start < TXI_PER_END) {
+        if (*count < TXI_MAX_LINKS) links[(*count)++] = *k;
+        return;
+    }
+    int worst = start;
+    for (int i = start; i < *count; i++) {
+        if (links[i].cost > links[worst].cost) worst = i;
+    }
+    if (k->cost < links[worst].cost) links[worst] = *k;
+}
+
+/* Candidates of all ends into links (room for TXI_MAX_LINKS), if they are better than no join. Returns
+   how many. */
+static int txi_candidates(const txi_pairs *pairs, txi_link *links) {
+    const txi_lines *l = pairs->l;
     int count = 0;
     for (int a = 0; a < l->end_count; a++) {
-        int kept = 0;
         const int start = count;
-        for (int b = a + 1; b <= l->end_count && count < TXI_MAX_LINKS; b++) {
-            txi_link k;
-            memset(&k, 0, sizeof k);
-            if (b < l->end_count) {
-                if (alpha > 0 && txi_distance(l->ends[a].place, l->ends[b].place) > alpha) continue;
-                if (!txi_link_ends(w, l, rules, a, b, &k)) continue;
-            } else if (!rules->look_ahead || !l->ends[a].is_long ||
-                       !txi_look_ahead(w, l, rules, a, &k)) {
-                continue;
-            }
-            k.cost = txm_float(k.cost - rules->votes * txi_affinity(growth, &k) -
-                               (k.b >= 0 && growth->met[a * l->end_count + k.b] ? rules->met : 0));
-            if (k.cost >= rules->unmatched * (k.b >= 0 ? 2 : 1)) continue;
-            if (kept < TXI_PER_END) {
-                links[count++] = k;
-                kept++;
-                continue;
-            }
-            int worst = start;
-            for (int i = start; i < count; i++) {
-                if (links[i].cost > links[worst].cost) worst = i;
-            }
-            if (k.cost < links[worst].cost) links[worst] = k;
+        txi_link k;
+        memset(&k, 0, sizeof k);
+        for (int b = a + 1; b < l->end_count; b++) {
+            const double d = txi_distance(l->ends[a].place, l->ends[b].place);
+            if ((pairs->alpha > 0 && d > pairs->alpha) || !txi_link_ends(pairs, a, b, &k)) continue;
+            const int met = pairs->growth.met[(size_t)a * (size_t)l->end_count + (size_t)b];
+            k.cost = txm_float(k.cost - pairs->rules.votes * txi_affinity(&pairs->growth, &k) -
+                               (met ? pairs->rules.met : 0));
+            txi_keep_link(pairs, &k, links, start, &count);
         }
+        if (pairs->rules.look_ahead && l->ends[a].is_long && txi_look_ahead(pairs, a, &k)) {
+            k.cost = txm_float(k.cost - pairs->rules.votes * txi_affinity(&pairs->growth, &k));
+            txi_keep_link(pairs, &k, links, start, &count);
+        }
+        if (pairs->prior && txi_follow_prior(pairs, a, &k))
+            txi_keep_link(pairs, &k, links, start, &count);
     }
     return count;
 }
@@ -7495,15 +7685,16 @@ static int txi_known_count(const txi_end *e) {
 }
 
 /* A chosen link as a curve with its known parts. dense, fine: room for room points */
-static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const txi_link *k,
-                                 txm_vec2 *dense, txm_vec2 *fine, int room, txm_arena *arena,
-                                 txm_env *env, txi_curve *c) {
+static txm_status txi_curve_make(const txi_pairs *pairs, const txi_link *k, txm_vec2 *dense,
+                                 txm_vec2 *fine, int room, txm_arena *arena, txm_env *env,
+                                 txi_curve *c) {
+    const txi_window *w = pairs->w;
+    const txi_lines *l = pairs->l;
     const txi_end *a = &l->ends[k->a], *b = k->b >= 0 ? &l->ends[k->b] : NULL;
     int n = 0, m;
     const int head = txi_known_count(a), tail = b ? txi_known_count(b) : 0;
     for (int s = head; s > 0; s--) dense[n++] = txi_known_point(l, a, s);
-    txi_hermite(a->place, a->heading, b ? b->place : k->leave, b ? b->heading : k->backwards, 4 * TXI_STEPS,
-              fine);
+    txi_link_curve(pairs, k, 4 * TXI_STEPS, fine);
     m = txi_resample(fine, 4 * TXI_STEPS + 1, dense + n, room - n - TXI_KNOWN_PART);
     n += m;
     for (int s = 1; s <= tail; s++) dense[n++] = txi_known_point(l, b, s);
@@ -7526,6 +7717,93 @@ static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const 
     return TXM_OK;
 }
 
+/* ---- junctions --------------------------------------------------------------------------- */
+
+/* Mean colour of a side of an end, 1 to 3 pixels from the line; side 0 left, 1 right. */
+static void txi_end_side(const txi_end *e, int side, double color[3]) {
+    const int mid = TXI_PROFILE / 2;
+    for (int c = 0; c < 3; c++) {
+        color[c] = 0;
+        for (int k = 2; k <= 6; k++) color[c] += e->profile[side ? mid + k : mid - k][c] / 5.0;
+    }
+}
+
+static double txi_end_color_distance(const double a[3], const double b[3]) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrt((x * x + y * y + z * z) / 3);
+}
+
+/* Continue an end that is not joined until it meets a curve: the end of a line at another, a
+   T-junction. The colour of one of its sides must be that of the curve on the side where it arrives. 0:
+   it meets none within most pixels. */
+static int txi_meet_curve(const txi_lines *l, const txi_end *e, const txi_curve *curves, int count,
+                          double most, txi_link *k) {
+    const double turn = fabs(e->curvature) * most < 1 ? e->curvature : 0;
+    double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y;
+    for (int i = 0; i < (int)most; i++) {
+        x += dx;
+        y += dy;
+        const txm_vec2 d = txi_unit(dx - turn * dy, dy + turn * dx);
+        dx = d.x;
+        dy = d.y;
+        for (int j = 0; j < count && i >= 2; j++) {
+            const txi_curve *c = &curves[j];
+            for (int n = c->first; n < c->last; n++) {
+                const txm_vec2 p = c->points[n], q = c->points[n + 1];
+                const double ox = x - p.x, oy = y - p.y;
+                if (ox * ox + oy * oy > 1.2) continue;
+                const txm_vec2 t = txi_unit((double)q.x - p.x, (double)q.y - p.y);
+                const double cross = dx * t.y - dy * t.x; /* positive: it comes from the right       */
+                if (fabs(cross) < 0.4) return 0;
+                double arrived[3], left[3], right[3];
+                txi_end_side(&l->ends[c->ends[0]], cross < 0, arrived);
+                txi_end_side(e, 0, left);
+                txi_end_side(e, 1, right);
+                if (txi_end_color_distance(arrived, left) > 40 && txi_end_color_distance(arrived, right) > 40)
+                    return 0;
+                k->leave = txm_v2(txm_float(x), txm_float(y));
+                k->backwards = txm_v2(txm_float(-dx), txm_float(-dy));
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* ---- all of it --------------------------------------------------------------------------- */
+
+/* The chosen candidates as curves, then the ends that meet one of them. */
+static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *match, txm_arena *scratch,
+                                  txm_arena *arena, txm_env *env, txi_curve *curves, int *count) {
+    const txi_window *w = pairs->w;
+    const txi_lines *l = pairs->l;
+    const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
+    txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(scratch, (size_t)room, 2 * sizeof *dense);
+    if (scratch->failed) return txi_no_memory(env);
+    for (int k = 0; k < match->link_count; k++) {
+        txi_curve c;
+        if (match->slot[k] < 0) continue;
+        const txm_status status =
+            txi_curve_make(pairs, &match->links[k], dense, dense + room, room, arena, env, &c);
+        if (status != TXM_OK) return status;
+        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+    }
+    const int whole = *count;
+    for (int e = 0; e < l->end_count; e++) {
+        txi_link k;
+        txi_curve c;
+        memset(&k, 0, sizeof k);
+        k.a = e;
+        k.b = k.line = -1;
+        if (match->chosen[e] >= 0 || !l->ends[e].is_long) continue;
+        if (!txi_meet_curve(l, &l->ends[e], curves, whole, 0.75 * l->width, &k)) continue;
+        const txm_status status = txi_curve_make(pairs, &k, dense, dense + room, room, arena, env, &c);
+        if (status != TXM_OK) return status;
+        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+    }
+    return TXM_OK;
+}
+
 /* Join the lines that end at the hole.
 
    prior      lines that attract, or NULL
@@ -7536,36 +7814,24 @@ static txm_status txi_curve_make(const txi_window *w, const txi_lines *l, const 
 static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_prior *prior, int structure,
                            float alpha, int beta, uint64_t seed, txm_arena *arena, txm_env *env,
                            txi_curve **curves, int *count) {
-    const txi_rules rules = txi_rules_of(structure);
-    const int room = 8 * (w->width + w->height) + 2 * TXI_KNOWN_PART + 8;
     txm_arena scratch;
     txi_pairing match;
-    txi_grown growth;
-    txm_status status = TXM_OK;
-    (void)prior;
+    txi_pairs pairs;
+    int n = 0;
     *curves = NULL;
     *count = 0;
     if (structure == TEXINPAINT_TEXTURE || l->end_count == 0) return TXM_OK;
     txm_arena_init(&scratch, env);
+    txm_status status = txi_pairs_make(&pairs, w, l, prior, structure, alpha, beta, &scratch, env);
     txi_link *links = (txi_link *)txm_arena_alloc(&scratch, TXI_MAX_LINKS, sizeof *links);
     int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
-    txm_vec2 *dense = (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)room, 2 * sizeof *dense);
-    if (scratch.failed) status = txi_no_memory(env);
-    if (status == TXM_OK) status = txi_grow(&growth, w, l, alpha, beta, &scratch, env);
-    if (status == TXM_OK) {
-        const int n = txi_candidates(w, l, &rules, alpha, &growth, links);
-        status = n ? txi_pairing_make(&match, links, n, l->end_count, &rules, &scratch, env) : TXM_OK;
-        if (status == TXM_OK && n) {
-            txi_anneal(&match, seed, best);
-            *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)match.active_count, sizeof **curves);
-            if (arena->failed) status = txi_no_memory(env);
-            for (int k = 0; k < n && status == TXM_OK; k++) {
-                if (match.slot[k] < 0) continue;
-                txi_curve c;
-                status = txi_curve_make(w, l, &links[k], dense, dense + room, room, arena, env, &c);
-                if (status == TXM_OK && c.first >= 0) (*curves)[(*count)++] = c;
-            }
-        }
+    *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)l->end_count, sizeof **curves);
+    if (status == TXM_OK && (scratch.failed || arena->failed)) status = txi_no_memory(env);
+    if (status == TXM_OK) n = txi_candidates(&pairs, links);
+    if (n) status = txi_pairing_make(&match, links, n, l->end_count, &pairs.rules, &scratch, env);
+    if (n && status == TXM_OK) {
+        txi_anneal(&match, seed, best);
+        status = txi_join_curves(&pairs, &match, &scratch, arena, env, *curves, count);
     }
     txm_arena_free(&scratch);
     return status;
