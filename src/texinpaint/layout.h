@@ -41,6 +41,7 @@ typedef struct txi_sheet {
     txm_vec2 *at;          /* by vertex of the disk: where it lies in the window                  */
     txm_vec3 *normal;      /* by vertex of the disk                                               */
     int width, height;     /* of the window                                                       */
+    int slit;              /* the disk may be slit within the hole                                */
     int reach;             /* pixels around the centre that are laid out; 0: the whole hole       */
 } txi_sheet;
 
@@ -308,6 +309,8 @@ static txm_status txi_sheet_disk(txi_sheet *l) {
     g.stop_least = l->reach ? l->reach * pixel : outside + band;
     g.stop = l->reach ? l->reach * pixel : outside + 3 * band;
     g.wanted = l->reach ? 1e300 : wanted > 8000 ? wanted : 8000;
+    l->disk.depth = l->slit ? l->from_centre : l->from_hole;
+    l->disk.slit_from = (l->slit ? TXI_GAP : TXI_SEAM) * pixel;
     return txi_disk_grow(&l->disk, s, l->centre, &g, l->env);
 }
 
@@ -776,6 +779,10 @@ static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scra
         txm_arena_free(&inner);
         l.scratch = outer;
         if (!again) break;
+        if (!l.slit) {
+            l.slit = 1;
+            continue;
+        }
         l.reach = l.reach ? l.reach / 2 : (int)(0.75 * sqrt((double)l.texels));
         l.reach = txm_clampi(l.reach, TXI_REACH_LEAST, TXI_REACH_MOST);
     }

@@ -5,6 +5,9 @@
 
 /* ---- unfold: a disk of faces ----------------------------------------------------------------- */
 
+/* ours, radians: a disk that has more curvature than this is slit, from there to its border */
+#define TXI_BEND 0.8
+
 /* Faces that form a topological disk, glued along their sides. A vertex of the surface that the disk
    meets from several parts of its border has a copy in each. */
 typedef struct txi_disk {
@@ -19,6 +22,9 @@ typedef struct txi_disk {
     size_t loop;            /* sides of the border                                               */
     uint32_t border;        /* one of them                                                       */
     uint32_t *slot;         /* 1 per face of the surface: its place in faces, or TXI_NO_FACE     */
+    double bend;            /* curvature within the disk, in radians, since it was last slit      */
+    const double *depth;    /* 1 per vertex of the surface: it may be slit where this is above    */
+    double slit_from;       /* slit_from; NULL: nowhere                                          */
 } txi_disk;
 
 /* Room for so many faces. */
@@ -72,12 +78,46 @@ static void txi_disk_begin(txi_disk *disk, uint32_t face) {
     }
 }
 
+/* The angle of the vector (x, y), y at least 0: 0 to pi. With tan(a / 2) = y / (r + x), halved twice more,
+   then Taylor; only operations that give the same bits everywhere. */
+static double txi_angle(double x, double y) {
+    const double r = sqrt(x * x + y * y);
+    if (!(r > 0) || (x < 0 && y <= -x * 1e-9)) return r > 0 ? TXM_PI : 0;
+    double t = y / (r + x), turns = 2;
+    for (; turns < 16 || t > 0.2; turns *= 2) t /= 1 + sqrt(1 + t * t);
+    const double tt = t * t;
+    return turns * t * (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt / 9))));
+}
+
+/* The curvature at a vertex of the surface: what the angles of its faces lack to a full turn. */
+static double txi_angle_lack(const txi_surface *s, uint32_t vertex) {
+    double sum = 2 * TXM_PI;
+    for (uint32_t i = s->first[vertex]; i < s->first[vertex + 1]; i++) {
+        const uint32_t c = s->corners[i], p = txi_next_corner(c), q = txi_next_corner(p);
+        const txm_dvec3 a = txm_d3_sub(txi_corner_point(s, p), txi_corner_point(s, c));
+        const txm_dvec3 b = txm_d3_sub(txi_corner_point(s, q), txi_corner_point(s, c));
+        if (txi_is_flat_face(s, c / 3)) continue;
+        sum -= txi_angle(txm_d3_dot(a, b), txm_d3_len(txm_d3_cross(a, b)));
+    }
+    return sum;
+}
+
+/* A vertex is about to come to lie within the disk. Should the disk stay slit there, as it has become
+   too curved to lie flat? */
+static int txi_disk_slits(txi_disk *disk, const txi_surface *s, uint32_t vertex) {
+    disk->bend += txi_angle_lack(s, vertex);
+    if (!disk->depth || disk->depth[vertex] <= disk->slit_from || fabs(disk->bend) < TXI_BEND) return 0;
+    disk->bend = 0;
+    return 1;
+}
+
 /* Glue the border's side with the next one as long as they are the two sides of one edge, then the
    sides before and behind them, and so on. At least three sides stay. */
 static void txi_disk_zip(txi_disk *disk, const txi_surface *s, uint32_t side) {
     while (disk->loop >= 5) {
         const uint32_t other = disk->next[side], before = disk->prev[side], behind = disk->next[other];
         if (txi_disk_side(disk, s->opposite[txi_surface_side(disk, side)]) != other) return;
+        if (txi_disk_slits(disk, s, s->vertex[txi_surface_side(disk, other)])) return;
         txi_join_sets(disk->parent, disk->corner[side], disk->corner[txi_next_corner(other)]);
         disk->is_border[side] = disk->is_border[other] = 0;
         txi_disk_link(disk, before, behind);
