@@ -591,6 +591,7 @@ static void txi_show(const txi_domain *domain, const char *name, uint8_t *pixels
 
 enum {
     TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel     */
+    TXI_TILE = 8,     /* ours: texels of a side                                                   */
     TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
 };
 
@@ -609,6 +610,9 @@ struct txi_surface {
     uint32_t *owner;     /* 1 per texel: the first face that covers its centre, or TXI_NO_FACE  */
     uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] - 1] */
     uint32_t *hole_first, *hole; /* the texels of face f that were missing, in the same form     */
+    uint32_t *tile;      /* 1 per TXI_TILE x TXI_TILE texels: the chart, if they all have the same, or
+                            TXI_NO_FACE                                                        */
+    size_t tile_stride;  /* tiles in a row                                                     */
     size_t cursor;       /* no texel before this one is missing and covered                    */
 };
 
@@ -858,6 +862,20 @@ static void txi_cover(txi_domain *d, txi_surface *s) {
     for (size_t i = 0; i < texels; i++) d->covered[i] = s->owner[i] != TXI_NO_FACE;
 }
 
+/* Which tiles lie in one chart. */
+static void txi_fill_tiles(const txi_domain *d, txi_surface *s) {
+    const size_t w = (size_t)d->width, h = (size_t)d->height;
+    for (size_t y = 0; y < h; y++) {
+        for (size_t x = 0; x < w; x++) {
+            uint32_t *tile = &s->tile[y / TXI_TILE * s->tile_stride + x / TXI_TILE];
+            const uint32_t owner = s->owner[y * w + x];
+            const uint32_t chart = owner == TXI_NO_FACE ? TXI_NO_FACE : s->chart[owner];
+            if (x % TXI_TILE == 0 && y % TXI_TILE == 0) *tile = chart;
+            else if (*tile != chart) *tile = TXI_NO_FACE;
+        }
+    }
+}
+
 /* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at first[k] ..
    first[k + 1] - 1. Only those with a mark, if there are marks. first: room for count + 1. */
 static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks, size_t count,
@@ -898,6 +916,9 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
     s->uv = (txm_vec2 *)txm_arena_alloc(arena, faces, 3 * sizeof(txm_vec2));
     s->chart = (uint32_t *)txm_arena_alloc(arena, faces, sizeof(uint32_t));
     s->owner = (uint32_t *)txm_arena_alloc(arena, texels, sizeof(uint32_t));
+    s->tile_stride = (size_t)(d->width - 1) / TXI_TILE + 1;
+    s->tile = (uint32_t *)txm_arena_alloc(arena, s->tile_stride * ((size_t)(d->height - 1) / TXI_TILE + 1),
+                                          sizeof(uint32_t));
     s->hole_first = (uint32_t *)txm_arena_alloc(arena, faces + 1, sizeof(uint32_t));
     s->first = (uint32_t *)txm_arena_alloc(arena, mesh->vertex_count + 1, sizeof(uint32_t));
     if (arena->failed) return txi_no_memory(env);
@@ -909,6 +930,7 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
     status = txi_link_sides(mesh, s, env);
     if (status != TXM_OK) return status;
     txi_cover(d, s);
+    txi_fill_tiles(d, s);
     txi_bin(s->vertex, 3 * faces, NULL, s->vertex_count, s->first, s->corners);
     for (size_t i = 0; i < texels; i++) holes += d->missing[i] && d->covered[i];
     s->hole = (uint32_t *)txm_arena_alloc(arena, holes + 1, sizeof(uint32_t));
@@ -1724,7 +1746,8 @@ static txm_status txi_flatten(txi_flat *flat, const double *face_weight, double 
 
 enum {
     TXI_NEAR = 3, /* texels; ours: how far a pixel between charts looks for a texel of its own   */
-    TXI_TAPS = 4  /* of the Catmull-Rom spline, per axis                                        */
+    TXI_TAPS = 6, /* of the kernel, per axis                                                    */
+    TXI_KERNEL_STEPS = 128 /* ours: places between two samples in the kernel's table            */
 };
 
 /* A window of this size from the arena: everything void. */
@@ -1747,14 +1770,51 @@ static txm_status txi_window_alloc(txi_window *w, int width, int height, txm_are
     return TXM_OK;
 }
 
-/* The weights of the spline of Catmull and Rom at t, 0..1, for samples at -1, 0, 1, 2. */
-static void txi_spline(double t, double weight[TXI_TAPS]) {
-    weight[0] = t * (-0.5 + t * (1 - 0.5 * t));
-    weight[1] = 1 + t * t * (-2.5 + 1.5 * t);
-    weight[2] = t * (0.5 + t * (2 - 1.5 * t));
-    weight[3] = t * t * (-0.5 + 0.5 * t);
+/* Interpolation is by the kernel of Lanczos with three lobes: from texels to pixels and back it keeps three
+   quarters of the energy of fine detail, the spline of Catmull and Rom half of it. Its weights for samples
+   at -2 .. 3, for a place t from 0 to below 1, which sum up to 1:
+
+       w(x) = sinc(pi x) sinc(pi x / 3),   x = t + 2 .. t - 3                                   */
+static void txi_lanczos(double t, double weight[TXI_TAPS]) {
+    /* cosine and sine of i / 3 of a half turn, i = -2 .. 3 */
+    static const double c[TXI_TAPS] = {-0.5, 0.5, 1, 0.5, -0.5, -1};
+    static const double s[TXI_TAPS] = {-0.86602540378443865, -0.86602540378443865, 0,
+                                       0.86602540378443865, 0.86602540378443865, 0};
+    double whole, third, across, unused, sum = 0;
+    txm_sincos(TXM_PI * t, &whole, &unused);
+    txm_sincos(TXM_PI / 3 * t, &third, &across);
+    for (int i = 0; i < TXI_TAPS; i++) {
+        const double x = t - (i - 2);
+        weight[i] = (i % 2 ? -whole : whole) * (third * c[i] - across * s[i]);
+        weight[i] = fabs(x) < 1e-5 ? 1 : weight[i] * (3 / (TXM_PI * TXM_PI)) / (x * x);
+        sum += weight[i];
+    }
+    for (int i = 0; i < TXI_TAPS; i++) weight[i] /= sum;
 }
 
+/* Its weights for t = 0, 1 / TXI_KERNEL_STEPS, .. 1, as they take longer to compute than to use. */
+typedef struct txi_kernel {
+    double weight[TXI_KERNEL_STEPS + 1][TXI_TAPS];
+} txi_kernel;
+
+static void txi_kernel_init(txi_kernel *kernel) {
+    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / TXI_KERNEL_STEPS, kernel->weight[i]);
+    for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;
+}
+
+static void txi_kernel_at(const txi_kernel *kernel, double t, double weight[TXI_TAPS]) {
+    const int i = (int)(t * TXI_KERNEL_STEPS);
+    const double part = t * TXI_KERNEL_STEPS - i;
+    const double *a = kernel->weight[i], *b = kernel->weight[i < TXI_KERNEL_STEPS ? i + 1 : i];
+    for (int k = 0; k < TXI_TAPS; k++) weight[k] = a[k] + part * (b[k] - a[k]);
+}
+
+/* A value between the four samples around it, in excess of them by at most a quarter of their range: the
+   kernel must not ring at hard edges. */
+static double txi_limit(double value, double low, double high) {
+    const double more = 0.25 * (high - low);
+    return value < low - more ? low - more : value > high + more ? high + more : value;
+}
 
 /* May a pixel on this face take texel (x, y), not wrapped yet? Its number, or -1: there is none, or
    it belongs to another chart. */
@@ -1787,60 +1847,136 @@ static int64_t txi_nearest_tap(const txi_domain *d, uint32_t face, txm_vec2 p, i
     return best;
 }
 
-/* The texels around a place and their weights. Where all 16 exist and are known these are those of
-   the spline, else those of the known ones among the inner four, else the nearest known one.
-   Returns their number. */
-static int txi_taps_at(const txi_domain *d, uint32_t face, txm_vec2 p, int is_label,
-                       int64_t texel[16], double weight[16]) {
-    const double fx = floor(p.x), fy = floor(p.y);
+/* Texels around a place and their weights, which sum up to 1. */
+typedef struct txi_taps {
+    int count, is_limited;  /* is_limited: by the inner four */
+    int64_t texel[TXI_TAPS * TXI_TAPS], inner[4];
+    double weight[TXI_TAPS * TXI_TAPS];
+} txi_taps;
+
+/* The known texels around p that a pixel on this face may take: those of the kernel, if the inner four
+   are among them and little weight is lost; else those of the inner four, bilinear; else the nearest. */
+static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p, int is_label,
+                        txi_taps *taps) {
+    const double fx = floor(p.x), fy = floor(p.y), tx = p.x - fx, ty = p.y - fy;
     const int x = (int)fx, y = (int)fy;
-    double wx[TXI_TAPS], wy[TXI_TAPS], sum = 0;
-    int count = 0, whole = 1;
-    if (!is_label) {
-        txi_spline(p.x - fx, wx);
-        txi_spline(p.y - fy, wy);
-        for (int k = 0; k < 16 && whole; k++) {
-            texel[k] = txi_tap(d, face, x - 1 + k % 4, y - 1 + k / 4);
-            weight[k] = wx[k % 4] * wy[k / 4];
-            whole = texel[k] >= 0 && !d->missing[texel[k]];
-        }
-        if (whole) return 16;
-        for (int k = 0; k < 4; k++) {
-            const int64_t i = txi_tap(d, face, x + k % 2, y + k / 2);
-            const double u = k % 2 ? p.x - fx : 1 - (p.x - fx), v = k / 2 ? p.y - fy : 1 - (p.y - fy);
-            if (i < 0 || d->missing[i] || !(u * v > 0)) continue;
-            texel[count] = i;
-            weight[count++] = u * v;
-            sum += u * v;
-        }
-        for (int k = 0; k < count; k++) weight[k] /= sum;
-        if (sum > 0.05) return count;
+    double wx[TXI_TAPS], wy[TXI_TAPS], part = 0, sum = 0;
+    taps->count = taps->is_limited = 0;
+    for (int k = 0; k < 4 && !is_label; k++) {
+        const int64_t i = txi_tap(d, face, x + k % 2, y + k / 2);
+        if (i < 0 || d->missing[i]) continue;
+        taps->inner[taps->count] = taps->texel[taps->count] = i;
+        taps->weight[taps->count] = (k % 2 ? tx : 1 - tx) * (k / 2 ? ty : 1 - ty);
+        part += taps->weight[taps->count++];
     }
-    texel[0] = txi_nearest_tap(d, face, p, 1);
-    weight[0] = 1;
-    return texel[0] >= 0;
+    if (taps->count == 4) {
+        int count = 0;
+        txi_kernel_at(kernel, tx, wx);
+        txi_kernel_at(kernel, ty, wy);
+        for (int k = 0; k < TXI_TAPS * TXI_TAPS; k++) {
+            const int i = k % TXI_TAPS, j = k / TXI_TAPS;
+            const int64_t texel = txi_tap(d, face, x - 2 + i, y - 2 + j);
+            if (texel < 0 || d->missing[texel]) continue;
+            taps->texel[count] = texel;
+            taps->weight[count] = wx[i] * wy[j];
+            sum += taps->weight[count++];
+        }
+        taps->count = count;
+        taps->is_limited = 1;
+        for (int k = 0; k < count; k++) taps->weight[k] /= sum;
+        if (sum > 0.8) return;
+        for (int k = 0; k < 4; k++) { /* too little is left of it */
+            taps->texel[k] = taps->inner[k];
+            taps->weight[k] = (k % 2 ? tx : 1 - tx) * (k / 2 ? ty : 1 - ty);
+        }
+        taps->count = 4;
+        return;
+    }
+    for (int k = 0; k < taps->count; k++) taps->weight[k] /= part;
+    if (part > 0.05) return;
+    taps->texel[0] = txi_nearest_tap(d, face, p, 1);
+    taps->weight[0] = 1;
+    taps->count = taps->texel[0] >= 0;
 }
 
-/* All channels of a map at pixel i of the window. */
-static void txi_read_pixel(const txi_domain *d, const txi_window *w, int map, size_t i, float *out) {
+static double txi_texel_value(const txm_image *image, int64_t texel, int c) {
+    return txm_image_get(image, (int)(texel % image->width), (int)(texel / image->width), c);
+}
+
+/* The channels of a map at a place all around which texels are known and of one chart. */
+static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, txm_vec2 p, float *out) {
+    const double fx = floor(p.x), fy = floor(p.y);
+    const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
+    const size_t skip = (size_t)x * (size_t)channels;
+    double wx[TXI_TAPS], wy[TXI_TAPS], sum[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
+    double low[TXI_MAX_CHANNELS] = {0, 0, 0, 0}, high[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
+    const double unit = image->sample == TXM_U8 ? 255 : image->sample == TXM_U16 ? 65535 : 1;
+    txi_kernel_at(kernel, p.x - fx, wx);
+    txi_kernel_at(kernel, p.y - fy, wy);
+    for (int j = 0; j < TXI_TAPS; j++) {
+        const char *row = (const char *)image->pixels + image->stride * (y + j);
+        for (int i = 0; i < TXI_TAPS; i++) {
+            const double weight = wx[i] * wy[j];
+            const int is_inner = (i == 2 || i == 3) && (j == 2 || j == 3), is_first = i == 2 && j == 2;
+            for (int c = 0; c < channels; c++) {
+                const size_t at = skip + (size_t)(i * channels + c);
+                const double v = image->sample == TXM_U8    ? ((const uint8_t *)row)[at]
+                                 : image->sample == TXM_U16 ? ((const uint16_t *)(const void *)row)[at]
+                                                            : ((const float *)(const void *)row)[at];
+                sum[c] += weight * v;
+                if (!is_inner) continue;
+                low[c] = is_first || v < low[c] ? v : low[c];
+                high[c] = is_first || v > high[c] ? v : high[c];
+            }
+        }
+    }
+    for (int c = 0; c < channels; c++) out[c] = txm_float(txi_limit(sum[c], low[c], high[c]) / unit);
+}
+
+/* Are all texels of the kernel at p known and of the chart of this face? Decided by tiles; 0 also where
+   that is not enough. */
+static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
+    const txi_surface *s = d->surface;
+    const int x = (int)floor(p.x) - 2, y = (int)floor(p.y) - 2, side = TXI_TILE;
+    if (x < 0 || y < 0 || x + TXI_TAPS > d->width || y + TXI_TAPS > d->height) return 0;
+    for (int k = 0; k < 4; k++) {
+        const size_t tx = (size_t)((x + k % 2 * (TXI_TAPS - 1)) / side);
+        const size_t ty = (size_t)((y + k / 2 * (TXI_TAPS - 1)) / side);
+        if (s->tile[ty * s->tile_stride + tx] != s->chart[face]) return 0;
+    }
+    for (int j = 0; j < TXI_TAPS; j++) {
+        static const uint8_t none[TXI_TAPS] = {0};
+        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS)) return 0;
+    }
+    return 1;
+}
+
+/* All channels of a map at pixel i of the window, which is not void. */
+static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w, int map,
+                           size_t i, float *out) {
     const txm_image *image = &d->maps[map];
     const int label = map > 0 && d->desc->maps[map - 1].is_label;
-    int64_t texel[16];
-    double weight[16];
-    int taps = 0;
-    if (w->state[i] != TXI_VOID && d->surface) {
-        taps = txi_taps_at(d, w->face[i], w->texel[i], label, texel, weight);
-    } else if (w->state[i] != TXI_VOID) { /* pixels of a picture are its texels */
-        texel[0] = txi_tap(d, TXI_NO_FACE, (int)w->texel[i].x, (int)w->texel[i].y);
-        weight[0] = 1;
-        taps = texel[0] >= 0 && !d->missing[texel[0]];
+    txi_taps taps;
+    if (!d->surface) { /* pixels of a picture are its texels */
+        const int x = (int)w->texel[i].x, y = (int)w->texel[i].y;
+        const int known = !d->missing[(size_t)y * (size_t)d->width + (size_t)x];
+        for (int c = 0; c < image->channels; c++) out[c] = known ? txm_image_get(image, x, y, c) : 0;
+        return;
     }
+    if (!label && txi_is_inside(d, w->face[i], w->texel[i])) {
+        txi_read_inside(image, kernel, w->texel[i], out);
+        return;
+    }
+    txi_taps_at(d, kernel, w->face[i], w->texel[i], label, &taps);
     for (int c = 0; c < image->channels; c++) {
-        double sum = 0;
-        for (int k = 0; k < taps; k++)
-            sum += weight[k] * txm_image_get(image, (int)(texel[k] % d->width),
-                                             (int)(texel[k] / d->width), c);
-        out[c] = txm_float(sum);
+        double sum = 0, low = 0, high = 0;
+        for (int k = 0; k < taps.count; k++) sum += taps.weight[k] * txi_texel_value(image, taps.texel[k], c);
+        for (int k = 0; k < 4 && taps.is_limited; k++) {
+            const double v = txi_texel_value(image, taps.inner[k], c);
+            low = k ? fmin(low, v) : v;
+            high = k ? fmax(high, v) : v;
+        }
+        out[c] = txm_float(taps.is_limited ? txi_limit(sum, low, high) : sum);
     }
 }
 
@@ -1886,14 +2022,21 @@ static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored
 /* ---- resample: from maps to windows, from windows to maps ---- */
 
 /* Every channel of a map at the window's pixels: values receives width * height * channels numbers,
-   in the units of txm_image_get. Interpolated by the spline of Catmull and Rom from known texels of
-   the pixel's own chart; labels are those of the nearest texel. 0 where there is no known texel. */
+   in the units of txm_image_get. Interpolated from known texels of the pixel's own chart; labels are those
+   of the nearest texel. 0 where there is no known texel. */
 static void txi_window_read(const txi_domain *d, const txi_window *w, int map, float *values) {
     const size_t count = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[map].channels;
+    txi_kernel kernel;
+    txi_kernel_init(&kernel);
     for (size_t i = 0; i < count; i++) {
-        txi_read_pixel(d, w, map, i, values + i * channels);
-        if (w->state[i] != TXI_VOID) txi_pack(d, map, w->axis[i], w->mirrored[i], values + i * channels);
+        float *v = values + i * channels;
+        if (w->state[i] == TXI_VOID) {
+            memset(v, 0, channels * sizeof *v);
+        } else {
+            txi_read_pixel(d, &kernel, w, map, i, v);
+            txi_pack(d, map, w->axis[i], w->mirrored[i], v);
+        }
     }
 }
 
@@ -1903,6 +2046,10 @@ static uint8_t txi_pixel_state(const txi_domain *d, uint32_t face, txm_vec2 p) {
     const double fx = floor(p.x), fy = floor(p.y);
     double most = 0;
     int64_t nearest = -1;
+    if (d->surface && txi_is_inside(d, face, p))
+        return d->usable[(size_t)floor(p.y + 0.5) * (size_t)d->width + (size_t)floor(p.x + 0.5)]
+                   ? TXI_KNOWN
+                   : TXI_FOREIGN;
     for (int k = 0; k < 4; k++) {
         const int64_t i = txi_tap(d, face, (int)fx + k % 2, (int)fy + k / 2);
         const double u = k % 2 ? p.x - fx : 1 - (p.x - fx), v = k / 2 ? p.y - fy : 1 - (p.y - fy);
@@ -1926,38 +2073,41 @@ static uint8_t txi_byte(double unit) {
 static void txi_window_colors(const txi_domain *d, txi_window *w) {
     const int channels = d->maps[0].channels, has_alpha = channels == 2 || channels == 4;
     const size_t count = (size_t)w->width * (size_t)w->height;
+    txi_kernel kernel;
+    txi_kernel_init(&kernel);
     for (size_t i = 0; i < count; i++) {
         float v[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
         uint8_t *out = w->color + 4 * i;
         memset(out, 0, 4);
         if (w->state[i] != TXI_VOID) w->state[i] = txi_pixel_state(d, w->face[i], w->texel[i]);
         if (w->state[i] == TXI_VOID) continue;
-        txi_read_pixel(d, w, 0, i, v);
+        txi_read_pixel(d, &kernel, w, 0, i, v);
         const double alpha = has_alpha ? (double)txm_clampf(v[channels - 1], 0, 1) : 1;
         for (int c = 0; c < 3; c++)
             out[c] = txi_byte(alpha * v[channels >= 3 ? c : 0] + (1 - alpha) * (128 / 255.0));
     }
 }
 
-/* The window's values at (x, y): the spline, limited to the range of the four pixels around, so
-   that it cannot ring; where a pixel of the sixteen is void, bilinear from those that are not. 0:
-   all four are void. */
-static int txi_window_value(const txi_window *w, int channels, int is_label, const float *values,
-                            double x, double y, float out[TXI_MAX_CHANNELS]) {
+/* The window's values at (x, y): by the kernel; where one of its pixels is void, bilinear from those of the
+   four around that are not. 0: all four are void. */
+static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int channels, int is_label,
+                            const float *values, double x, double y, float out[TXI_MAX_CHANNELS]) {
+    enum { N = TXI_TAPS };
     const double fx = floor(x), fy = floor(y);
-    const int left = (int)fx, up = (int)fy;
-    double wx[TXI_TAPS], wy[TXI_TAPS], bilinear[4], sum = 0, best = 0;
-    size_t at[16];
-    int solid[16], whole = 1, nearest = -1;
-    for (int k = 0; k < 16; k++) {
-        const int px = left - 1 + k % 4, py = up - 1 + k / 4;
+    const int left = (int)fx - 2, up = (int)fy - 2;
+    double wx[N], wy[N], bilinear[4], sum = 0, best = 0;
+    size_t at[N * N];
+    int solid[N * N], whole = 1, nearest = -1;
+    for (int k = 0; k < N * N; k++) {
+        const int px = left + k % N, py = up + k / N;
         solid[k] = px >= 0 && py >= 0 && px < w->width && py < w->height;
         at[k] = solid[k] ? (size_t)py * (size_t)w->width + (size_t)px : 0;
         solid[k] = solid[k] && w->state[at[k]] != TXI_VOID;
         whole &= solid[k];
+        at[k] *= (size_t)channels;
     }
     for (int k = 0; k < 4; k++) {
-        const int tap = 5 + k % 2 + 4 * (k / 2);
+        const int tap = (2 + k / 2) * N + 2 + k % 2;
         const double u = k % 2 ? x - fx : 1 - (x - fx), v = k / 2 ? y - fy : 1 - (y - fy);
         bilinear[k] = solid[tap] ? u * v : 0;
         sum += bilinear[k];
@@ -1966,30 +2116,23 @@ static int txi_window_value(const txi_window *w, int channels, int is_label, con
         nearest = tap;
     }
     if (nearest < 0) return 0;
-    txi_spline(x - fx, wx);
-    txi_spline(y - fy, wy);
+    txi_kernel_at(kernel, x - fx, wx);
+    txi_kernel_at(kernel, y - fy, wy);
     for (int c = 0; c < channels; c++) {
-        double value = 0, low = 0, high = 0;
-        if (is_label) {
-            out[c] = values[at[nearest] * (size_t)channels + (size_t)c];
-            continue;
+        const float *value = values + c;
+        double total = 0, low = value[at[nearest]], high = low;
+        for (int k = 0; k < 4; k++) {
+            const double v = value[at[(2 + k / 2) * N + 2 + k % 2]];
+            if (bilinear[k] > 0) total += bilinear[k] / sum * v;
+            if (bilinear[k] > 0 || whole) low = fmin(low, v);
+            if (bilinear[k] > 0 || whole) high = fmax(high, v);
         }
-        if (!whole) {
-            for (int k = 0; k < 4; k++) {
-                const size_t i = at[5 + k % 2 + 4 * (k / 2)];
-                value += bilinear[k] / sum * values[i * (size_t)channels + (size_t)c];
-            }
-            out[c] = txm_float(value);
-            continue;
+        if (whole) {
+            total = 0;
+            for (int k = 0; k < N * N; k++) total += wx[k % N] * wy[k / N] * value[at[k]];
+            total = txi_limit(total, low, high);
         }
-        for (int k = 0; k < 16; k++) {
-            const double v = values[at[k] * (size_t)channels + (size_t)c];
-            const int is_inner = (k % 4 == 1 || k % 4 == 2) && (k / 4 == 1 || k / 4 == 2);
-            value += wx[k % 4] * wy[k / 4] * v;
-            if (is_inner && (k == 5 || v < low)) low = v;
-            if (is_inner && (k == 5 || v > high)) high = v;
-        }
-        out[c] = txm_float(value < low ? low : value > high ? high : value);
+        out[c] = is_label ? value[at[nearest]] : txm_float(total);
     }
     return 1;
 }
@@ -2017,11 +2160,13 @@ static int64_t txi_solid_near(const txi_window *w, double x, double y) {
 static void txi_window_write(txi_domain *d, const txi_window *w, int map, const float *values) {
     const txm_image *image = &d->maps[map];
     const int channels = image->channels, label = map > 0 && d->desc->maps[map - 1].is_label;
+    txi_kernel kernel;
+    txi_kernel_init(&kernel);
     for (size_t i = 0; i < w->target_count; i++) {
         const txi_target *t = &w->targets[i];
         const int x = (int)(t->texel % (uint32_t)d->width), y = (int)(t->texel / (uint32_t)d->width);
         float value[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
-        if (!txi_window_value(w, channels, label, values, t->x, t->y, value)) {
+        if (!txi_window_value(w, &kernel, channels, label, values, t->x, t->y, value)) {
             const int64_t pixel = txi_solid_near(w, t->x, t->y);
             for (int c = 0; c < channels && pixel >= 0; c++)
                 value[c] = values[pixel * channels + c];

@@ -9,6 +9,7 @@
 
 enum {
     TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel     */
+    TXI_TILE = 8,     /* ours: texels of a side                                                   */
     TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
 };
 
@@ -27,6 +28,9 @@ struct txi_surface {
     uint32_t *owner;     /* 1 per texel: the first face that covers its centre, or TXI_NO_FACE  */
     uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] - 1] */
     uint32_t *hole_first, *hole; /* the texels of face f that were missing, in the same form     */
+    uint32_t *tile;      /* 1 per TXI_TILE x TXI_TILE texels: the chart, if they all have the same, or
+                            TXI_NO_FACE                                                        */
+    size_t tile_stride;  /* tiles in a row                                                     */
     size_t cursor;       /* no texel before this one is missing and covered                    */
 };
 
@@ -276,6 +280,20 @@ static void txi_cover(txi_domain *d, txi_surface *s) {
     for (size_t i = 0; i < texels; i++) d->covered[i] = s->owner[i] != TXI_NO_FACE;
 }
 
+/* Which tiles lie in one chart. */
+static void txi_fill_tiles(const txi_domain *d, txi_surface *s) {
+    const size_t w = (size_t)d->width, h = (size_t)d->height;
+    for (size_t y = 0; y < h; y++) {
+        for (size_t x = 0; x < w; x++) {
+            uint32_t *tile = &s->tile[y / TXI_TILE * s->tile_stride + x / TXI_TILE];
+            const uint32_t owner = s->owner[y * w + x];
+            const uint32_t chart = owner == TXI_NO_FACE ? TXI_NO_FACE : s->chart[owner];
+            if (x % TXI_TILE == 0 && y % TXI_TILE == 0) *tile = chart;
+            else if (*tile != chart) *tile = TXI_NO_FACE;
+        }
+    }
+}
+
 /* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at first[k] ..
    first[k + 1] - 1. Only those with a mark, if there are marks. first: room for count + 1. */
 static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks, size_t count,
@@ -316,6 +334,9 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
     s->uv = (txm_vec2 *)txm_arena_alloc(arena, faces, 3 * sizeof(txm_vec2));
     s->chart = (uint32_t *)txm_arena_alloc(arena, faces, sizeof(uint32_t));
     s->owner = (uint32_t *)txm_arena_alloc(arena, texels, sizeof(uint32_t));
+    s->tile_stride = (size_t)(d->width - 1) / TXI_TILE + 1;
+    s->tile = (uint32_t *)txm_arena_alloc(arena, s->tile_stride * ((size_t)(d->height - 1) / TXI_TILE + 1),
+                                          sizeof(uint32_t));
     s->hole_first = (uint32_t *)txm_arena_alloc(arena, faces + 1, sizeof(uint32_t));
     s->first = (uint32_t *)txm_arena_alloc(arena, mesh->vertex_count + 1, sizeof(uint32_t));
     if (arena->failed) return txi_no_memory(env);
@@ -327,6 +348,7 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
     status = txi_link_sides(mesh, s, env);
     if (status != TXM_OK) return status;
     txi_cover(d, s);
+    txi_fill_tiles(d, s);
     txi_bin(s->vertex, 3 * faces, NULL, s->vertex_count, s->first, s->corners);
     for (size_t i = 0; i < texels; i++) holes += d->missing[i] && d->covered[i];
     s->hole = (uint32_t *)txm_arena_alloc(arena, holes + 1, sizeof(uint32_t));
