@@ -276,8 +276,9 @@ typedef struct txi_window {
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
     txm_vec3 *normal; /* unit; pictures: 0, 0, 1                                               */
-    double spacing;  /* units of the mesh per window pixel: place * spacing is a point of the mesh;
-                        pictures: 1                                                            */
+    double spacing;  /* units of the mesh per window pixel: origin + place * spacing is a point of
+                        the mesh; pictures: 1; 0: places are not on the mesh                   */
+    txm_dvec3 origin;
     txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
     uint8_t *mirrored; /* as in txi_target                                                     */
     uint32_t *face;  /* the triangle under each pixel, for txi_window_read; pictures: none      */
@@ -2454,6 +2455,7 @@ static txm_status txi_cut_out(const txi_domain *d, txi_box box, int margin, cons
     const txm_status status =
         txi_window_alloc(w, box.right - box.left, box.bottom - box.top, arena, env);
     if (status != TXM_OK) return status;
+    w->spacing = 1;
     w->targets = (txi_target *)txm_arena_alloc(arena, ours->count, sizeof(txi_target));
     if (!w->targets) return txi_no_memory(env);
     for (int y = 0; y < w->height; y++) {
@@ -2982,6 +2984,8 @@ static int txi_lies_right(const txi_sheet *l, size_t i) {
 /* Fill the pixels whose centres the faces of the disk cover. Where the disk overlaps itself the face that
    came first stays, which is the one nearer to the hole. */
 static void txi_sheet_pixels(const txi_sheet *l, txi_window *w) {
+    w->spacing = l->pixel;
+    w->origin = l->flat.point[0];
     for (size_t i = 0; i < l->disk.face_count; i++) {
         txm_vec2 t[3];
         double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
@@ -5307,12 +5311,15 @@ enum {
     TXI_PRIOR_JUMP = 4,    /* window pixels: farther apart in the window, the line was cut; ours */
     TXI_PRIOR_SHORT = 6,   /* points, about pixels: shorter pieces are left out; ours           */
     TXI_PRIOR_WIDTH = 40,  /* window pixels: the farthest assistant line; ours                  */
-    TXI_PRIOR_LEAST = 24,  /* known pixels along a line that a distance is measured at; ours    */
+    TXI_PRIOR_LEAST = 32,  /* known pixels along a line that a distance is measured at; ours    */
+    TXI_PRIOR_NEAR = 12,   /* window pixels: lines that stay farther from the hole are left out; ours */
+    TXI_PRIOR_BLUR = 5,    /* points: radius of the mean that smooths crest lines, thrice; ours:
+                              they zigzag from triangle to triangle                             */
     TXI_PRIOR_CHORD = 6,   /* points to either side that give the direction of a line; ours     */
     TXI_PRIOR_STEP = 12,   /* levels of 8 bits: the mean step across an assistant line; ours    */
     TXI_PRIOR_AIDS = 2     /* assistant lines on each side; [1]                                 */
 };
-#define TXI_PRIOR_SURE 0.5 /* mean step over mean size of the steps: of one sign along the line; ours */
+#define TXI_PRIOR_SURE 0.7 /* mean step over mean size of the steps: of one sign along the line; ours */
 
 /* The lines of a window while they are collected. */
 typedef struct txi_prior_list {
@@ -5488,11 +5495,12 @@ static int txi_places_clip(const txi_places *s, txm_dvec3 a, txm_dvec3 d, double
 /* Lay a line of the surface into the window, in steps of half a pixel. 0: no memory. */
 static int txi_prior_lay(const txi_places *s, const texinpaint_line *line, txi_prior_list *list,
                          txm_arena *arena) {
-    const double unit = s->w->spacing > 0 ? 1 / s->w->spacing : 1;
+    const double unit = 1 / s->w->spacing;
     if (!txi_prior_reserve(list, 1, arena)) return 0;
     for (int k = 0; k + 1 < line->count; k++) {
-        const txm_dvec3 a = txm_d3_scale(txm_d3_load(line->points + 3 * (size_t)k), unit);
-        const txm_dvec3 b = txm_d3_scale(txm_d3_load(line->points + 3 * (size_t)k + 3), unit);
+        const float *p = line->points + 3 * (size_t)k;
+        const txm_dvec3 a = txm_d3_scale(txm_d3_sub(txm_d3_load(p), s->w->origin), unit);
+        const txm_dvec3 b = txm_d3_scale(txm_d3_sub(txm_d3_load(p + 3), s->w->origin), unit);
         const txm_dvec3 d = txm_d3_sub(b, a);
         double from, to;
         if (!txi_places_clip(s, a, d, &from, &to)) {
@@ -5501,10 +5509,10 @@ static int txi_prior_lay(const txi_places *s, const texinpaint_line *line, txi_p
         }
         const int steps = 1 + (int)fmin(2 * (to - from) * txm_d3_len(d), 1e6);
         for (int i = 0; i <= steps; i++) {
-            txm_vec2 p;
-            if (!txi_places_find(s, txm_d3_mad(a, d, from + (to - from) * i / steps), &p)) {
+            txm_vec2 at;
+            if (!txi_places_find(s, txm_d3_mad(a, d, from + (to - from) * i / steps), &at)) {
                 txi_prior_close(list);
-            } else if (!txi_prior_add(list, p, arena)) {
+            } else if (!txi_prior_add(list, at, arena)) {
                 return 0;
             }
             if (!txi_prior_reserve(list, 1, arena)) return 0;
@@ -5641,8 +5649,54 @@ static int txi_prior_assist(const txi_window *w, txi_prior_list *list, int k, in
     return 1;
 }
 
-/* The prior lines of a window, each followed by its assistants if it has any, those of pieces of one
-   line after all of these.
+/* Smooth a line; its ends stay where they are. scratch: room for n points. */
+static void txi_prior_smooth(txm_vec2 *points, int n, txm_vec2 *scratch) {
+    for (int pass = 0; pass < 3; pass++) {
+        memcpy(scratch, points, (size_t)n * sizeof *points);
+        for (int k = 1; k + 1 < n; k++) {
+            const int most = k < n - 1 - k ? k : n - 1 - k;
+            const int r = most < TXI_PRIOR_BLUR ? most : TXI_PRIOR_BLUR;
+            double x = 0, y = 0;
+            for (int i = k - r; i <= k + r; i++) {
+                x += (double)scratch[i].x;
+                y += (double)scratch[i].y;
+            }
+            points[k] = txm_v2(txm_float(x / (2 * r + 1)), txm_float(y / (2 * r + 1)));
+        }
+    }
+}
+
+/* Does a line come near the hole? */
+static int txi_prior_is_near(const txi_window *w, const txm_vec2 *points, int n) {
+    for (int k = 0; k < n; k++) {
+        const int x = (int)floor((double)points[k].x + 0.5), y = (int)floor((double)points[k].y + 0.5);
+        for (int dy = -TXI_PRIOR_NEAR; dy <= TXI_PRIOR_NEAR; dy += 4) {
+            for (int dx = -TXI_PRIOR_NEAR; dx <= TXI_PRIOR_NEAR; dx += 4) {
+                const int u = x + dx, v = y + dy;
+                if (u < 0 || v < 0 || u >= w->width || v >= w->height) continue;
+                if (w->state[(size_t)v * (size_t)w->width + (size_t)u] == TXI_HOLE) return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Leave out the lines that stay away from the hole. */
+static void txi_prior_filter(const txi_window *w, txi_prior_list *list) {
+    int lines = 0, points = 0;
+    for (int k = 0; k < list->count; k++) {
+        const int first = list->starts[k], n = list->starts[k + 1] - first;
+        if (!txi_prior_is_near(w, list->points + first, n)) continue;
+        memmove(list->points + points, list->points + first, (size_t)n * sizeof *list->points);
+        list->starts[lines++] = points;
+        points += n;
+    }
+    list->count = lines;
+    if (list->starts) list->starts[lines] = points;
+}
+
+/* The prior lines of a window that come near its hole: first all lines themselves, in pieces, then their
+   assistants.
    crests  NULL: the lines of the description
    prior   lies in the arena
    return  TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED
@@ -5658,7 +5712,7 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
     int ok = 1;
     memset(prior, 0, sizeof *prior);
     memset(&list, 0, sizeof list);
-    if (count == 0) return TXM_OK;
+    if (count == 0 || !(w->spacing > 0)) return TXM_OK;
     if (txm_progress(env, 0, "prior lines")) return txi_stopped(env);
     txm_arena_init(&scratch, env);
     if (d->surface) ok = txi_places_make(w, &scratch, &places);
@@ -5667,10 +5721,18 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
         else ok = txi_prior_copy(w, &lines[i], &list, arena);
     }
     const int own = list.count;
+    if (own > 0 && crests && ok) {
+        txm_vec2 *copy =
+            (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)list.open, sizeof(txm_vec2));
+        ok = copy != NULL;
+        for (int k = 0; k < own && ok; k++)
+            txi_prior_smooth(list.points + list.starts[k], list.starts[k + 1] - list.starts[k], copy);
+    }
     for (int k = 0; k < own && ok; k++)
         ok = txi_prior_assist(w, &list, k, 1, arena) && txi_prior_assist(w, &list, k, -1, arena);
     txm_arena_free(&scratch);
     if (!ok) return txi_no_memory(env);
+    txi_prior_filter(w, &list);
     prior->points = list.points;
     prior->starts = list.starts;
     prior->line_count = list.count;

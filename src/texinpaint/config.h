@@ -32,8 +32,9 @@ typedef struct txi_window {
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
     txm_vec3 *normal; /* unit; pictures: 0, 0, 1                                               */
-    double spacing;  /* units of the mesh per window pixel: place * spacing is a point of the mesh;
-                        pictures: 1                                                            */
+    double spacing;  /* units of the mesh per window pixel: origin + place * spacing is a point of
+                        the mesh; pictures: 1; 0: places are not on the mesh                   */
+    txm_dvec3 origin;
     txm_vec2 *axis;  /* direction of the texture's u axis in the window, unit                   */
     uint8_t *mirrored; /* as in txi_target                                                     */
     uint32_t *face;  /* the triangle under each pixel, for txi_window_read; pictures: none      */

@@ -467,6 +467,8 @@ static int txi_lies_right(const txi_sheet *l, size_t i) {
 /* Fill the pixels whose centres the faces of the disk cover. Where the disk overlaps itself the face that
    came first stays, which is the one nearer to the hole. */
 static void txi_sheet_pixels(const txi_sheet *l, txi_window *w) {
+    w->spacing = l->pixel;
+    w->origin = l->flat.point[0];
     for (size_t i = 0; i < l->disk.face_count; i++) {
         txm_vec2 t[3];
         double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];

@@ -172,6 +172,7 @@ static txm_status txi_cut_out(const txi_domain *d, txi_box box, int margin, cons
     const txm_status status =
         txi_window_alloc(w, box.right - box.left, box.bottom - box.top, arena, env);
     if (status != TXM_OK) return status;
+    w->spacing = 1;
     w->targets = (txi_target *)txm_arena_alloc(arena, ours->count, sizeof(txi_target));
     if (!w->targets) return txi_no_memory(env);
     for (int y = 0; y < w->height; y++) {

@@ -557,7 +557,7 @@ static void test_prior_in_a_picture(void **state) {
     w.spacing = 1;
     for (int i = 0; i < WINDOW; i++) { /* the window begins at pixel 200, 80 of the picture */
         place[i] = txm_v3((float)(200 + i % WIDTH), (float)(80 + i / WIDTH), 0);
-        state_of[i] = TXI_KNOWN;
+        state_of[i] = i % WIDTH == 45 ? TXI_HOLE : TXI_KNOWN;
     }
     txm_arena_init(&arena, NULL);
     assert_int_equal(txi_prior_make(&d, NULL, &w, &arena, NULL, &prior), TXM_OK);
