@@ -223,15 +223,18 @@ static void txi_strips_body(void *context, int index) {
         txi_strip_unary(s, k, feature, mask, all->unary + all->firsts[s->node + k]);
 }
 
-/* The sources of all strips, and the graph of all patches. */
-static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
+/* The sources of all strips, and the graph of all patches. profiles: there are to be none; strips
+   without patches get profiles. */
+static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines, const txi_curve *curves,
                                    txm_arena *arena, txm_env *env) {
     size_t labels = 0;
     for (int i = 0; i < all->count; i++) {
         txi_strip *s = &all->strips[i];
-        txm_status status = txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
+        txm_status status =
+            profiles ? TXM_OK : txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
+        if (status == TXM_OK && !profiles) txi_strip_labels(s);
+        if (status == TXM_OK && !s->node_count) status = txi_strip_profile(s, arena, env);
         if (status != TXM_OK) return status;
-        txi_strip_labels(s);
         s->node = all->node_count;
         all->node_count += s->node_count;
         all->link_count += s->node_count ? s->node_count - 1 : 0;

@@ -229,40 +229,72 @@ static int txi_lay_pull(const txi_lay *lay, const txi_strip *s, double away, int
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
-/* One pixel of a strip, if no other strip has a better claim to it. */
-static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
-    const txi_window *w = lay->all->w;
-    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends, at its
+   side, or another strip has a better claim to it. */
+typedef struct txi_strip_spot {
+    double column, row, across, away, half;
+    float claim;
+} txi_strip_spot;
+
+static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, size_t at, txi_strip_spot *o) {
     const int i = lay->columns[at];
-    const txm_vec2 t = s->line.along[i];
-    const double dx = x - (double)s->line.place[i].x, dy = y - (double)s->line.place[i].y;
-    const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
-    const double half = s->line.half[i];
-    const double away = (across < 0 ? -across : across) - half;
-    const double claim = away > TXI_LAY_CLAIM ? away - TXI_LAY_CLAIM : 0;
-    double rgb[3];
-    if (ahead > 1.5 || ahead < -1.5 || away >= TXI_STRIP_MARGIN || claim >= lay->claims[at]) return;
-    const double row = txi_offset_row(across, s->inside, half), column = i + ahead;
-    const int j = txm_clampi((int)(row + 0.5), 0, s->rows - 1);
-    const int k = txi_lay_patch(lay, s, column, j), centre = s->first + k * s->hop;
-    const txi_column from = txi_column_at(s, s->chosen[k], column - centre);
-    const txm_vec2 p = txi_column_place(&from, txi_row_offset(row, s->inside, (double)from.half));
-    const int pull = txi_lay_pull(lay, s, away, i);
-    if (!pull || !txi_lay_pixel(w, (double)p.x, (double)p.y, rgb)) return;
+    const txm_vec2 t = s->line.along[i], p = s->line.place[i];
+    const double dx = x - (double)p.x, dy = y - (double)p.y;
+    const double ahead = dx * t.x + dy * t.y;
+    o->half = s->line.half[i];
+    o->across = dy * t.x - dx * t.y;
+    o->away = (o->across < 0 ? -o->across : o->across) - o->half;
+    o->column = i + ahead;
+    o->row = txi_offset_row(o->across, s->inside, o->half);
+    o->claim = o->away > TXI_LAY_CLAIM ? txm_float(o->away - TXI_LAY_CLAIM) : 0;
+    return ahead <= 1.5 && ahead >= -1.5 && o->away < TXI_STRIP_MARGIN && o->claim < lay->claims[at];
+}
+
+static uint8_t txi_lay_round(double value) {
+    return (uint8_t)(value < 0 ? 0 : value > 254.5 ? 255 : (int)(value + 0.5));
+}
+
+/* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is not
+   known there. */
+static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_spot *o, size_t at) {
+    const int j = txm_clampi((int)(o->row + 0.5), 0, s->rows - 1);
+    const int k = txi_lay_patch(lay, s, o->column, j), centre = s->first + k * s->hop;
+    const txi_column from = txi_column_at(s, s->chosen[k], o->column - centre);
+    const txm_vec2 p =
+        txi_column_place(&from, txi_row_offset(o->row, s->inside, (double)from.half));
     const float *offset = lay->all->offsets + (size_t)(s->node + k) * 3 * TXI_STRIP_ROWS + 3 * j;
-    const int next = column >= centre ? (k + 1 < s->node_count ? 1 : 0) : k > 0 ? -1 : 0;
-    const double mix = (column >= centre ? column - centre : centre - column) / s->hop;
+    const int forward = o->column >= centre;
+    const int next = forward ? (k + 1 < s->node_count ? 1 : 0) : k > 0 ? -1 : 0;
+    const double mix = (forward ? o->column - centre : centre - o->column) / s->hop;
+    double rgb[3];
+    if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return 0;
     for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
-        const double there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
-        const double value = rgb[c] + (double)offset[c] + (there - (double)offset[c]) * mix + 0.5;
-        lay->plan->color[4 * at + (size_t)c] =
-            (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : (int)value);
+        const double here = (double)offset[c], there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
+        lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
-    lay->claims[at] = txm_float(claim);
-    lay->plan->pull[at] = (uint8_t)pull;
     lay->plan->copies[at].x = p.x;
     lay->plan->copies[at].y = p.y;
     lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
+    return 1;
+}
+
+/* One pixel of a strip. */
+static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
+    const size_t at = (size_t)y * (size_t)lay->all->w->width + (size_t)x;
+    txi_strip_spot o;
+    if (!txi_lay_spot(lay, s, x, y, at, &o)) return;
+    const int pull = txi_lay_pull(lay, s, o.away, lay->columns[at]);
+    if (!pull) return;
+    if (s->node_count) {
+        if (!txi_lay_patch_at(lay, s, &o, at)) return;
+    } else {
+        double rgb[3];
+        txi_strip_profile_at(s, o.column, o.row, rgb);
+        for (int c = 0; c < 3; c++) lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c]);
+        lay->plan->copies[at].piece = -1;
+    }
+    lay->claims[at] = o.claim;
+    lay->plan->pull[at] = (uint8_t)pull;
 }
 
 /* The pose of a patch: both frames at its centre. */
@@ -284,7 +316,7 @@ static void txi_lay_all(txi_lay *lay) {
     for (int k = 0; k < lay->all->count; k++) {
         const txi_strip *s = &lay->all->strips[lay->all->order[k]];
         int box[4];
-        if (!s->node_count) continue;
+        if (!s->node_count && !s->profile) continue;
         for (int n = 0; n < s->node_count; n++) lay->poses[s->node + n] = txi_lay_pose(s, n);
         txi_lay_nearest(lay, s, box);
         for (int y = box[1]; y <= box[3]; y++) {
@@ -343,15 +375,15 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
 
 /* ---- the plan ---- */
 
-static txm_status txi_plan_run(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
-                               int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
+static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *lines,
+                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
                                txm_env *env, txi_plan *plan, txi_pose **poses) {
     const txi_window *w = all->w;
     const size_t pixels = (size_t)w->width * (size_t)w->height;
     txi_lay lay;
     txm_status status = txi_strips_make(w, curves, count, all, scratch, env);
     if (status == TXM_OK) status = txi_strips_order(all, curves, scratch, env);
-    if (status == TXM_OK) status = txi_strips_graph(all, lines, curves, scratch, env);
+    if (status == TXM_OK) status = txi_strips_graph(all, profiles, lines, curves, scratch, env);
     if (status == TXM_OK) status = txi_strips_choose(all, seed, scratch, env);
     if (status == TXM_OK) status = txi_strips_finish(all, scratch, env);
     if (status != TXM_OK) return status;
@@ -400,11 +432,29 @@ static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, con
     all.w = w;
     txm_arena_init(&scratch, env);
     const txm_status status =
-        txi_plan_run(&all, lines, curves, count, seed, arena, &scratch, env, plan, &made);
+        txi_plan_run(&all, 0, lines, curves, count, seed, arena, &scratch, env, plan, &made);
     txm_arena_free(&scratch);
     if (status != TXM_OK) memset(plan, 0, sizeof *plan);
     *poses = status == TXM_OK ? made : NULL;
     *pose_count = status == TXM_OK ? all.node_count : 0;
+    return status;
+}
+
+/* The same without texture: the colours across each line are the mean ones of its known ends, blended
+   along it. plan->copies has no pieces. */
+static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
+                              int count, txm_arena *arena, txm_env *env, txi_plan *plan) {
+    txi_strips all;
+    txi_pose *none = NULL;
+    txm_arena scratch;
+    memset(&all, 0, sizeof all);
+    memset(plan, 0, sizeof *plan);
+    all.w = w;
+    txm_arena_init(&scratch, env);
+    const txm_status status =
+        txi_plan_run(&all, 1, lines, curves, count, 0, arena, &scratch, env, plan, &none);
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
     return status;
 }
 

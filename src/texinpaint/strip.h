@@ -28,6 +28,7 @@ enum {
     TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
     TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
     TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
+    TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
 };
 
@@ -64,6 +65,7 @@ typedef struct txi_strip {
     int *labels;         /* source columns that are centres of whole patches                      */
     int label_count;
     int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                 */
+    float *profile;      /* 2 * 3 * rows: mean colours in front of the hole and behind it; NULL: none */
     int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop       */
     int *chosen;         /* per patch: the source column chosen                                   */
 } txi_strip;
@@ -601,6 +603,62 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
     }
     if (own < TXI_STRIP_COLUMNS / 8) txi_columns_own(s, 1);
     return s->source_count > own ? txi_columns_sample(w, s, arena, env) : TXM_OK;
+}
+
+/* ---- profiles ---- */
+
+/* The mean colours of the known columns next to the hole, row by row, on one side of it. Rows of which
+   nothing is known are like the next one towards the lines. 0: the rows of the lines are not known. */
+static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
+    const int from = end ? s->last + 1 : s->first > TXI_STRIP_PROFILE ? s->first - TXI_STRIP_PROFILE : 0;
+    const int behind = end ? from + TXI_STRIP_PROFILE : s->first;
+    const int to = behind < s->line.count ? behind : s->line.count;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
+    int known[TXI_STRIP_ROWS];
+    for (int j = 0; j < s->rows; j++) {
+        int sum[3] = {0, 0, 0};
+        known[j] = 0;
+        for (int i = from; i < to; i++) {
+            const size_t at = (size_t)i * (size_t)s->rows + (size_t)j;
+            for (int c = 0; c < 3 && s->known[at]; c++) sum[c] += s->color[3 * at + (size_t)c];
+            known[j] += s->known[at];
+        }
+        for (int c = 0; c < 3 && known[j]; c++) profile[3 * j + c] = (float)sum[c] / (float)known[j];
+        if (!known[j] && j >= low && j <= high) return 0;
+    }
+    for (int j = low - 1; j >= 0; j--)
+        if (!known[j]) memcpy(profile + 3 * j, profile + 3 * (j + 1), 3 * sizeof *profile);
+    for (int j = high + 1; j < s->rows; j++)
+        if (!known[j]) memcpy(profile + 3 * j, profile + 3 * (j - 1), 3 * sizeof *profile);
+    return 1;
+}
+
+/* The profiles on both sides of the hole; where one is missing the other one counts for both. */
+static txm_status txi_strip_profile(txi_strip *s, txm_arena *arena, txm_env *env) {
+    const size_t half = 3 * (size_t)s->rows;
+    float *both = (float *)txm_arena_alloc(arena, half, 2 * sizeof *both);
+    if (!both) return txi_no_memory(env);
+    const int before = txi_strip_profile_side(s, 0, both);
+    const int behind = txi_strip_profile_side(s, 1, both + half);
+    if (!before && !behind) return TXM_OK;
+    if (!before) memcpy(both, both + half, half * sizeof *both);
+    if (!behind) memcpy(both + half, both, half * sizeof *both);
+    s->profile = both;
+    return TXM_OK;
+}
+
+/* The colour at a place of the strip by its profiles, blended along the hole. */
+static void txi_strip_profile_at(const txi_strip *s, double column, double row, double rgb[3]) {
+    const double along = (column - s->first + 1) / (s->last - s->first + 2);
+    const double t = along < 0 ? 0 : along > 1 ? 1 : along;
+    const double r = row < 0 ? 0 : row > s->rows - 1 ? s->rows - 1 : row;
+    const int j = (int)r < s->rows - 1 ? (int)r : s->rows - 2;
+    for (int c = 0; c < 3; c++) {
+        const float *p = s->profile + 3 * j + c, *q = p + 3 * s->rows;
+        const double before = (double)p[0] + (r - j) * ((double)p[3] - (double)p[0]);
+        const double behind = (double)q[0] + (r - j) * ((double)q[3] - (double)q[0]);
+        rgb[c] = before + t * (behind - before);
+    }
 }
 
 #endif /* TEXINPAINT_STRIP_H */
