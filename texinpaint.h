@@ -8959,6 +8959,7 @@ enum {
     TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
     TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
     TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
+    TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
 };
 
@@ -8995,6 +8996,7 @@ typedef struct txi_strip {
     int *labels;         /* source columns that are centres of whole patches                      */
     int label_count;
     int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                 */
+    float *profile;      /* 2 * 3 * rows: mean colours in front of the hole and behind it; NULL: none */
     int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop       */
     int *chosen;         /* per patch: the source column chosen                                   */
 } txi_strip;
@@ -9534,6 +9536,62 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
     return s->source_count > own ? txi_columns_sample(w, s, arena, env) : TXM_OK;
 }
 
+/* ---- profiles ---- */
+
+/* The mean colours of the known columns next to the hole, row by row, on one side of it. Rows of which
+   nothing is known are like the next one towards the lines. 0: the rows of the lines are not known. */
+static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
+    const int from = end ? s->last + 1 : s->first > TXI_STRIP_PROFILE ? s->first - TXI_STRIP_PROFILE : 0;
+    const int behind = end ? from + TXI_STRIP_PROFILE : s->first;
+    const int to = behind < s->line.count ? behind : s->line.count;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
+    int known[TXI_STRIP_ROWS];
+    for (int j = 0; j < s->rows; j++) {
+        int sum[3] = {0, 0, 0};
+        known[j] = 0;
+        for (int i = from; i < to; i++) {
+            const size_t at = (size_t)i * (size_t)s->rows + (size_t)j;
+            for (int c = 0; c < 3 && s->known[at]; c++) sum[c] += s->color[3 * at + (size_t)c];
+            known[j] += s->known[at];
+        }
+        for (int c = 0; c < 3 && known[j]; c++) profile[3 * j + c] = (float)sum[c] / (float)known[j];
+        if (!known[j] && j >= low && j <= high) return 0;
+    }
+    for (int j = low - 1; j >= 0; j--)
+        if (!known[j]) memcpy(profile + 3 * j, profile + 3 * (j + 1), 3 * sizeof *profile);
+    for (int j = high + 1; j < s->rows; j++)
+        if (!known[j]) memcpy(profile + 3 * j, profile + 3 * (j - 1), 3 * sizeof *profile);
+    return 1;
+}
+
+/* The profiles on both sides of the hole; where one is missing the other one counts for both. */
+static txm_status txi_strip_profile(txi_strip *s, txm_arena *arena, txm_env *env) {
+    const size_t half = 3 * (size_t)s->rows;
+    float *both = (float *)txm_arena_alloc(arena, half, 2 * sizeof *both);
+    if (!both) return txi_no_memory(env);
+    const int before = txi_strip_profile_side(s, 0, both);
+    const int behind = txi_strip_profile_side(s, 1, both + half);
+    if (!before && !behind) return TXM_OK;
+    if (!before) memcpy(both, both + half, half * sizeof *both);
+    if (!behind) memcpy(both + half, both, half * sizeof *both);
+    s->profile = both;
+    return TXM_OK;
+}
+
+/* The colour at a place of the strip by its profiles, blended along the hole. */
+static void txi_strip_profile_at(const txi_strip *s, double column, double row, double rgb[3]) {
+    const double along = (column - s->first + 1) / (s->last - s->first + 2);
+    const double t = along < 0 ? 0 : along > 1 ? 1 : along;
+    const double r = row < 0 ? 0 : row > s->rows - 1 ? s->rows - 1 : row;
+    const int j = (int)r < s->rows - 1 ? (int)r : s->rows - 2;
+    for (int c = 0; c < 3; c++) {
+        const float *p = s->profile + 3 * j + c, *q = p + 3 * s->rows;
+        const double before = (double)p[0] + (r - j) * ((double)p[3] - (double)p[0]);
+        const double behind = (double)q[0] + (r - j) * ((double)q[3] - (double)q[0]);
+        rgb[c] = before + t * (behind - before);
+    }
+}
+
 /* ---- the graph of all patches -------------------------------------------------------------------
    The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with those
    of the other.                                                                                 */
@@ -9754,15 +9812,18 @@ static void txi_strips_body(void *context, int index) {
         txi_strip_unary(s, k, feature, mask, all->unary + all->firsts[s->node + k]);
 }
 
-/* The sources of all strips, and the graph of all patches. */
-static txm_status txi_strips_graph(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
+/* The sources of all strips, and the graph of all patches. profiles: there are to be none; strips
+   without patches get profiles. */
+static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines, const txi_curve *curves,
                                    txm_arena *arena, txm_env *env) {
     size_t labels = 0;
     for (int i = 0; i < all->count; i++) {
         txi_strip *s = &all->strips[i];
-        txm_status status = txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
+        txm_status status =
+            profiles ? TXM_OK : txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
+        if (status == TXM_OK && !profiles) txi_strip_labels(s);
+        if (status == TXM_OK && !s->node_count) status = txi_strip_profile(s, arena, env);
         if (status != TXM_OK) return status;
-        txi_strip_labels(s);
         s->node = all->node_count;
         all->node_count += s->node_count;
         all->link_count += s->node_count ? s->node_count - 1 : 0;
@@ -10057,40 +10118,72 @@ static int txi_lay_pull(const txi_lay *lay, const txi_strip *s, double away, int
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
-/* One pixel of a strip, if no other strip has a better claim to it. */
-static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
-    const txi_window *w = lay->all->w;
-    const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
+/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends, at its
+   side, or another strip has a better claim to it. */
+typedef struct txi_strip_spot {
+    double column, row, across, away, half;
+    float claim;
+} txi_strip_spot;
+
+static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, size_t at, txi_strip_spot *o) {
     const int i = lay->columns[at];
-    const txm_vec2 t = s->line.along[i];
-    const double dx = x - (double)s->line.place[i].x, dy = y - (double)s->line.place[i].y;
-    const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
-    const double half = s->line.half[i];
-    const double away = (across < 0 ? -across : across) - half;
-    const double claim = away > TXI_LAY_CLAIM ? away - TXI_LAY_CLAIM : 0;
-    double rgb[3];
-    if (ahead > 1.5 || ahead < -1.5 || away >= TXI_STRIP_MARGIN || claim >= lay->claims[at]) return;
-    const double row = txi_offset_row(across, s->inside, half), column = i + ahead;
-    const int j = txm_clampi((int)(row + 0.5), 0, s->rows - 1);
-    const int k = txi_lay_patch(lay, s, column, j), centre = s->first + k * s->hop;
-    const txi_column from = txi_column_at(s, s->chosen[k], column - centre);
-    const txm_vec2 p = txi_column_place(&from, txi_row_offset(row, s->inside, (double)from.half));
-    const int pull = txi_lay_pull(lay, s, away, i);
-    if (!pull || !txi_lay_pixel(w, (double)p.x, (double)p.y, rgb)) return;
+    const txm_vec2 t = s->line.along[i], p = s->line.place[i];
+    const double dx = x - (double)p.x, dy = y - (double)p.y;
+    const double ahead = dx * t.x + dy * t.y;
+    o->half = s->line.half[i];
+    o->across = dy * t.x - dx * t.y;
+    o->away = (o->across < 0 ? -o->across : o->across) - o->half;
+    o->column = i + ahead;
+    o->row = txi_offset_row(o->across, s->inside, o->half);
+    o->claim = o->away > TXI_LAY_CLAIM ? txm_float(o->away - TXI_LAY_CLAIM) : 0;
+    return ahead <= 1.5 && ahead >= -1.5 && o->away < TXI_STRIP_MARGIN && o->claim < lay->claims[at];
+}
+
+static uint8_t txi_lay_round(double value) {
+    return (uint8_t)(value < 0 ? 0 : value > 254.5 ? 255 : (int)(value + 0.5));
+}
+
+/* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is not
+   known there. */
+static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_spot *o, size_t at) {
+    const int j = txm_clampi((int)(o->row + 0.5), 0, s->rows - 1);
+    const int k = txi_lay_patch(lay, s, o->column, j), centre = s->first + k * s->hop;
+    const txi_column from = txi_column_at(s, s->chosen[k], o->column - centre);
+    const txm_vec2 p =
+        txi_column_place(&from, txi_row_offset(o->row, s->inside, (double)from.half));
     const float *offset = lay->all->offsets + (size_t)(s->node + k) * 3 * TXI_STRIP_ROWS + 3 * j;
-    const int next = column >= centre ? (k + 1 < s->node_count ? 1 : 0) : k > 0 ? -1 : 0;
-    const double mix = (column >= centre ? column - centre : centre - column) / s->hop;
+    const int forward = o->column >= centre;
+    const int next = forward ? (k + 1 < s->node_count ? 1 : 0) : k > 0 ? -1 : 0;
+    const double mix = (forward ? o->column - centre : centre - o->column) / s->hop;
+    double rgb[3];
+    if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return 0;
     for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
-        const double there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
-        const double value = rgb[c] + (double)offset[c] + (there - (double)offset[c]) * mix + 0.5;
-        lay->plan->color[4 * at + (size_t)c] =
-            (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : (int)value);
+        const double here = (double)offset[c], there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
+        lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
-    lay->claims[at] = txm_float(claim);
-    lay->plan->pull[at] = (uint8_t)pull;
     lay->plan->copies[at].x = p.x;
     lay->plan->copies[at].y = p.y;
     lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
+    return 1;
+}
+
+/* One pixel of a strip. */
+static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
+    const size_t at = (size_t)y * (size_t)lay->all->w->width + (size_t)x;
+    txi_strip_spot o;
+    if (!txi_lay_spot(lay, s, x, y, at, &o)) return;
+    const int pull = txi_lay_pull(lay, s, o.away, lay->columns[at]);
+    if (!pull) return;
+    if (s->node_count) {
+        if (!txi_lay_patch_at(lay, s, &o, at)) return;
+    } else {
+        double rgb[3];
+        txi_strip_profile_at(s, o.column, o.row, rgb);
+        for (int c = 0; c < 3; c++) lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c]);
+        lay->plan->copies[at].piece = -1;
+    }
+    lay->claims[at] = o.claim;
+    lay->plan->pull[at] = (uint8_t)pull;
 }
 
 /* The pose of a patch: both frames at its centre. */
@@ -10112,7 +10205,7 @@ static void txi_lay_all(txi_lay *lay) {
     for (int k = 0; k < lay->all->count; k++) {
         const txi_strip *s = &lay->all->strips[lay->all->order[k]];
         int box[4];
-        if (!s->node_count) continue;
+        if (!s->node_count && !s->profile) continue;
         for (int n = 0; n < s->node_count; n++) lay->poses[s->node + n] = txi_lay_pose(s, n);
         txi_lay_nearest(lay, s, box);
         for (int y = box[1]; y <= box[3]; y++) {
@@ -10171,15 +10264,15 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
 
 /* ---- the plan ---- */
 
-static txm_status txi_plan_run(txi_strips *all, const txi_lines *lines, const txi_curve *curves,
-                               int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
+static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *lines,
+                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
                                txm_env *env, txi_plan *plan, txi_pose **poses) {
     const txi_window *w = all->w;
     const size_t pixels = (size_t)w->width * (size_t)w->height;
     txi_lay lay;
     txm_status status = txi_strips_make(w, curves, count, all, scratch, env);
     if (status == TXM_OK) status = txi_strips_order(all, curves, scratch, env);
-    if (status == TXM_OK) status = txi_strips_graph(all, lines, curves, scratch, env);
+    if (status == TXM_OK) status = txi_strips_graph(all, profiles, lines, curves, scratch, env);
     if (status == TXM_OK) status = txi_strips_choose(all, seed, scratch, env);
     if (status == TXM_OK) status = txi_strips_finish(all, scratch, env);
     if (status != TXM_OK) return status;
@@ -10228,11 +10321,29 @@ static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, con
     all.w = w;
     txm_arena_init(&scratch, env);
     const txm_status status =
-        txi_plan_run(&all, lines, curves, count, seed, arena, &scratch, env, plan, &made);
+        txi_plan_run(&all, 0, lines, curves, count, seed, arena, &scratch, env, plan, &made);
     txm_arena_free(&scratch);
     if (status != TXM_OK) memset(plan, 0, sizeof *plan);
     *poses = status == TXM_OK ? made : NULL;
     *pose_count = status == TXM_OK ? all.node_count : 0;
+    return status;
+}
+
+/* The same without texture: the colours across each line are the mean ones of its known ends, blended
+   along it. plan->copies has no pieces. */
+static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
+                              int count, txm_arena *arena, txm_env *env, txi_plan *plan) {
+    txi_strips all;
+    txi_pose *none = NULL;
+    txm_arena scratch;
+    memset(&all, 0, sizeof all);
+    memset(plan, 0, sizeof *plan);
+    all.w = w;
+    txm_arena_init(&scratch, env);
+    const txm_status status =
+        txi_plan_run(&all, 1, lines, curves, count, 0, arena, &scratch, env, plan, &none);
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
     return status;
 }
 
