@@ -1308,6 +1308,7 @@ typedef struct txi_disk {
     size_t face_count, room;
     uint32_t *corner;       /* 3 per face: its vertices, of the disk; while it grows, to be resolved
                                by txi_root                                                       */
+    uint32_t *grown_from;   /* 1 per face: the face that it was added to; the first: itself      */
     size_t vertex_count;
     uint32_t *parent;       /* while it grows: vertices that are one                             */
     uint32_t *next, *prev;  /* the loop of sides that are the border; side k of face i is 3 i + k */
@@ -1327,6 +1328,7 @@ static txm_status txi_disk_init(txi_disk *disk, const txi_surface *s, size_t roo
     disk->room = room;
     disk->faces = (uint32_t *)txm_arena_alloc(arena, room, sizeof(uint32_t));
     disk->corner = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
+    disk->grown_from = (uint32_t *)txm_arena_alloc(arena, room, sizeof(uint32_t));
     disk->parent = (uint32_t *)txm_arena_alloc(arena, room + 2, sizeof(uint32_t));
     disk->next = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
     disk->prev = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
@@ -1360,6 +1362,7 @@ static void txi_disk_link(txi_disk *disk, uint32_t side, uint32_t next) {
 /* The first face. */
 static void txi_disk_begin(txi_disk *disk, uint32_t face) {
     disk->faces[0] = face;
+    disk->grown_from[0] = 0;
     disk->slot[face] = 0;
     disk->face_count = 1;
     disk->loop = 3;
@@ -1431,6 +1434,7 @@ static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
     const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side], behind = disk->next[side];
     const uint32_t base = 3 * i + o % 3, n1 = txi_next_corner(base), n2 = txi_next_corner(n1);
     disk->faces[i] = o / 3;
+    disk->grown_from[i] = side / 3;
     disk->slot[o / 3] = i;
     disk->corner[base] = disk->corner[txi_next_corner(side)];
     disk->corner[n1] = disk->corner[side];
@@ -2556,6 +2560,7 @@ typedef struct txi_sheet {
     txi_flat flat;
     double *rigid;         /* by face of the disk                                                 */
     txm_vec2 *at;          /* by vertex of the disk: where it lies in the window                  */
+    uint8_t *shown;        /* by face of the disk: it is in the window                            */
     txm_vec3 *normal;      /* by vertex of the disk                                               */
     int width, height;     /* of the window                                                       */
     int slit;              /* the disk may be slit within the hole                                */
@@ -2981,39 +2986,6 @@ static int txi_lies_right(const txi_sheet *l, size_t i) {
     return txi_cross2(l->at[c[0]], l->at[c[1]], l->at[c[2]]) < -1e-9;
 }
 
-/* Fill the pixels whose centres the faces of the disk cover. Where the disk overlaps itself the face that
-   came first stays, which is the one nearer to the hole. */
-static void txi_sheet_pixels(const txi_sheet *l, txi_window *w) {
-    w->spacing = l->pixel;
-    w->origin = l->flat.point[0];
-    for (size_t i = 0; i < l->disk.face_count; i++) {
-        txm_vec2 t[3];
-        double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
-        if (!txi_lies_right(l, i)) continue;
-        for (size_t k = 0; k < 3; k++) t[k] = l->at[l->disk.corner[3 * i + k]];
-        txi_texel_steps(l, i, right, down);
-        const int mirrored = right[0] * down[1] - right[1] * down[0] < 0;
-        const float top = txm_minf(t[0].y, txm_minf(t[1].y, t[2].y));
-        const float bottom = txm_maxf(t[0].y, txm_maxf(t[1].y, t[2].y));
-        const float from = txm_minf(t[0].x, txm_minf(t[1].x, t[2].x));
-        const float to = txm_maxf(t[0].x, txm_maxf(t[1].x, t[2].x));
-        const int x0 = txm_clampi((int)ceil((double)from - 1e-4), 0, w->width - 1);
-        const int x1 = txm_clampi((int)floor((double)to + 1e-4), 0, w->width - 1);
-        const int y0 = txm_clampi((int)ceil((double)top - 1e-4), 0, w->height - 1);
-        const int y1 = txm_clampi((int)floor((double)bottom + 1e-4), 0, w->height - 1);
-        for (int y = y0; y <= y1; y++) {
-            for (int x = x0; x <= x1; x++) {
-                const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
-                if (w->face[pixel] != TXI_NO_FACE || !txi_weights(t, x, y, weight)) continue;
-                if (weight[0] < -1e-6 || weight[1] < -1e-6 || weight[2] < -1e-6) continue;
-                txi_sheet_pixel(l, w, pixel, i, weight, right, mirrored);
-            }
-        }
-    }
-}
-
-/* ---- layout: targets ------------------------------------------------------------------------- */
-
 /* Is face i of the disk laid out with little distortion: its singular values between 1 / TXI_STRETCH
    and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
 
@@ -3031,6 +3003,53 @@ static int txi_is_true(const txi_sheet *l, size_t i) {
     const double n = sqrt((a - d) * (a - d) + (c + b) * (c + b)) / 2;
     return m + n < TXI_STRETCH && fabs(m - n) > 1 / TXI_STRETCH;
 }
+
+/* Go through the pixels whose centres face i of the disk covers. With fill they are filled unless another
+   face has been there first, the one nearer to the hole. Returns how many others cover within it. */
+static size_t txi_sheet_face(const txi_sheet *l, txi_window *w, size_t i, int fill) {
+    txm_vec2 t[3];
+    double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
+    size_t taken = 0;
+    for (size_t k = 0; k < 3; k++) t[k] = l->at[l->disk.corner[3 * i + k]];
+    txi_texel_steps(l, i, right, down);
+    const int mirrored = right[0] * down[1] - right[1] * down[0] < 0;
+    const float top = txm_minf(t[0].y, txm_minf(t[1].y, t[2].y));
+    const float bottom = txm_maxf(t[0].y, txm_maxf(t[1].y, t[2].y));
+    const float from = txm_minf(t[0].x, txm_minf(t[1].x, t[2].x));
+    const float to = txm_maxf(t[0].x, txm_maxf(t[1].x, t[2].x));
+    const int x0 = txm_clampi((int)ceil((double)from - 1e-4), 0, w->width - 1);
+    const int x1 = txm_clampi((int)floor((double)to + 1e-4), 0, w->width - 1);
+    const int y0 = txm_clampi((int)ceil((double)top - 1e-4), 0, w->height - 1);
+    const int y1 = txm_clampi((int)floor((double)bottom + 1e-4), 0, w->height - 1);
+    for (int y = y0; y <= y1; y++) {
+        for (int x = x0; x <= x1; x++) {
+            const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
+            if (!txi_weights(t, x, y, weight)) continue;
+            const double least = fmin(weight[0], fmin(weight[1], weight[2]));
+            if (least < -1e-6) continue;
+            if (w->face[pixel] != TXI_NO_FACE) taken += least > 1e-3;
+            else if (fill) txi_sheet_pixel(l, w, pixel, i, weight, right, mirrored);
+        }
+    }
+    return taken;
+}
+
+/* Fill the pixels that the disk covers. Left out is what is known but lies badly: faces that are much
+   distorted or lie over others, and those that were added behind them.
+   shown  receives 1 per face of the disk                                                      */
+static void txi_sheet_pixels(const txi_sheet *l, txi_window *w, uint8_t *shown) {
+    w->spacing = l->pixel;
+    w->origin = l->flat.point[0];
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        shown[i] = (uint8_t)txi_lies_right(l, i);
+        if (shown[i] && l->state[l->disk.faces[i]] != TXI_SHEET_GROUP)
+            shown[i] = txi_is_true(l, i) && (i == 0 || shown[l->disk.grown_from[i]]) &&
+                       txi_sheet_face(l, w, i, 0) == 0;
+        if (shown[i]) txi_sheet_face(l, w, i, 1);
+    }
+}
+
+/* ---- layout: targets ------------------------------------------------------------------------- */
 
 /* Mark the pixels along the border of the disk where the surface goes on: all of it, or only where it
    goes through the hole. Returns how many sides that were. */
@@ -3086,6 +3105,7 @@ static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const
     const int x = txm_clampi((int)((double)t->x + 0.5), 0, w->width - 1);
     const int y = txm_clampi((int)((double)t->y + 0.5), 0, w->height - 1);
     const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
+    if (!l->shown[i]) return 0;
     if (w->face[pixel] == TXI_NO_FACE || w->face[pixel] == l->disk.faces[i]) return 1;
     const txm_dvec3 p = txm_d3_scale(txm_d3_sub(txi_texel_point(l->d, l->disk.faces[i], t->texel),
                                                 l->flat.point[0]), 1 / l->pixel);
@@ -3243,6 +3263,7 @@ static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, i
     l->at = (txm_vec2 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec2));
     l->normal = (txm_vec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec3));
     uint32_t *counts = (uint32_t *)txm_arena_alloc(l->scratch, faces, sizeof(uint32_t));
+    l->shown = (uint8_t *)txm_arena_alloc(l->scratch, l->disk.face_count, 1);
     if (l->scratch->failed) return txi_no_memory(l->env);
     if (!txi_sheet_place(l, counts)) {
         if (is_last) return txi_sheet_alone(l, arena, w);
@@ -3259,7 +3280,7 @@ static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, i
     if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, room, sizeof(txi_target));
     if (status != TXM_OK || !w->targets) return txi_no_memory(l->env);
     txi_sheet_normals(l);
-    txi_sheet_pixels(l, w);
+    txi_sheet_pixels(l, w, l->shown);
     *again = !txi_sheet_targets(l, w, marks, nearest, &status);
     if (status == TXM_OK && !*again) status = txi_sheet_others(l, w, marks, nearest, room);
     return status;

@@ -15,6 +15,7 @@ typedef struct txi_disk {
     size_t face_count, room;
     uint32_t *corner;       /* 3 per face: its vertices, of the disk; while it grows, to be resolved
                                by txi_root                                                       */
+    uint32_t *grown_from;   /* 1 per face: the face that it was added to; the first: itself      */
     size_t vertex_count;
     uint32_t *parent;       /* while it grows: vertices that are one                             */
     uint32_t *next, *prev;  /* the loop of sides that are the border; side k of face i is 3 i + k */
@@ -34,6 +35,7 @@ static txm_status txi_disk_init(txi_disk *disk, const txi_surface *s, size_t roo
     disk->room = room;
     disk->faces = (uint32_t *)txm_arena_alloc(arena, room, sizeof(uint32_t));
     disk->corner = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
+    disk->grown_from = (uint32_t *)txm_arena_alloc(arena, room, sizeof(uint32_t));
     disk->parent = (uint32_t *)txm_arena_alloc(arena, room + 2, sizeof(uint32_t));
     disk->next = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
     disk->prev = (uint32_t *)txm_arena_alloc(arena, room, 3 * sizeof(uint32_t));
@@ -67,6 +69,7 @@ static void txi_disk_link(txi_disk *disk, uint32_t side, uint32_t next) {
 /* The first face. */
 static void txi_disk_begin(txi_disk *disk, uint32_t face) {
     disk->faces[0] = face;
+    disk->grown_from[0] = 0;
     disk->slot[face] = 0;
     disk->face_count = 1;
     disk->loop = 3;
@@ -138,6 +141,7 @@ static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
     const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side], behind = disk->next[side];
     const uint32_t base = 3 * i + o % 3, n1 = txi_next_corner(base), n2 = txi_next_corner(n1);
     disk->faces[i] = o / 3;
+    disk->grown_from[i] = side / 3;
     disk->slot[o / 3] = i;
     disk->corner[base] = disk->corner[txi_next_corner(side)];
     disk->corner[n1] = disk->corner[side];
