@@ -10368,6 +10368,18 @@ static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const
     return status;
 }
 
+/* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per pixel. */
+static void txi_draw_strips(const txi_window *w, const txi_plan *plan, uint8_t *rgb) {
+    for (size_t i = 0; i < (size_t)w->width * (size_t)w->height; i++) {
+        for (size_t c = 0; c < 3; c++) {
+            const int laid = (plan->color[4 * i + c] * plan->pull[i] + 90 * (255 - plan->pull[i])) / 255;
+            rgb[3 * i + c] = w->state[i] == TXI_VOID ? 0
+                             : w->state[i] == TXI_HOLE ? (uint8_t)laid
+                                                       : w->color[4 * i + c];
+        }
+    }
+}
+
 /* ---- levels of a window -------------------------------------------------------------------- */
 
 enum {
@@ -13063,6 +13075,7 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
 /* Show what was found and tried. */
 static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
     static const char *const lines[] = {"", "lines-texture", "lines-picture", "lines-pattern"};
+    static const char *const strips[] = {"", "strips-texture", "strips-picture", "strips-pattern"};
     static const char *const names[] = {"", "half-texture", "half-picture", "half-pattern"};
     enum { SCALE = 3 };
     const txi_window *w = c->w;
@@ -13073,6 +13086,10 @@ static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
         const txi_hypothesis *h = &c->tried[i];
         txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
         txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
+        if (h->plan.color) {
+            txi_draw_strips(w, &h->plan, rgb);
+            txi_show(c->domain, strips[h->structure], rgb, w->width, w->height, 3);
+        }
         for (size_t p = 0; p < (size_t)w->width * (size_t)w->height; p++) {
             const uint8_t *from = (w->state[p] == TXI_HOLE ? h->preview : w->color) + 4 * p;
             for (int k = 0; k < 3; k++) rgb[3 * p + (size_t)k] = from[k];

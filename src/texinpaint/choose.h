@@ -121,6 +121,7 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
 /* Show what was found and tried. */
 static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
     static const char *const lines[] = {"", "lines-texture", "lines-picture", "lines-pattern"};
+    static const char *const strips[] = {"", "strips-texture", "strips-picture", "strips-pattern"};
     static const char *const names[] = {"", "half-texture", "half-picture", "half-pattern"};
     enum { SCALE = 3 };
     const txi_window *w = c->w;
@@ -131,6 +132,10 @@ static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
         const txi_hypothesis *h = &c->tried[i];
         txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
         txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
+        if (h->plan.color) {
+            txi_draw_strips(w, &h->plan, rgb);
+            txi_show(c->domain, strips[h->structure], rgb, w->width, w->height, 3);
+        }
         for (size_t p = 0; p < (size_t)w->width * (size_t)w->height; p++) {
             const uint8_t *from = (w->state[p] == TXI_HOLE ? h->preview : w->color) + 4 * p;
             for (int k = 0; k < 3; k++) rgb[3 * p + (size_t)k] = from[k];

@@ -458,4 +458,16 @@ static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const
     return status;
 }
 
+/* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per pixel. */
+static void txi_draw_strips(const txi_window *w, const txi_plan *plan, uint8_t *rgb) {
+    for (size_t i = 0; i < (size_t)w->width * (size_t)w->height; i++) {
+        for (size_t c = 0; c < 3; c++) {
+            const int laid = (plan->color[4 * i + c] * plan->pull[i] + 90 * (255 - plan->pull[i])) / 255;
+            rgb[3 * i + c] = w->state[i] == TXI_VOID ? 0
+                             : w->state[i] == TXI_HOLE ? (uint8_t)laid
+                                                       : w->color[4 * i + c];
+        }
+    }
+}
+
 #endif /* TEXINPAINT_LAY_H */
