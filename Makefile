@@ -76,9 +76,9 @@ $(BUILD)/texkit: $(TEXKIT)
 	$(LINK) $^ -o $@ -lcjson -lm
 
 # small programs that the demo, the tests and the benchmark use
-helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/shape $(BUILD)/view
+helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/scan $(BUILD)/shape $(BUILD)/view
 
-$(BUILD)/crop $(BUILD)/draw: $(BUILD)/%: $(BUILD)/helpers/%.o $(IMAGES)
+$(BUILD)/crop $(BUILD)/draw $(BUILD)/scan: $(BUILD)/%: $(BUILD)/helpers/%.o $(IMAGES)
 	$(LINK) $^ -o $@ -lm
 
 $(BUILD)/shape: $(BUILD)/helpers/shape.o
@@ -102,6 +102,7 @@ $(BUILD)/examples/%: examples/%/main.c $(BUILD)/files/stb.o $(SOURCES)
 
 $(BUILD)/examples/membrane: $(wildcard examples/membrane/*)
 $(BUILD)/examples/membrane: $(BUILD)/helpers/render.o $(MESHES) $(IMAGES)
+$(BUILD)/examples/repair: $(BUILD)/helpers/render.o $(MESHES) $(IMAGES)
 $(BUILD)/examples/join: $(IMAGES)
 $(BUILD)/examples/join: CPPFLAGS += -D_FILE_OFFSET_BITS=64
 $(BUILD)/examples/brush: $(wildcard examples/brush/*)

@@ -72,7 +72,7 @@ golden: $(GOLDEN:%=$(BUILD)/golden/golden_%)
 # ---- running: NAME.done is made by a test that has passed, NAME.log holds what it printed
 
 KIT      := $(wildcard tests/kit/*)
-HELPERS   = $(addprefix $(BUILD)/,texkit crop draw shape view)
+HELPERS   = $(addprefix $(BUILD)/,texkit crop draw scan shape view)
 TOOL_RUNS = $(patsubst tests/tool/%.sh,tool_%,$(wildcard tests/tool/*.sh))
 LOOK_RUNS = $(patsubst tests/look/%.sh,look_%,$(wildcard tests/look/*.sh))
 WIDE_RUNS = $(patsubst tests/wide/%.sh,wide_%,$(wildcard tests/wide/*.sh))

@@ -45,6 +45,13 @@ check "retile" run 0 retile torus.obj -o torus.glb --vertices 200
 check "has so many places" check_tool glb torus.glb places=200
 refuses 1 "No such file" retile missing.obj -o n.obj --vertices 100
 
+"$root/build/scan" ball ball 192
+check "inpaint" run 0 inpaint --mesh ball.obj --texture ball.png --mask ball-mask.png -o whole.png
+check "changes nothing that is known, and the rest" check_tool inpaint kept ball.png ball-mask.png whole.png
+check "in a picture" run 0 inpaint ball.png --mask ball-mask.png -o flat.png
+check "differs from that on the mesh" sh -c "! cmp -s whole.png flat.png"
+refuses 2 "add --mask" inpaint ball.png -o n.png
+
 check "tree" run 0 tree -o tree.glb --species oak --pieces 60 --sheet 128 --wind 5 --seconds 1 \
     --rate 4 --stats stats.json
 check "is whole, closed and moves" check_tool tree skin tree.glb keys=5 seconds=1 \

@@ -48,10 +48,10 @@ static int check_pairs(inpaint_job *j) {
     const int on_mesh = j->mesh_path != NULL, is_simple = j->smooth || j->dilate;
     const char *picture = j->run.inputs[0];
     const conflict list[] = {
+        {!on_mesh && j->texture, "--texture goes with --mesh; a plain picture is IMAGE"},
         {!picture && !on_mesh, "no picture given; name IMAGE, or --mesh and --texture"},
         {picture && on_mesh, "give IMAGE, or --mesh and --texture, not both"},
         {!picture && on_mesh && !j->texture, "--mesh needs its texture; add --texture T"},
-        {!on_mesh && j->texture, "--texture goes with --mesh; a plain picture is IMAGE"},
         {j->smooth && j->dilate, "choose one of --smooth and --dilate"},
         {j->dilate && !on_mesh, "--dilate goes with --mesh"},
         {!j->mask && !j->dilate, "no mask given; add --mask M, white where the picture is missing"},
