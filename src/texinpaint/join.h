@@ -9,7 +9,8 @@
 typedef struct txi_pairing {
     const txi_link *links;
     int link_count, end_count;
-    double unmatched, crossing;
+    double crossing;
+    float *saved;      /* one per link: what it saves, as its ends are no longer unmatched        */
     uint8_t *crosses;  /* link_count squared: 0 not known yet, 1 no, 2 yes                         */
     int *chosen;       /* one per end: its link, or -1                                           */
     int *active;       /* the chosen links                                                       */
@@ -80,19 +81,14 @@ static void txi_deactivate(txi_pairing *m, int k) {
     if (m->links[k].b >= 0) m->chosen[m->links[k].b] = -1;
 }
 
-/* How much matching link k saves: its ends are no longer unmatched. */
-static double txi_saved(const txi_pairing *m, int k) {
-    return m->unmatched * (m->links[k].b >= 0 ? 2 : 1);
-}
-
 static double txi_remove(txi_pairing *m, int k) {
-    const double change = txi_saved(m, k) - txi_link_energy(m, k);
+    const double change = (double)m->saved[k] - txi_link_energy(m, k);
     txi_deactivate(m, k);
     return change;
 }
 
 static double txi_insert(txi_pairing *m, int k) {
-    const double change = txi_link_energy(m, k) - txi_saved(m, k);
+    const double change = txi_link_energy(m, k) - (double)m->saved[k];
     txi_activate(m, k);
     return change;
 }
@@ -147,16 +143,17 @@ static double txi_pairing_try(txi_pairing *m, int k, double allowed) {
     return 0;
 }
 
-static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int count, int ends,
-                                 const txi_rules *rules, txm_arena *scratch, txm_env *env) {
+static txm_status txi_pairing_make(txi_pairing *m, const txi_pairs *pairs, const txi_link *links,
+                                   int count, txm_arena *scratch, txm_env *env) {
+    const int ends = pairs->l->end_count;
     const size_t n = (size_t)count, e = (size_t)ends;
     memset(m, 0, sizeof *m);
     m->links = links;
     m->link_count = count;
     m->end_count = ends;
-    m->unmatched = rules->unmatched;
-    m->crossing = rules->crossing;
+    m->crossing = pairs->rules.crossing;
     m->crosses = (uint8_t *)txm_arena_zero(scratch, n, n);
+    m->saved = (float *)txm_arena_alloc(scratch, n, sizeof *m->saved);
     m->chosen = (int *)txm_arena_alloc(scratch, e, sizeof(int));
     m->active = (int *)txm_arena_alloc(scratch, n, sizeof(int));
     m->slot = (int *)txm_arena_alloc(scratch, n, sizeof(int));
@@ -166,6 +163,7 @@ static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int co
     for (int i = 0; i < ends; i++) m->chosen[i] = -1;
     for (int k = 0; k < count; k++) {
         m->slot[k] = -1;
+        m->saved[k] = txm_float(txi_saved_by(pairs->l, &pairs->rules, &links[k]));
         m->of_start[links[k].a + 2]++;
         if (links[k].b >= 0) m->of_start[links[k].b + 2]++;
     }
@@ -398,7 +396,7 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)l->end_count, sizeof **curves);
     if (status == TXM_OK && (scratch.failed || arena->failed)) status = txi_no_memory(env);
     if (status == TXM_OK) n = txi_candidates(&pairs, links);
-    if (n) status = txi_pairing_make(&match, links, n, l->end_count, &pairs.rules, &scratch, env);
+    if (n) status = txi_pairing_make(&match, &pairs, links, n, &scratch, env);
     if (n && status == TXM_OK) {
         txi_anneal(&match, seed, best);
         status = txi_join_curves(&pairs, &match, &scratch, arena, env, *curves, count);

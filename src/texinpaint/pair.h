@@ -32,6 +32,7 @@ typedef struct txi_link {
 /* What a way of joining costs. All without unit; ours, from the recipe's experiments. */
 typedef struct txi_rules {
     double unmatched; /* an end that is not joined                                               */
+    double weak;      /* share of that for ends that are not long                                */
     double crossing;  /* two curves that cross                                                   */
     double bend;      /* factor of the bending energy                                            */
     double votes;     /* less for votes that agree with the curve                                */
@@ -58,9 +59,11 @@ typedef struct txi_pairs {
 } txi_pairs;
 
 static txi_rules txi_rules_of(int structure) {
-    txi_rules picture = {3, 0.3, 1, 1, 1.5, 0.25, 1}, pattern = {6, 2, 0.6, 1, 1.5, 0.25, 0};
+    txi_rules picture = {3, 0.8, 0.3, 1, 1, 1.5, 0.25, 1}, pattern = {6, 0.45, 2, 0.6, 1, 1.5, 0.25, 0};
     return structure == TEXINPAINT_PATTERN ? pattern : picture;
 }
+
+#define TXI_ANGLE_ERROR 1 /* pixels: of a direction, times the length it was measured on; ours    */
 
 /* ---- curves ------------------------------------------------------------------------------ */
 
@@ -79,6 +82,34 @@ static void txi_hermite(txm_vec2 p, txm_vec2 d, txm_vec2 q, txm_vec2 e, int step
         out[i] = txm_v2(txm_float(h0 * p.x + h1 * d.x + g0 * q.x + g1 * e.x),
                         txm_float(h0 * p.y + h1 * d.y + g0 * q.y + g1 * e.y));
     }
+}
+
+/* Directions are known to some degrees only, the less the shorter the piece is that they were measured
+   on. Within that, turn both ends towards an arc, whose ends have opposite angles to the chord, and if
+   that is nearly straight towards the chord. So two edges of a bar stay parallel. */
+static void txi_straighten(const txi_end *a, const txi_end *b, txm_vec2 *d, txm_vec2 *e) {
+    const txm_vec2 c = txi_unit((double)b->place.x - a->place.x, (double)b->place.y - a->place.y);
+    const double fa = a->fit_length > 6 ? a->fit_length : 6, fb = b->fit_length > 6 ? b->fit_length : 6;
+    const double va = TXI_ANGLE_ERROR / fa, vb = TXI_ANGLE_ERROR / fb; /* largest errors              */
+    const double ca = (double)c.x * a->heading.x + (double)c.y * a->heading.y;
+    const double cb = -((double)c.x * b->heading.x + (double)c.y * b->heading.y);
+    *d = a->heading;
+    *e = b->heading;
+    if (ca < 0.7 || cb < 0.7) return;
+    /* sines of the angles from the chord: of the start, and of the direction in which it arrives     */
+    double sa = (double)c.x * a->heading.y - (double)c.y * a->heading.x;
+    double sb = -((double)c.x * b->heading.y - (double)c.y * b->heading.x);
+    const double excess = sa + sb, most = va + vb; /* 0 for an arc                                  */
+    const double share = excess > most ? 1 : excess < -most ? -1 : excess / most;
+    sa -= share * va;
+    sb -= share * vb;
+    const double mean = 0.5 * (sa - sb), least = va < vb ? va : vb;
+    const double less = mean > least ? least : mean < -least ? -least : mean;
+    sa -= less;
+    sb += less;
+    const double da = sqrt(1 - sa * sa), db = sqrt(1 - sb * sb);
+    *d = txi_unit(c.x * da - c.y * sa, c.y * da + c.x * sa);
+    *e = txi_unit(-(c.x * db - c.y * sb), -(c.y * db + c.x * sb));
 }
 
 /* Length of a line, and its bending energy: length times the integral of squared curvature, which is
@@ -180,9 +211,11 @@ static void txi_prior_curve(const txi_prior *prior, const txi_link *k, txm_vec2 
 /* The curve of a candidate, steps + 1 points. */
 static void txi_link_curve(const txi_pairs *pairs, const txi_link *k, int steps, txm_vec2 *out) {
     const txi_end *a = &pairs->l->ends[k->a], *b = k->b >= 0 ? &pairs->l->ends[k->b] : NULL;
-    const txm_vec2 q = b ? b->place : k->leave, e = b ? b->heading : k->backwards;
-    if (k->line >= 0) txi_prior_curve(pairs->prior, k, a->place, a->heading, q, e, steps, out);
-    else txi_hermite(a->place, a->heading, q, e, steps, out);
+    const txm_vec2 q = b ? b->place : k->leave;
+    txm_vec2 d = a->heading, e = b ? b->heading : k->backwards;
+    if (b) txi_straighten(a, b, &d, &e);
+    if (k->line >= 0) txi_prior_curve(pairs->prior, k, a->place, d, q, e, steps, out);
+    else txi_hermite(a->place, d, q, e, steps, out);
 }
 
 /* The prior line that passes both ends nearest, into the candidate; 0: none. b = -1: any line near a. */
@@ -301,7 +334,7 @@ static int txi_link_ends(const txi_pairs *pairs, int a, int b, txi_link *k) {
         shape = 0.1 * fabs((double)u->offset - v->offset) - pairs->rules.prior;
     }
     const double u = (double)p->contrast + 2, v = (double)q->contrast + 2;
-    k->cost = txm_float(shape + 3 * (1 - correlation) + 1.5 * (mismatch < 2 ? mismatch : 2) +
+    k->cost = txm_float(shape + 3 * (1 - correlation) + 2 * (mismatch < 2 ? mismatch : 2) +
                         0.6 * fabs(u - v) / (u + v) + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
                         0.3 * !p->is_long + 0.3 * !q->is_long);
     return 1;
@@ -379,7 +412,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
     k->line = -1;
     if (!txi_link_measure(pairs, k)) return 0;
     k->cost = txm_float(pairs->rules.bend * k->bend + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
-                        0.9 - 0.02 * hits + 0.05 * fabs(offset));
+                        0.75 - 0.02 * hits + 0.05 * fabs(offset));
     return 1;
 }
 
@@ -440,10 +473,17 @@ static txm_status txi_pairs_make(txi_pairs *pairs, const txi_window *w, const tx
     return txi_grow(&pairs->growth, w, l, alpha, beta, scratch, env);
 }
 
+/* What is saved by a candidate, as its ends are no longer unmatched. */
+static double txi_saved_by(const txi_lines *l, const txi_rules *rules, const txi_link *k) {
+    double sum = l->ends[k->a].is_long ? 1 : rules->weak;
+    if (k->b >= 0) sum += l->ends[k->b].is_long ? 1 : rules->weak;
+    return rules->unmatched * sum;
+}
+
 /* Another candidate of an end, which has those from start on: the best TXI_PER_END are kept. */
 static void txi_keep_link(const txi_pairs *pairs, const txi_link *k, txi_link *links, int start,
                           int *count) {
-    if (k->cost >= pairs->rules.unmatched * (k->b >= 0 ? 2 : 1)) return;
+    if (k->cost >= txi_saved_by(pairs->l, &pairs->rules, k)) return;
     if (*count - start < TXI_PER_END) {
         if (*count < TXI_MAX_LINKS) links[(*count)++] = *k;
         return;

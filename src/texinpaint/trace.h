@@ -18,6 +18,8 @@ enum {
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
     TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
+    TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that         */
+    TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own        */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
 
@@ -630,13 +632,26 @@ static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit
     return sqrt(error / total);
 }
 
+/* How far a fitted line is from the first 8 points, root of the mean square. */
+static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) {
+    double s = 0, error = 0;
+    int i = 0;
+    for (; i < n && i < 8; i++) {
+        if (i) s += txi_distance(points[i], points[i - 1]);
+        const double x = fit[0] + fit[1] * s + fit[2] * s * s - points[i].x;
+        const double y = fit[3] + fit[4] * s + fit[5] * s * s - points[i].y;
+        error += x * x + y * y;
+    }
+    return sqrt(error / i);
+}
+
 /* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
 static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) {
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
         const double rms = txi_fit_line(points, n, 2, fit);
-        if (rms < 0.5 || n <= 8) {
+        if ((rms < 0.5 && txi_fit_start(points, n, fit) < 0.3) || n <= 8) {
             /* a straight line unless a bent one is clearly better: the direction is more exact   */
             if (n <= 8 || txi_fit_line(points, n, 1, line) < 1.25 * rms + 0.03) {
                 txi_fit_line(points, n, 1, line);
@@ -645,6 +660,14 @@ static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) 
             break;
         }
         n = n * 3 / 4;
+    }
+    /* a corner near the hole: the first points alone are straight, in another direction            */
+    if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
+        const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
+        if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
+            memcpy(fit, line, sizeof fit);
+            n = TXI_CORNER;
+        }
     }
     for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels     */
         s = -0.25 * i;
@@ -720,40 +743,49 @@ static int txi_end_exists(const txi_lines *l, const txi_end *e) {
     return 0;
 }
 
-/* Ends from points 2.6 to 4.2 pixels outside of the hole, the strongest first. */
+/* Try a point of a line as the end of that line. room: points of one end */
+static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, int room) {
+    txi_end *e = &l->ends[l->end_count];
+    const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
+    double strength;
+    if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.12) return;
+    e->first = l->point_count;
+    e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
+    if (e->count < 5) return;
+    const txm_vec2 p = l->points[e->first];
+    const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
+    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l->points + e->first, e)) return;
+    e->strength = txm_float(strength);
+    e->length = (float)e->count;
+    e->is_long = e->length >= TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
+    txi_profile(w, l, e);
+    if (txi_end_exists(l, e)) return;
+    l->point_count += e->count;
+    l->end_count++;
+}
+
+/* Ends from points near the hole: 2.6 to 4.2 pixels from it, then up to 6 pixels, for lines that are lost
+   on their last pixels; the strongest first. */
 static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
                                 txm_arena *scratch, txm_env *env) {
-    const int room = (int)l->limit + TXI_INNER; /* points of one end                               */
+    const int room = (int)l->limit + TXI_INNER;
     txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
-    size_t count = 0;
     if (l->thin_count == 0) return TXM_OK;
     l->ends = (txi_end *)txm_arena_zero(arena, TXI_MAX_ENDS, sizeof *l->ends);
     l->points = (txm_vec2 *)txm_arena_alloc(arena, TXI_MAX_ENDS * (size_t)room, sizeof *l->points);
     if (arena->failed || scratch->failed) return txi_no_memory(env);
-    for (int i = 0; i < l->thin_count; i++) {
-        const txm_vec2 p = l->thin[i].place;
-        const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
-        if (at < 0 || l->away[at] < 7 || l->away[at] > 17) continue;
-        order[count].key = ~txm_sort_key(l->thin[i].strength);
-        order[count++].value = (uint32_t)i;
-    }
-    txm_sort_pairs(order, order + l->thin_count, count);
-    for (size_t k = 0; k < count && l->end_count < TXI_MAX_ENDS; k++) {
-        const txi_thin *t = &l->thin[order[k].value];
-        txi_end *e = &l->ends[l->end_count];
-        const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
-        double strength;
-        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.12) continue;
-        e->first = l->point_count;
-        e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
-        if (e->count < 5 || !txi_fit_end(w, l->points + e->first, e)) continue;
-        e->strength = txm_float(strength);
-        e->length = (float)e->count;
-        e->is_long = e->length >= 24 || e->length >= 0.8f * l->limit;
-        txi_profile(w, l, e);
-        if (txi_end_exists(l, e)) continue;
-        l->point_count += e->count;
-        l->end_count++;
+    for (int pass = 0; pass < 2; pass++) {
+        size_t count = 0;
+        for (int i = 0; i < l->thin_count; i++) {
+            const txm_vec2 p = l->thin[i].place;
+            const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
+            if (at < 0 || l->away[at] < (pass ? 18 : 7) || l->away[at] > (pass ? 36 : 17)) continue;
+            order[count].key = ~txm_sort_key(l->thin[i].strength);
+            order[count++].value = (uint32_t)i;
+        }
+        txm_sort_pairs(order, order + l->thin_count, count);
+        for (size_t k = 0; k < count && l->end_count < TXI_MAX_ENDS; k++)
+            txi_try_end(w, l, &l->thin[order[k].value], room);
     }
     return TXM_OK;
 }
@@ -872,7 +904,7 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     if (status == TXM_OK)
         status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, env);
     if (status == TXM_OK) {
-        const double strong = 0.35 * txi_strong(&lines->field, lines->away, reach * reach);
+        const double strong = 0.3 * txi_strong(&lines->field, lines->away, reach * reach);
         lines->threshold = txm_float(strong > 6 ? strong : 6);
         status = txi_thin_all(lines, reach * reach, arena, env);
     }
