@@ -6070,6 +6070,8 @@ enum {
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
     TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
+    TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that         */
+    TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own        */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
 
@@ -6682,13 +6684,26 @@ static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit
     return sqrt(error / total);
 }
 
+/* How far a fitted line is from the first 8 points, root of the mean square. */
+static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) {
+    double s = 0, error = 0;
+    int i = 0;
+    for (; i < n && i < 8; i++) {
+        if (i) s += txi_distance(points[i], points[i - 1]);
+        const double x = fit[0] + fit[1] * s + fit[2] * s * s - points[i].x;
+        const double y = fit[3] + fit[4] * s + fit[5] * s * s - points[i].y;
+        error += x * x + y * y;
+    }
+    return sqrt(error / i);
+}
+
 /* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
 static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) {
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
         const double rms = txi_fit_line(points, n, 2, fit);
-        if (rms < 0.5 || n <= 8) {
+        if ((rms < 0.5 && txi_fit_start(points, n, fit) < 0.3) || n <= 8) {
             /* a straight line unless a bent one is clearly better: the direction is more exact   */
             if (n <= 8 || txi_fit_line(points, n, 1, line) < 1.25 * rms + 0.03) {
                 txi_fit_line(points, n, 1, line);
@@ -6697,6 +6712,14 @@ static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) 
             break;
         }
         n = n * 3 / 4;
+    }
+    /* a corner near the hole: the first points alone are straight, in another direction            */
+    if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
+        const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
+        if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
+            memcpy(fit, line, sizeof fit);
+            n = TXI_CORNER;
+        }
     }
     for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels     */
         s = -0.25 * i;
@@ -6772,40 +6795,49 @@ static int txi_end_exists(const txi_lines *l, const txi_end *e) {
     return 0;
 }
 
-/* Ends from points 2.6 to 4.2 pixels outside of the hole, the strongest first. */
+/* Try a point of a line as the end of that line. room: points of one end */
+static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, int room) {
+    txi_end *e = &l->ends[l->end_count];
+    const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
+    double strength;
+    if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.12) return;
+    e->first = l->point_count;
+    e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
+    if (e->count < 5) return;
+    const txm_vec2 p = l->points[e->first];
+    const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
+    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l->points + e->first, e)) return;
+    e->strength = txm_float(strength);
+    e->length = (float)e->count;
+    e->is_long = e->length >= TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
+    txi_profile(w, l, e);
+    if (txi_end_exists(l, e)) return;
+    l->point_count += e->count;
+    l->end_count++;
+}
+
+/* Ends from points near the hole: 2.6 to 4.2 pixels from it, then up to 6 pixels, for lines that are lost
+   on their last pixels; the strongest first. */
 static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
                                 txm_arena *scratch, txm_env *env) {
-    const int room = (int)l->limit + TXI_INNER; /* points of one end                               */
+    const int room = (int)l->limit + TXI_INNER;
     txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
-    size_t count = 0;
     if (l->thin_count == 0) return TXM_OK;
     l->ends = (txi_end *)txm_arena_zero(arena, TXI_MAX_ENDS, sizeof *l->ends);
     l->points = (txm_vec2 *)txm_arena_alloc(arena, TXI_MAX_ENDS * (size_t)room, sizeof *l->points);
     if (arena->failed || scratch->failed) return txi_no_memory(env);
-    for (int i = 0; i < l->thin_count; i++) {
-        const txm_vec2 p = l->thin[i].place;
-        const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
-        if (at < 0 || l->away[at] < 7 || l->away[at] > 17) continue;
-        order[count].key = ~txm_sort_key(l->thin[i].strength);
-        order[count++].value = (uint32_t)i;
-    }
-    txm_sort_pairs(order, order + l->thin_count, count);
-    for (size_t k = 0; k < count && l->end_count < TXI_MAX_ENDS; k++) {
-        const txi_thin *t = &l->thin[order[k].value];
-        txi_end *e = &l->ends[l->end_count];
-        const txm_vec2 in = txi_inwards(l, (int)(t->place.x + 0.5f), (int)(t->place.y + 0.5f));
-        double strength;
-        if (fabs((double)in.x * t->along.x + (double)in.y * t->along.y) < 0.12) continue;
-        e->first = l->point_count;
-        e->count = txi_follow(l, t, in, l->points + e->first, room, &strength);
-        if (e->count < 5 || !txi_fit_end(w, l->points + e->first, e)) continue;
-        e->strength = txm_float(strength);
-        e->length = (float)e->count;
-        e->is_long = e->length >= 24 || e->length >= 0.8f * l->limit;
-        txi_profile(w, l, e);
-        if (txi_end_exists(l, e)) continue;
-        l->point_count += e->count;
-        l->end_count++;
+    for (int pass = 0; pass < 2; pass++) {
+        size_t count = 0;
+        for (int i = 0; i < l->thin_count; i++) {
+            const txm_vec2 p = l->thin[i].place;
+            const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
+            if (at < 0 || l->away[at] < (pass ? 18 : 7) || l->away[at] > (pass ? 36 : 17)) continue;
+            order[count].key = ~txm_sort_key(l->thin[i].strength);
+            order[count++].value = (uint32_t)i;
+        }
+        txm_sort_pairs(order, order + l->thin_count, count);
+        for (size_t k = 0; k < count && l->end_count < TXI_MAX_ENDS; k++)
+            txi_try_end(w, l, &l->thin[order[k].value], room);
     }
     return TXM_OK;
 }
@@ -6924,7 +6956,7 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     if (status == TXM_OK)
         status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, env);
     if (status == TXM_OK) {
-        const double strong = 0.35 * txi_strong(&lines->field, lines->away, reach * reach);
+        const double strong = 0.3 * txi_strong(&lines->field, lines->away, reach * reach);
         lines->threshold = txm_float(strong > 6 ? strong : 6);
         status = txi_thin_all(lines, reach * reach, arena, env);
     }
@@ -7258,6 +7290,7 @@ typedef struct txi_link {
 /* What a way of joining costs. All without unit; ours, from the recipe's experiments. */
 typedef struct txi_rules {
     double unmatched; /* an end that is not joined                                               */
+    double weak;      /* share of that for ends that are not long                                */
     double crossing;  /* two curves that cross                                                   */
     double bend;      /* factor of the bending energy                                            */
     double votes;     /* less for votes that agree with the curve                                */
@@ -7284,9 +7317,11 @@ typedef struct txi_pairs {
 } txi_pairs;
 
 static txi_rules txi_rules_of(int structure) {
-    txi_rules picture = {3, 0.3, 1, 1, 1.5, 0.25, 1}, pattern = {6, 2, 0.6, 1, 1.5, 0.25, 0};
+    txi_rules picture = {3, 0.8, 0.3, 1, 1, 1.5, 0.25, 1}, pattern = {6, 0.45, 2, 0.6, 1, 1.5, 0.25, 0};
     return structure == TEXINPAINT_PATTERN ? pattern : picture;
 }
+
+#define TXI_ANGLE_ERROR 1 /* pixels: of a direction, times the length it was measured on; ours    */
 
 /* ---- curves ------------------------------------------------------------------------------ */
 
@@ -7305,6 +7340,34 @@ static void txi_hermite(txm_vec2 p, txm_vec2 d, txm_vec2 q, txm_vec2 e, int step
         out[i] = txm_v2(txm_float(h0 * p.x + h1 * d.x + g0 * q.x + g1 * e.x),
                         txm_float(h0 * p.y + h1 * d.y + g0 * q.y + g1 * e.y));
     }
+}
+
+/* Directions are known to some degrees only, the less the shorter the piece is that they were measured
+   on. Within that, turn both ends towards an arc, whose ends have opposite angles to the chord, and if
+   that is nearly straight towards the chord. So two edges of a bar stay parallel. */
+static void txi_straighten(const txi_end *a, const txi_end *b, txm_vec2 *d, txm_vec2 *e) {
+    const txm_vec2 c = txi_unit((double)b->place.x - a->place.x, (double)b->place.y - a->place.y);
+    const double fa = a->fit_length > 6 ? a->fit_length : 6, fb = b->fit_length > 6 ? b->fit_length : 6;
+    const double va = TXI_ANGLE_ERROR / fa, vb = TXI_ANGLE_ERROR / fb; /* largest errors              */
+    const double ca = (double)c.x * a->heading.x + (double)c.y * a->heading.y;
+    const double cb = -((double)c.x * b->heading.x + (double)c.y * b->heading.y);
+    *d = a->heading;
+    *e = b->heading;
+    if (ca < 0.7 || cb < 0.7) return;
+    /* sines of the angles from the chord: of the start, and of the direction in which it arrives     */
+    double sa = (double)c.x * a->heading.y - (double)c.y * a->heading.x;
+    double sb = -((double)c.x * b->heading.y - (double)c.y * b->heading.x);
+    const double excess = sa + sb, most = va + vb; /* 0 for an arc                                  */
+    const double share = excess > most ? 1 : excess < -most ? -1 : excess / most;
+    sa -= share * va;
+    sb -= share * vb;
+    const double mean = 0.5 * (sa - sb), least = va < vb ? va : vb;
+    const double less = mean > least ? least : mean < -least ? -least : mean;
+    sa -= less;
+    sb += less;
+    const double da = sqrt(1 - sa * sa), db = sqrt(1 - sb * sb);
+    *d = txi_unit(c.x * da - c.y * sa, c.y * da + c.x * sa);
+    *e = txi_unit(-(c.x * db - c.y * sb), -(c.y * db + c.x * sb));
 }
 
 /* Length of a line, and its bending energy: length times the integral of squared curvature, which is
@@ -7406,9 +7469,11 @@ static void txi_prior_curve(const txi_prior *prior, const txi_link *k, txm_vec2 
 /* The curve of a candidate, steps + 1 points. */
 static void txi_link_curve(const txi_pairs *pairs, const txi_link *k, int steps, txm_vec2 *out) {
     const txi_end *a = &pairs->l->ends[k->a], *b = k->b >= 0 ? &pairs->l->ends[k->b] : NULL;
-    const txm_vec2 q = b ? b->place : k->leave, e = b ? b->heading : k->backwards;
-    if (k->line >= 0) txi_prior_curve(pairs->prior, k, a->place, a->heading, q, e, steps, out);
-    else txi_hermite(a->place, a->heading, q, e, steps, out);
+    const txm_vec2 q = b ? b->place : k->leave;
+    txm_vec2 d = a->heading, e = b ? b->heading : k->backwards;
+    if (b) txi_straighten(a, b, &d, &e);
+    if (k->line >= 0) txi_prior_curve(pairs->prior, k, a->place, d, q, e, steps, out);
+    else txi_hermite(a->place, d, q, e, steps, out);
 }
 
 /* The prior line that passes both ends nearest, into the candidate; 0: none. b = -1: any line near a. */
@@ -7527,7 +7592,7 @@ static int txi_link_ends(const txi_pairs *pairs, int a, int b, txi_link *k) {
         shape = 0.1 * fabs((double)u->offset - v->offset) - pairs->rules.prior;
     }
     const double u = (double)p->contrast + 2, v = (double)q->contrast + 2;
-    k->cost = txm_float(shape + 3 * (1 - correlation) + 1.5 * (mismatch < 2 ? mismatch : 2) +
+    k->cost = txm_float(shape + 3 * (1 - correlation) + 2 * (mismatch < 2 ? mismatch : 2) +
                         0.6 * fabs(u - v) / (u + v) + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
                         0.3 * !p->is_long + 0.3 * !q->is_long);
     return 1;
@@ -7605,7 +7670,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
     k->line = -1;
     if (!txi_link_measure(pairs, k)) return 0;
     k->cost = txm_float(pairs->rules.bend * k->bend + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
-                        0.9 - 0.02 * hits + 0.05 * fabs(offset));
+                        0.75 - 0.02 * hits + 0.05 * fabs(offset));
     return 1;
 }
 
@@ -7666,10 +7731,17 @@ static txm_status txi_pairs_make(txi_pairs *pairs, const txi_window *w, const tx
     return txi_grow(&pairs->growth, w, l, alpha, beta, scratch, env);
 }
 
+/* What is saved by a candidate, as its ends are no longer unmatched. */
+static double txi_saved_by(const txi_lines *l, const txi_rules *rules, const txi_link *k) {
+    double sum = l->ends[k->a].is_long ? 1 : rules->weak;
+    if (k->b >= 0) sum += l->ends[k->b].is_long ? 1 : rules->weak;
+    return rules->unmatched * sum;
+}
+
 /* Another candidate of an end, which has those from start on: the best TXI_PER_END are kept. */
 static void txi_keep_link(const txi_pairs *pairs, const txi_link *k, txi_link *links, int start,
                           int *count) {
-    if (k->cost >= pairs->rules.unmatched * (k->b >= 0 ? 2 : 1)) return;
+    if (k->cost >= txi_saved_by(pairs->l, &pairs->rules, k)) return;
     if (*count - start < TXI_PER_END) {
         if (*count < TXI_MAX_LINKS) links[(*count)++] = *k;
         return;
@@ -7714,7 +7786,8 @@ static int txi_candidates(const txi_pairs *pairs, txi_link *links) {
 typedef struct txi_pairing {
     const txi_link *links;
     int link_count, end_count;
-    double unmatched, crossing;
+    double crossing;
+    float *saved;      /* one per link: what it saves, as its ends are no longer unmatched        */
     uint8_t *crosses;  /* link_count squared: 0 not known yet, 1 no, 2 yes                         */
     int *chosen;       /* one per end: its link, or -1                                           */
     int *active;       /* the chosen links                                                       */
@@ -7785,19 +7858,14 @@ static void txi_deactivate(txi_pairing *m, int k) {
     if (m->links[k].b >= 0) m->chosen[m->links[k].b] = -1;
 }
 
-/* How much matching link k saves: its ends are no longer unmatched. */
-static double txi_saved(const txi_pairing *m, int k) {
-    return m->unmatched * (m->links[k].b >= 0 ? 2 : 1);
-}
-
 static double txi_remove(txi_pairing *m, int k) {
-    const double change = txi_saved(m, k) - txi_link_energy(m, k);
+    const double change = (double)m->saved[k] - txi_link_energy(m, k);
     txi_deactivate(m, k);
     return change;
 }
 
 static double txi_insert(txi_pairing *m, int k) {
-    const double change = txi_link_energy(m, k) - txi_saved(m, k);
+    const double change = txi_link_energy(m, k) - (double)m->saved[k];
     txi_activate(m, k);
     return change;
 }
@@ -7852,16 +7920,17 @@ static double txi_pairing_try(txi_pairing *m, int k, double allowed) {
     return 0;
 }
 
-static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int count, int ends,
-                                 const txi_rules *rules, txm_arena *scratch, txm_env *env) {
+static txm_status txi_pairing_make(txi_pairing *m, const txi_pairs *pairs, const txi_link *links,
+                                   int count, txm_arena *scratch, txm_env *env) {
+    const int ends = pairs->l->end_count;
     const size_t n = (size_t)count, e = (size_t)ends;
     memset(m, 0, sizeof *m);
     m->links = links;
     m->link_count = count;
     m->end_count = ends;
-    m->unmatched = rules->unmatched;
-    m->crossing = rules->crossing;
+    m->crossing = pairs->rules.crossing;
     m->crosses = (uint8_t *)txm_arena_zero(scratch, n, n);
+    m->saved = (float *)txm_arena_alloc(scratch, n, sizeof *m->saved);
     m->chosen = (int *)txm_arena_alloc(scratch, e, sizeof(int));
     m->active = (int *)txm_arena_alloc(scratch, n, sizeof(int));
     m->slot = (int *)txm_arena_alloc(scratch, n, sizeof(int));
@@ -7871,6 +7940,7 @@ static txm_status txi_pairing_make(txi_pairing *m, const txi_link *links, int co
     for (int i = 0; i < ends; i++) m->chosen[i] = -1;
     for (int k = 0; k < count; k++) {
         m->slot[k] = -1;
+        m->saved[k] = txm_float(txi_saved_by(pairs->l, &pairs->rules, &links[k]));
         m->of_start[links[k].a + 2]++;
         if (links[k].b >= 0) m->of_start[links[k].b + 2]++;
     }
@@ -8103,7 +8173,7 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)l->end_count, sizeof **curves);
     if (status == TXM_OK && (scratch.failed || arena->failed)) status = txi_no_memory(env);
     if (status == TXM_OK) n = txi_candidates(&pairs, links);
-    if (n) status = txi_pairing_make(&match, links, n, l->end_count, &pairs.rules, &scratch, env);
+    if (n) status = txi_pairing_make(&match, &pairs, links, n, &scratch, env);
     if (n && status == TXM_OK) {
         txi_anneal(&match, seed, best);
         status = txi_join_curves(&pairs, &match, &scratch, arena, env, *curves, count);
