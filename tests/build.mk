@@ -13,7 +13,7 @@ SANITIZE  = -Og -g1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sa
 LONG      = test_trimesh_relax test_textiles_exemplars test_texsyn test_trimesh_repel
 UNITS    := $(basename $(notdir $(wildcard tests/unit/test_*.c)))
 UNITS    := $(filter $(LONG),$(UNITS)) $(filter-out $(LONG),$(UNITS))
-GOLDEN    = texmath texsyn texpatch texedges textiles trimesh_relax trimesh_cover treepieces
+GOLDEN    = texmath texsyn texpatch texedges textiles trimesh_relax trimesh_cover texinpaint treepieces
 TEST_C    = $(CC) -std=gnu99 -ffp-contract=off -Wall -Wextra -Isrc -Itests/kit -Itools -MMD -MP
 
 # ---- what is tested: modules, tool and their unit tests, with the sanitizers
