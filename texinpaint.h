@@ -8899,8 +8899,9 @@ static void txi_sides_make(const txi_window *w, const txi_curve *c, double away,
                 s->hits[end][side]++;
             }
         }
-        for (int k = 0; k < 6; k++)
-            if (s->hits[end][k / 3]) s->color[end][k / 3][k % 3] /= s->hits[end][k / 3];
+        for (int side = 0; side < 2; side++)
+            for (int k = 0; k < 3 && s->hits[end][side]; k++)
+                s->color[end][side][k] /= s->hits[end][side];
     }
 }
 
@@ -9170,7 +9171,8 @@ static txm_status txi_ribbon_make(const txm_vec2 *points, int count, txm_arena *
 }
 
 enum {
-    TXI_REGISTER_TAPS = 25,  /* samples across a line, half a pixel apart: -6 .. 6 pixels          */
+    TXI_REGISTER_SIDE = 12,  /* samples on each side of a line, half a pixel apart                 */
+    TXI_REGISTER_TAPS = 2 * TXI_REGISTER_SIDE + 1,
     TXI_REGISTER_SHIFT = 3   /* most samples that a line is moved                                 */
 };
 
@@ -9178,7 +9180,7 @@ enum {
 static int txi_register_profile(const txi_window *w, const txi_ribbon *r, int i, float *profile) {
     const txm_vec2 n = txi_normal_of(r->along[i]);
     for (int k = 0; k < TXI_REGISTER_TAPS; k++) {
-        const double t = 0.5 * (k - TXI_REGISTER_TAPS / 2);
+        const double t = 0.5 * (k - TXI_REGISTER_SIDE);
         int rgb[3];
         if (!txi_strip_pixel(w, (double)r->place[i].x + t * (double)n.x,
                              (double)r->place[i].y + t * (double)n.y, rgb))
@@ -9432,7 +9434,7 @@ static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_aren
     for (size_t i = 0; i < count; i++) {
         txi_column *a = &s->sources[i];
         uint8_t *color = s->source_color + 3 * i * rows;
-        int known[TXI_STRIP_ROWS], n = 0, whole = 1;
+        int known[TXI_STRIP_ROWS] = {0}, n = 0, whole = 1;
         for (int j = 0; j < s->rows; j++) {
             const txm_vec2 p =
                 txi_column_place(a, txi_row_offset(j, s->inside, (double)a->half));
@@ -9636,7 +9638,7 @@ static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
     const int behind = end ? from + TXI_STRIP_PROFILE : s->first;
     const int to = behind < s->line.count ? behind : s->line.count;
     const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
-    int known[TXI_STRIP_ROWS];
+    int known[TXI_STRIP_ROWS] = {0};
     for (int j = 0; j < s->rows; j++) {
         int sum[3] = {0, 0, 0};
         known[j] = 0;
@@ -9819,7 +9821,8 @@ static void txi_meeting_make(const txi_strips *all, txi_meeting *m) {
     const double mx = 0.5 * ((double)p.x + q.x), my = 0.5 * ((double)p.y + q.y);
     m->count = 0;
     for (int k = 0; k < 13 * 13 && m->count < TXI_MEETING_SAMPLES; k++) {
-        const double x = mx + TXI_MEETING_STEP * (k % 13 - 6), y = my + TXI_MEETING_STEP * (k / 13 - 6);
+        const int right = k % 13 - 6, down = k / 13 - 6;
+        const double x = mx + TXI_MEETING_STEP * right, y = my + TXI_MEETING_STEP * down;
         int offset[2], row[2];
         double away[2];
         if (!txi_patch_locate(a, m->patch[0], x, y, &offset[0], &row[0], &away[0]) ||

@@ -139,7 +139,8 @@ static void txi_meeting_make(const txi_strips *all, txi_meeting *m) {
     const double mx = 0.5 * ((double)p.x + q.x), my = 0.5 * ((double)p.y + q.y);
     m->count = 0;
     for (int k = 0; k < 13 * 13 && m->count < TXI_MEETING_SAMPLES; k++) {
-        const double x = mx + TXI_MEETING_STEP * (k % 13 - 6), y = my + TXI_MEETING_STEP * (k / 13 - 6);
+        const int right = k % 13 - 6, down = k / 13 - 6;
+        const double x = mx + TXI_MEETING_STEP * right, y = my + TXI_MEETING_STEP * down;
         int offset[2], row[2];
         double away[2];
         if (!txi_patch_locate(a, m->patch[0], x, y, &offset[0], &row[0], &away[0]) ||

@@ -49,8 +49,9 @@ static void txi_sides_make(const txi_window *w, const txi_curve *c, double away,
                 s->hits[end][side]++;
             }
         }
-        for (int k = 0; k < 6; k++)
-            if (s->hits[end][k / 3]) s->color[end][k / 3][k % 3] /= s->hits[end][k / 3];
+        for (int side = 0; side < 2; side++)
+            for (int k = 0; k < 3 && s->hits[end][side]; k++)
+                s->color[end][side][k] /= s->hits[end][side];
     }
 }
 
