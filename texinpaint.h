@@ -2887,13 +2887,63 @@ static uint32_t txi_main_chart(const txi_sheet *l, uint32_t *counts) {
     return best;
 }
 
+/* A box of places in the window. */
+typedef struct txi_bounds {
+    double left, top, right, bottom;
+} txi_bounds;
+
+static void txi_bounds_add(txi_bounds *b, double x, double y) {
+    b->left = fmin(b->left, x);
+    b->top = fmin(b->top, y);
+    b->right = fmax(b->right, x);
+    b->bottom = fmax(b->bottom, y);
+}
+
+/* Where a texel lies in the window, on face i of the disk. */
+static void txi_sheet_texel(const txi_sheet *l, size_t i, uint32_t texel, double *x, double *y) {
+    double w[3];
+    *x = *y = 0;
+    txi_texel_weights(l->d, l->disk.faces[i], texel, w);
+    for (size_t k = 0; k < 3; k++) {
+        *x += w[k] * l->at[l->disk.corner[3 * i + k]].x;
+        *y += w[k] * l->at[l->disk.corner[3 * i + k]].y;
+    }
+}
+
+/* What the window should show: the disk, but not more than three bands around the missing texels, as faces
+   may be much larger than the hole. */
+static txi_bounds txi_sheet_bounds(const txi_sheet *l) {
+    txi_bounds all = {1e300, 1e300, -1e300, -1e300}, hole = all;
+    const double wide = 3 * txi_band(l->texels);
+    for (size_t i = 0; i < l->disk.face_count; i++) {
+        size_t count;
+        const uint32_t *texels = txi_face_texels(l->s, l->disk.faces[i], &count);
+        for (size_t k = 0; k < 3; k++) {
+            const txm_vec2 p = l->at[l->disk.corner[3 * i + k]];
+            txi_bounds_add(&all, p.x, p.y);
+        }
+        if (l->state[l->disk.faces[i]] != TXI_SHEET_GROUP) continue;
+        for (size_t k = 0; k < count; k++) {
+            double x, y;
+            if (!l->d->missing[texels[k]]) continue;
+            txi_sheet_texel(l, i, texels[k], &x, &y);
+            txi_bounds_add(&hole, x, y);
+        }
+    }
+    all.left = fmax(all.left, hole.left - wide);
+    all.top = fmax(all.top, hole.top - wide);
+    all.right = fmin(all.right, hole.right + wide);
+    all.bottom = fmin(all.bottom, hole.bottom + wide);
+    return all;
+}
+
 /* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that on the
    main chart texels and pixels coincide as well as they can, so that little is lost by interpolation.
    0: it is not finite, or too large for a window. */
 static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
     const txi_disk *disk = &l->disk;
     const uint32_t chart = txi_main_chart(l, counts);
-    double c = 0, s = 0, left = 0, top = 0, right = 0, bottom = 0, off[2] = {0, 0};
+    double c = 0, s = 0, off[2] = {0, 0};
     int64_t reference = -1;
     for (size_t v = 0; v < disk->vertex_count; v++) {
         const double x = l->flat.xy[2 * v] / l->pixel, y = -l->flat.xy[2 * v + 1] / l->pixel;
@@ -2914,30 +2964,21 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
     for (size_t v = 0; v < disk->vertex_count; v++) {
         const double x = c * l->at[v].x + s * l->at[v].y, y = c * l->at[v].y - s * l->at[v].x;
         l->at[v] = txm_v2(txm_float(x), txm_float(y));
-        left = v ? fmin(left, x) : x;
-        top = v ? fmin(top, y) : y;
-        right = v ? fmax(right, x) : x;
-        bottom = v ? fmax(bottom, y) : y;
     }
-    if ((right - left + 4) * (bottom - top + 4) > TXI_WINDOW_MOST) return 0;
+    const txi_bounds box = txi_sheet_bounds(l);
+    if ((box.right - box.left + 4) * (box.bottom - box.top + 4) > TXI_WINDOW_MOST) return 0;
     if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
         size_t count, k = 0;
-        const uint32_t face = disk->faces[reference], *texels = txi_face_texels(l->s, face, &count);
-        double w[3];
+        const uint32_t *texels = txi_face_texels(l->s, disk->faces[reference], &count);
         while (k + 1 < count && !l->d->missing[texels[k]]) k++;
-        txi_texel_weights(l->d, face, texels[k], w);
-        for (size_t i = 0; i < 3; i++) {
-            const txm_vec2 p = l->at[disk->corner[3 * (size_t)reference + i]];
-            off[0] += w[i] * p.x;
-            off[1] += w[i] * p.y;
-        }
+        txi_sheet_texel(l, (size_t)reference, texels[k], &off[0], &off[1]);
     }
-    off[0] += floor(left - off[0]) - 1;
-    off[1] += floor(top - off[1]) - 1;
+    off[0] += floor(box.left - off[0]) - 1;
+    off[1] += floor(box.top - off[1]) - 1;
     for (size_t v = 0; v < disk->vertex_count; v++)
         l->at[v] = txm_v2(txm_float(l->at[v].x - off[0]), txm_float(l->at[v].y - off[1]));
-    l->width = (int)(right - off[0]) + 3;
-    l->height = (int)(bottom - off[1]) + 3;
+    l->width = (int)(box.right - off[0]) + 3;
+    l->height = (int)(box.bottom - off[1]) + 3;
     return 1;
 }
 
@@ -3084,12 +3125,8 @@ static double txi_from_marks(const txi_window *w, const int32_t *nearest, double
 /* The target for a texel on face i of the disk. */
 static txi_target txi_make_target(const txi_sheet *l, size_t i, uint32_t texel) {
     txi_target t;
-    double w[3], right[2] = {1, 0}, down[2] = {0, 1}, x = 0, y = 0;
-    txi_texel_weights(l->d, l->disk.faces[i], texel, w);
-    for (size_t k = 0; k < 3; k++) {
-        x += w[k] * l->at[l->disk.corner[3 * i + k]].x;
-        y += w[k] * l->at[l->disk.corner[3 * i + k]].y;
-    }
+    double right[2] = {1, 0}, down[2] = {0, 1}, x, y;
+    txi_sheet_texel(l, i, texel, &x, &y);
     txi_texel_steps(l, i, right, down);
     const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
     t.texel = texel;
@@ -3105,7 +3142,9 @@ static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const
     const int x = txm_clampi((int)((double)t->x + 0.5), 0, w->width - 1);
     const int y = txm_clampi((int)((double)t->y + 0.5), 0, w->height - 1);
     const size_t pixel = (size_t)y * (size_t)w->width + (size_t)x;
-    if (!l->shown[i]) return 0;
+    if (!l->shown[i] || t->x < 0 || t->y < 0 || t->x > (float)(w->width - 1) ||
+        t->y > (float)(w->height - 1))
+        return 0;
     if (w->face[pixel] == TXI_NO_FACE || w->face[pixel] == l->disk.faces[i]) return 1;
     const txm_dvec3 p = txm_d3_scale(txm_d3_sub(txi_texel_point(l->d, l->disk.faces[i], t->texel),
                                                 l->flat.point[0]), 1 / l->pixel);
@@ -3217,13 +3256,20 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         x += weight[i] * t[i].x;
         y += weight[i] * t[i].y;
     }
-    /* the window's pixels are texels, its middle is the first of the missing ones */
-    const int left = (int)floor(x + 0.5) - TXI_FLAT_SIDE / 2, top = (int)floor(y + 0.5) - TXI_FLAT_SIDE / 2;
-    txm_status status = txi_window_alloc(w, TXI_FLAT_SIDE, TXI_FLAT_SIDE, arena, l->env);
+    /* the window's pixels are texels, the first of the missing ones lies within */
+    txi_bounds box = {x - TXI_FLAT_SIDE / 2, y - TXI_FLAT_SIDE / 2, x + TXI_FLAT_SIDE / 2,
+                      y + TXI_FLAT_SIDE / 2};
+    box.left = fmax(box.left, fmin(t[0].x, fmin(t[1].x, t[2].x)) - 1);
+    box.top = fmax(box.top, fmin(t[0].y, fmin(t[1].y, t[2].y)) - 1);
+    box.right = fmin(box.right, fmax(t[0].x, fmax(t[1].x, t[2].x)) + 1);
+    box.bottom = fmin(box.bottom, fmax(t[0].y, fmax(t[1].y, t[2].y)) + 1);
+    const int left = (int)floor(box.left), top = (int)floor(box.top);
+    const int width = (int)ceil(box.right) - left + 1, height = (int)ceil(box.bottom) - top + 1;
+    txm_status status = txi_window_alloc(w, width, height, arena, l->env);
     if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
     if (!w->targets) return txi_no_memory(l->env);
-    for (size_t i = 0; i < (size_t)TXI_FLAT_SIDE * TXI_FLAT_SIDE; i++) {
-        const int px = left + (int)(i % TXI_FLAT_SIDE), py = top + (int)(i / TXI_FLAT_SIDE);
+    for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
+        const int px = left + (int)(i % (size_t)width), py = top + (int)(i / (size_t)width);
         if (!txi_weights(t, px, py, weight)) continue;
         if (weight[0] < -1e-6 || weight[1] < -1e-6 || weight[2] < -1e-6) continue;
         w->state[i] = TXI_KNOWN;
@@ -3239,7 +3285,7 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         txi_texel_weights(l->d, l->centre, texels[n], weight);
         x = weight[0] * t[0].x + weight[1] * t[1].x + weight[2] * t[2].x - left;
         y = weight[0] * t[0].y + weight[1] * t[1].y + weight[2] * t[2].y - top;
-        if (!(x >= 0 && y >= 0 && x < TXI_FLAT_SIDE && y < TXI_FLAT_SIDE)) continue;
+        if (!(x >= 0 && y >= 0 && x <= width - 1 && y <= height - 1)) continue;
         target.texel = texels[n];
         target.x = txm_float(x);
         target.y = txm_float(y);
