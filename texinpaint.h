@@ -10610,6 +10610,24 @@ static void txi_level_halve(const txi_level *f, txi_level *l) {
     }
 }
 
+/* The colours of the hole at half resolution, from those of the finer level; the rest is not touched. */
+static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l, uint8_t *to) {
+    for (int i = 0; i < l->hole_count; i++) {
+        const int x = l->hole[i] % l->width, y = l->hole[i] / l->width;
+        int sum[4] = {0, 0, 0, 0}, count = 0;
+        for (int k = 0; k < 4; k++) {
+            const int fx = 2 * x - TXI_EDGE + (k & 1), fy = 2 * y - TXI_EDGE + (k >> 1);
+            if (fx >= f->width || fy >= f->height) continue;
+            const size_t p = (size_t)fy * (size_t)f->width + (size_t)fx;
+            if (f->state[p] == TXI_VOID) continue;
+            for (int c = 0; c < 4; c++) sum[c] += from[4 * p + (size_t)c];
+            count++;
+        }
+        for (int c = 0; c < 4 && count; c++)
+            to[4 * (size_t)l->hole[i] + (size_t)c] = (uint8_t)((sum[c] + count / 2) / count);
+    }
+}
+
 /* How the pixels may be resampled. At the finest level a pixel may be copied only if its 3x3
    neighbours are known, so that the caller can interpolate there. */
 static int txi_level_taps(txi_level *l, int finest, txm_arena *scratch) {
@@ -11751,8 +11769,8 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
 typedef struct txi_ballot {
     txi_canvas *canvas;
     int pull;                /* strength of the plan's strips, 0..256                         */
-    int32_t *chosen;         /* receives the anchor whose proposal each hole pixel took, -1: a strip's
-                                or none. NULL: not wanted                                     */
+    int32_t *chosen;         /* receives the anchor whose proposal is the best for each hole pixel, -1:
+                                there is none. NULL: not wanted                               */
     const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
 } txi_ballot;
 
@@ -11812,10 +11830,6 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
     const int pull = t->level->pull ? t->level->pull[p] * v->pull / 256 : 0;
     const uint8_t *strip = pull ? t->level->strip + 4 * (size_t)p : NULL;
     uint8_t *out = t->color + 4 * (size_t)p;
-    if (pull >= 128) { /* the strip itself */
-        memcpy(out, strip, 3);
-        return -1;
-    }
     for (int c = 0; c < 3 && pull; c++)
         mean[c] += (strip[c] - mean[c]) * pull / 255;
     int64_t best = INT64_MAX;
@@ -11829,6 +11843,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
         chosen = list[k].anchor;
         memcpy(out, list[k].color, 3);
     }
+    if (pull >= 128) memcpy(out, strip, 3); /* the strip itself */
     return chosen;
 }
 
@@ -12284,6 +12299,7 @@ typedef struct txi_style {
     float detail_clamp;  /* a pixel's detail counts up to its square times the median          */
     float detail_offset; /* expected detail: standard deviations below the mean of the known   */
     int start;           /* pixels: about the width of the hole at the coarsest level          */
+    uint32_t poses;      /* which sources, one bit each, the lowest for the window as it is; 0 = all */
     int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
@@ -12298,6 +12314,8 @@ enum {
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
     TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
+    TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
+    TXI_JUDGE_SWEEPS = 8,
     TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
@@ -12319,6 +12337,7 @@ typedef struct txi_field {
     int level;
     txi_match *match; /* one per anchor                                                        */
     uint8_t *color;   /* 4 per pixel of the level                                              */
+    double energy;    /* geometric mean over the levels of the mean cost of a patch            */
 } txi_field;
 
 /* Make a level: everything but its sources. */
@@ -12379,7 +12398,7 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
         f->pose[k].c = (float)s.c / TXI_UNIT;
         f->pose[k].d = (float)s.d / TXI_UNIT;
     }
-    memset(all, 1, sizeof all);
+    for (int k = 0; k < TXI_MAX_POSES; k++) all[k] = style->poses == 0 || (style->poses >> k & 1);
     for (int k = 0; k < TXI_MAX_LEVELS; k++) {
         uint8_t wanted[TXI_MAX_POSES];
         txi_level *l = &f->level[k];
@@ -12387,8 +12406,9 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
         if (!txi_filler_level(f, k, env)) return txi_no_memory(env);
         const int is_last = k == TXI_MAX_LEVELS - 1 ||
                             txi_level_hole_width(l) * 10 < style->start * 14;
-        memset(wanted, k > 0 || is_last, sizeof wanted);
-        wanted[0] = 1; /* the finest level's others are made once it is known which are used */
+        memcpy(wanted, all, sizeof all);
+        /* the finest level's others are made once it is known which are used */
+        for (int i = 1; i < TXI_MAX_POSES && k == 0 && !is_last; i++) wanted[i] = 0;
         if (!txi_level_sources(l, style->is_picture, f->pose_count, wanted, arena, env))
             return txi_no_memory(env);
         for (int pose = 0; pose < f->pose_count; pose++)
@@ -12574,6 +12594,55 @@ static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *fiel
     return !arena->failed;
 }
 
+/* mean cost of the canvas' patches */
+static double txi_mean_cost(const txi_canvas *t) {
+    double sum = 0;
+    int count = 0;
+    for (int a = 0; a < t->level->anchor_count; a++) {
+        if (t->match[a].cost == UINT32_MAX) continue;
+        sum += t->match[a].cost;
+        count++;
+    }
+    return count ? sum / count : 0;
+}
+
+/* How like the known part a field is, at its own level and at the coarser ones, whose patches see
+   larger parts of it. */
+static txm_status txi_field_judge(const txi_filler *f, txi_field *field, txm_env *env) {
+    double sum = 0;
+    int count = 0;
+    txm_arena memory[2];
+    txi_canvas canvas[2];
+    txm_status status = TXM_OK;
+    txm_arena_init(&memory[0], env);
+    txm_arena_init(&memory[1], env);
+    for (int level = field->level; level < f->level_count && status == TXM_OK; level++) {
+        txi_canvas *t = &canvas[level & 1], *fine = &canvas[!(level & 1)];
+        const txi_level *l = &f->level[level];
+        txm_arena_free(&memory[level & 1]);
+        if (level > field->level && txi_level_hole_width(l) < TXI_JUDGE_WIDTH) break;
+        if (!txi_canvas_make(f, level, t, &memory[level & 1])) {
+            status = txi_no_memory(env);
+            break;
+        }
+        if (level == field->level) {
+            memcpy(t->color, field->color, 4 * (size_t)l->width * (size_t)l->height);
+            memcpy(t->match, field->match, (size_t)l->anchor_count * sizeof *t->match);
+        } else {
+            txi_color_halve(&f->level[level - 1], fine->color, l, t->color);
+            for (int a = 0; a < l->anchor_count; a++) t->match[a].pose = -1;
+            for (int k = 0; k < TXI_JUDGE_SWEEPS; k++) txi_search(t, env);
+        }
+        sum += log(txi_mean_cost(t) + 64);
+        count++;
+        if (txm_progress(env, 0, "judging")) status = txi_stopped(env);
+    }
+    field->energy = txm_float(exp(sum / (count ? count : 1)));
+    txm_arena_free(&memory[0]);
+    txm_arena_free(&memory[1]);
+    return status;
+}
+
 /* the level where a coherent completion begins */
 static int txi_offset_start(const txi_filler *f) {
     int k = f->level_count - 1;
@@ -12613,7 +12682,7 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
     }
     txm_arena_free(&memory[0]);
     txm_arena_free(&memory[1]);
-    return status;
+    return status == TXM_OK ? txi_field_judge(f, field, env) : status;
 }
 
 /* A look at a field, as a picture of the window, with two measures of how good it is.
@@ -12623,7 +12692,7 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
                              double *energy, double *detail) {
     const txi_level *l = &f->level[field->level];
     const txi_window *w = f->window;
-    double cost = 0, ratio = 0;
+    double ratio = 0;
     int count = 0;
     for (int a = 0; a < l->anchor_count; a++) {
         const txi_match *m = &field->match[a];
@@ -12631,11 +12700,10 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
         const txi_source *s = &l->source[m->pose];
         const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
         const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
-        cost += m->cost;
         ratio += log((worth * unit + TXI_WANT_FLOOR) / (l->want[a] * unit + TXI_WANT_FLOOR));
         count++;
     }
-    *energy = count ? cost / count : 0;
+    *energy = field->energy;
     *detail = count ? ratio / count : 0;
     for (int y = 0; y < w->height; y++) {
         for (int x = 0; x < w->width; x++) {
@@ -13127,6 +13195,7 @@ static void txi_choose_style(txi_choice *c, double grain) {
         c->style.detail_clamp = 6;
         c->style.detail_weight = 1.5f;
         c->style.start = 10;
+        c->style.poses = c->style.is_picture ? 1 : 0; /* grain stays sharp if it is not turned */
     } else if (has_lines && grain > TXI_GRAIN_NO_PATTERN) {
         c->style.detail_offset = 0.35f;
         c->style.detail_clamp = 4;

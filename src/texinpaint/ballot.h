@@ -36,8 +36,8 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
 typedef struct txi_ballot {
     txi_canvas *canvas;
     int pull;                /* strength of the plan's strips, 0..256                         */
-    int32_t *chosen;         /* receives the anchor whose proposal each hole pixel took, -1: a strip's
-                                or none. NULL: not wanted                                     */
+    int32_t *chosen;         /* receives the anchor whose proposal is the best for each hole pixel, -1:
+                                there is none. NULL: not wanted                               */
     const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
 } txi_ballot;
 
@@ -97,10 +97,6 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
     const int pull = t->level->pull ? t->level->pull[p] * v->pull / 256 : 0;
     const uint8_t *strip = pull ? t->level->strip + 4 * (size_t)p : NULL;
     uint8_t *out = t->color + 4 * (size_t)p;
-    if (pull >= 128) { /* the strip itself */
-        memcpy(out, strip, 3);
-        return -1;
-    }
     for (int c = 0; c < 3 && pull; c++)
         mean[c] += (strip[c] - mean[c]) * pull / 255;
     int64_t best = INT64_MAX;
@@ -114,6 +110,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
         chosen = list[k].anchor;
         memcpy(out, list[k].color, 3);
     }
+    if (pull >= 128) memcpy(out, strip, 3); /* the strip itself */
     return chosen;
 }
 

@@ -54,6 +54,7 @@ static void txi_choose_style(txi_choice *c, double grain) {
         c->style.detail_clamp = 6;
         c->style.detail_weight = 1.5f;
         c->style.start = 10;
+        c->style.poses = c->style.is_picture ? 1 : 0; /* grain stays sharp if it is not turned */
     } else if (has_lines && grain > TXI_GRAIN_NO_PATTERN) {
         c->style.detail_offset = 0.35f;
         c->style.detail_clamp = 4;

@@ -12,6 +12,7 @@ typedef struct txi_style {
     float detail_clamp;  /* a pixel's detail counts up to its square times the median          */
     float detail_offset; /* expected detail: standard deviations below the mean of the known   */
     int start;           /* pixels: about the width of the hole at the coarsest level          */
+    uint32_t poses;      /* which sources, one bit each, the lowest for the window as it is; 0 = all */
     int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
@@ -26,6 +27,8 @@ enum {
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
     TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
+    TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
+    TXI_JUDGE_SWEEPS = 8,
     TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
@@ -47,6 +50,7 @@ typedef struct txi_field {
     int level;
     txi_match *match; /* one per anchor                                                        */
     uint8_t *color;   /* 4 per pixel of the level                                              */
+    double energy;    /* geometric mean over the levels of the mean cost of a patch            */
 } txi_field;
 
 /* Make a level: everything but its sources. */
@@ -107,7 +111,7 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
         f->pose[k].c = (float)s.c / TXI_UNIT;
         f->pose[k].d = (float)s.d / TXI_UNIT;
     }
-    memset(all, 1, sizeof all);
+    for (int k = 0; k < TXI_MAX_POSES; k++) all[k] = style->poses == 0 || (style->poses >> k & 1);
     for (int k = 0; k < TXI_MAX_LEVELS; k++) {
         uint8_t wanted[TXI_MAX_POSES];
         txi_level *l = &f->level[k];
@@ -115,8 +119,9 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
         if (!txi_filler_level(f, k, env)) return txi_no_memory(env);
         const int is_last = k == TXI_MAX_LEVELS - 1 ||
                             txi_level_hole_width(l) * 10 < style->start * 14;
-        memset(wanted, k > 0 || is_last, sizeof wanted);
-        wanted[0] = 1; /* the finest level's others are made once it is known which are used */
+        memcpy(wanted, all, sizeof all);
+        /* the finest level's others are made once it is known which are used */
+        for (int i = 1; i < TXI_MAX_POSES && k == 0 && !is_last; i++) wanted[i] = 0;
         if (!txi_level_sources(l, style->is_picture, f->pose_count, wanted, arena, env))
             return txi_no_memory(env);
         for (int pose = 0; pose < f->pose_count; pose++)
@@ -302,6 +307,55 @@ static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *fiel
     return !arena->failed;
 }
 
+/* mean cost of the canvas' patches */
+static double txi_mean_cost(const txi_canvas *t) {
+    double sum = 0;
+    int count = 0;
+    for (int a = 0; a < t->level->anchor_count; a++) {
+        if (t->match[a].cost == UINT32_MAX) continue;
+        sum += t->match[a].cost;
+        count++;
+    }
+    return count ? sum / count : 0;
+}
+
+/* How like the known part a field is, at its own level and at the coarser ones, whose patches see
+   larger parts of it. */
+static txm_status txi_field_judge(const txi_filler *f, txi_field *field, txm_env *env) {
+    double sum = 0;
+    int count = 0;
+    txm_arena memory[2];
+    txi_canvas canvas[2];
+    txm_status status = TXM_OK;
+    txm_arena_init(&memory[0], env);
+    txm_arena_init(&memory[1], env);
+    for (int level = field->level; level < f->level_count && status == TXM_OK; level++) {
+        txi_canvas *t = &canvas[level & 1], *fine = &canvas[!(level & 1)];
+        const txi_level *l = &f->level[level];
+        txm_arena_free(&memory[level & 1]);
+        if (level > field->level && txi_level_hole_width(l) < TXI_JUDGE_WIDTH) break;
+        if (!txi_canvas_make(f, level, t, &memory[level & 1])) {
+            status = txi_no_memory(env);
+            break;
+        }
+        if (level == field->level) {
+            memcpy(t->color, field->color, 4 * (size_t)l->width * (size_t)l->height);
+            memcpy(t->match, field->match, (size_t)l->anchor_count * sizeof *t->match);
+        } else {
+            txi_color_halve(&f->level[level - 1], fine->color, l, t->color);
+            for (int a = 0; a < l->anchor_count; a++) t->match[a].pose = -1;
+            for (int k = 0; k < TXI_JUDGE_SWEEPS; k++) txi_search(t, env);
+        }
+        sum += log(txi_mean_cost(t) + 64);
+        count++;
+        if (txm_progress(env, 0, "judging")) status = txi_stopped(env);
+    }
+    field->energy = txm_float(exp(sum / (count ? count : 1)));
+    txm_arena_free(&memory[0]);
+    txm_arena_free(&memory[1]);
+    return status;
+}
+
 /* the level where a coherent completion begins */
 static int txi_offset_start(const txi_filler *f) {
     int k = f->level_count - 1;
@@ -341,7 +395,7 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
     }
     txm_arena_free(&memory[0]);
     txm_arena_free(&memory[1]);
-    return status;
+    return status == TXM_OK ? txi_field_judge(f, field, env) : status;
 }
 
 /* A look at a field, as a picture of the window, with two measures of how good it is.
@@ -351,7 +405,7 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
                              double *energy, double *detail) {
     const txi_level *l = &f->level[field->level];
     const txi_window *w = f->window;
-    double cost = 0, ratio = 0;
+    double ratio = 0;
     int count = 0;
     for (int a = 0; a < l->anchor_count; a++) {
         const txi_match *m = &field->match[a];
@@ -359,11 +413,10 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
         const txi_source *s = &l->source[m->pose];
         const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
         const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
-        cost += m->cost;
         ratio += log((worth * unit + TXI_WANT_FLOOR) / (l->want[a] * unit + TXI_WANT_FLOOR));
         count++;
     }
-    *energy = count ? cost / count : 0;
+    *energy = field->energy;
     *detail = count ? ratio / count : 0;
     for (int y = 0; y < w->height; y++) {
         for (int x = 0; x < w->width; x++) {

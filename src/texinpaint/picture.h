@@ -119,6 +119,24 @@ static void txi_level_halve(const txi_level *f, txi_level *l) {
     }
 }
 
+/* The colours of the hole at half resolution, from those of the finer level; the rest is not touched. */
+static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l, uint8_t *to) {
+    for (int i = 0; i < l->hole_count; i++) {
+        const int x = l->hole[i] % l->width, y = l->hole[i] / l->width;
+        int sum[4] = {0, 0, 0, 0}, count = 0;
+        for (int k = 0; k < 4; k++) {
+            const int fx = 2 * x - TXI_EDGE + (k & 1), fy = 2 * y - TXI_EDGE + (k >> 1);
+            if (fx >= f->width || fy >= f->height) continue;
+            const size_t p = (size_t)fy * (size_t)f->width + (size_t)fx;
+            if (f->state[p] == TXI_VOID) continue;
+            for (int c = 0; c < 4; c++) sum[c] += from[4 * p + (size_t)c];
+            count++;
+        }
+        for (int c = 0; c < 4 && count; c++)
+            to[4 * (size_t)l->hole[i] + (size_t)c] = (uint8_t)((sum[c] + count / 2) / count);
+    }
+}
+
 /* How the pixels may be resampled. At the finest level a pixel may be copied only if its 3x3
    neighbours are known, so that the caller can interpolate there. */
 static int txi_level_taps(txi_level *l, int finest, txm_arena *scratch) {
