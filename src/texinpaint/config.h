@@ -65,6 +65,7 @@ typedef struct txi_curve {
     int ends[2];       /* the line ends that it joins; -1: it ends in the hole                 */
     float strength;    /* contrast of the line, in levels of 8 bits                            */
     int partner;       /* the curve along the other side of the same stroke, or -1             */
+    float cost;        /* of the join, without unit: about 0.5 for a sure one, 3 for a doubtful one */
 } txi_curve;
 
 /* What the lines say about a window, for txi_fill. NULL pointers: nothing. */

@@ -13,7 +13,8 @@ enum {
     TXI_STEPS = 24,        /* pieces of the curve of a candidate                                 */
     TXI_PER_END = 12,      /* candidates kept for each end, the best ones; ours                   */
     TXI_MAX_LINKS = 3000,  /* candidates in all; ours                                            */
-    TXI_MOVES = 60000,     /* of the annealing; ours                                             */
+    TXI_STARTS = 3,        /* of the annealing; one alone differs more between seeds; ours        */
+    TXI_MOVES = 30000,     /* from each start; ours                                               */
     TXI_KNOWN_PART = 120   /* pixels of a curve outside of the hole, on each side                */
 };
 
