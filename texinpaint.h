@@ -309,6 +309,7 @@ typedef struct txi_curve {
     int ends[2];       /* the line ends that it joins; -1: it ends in the hole                 */
     float strength;    /* contrast of the line, in levels of 8 bits                            */
     int partner;       /* the curve along the other side of the same stroke, or -1             */
+    float cost;        /* of the join, without unit: about 0.5 for a sure one, 3 for a doubtful one */
 } txi_curve;
 
 /* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
@@ -7317,7 +7318,8 @@ enum {
     TXI_STEPS = 24,        /* pieces of the curve of a candidate                                 */
     TXI_PER_END = 12,      /* candidates kept for each end, the best ones; ours                   */
     TXI_MAX_LINKS = 3000,  /* candidates in all; ours                                            */
-    TXI_MOVES = 60000,     /* of the annealing; ours                                             */
+    TXI_STARTS = 3,        /* of the annealing; one alone differs more between seeds; ours        */
+    TXI_MOVES = 30000,     /* from each start; ours                                               */
     TXI_KNOWN_PART = 120   /* pixels of a curve outside of the hole, on each side                */
 };
 
@@ -7916,50 +7918,56 @@ static double txi_insert(txi_pairing *m, int k) {
     return change;
 }
 
-/* The link between two ends, or -1. */
-static int txi_link_between(const txi_pairing *m, int a, int b) {
-    for (int i = m->of_start[a]; i < m->of_start[a + 1]; i++) {
+/* Insert the link of a free end to another free end, or out of the hole, that lowers the energy most. The
+   change; 0: there is none, *link is -1 then. */
+static double txi_rejoin(txi_pairing *m, int end, int *link) {
+    double least = -1e-9;
+    *link = -1;
+    for (int i = m->of_start[end]; i < m->of_start[end + 1]; i++) {
         const txi_link *k = &m->links[m->of_end[i]];
-        if ((k->a == a && k->b == b) || (k->b == a && k->a == b)) return m->of_end[i];
+        const int other = k->a == end ? k->b : k->a;
+        if (other >= 0 && m->chosen[other] >= 0) continue;
+        const double change = txi_link_energy(m, m->of_end[i]) - (double)m->saved[m->of_end[i]];
+        if (change >= least) continue;
+        least = change;
+        *link = m->of_end[i];
     }
-    return -1;
+    if (*link < 0) return 0;
+    txi_activate(m, *link);
+    return least;
 }
 
 /* Try link k: it goes if it is there; else it replaces the links of its two ends, and the two ends that
-   become free are joined if they can be. Kept if the energy changes by less than allowed; returns the
-   change, or 0 if it was not kept. */
+   become free are joined anew if they can be. Kept if the energy changes by less than allowed; returns
+   the change, or 0 if it was not kept. */
 static double txi_pairing_try(txi_pairing *m, int k, double allowed) {
-    int gone[2] = {-1, -1}, free_end[2] = {-1, -1}, extra = -1;
+    int gone[2] = {-1, -1}, free_end[2] = {-1, -1}, anew[2] = {-1, -1};
     double change = 0;
     if (m->slot[k] >= 0) {
+        gone[0] = k;
+        free_end[0] = m->links[k].a;
+        free_end[1] = m->links[k].b;
         change = txi_remove(m, k);
-        if (change < allowed) return change;
-        txi_activate(m, k);
-        return 0;
+    } else {
+        for (int s = 0; s < 2; s++) {
+            const int end = s ? m->links[k].b : m->links[k].a;
+            const int old = end >= 0 ? m->chosen[end] : -1;
+            if (old < 0) continue;
+            gone[s] = old;
+            free_end[s] = m->links[old].a == end ? m->links[old].b : m->links[old].a;
+            change += txi_remove(m, old);
+        }
+        change += txi_insert(m, k);
     }
     for (int s = 0; s < 2; s++) {
-        const int end = s ? m->links[k].b : m->links[k].a;
-        const int old = end >= 0 ? m->chosen[end] : -1;
-        if (old < 0) continue;
-        gone[s] = old;
-        free_end[s] = m->links[old].a == end ? m->links[old].b : m->links[old].a;
-        change += txi_remove(m, old);
-    }
-    change += txi_insert(m, k);
-    if (free_end[0] >= 0 && free_end[1] >= 0) {
-        extra = txi_link_between(m, free_end[0], free_end[1]);
-        if (extra >= 0) {
-            const double more = txi_insert(m, extra);
-            if (more < 0) change += more;
-            else {
-                txi_deactivate(m, extra);
-                extra = -1;
-            }
-        }
+        if (free_end[s] >= 0 && m->chosen[free_end[s]] < 0)
+            change += txi_rejoin(m, free_end[s], &anew[s]);
     }
     if (change < allowed) return change;
-    if (extra >= 0) txi_deactivate(m, extra);
-    txi_deactivate(m, k);
+    for (int s = 1; s >= 0; s--) {
+        if (anew[s] >= 0) txi_deactivate(m, anew[s]);
+    }
+    if (m->slot[k] >= 0) txi_deactivate(m, k);
     for (int s = 0; s < 2; s++) {
         if (gone[s] >= 0) txi_activate(m, gone[s]);
     }
@@ -7998,25 +8006,34 @@ static txm_status txi_pairing_make(txi_pairing *m, const txi_pairs *pairs, const
     return TXM_OK;
 }
 
-/* Simulated annealing from no joins at all; then every link is tried until none improves. best: room
-   for end_count numbers. */
+/* -ln(u) for 0 < u <= 1, to 1 %: u = 2^-bits v, then a series in 1 - v. */
+static double txi_minus_log(double u) {
+    double bits = 0;
+    while (u < 0.5) {
+        u *= 2;
+        bits += 1;
+    }
+    const double x = 1 - u;
+    return bits * 0.6931471805599453 + x * (1 + x * (1 / 2.0 + x * (1 / 3.0 + x / 4)));
+}
+
+/* Simulated annealing, several times from no joins at all; then, from the best that was met, every link
+   is tried until none improves.
+   best  room for end_count numbers                                                             */
 static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
-    txm_rng rng = txm_rng_make(seed, 0x6a6f696e);
-    double energy = 0, least = 0;
+    double least = 0;
     for (int i = 0; i < m->end_count; i++) best[i] = -1;
-    for (int i = 0; i < TXI_MOVES && m->link_count; i++) {
-        const double heat = 1.5 * txm_exp2(-7.0 * i / TXI_MOVES);
-        const int k = (int)txm_rng_below(&rng, (uint32_t)m->link_count);
-        const double u = txm_rng_double(&rng);
-        /* accepted with probability exp(-change / heat): a change below -heat log(u)             */
-        double bits = 0, v = u > 1e-9 ? u : 1e-9;
-        while (v < 0.5) {
-            v *= 2;
-            bits += 1;
-        }
-        const double allowed = heat * (bits * 0.6931471805599453 + 1.4 * (1 - v) * (1.5 - 0.5 * v));
-        energy += txi_pairing_try(m, k, allowed);
-        if (energy < least - 1e-9) {
+    for (int start = 0; start < TXI_STARTS; start++) {
+        txm_rng rng = txm_rng_make(seed, 0x6a6f696e + (uint64_t)start);
+        double energy = 0;
+        while (m->active_count) txi_deactivate(m, m->active[m->active_count - 1]);
+        for (int i = 0; i < TXI_MOVES; i++) {
+            const double heat = 1.5 * txm_exp2(-7.0 * i / TXI_MOVES);
+            const int k = (int)txm_rng_below(&rng, (uint32_t)m->link_count);
+            const double u = txm_rng_double(&rng);
+            /* accepted with probability exp(-change / heat)                                      */
+            energy += txi_pairing_try(m, k, heat * txi_minus_log(u > 1e-9 ? u : 1e-9));
+            if (energy >= least - 1e-9) continue;
             least = energy;
             memcpy(best, m->chosen, (size_t)m->end_count * sizeof *best);
         }
@@ -8105,6 +8122,7 @@ static txm_status txi_curve_make(const txi_pairs *pairs, const txi_link *k, txm_
     c->ends[1] = k->b;
     c->strength = b ? 0.5f * (a->contrast + b->contrast) : a->contrast;
     c->partner = -1;
+    c->cost = k->cost;
     return TXM_OK;
 }
 
@@ -8332,6 +8350,21 @@ static double txi_mean_bend(const txi_curve *curves, int count) {
         sum += b < 4 ? b : 4;
     }
     return count ? sum / count : 0;
+}
+
+/* Does the joining look as if there were no lines to join: many ends, joins that cost much and hardly
+   any sure one. Outlines of stones and grain have long ends, too, but they do not go on. For the joins
+   of TEXINPAINT_PICTURE. */
+static int txi_joins_doubtful(const txi_lines *l, const txi_curve *curves, int count) {
+    double cost = 0;
+    int ends = 0, sure = 0;
+    for (int i = 0; i < count; i++) {
+        const int n = 1 + (curves[i].ends[1] >= 0);
+        cost += (double)curves[i].cost;
+        ends += n;
+        if (n == 2 && curves[i].cost < 1) sure += 2;
+    }
+    return l->end_count > 8 && cost > 1.05 * ends && sure * 12 < l->end_count;
 }
 
 /* ---- pictures ---------------------------------------------------------------------------- */
