@@ -189,16 +189,22 @@ TEXINPAINT_API void texinpaint_free(texinpaint_job *job);
 /* ---- without texture: smooth fill, gutters -------------------------------------------------- */
 
 /* Fill the holes smoothly: each colour is a harmonic function on the surface (in the picture, without
-   a mesh), its values at the border of the hole those of the known texels. image, mask, maps, mesh, uv
-   and gutter of the desc are used. Holes without any known texel around them get the mean colour of
-   the known ones. As texinpaint_complete otherwise. */
+   a mesh), its values at the border of the hole those of the known texels, the seams of the atlas
+   without effect. image, mask, maps, mesh, uv and gutter of the desc are used. Colours are averaged times
+   their alpha; normals in space, then made unit; labels are those of the nearest known texel. Parts of the
+   surface without any known texel get the mean colour of the known ones.
+   return as texinpaint_complete; TXM_TOO_SMALL if nothing in the charts is known
+   cost   about 3 us per missing texel of three channels of 8 bits, 200 bytes               */
 TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_env *env,
                                               const txm_image *out);
 
-/* Fill the gutters: every texel outside the charts, however far (or up to desc->gutter texels), gets
-   the colour of the nearest texel in a chart. image, maps, mesh, uv, gutter (0 = without limit) are used;
-   mask, if it has pixels, marks texels in charts that are not to be spread either. As
-   texinpaint_complete otherwise. */
+/* Fill the gutters: every texel outside the charts, however far (or up to desc->gutter texels, measured
+   from centre to centre), gets the values of the nearest texel in a chart, in all maps. The picture does
+   not wrap. image, maps, mesh, uv, gutter (0 = without limit) are used; mask, if it has pixels, marks
+   texels in charts that are not to be spread either. Without a mesh the masked pixels are filled, from
+   the others.
+   return as texinpaint_complete; TXM_TOO_SMALL if there is nothing to spread
+   cost   O(pixels), about 20 ns and 6 bytes each                                           */
 TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,
                                             const txm_image *out);
 

@@ -117,8 +117,11 @@ static void test_poisson_against_direct_solve(void **state) {
     for (int round = 0; round < 4; round++) {
         const double screen = round % 2 ? 0.3 : 0;
         double u[NODES], right[NODES];
-        txi_steps steps = {link, rim, value, 0};
-        steps.screen = screen;
+        double scratch[NODES];
+        txi_steps steps = {link, rim, value};
+        txi_poisson_system system;
+        txm_arena arena;
+        txm_arena_init(&arena, NULL);
         network_make(&net, &rng, 1);
         const txi_texel_graph g = {NODES, texel, net.first, net.to, net.weight, rim_first, rim_texel,
                                    rim_weight};
@@ -152,8 +155,10 @@ static void test_poisson_against_direct_solve(void **state) {
             }
         }
         solve_dense(matrix, right);
-        assert_int_equal(txi_surface_poisson(&g, &steps, u, 1e-10, NULL), TXM_OK);
+        assert_int_equal(txi_poisson_make(&g, screen, &arena, NULL, &system), TXM_OK);
+        assert_int_equal(txi_surface_poisson(&system, &steps, u, scratch, 1e-10, NULL), TXM_OK);
         for (int i = 0; i < NODES; i++) assert_true(fabs(u[i] - right[i]) < 1e-5);
+        txm_arena_free(&arena);
     }
 }
 
@@ -168,9 +173,15 @@ static void test_poisson_without_rim(void **state) {
     const double wanted[5] = {10, 11, 13, 16, 15};
     const txi_texel_graph g = {5, texel, (uint32_t *)first, (uint32_t *)to, (float *)weight,
                                (uint32_t *)none, NULL, NULL};
-    const txi_steps steps = {step, NULL, NULL, 0};
-    assert_int_equal(txi_surface_poisson(&g, &steps, u, 1e-10, NULL), TXM_OK);
+    const txi_steps steps = {step, NULL, NULL};
+    txi_poisson_system system;
+    double scratch[5];
+    txm_arena arena;
+    txm_arena_init(&arena, NULL);
+    assert_int_equal(txi_poisson_make(&g, 0, &arena, NULL, &system), TXM_OK);
+    assert_int_equal(txi_surface_poisson(&system, &steps, u, scratch, 1e-10, NULL), TXM_OK);
     for (int i = 0; i < 5; i++) assert_true(fabs(u[i] - wanted[i]) < 1e-7);
+    txm_arena_free(&arena);
 }
 
 static void test_stencil(void **state) {
