@@ -118,7 +118,7 @@ $(eval $(call mode_rules,check,1))
 # these also run the tool with the sanitizers; and an example
 $(TOOL_RUNS:%=$(TESTS)/check/%.done): $(TESTS)/asan/texkit
 $(TESTS)/check/tool_plane.done: $(BUILD)/examples/join examples/plane.sh
-$(TESTS)/check/wide_examples.done: $(BUILD)/files/stb.o
+$(TESTS)/check/wide_examples.done: $(BUILD)/files/stb.o $(BUILD)/examples/repair
 $(TESTS)/check/look_brush.done: $(filter %/brush,$(EXAMPLES))
 $(TESTS)/check/look_forest_gl.done: $(filter %/forest_gl,$(EXAMPLES))
 

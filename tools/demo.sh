@@ -1,6 +1,6 @@
 #!/bin/sh
-# demo.sh - what texkit does with the samples of build/samples/: textures, tiles, meshes, trees; the
-# results and a page that shows them, index.html, are written to out/
+# demo.sh - what texkit does with the samples of build/samples/: textures, tiles, meshes, completion,
+# trees; the results and a page that shows them, index.html, are written to out/
 set -eu
 
 build=${BUILD:-build}
@@ -154,6 +154,61 @@ covered() {
 <p class="source">$vertices vertices; as <a href="$shape-covered.glb">GLB</a>, for glTF viewers, and
 as <a href="$shape-covered.obj">OBJ</a>.</p>
 COVERED
+}
+
+# repaired KIND SIDE TEXT [PHOTO]: a model with holes in its texture, completed, appended to the page
+repaired() {
+    kind=$1 side=$2 text=$3
+    shift 3
+    rm -rf "$out/$kind-steps"
+    "$build/scan" "$kind" "$out/$kind" "$side" "$@"
+    "$build/texkit" inpaint --mesh "$out/$kind.obj" --texture "$out/$kind.png" --mask "$out/$kind-mask.png" \
+        -o "$out/$kind-completed.png" --debug "$out/$kind-steps" --quiet
+    "$build/texkit" inpaint --mesh "$out/$kind.obj" --texture "$out/$kind.png" --mask "$out/$kind-mask.png" \
+        -o "$out/$kind-completed.png" --stats "$out/$kind.json" --quiet
+    total=$(seconds total "$out/$kind.json")
+    printf 'demo: %-8s %s texels completed in %4s s, %s lines continued\n' "$kind" \
+        "$(figure written "$out/$kind.json")" "$total" "$(figure joins "$out/$kind.json")"
+    cat >>"$out/index.part" <<REPAIRED
+<h3>A $kind</h3>
+<p>$text</p>
+<dl>
+<dt>missing</dt><dd>$(figure missing "$out/$kind.json") texels <small>of a texture of $side x $side</small></dd>
+<dt>completed in</dt><dd>$total s</dd>
+</dl>
+<div class="couple">
+<img src="$kind.png" width="512" height="512" alt="the texture with its holes">
+<img src="$kind-completed.png" width="512" height="512" alt="the texture completed">
+</div>
+REPAIRED
+    [ -x "$build/examples/repair" ] || return 0
+    "$build/examples/repair" "$out/$kind.obj" "$out/$kind.png" "$out/$kind-mask.png" \
+        "$out/$kind-repaired" >/dev/null
+    cat >>"$out/index.part" <<REPAIRED
+<p>From two sides: before, the preview, which is there at once, and after (<code>examples/repair.c</code>).</p>
+<img class="wide" src="$kind-repaired-0.png" width="1440" height="480" alt="the $kind: before, preview, after">
+<img class="wide" src="$kind-repaired-1.png" width="1440" height="480" alt="the same from another side">
+REPAIRED
+}
+
+# removed NAME TITLE BOXES...: an object taken out of a sample photograph, appended to the page
+removed() {
+    name=$1 title=$2
+    shift 2
+    [ -e "$build/samples/scene/$name.png" ] && [ -x "$build/examples/remove" ] || return 0
+    cp "$build/samples/scene/$name.png" "$out/$name.png"
+    "$build/examples/remove" "$out/$name.png" "$out/$name-removed.png" "$@"
+    credit=$(awk -F "$tab" -v name="scene/$name" '$2 == name { print $4 "; licence " $5 }' \
+        "$build/samples/list.txt")
+    printf 'demo: %-8s %s removed\n' "$name" "$title"
+    cat >>"$out/index.part" <<REMOVED
+<div class="couple">
+<img src="$name.png" width="512" height="512" alt="$name, a photograph">
+<img src="$name-removed.png" width="512" height="512" alt="the same without $title">
+</div>
+<p class="source">Left: $credit. Right: without $title,
+<code>remove $name.png $name-removed.png $*</code>.</p>
+REMOVED
 }
 
 # bilayer SHAPE: a membrane, by examples/membrane
@@ -377,6 +432,33 @@ MEMBRANE
     bilayer capsule
 fi
 
+stone=$(pick lichen 3)
+cat >>"$out/index.part" <<'INPAINT'
+<h2>What is missing, completed</h2>
+<p>Gray parts of these textures are missing, as in scans. They are completed on the surface, across the seams
+of the texture: lines that end at a hole are continued through it, then the rest is filled with pieces of
+the surroundings. Nothing else changes.</p>
+INPAINT
+repaired ball 1024 "Drawn stripes, in six charts."
+cat >>"$out/index.part" <<'STEPS'
+<p>What the library shows of its work on one of the holes, laid flat (<code>--debug DIR</code>):</p>
+<div class="frames">
+STEPS
+for picture in "$out"/ball-steps/*.png; do
+    step=${picture##*/}
+    echo "<div><img src=\"ball-steps/$step\" alt=\"\"><small>${step%.png}</small></div>"
+done >>"$out/index.part"
+echo '</div>' >>"$out/index.part"
+repaired ring 1024 "Covered with $stone, mirrored from chart to chart." "$out/$stone.png"
+if [ -e "$build/samples/scene/rocket.png" ]; then
+    cat >>"$out/index.part" <<'REMOVE'
+<h3>Objects removed from photographs</h3>
+<p>The same for plain pictures (<code>examples/remove.c</code>): each hole is the ellipse in a box.</p>
+REMOVE
+fi
+removed rocket "a tower" 322,110,42,236 318,260,60,110
+removed camera "a tall building" 402,106,50,90
+
 # trees: files written by the tool, and where there is OpenGL pictures drawn by examples/forest_gl
 bark=$(pick lichen 3)
 "$build/texkit" tiles "$out/$bark.png" -o "$out/$bark-tiles-bark" --kind frame --colors 1 --variants 8 \
@@ -445,10 +527,11 @@ pair: <code>texkit learn NAME.png -o NAME.txs</code>, then
 <code>texkit edges NAME.png -o NAME-edges.png --smooth 1.5 --least 40</code> and
 <code>texkit patch NAME.png -o NAME-strokes.png --size 512x512 --control strokes.json</code>. Each set of tiles:
 <code>texkit tiles NAME.png -o NAME-tiles-KIND --kind KIND --colors C --size 64</code>. Each retiled
-mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>; trees:
+mesh: <code>texkit retile NAME.obj -o NAME-retiled.obj --vertices N</code>; each completed texture:
+<code>texkit inpaint --mesh NAME.obj --texture NAME.png --mask NAME-mask.png -o NAME-completed.png</code>; trees:
 <code>texkit tree -o oak.glb --species oak --wind 9 --seed 2</code>. The times are those of this run.</footer>
 </body>
 </html>
 TAIL
 mv "$out/index.part" "$out/index.html"
-echo "demo: $((count + limits)) pairs, 3 tile sets, 2 meshes, trees; open $out/index.html"
+echo "demo: $((count + limits)) pairs, 3 tile sets, 4 meshes, trees; open $out/index.html"

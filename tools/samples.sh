@@ -1,11 +1,11 @@
 #!/bin/sh
-# samples.sh - put sample exemplars of 256 x 256 pixels into build/samples/
+# samples.sh - put sample pictures, most of 256 x 256 pixels, into build/samples/
 #
 # The photographs belong to Debian packages; they are taken from where the package puts them, or
 # the package is downloaded and unpacked under build/packages/, never installed. With none of them
 # in reach the project draws exemplars of its own. build/samples/list.txt has a line for each: role,
 # path below build/samples/, title, where it comes from, licence, separated by tabs. Those of the
-# roles "limit" and "layout" lie in folders of these names, out of the way of tests and benchmarks.
+# other roles lie in folders of these names, out of the way of tests and benchmarks.
 set -eu
 
 build=${BUILD:-build}
@@ -13,7 +13,8 @@ samples=$build/samples
 packages=$build/packages
 
 # role, name, title, package, path, licence, times to shrink before cutting the middle out. The role
-# "good": texsyn.h is made for it; "limit": it shows what texsyn.h cannot do; "layout": for texpatch.h.
+# "good": texsyn.h is made for it; "limit": it shows what texsyn.h cannot do; "layout": for texpatch.h;
+# "scene": for texinpaint.h, up to 512 pixels.
 photographs="
 good  gravel  Gravel   python3-skimage      usr/lib/python3/dist-packages/skimage/data/gravel.png CC0-1.0 2
 good  pebbles Pebbles  extremetuxracer-data usr/share/games/etr/terrains/pebbles04.png            GPL-2+ 1
@@ -26,12 +27,14 @@ good  lichen  Lichen   extremetuxracer-data usr/share/games/etr/terrains/rock05.
 limit grass   Blades   python3-skimage      usr/lib/python3/dist-packages/skimage/data/grass.png  CC0-1.0 1
 limit brick   Bricks   python3-skimage      usr/lib/python3/dist-packages/skimage/data/brick.png  CC0-1.0 1
 layout wall   Slates   extremetuxracer-data usr/share/games/etr/terrains/pave01.png               GPL-2+ 1
+scene rocket  Rocket   python3-skimage      usr/lib/python3/dist-packages/skimage/data/rocket.jpg CC0-1.0 1
+scene camera  Camera   python3-skimage      usr/lib/python3/dist-packages/skimage/data/camera.png CC0-1.0 1
 "
 
 # nothing to do while the samples are there and this list of them is the same
 [ -s "$samples/list.txt" ] && [ -z "$(find "$0" -newer "$samples/list.txt")" ] && exit 0
 rm -rf "$samples"
-mkdir -p "$samples/limit" "$samples/layout" "$packages"
+mkdir -p "$samples/limit" "$samples/layout" "$samples/scene" "$packages"
 log=$packages/log.txt
 tab=$(printf '\t')
 
@@ -65,7 +68,9 @@ echo "$photographs" | {
             file=$packages/$package/$path
         fi
         [ "$role" = good ] || name=$role/$name
-        "$build/crop" "$file" "$samples/$name.png" 256 "$shrink" || continue
+        side=256
+        [ "$role" != scene ] || side=512
+        "$build/crop" "$file" "$samples/$name.png" $side "$shrink" || continue
         echo "$role$tab$name$tab$title${tab}photograph ${path##*/} of the Debian package \
 $package$tab$licence" >>"$samples/list.part"
     done

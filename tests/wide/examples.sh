@@ -5,11 +5,12 @@
 
 warn="-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Werror"
 mkdir "$tmp/include" && cp ./*.h "$tmp/include/"
-make -s build/files/stb.o build/draw build/shape || exit 1
+make -s build/files/stb.o build/draw build/scan build/shape build/examples/repair || exit 1
 build/draw bricks "$tmp/bricks.png" 96
 build/draw bricks-height "$tmp/height.png" 96
 build/draw clouds "$tmp/clouds.png" 96
 build/shape blob "$tmp/blob.obj"
+build/scan ball "$tmp/ball" 256
 
 # example NAME: build it, and see that it explains itself if it is called without arguments
 example() {
@@ -100,3 +101,27 @@ tree() {
 example tree
 check "tree writes a mesh, its materials and their pictures" tree
 check "tree knows its species" refuses 'no species "fern"' "$tmp/tree" fern "$tmp/fern"
+
+# the disc is the mask of that box
+remove() {
+    /usr/bin/python3 tests/tool/check_inpaint.py mask disc 96 "$tmp/disc.png" &&
+        "$tmp/remove" "$tmp/clouds.png" "$tmp/r.png" 32,32,32,32 &&
+        /usr/bin/python3 tests/tool/check_inpaint.py kept "$tmp/clouds.png" "$tmp/disc.png" "$tmp/r.png"
+}
+example remove
+check "remove writes a picture" remove
+check "remove needs a photograph" refuses "^remove: " "$tmp/remove" none.png "$tmp/n.png" 1,1,5,5
+check "remove needs boxes" refuses "a box is" "$tmp/remove" "$tmp/clouds.png" "$tmp/n.png" 1,1,5
+check "remove leaves something" refuses "^remove: " "$tmp/remove" "$tmp/clouds.png" "$tmp/n.png" -99,-99,300,300
+
+# of more files than one: built by make
+repair() {
+    build/examples/repair "$tmp/ball.obj" "$tmp/ball.png" "$tmp/ball-mask.png" "$tmp/b" || return 1
+    /usr/bin/python3 tests/tool/check_inpaint.py kept "$tmp/ball.png" "$tmp/ball-mask.png" "$tmp/b.png" &&
+        [ "$(size "$tmp/b-0.png")" = "1440 480" ] && [ "$(size "$tmp/b-1.png")" = "1440 480" ]
+}
+check "repair writes a texture and pictures" repair
+check "repair needs coordinates" refuses "^repair: " build/examples/repair "$tmp/blob.obj" "$tmp/ball.png" \
+    "$tmp/ball-mask.png" "$tmp/n"
+check "repair needs a mask of the same size" refuses "^repair: " build/examples/repair "$tmp/ball.obj" \
+    "$tmp/ball.png" "$tmp/clouds.png" "$tmp/n"
