@@ -8,6 +8,8 @@
 
 enum {
     TXI_GAP = 24,              /* pixels: holes that are so near are laid out together; ours   */
+    TXI_ROUNDS = 6,            /* ... and those near them, so many times                       */
+    TXI_SPECKS = 4000,         /* texels: holes of less in all                                 */
     TXI_GROUP_MOST = 150000,   /* pixels of holes that are joined                              */
     TXI_WHOLE_MOST = 300000,   /* pixels of a hole that is tried in one window                 */
     TXI_DISK_MOST = 700000,    /* pixels of a disk                                             */
@@ -15,6 +17,7 @@ enum {
     TXI_REACH_LEAST = 64,      /* ... the smallest that is tried                               */
     TXI_SEAM = 16,             /* pixels: what lies nearer to a cut through the hole is left to the
                                   next window                                                  */
+    TXI_SIDE_MOST = 8192,      /* pixels: longest side of a window                             */
     TXI_FLAT_SIDE = 512,       /* pixels: side of a window of a face that cannot be laid out   */
     TXI_SMALL_HOLE = 400       /* texels: however it is distorted, it is done at once          */
 };
@@ -188,9 +191,11 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
     txi_is_hole(l, seed);
     if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
     txi_measure(l);
-    for (int round = 0, grown = 1; round < 4 && grown && l->pixel > 0; round++) {
+    for (int round = 0, grown = 1; round < TXI_ROUNDS && grown && l->pixel > 0; round++) {
+        /* specks reach farther than holes that fill a window by themselves */
+        const int gap = l->texels < TXI_SPECKS ? 2 * TXI_GAP : TXI_GAP;
         grown = 0;
-        status = txi_measure_from_hole(l, TXI_GAP * l->pixel);
+        status = txi_measure_from_hole(l, gap * l->pixel);
         for (uint32_t v = 0; v < l->s->vertex_count && status == TXM_OK; v++) {
             if (l->from_hole[v] >= TXI_UNREACHED) continue;
             for (uint32_t i = l->s->first[v]; i < l->s->first[v + 1]; i++) {
@@ -445,7 +450,9 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         l->at[v] = txm_v2(txm_float(x), txm_float(y));
     }
     const txi_bounds box = txi_sheet_bounds(l);
-    if ((box.right - box.left + 4) * (box.bottom - box.top + 4) > TXI_WINDOW_MOST) return 0;
+    if (box.right - box.left > TXI_SIDE_MOST || box.bottom - box.top > TXI_SIDE_MOST ||
+        (box.right - box.left + 4) * (box.bottom - box.top + 4) > TXI_WINDOW_MOST)
+        return 0;
     if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
         size_t count, k = 0;
         const uint32_t *texels = txi_face_texels(l->s, disk->faces[reference], &count);
