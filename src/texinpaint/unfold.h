@@ -89,7 +89,7 @@ static double txi_angle(double x, double y) {
     double t = y / (r + x), turns = 2;
     for (; turns < 16 || t > 0.2; turns *= 2) t /= 1 + sqrt(1 + t * t);
     const double tt = t * t;
-    return turns * t * (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt / 9))));
+    return turns * t * (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt * (1.0 / 9 - tt / 11)))));
 }
 
 /* The curvature at a vertex of the surface: what the angles of its faces lack to a full turn. */
