@@ -41,14 +41,19 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     txi_ribbon *lines = (txi_ribbon *)txm_arena_zero(arena, (size_t)count, sizeof *lines);
     uint8_t *done = (uint8_t *)txm_arena_zero(arena, (size_t)count, 1);
     int *partners = (int *)txm_arena_alloc(arena, (size_t)count, sizeof *partners);
+    int *is_open = (int *)txm_arena_zero(arena, (size_t)count, sizeof *is_open);
     float *widths = (float *)txm_arena_alloc(arena, (size_t)count, (size_t)count * sizeof *widths);
     if (arena->failed) return txi_no_memory(env);
     int most = 1;
     txi_find_strokes(w, curves, count, partners, widths);
     for (int i = 0; i < count; i++) {
         if (curves[i].count < 2) continue;
-        most = curves[i].count > most ? curves[i].count : most;
-        txm_status status = txi_ribbon_make(curves[i].points, curves[i].count, arena, &lines[i], env);
+        const size_t room = (size_t)curves[i].count + TXI_STRIP_ONWARD;
+        most = (int)room > most ? (int)room : most;
+        txm_vec2 *points = (txm_vec2 *)txm_arena_alloc(arena, room, sizeof *points);
+        if (!points) return txi_no_memory(env);
+        const int n = txi_curve_onward(w, &curves[i], points, &is_open[i]);
+        txm_status status = txi_ribbon_make(points, n, arena, &lines[i], env);
         if (status == TXM_OK) status = txi_ribbon_register(w, &lines[i], arena, env);
         if (status != TXM_OK) return status;
         if (txm_progress(env, 0, "strips")) return txi_stopped(env);
@@ -61,6 +66,8 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
         if (done[i] || lines[i].count < 2) continue;
         s->curve = i;
         s->partner = -1;
+        s->tail = curves[i].ends[1] < 0;
+        s->is_open = is_open[i];
         s->line = lines[i];
         if (p >= 0 && !done[p] && lines[p].count >= 2 &&
             txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {

@@ -10,7 +10,7 @@
 enum {
     TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
     TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
-    TXI_LAY_OFFSET = 32,     /* levels; most that a strip's colours are changed                    */
+    TXI_LAY_TONE = 24,       /* levels; larger differences are none of tone, and not evened out    */
     TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
     TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
@@ -45,47 +45,65 @@ static void txi_patch_cut(const txi_strip *s, int k, int *cut) {
     for (int j = 0; j < s->rows; j++) cut[j] += s->first + k * s->hop + 1;
 }
 
+/* What the colours of row j of a patch lack: against the known part (from = 0), or of the next patch
+   against this one in their overlap (1). Mean RGB differences into d; returns a weight, 0..1: the share
+   of the row that is compared, less for differences that are no matter of tone. */
+static double txi_row_difference(const txi_strip *s, int k, int j, int from, double d[3]) {
+    int sum[3] = {0, 0, 0}, hits = 0;
+    for (int m = from ? s->hop - s->reach : -s->reach; m <= s->reach; m++) {
+        const int column = s->first + k * s->hop + m;
+        const uint8_t *mine = txi_patch_color(s, k, m, j), *other;
+        if (from) {
+            other = txi_patch_color(s, k + 1, m - s->hop, j);
+        } else {
+            if (column < 0 || column >= s->line.count) continue;
+            const size_t at = (size_t)column * (size_t)s->rows + (size_t)j;
+            if (!s->known[at]) continue;
+            other = s->color + 3 * at;
+        }
+        for (int c = 0; c < 3; c++) sum[c] += from ? mine[c] - other[c] : other[c] - mine[c];
+        hits++;
+    }
+    double square = 0;
+    for (int c = 0; c < 3; c++) {
+        d[c] = hits ? (double)sum[c] / hits : 0;
+        square += d[c] * d[c] / 3;
+    }
+    const int whole = from ? 2 * s->reach - s->hop + 1 : 2 * s->reach + 1;
+    const double tone = square / (TXI_LAY_TONE * TXI_LAY_TONE);
+    return (double)hits / whole / (1 + tone * tone);
+}
+
 /* What is to be added to the colours of row j in each patch, so that patches meet without a step and
    the ends meet the known part: the offsets e minimise
 
-       sum over k of (e(k+1) - e(k) - d(k))^2 + sum over k of w(k) (e(k) - g(k))^2 + 0.0001 e(k)^2
+       sum over k of v(k) (e(k+1) - e(k) - d(k))^2 + w(k) (e(k) - g(k))^2 + 0.001 e(k)^2
 
-   d: mean difference of neighbours in their overlap, g: of the known part, w: known share of the
-   patch's row. The matrix has three diagonals and is solved by elimination. e: 2 * node_count. */
-static void txi_row_offsets(const txi_strip *s, int j, int c, double *e, float *offsets) {
+   d: mean difference of neighbours in their overlap, g: of the known part; v, w: their weights. The
+   matrix has three diagonals and is solved by elimination. e: 4 doubles per patch, RGB and a factor. */
+static void txi_row_offsets(const txi_strip *s, int j, double *e, float *offsets) {
     const int n = s->node_count;
-    double *factor = e + n, d_before = 0;
+    double before[3] = {0, 0, 0}, v_before = 0;
     for (int k = 0; k < n; k++) {
-        double load = 0, diagonal = 1e-4, d = 0;
-        int hits = 0, sum = 0;
-        for (int m = -s->reach; m <= s->reach; m++) {
-            const int column = s->first + k * s->hop + m;
-            const size_t at = (size_t)(column < 0 ? 0 : column) * (size_t)s->rows + (size_t)j;
-            if (column < 0 || column >= s->line.count || !s->known[at]) continue;
-            sum += s->color[3 * at + (size_t)c] - txi_patch_color(s, k, m, j)[c];
-            hits++;
+        double g[3], d[3] = {0, 0, 0}, v = 0;
+        const double w = txi_row_difference(s, k, j, 0, g);
+        if (k + 1 < n) v = txi_row_difference(s, k, j, 1, d);
+        double diagonal = 0.001 + w + v + v_before;
+        if (k) diagonal -= v_before * e[4 * (k - 1) + 3]; /* e(k-1) = e[k-1] + factor e(k) */
+        for (int c = 0; c < 3; c++) {
+            const double earlier = k ? e[4 * (k - 1) + c] : 0;
+            e[4 * k + c] =
+                (w * g[c] - v * d[c] + v_before * (before[c] + earlier)) / diagonal;
+            before[c] = d[c];
         }
-        diagonal += (double)hits / (2 * s->reach + 1);
-        load += (double)sum / (2 * s->reach + 1);
-        sum = 0;
-        for (int m = s->hop - s->reach; m <= s->reach && k + 1 < n; m++)
-            sum += txi_patch_color(s, k, m, j)[c] - txi_patch_color(s, k + 1, m - s->hop, j)[c];
-        if (k + 1 < n) {
-            d = (double)sum / (2 * s->reach - s->hop + 1);
-            load -= d;
-            diagonal += 1;
-        }
-        if (k) { /* eliminate e(k-1): its row is e(k-1) - factor(k-1) e(k) = e[k-1] */
-            load += d_before + e[k - 1];
-            diagonal += 1 - factor[k - 1];
-        }
-        factor[k] = k + 1 < n ? 1 / diagonal : 0;
-        e[k] = load / diagonal;
-        d_before = d;
+        e[4 * k + 3] = v / diagonal;
+        v_before = v;
     }
     for (int k = n - 1; k >= 0; k--) {
-        if (k + 1 < n) e[k] += factor[k] * e[k + 1];
-        offsets[(size_t)k * 3 * TXI_STRIP_ROWS + (size_t)(3 * j + c)] = txm_float(e[k]);
+        for (int c = 0; c < 3; c++) {
+            if (k + 1 < n) e[4 * k + c] += e[4 * k + 3] * e[4 * (k + 1) + c];
+            offsets[(size_t)k * 3 * TXI_STRIP_ROWS + (size_t)(3 * j + c)] = txm_float(e[4 * k + c]);
+        }
     }
 }
 
@@ -95,21 +113,18 @@ static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *
     all->cuts = (int *)txm_arena_zero(arena, nodes + 1, TXI_STRIP_ROWS * sizeof *all->cuts);
     all->offsets =
         (float *)txm_arena_zero(arena, nodes + 1, 3 * TXI_STRIP_ROWS * sizeof *all->offsets);
-    double *e = (double *)txm_arena_alloc(arena, nodes + 1, 2 * sizeof *e);
+    double *e = (double *)txm_arena_alloc(arena, nodes + 1, 4 * sizeof *e);
     if (arena->failed) return txi_no_memory(env);
     for (int i = 0; i < all->count; i++) {
         const txi_strip *s = &all->strips[i];
         float *offsets = all->offsets + (size_t)s->node * 3 * TXI_STRIP_ROWS;
         for (int k = 0; k + 1 < s->node_count; k++)
             txi_patch_cut(s, k, all->cuts + (size_t)(s->node + k) * TXI_STRIP_ROWS);
-        for (int j = 0; j < 3 * s->rows && s->node_count; j++)
-            txi_row_offsets(s, j / 3, j % 3, e, offsets);
+        for (int j = 0; j < s->rows && s->node_count; j++) txi_row_offsets(s, j, e, offsets);
         for (int k = 0; k < s->node_count; k++) {
             float *row = offsets + (size_t)k * 3 * TXI_STRIP_ROWS, smooth[3 * TXI_STRIP_ROWS];
             for (int j = 0; j < 3 * s->rows; j++)
-                smooth[j] = txm_clampf(
-                    txm_float(txi_running_mean(row + j % 3, s->rows, 3, j / 3, 2)),
-                    -TXI_LAY_OFFSET, TXI_LAY_OFFSET);
+                smooth[j] = txm_float(txi_running_mean(row + j % 3, s->rows, 3, j / 3, 2));
             memcpy(row, smooth, (size_t)(3 * s->rows) * sizeof *row);
         }
         if (txm_progress(env, 0, "strips")) return txi_stopped(env);
@@ -156,7 +171,6 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
 /* Which columns of a strip the pixels near it belong to. Arrays of one item per window pixel. */
 typedef struct txi_lay {
     txi_strips *all;
-    const txi_curve *curves;
     txi_plan *plan;
     txi_pose *poses;
     float *squares;   /* squared distance to the nearest column of the current strip               */
@@ -218,14 +232,12 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
 
 /* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
    less towards the end of a line that ends in the hole. */
-static int txi_lay_pull(const txi_lay *lay, const txi_strip *s, double away, int column) {
-    const txi_curve *c = &lay->curves[s->curve];
+static int txi_lay_pull(const txi_strip *s, double away, int column) {
     double pull = away <= TXI_LAY_CORE
                       ? 1
                       : (TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
-    if (c->ends[1] < 0 && s->line.count - 1 - column < TXI_LAY_FADE)
+    if (s->is_open && s->line.count - 1 - column < TXI_LAY_FADE)
         pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
-    if (c->ends[0] < 0 && column < TXI_LAY_FADE) pull *= (double)(column + 1) / (TXI_LAY_FADE + 1);
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
@@ -283,7 +295,7 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
     const size_t at = (size_t)y * (size_t)lay->all->w->width + (size_t)x;
     txi_strip_spot o;
     if (!txi_lay_spot(lay, s, x, y, at, &o)) return;
-    const int pull = txi_lay_pull(lay, s, o.away, lay->columns[at]);
+    const int pull = txi_lay_pull(s, o.away, lay->columns[at]);
     if (!pull) return;
     if (s->node_count) {
         if (!txi_lay_patch_at(lay, s, &o, at)) return;
@@ -389,7 +401,6 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
     if (status != TXM_OK) return status;
 
     lay.all = all;
-    lay.curves = curves;
     lay.plan = plan;
     lay.squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.squares);
     lay.columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay.columns);

@@ -28,6 +28,7 @@ enum {
     TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
     TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
     TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
+    TXI_STRIP_ONWARD = 12,   /* pixels that lines without an end are continued behind the hole      */
     TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
 };
@@ -53,6 +54,8 @@ typedef struct txi_strip {
     int curve, partner; /* indices of the curves; partner -1: a single line                       */
     int inside, rows;
     int first, last;    /* columns with hole pixels                                              */
+    int tail;           /* columns behind the hole are no known part of the line, or are missing   */
+    int is_open;        /* the line ends in the hole                                             */
     txi_ribbon line;
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
@@ -145,6 +148,25 @@ static txm_status txi_ribbon_make(const txm_vec2 *points, int count, txm_arena *
         r->along[i] = txi_unit((double)b.x - a.x, (double)b.y - a.y);
     }
     return TXM_OK;
+}
+
+/* The points of a curve. One that goes through the hole, but meets no line on the other side of it, is
+   continued straight on there, so that its strip fits what is known; is_open receives 0 for it, 1 for one
+   that ends in the hole. points: room for TXI_STRIP_ONWARD more than the curve has. Returns how many. */
+static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *points, int *is_open) {
+    const int n = c->count;
+    memcpy(points, c->points, (size_t)n * sizeof *points);
+    *is_open = c->ends[1] < 0;
+    if (c->ends[1] >= 0 || n < 4) return n;
+    const txm_vec2 p = points[n - 1], t = txi_curve_along(c, n - 2);
+    const ptrdiff_t beyond =
+        txi_pixel(w->width, w->height, (double)p.x + 3 * (double)t.x, (double)p.y + 3 * (double)t.y);
+    if (beyond < 0 || (w->state[beyond] != TXI_KNOWN && w->state[beyond] != TXI_FOREIGN)) return n;
+    *is_open = 0;
+    for (int i = 0; i < TXI_STRIP_ONWARD; i++)
+        points[n + i] = txm_v2(txm_float((double)p.x + (i + 1) * (double)t.x),
+                               txm_float((double)p.y + (i + 1) * (double)t.y));
+    return n + TXI_STRIP_ONWARD;
 }
 
 enum {
@@ -381,7 +403,7 @@ static int txi_columns_own(txi_strip *s, int mirrored) {
     const int from = s->first > most ? s->first - most : 0;
     const int to = s->line.count - 1 - s->last > most ? s->last + most : s->line.count - 1;
     if (s->first > 0) txi_columns_add(s, &s->line, from, s->first - 1, 0, mirrored);
-    if (to > s->last) txi_columns_add(s, &s->line, s->last + 1, to, 0, mirrored);
+    if (to > s->last && !s->tail) txi_columns_add(s, &s->line, s->last + 1, to, 0, mirrored);
     return s->source_count - before;
 }
 
