@@ -382,6 +382,24 @@ static txm_status txi_stage_end(const txi_stage *stage, txm_status status) {
     return status == TXM_OK ? status : txm_fail(stage->whole, status, stage->env.message);
 }
 
+/* ---- ablation -------------------------------------------------------------------------------
+   Steps that bench/bench_inpaint.c leaves out one by one, to measure what each contributes: it defines
+   TXI_LEFT_OUT as a variable of its own. Everywhere else nothing is left out.                   */
+
+enum {
+    TXI_VOTES = 1,    /* tensor votes for or against a join                                      */
+    TXI_MATCHING = 2, /* annealing of all joins together; instead: each in turn, if it pays      */
+    TXI_STRIPS = 4,   /* strips of real texture along lines; instead: their mean profile         */
+    TXI_BELIEF = 8,   /* belief propagation; instead: the best candidate of each patch by itself */
+    TXI_TURNS = 16,   /* turned and mirrored copies                                              */
+    TXI_DETAIL = 32,  /* the preference for as much detail as around the hole                    */
+    TXI_PIECES = 64,  /* minimum cuts between pieces                                             */
+    TXI_POISSON = 128 /* blending                                                                */
+};
+#ifndef TXI_LEFT_OUT
+#define TXI_LEFT_OUT 0
+#endif
+
 static txm_status txi_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the completion");
 }
@@ -7334,6 +7352,7 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
    0 where there are no votes. */
 static double txi_votes_agree(const txi_grown *g, double x, double y, double dx, double dy) {
     double t[3];
+    if (TXI_LEFT_OUT & TXI_VOTES) return 0;
     txi_votes_in_window(g, x, y, t);
     const double across = dy * dy * t[0] - 2 * dx * dy * t[1] + dx * dx * t[2];
     const double along = dx * dx * t[0] + 2 * dx * dy * t[1] + dy * dy * t[2];
@@ -8053,9 +8072,10 @@ static double txi_minus_log(double u) {
    is tried until none improves.
    best  room for end_count numbers                                                             */
 static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
+    const int starts = TXI_LEFT_OUT & TXI_MATCHING ? 0 : TXI_STARTS, rounds = starts ? 50 : 1;
     double least = 0;
     for (int i = 0; i < m->end_count; i++) best[i] = -1;
-    for (int start = 0; start < TXI_STARTS; start++) {
+    for (int start = 0; start < starts; start++) {
         txm_rng rng = txm_rng_make(seed, 0x6a6f696e + (uint64_t)start);
         double energy = 0;
         while (m->active_count) txi_deactivate(m, m->active[m->active_count - 1]);
@@ -8074,7 +8094,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
     for (int i = 0; i < m->end_count; i++) {
         if (best[i] >= 0 && m->slot[best[i]] < 0) txi_activate(m, best[i]);
     }
-    for (int round = 0, better = 1; better && round < 50; round++) {
+    for (int round = 0, better = 1; better && round < rounds; round++) {
         better = 0;
         for (int k = 0; k < m->link_count; k++) better |= txi_pairing_try(m, k, -1e-7) < 0;
     }
@@ -8879,6 +8899,16 @@ static void txi_belief_improve(txi_beliefs *t, int *x, txm_rng *rng) {
 
 /* ---- the whole ---- */
 
+/* The cheapest label of each node by itself. */
+static void txi_belief_cheapest(const txi_beliefs *t, int *x) {
+    for (int n = 0; n < t->graph->node_count; n++) {
+        const int64_t *unary = t->unary + t->kept_firsts[n];
+        x[n] = 0;
+        for (int a = 1; a < t->kept_counts[n]; a++)
+            if (unary[a] < unary[x[n]]) x[n] = a;
+    }
+}
+
 /* Tables of the pair costs of kept labels, and room for moves. */
 static txm_status txi_belief_tables(txi_beliefs *t, txm_arena *arena, txm_env *env) {
     const txi_graph *g = t->graph;
@@ -8942,15 +8972,13 @@ static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_ar
     int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x), *y = x + nodes;
     if (!x) return txi_no_memory(env);
 
-    if (txi_belief_free(&t) == g->node_count) {
+    if (TXI_LEFT_OUT & TXI_BELIEF) {
+        txi_belief_cheapest(&t, x);
+    } else if (txi_belief_free(&t) == g->node_count) {
         txi_belief_move(&t, x);
     } else {
         txm_rng rng = txm_rng_make(seed, 0);
-        for (size_t n = 0; n < nodes; n++) {
-            const int64_t *unary = t.unary + t.kept_firsts[n];
-            for (int a = 1; a < t.kept_counts[n]; a++)
-                if (unary[a] < unary[y[n]]) y[n] = a;
-        }
+        txi_belief_cheapest(&t, y);
         txi_belief_single(&t, y);
         memcpy(x, y, nodes * sizeof *x);
         status = txi_belief_loopy(&t, x, y + nodes, arena, env);
@@ -12899,7 +12927,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
         label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
     }
     const int kinds = txi_labels_used(&assembly, queue, TXI_ASSEMBLY_LABELS, pairs);
-    for (int pass = 0, changed = 1; pass < TXI_ASSEMBLY_PASSES && changed; pass++) {
+    const int passes = TXI_LEFT_OUT & TXI_PIECES ? 0 : TXI_ASSEMBLY_PASSES;
+    for (int pass = 0, changed = 1; pass < passes && changed; pass++) {
         changed = 0;
         for (int k = 0; k < kinds; k++) changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
     }
@@ -13235,7 +13264,8 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
     txi_blend_number(&b);
     txm_parallel_for(env, txi_chunks(b.count), txi_blend_values, &b);
     if (!is_label) txm_parallel_for(env, txi_chunks(b.count), txi_blend_links, &b);
-    for (int sweep = 0; sweep < TXI_BLEND_SWEEPS && !is_label; sweep++) {
+    const int sweeps = is_label || (TXI_LEFT_OUT & TXI_POISSON) ? 0 : TXI_BLEND_SWEEPS;
+    for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int color = 0; color < 2; color++) {
             b.first = color ? b.reds : 0;
             b.last = color ? b.count : b.reds;
@@ -13312,6 +13342,8 @@ static void txi_choose_style(txi_choice *c, double grain) {
         c->style.detail_weight = 1;
         c->style.start = 14;
     }
+    if (TXI_LEFT_OUT & TXI_TURNS) c->style.poses = 1;
+    if (TXI_LEFT_OUT & TXI_DETAIL) c->style.detail_weight = 0;
     c->count = 0;
     if (forced != TEXINPAINT_AUTO) {
         c->tried[c->count++].structure = forced;
@@ -13333,8 +13365,10 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena
         status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
                           arena, env, &h->curves, &h->curve_count);
         if (status == TXM_OK && h->curve_count > 0) {
-            status = txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena, env,
-                                   &h->plan, &h->plan.poses, &h->plan.pose_count);
+            status = TXI_LEFT_OUT & TXI_STRIPS
+                         ? txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, arena, env, &h->plan)
+                         : txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena,
+                                         env, &h->plan, &h->plan.poses, &h->plan.pose_count);
             plan = &h->plan;
         }
     }

@@ -439,6 +439,16 @@ static void txi_belief_improve(txi_beliefs *t, int *x, txm_rng *rng) {
 
 /* ---- the whole ---- */
 
+/* The cheapest label of each node by itself. */
+static void txi_belief_cheapest(const txi_beliefs *t, int *x) {
+    for (int n = 0; n < t->graph->node_count; n++) {
+        const int64_t *unary = t->unary + t->kept_firsts[n];
+        x[n] = 0;
+        for (int a = 1; a < t->kept_counts[n]; a++)
+            if (unary[a] < unary[x[n]]) x[n] = a;
+    }
+}
+
 /* Tables of the pair costs of kept labels, and room for moves. */
 static txm_status txi_belief_tables(txi_beliefs *t, txm_arena *arena, txm_env *env) {
     const txi_graph *g = t->graph;
@@ -502,15 +512,13 @@ static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_ar
     int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x), *y = x + nodes;
     if (!x) return txi_no_memory(env);
 
-    if (txi_belief_free(&t) == g->node_count) {
+    if (TXI_LEFT_OUT & TXI_BELIEF) {
+        txi_belief_cheapest(&t, x);
+    } else if (txi_belief_free(&t) == g->node_count) {
         txi_belief_move(&t, x);
     } else {
         txm_rng rng = txm_rng_make(seed, 0);
-        for (size_t n = 0; n < nodes; n++) {
-            const int64_t *unary = t.unary + t.kept_firsts[n];
-            for (int a = 1; a < t.kept_counts[n]; a++)
-                if (unary[a] < unary[y[n]]) y[n] = a;
-        }
+        txi_belief_cheapest(&t, y);
         txi_belief_single(&t, y);
         memcpy(x, y, nodes * sizeof *x);
         status = txi_belief_loopy(&t, x, y + nodes, arena, env);

@@ -66,6 +66,8 @@ static void txi_choose_style(txi_choice *c, double grain) {
         c->style.detail_weight = 1;
         c->style.start = 14;
     }
+    if (TXI_LEFT_OUT & TXI_TURNS) c->style.poses = 1;
+    if (TXI_LEFT_OUT & TXI_DETAIL) c->style.detail_weight = 0;
     c->count = 0;
     if (forced != TEXINPAINT_AUTO) {
         c->tried[c->count++].structure = forced;
@@ -87,8 +89,10 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena
         status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
                           arena, env, &h->curves, &h->curve_count);
         if (status == TXM_OK && h->curve_count > 0) {
-            status = txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena, env,
-                                   &h->plan, &h->plan.poses, &h->plan.pose_count);
+            status = TXI_LEFT_OUT & TXI_STRIPS
+                         ? txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, arena, env, &h->plan)
+                         : txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena,
+                                         env, &h->plan, &h->plan.poses, &h->plan.pose_count);
             plan = &h->plan;
         }
     }

@@ -132,6 +132,24 @@ static txm_status txi_stage_end(const txi_stage *stage, txm_status status) {
     return status == TXM_OK ? status : txm_fail(stage->whole, status, stage->env.message);
 }
 
+/* ---- ablation -------------------------------------------------------------------------------
+   Steps that bench/bench_inpaint.c leaves out one by one, to measure what each contributes: it defines
+   TXI_LEFT_OUT as a variable of its own. Everywhere else nothing is left out.                   */
+
+enum {
+    TXI_VOTES = 1,    /* tensor votes for or against a join                                      */
+    TXI_MATCHING = 2, /* annealing of all joins together; instead: each in turn, if it pays      */
+    TXI_STRIPS = 4,   /* strips of real texture along lines; instead: their mean profile         */
+    TXI_BELIEF = 8,   /* belief propagation; instead: the best candidate of each patch by itself */
+    TXI_TURNS = 16,   /* turned and mirrored copies                                              */
+    TXI_DETAIL = 32,  /* the preference for as much detail as around the hole                    */
+    TXI_PIECES = 64,  /* minimum cuts between pieces                                             */
+    TXI_POISSON = 128 /* blending                                                                */
+};
+#ifndef TXI_LEFT_OUT
+#define TXI_LEFT_OUT 0
+#endif
+
 static txm_status txi_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the completion");
 }

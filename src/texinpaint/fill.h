@@ -507,7 +507,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
         label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
     }
     const int kinds = txi_labels_used(&assembly, queue, TXI_ASSEMBLY_LABELS, pairs);
-    for (int pass = 0, changed = 1; pass < TXI_ASSEMBLY_PASSES && changed; pass++) {
+    const int passes = TXI_LEFT_OUT & TXI_PIECES ? 0 : TXI_ASSEMBLY_PASSES;
+    for (int pass = 0, changed = 1; pass < passes && changed; pass++) {
         changed = 0;
         for (int k = 0; k < kinds; k++) changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
     }

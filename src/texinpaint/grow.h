@@ -289,6 +289,7 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
    0 where there are no votes. */
 static double txi_votes_agree(const txi_grown *g, double x, double y, double dx, double dy) {
     double t[3];
+    if (TXI_LEFT_OUT & TXI_VOTES) return 0;
     txi_votes_in_window(g, x, y, t);
     const double across = dy * dy * t[0] - 2 * dx * dy * t[1] + dx * dx * t[2];
     const double along = dx * dx * t[0] + 2 * dx * dy * t[1] + dy * dy * t[2];

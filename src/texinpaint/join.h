@@ -196,9 +196,10 @@ static double txi_minus_log(double u) {
    is tried until none improves.
    best  room for end_count numbers                                                             */
 static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
+    const int starts = TXI_LEFT_OUT & TXI_MATCHING ? 0 : TXI_STARTS, rounds = starts ? 50 : 1;
     double least = 0;
     for (int i = 0; i < m->end_count; i++) best[i] = -1;
-    for (int start = 0; start < TXI_STARTS; start++) {
+    for (int start = 0; start < starts; start++) {
         txm_rng rng = txm_rng_make(seed, 0x6a6f696e + (uint64_t)start);
         double energy = 0;
         while (m->active_count) txi_deactivate(m, m->active[m->active_count - 1]);
@@ -217,7 +218,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
     for (int i = 0; i < m->end_count; i++) {
         if (best[i] >= 0 && m->slot[best[i]] < 0) txi_activate(m, best[i]);
     }
-    for (int round = 0, better = 1; better && round < 50; round++) {
+    for (int round = 0, better = 1; better && round < rounds; round++) {
         better = 0;
         for (int k = 0; k < m->link_count; k++) better |= txi_pairing_try(m, k, -1e-7) < 0;
     }
