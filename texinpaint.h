@@ -202,7 +202,8 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
    from centre to centre), gets the values of the nearest texel in a chart, in all maps. The picture does
    not wrap. image, maps, mesh, uv, gutter (0 = without limit) are used; mask, if it has pixels, marks
    texels in charts that are not to be spread either. Without a mesh the masked pixels are filled, from
-   the others.
+   the others; without mesh and mask those that are fully transparent get the colour of the nearest one
+   that is not, and stay transparent.
    return as texinpaint_complete; TXM_TOO_SMALL if there is nothing to spread
    cost   O(pixels), about 20 ns and 6 bytes each                                           */
 TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,
@@ -4368,7 +4369,8 @@ static txm_status txi_surface_poisson(const txi_poisson_system *s, const txi_ste
 /* where a texel lies: in space, or in the picture */
 static txm_dvec3 txi_fill_point(const txi_domain *d, uint32_t texel) {
     if (d->surface) return txi_texel_point(d, d->surface->owner[texel], texel);
-    return txm_d3(texel % (uint32_t)d->width, texel / (uint32_t)d->width, 0);
+    const int y = (int)(texel / (uint32_t)d->width);
+    return txm_d3((int)(texel % (uint32_t)d->width), y, 0);
 }
 
 /* For each node the known texel that is nearest, of those at the rim that its neighbours have: distances in
@@ -4587,21 +4589,49 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
     return status;
 }
 
-/* Texels without marks get the values of the nearest one with a mark, at most `reach` away. */
-static txm_status txi_dilate(const txi_domain *d, const uint8_t *marks, const uint8_t *wanted,
-                             int reach, txm_env *env) {
+/* What is spread and what is filled. */
+enum { TXI_SPREAD_NOT = 0, TXI_SPREAD_FROM = 1, TXI_SPREAD_TO = 2 };
+
+/* Is the pixel fully transparent? */
+static int txi_is_clear(const txm_image *image, int x, int y) {
+    return image->channels % 2 == 0 && !(txm_image_get(image, x, y, image->channels - 1) > 0);
+}
+
+/* Mark the texels; returns how many there are to spread. is_solid: the picture's transparent pixels
+   are filled with colour, and stay transparent. */
+static size_t txi_spread_marks(const txi_domain *d, int is_solid, uint8_t *marks) {
+    size_t known = 0;
+    for (int y = 0; y < d->height; y++) {
+        for (int x = 0; x < d->width; x++) {
+            const size_t i = (size_t)y * (size_t)d->width + (size_t)x;
+            const int missing = is_solid ? txi_is_clear(&d->maps[0], x, y) : d->missing[i];
+            const int fills = d->surface ? !d->covered[i] : missing;
+            marks[i] = fills ? TXI_SPREAD_TO : missing ? TXI_SPREAD_NOT : TXI_SPREAD_FROM;
+            known += marks[i] == TXI_SPREAD_FROM;
+        }
+    }
+    return known;
+}
+
+/* Give texels the values of the nearest one that is spread, at most `reach` away (0: any distance). */
+static txm_status txi_spread(const txi_domain *d, uint8_t *marks, int is_solid, int reach, txm_env *env) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
+    const txm_image *image = &d->maps[0];
+    const size_t bytes = txm_sample_bytes(image->sample), pixel = (size_t)image->channels * bytes;
     txm_arena scratch;
     txm_arena_init(&scratch, env);
     int32_t *nearest = (int32_t *)txm_arena_alloc(&scratch, texels, sizeof(int32_t));
-    txm_status status = nearest ? txi_nearest(marks, d->width, d->height, env, nearest)
-                                : txi_no_memory(env);
+    uint8_t *from = (uint8_t *)txm_arena_alloc(&scratch, texels, 1);
+    txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
+    for (size_t i = 0; i < texels && status == TXM_OK; i++) from[i] = marks[i] == TXI_SPREAD_FROM;
+    if (status == TXM_OK) status = txi_nearest(from, d->width, d->height, env, nearest);
     for (size_t i = 0; i < texels && status == TXM_OK; i++) {
-        if (!wanted[i] || nearest[i] < 0) continue;
+        if (marks[i] != TXI_SPREAD_TO || nearest[i] < 0) continue;
         const int64_t dx = (int64_t)(i % (size_t)d->width) - nearest[i] % d->width;
         const int64_t dy = (int64_t)(i / (size_t)d->width) - nearest[i] / d->width;
         if (reach > 0 && dx * dx + dy * dy > (int64_t)reach * reach) continue;
         txi_copy_texel(d, (size_t)nearest[i], i);
+        if (is_solid) memset((uint8_t *)image->pixels + (i + 1) * pixel - bytes, 0, bytes);
     }
     txm_arena_free(&scratch);
     return status;
@@ -4611,30 +4641,26 @@ TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env
                                             const txm_image *out) {
     txi_domain d;
     txm_arena arena;
-    size_t known = 0;
+    uint8_t *marks = NULL;
     txm_status status = txi_check_common(desc, env);
     if (status == TXM_OK && desc->mask.pixels)
         status = txi_check_mask(&desc->mask, "mask", &desc->image, env);
     if (status == TXM_OK) status = txi_check_outputs(desc, out, 1 + desc->map_count, env);
     if (status != TXM_OK) return status;
+    const int is_solid = !desc->mask.pixels && desc->mesh.face_count == 0;
     txm_arena_init(&arena, env);
     status = txi_domain_make(&d, desc, &arena, env);
     if (status == TXM_OK && txm_progress(env, 0, "gutters")) status = txi_stopped(env);
     if (status == TXM_OK) status = txi_surface_make(&d, &arena, env);
-    const size_t texels = (size_t)d.width * (size_t)d.height;
-    uint8_t *marks = status == TXM_OK ? (uint8_t *)txm_arena_alloc(&arena, texels, 2) : NULL;
-    if (status == TXM_OK && !marks) status = txi_no_memory(env);
     if (status == TXM_OK) {
-        for (size_t i = 0; i < texels; i++) {
-            marks[i] = d.covered[i] && !d.missing[i];
-            marks[texels + i] = d.surface ? !d.covered[i] : d.missing[i];
-            known += marks[i];
-        }
-        if (known == 0) status = txm_fail(env, TXM_TOO_SMALL, "no texel in a chart has a colour");
+        marks = (uint8_t *)txm_arena_alloc(&arena, (size_t)d.width * (size_t)d.height, 1);
+        if (!marks) status = txi_no_memory(env);
     }
+    if (status == TXM_OK && txi_spread_marks(&d, is_solid, marks) == 0)
+        status = txm_fail(env, TXM_TOO_SMALL, "no texel has a colour that could be spread");
     if (status == TXM_OK && txm_progress(env, 0.5f, "gutters")) status = txi_stopped(env);
     if (status == TXM_OK && desc->gutter >= 0)
-        status = txi_dilate(&d, marks, marks + texels, desc->gutter, env);
+        status = txi_spread(&d, marks, is_solid, desc->gutter, env);
     if (status == TXM_OK) txi_deliver(&d, out);
     txm_arena_free(&arena);
     return status;
@@ -5589,7 +5615,8 @@ static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
         y = (e * b - f * a) / det;
     }
     if (fabs(x) > 1.5 || fabs(y) > 1.5) return 0; /* beyond the edge of what the window shows */
-    *out = txm_v2(txm_float((double)(i % s->w->width) + x), txm_float((double)(i / s->w->width) + y));
+    const int column = (int)(i % s->w->width), row = (int)(i / s->w->width);
+    *out = txm_v2(txm_float(column + x), txm_float(row + y));
     return 1;
 }
 

@@ -202,7 +202,8 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
    from centre to centre), gets the values of the nearest texel in a chart, in all maps. The picture does
    not wrap. image, maps, mesh, uv, gutter (0 = without limit) are used; mask, if it has pixels, marks
    texels in charts that are not to be spread either. Without a mesh the masked pixels are filled, from
-   the others.
+   the others; without mesh and mask those that are fully transparent get the colour of the nearest one
+   that is not, and stay transparent.
    return as texinpaint_complete; TXM_TOO_SMALL if there is nothing to spread
    cost   O(pixels), about 20 ns and 6 bytes each                                           */
 TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env *env,

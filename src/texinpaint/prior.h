@@ -175,7 +175,8 @@ static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
         y = (e * b - f * a) / det;
     }
     if (fabs(x) > 1.5 || fabs(y) > 1.5) return 0; /* beyond the edge of what the window shows */
-    *out = txm_v2(txm_float((double)(i % s->w->width) + x), txm_float((double)(i / s->w->width) + y));
+    const int column = (int)(i % s->w->width), row = (int)(i / s->w->width);
+    *out = txm_v2(txm_float(column + x), txm_float(row + y));
     return 1;
 }
 

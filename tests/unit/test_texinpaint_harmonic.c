@@ -568,6 +568,28 @@ static void test_dilation_against_brute_force(void **state) {
     }
 }
 
+/* Without mesh and mask colours spread into the transparent pixels, which stay transparent. */
+static void test_transparent_pixels(void **state) {
+    (void)state;
+    static uint16_t a[2 * PIXELS], b[2 * PIXELS];
+    texinpaint_desc desc = desc_of(a, 2, TXM_U16);
+    const txm_image o = image_of(b, 2, TXM_U16);
+    desc.mask.pixels = NULL;
+    for (int i = 0; i < PIXELS; i++) {
+        const int x = i % SIDE;
+        a[2 * i] = (uint16_t)(x < 20 ? 3000 : x > 40 ? 5000 : 7);
+        a[2 * i + 1] = (uint16_t)(x < 20 ? 1 : x > 40 ? 65535 : 0);
+    }
+    assert_int_equal(texinpaint_dilate(&desc, NULL, &o), TXM_OK);
+    for (int i = 0; i < PIXELS; i++) {
+        const int x = i % SIDE;
+        assert_int_equal(b[2 * i + 1], a[2 * i + 1]);
+        assert_int_equal(b[2 * i], x <= 30 ? 3000 : 5000);
+    }
+    for (int i = 0; i < PIXELS; i++) a[2 * i + 1] = 0;
+    assert_int_equal(texinpaint_dilate(&desc, NULL, &o), TXM_TOO_SMALL);
+}
+
 static void test_in_place(void **state) {
     (void)state;
     static uint8_t a[PIXELS], b[PIXELS];
@@ -672,6 +694,7 @@ int main(void) {
         cmocka_unit_test(test_labels_are_the_nearest),
         cmocka_unit_test(test_a_hole_without_known_texels_gets_the_mean),
         cmocka_unit_test(test_dilation_against_brute_force),
+        cmocka_unit_test(test_transparent_pixels),
         cmocka_unit_test(test_in_place),
         cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_faults),
