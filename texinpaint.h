@@ -5570,7 +5570,13 @@ static int txi_places_make(const txi_window *w, txm_arena *arena, txi_places *s)
     return 1;
 }
 
-/* The pixel nearest to a place, within reach; -1: none. */
+/* Is the place in the box? Clipped lines of huge numbers may end anywhere. */
+static int txi_places_hold(const txi_places *s, txm_dvec3 p) {
+    return p.x >= s->low[0] && p.x <= s->high[0] && p.y >= s->low[1] && p.y <= s->high[1] &&
+           p.z >= s->low[2] && p.z <= s->high[2];
+}
+
+/* The pixel nearest to a place in the box, within reach; -1: none. */
 static int64_t txi_places_nearest(const txi_places *s, txm_dvec3 p) {
     const int64_t x = txi_places_cell(p.x), y = txi_places_cell(p.y), z = txi_places_cell(p.z);
     double least = TXI_PRIOR_REACH * TXI_PRIOR_REACH;
@@ -5602,7 +5608,7 @@ static txm_dvec3 txi_places_slope(const txi_window *w, size_t i, int axis) {
 
 /* Where a place of the surface lies in the window. 0: outside. */
 static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
-    const int64_t i = txi_places_nearest(s, p);
+    const int64_t i = txi_places_hold(s, p) ? txi_places_nearest(s, p) : -1;
     if (i < 0) return 0;
     const txm_vec3 q = s->w->place[i];
     const txm_dvec3 u = txi_places_slope(s->w, (size_t)i, 0), v = txi_places_slope(s->w, (size_t)i, 1);
@@ -5688,9 +5694,10 @@ static int txi_prior_copy(const txi_window *w, const texinpaint_line *line, txi_
             txi_prior_close(list);
             continue;
         }
-        const int steps = 1 + (int)((to - from) * txm_d3_len(d));
+        const int steps = 1 + (int)fmin((to - from) * txm_d3_len(d), 1e6);
         for (int i = 0; i <= steps; i++) {
             const txm_dvec3 q = txm_d3_mad(a, d, from + (to - from) * i / steps);
+            if (!txi_places_hold(&box, q)) continue;
             if (!txi_prior_add(list, txm_v2(txm_float(q.x), txm_float(q.y)), arena)) return 0;
         }
     }
