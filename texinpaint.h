@@ -13325,6 +13325,8 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
 
 enum { TXI_HYPOTHESES = 3 };
 #define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all   */
+#define TXI_SHARE_SMOOTH 0.15   /* the same between smooth parts, where short ends are no grain    */
+#define TXI_ENERGY_WEIGHT 0.12  /* share of ends that must go on for patches that cost twice as much */
 #define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture       */
 #define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried          */
 
@@ -13355,7 +13357,8 @@ typedef struct txi_choice {
 
 /* Which hypotheses to try, and how strongly detail is asked for. */
 static void txi_choose_style(txi_choice *c, double grain) {
-    const int has_lines = c->lines.end_count > 0 && c->lines.share_long >= TXI_SHARE_LONG;
+    const double least = grain > TXI_GRAIN_TEXTURE ? TXI_SHARE_LONG : TXI_SHARE_SMOOTH;
+    const int has_lines = c->lines.end_count > 0 && (double)c->lines.share_long >= least;
     const int forced = c->domain->desc->structure;
     memset(&c->style, 0, sizeof c->style);
     c->style.is_picture = c->domain->surface == NULL;
@@ -13423,7 +13426,7 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
     double score = 0;
     const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
     if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
-    score -= 0.04 * log(ratio) / log(2.0);
+    score -= TXI_ENERGY_WEIGHT * log(ratio) / log(2.0);
     if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
     if (is_picture && h->curve_count > 0) {
         score += 0.15 * txi_straight_share(&c->lines, h->curves, h->curve_count);
