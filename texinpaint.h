@@ -2554,7 +2554,7 @@ static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *e
     return status;
 }
 
-/* ---- layout: parts of surfaces --------------------------------------------------------------- */
+/* ---- sheet: a hole and its surroundings, laid out flat --------------------------------------- */
 
 enum {
     TXI_GAP = 24,              /* pixels: holes that are so near are laid out together; ours   */
@@ -2581,7 +2581,7 @@ typedef struct txi_sheet {
     const txi_surface *s;
     txm_env *env;
     txm_arena *scratch;
-    uint8_t *state;        /* by face: what txi_is_hole has found out, or TXI_SHEET_...             */
+    uint8_t *state;        /* by face: TXI_SHEET_...                                              */
     txi_list group;        /* the faces of the hole that is to be completed                       */
     size_t texels;         /* missing texels of the group                                         */
     double pixel;          /* side of a pixel, in the unit of the surface                         */
@@ -2597,9 +2597,20 @@ typedef struct txi_sheet {
     int width, height;     /* of the window                                                       */
     int slit;              /* the disk may be slit within the hole                                */
     int reach;             /* pixels around the centre that are laid out; 0: the whole hole       */
+    int is_source;         /* not around a hole: only what may be copied from                     */
+    txm_dvec3 origin;      /* places are relative to it                                           */
 } txi_sheet;
 
-enum { TXI_SHEET_UNSEEN = 0, TXI_SHEET_KNOWN, TXI_SHEET_HOLE, TXI_SHEET_GROUP, TXI_SHEET_TAKEN, TXI_SHEET_REFUSED };
+/* what a face of the surface is found to be: known, of a hole, of the hole that is completed, of one that is
+   completed along, of one that is left for later */
+enum {
+    TXI_SHEET_UNSEEN = 0,
+    TXI_SHEET_KNOWN,
+    TXI_SHEET_HOLE,
+    TXI_SHEET_GROUP,
+    TXI_SHEET_TAKEN,
+    TXI_SHEET_REFUSED
+};
 
 /* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing any
    longer */
@@ -2672,7 +2683,7 @@ static size_t txi_missing_count(const txi_domain *d, uint32_t face) {
     return missing;
 }
 
-/* ---- layout: the hole ------------------------------------------------------------------------ */
+/* ---- sheet: the hole ------------------------------------------------------------------------ */
 
 /* Add to list the hole that a face belongs to, connected across sides; its faces get this state. Faces
    outside the disk, if there is one, end it: 0. -1: no memory. */
@@ -2712,6 +2723,8 @@ static void txi_measure(txi_sheet *l) {
 /* Distances of the vertices from the missing texels of the group. */
 static txm_status txi_measure_from_hole(txi_sheet *l, double limit) {
     const size_t count = 3 * l->group.count;
+    for (size_t v = 0; v < l->s->vertex_count; v++) l->from_hole[v] = TXI_UNREACHED;
+    if (!count) return TXM_OK;
     uint32_t *sources = (uint32_t *)txm_arena_alloc(l->scratch, count, sizeof(uint32_t));
     double *start = (double *)txm_arena_alloc(l->scratch, count, sizeof(double));
     if (!sources || !start) return txi_no_memory(l->env);
@@ -2803,7 +2816,7 @@ static void txi_find_centre(txi_sheet *l) {
     }
 }
 
-/* ---- layout: the disk ------------------------------------------------------------------------ */
+/* ---- sheet: the disk ------------------------------------------------------------------------ */
 
 /* Is the middle of a face texture that may be copied? */
 static int txi_is_usable_face(const txi_domain *d, uint32_t face) {
@@ -2854,6 +2867,10 @@ static txm_status txi_sheet_disk(txi_sheet *l) {
         const int is_group = l->state[f] == TXI_SHEET_GROUP;
         l->weight[f] = txm_d3_len(txi_face_area2(s, f)) / (2 * pixel * pixel);
         l->size[f] = !is_group && txi_is_usable_face(l->d, f) ? l->weight[f] : 0;
+        if (l->is_source && !txi_is_usable_face(l->d, f)) {
+            l->key[f] = TXI_UNREACHED;
+            continue;
+        }
         l->key[f] = l->reach || is_group ? txi_mean_of(s, f, l->from_centre)
                                          : outside + txi_least_of(s, f, l->from_hole);
     }
@@ -2964,6 +2981,7 @@ static txi_bounds txi_sheet_bounds(const txi_sheet *l) {
             txi_bounds_add(&hole, x, y);
         }
     }
+    if (hole.left > hole.right) return all;
     all.left = fmax(all.left, hole.left - wide);
     all.top = fmax(all.top, hole.top - wide);
     all.right = fmin(all.right, hole.right + wide);
@@ -2986,11 +3004,12 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
     }
     for (size_t i = 0; i < disk->face_count; i++) {
         double u[2], v[2];
-        const double n = (double)txi_missing_count(l->d, disk->faces[i]);
+        const double n = l->is_source ? l->weight[disk->faces[i]]
+                                      : (double)txi_missing_count(l->d, disk->faces[i]);
         if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v)) continue;
         c += n * u[0];
         s += n * u[1];
-        if (reference < 0) reference = (int64_t)i;
+        if (reference < 0 && !l->is_source) reference = (int64_t)i;
     }
     const double length = sqrt(c * c + s * s);
     c = length > 0 ? c / length : 1;
@@ -3043,7 +3062,7 @@ static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, siz
     for (int k = 0; k < 3; k++) {
         x += weight[k] * t[k].x;
         y += weight[k] * t[k].y;
-        p = txm_d3_mad(p, txm_d3_sub(l->flat.point[c[k]], l->flat.point[0]), weight[k] / l->pixel);
+        p = txm_d3_mad(p, txm_d3_sub(l->flat.point[c[k]], l->origin), weight[k] / l->pixel);
         n = txm_vec3_add(n, txm_vec3_scale(l->normal[c[k]], txm_float(weight[k])));
     }
     const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
@@ -3116,7 +3135,7 @@ static size_t txi_sheet_face(const txi_sheet *l, txi_window *w, size_t i, int fi
    shown  receives 1 per face of the disk                                                      */
 static void txi_sheet_pixels(const txi_sheet *l, txi_window *w, uint8_t *shown) {
     w->spacing = l->pixel;
-    w->origin = l->flat.point[0];
+    w->origin = l->origin;
     for (size_t i = 0; i < l->disk.face_count; i++) {
         shown[i] = (uint8_t)txi_lies_right(l, i);
         if (shown[i] && l->state[l->disk.faces[i]] != TXI_SHEET_GROUP)
@@ -3183,7 +3202,7 @@ static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const
         return 0;
     if (w->face[pixel] == TXI_NO_FACE || w->face[pixel] == l->disk.faces[i]) return 1;
     const txm_dvec3 p = txm_d3_scale(txm_d3_sub(txi_texel_point(l->d, l->disk.faces[i], t->texel),
-                                                l->flat.point[0]), 1 / l->pixel);
+                                                l->origin), 1 / l->pixel);
     const txm_vec3 q = w->place[pixel];
     return txm_d3_dist(p, txm_d3(q.x, q.y, q.z)) < 4;
 }
@@ -3332,23 +3351,31 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
     return TXM_OK;
 }
 
-/* Lay out the hole with l->reach. *again: it should be tried with a smaller one. */
-static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, int *again) {
-    const size_t faces = l->s->face_count;
-    const int is_last = l->reach == TXI_REACH_LEAST;
-    *again = 0;
-    txi_find_centre(l);
-    txm_status status = txi_disk_init(&l->disk, l->s, faces, l->scratch, l->env);
+/* Lay the disk around l->centre out in the plane. *fits: it is small enough for a window. */
+static txm_status txi_sheet_spread(txi_sheet *l, int *fits) {
+    txm_status status = txi_disk_init(&l->disk, l->s, l->s->face_count, l->scratch, l->env);
     if (status == TXM_OK) status = txi_sheet_disk(l);
     if (status == TXM_OK) status = txi_sheet_flat(l);
     if (status != TXM_OK) return status;
     l->at = (txm_vec2 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec2));
     l->normal = (txm_vec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_vec3));
-    uint32_t *counts = (uint32_t *)txm_arena_alloc(l->scratch, faces, sizeof(uint32_t));
+    uint32_t *counts = (uint32_t *)txm_arena_alloc(l->scratch, l->s->face_count, sizeof(uint32_t));
     l->shown = (uint8_t *)txm_arena_alloc(l->scratch, l->disk.face_count, 1);
     if (l->scratch->failed) return txi_no_memory(l->env);
-    if (!txi_sheet_place(l, counts)) {
-        if (is_last) return txi_sheet_alone(l, arena, w);
+    if (!l->is_source) l->origin = l->flat.point[0];
+    *fits = txi_sheet_place(l, counts);
+    return TXM_OK;
+}
+
+/* Lay out the hole with l->reach, in a window of scratch memory. *again: it should be tried otherwise. */
+static txm_status txi_sheet_try(txi_sheet *l, txi_window *w, int *again) {
+    int fits = 0;
+    *again = 0;
+    txi_find_centre(l);
+    txm_status status = txi_sheet_spread(l, &fits);
+    if (status != TXM_OK) return status;
+    if (!fits) {
+        if (l->reach == TXI_REACH_LEAST) return txi_sheet_alone(l, l->scratch, w);
         *again = 1;
         return TXM_OK;
     }
@@ -3357,10 +3384,9 @@ static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, i
     for (size_t i = 0; i < l->disk.face_count; i++) room += txi_missing_count(l->d, l->disk.faces[i]);
     uint8_t *marks = (uint8_t *)txm_arena_alloc(l->scratch, pixels, 1);
     int32_t *nearest = (int32_t *)txm_arena_alloc(l->scratch, pixels, sizeof(int32_t));
-    if (!marks || !nearest) return txi_no_memory(l->env);
-    status = txi_window_alloc(w, l->width, l->height, arena, l->env);
-    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, room, sizeof(txi_target));
-    if (status != TXM_OK || !w->targets) return txi_no_memory(l->env);
+    status = txi_window_alloc(w, l->width, l->height, l->scratch, l->env);
+    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(l->scratch, room, sizeof(txi_target));
+    if (l->scratch->failed) return txi_no_memory(l->env);
     txi_sheet_normals(l);
     txi_sheet_pixels(l, w, l->shown);
     *again = !txi_sheet_targets(l, w, marks, nearest, &status);
@@ -3368,12 +3394,107 @@ static txm_status txi_sheet_try(txi_sheet *l, txm_arena *arena, txi_window *w, i
     return status;
 }
 
-/* Lay out the hole of a face: all of it in one window if that can be done; else a disk at its rim, smaller
-   and smaller until it lies flat enough. */
+/* Copy the pixels of one window to another, from column left on. */
+static void txi_window_paste(txi_window *to, const txi_window *from, int left) {
+    const size_t n = (size_t)from->width;
+    for (int y = 0; y < from->height; y++) {
+        const size_t a = (size_t)y * n, b = (size_t)y * (size_t)to->width + (size_t)left;
+        memcpy(to->state + b, from->state + a, n);
+        memcpy(to->color + 4 * b, from->color + 4 * a, 4 * n);
+        memcpy(to->texel + b, from->texel + a, n * sizeof *to->texel);
+        memcpy(to->place + b, from->place + a, n * sizeof *to->place);
+        memcpy(to->normal + b, from->normal + a, n * sizeof *to->normal);
+        memcpy(to->axis + b, from->axis + a, n * sizeof *to->axis);
+        memcpy(to->mirrored + b, from->mirrored + a, n);
+        memcpy(to->face + b, from->face + a, n * sizeof *to->face);
+    }
+}
+
+/* The window in memory of the arena: a copy, with another beside it unless that is NULL. */
+static txm_status txi_window_join(txi_window *w, const txi_window *hole, const txi_window *source,
+                                  txm_arena *arena, txm_env *env) {
+    const int left = hole->width + TXI_GAP;
+    const int width = source ? left + source->width : hole->width;
+    const int height = source && source->height > hole->height ? source->height : hole->height;
+    const txm_status status = txi_window_alloc(w, width, height, arena, env);
+    if (status != TXM_OK) return status;
+    w->targets = (txi_target *)txm_arena_alloc(arena, hole->target_count, sizeof(txi_target));
+    if (!w->targets) return txi_no_memory(env);
+    memcpy(w->targets, hole->targets, hole->target_count * sizeof(txi_target));
+    w->target_count = hole->target_count;
+    w->spacing = hole->spacing;
+    w->origin = hole->origin;
+    txi_window_paste(w, hole, 0);
+    if (source) txi_window_paste(w, source, left);
+    return TXM_OK;
+}
+
+/* The face that lies deepest in what may be copied from: farthest from all that may not. 0: there is none. */
+static int txi_find_source(txi_sheet *l, txm_status *status) {
+    const txi_surface *s = l->s;
+    uint32_t *sources = (uint32_t *)txm_arena_alloc(l->scratch, s->face_count, 3 * sizeof(uint32_t));
+    size_t count = 0;
+    double deepest = -1;
+    if (!sources) {
+        *status = txi_no_memory(l->env);
+        return 0;
+    }
+    for (uint32_t f = 0; f < s->face_count; f++) {
+        for (uint32_t k = 0; k < 3 && !txi_is_usable_face(l->d, f); k++)
+            sources[count++] = s->vertex[3 * f + k];
+    }
+    *status = txi_geodesic(s, sources, NULL, count, 0.5 * TXI_UNREACHED, l->env, l->from_centre);
+    for (uint32_t f = 0; f < s->face_count && *status == TXM_OK; f++) {
+        const double depth = txi_mean_of(s, f, l->from_centre);
+        if (txi_is_flat_face(s, f) || !txi_is_usable_face(l->d, f) || depth <= deepest) continue;
+        deepest = depth;
+        l->centre = f;
+    }
+    return deepest >= 0;
+}
+
+/* Lay out a part of what may be copied from that is not around the hole. *found: there is one. */
+static txm_status txi_sheet_source(txi_sheet *l, size_t wanted, txi_window *w, int *found) {
+    txm_status status = TXM_OK;
+    *found = 0;
+    l->group.count = l->texels = 0;
+    l->is_source = l->slit = 1;
+    l->reach = txm_clampi((int)sqrt((double)wanted), TXI_REACH_LEAST, TXI_REACH_MOST);
+    if (!txi_find_source(l, &status)) return status;
+    for (; status == TXM_OK && !*found && l->reach >= TXI_REACH_LEAST / 2; l->reach /= 2)
+        status = txi_sheet_spread(l, found);
+    if (status != TXM_OK || !*found) return status;
+    status = txi_window_alloc(w, l->width, l->height, l->scratch, l->env);
+    if (status != TXM_OK) return status;
+    txi_sheet_normals(l);
+    txi_sheet_pixels(l, w, l->shown);
+    txi_window_colors(l->d, w);
+    return TXM_OK;
+}
+
+/* The window as the caller gets it: with something to copy from beside it, if around the hole there is next
+   to nothing. */
+static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *arena, txi_window *w) {
+    const size_t pixels = (size_t)hole->width * (size_t)hole->height;
+    size_t usable = 0, wanted = TXI_SOURCE_RATIO * hole->target_count;
+    txi_window source;
+    txm_status status = TXM_OK;
+    int found = 0;
+    if (wanted < TXI_SOURCE_LEAST) wanted = TXI_SOURCE_LEAST;
+    txi_window_colors(l->d, hole);
+    for (size_t i = 0; i < pixels; i++) usable += hole->state[i] == TXI_KNOWN;
+    if (10 * usable < wanted && l->pixel > 0) status = txi_sheet_source(l, wanted, &source, &found);
+    if (status != TXM_OK) return status;
+    return txi_window_join(w, hole, found ? &source : NULL, arena, l->env);
+}
+
+/* Lay out the hole of a face: all of it in one window if that can be done; else with cuts through it; else a
+   disk at its rim, smaller and smaller until it lies flat enough. */
 static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch, txm_arena *arena,
-                                 txm_env *env, txi_window *w) {
+                                   txm_env *env, txi_window *w) {
     const txi_surface *s = d->surface;
     txi_sheet l;
+    txi_window hole;
     int again = 1;
     memset(&l, 0, sizeof l);
     l.d = d;
@@ -3388,32 +3509,32 @@ static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scra
     l.weight = (double *)txm_arena_alloc(scratch, s->face_count, sizeof(double));
     if (scratch->failed) return txi_no_memory(env);
     txm_status status = txi_find_group(&l, seed);
-    if (status == TXM_OK && !(l.pixel > 0)) {
-        l.centre = seed;
-        return txi_sheet_alone(&l, arena, w);
-    }
-    if (l.texels > TXI_WHOLE_MOST) l.reach = TXI_REACH_MOST;
+    if (status == TXM_OK && l.texels > TXI_WHOLE_MOST) l.reach = TXI_REACH_MOST;
     while (status == TXM_OK && again) {
-        txm_arena inner, *outer = l.scratch;
+        txm_arena inner;
         txm_arena_init(&inner, env);
         l.scratch = &inner;
-        status = txi_sheet_try(&l, arena, w, &again);
-        txm_arena_free(&inner);
-        l.scratch = outer;
-        if (!again) break;
-        if (!l.slit) {
-            l.slit = 1;
-            continue;
+        if (l.pixel > 0) {
+            status = txi_sheet_try(&l, &hole, &again);
+        } else {
+            again = 0;
+            l.centre = seed;
+            status = txi_sheet_alone(&l, &inner, &hole);
         }
-        l.reach = l.reach ? l.reach / 2 : (int)(0.75 * sqrt((double)l.texels));
-        l.reach = txm_clampi(l.reach, TXI_REACH_LEAST, TXI_REACH_MOST);
+        if (status == TXM_OK && !again) status = txi_sheet_finish(&l, &hole, arena, w);
+        txm_arena_free(&inner);
+        if (again && l.slit) {
+            l.reach = l.reach ? l.reach / 2 : (int)(0.75 * sqrt((double)l.texels));
+            l.reach = txm_clampi(l.reach, TXI_REACH_LEAST, TXI_REACH_MOST);
+        }
+        l.slit = 1;
     }
     return status;
 }
 
 /* Lay out the next window with missing texels: of the first hole, in the order of the texture, or of a
    part of it. found receives 0 if none are left; else the window has one target or more. Its memory is
-   the arena's. */
+   the arena's; states and colours are set. */
 static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
                                    int *found) {
     txi_surface *s = d->surface;
@@ -3426,7 +3547,6 @@ static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env
     txm_arena_init(&scratch, env);
     const txm_status status = txi_sheet_window(d, s->owner[s->cursor], &scratch, arena, env, w);
     txm_arena_free(&scratch);
-    if (status == TXM_OK) txi_window_colors(d, w);
     return status;
 }
 

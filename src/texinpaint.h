@@ -263,6 +263,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/flatten.h"
 #include "texinpaint/resample.h"
 #include "texinpaint/window.h"
+#include "texinpaint/sheet.h"
 #include "texinpaint/layout.h"
 #include "texinpaint/graph.h"
 #include "texinpaint/multigrid.h"

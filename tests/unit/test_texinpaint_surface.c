@@ -708,6 +708,43 @@ static void test_source(void **state) {
     end();
 }
 
+/* What may be copied from lies on another piece of the mesh: a part of it is laid out beside the hole. */
+static void test_source_apart(void **state) {
+    static uint8_t source[128 * 128];
+    txm_arena arena;
+    txi_window w;
+    int found, usable = 0, foreign = 0, holes = 0;
+    (void)state;
+    begin(128);
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < 4; i++) vertex(i % 3 > 0, i > 1, k);
+        quad((uint32_t)(4 * k), (uint32_t)(4 * k + 1), (uint32_t)(4 * k + 2), (uint32_t)(4 * k + 3),
+             k * 0.5 + 0.02, 0.02, k * 0.5 + 0.48, 0.98);
+    }
+    for (int i = 0; i < 128 * 128; i++) {
+        const int x = i % 128, y = i / 128;
+        s.mask[i] = x > 20 && x < 40 && y > 50 && y < 80 ? 255 : 0;
+        source[i] = x > 64 ? 255 : 0;
+    }
+    const txm_image from = {source, 128, 128, 1, TXM_U8, 0};
+    s.desc.source = from;
+    domain();
+    for (int i = 0; i < 128 * 128; i++) s.d.usable[i] = source[i] > 0;
+    txm_arena_init(&arena, NULL);
+    assert_int_equal(txi_windows_next(&s.d, &arena, NULL, &w, &found), TXM_OK);
+    for (int i = 0; i < w.width * w.height; i++) {
+        usable += w.state[i] == TXI_KNOWN;
+        foreign += w.state[i] == TXI_FOREIGN;
+        holes += w.state[i] == TXI_HOLE;
+    }
+    assert_true(usable > 3000 && foreign > 3000);
+    assert_int_equal(w.target_count, 19 * 29);
+    assert_true(abs(holes - 19 * 29) < 120);
+    txm_arena_free(&arena);
+    assert_int_equal(complete(), 1);
+    end();
+}
+
 /* ---- faults --------------------------------------------------------------------------------- */
 
 static txm_status all_of_it(void *context, txm_env *env) {
@@ -758,7 +795,8 @@ int main(void) {
         cmocka_unit_test(test_mirrored),            cmocka_unit_test(test_repeats),
         cmocka_unit_test(test_bad_meshes),          cmocka_unit_test(test_random_meshes),
         cmocka_unit_test(test_gutter),              cmocka_unit_test(test_pictures),
-        cmocka_unit_test(test_source),              cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_source),              cmocka_unit_test(test_source_apart),
+        cmocka_unit_test(test_faults),
     };
     return cmocka_run_group_tests_name("texinpaint: surfaces and windows", tests, NULL, NULL);
 }
