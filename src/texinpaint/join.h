@@ -323,7 +323,7 @@ static double txi_end_color_distance(const double a[3], const double b[3]) {
    it meets none within most pixels. */
 static int txi_meet_curve(const txi_lines *l, const txi_end *e, const txi_curve *curves, int count,
                           double most, txi_link *k) {
-    const double turn = fabs(e->curvature) * most < 1 ? e->curvature : 0;
+    const double turn = fabs((double)e->curvature) * most < 1 ? e->curvature : 0;
     double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y;
     for (int i = 0; i < (int)most; i++) {
         x += dx;

@@ -229,7 +229,7 @@ static int txi_prior_choose(const txi_pairs *pairs, int a, int b, txi_link *k) {
         const txi_near *q = b >= 0 ? &pairs->passes[(size_t)b * (size_t)lines + (size_t)i] : p;
         if (p->at < 0 || q->at < 0) continue;
         if (b >= 0 && fabs((double)p->at - q->at) < 2) continue;
-        const double d = fabs(p->offset) + fabs(q->offset) + 2 * fabs((double)p->offset - q->offset);
+        const double d = fabs((double)p->offset) + fabs((double)q->offset) + 2 * fabs((double)p->offset - q->offset);
         if (d >= best) continue;
         best = d;
         k->line = i;
@@ -349,10 +349,23 @@ static double txi_affinity(const txi_grown *g, const txi_link *k) {
         const txm_vec2 d = txi_unit((double)q.x - p.x, (double)q.y - p.y);
         sum += txi_votes_agree(g, k->points[i].x, k->points[i].y, d.x, d.y);
     }
-    return sum / (TXI_STEPS / 2 - 1);
+    return sum / ((TXI_STEPS - 2) * 0.5);
 }
 
 /* ---- looking ahead ----------------------------------------------------------------------- */
+
+/* Does a line of the same colours end where end e would leave the hole? Then the two can be joined. */
+static int txi_end_there(const txi_lines *l, const txi_end *e, const txi_link *k) {
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *o = &l->ends[i];
+        double correlation, mismatch, sides[2];
+        const double d = (double)o->heading.x * k->backwards.x + (double)o->heading.y * k->backwards.y;
+        if (o == e || d < 0.8 || txi_distance(o->place, k->leave) > 8) continue;
+        txi_compare(e, o, &correlation, &mismatch, sides);
+        if (correlation > 0.7 && mismatch < 0.3) return 1;
+    }
+    return 0;
+}
 
 /* Continue end a straight on (along its fitted curve) to the other side of the hole, and look for a
    line there that could be its continuation although it does not end at the hole, as other lines
@@ -362,7 +375,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
     const txi_window *w = pairs->w;
     const txi_lines *l = pairs->l;
     const txi_end *e = &l->ends[a];
-    const double turn = fabs(e->curvature) * l->width < 1.5 ? e->curvature : 0;
+    const double turn = fabs((double)e->curvature) * l->width < 1.5 ? e->curvature : 0;
     double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y, change[3];
     double offset = 0, offsets[TXI_LOOK_AHEAD];
     int inside = 0, beyond = 0, hits = 0, first = 0;
@@ -411,7 +424,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
     k->leave = txm_v2(txm_float(exit.x - offset * direction.y), txm_float(exit.y + offset * direction.x));
     k->backwards = txm_v2(-direction.x, -direction.y);
     k->line = -1;
-    if (!txi_link_measure(pairs, k)) return 0;
+    if (txi_end_there(l, e, k) || !txi_link_measure(pairs, k)) return 0;
     k->cost = txm_float(pairs->rules.bend * k->bend + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
                         0.75 - 0.02 * hits + 0.05 * fabs(offset));
     return 1;

@@ -19,6 +19,8 @@ enum {
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
     TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
     TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that         */
+    TXI_BENT_FIT = 40,      /* pixels; parabolas are fitted to as much of a line, or half of the width of
+                               the hole; ours                                                    */
     TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own        */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
@@ -376,7 +378,8 @@ static double txi_strength_at(const txi_slopes *f, double x, double y) {
 /* The pixel of a place, or -1 outside of the window. */
 static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
-    return (ptrdiff_t)(int)(y + 0.5) * width + (int)(x + 0.5);
+    const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
+    return (ptrdiff_t)row * width + column;
 }
 
 /* ---- following a line -------------------------------------------------------------------- */
@@ -646,19 +649,21 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
 }
 
 /* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
-static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) {
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+    const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
+           pieces a parabola is no arc                                                            */
+        const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
-        if ((rms < 0.5 && txi_fit_start(points, n, fit) < 0.3) || n <= 8) {
-            /* a straight line unless a bent one is clearly better: the direction is more exact   */
-            if (n <= 8 || txi_fit_line(points, n, 1, line) < 1.25 * rms + 0.03) {
-                txi_fit_line(points, n, 1, line);
-                memcpy(fit, line, sizeof fit);
-            }
+        const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
+        if (is_straight) memcpy(fit, line, sizeof fit);
+        if (n <= 8) break;
+        if ((is_straight ? straight : rms) < 0.5 && txi_fit_start(points, n, fit) < 0.3 &&
+            (is_straight || n <= bent))
             break;
-        }
         n = n * 3 / 4;
     }
     /* a corner near the hole: the first points alone are straight, in another direction            */
@@ -754,7 +759,7 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     if (e->count < 5) return;
     const txm_vec2 p = l->points[e->first];
     const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
-    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l->points + e->first, e)) return;
+    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e)) return;
     e->strength = txm_float(strength);
     e->length = (float)e->count;
     e->is_long = e->length >= TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;

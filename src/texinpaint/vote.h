@@ -234,7 +234,7 @@ static uint32_t txi_bucket(const txi_tokens *k, int64_t x, int64_t y, int64_t z)
 }
 
 static int64_t txi_cell(const txi_tokens *k, double x) {
-    return (int64_t)floor(txm_clampf(txm_float(x / k->cell), -1e9f, 1e9f));
+    return (int64_t)floor((double)txm_clampf(txm_float(x / k->cell), -1e9f, 1e9f));
 }
 
 /* No tokens; room for that many. */
