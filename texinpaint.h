@@ -6242,7 +6242,7 @@ static uint32_t txi_bucket(const txi_tokens *k, int64_t x, int64_t y, int64_t z)
 }
 
 static int64_t txi_cell(const txi_tokens *k, double x) {
-    return (int64_t)floor(txm_clampf(txm_float(x / k->cell), -1e9f, 1e9f));
+    return (int64_t)floor((double)txm_clampf(txm_float(x / k->cell), -1e9f, 1e9f));
 }
 
 /* No tokens; room for that many. */
@@ -6322,6 +6322,8 @@ enum {
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
     TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
     TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that         */
+    TXI_BENT_FIT = 40,      /* pixels; parabolas are fitted to as much of a line, or half of the width of
+                               the hole; ours                                                    */
     TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own        */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
@@ -6679,7 +6681,8 @@ static double txi_strength_at(const txi_slopes *f, double x, double y) {
 /* The pixel of a place, or -1 outside of the window. */
 static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
-    return (ptrdiff_t)(int)(y + 0.5) * width + (int)(x + 0.5);
+    const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
+    return (ptrdiff_t)row * width + column;
 }
 
 /* ---- following a line -------------------------------------------------------------------- */
@@ -6949,19 +6952,21 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
 }
 
 /* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
-static int txi_fit_end(const txi_window *w, const txm_vec2 *points, txi_end *e) {
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+    const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
+           pieces a parabola is no arc                                                            */
+        const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
-        if ((rms < 0.5 && txi_fit_start(points, n, fit) < 0.3) || n <= 8) {
-            /* a straight line unless a bent one is clearly better: the direction is more exact   */
-            if (n <= 8 || txi_fit_line(points, n, 1, line) < 1.25 * rms + 0.03) {
-                txi_fit_line(points, n, 1, line);
-                memcpy(fit, line, sizeof fit);
-            }
+        const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
+        if (is_straight) memcpy(fit, line, sizeof fit);
+        if (n <= 8) break;
+        if ((is_straight ? straight : rms) < 0.5 && txi_fit_start(points, n, fit) < 0.3 &&
+            (is_straight || n <= bent))
             break;
-        }
         n = n * 3 / 4;
     }
     /* a corner near the hole: the first points alone are straight, in another direction            */
@@ -7057,7 +7062,7 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     if (e->count < 5) return;
     const txm_vec2 p = l->points[e->first];
     const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
-    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l->points + e->first, e)) return;
+    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e)) return;
     e->strength = txm_float(strength);
     e->length = (float)e->count;
     e->is_long = e->length >= TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
@@ -7739,7 +7744,7 @@ static int txi_prior_choose(const txi_pairs *pairs, int a, int b, txi_link *k) {
         const txi_near *q = b >= 0 ? &pairs->passes[(size_t)b * (size_t)lines + (size_t)i] : p;
         if (p->at < 0 || q->at < 0) continue;
         if (b >= 0 && fabs((double)p->at - q->at) < 2) continue;
-        const double d = fabs(p->offset) + fabs(q->offset) + 2 * fabs((double)p->offset - q->offset);
+        const double d = fabs((double)p->offset) + fabs((double)q->offset) + 2 * fabs((double)p->offset - q->offset);
         if (d >= best) continue;
         best = d;
         k->line = i;
@@ -7859,10 +7864,23 @@ static double txi_affinity(const txi_grown *g, const txi_link *k) {
         const txm_vec2 d = txi_unit((double)q.x - p.x, (double)q.y - p.y);
         sum += txi_votes_agree(g, k->points[i].x, k->points[i].y, d.x, d.y);
     }
-    return sum / (TXI_STEPS / 2 - 1);
+    return sum / ((TXI_STEPS - 2) * 0.5);
 }
 
 /* ---- looking ahead ----------------------------------------------------------------------- */
+
+/* Does a line of the same colours end where end e would leave the hole? Then the two can be joined. */
+static int txi_end_there(const txi_lines *l, const txi_end *e, const txi_link *k) {
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *o = &l->ends[i];
+        double correlation, mismatch, sides[2];
+        const double d = (double)o->heading.x * k->backwards.x + (double)o->heading.y * k->backwards.y;
+        if (o == e || d < 0.8 || txi_distance(o->place, k->leave) > 8) continue;
+        txi_compare(e, o, &correlation, &mismatch, sides);
+        if (correlation > 0.7 && mismatch < 0.3) return 1;
+    }
+    return 0;
+}
 
 /* Continue end a straight on (along its fitted curve) to the other side of the hole, and look for a
    line there that could be its continuation although it does not end at the hole, as other lines
@@ -7872,7 +7890,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
     const txi_window *w = pairs->w;
     const txi_lines *l = pairs->l;
     const txi_end *e = &l->ends[a];
-    const double turn = fabs(e->curvature) * l->width < 1.5 ? e->curvature : 0;
+    const double turn = fabs((double)e->curvature) * l->width < 1.5 ? e->curvature : 0;
     double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y, change[3];
     double offset = 0, offsets[TXI_LOOK_AHEAD];
     int inside = 0, beyond = 0, hits = 0, first = 0;
@@ -7921,7 +7939,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
     k->leave = txm_v2(txm_float(exit.x - offset * direction.y), txm_float(exit.y + offset * direction.x));
     k->backwards = txm_v2(-direction.x, -direction.y);
     k->line = -1;
-    if (!txi_link_measure(pairs, k)) return 0;
+    if (txi_end_there(l, e, k) || !txi_link_measure(pairs, k)) return 0;
     k->cost = txm_float(pairs->rules.bend * k->bend + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
                         0.75 - 0.02 * hits + 0.05 * fabs(offset));
     return 1;
@@ -8353,7 +8371,7 @@ static double txi_end_color_distance(const double a[3], const double b[3]) {
    it meets none within most pixels. */
 static int txi_meet_curve(const txi_lines *l, const txi_end *e, const txi_curve *curves, int count,
                           double most, txi_link *k) {
-    const double turn = fabs(e->curvature) * most < 1 ? e->curvature : 0;
+    const double turn = fabs((double)e->curvature) * most < 1 ? e->curvature : 0;
     double x = e->place.x, y = e->place.y, dx = e->heading.x, dy = e->heading.y;
     for (int i = 0; i < (int)most; i++) {
         x += dx;
