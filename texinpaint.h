@@ -1937,34 +1937,42 @@ static double txi_texel_value(const txm_image *image, int64_t texel, int c) {
     return txm_image_get(image, (int)(texel % image->width), (int)(texel / image->width), c);
 }
 
+/* The samples of a row, as they are stored. */
+static void txi_load_row(const txm_image *image, int x, int y, int count, double *out) {
+    const void *row = (const char *)image->pixels + image->stride * y;
+    const size_t first = (size_t)x * (size_t)image->channels;
+    if (image->sample == TXM_U8) {
+        for (int i = 0; i < count; i++) out[i] = ((const uint8_t *)row + first)[i];
+    } else if (image->sample == TXM_U16) {
+        for (int i = 0; i < count; i++) out[i] = ((const uint16_t *)row + first)[i];
+    } else {
+        for (int i = 0; i < count; i++) out[i] = ((const float *)row + first)[i];
+    }
+}
+
 /* The channels of a map at a place all around which texels are known and of one chart. */
 static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, txm_vec2 p, float *out) {
+    enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
     const double fx = floor(p.x), fy = floor(p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
-    const size_t skip = (size_t)x * (size_t)channels;
-    double wx[TXI_TAPS], wy[TXI_TAPS], sum[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
-    double low[TXI_MAX_CHANNELS] = {0, 0, 0, 0}, high[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
     const double unit = image->sample == TXM_U8 ? 255 : image->sample == TXM_U16 ? 65535 : 1;
+    double wx[N], wy[N], v[N * ROW];
     txi_kernel_at(kernel, p.x - fx, wx);
     txi_kernel_at(kernel, p.y - fy, wy);
-    for (int j = 0; j < TXI_TAPS; j++) {
-        const char *row = (const char *)image->pixels + image->stride * (y + j);
-        for (int i = 0; i < TXI_TAPS; i++) {
-            const double weight = wx[i] * wy[j];
-            const int is_inner = (i == 2 || i == 3) && (j == 2 || j == 3), is_first = i == 2 && j == 2;
-            for (int c = 0; c < channels; c++) {
-                const size_t at = skip + (size_t)(i * channels + c);
-                const double v = image->sample == TXM_U8    ? ((const uint8_t *)row)[at]
-                                 : image->sample == TXM_U16 ? ((const uint16_t *)(const void *)row)[at]
-                                                            : ((const float *)(const void *)row)[at];
-                sum[c] += weight * v;
-                if (!is_inner) continue;
-                low[c] = is_first || v < low[c] ? v : low[c];
-                high[c] = is_first || v > high[c] ? v : high[c];
-            }
+    for (int j = 0; j < N; j++) txi_load_row(image, x, y + j, N * channels, v + j * ROW);
+    for (int c = 0; c < channels; c++) {
+        const double *a = v + 2 * ROW + 2 * channels + c, *b = a + ROW; /* the inner four */
+        const double low = fmin(fmin(a[0], a[channels]), fmin(b[0], b[channels]));
+        const double high = fmax(fmax(a[0], a[channels]), fmax(b[0], b[channels]));
+        double sum = 0;
+        for (int j = 0; j < N; j++) {
+            const double *row = v + j * ROW + c;
+            double line = 0;
+            for (int i = 0; i < N; i++) line += wx[i] * row[i * channels];
+            sum += wy[j] * line;
         }
+        out[c] = txm_float(txi_limit(sum, low, high) / unit);
     }
-    for (int c = 0; c < channels; c++) out[c] = txm_float(txi_limit(sum[c], low[c], high[c]) / unit);
 }
 
 /* Are all texels of the kernel at p known and of the chart of this face? Decided by tiles; 0 also where
