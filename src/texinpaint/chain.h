@@ -167,8 +167,9 @@ static int32_t txi_meeting_cost(const txi_strips *all, const txi_meeting *m, int
     const txi_strip *s = &all->strips[m->strip[0]], *t = &all->strips[m->strip[1]];
     int32_t sum = 0;
     for (int k = 0; k < m->count; k++) {
-        const uint8_t *u = s->source_color + 3 * ((s->labels[a] + m->offset[k][0]) * s->rows + m->row[k][0]);
-        const uint8_t *v = t->source_color + 3 * ((t->labels[b] + m->offset[k][1]) * t->rows + m->row[k][1]);
+        const int p = (s->labels[a] + m->offset[k][0]) * s->rows + m->row[k][0];
+        const int q = (t->labels[b] + m->offset[k][1]) * t->rows + m->row[k][1];
+        const uint8_t *u = s->source_color + 3 * p, *v = t->source_color + 3 * q;
         for (int c = 0; c < 3; c++) sum += (u[c] - v[c]) * (u[c] - v[c]);
     }
     return sum * TXI_MEETING_STEP * TXI_MEETING_STEP / 4; /* rows off the lines count a quarter */
@@ -236,8 +237,12 @@ static void txi_strips_body(void *context, int index) {
 static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines, const txi_curve *curves,
                                    txm_arena *arena, txm_env *env) {
     size_t labels = 0;
+    int room = TXI_STRIP_COLUMNS;
+    while (room > TXI_STRIP_COLUMNS_LEAST && room * room > TXI_STRIP_CELLS / (all->count + 1))
+        room -= 16;
     for (int i = 0; i < all->count; i++) {
         txi_strip *s = &all->strips[i];
+        s->room = room;
         txm_status status =
             profiles ? TXM_OK : txi_strip_sources(all->w, lines, &curves[s->curve], s, arena, env);
         if (status == TXM_OK && !profiles) txi_strip_labels(s);

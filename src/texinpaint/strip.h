@@ -26,6 +26,8 @@ enum {
     TXI_STRIP_HOP = 6,       /* columns between neighbouring patches, so that they overlap        */
     TXI_STRIP_REACH_LEAST = 3, /* of patches where little of a line is known                       */
     TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
+    TXI_STRIP_COLUMNS_LEAST = 128, /* and so many at least, however many strips there are          */
+    TXI_STRIP_CELLS = 4 << 20, /* of all tables of overlaps, 4 bytes each: 16 MB                  */
     TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
     TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
     TXI_STRIP_ONWARD = 12,   /* pixels that lines without an end are continued behind the hole      */
@@ -60,7 +62,7 @@ typedef struct txi_strip {
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
     txi_column *sources;
-    int source_count;
+    int source_count, room; /* room: most of them                                                */
     uint8_t *source_color; /* 3 per source column and row                                         */
     int16_t *source_feature; /* features per source column: colours, weighted                      */
     int features;        /* 3 * rows, rounded up to a multiple of 16                               */
@@ -381,7 +383,7 @@ static txm_vec2 txi_column_place(const txi_column *a, double t) {
    or mirrored (backwards, but with the rows as they are). */
 static void txi_columns_add(txi_strip *s, const txi_ribbon *r, int from, int to, int backwards,
                            int mirrored) {
-    const int room = TXI_STRIP_COLUMNS - s->source_count;
+    const int room = s->room - s->source_count;
     const int count = to - from + 1 < room ? to - from + 1 : room;
     for (int k = 0; k < count; k++) {
         const int i = backwards || mirrored ? to - k : from + k;
@@ -396,10 +398,10 @@ static void txi_columns_add(txi_strip *s, const txi_ribbon *r, int from, int to,
     s->source_count += count > 0 ? count : 0;
 }
 
-/* The strip's own known columns, those next to the hole first: both sides of the hole in turn would
-   only matter beyond TXI_STRIP_COLUMNS / 2 columns each. Returns how many. */
+/* Add the strip's own known columns: on each side of the hole at most room / 2, those next to it.
+   Returns how many. */
 static int txi_columns_own(txi_strip *s, int mirrored) {
-    const int most = TXI_STRIP_COLUMNS / 2, before = s->source_count;
+    const int most = s->room / 2, before = s->source_count;
     const int from = s->first > most ? s->first - most : 0;
     const int to = s->line.count - 1 - s->last > most ? s->last + most : s->line.count - 1;
     if (s->first > 0) txi_columns_add(s, &s->line, from, s->first - 1, 0, mirrored);
@@ -607,14 +609,14 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
                                     const txi_curve *curve, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     int best[TXI_STRIP_OTHERS], others = 0;
-    s->sources = (txi_column *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->sources);
-    s->labels = (int *)txm_arena_alloc(arena, TXI_STRIP_COLUMNS, sizeof *s->labels);
+    s->sources = (txi_column *)txm_arena_alloc(arena, (size_t)s->room, sizeof *s->sources);
+    s->labels = (int *)txm_arena_alloc(arena, (size_t)s->room, sizeof *s->labels);
     if (arena->failed) return txi_no_memory(env);
     s->source_count = 0;
     const int own = txi_columns_own(s, 0);
     txm_status status = txi_columns_sample(w, s, arena, env);
     if (status != TXM_OK) return status;
-    if (s->partner < 0 && lines && own > 0 && own < TXI_STRIP_COLUMNS / 4)
+    if (s->partner < 0 && lines && own > 0 && own < s->room / 4)
         others = txi_strip_others(s, lines, curve->ends, best);
     for (int k = 0; k < others; k++) {
         const txi_end *e = &lines->ends[best[k] / 2];
@@ -624,7 +626,7 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
         /* points run outwards, the profile is that seen on the way inwards */
         txi_columns_add(s, &r, 0, r.count - 1, !(best[k] & 1), 0);
     }
-    if (own < TXI_STRIP_COLUMNS / 8) txi_columns_own(s, 1);
+    if (own < s->room / 8) txi_columns_own(s, 1);
     return s->source_count > own ? txi_columns_sample(w, s, arena, env) : TXM_OK;
 }
 
