@@ -7587,6 +7587,7 @@ static txi_rules txi_rules_of(int structure) {
     return structure == TEXINPAINT_PATTERN ? pattern : picture;
 }
 
+#define TXI_SIDE_COST 0.015  /* per level of difference of the colours on one side; ours            */
 #define TXI_ANGLE_ERROR 1 /* pixels: of a direction, times the length it was measured on; ours    */
 
 /* ---- curves ------------------------------------------------------------------------------ */
@@ -7859,6 +7860,7 @@ static int txi_link_ends(const txi_pairs *pairs, int a, int b, txi_link *k) {
     }
     const double u = (double)p->contrast + 2, v = (double)q->contrast + 2;
     k->cost = txm_float(shape + 3 * (1 - correlation) + 2 * (mismatch < 2 ? mismatch : 2) +
+                        TXI_SIDE_COST * (sides[0] > sides[1] ? sides[0] : sides[1]) +
                         0.6 * fabs(u - v) / (u + v) + 0.6 * k->length / (l->width > 8 ? l->width : 8) +
                         0.3 * !p->is_long + 0.3 * !q->is_long);
     return 1;
