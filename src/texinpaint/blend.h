@@ -13,7 +13,7 @@
    over neighbours p, q. Inside of a piece j = 0, w = 1. Across a seam j is what the step v(q) - v(p)
    is more than the mean of the steps at the same places in the two sources; at the rim, where
    c(q) = 0, more than the step in the source of p. A large j is no error of tone but an edge, which
-   is not to be smeared (an occluding stroke): w falls with it.                                    */
+   is not to be smeared (an occluding stroke): w falls with it, to 0 (Tukey's weight).                                   */
 
 enum {
     TXI_BLEND_SWEEPS = 80, /* of successive over-relaxation; see docs/choices.md                  */
@@ -21,7 +21,8 @@ enum {
 };
 #define TXI_BLEND_SCREEN 0.02 /* lambda: corrections fade out within some 7 pixels                */
 #define TXI_BLEND_OMEGA 1.7   /* over-relaxation, 1..2                                            */
-#define TXI_BLEND_JUMP 0.14   /* of the range of values: half the weight across a seam            */
+#define TXI_BLEND_JUMP 0.14   /* of the range of values: 0.8 of the weight across a seam; none from
+                                 three times that on                                            */
 #define TXI_RIM_JUMP 0.28     /* the same at the rim                                              */
 
 /* One map of a window while it is blended. */
@@ -147,7 +148,7 @@ static void txi_blend_link(txi_blend *b, size_t i, int k) {
         }
         square /= b->channels;
     }
-    const double weight = 1 / (1 + square);
+    const double weight = square < 9 ? (1 - square / 9) * (1 - square / 9) : 0;
     b->side[4 * i + (size_t)k] = j;
     b->weight[4 * i + (size_t)k] = txm_float(weight);
     b->diagonal[i] += (double)b->weight[4 * i + (size_t)k];
