@@ -272,6 +272,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/crest.h"
 #include "texinpaint/prior.h"
 #include "texinpaint/vote.h"
+#include "texinpaint/slope.h"
 #include "texinpaint/trace.h"
 #include "texinpaint/grow.h"
 #include "texinpaint/pair.h"

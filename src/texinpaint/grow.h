@@ -2,6 +2,7 @@
 #define TEXINPAINT_GROW_H
 
 #include "trace.h"
+#include "vote.h"
 
 /* ---- lines grow into the hole -----------------------------------------------------------------
    [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places are

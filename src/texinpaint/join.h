@@ -395,7 +395,8 @@ static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *mat
    structure  TEXINPAINT_PICTURE or TEXINPAINT_PATTERN; TEXINPAINT_TEXTURE: no curves
    alpha      the largest distance of two ends that are joined, pixels; 0 = no limit
    beta       rounds over which lines grow by votes; 0 = as many as it takes
-   curves     receives *count curves, in the arena                                             */
+   curves     receives *count curves, in the arena
+   return     TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED                                         */
 static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_prior *prior, int structure,
                            float alpha, int beta, uint64_t seed, txm_arena *arena, txm_env *env,
                            txi_curve **curves, int *count) {
@@ -412,8 +413,10 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
     *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)l->end_count, sizeof **curves);
     if (status == TXM_OK && (scratch.failed || arena->failed)) status = txi_no_memory(env);
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK) n = txi_candidates(&pairs, links);
     if (n) status = txi_pairing_make(&match, &pairs, links, n, &scratch, env);
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (n && status == TXM_OK) {
         txi_anneal(&match, seed, best);
         status = txi_join_curves(&pairs, &match, &scratch, arena, env, *curves, count);

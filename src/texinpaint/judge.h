@@ -67,7 +67,7 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
             from[i] = w->state[i] == TXI_HOLE ? l->depth[i] : l->away[i];
         }
         txi_distances(mark, w->width, w->height, row, f.gap);
-        status = txi_slopes_make(&f, from, 15 * 15, &arena, env);
+        status = txi_slopes_make(&f, from, 15 * 15, &arena, &arena, env);
     }
     for (int i = 0; i < l->end_count && status == TXM_OK; i++)
         sum += txi_goes_on(w, &f, &l->ends[i]) / (double)TXI_GO_ON;

@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_TRACE_H
 #define TEXINPAINT_TRACE_H
 
-#include "vote.h"
+#include "slope.h"
 
 /* ---- lines near a hole ------------------------------------------------------------------------
    The structure of [1, II.A]: points of strong colour gradient near the hole, thinned to lines, and
@@ -9,10 +9,6 @@
    the gradient in the window is the gradient on the surface.                                       */
 
 enum {
-    TXI_GRADIENT_UNIT = 64, /* stored gradients are in 1/64 of a level per pixel               */
-    TXI_GRADIENT_TAPS = 3,  /* pixels; radius of the derivative of a Gaussian of sigma 1.2       */
-    TXI_TENSOR_TAPS = 3,    /* pixels; radius of the Gaussian of sigma 1.5 over the tensor      */
-    TXI_BAND_ROWS = 32,     /* rows that one call of a parallel loop computes                   */
     TXI_PROFILE = 21,       /* samples of the colours across a line, half a pixel apart          */
     TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
@@ -42,24 +38,11 @@ typedef struct txi_end {
     float length;     /* pixels over which it was followed outwards                             */
     int is_long;      /* long enough to be a line and not grain                                 */
     int first, count; /* its points in txi_lines.points, from the border outwards, 1 pixel apart */
-    int loop;         /* which loop of the border of the hole it lies on                        */
-    int along;        /* where on the loop, in pixel sides from its start                       */
     float profile[TXI_PROFILE][3]; /* RGB across it from left to right, 5 pixels to each side   */
     float fit[6];     /* x = fit[0] + fit[1] s + fit[2] s^2, y with fit[3..5], s = pixels outwards
                          from place                                                             */
     float fit_length; /* over how many pixels that holds                                        */
 } txi_end;
-
-/* Gradients of a window. */
-typedef struct txi_slopes {
-    int width, height;
-    const uint8_t *color; /* 4 per pixel                                                        */
-    uint8_t *known;      /* 1: the colour counts                                                */
-    int32_t *gap;        /* squared distance to the nearest pixel that is not known             */
-    int16_t *gradient;   /* 6 per pixel: x and y of R, G, B; 0 where unknown                     */
-    float *strength;     /* root of the sum of their squares, levels per pixel                  */
-    int32_t *tensor;     /* sums of xx, xy, yy over RGB, smoothed, (1/16 level per pixel)^2       */
-} txi_slopes;
 
 /* What is known about the lines of a window. */
 typedef struct txi_lines {
@@ -78,309 +61,6 @@ typedef struct txi_lines {
     float limit;      /* pixels over which lines were followed                                  */
     float share_long; /* share of ends that are long; 0.45 or more: there is structure          */
 } txi_lines;
-
-static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
-    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
-}
-
-static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
-    const double x = (double)a.x - b.x, y = (double)a.y - b.y;
-    return sqrt(x * x + y * y);
-}
-
-static inline txm_vec2 txi_unit(double x, double y) {
-    const double n = sqrt(x * x + y * y);
-    return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
-}
-
-/* ---- distances --------------------------------------------------------------------------- */
-
-enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
-
-/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
-   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
-   row (Meijster, Roerdink, Hesselink 2000).
-   scratch  3 * max(width, height) numbers
-   cost     O(width * height)                                                                     */
-static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
-    int32_t *row = scratch, *hull = row + width, *from = hull + width;
-    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
-    for (int x = 0; x < width; x++) {
-        for (int pass = 0; pass < 2; pass++) {
-            int d = beyond;
-            for (int k = 0; k < height; k++) {
-                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
-                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
-                if (!pass || d < out[i]) out[i] = d;
-            }
-        }
-    }
-    for (int y = 0; y < height; y++) {
-        int32_t *o = out + (size_t)y * (size_t)width;
-        int top = 0;
-        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
-        hull[0] = from[0] = 0;
-        for (int x = 1; x < width; x++) {
-            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
-            for (; top >= 0; top--) {
-                const int h = hull[top], t = from[top];
-                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
-            }
-            if (top < 0) {
-                top = 0;
-                hull[0] = x;
-                from[0] = 0;
-                continue;
-            }
-            const int64_t h = hull[top];
-            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
-            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
-            if (at < width) {
-                hull[++top] = x;
-                from[top] = (int32_t)at;
-            }
-        }
-        for (int x = width - 1; x >= 0; x--) {
-            const int h = hull[top];
-            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
-            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
-            if (x == from[top] && top > 0) top--;
-        }
-    }
-}
-
-/* ---- gradients --------------------------------------------------------------------------- */
-
-/* 64 exp(-k^2 / 2 / 1.2^2): the derivative of a Gaussian is the slope of the plane that fits best
-   with these weights. Next to pixels that are not known the plane is fitted to the known ones, so
-   that the borders of the hole and of the surface are no edges. */
-static const int txi_gradient_weight[TXI_GRADIENT_TAPS + 1] = {64, 45, 16, 3};
-
-/* The slopes of the planes through the known pixels around (x, y): 6 numbers, levels per pixel. */
-static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
-    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x, y */
-    for (int j = -TXI_GRADIENT_TAPS; j <= TXI_GRADIENT_TAPS; j++) {
-        for (int i = -TXI_GRADIENT_TAPS; i <= TXI_GRADIENT_TAPS; i++) {
-            const int px = x + i, py = y + j;
-            if (px < 0 || py < 0 || px >= f->width || py >= f->height) continue;
-            const size_t at = (size_t)py * (size_t)f->width + (size_t)px;
-            if (!f->known[at]) continue;
-            const double w = txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
-            m[0] += w;
-            m[1] += w * i;
-            m[2] += w * j;
-            m[3] += w * i * i;
-            m[4] += w * i * j;
-            m[5] += w * j * j;
-            for (int c = 0; c < 3; c++) {
-                const double value = w * f->color[4 * at + (size_t)c];
-                v[c][0] += value;
-                v[c][1] += value * i;
-                v[c][2] += value * j;
-            }
-        }
-    }
-    for (int c = 0; c < 6; c++) slope[c] = 0;
-    if (m[0] <= 0) return;
-    const double xx = m[3] - m[1] * m[1] / m[0], xy = m[4] - m[1] * m[2] / m[0];
-    const double yy = m[5] - m[2] * m[2] / m[0], det = xx * yy - xy * xy;
-    if (det < 0.05 * m[0] * m[0]) return; /* pixels in one line, or too few: no slope             */
-    for (int c = 0; c < 3; c++) {
-        const double gx = v[c][1] - m[1] * v[c][0] / m[0], gy = v[c][2] - m[2] * v[c][0] / m[0];
-        slope[2 * c] = (yy * gx - xy * gy) / det;
-        slope[2 * c + 1] = (xx * gy - xy * gx) / det;
-    }
-}
-
-static int16_t txi_gradient_round(double slope) {
-    const double v = slope * TXI_GRADIENT_UNIT;
-    return (int16_t)(v < -32000 ? -32000 : v > 32000 ? 32000 : v < 0 ? v - 0.5 : v + 0.5);
-}
-
-/* The job of one band of rows. rows: scratch of this band, 6 * width * (TXI_BAND_ROWS + 6) ints */
-typedef struct txi_slopes_job {
-    txi_slopes *field;
-    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere   */
-    int32_t reach;
-    int32_t *rows;
-    int smooth;          /* 0: the gradients, 1: the tensor                                     */
-} txi_slopes_job;
-
-/* Horizontal sums of row y: smoothed and derived, RGB each. */
-static void txi_gradient_row(const txi_slopes *f, int y, int32_t *out) {
-    const uint8_t *c = f->color + 4 * (size_t)y * (size_t)f->width;
-    for (int x = TXI_GRADIENT_TAPS; x < f->width - TXI_GRADIENT_TAPS; x++) {
-        const uint8_t *p = c + 4 * x;
-        for (int k = 0; k < 3; k++) {
-            out[6 * x + k] = 64 * p[k] + 45 * (p[k - 4] + p[k + 4]) + 16 * (p[k - 8] + p[k + 8]) +
-                             3 * (p[k - 12] + p[k + 12]);
-            out[6 * x + 3 + k] =
-                45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) + 9 * (p[k + 12] - p[k - 12]);
-        }
-    }
-}
-
-static void txi_gradient_pixel(txi_slopes *f, int x, int y, const int32_t *row0, size_t pitch) {
-    const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
-    const int taps = TXI_GRADIENT_TAPS;
-    double slope[6], sum = 0;
-    if (f->gap[i] > 2 * taps * taps && x >= taps && y >= taps && x < f->width - taps &&
-        y < f->height - taps) {
-        /* the sum of the weights is 192, that of weight * k^2 is 272                             */
-        for (int c = 0; c < 3; c++) {
-            int gx = 0, gy = 0;
-            for (int k = -taps; k <= taps; k++) {
-                const int32_t *r = row0 + (size_t)(k + taps) * pitch + 6 * (size_t)x;
-                const int w = txi_gradient_weight[k < 0 ? -k : k];
-                gx += w * r[3 + c];
-                gy += w * k * r[c];
-            }
-            slope[2 * c] = gx / (192.0 * 272.0);
-            slope[2 * c + 1] = gy / (192.0 * 272.0);
-        }
-    } else {
-        txi_slope(f, x, y, slope);
-    }
-    for (int c = 0; c < 6; c++) {
-        const int16_t g = txi_gradient_round(slope[c]);
-        f->gradient[6 * i + (size_t)c] = g;
-        sum += (double)g * g;
-    }
-    f->strength[i] = txm_float(sqrt(sum) / TXI_GRADIENT_UNIT);
-}
-
-static void txi_gradient_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
-    txi_slopes *f = job->field;
-    const size_t pitch = 6 * (size_t)f->width;
-    const int taps = TXI_GRADIENT_TAPS;
-    for (int y = y0 - taps; y < y1 + taps; y++) {
-        if (y >= 0 && y < f->height)
-            txi_gradient_row(f, y, rows + (size_t)(y - y0 + taps) * pitch);
-    }
-    for (int y = y0; y < y1; y++) {
-        for (int x = 0; x < f->width; x++) {
-            const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
-            if (f->known[i] && (!job->away || job->away[i] <= job->reach))
-                txi_gradient_pixel(f, x, y, rows + (size_t)(y - y0) * pitch, pitch);
-        }
-    }
-}
-
-/* xx, xy, yy of one row, smoothed horizontally by {18, 14, 7, 2} / 64. */
-static void txi_tensor_row(const txi_slopes *f, int y, int32_t *out, int32_t *raw) {
-    const int16_t *g = f->gradient + 6 * (size_t)y * (size_t)f->width;
-    for (int x = 0; x < f->width; x++) {
-        int32_t *t = raw + 3 * x;
-        t[0] = t[1] = t[2] = 0;
-        for (int c = 0; c < 3; c++) {
-            const int gx = g[6 * x + 2 * c] / 4, gy = g[6 * x + 2 * c + 1] / 4;
-            t[0] += gx * gx;
-            t[1] += gx * gy;
-            t[2] += gy * gy;
-        }
-        for (int k = 0; k < 3; k++) t[k] = t[k] > 16000000 ? 16000000 : t[k];
-    }
-    for (int x = 0; x < f->width; x++) {
-        for (int k = 0; k < 3; k++) {
-            int sum = 18 * raw[3 * x + k];
-            if (x >= 1) sum += 14 * raw[3 * (x - 1) + k];
-            if (x >= 2) sum += 7 * raw[3 * (x - 2) + k];
-            if (x >= 3) sum += 2 * raw[3 * (x - 3) + k];
-            if (x + 1 < f->width) sum += 14 * raw[3 * (x + 1) + k];
-            if (x + 2 < f->width) sum += 7 * raw[3 * (x + 2) + k];
-            if (x + 3 < f->width) sum += 2 * raw[3 * (x + 3) + k];
-            out[3 * x + k] = sum / 64;
-        }
-    }
-}
-
-static void txi_tensor_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
-    static const int weight[TXI_TENSOR_TAPS + 1] = {18, 14, 7, 2};
-    txi_slopes *f = job->field;
-    const size_t pitch = 3 * (size_t)f->width;
-    const int taps = TXI_TENSOR_TAPS;
-    int32_t *raw = rows + (size_t)(TXI_BAND_ROWS + 2 * taps) * pitch;
-    for (int y = y0 - taps; y < y1 + taps; y++) {
-        int32_t *out = rows + (size_t)(y - y0 + taps) * pitch;
-        if (y >= 0 && y < f->height) txi_tensor_row(f, y, out, raw);
-        else memset(out, 0, pitch * sizeof *out);
-    }
-    for (int y = y0; y < y1; y++) {
-        int32_t *t = f->tensor + (size_t)y * pitch;
-        for (size_t i = 0; i < pitch; i++) {
-            int sum = 0;
-            for (int k = -taps; k <= taps; k++)
-                sum += weight[k < 0 ? -k : k] * rows[(size_t)(y - y0 + taps + k) * pitch + i];
-            t[i] = sum / 64;
-        }
-    }
-}
-
-static void txi_slopes_body(void *context, int index) {
-    const txi_slopes_job *job = (const txi_slopes_job *)context;
-    const int y0 = index * TXI_BAND_ROWS;
-    const int y1 = y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
-    int32_t *rows = job->rows + (size_t)index * 6 * (size_t)job->field->width * (TXI_BAND_ROWS + 6);
-    if (job->smooth) txi_tensor_band(job, y0, y1, rows);
-    else txi_gradient_band(job, y0, y1, rows);
-}
-
-/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. */
-static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach, txm_arena *arena,
-                                 txm_env *env) {
-    const size_t count = (size_t)f->width * (size_t)f->height;
-    const int bands = (f->height + TXI_BAND_ROWS - 1) / TXI_BAND_ROWS;
-    txi_slopes_job job;
-    txm_arena scratch;
-    txm_arena_init(&scratch, env);
-    f->gradient = (int16_t *)txm_arena_zero(arena, count, 6 * sizeof *f->gradient);
-    f->strength = (float *)txm_arena_zero(arena, count, sizeof *f->strength);
-    f->tensor = (int32_t *)txm_arena_zero(arena, count, 3 * sizeof *f->tensor);
-    job.rows = (int32_t *)txm_arena_zero(&scratch, (size_t)bands * 6 * (size_t)f->width,
-                                         (TXI_BAND_ROWS + 6) * sizeof *job.rows);
-    if (arena->failed || scratch.failed) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
-    job.field = f;
-    job.away = away;
-    job.reach = reach;
-    for (job.smooth = 0; job.smooth < 2; job.smooth++)
-        txm_parallel_for(env, bands, txi_slopes_body, &job);
-    txm_arena_free(&scratch);
-    return TXM_OK;
-}
-
-/* The direction across the edge at a pixel, unit, and how clear it is, 0..1. */
-static double txi_across(const txi_slopes *f, size_t i, double *nx, double *ny) {
-    const double a = f->tensor[3 * i], b = f->tensor[3 * i + 1], c = f->tensor[3 * i + 2];
-    const double half = 0.5 * (a - c), r = sqrt(half * half + b * b);
-    double x = r + half, y = b;
-    if (half < 0) {
-        x = b;
-        y = r - half;
-    }
-    const double n = sqrt(x * x + y * y);
-    *nx = n > 0 ? x / n : 1;
-    *ny = n > 0 ? y / n : 0;
-    return a + c > 0 ? 2 * r / (a + c) : 0;
-}
-
-/* Bilinear gradient strength; 0 outside of the window. */
-static double txi_strength_at(const txi_slopes *f, double x, double y) {
-    if (!(x >= 0 && y >= 0 && x < f->width - 1 && y < f->height - 1)) return 0;
-    const int ix = (int)x, iy = (int)y;
-    const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
-    const double u = x - ix, v = y - iy;
-    return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
-}
-
-/* The pixel of a place, or -1 outside of the window. */
-static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
-    if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
-    const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
-    return (ptrdiff_t)row * width + column;
-}
 
 /* ---- following a line -------------------------------------------------------------------- */
 
@@ -795,70 +475,6 @@ static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *ar
     return TXM_OK;
 }
 
-/* ---- the border of the hole -------------------------------------------------------------- */
-
-/* Number the pixel sides between hole and rest along the border's loops: side 4 i + k is the upper,
-   right, lower, left side of hole pixel i. Each end gets the loop and the place of the side that is
-   nearest. Loops follow the border with the hole to their right. */
-static txm_status txi_order_ends(const txi_window *w, txi_lines *l, txm_arena *scratch, txm_env *env) {
-    static const int sx[4] = {0, 1, 0, -1}, sy[4] = {-1, 0, 1, 0}; /* to the pixel beyond a side   */
-    const size_t count = (size_t)w->width * (size_t)w->height;
-    int32_t *loop_of = (int32_t *)txm_arena_zero(scratch, count, 4 * sizeof *loop_of);
-    int32_t *along = (int32_t *)txm_arena_alloc(scratch, count, 4 * sizeof *along);
-    int loops = 0;
-    if (scratch->failed) return txi_no_memory(env);
-    for (size_t begin = 0; begin < 4 * count; begin++) {
-        const size_t pixel = begin / 4;
-        int x = (int)(pixel % (size_t)w->width), y = (int)(pixel / (size_t)w->width);
-        int side = (int)(begin % 4), n = 0;
-        size_t at = begin;
-        if (w->state[pixel] != TXI_HOLE || loop_of[begin]) continue;
-        const int bx = x + sx[side], by = y + sy[side];
-        if (bx >= 0 && by >= 0 && bx < w->width && by < w->height &&
-            w->state[(size_t)by * (size_t)w->width + (size_t)bx] == TXI_HOLE)
-            continue;
-        loops++;
-        while (!loop_of[at]) { /* forwards along a side is the direction of the next side's normal   */
-            loop_of[at] = loops;
-            along[at] = n++;
-            const int f = (side + 1) % 4;
-            int px = x + sx[f] + sx[side], py = y + sy[f] + sy[side]; /* diagonally ahead: turn left */
-            int turn = 3;
-            for (int k = 0; k < 2; k++) {
-                if (px >= 0 && py >= 0 && px < w->width && py < w->height &&
-                    w->state[(size_t)py * (size_t)w->width + (size_t)px] == TXI_HOLE)
-                    break;
-                px = k ? x : x + sx[f]; /* then straight on, then round the corner                */
-                py = k ? y : y + sy[f];
-                turn = k ? 1 : 0;
-            }
-            x = px;
-            y = py;
-            side = (side + turn) % 4;
-            at = 4 * ((size_t)y * (size_t)w->width + (size_t)x) + (size_t)side;
-        }
-    }
-    for (int i = 0; i < l->end_count; i++) {
-        txi_end *e = &l->ends[i];
-        double best = 1e9;
-        const int cx = (int)(e->place.x + 0.5f), cy = (int)(e->place.y + 0.5f);
-        for (int y = cy - 3; y <= cy + 3; y++) {
-            for (int x = cx - 3; x <= cx + 3; x++) {
-                if (x < 0 || y < 0 || x >= w->width || y >= w->height) continue;
-                for (int k = 0; k < 4; k++) {
-                    const size_t at = 4 * ((size_t)y * (size_t)w->width + (size_t)x) + (size_t)k;
-                    const double dx = x + 0.5 * sx[k] - e->place.x, dy = y + 0.5 * sy[k] - e->place.y;
-                    if (!loop_of[at] || dx * dx + dy * dy >= best) continue;
-                    best = dx * dx + dy * dy;
-                    e->loop = loop_of[at];
-                    e->along = along[at];
-                }
-            }
-        }
-    }
-    return TXM_OK;
-}
-
 /* ---- all of it --------------------------------------------------------------------------- */
 
 /* known pixels, distances, the width of the hole */
@@ -873,7 +489,7 @@ static txm_status txi_lines_begin(const txi_window *w, txm_arena *arena, txm_are
     l->field.height = w->height;
     l->field.color = w->color;
     l->field.known = (uint8_t *)txm_arena_alloc(arena, count, 1);
-    l->field.gap = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->field.gap);
+    l->field.gap = (int32_t *)txm_arena_alloc(scratch, count, sizeof *l->field.gap);
     l->away = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->away);
     l->depth = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->depth);
     if (arena->failed || scratch->failed) return txi_no_memory(env);
@@ -897,8 +513,8 @@ static txm_status txi_lines_begin(const txi_window *w, txm_arena *arena, txm_are
 /* Find the lines that end at the hole of a window.
 
    arena  holds the results
-   return TXM_OK, also if there are none; TXM_OUT_OF_MEMORY
-   cost   O(pixels) + O(length of lines); about 250 bytes per pixel while it runs, 60 after      */
+   return TXM_OK, also if there are none; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(pixels) + O(length of lines); 46 bytes per pixel while it runs, 30 after              */
 static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env, txi_lines *lines) {
     txm_arena scratch;
     int longs = 0;
@@ -906,18 +522,21 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     memset(lines, 0, sizeof *lines);
     txm_status status = txi_lines_begin(w, arena, &scratch, env, lines);
     const int reach = (int)lines->limit + TXI_LOOK_AHEAD;
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK)
-        status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, env);
+        status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, &scratch, env);
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK) {
         const double strong = 0.3 * txi_strong(&lines->field, lines->away, reach * reach);
         lines->threshold = txm_float(strong > 6 ? strong : 6);
         status = txi_thin_all(lines, reach * reach, arena, env);
     }
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK) status = txi_find_ends(w, lines, arena, &scratch, env);
-    if (status == TXM_OK) status = txi_order_ends(w, lines, &scratch, env);
     for (int i = 0; i < lines->end_count && status == TXM_OK; i++) longs += lines->ends[i].is_long;
     if (lines->end_count && status == TXM_OK)
         lines->share_long = (float)longs / (float)lines->end_count;
+    lines->field.gap = lines->field.tensor = NULL; /* they were in scratch                           */
     txm_arena_free(&scratch);
     return status;
 }

@@ -347,10 +347,11 @@ static txm_status trace_and_join(void *context, txm_env *env) {
     return status;
 }
 
-static void test_failed_allocations(void **state) {
+static void test_faults(void **state) {
     (void)state;
     scene *s = scene_make(30, paint_bars);
     assert_true(tk_sweep(trace_and_join, s, TK_ALLOCATION) > 20);
+    assert_true(tk_sweep(trace_and_join, s, TK_CANCEL) > 4);
     free(s);
 }
 
@@ -365,7 +366,7 @@ int main(void) {
         cmocka_unit_test(test_prior_attracts),
         cmocka_unit_test(test_continued),
         cmocka_unit_test(test_threads_do_not_matter),
-        cmocka_unit_test(test_failed_allocations),
+        cmocka_unit_test(test_faults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
