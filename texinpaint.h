@@ -7149,7 +7149,7 @@ static txm_status txi_lines_begin(const txi_window *w, txm_arena *arena, txm_are
 /* Find the lines that end at the hole of a window.
 
    arena  holds the results
-   return TXM_OK, also if there are none; TXM_OUT_OF_MEMORY
+   return TXM_OK, also if there are none; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(pixels) + O(length of lines); 46 bytes per pixel while it runs, 30 after              */
 static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env, txi_lines *lines) {
     txm_arena scratch;
@@ -7158,13 +7158,16 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     memset(lines, 0, sizeof *lines);
     txm_status status = txi_lines_begin(w, arena, &scratch, env, lines);
     const int reach = (int)lines->limit + TXI_LOOK_AHEAD;
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK)
         status = txi_slopes_make(&lines->field, lines->away, reach * reach, arena, &scratch, env);
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK) {
         const double strong = 0.3 * txi_strong(&lines->field, lines->away, reach * reach);
         lines->threshold = txm_float(strong > 6 ? strong : 6);
         status = txi_thin_all(lines, reach * reach, arena, env);
     }
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK) status = txi_find_ends(w, lines, arena, &scratch, env);
     for (int i = 0; i < lines->end_count && status == TXM_OK; i++) longs += lines->ends[i].is_long;
     if (lines->end_count && status == TXM_OK)
@@ -8394,7 +8397,8 @@ static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *mat
    structure  TEXINPAINT_PICTURE or TEXINPAINT_PATTERN; TEXINPAINT_TEXTURE: no curves
    alpha      the largest distance of two ends that are joined, pixels; 0 = no limit
    beta       rounds over which lines grow by votes; 0 = as many as it takes
-   curves     receives *count curves, in the arena                                             */
+   curves     receives *count curves, in the arena
+   return     TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED                                         */
 static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_prior *prior, int structure,
                            float alpha, int beta, uint64_t seed, txm_arena *arena, txm_env *env,
                            txi_curve **curves, int *count) {
@@ -8411,8 +8415,10 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
     int *best = (int *)txm_arena_alloc(&scratch, (size_t)l->end_count, sizeof *best);
     *curves = (txi_curve *)txm_arena_alloc(arena, (size_t)l->end_count, sizeof **curves);
     if (status == TXM_OK && (scratch.failed || arena->failed)) status = txi_no_memory(env);
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (status == TXM_OK) n = txi_candidates(&pairs, links);
     if (n) status = txi_pairing_make(&match, &pairs, links, n, &scratch, env);
+    if (status == TXM_OK && txm_progress(env, 0, "lines")) status = txi_stopped(env);
     if (n && status == TXM_OK) {
         txi_anneal(&match, seed, best);
         status = txi_join_curves(&pairs, &match, &scratch, arena, env, *curves, count);
