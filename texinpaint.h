@@ -1892,7 +1892,7 @@ typedef struct txi_taps {
    are among them and little weight is lost; else those of the inner four, bilinear; else the nearest. */
 static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p, int is_label,
                         txi_taps *taps) {
-    const double fx = floor(p.x), fy = floor(p.y), tx = p.x - fx, ty = p.y - fy;
+    const double fx = floor((double)p.x), fy = floor((double)p.y), tx = p.x - fx, ty = p.y - fy;
     const int x = (int)fx, y = (int)fy;
     double wx[TXI_TAPS], wy[TXI_TAPS], part = 0, sum = 0;
     taps->count = taps->is_limited = 0;
@@ -1953,7 +1953,7 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 /* The channels of a map at a place all around which texels are known and of one chart. */
 static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, txm_vec2 p, float *out) {
     enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
-    const double fx = floor(p.x), fy = floor(p.y);
+    const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
     const double unit = image->sample == TXM_U8 ? 255 : image->sample == TXM_U16 ? 65535 : 1;
     double wx[N], wy[N], v[N * ROW];
@@ -1979,7 +1979,7 @@ static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, tx
    that is not enough. */
 static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     const txi_surface *s = d->surface;
-    const int x = (int)floor(p.x) - 2, y = (int)floor(p.y) - 2, side = TXI_TILE;
+    const int x = (int)floor((double)p.x) - 2, y = (int)floor((double)p.y) - 2, side = TXI_TILE;
     if (x < 0 || y < 0 || x + TXI_TAPS > d->width || y + TXI_TAPS > d->height) return 0;
     for (int k = 0; k < 4; k++) {
         const size_t tx = (size_t)((x + k % 2 * (TXI_TAPS - 1)) / side);
@@ -1988,7 +1988,8 @@ static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     }
     for (int j = 0; j < TXI_TAPS; j++) {
         static const uint8_t none[TXI_TAPS] = {0};
-        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS)) return 0;
+        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS) != 0)
+            return 0;
     }
     return 1;
 }
@@ -2085,11 +2086,11 @@ static void txi_window_read(const txi_domain *d, const txi_window *w, int map, f
 /* Is a pixel, that has a surface, known, missing or not to be copied from? A hole if its nearest
    texel is missing, or one that has more than 2 % of the bilinear weight; void without any. */
 static uint8_t txi_pixel_state(const txi_domain *d, uint32_t face, txm_vec2 p) {
-    const double fx = floor(p.x), fy = floor(p.y);
+    const double fx = floor((double)p.x), fy = floor((double)p.y);
     double most = 0;
     int64_t nearest = -1;
     if (d->surface && txi_is_inside(d, face, p))
-        return d->usable[(size_t)floor(p.y + 0.5) * (size_t)d->width + (size_t)floor(p.x + 0.5)]
+        return d->usable[(size_t)floor((double)p.y + 0.5) * (size_t)d->width + (size_t)floor((double)p.x + 0.5)]
                    ? TXI_KNOWN
                    : TXI_FOREIGN;
     for (int k = 0; k < 4; k++) {
@@ -2802,7 +2803,8 @@ static void txi_find_centre(txi_sheet *l) {
     for (size_t i = 0; i < l->group.count; i++) {
         const uint32_t f = l->group.items[i];
         const double n = (double)txi_missing_count(l->d, f);
-        for (uint32_t k = 0; k < 3; k++) middle = txm_d3_mad(middle, txi_corner_point(l->s, 3 * f + k), n / 3);
+        for (uint32_t k = 0; k < 3; k++)
+            middle = txm_d3_mad(middle, txi_corner_point(l->s, 3 * f + k), n / 3);
         count += n;
     }
     middle = txm_d3_scale(middle, 1 / count);
@@ -3179,9 +3181,11 @@ static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, u
 
 /* The distance of a place in the window from the nearest mark. */
 static double txi_from_marks(const txi_window *w, const int32_t *nearest, double x, double y) {
-    const int px = txm_clampi((int)(x + 0.5), 0, w->width - 1), py = txm_clampi((int)(y + 0.5), 0, w->height - 1);
+    const int px = txm_clampi((int)(x + 0.5), 0, w->width - 1);
+    const int py = txm_clampi((int)(y + 0.5), 0, w->height - 1);
     const int32_t at = nearest[(size_t)py * (size_t)w->width + (size_t)px];
-    const double dx = at % w->width - x, dy = at / w->width - y;
+    const int column = at % w->width, row = at / w->width;
+    const double dx = column - x, dy = row - y;
     return at < 0 ? 1e30 : sqrt(dx * dx + dy * dy);
 }
 
@@ -3320,12 +3324,12 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         y += weight[i] * t[i].y;
     }
     /* the window's pixels are texels, the first of the missing ones lies within */
-    txi_bounds box = {x - TXI_FLAT_SIDE / 2, y - TXI_FLAT_SIDE / 2, x + TXI_FLAT_SIDE / 2,
-                      y + TXI_FLAT_SIDE / 2};
-    box.left = fmax(box.left, fmin(t[0].x, fmin(t[1].x, t[2].x)) - 1);
-    box.top = fmax(box.top, fmin(t[0].y, fmin(t[1].y, t[2].y)) - 1);
-    box.right = fmin(box.right, fmax(t[0].x, fmax(t[1].x, t[2].x)) + 1);
-    box.bottom = fmin(box.bottom, fmax(t[0].y, fmax(t[1].y, t[2].y)) + 1);
+    const double half = 0.5 * TXI_FLAT_SIDE;
+    txi_bounds box = {x - half, y - half, x + half, y + half};
+    box.left = fmax(box.left, (double)txm_minf(t[0].x, txm_minf(t[1].x, t[2].x)) - 1);
+    box.top = fmax(box.top, (double)txm_minf(t[0].y, txm_minf(t[1].y, t[2].y)) - 1);
+    box.right = fmin(box.right, (double)txm_maxf(t[0].x, txm_maxf(t[1].x, t[2].x)) + 1);
+    box.bottom = fmin(box.bottom, (double)txm_maxf(t[0].y, txm_maxf(t[1].y, t[2].y)) + 1);
     const int left = (int)floor(box.left), top = (int)floor(box.top);
     const int width = (int)ceil(box.right) - left + 1, height = (int)ceil(box.bottom) - top + 1;
     txm_status status = txi_window_alloc(w, width, height, arena, l->env);

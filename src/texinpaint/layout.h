@@ -137,9 +137,11 @@ static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, u
 
 /* The distance of a place in the window from the nearest mark. */
 static double txi_from_marks(const txi_window *w, const int32_t *nearest, double x, double y) {
-    const int px = txm_clampi((int)(x + 0.5), 0, w->width - 1), py = txm_clampi((int)(y + 0.5), 0, w->height - 1);
+    const int px = txm_clampi((int)(x + 0.5), 0, w->width - 1);
+    const int py = txm_clampi((int)(y + 0.5), 0, w->height - 1);
     const int32_t at = nearest[(size_t)py * (size_t)w->width + (size_t)px];
-    const double dx = at % w->width - x, dy = at / w->width - y;
+    const int column = at % w->width, row = at / w->width;
+    const double dx = column - x, dy = row - y;
     return at < 0 ? 1e30 : sqrt(dx * dx + dy * dy);
 }
 
@@ -278,12 +280,12 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         y += weight[i] * t[i].y;
     }
     /* the window's pixels are texels, the first of the missing ones lies within */
-    txi_bounds box = {x - TXI_FLAT_SIDE / 2, y - TXI_FLAT_SIDE / 2, x + TXI_FLAT_SIDE / 2,
-                      y + TXI_FLAT_SIDE / 2};
-    box.left = fmax(box.left, fmin(t[0].x, fmin(t[1].x, t[2].x)) - 1);
-    box.top = fmax(box.top, fmin(t[0].y, fmin(t[1].y, t[2].y)) - 1);
-    box.right = fmin(box.right, fmax(t[0].x, fmax(t[1].x, t[2].x)) + 1);
-    box.bottom = fmin(box.bottom, fmax(t[0].y, fmax(t[1].y, t[2].y)) + 1);
+    const double half = 0.5 * TXI_FLAT_SIDE;
+    txi_bounds box = {x - half, y - half, x + half, y + half};
+    box.left = fmax(box.left, (double)txm_minf(t[0].x, txm_minf(t[1].x, t[2].x)) - 1);
+    box.top = fmax(box.top, (double)txm_minf(t[0].y, txm_minf(t[1].y, t[2].y)) - 1);
+    box.right = fmin(box.right, (double)txm_maxf(t[0].x, txm_maxf(t[1].x, t[2].x)) + 1);
+    box.bottom = fmin(box.bottom, (double)txm_maxf(t[0].y, txm_maxf(t[1].y, t[2].y)) + 1);
     const int left = (int)floor(box.left), top = (int)floor(box.top);
     const int width = (int)ceil(box.right) - left + 1, height = (int)ceil(box.bottom) - top + 1;
     txm_status status = txi_window_alloc(w, width, height, arena, l->env);

@@ -119,7 +119,7 @@ typedef struct txi_taps {
    are among them and little weight is lost; else those of the inner four, bilinear; else the nearest. */
 static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p, int is_label,
                         txi_taps *taps) {
-    const double fx = floor(p.x), fy = floor(p.y), tx = p.x - fx, ty = p.y - fy;
+    const double fx = floor((double)p.x), fy = floor((double)p.y), tx = p.x - fx, ty = p.y - fy;
     const int x = (int)fx, y = (int)fy;
     double wx[TXI_TAPS], wy[TXI_TAPS], part = 0, sum = 0;
     taps->count = taps->is_limited = 0;
@@ -180,7 +180,7 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 /* The channels of a map at a place all around which texels are known and of one chart. */
 static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, txm_vec2 p, float *out) {
     enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
-    const double fx = floor(p.x), fy = floor(p.y);
+    const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
     const double unit = image->sample == TXM_U8 ? 255 : image->sample == TXM_U16 ? 65535 : 1;
     double wx[N], wy[N], v[N * ROW];
@@ -206,7 +206,7 @@ static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, tx
    that is not enough. */
 static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     const txi_surface *s = d->surface;
-    const int x = (int)floor(p.x) - 2, y = (int)floor(p.y) - 2, side = TXI_TILE;
+    const int x = (int)floor((double)p.x) - 2, y = (int)floor((double)p.y) - 2, side = TXI_TILE;
     if (x < 0 || y < 0 || x + TXI_TAPS > d->width || y + TXI_TAPS > d->height) return 0;
     for (int k = 0; k < 4; k++) {
         const size_t tx = (size_t)((x + k % 2 * (TXI_TAPS - 1)) / side);
@@ -215,7 +215,8 @@ static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     }
     for (int j = 0; j < TXI_TAPS; j++) {
         static const uint8_t none[TXI_TAPS] = {0};
-        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS)) return 0;
+        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS) != 0)
+            return 0;
     }
     return 1;
 }
@@ -312,11 +313,11 @@ static void txi_window_read(const txi_domain *d, const txi_window *w, int map, f
 /* Is a pixel, that has a surface, known, missing or not to be copied from? A hole if its nearest
    texel is missing, or one that has more than 2 % of the bilinear weight; void without any. */
 static uint8_t txi_pixel_state(const txi_domain *d, uint32_t face, txm_vec2 p) {
-    const double fx = floor(p.x), fy = floor(p.y);
+    const double fx = floor((double)p.x), fy = floor((double)p.y);
     double most = 0;
     int64_t nearest = -1;
     if (d->surface && txi_is_inside(d, face, p))
-        return d->usable[(size_t)floor(p.y + 0.5) * (size_t)d->width + (size_t)floor(p.x + 0.5)]
+        return d->usable[(size_t)floor((double)p.y + 0.5) * (size_t)d->width + (size_t)floor((double)p.x + 0.5)]
                    ? TXI_KNOWN
                    : TXI_FOREIGN;
     for (int k = 0; k < 4; k++) {

@@ -244,7 +244,8 @@ static void txi_find_centre(txi_sheet *l) {
     for (size_t i = 0; i < l->group.count; i++) {
         const uint32_t f = l->group.items[i];
         const double n = (double)txi_missing_count(l->d, f);
-        for (uint32_t k = 0; k < 3; k++) middle = txm_d3_mad(middle, txi_corner_point(l->s, 3 * f + k), n / 3);
+        for (uint32_t k = 0; k < 3; k++)
+            middle = txm_d3_mad(middle, txi_corner_point(l->s, 3 * f + k), n / 3);
         count += n;
     }
     middle = txm_d3_scale(middle, 1 / count);
