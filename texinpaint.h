@@ -10775,9 +10775,9 @@ static void txi_draw_strips(const txi_window *w, const txi_plan *plan, uint8_t *
 /* ---- levels of a window -------------------------------------------------------------------- */
 
 enum {
-    TXI_PATCH = 8,       /* pixels: side of the square patches that are compared               */
+    TXI_PATCH = 8, /* pixels: side of the square patches that are compared               */
     TXI_PATCH_AREA = TXI_PATCH * TXI_PATCH,
-    TXI_EDGE = 8,        /* pixels of void around each level, so that all patches lie inside   */
+    TXI_EDGE = 8, /* pixels of void around each level, so that all patches lie inside   */
     TXI_MAX_LEVELS = 8,
     TXI_MAX_POSES = 16,
     TXI_LEAST_PATCHES = 48, /* source patches that a coarse level must have; ours              */
@@ -10804,17 +10804,17 @@ typedef struct txi_source {
    TXI_EDGE pixels of void on all sides, or lists of numbers of pixels in these. */
 typedef struct txi_level {
     int width, height;
-    uint8_t *state;      /* TXI_VOID .. TXI_FOREIGN                                            */
-    uint8_t *color;      /* 4 per pixel; 0 where there is nothing known. The fourth is the guide */
-    uint8_t *mask;       /* 4 per pixel: 255 where the pixel is not void                       */
-    uint8_t *taps;       /* how the pixel and those right of and below it may be copied: TXI_TAP_ */
-    uint8_t *guide;      /* the plan's guide, strips and their pull, at this level; see fill.h  */
+    uint8_t *state; /* TXI_VOID .. TXI_FOREIGN                                            */
+    uint8_t *color; /* 4 per pixel; 0 where there is nothing known. The fourth is the guide */
+    uint8_t *mask;  /* 4 per pixel: 255 where the pixel is not void                       */
+    uint8_t *taps;  /* how the pixel and those right of and below it may be copied: TXI_TAP_ */
+    uint8_t *guide; /* the plan's guide, strips and their pull, at this level; see fill.h  */
     uint8_t *strip, *pull;
-    uint8_t *depth;      /* of hole pixels: pixels to the nearest known one, at most 255       */
-    int32_t *hole;       /* the hole's pixels                                                  */
+    uint8_t *depth; /* of hole pixels: pixels to the nearest known one, at most 255       */
+    int32_t *hole;  /* the hole's pixels                                                  */
     int hole_count;
-    int32_t *hole_row;   /* height + 1: the first of them in each row                          */
-    int32_t *anchor;     /* upper left corners of the patches that touch the hole              */
+    int32_t *hole_row; /* height + 1: the first of them in each row                          */
+    int32_t *anchor;   /* upper left corners of the patches that touch the hole              */
     int anchor_count;
     int32_t *anchor_row; /* height + 1                                                         */
     int32_t *slot;       /* the pixel's number as an anchor, -1: it is none                    */
@@ -10884,7 +10884,8 @@ static void txi_level_halve(const txi_level *f, txi_level *l) {
 }
 
 /* The colours of the hole at half resolution, from those of the finer level; the rest is not touched. */
-static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l, uint8_t *to) {
+static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l,
+                            uint8_t *to) {
     for (int i = 0; i < l->hole_count; i++) {
         const int x = l->hole[i] % l->width, y = l->hole[i] / l->width;
         int sum[4] = {0, 0, 0, 0}, count = 0;
@@ -10972,7 +10973,8 @@ static int txi_level_lists(txi_level *l, txm_arena *arena) {
         for (int y = 0; y < TXI_PATCH; y++)
             for (int x = 0; x < TXI_PATCH; x++) filled += l->state[p + y * w + x] != TXI_VOID;
         const int centre = p + (TXI_PATCH / 2) * (w + 1);
-        touch[p] = (uint8_t)(filled >= TXI_LEAST_FILLED || l->state[centre] == TXI_HOLE ? filled : 0);
+        touch[p] =
+            (uint8_t)(filled >= TXI_LEAST_FILLED || l->state[centre] == TXI_HOLE ? filled : 0);
         l->anchor_count += touch[p] != 0;
     }
     l->hole = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof(int32_t));
@@ -11161,9 +11163,9 @@ static void txi_box_line(float *v, int count, size_t step, int radius, float *co
 typedef struct txi_wish {
     int width, height, step; /* cells; pixels per cell                                         */
     float *weight, *first, *second; /* of the known patches                                    */
-    float *blur[3];          /* the same, filtered                                             */
+    float *blur[3]; /* the same, filtered                                             */
     float *copy;
-    float *result;           /* expected detail; below 0: not yet                              */
+    float *result; /* expected detail; below 0: not yet                              */
 } txi_wish;
 
 static void txi_wish_reach(txi_wish *g, int radius, float offset) {
@@ -11270,8 +11272,8 @@ enum {
 /* The pose's axes. Pose 0 is the window as it is. */
 static void txi_pose_axes(int is_picture, int pose, txi_source *s) {
     /* in 1/16 turns, or degrees; poses that are near pose 0 come first */
-    static const int degrees[TXI_PICTURE_POSES] = {0, 5, -5, 10, -10, 15, -15, 20, -20,
-                                                   0, 5, -5, 10, -10};
+    static const int degrees[TXI_PICTURE_POSES] = {0,  5,   -5, 10, -10, 15, -15,
+                                                   20, -20, 0,  5,  -5,  10, -10};
     static const int turns[TXI_MESH_POSES] = {0, 1, 15, 2, 14, 3, 13, 4, 12, 5, 11, 6, 10, 7, 9, 8};
     double sine, cosine;
     txm_sincos(is_picture ? degrees[pose] * (TXM_PI / 180) : turns[pose] * (TXM_PI / 8), &sine,
@@ -11350,7 +11352,8 @@ static void txi_level_sample(const txi_level *l, size_t p, int fx, int fy, int t
     const uint8_t *row = l->color + 4 * p - pitch - 4;
     for (int y = 0; y < 4; y++, row += pitch) {
         for (int c = 0; c < 3; c++) {
-            const int line = row[c] * wx[0] + row[4 + c] * wx[1] + row[8 + c] * wx[2] + row[12 + c] * wx[3];
+            const int line =
+                row[c] * wx[0] + row[4 + c] * wx[1] + row[8 + c] * wx[2] + row[12 + c] * wx[3];
             sum[c] += line / 16 * wy[y];
         }
     }
@@ -11371,7 +11374,8 @@ static void txi_source_draw(const txi_level *l, txi_source *s) {
             memset(s->color + 4 * q, 0, 4);
             if (x < 0 || y < 0) continue;
             const int px = x / TXI_UNIT, py = y / TXI_UNIT;
-            if (px < TXI_EDGE || py < TXI_EDGE || px >= l->width - TXI_EDGE || py >= l->height - TXI_EDGE)
+            if (px < TXI_EDGE || py < TXI_EDGE || px >= l->width - TXI_EDGE ||
+                py >= l->height - TXI_EDGE)
                 continue;
             const size_t p = (size_t)py * (size_t)l->width + (size_t)px;
             const int fx = x % TXI_UNIT / (TXI_UNIT / TXI_PHASES);
@@ -11398,9 +11402,10 @@ static void txi_source_worth(const txi_level *l, txi_source *s, uint32_t *number
     }
     txi_patch_sums(e, s->width, s->height, (uint32_t *)(void *)columns, sums);
     for (size_t q = 0; q < n; q++)
-        s->worth[q] = (uint16_t)(sums[q] >> 20 == TXI_PATCH_AREA
-                                     ? 1 + ((sums[q] & 0xfffff) < 65534 ? (sums[q] & 0xfffff) : 65534)
-                                     : 0);
+        s->worth[q] =
+            (uint16_t)(sums[q] >> 20 == TXI_PATCH_AREA
+                           ? 1 + ((sums[q] & 0xfffff) < 65534 ? (sums[q] & 0xfffff) : 65534)
+                           : 0);
 }
 
 /* One source per call of the body. Each has its own scratch memory, allocated before. */
@@ -11465,8 +11470,8 @@ enum {
 
 /* Which source patch an anchor's patch is like. */
 typedef struct txi_match {
-    int16_t x, y;  /* upper left corner in the source                                          */
-    int16_t pose;  /* number of the source; -1: none                                           */
+    int16_t x, y; /* upper left corner in the source                                          */
+    int16_t pose; /* number of the source; -1: none                                           */
     int16_t spare;
     uint32_t cost; /* squared differences of a full patch, and what missing detail costs       */
 } txi_match;
@@ -11474,17 +11479,17 @@ typedef struct txi_match {
 /* The state of a completion at one level. */
 typedef struct txi_canvas {
     const txi_level *level;
-    uint8_t *color;     /* 4 per pixel: the level's, and in the hole the current guess         */
-    txi_match *match;   /* one per anchor                                                      */
-    txi_match *old;     /* as it was before the sweep                                          */
-    uint16_t *weight;   /* of each anchor's vote                                               */
-    uint32_t price;     /* of one unit of missing detail, in 1/65536                           */
+    uint8_t *color;   /* 4 per pixel: the level's, and in the hole the current guess         */
+    txi_match *match; /* one per anchor                                                      */
+    txi_match *old;   /* as it was before the sweep                                          */
+    uint16_t *weight; /* of each anchor's vote                                               */
+    uint32_t price;   /* of one unit of missing detail, in 1/65536                           */
     uint64_t seed;
-    int sweep;          /* counts the sweeps                                                   */
-    int fresh;          /* the costs are up to date                                            */
-    int least;          /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
+    int sweep;  /* counts the sweeps                                                   */
+    int fresh;  /* the costs are up to date                                            */
+    int least;  /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
                            are                                                                 */
-    int radius;         /* pixels: where random tries begin                                    */
+    int radius; /* pixels: where random tries begin                                    */
 } txi_canvas;
 
 /* What the missing detail of a source patch costs. */
@@ -11663,8 +11668,10 @@ static txi_match txi_match_refine(const txi_level *coarse, const txi_level *fine
     const txi_source *from = &coarse->source[m->pose];
     const int p = fine->anchor[a];
     /* from the coarse patch's corner to the fine one's centre, in quarters of coarse pixels */
-    const int dx = 2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
-    const int dy = 2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
+    const int dx =
+        2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
+    const int dy =
+        2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
     int32_t wx, wy;
     txi_source_place(from, m->x, m->y, &wx, &wy);
     wx += from->a / 4 * dx + from->c / 4 * dy;
@@ -11752,22 +11759,22 @@ static void txi_upsample(const txi_level *coarse, const txi_match *from, txi_can
    resolution this is affordable, and random candidates instead would cost the structure.      */
 
 enum {
-    TXI_ONION_SHARE = 55,   /* percent of a patch that must be known                           */
-    TXI_ONION_FULL = 85,    /* percent from which patches off the lattice are compared, too    */
-    TXI_ONION_RING = 2,     /* pixels filled a pass                                            */
-    TXI_ONION_BEST = 8,     /* matches that are refined                                        */
-    TXI_ONION_REACH = 2,    /* pixels of the refinement                                        */
+    TXI_ONION_SHARE = 55,     /* percent of a patch that must be known                           */
+    TXI_ONION_FULL = 85,      /* percent from which patches off the lattice are compared, too    */
+    TXI_ONION_RING = 2,       /* pixels filled a pass                                            */
+    TXI_ONION_BEST = 8,       /* matches that are refined                                        */
+    TXI_ONION_REACH = 2,      /* pixels of the refinement                                        */
     TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
-    TXI_ONION_LEAST = 4000  /* places compared at least                                        */
+    TXI_ONION_LEAST = 4000    /* places compared at least                                        */
 };
 
 typedef struct txi_onion {
     const txi_canvas *canvas;
-    uint8_t *known;        /* 4 per pixel: 255 where it is known or filled                     */
+    uint8_t *known;         /* 4 per pixel: 255 where it is known or filled                     */
     const txi_match *place; /* source patches to compare with                                  */
     int place_count;
-    int32_t *todo;         /* anchors of this pass                                             */
-    txi_match *found;      /* of each anchor of the level; cost as of a full patch             */
+    int32_t *todo;    /* anchors of this pass                                             */
+    txi_match *found; /* of each anchor of the level; cost as of a full patch             */
     int todo_count;
 } txi_onion;
 
@@ -11820,7 +11827,8 @@ static void txi_onion_anchor(void *context, int index) {
     }
     for (int k = 0; k < o->place_count; k++) {
         const txi_match *m = &o->place[k];
-        const uint32_t cost = txi_onion_cost(o, a, known, m->pose, m->x, m->y, best[TXI_ONION_BEST - 1].cost);
+        const uint32_t cost =
+            txi_onion_cost(o, a, known, m->pose, m->x, m->y, best[TXI_ONION_BEST - 1].cost);
         if (cost < best[TXI_ONION_BEST - 1].cost) txi_onion_keep(best, m, cost);
     }
     top = best[0];
@@ -11917,7 +11925,8 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
         }
         if (n) o->todo[l->anchor_count + filled++] = p;
     }
-    for (int k = 0; k < filled; k++) memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);
+    for (int k = 0; k < filled; k++)
+        memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);
     return filled;
 }
 
@@ -12009,6 +12018,197 @@ static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
     return status;
 }
 
+/* ---- the coarsest level: annealed labelling -----------------------------------------------------
+
+   Patches on a lattice of half their side cover the hole; each has a label, the source patch that it
+   shows. The labelling of largest probability [1, III.B]
+
+       P(Psi | W) P(W)                                                                      (5)
+       P(Psi | W) ~ exp(- sum over patches: D(p(x), known part) / (2 sigma(x)^2))           (6)
+       P(W) ~ exp(- sum over overlapping pairs: D(p(x), p(y)) / (2 sigma(x, y)^2))          (7)
+
+   is sought by simulated annealing with Metropolis moves. sigma^2 is the context: the detail that is
+   expected of a patch per pixel (detail.h), so that rough texture may differ more. Missing detail
+   counts under (6), as everywhere else. The start is the onion's result, not a random labelling: from
+   a random one the structure is not found in reasonable time. Moves propose a neighbour's label
+   (shifted), the own one nearby, or any; they are not weighted for symmetry, as only the maximum is
+   wanted.                                                                                     */
+
+enum {
+    TXI_ANNEAL_STEP = TXI_PATCH / 2, /* pixels between patches                                 */
+    TXI_ANNEAL_MOVES = 600, /* per patch                                                       */
+    TXI_ANNEAL_PAIRS = 8    /* patches that a patch overlaps                                   */
+};
+#define TXI_ANNEAL_HOT 6.0 /* temperatures, in units of the exponents of (6) and (7)          */
+#define TXI_ANNEAL_COLD 0.3
+
+typedef struct txi_site {
+    int anchor;
+    int pair[TXI_ANNEAL_PAIRS]; /* the site in each direction, -1: none                        */
+    double precision;           /* 1 / (2 sigma^2)                                             */
+    txi_match match;
+} txi_site;
+
+/* directions of neighbours: the step in x and in y */
+static int txi_anneal_dx(int k) {
+    return ((k < 4 ? k : k + 1) % 3 - 1) * TXI_ANNEAL_STEP;
+}
+static int txi_anneal_dy(int k) {
+    return ((k < 4 ? k : k + 1) / 3 - 1) * TXI_ANNEAL_STEP;
+}
+
+/* D of (7): what two labels differ by where their patches, (dx, dy) apart, overlap. */
+static uint32_t txi_anneal_overlap(const txi_level *l, const txi_match *a, const txi_match *b,
+                                   int dx, int dy) {
+    const txi_source *s = &l->source[a->pose], *t = &l->source[b->pose];
+    const int x0 = dx > 0 ? dx : 0, y0 = dy > 0 ? dy : 0;
+    const int w = TXI_PATCH - (dx > 0 ? dx : -dx), h = TXI_PATCH - (dy > 0 ? dy : -dy);
+    uint32_t sum = 0;
+    for (int y = y0; y < y0 + h; y++) {
+        const uint8_t *u =
+            s->color + 4 * ((size_t)(a->y + y) * (size_t)s->width + (size_t)(a->x + x0));
+        const uint8_t *v =
+            t->color + 4 * ((size_t)(b->y + y - dy) * (size_t)t->width + (size_t)(b->x + x0 - dx));
+        for (int i = 0; i < 4 * w; i++) {
+            const int d = u[i] - v[i];
+            sum += (uint32_t)(d * d);
+        }
+    }
+    return sum;
+}
+
+/* The exponents of a site with a label. known: mask of what the hole does not cover. */
+static double txi_anneal_energy(const txi_canvas *t, const txi_site *sites, int i,
+                                const txi_match *m, const uint8_t *known) {
+    const txi_level *l = t->level;
+    const txi_site *site = &sites[i];
+    const txi_source *s = &l->source[m->pose];
+    const size_t q = (size_t)m->y * (size_t)s->width + (size_t)m->x;
+    const size_t p = (size_t)l->anchor[site->anchor];
+    const double data = (double)txi_ssd(l->color + 4 * p, 4 * (size_t)l->width, known + 4 * p,
+                                        s->color + 4 * q, 4 * (size_t)s->width, UINT32_MAX) +
+                        txi_shortfall(t, site->anchor, s->worth[q]);
+    double sum = data * site->precision;
+    for (int k = 0; k < TXI_ANNEAL_PAIRS; k++) {
+        if (site->pair[k] < 0) continue;
+        const txi_site *other = &sites[site->pair[k]];
+        const double d =
+            txi_anneal_overlap(l, m, &other->match, txi_anneal_dx(k), txi_anneal_dy(k));
+        sum += d * 0.5 * (site->precision + other->precision);
+    }
+    return sum;
+}
+
+/* A proposal for a site; 0: it cannot be copied. */
+static int txi_anneal_propose(const txi_level *l, const txi_site *sites, int i, txm_rng *rng,
+                              txi_match *m) {
+    const uint32_t kind = txm_rng_below(rng, 4);
+    *m = sites[i].match;
+    if (kind < 2) {
+        const int k = (int)txm_rng_below(rng, TXI_ANNEAL_PAIRS), j = sites[i].pair[k];
+        if (j < 0) return 0;
+        *m = sites[j].match;
+        m->x = (int16_t)(m->x - txi_anneal_dx(k));
+        m->y = (int16_t)(m->y - txi_anneal_dy(k));
+    } else if (kind == 2) {
+        m->x = (int16_t)(m->x + txm_rng_range(rng, -2, 2));
+        m->y = (int16_t)(m->y + txm_rng_range(rng, -2, 2));
+    } else {
+        *m = txi_match_any(l, rng);
+    }
+    return txi_match_holds(l, m);
+}
+
+/* The lattice's sites, in the order of their anchors; returns their number. */
+static int txi_anneal_sites(const txi_canvas *t, txi_site *sites, int32_t *at) {
+    const txi_level *l = t->level;
+    const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
+    int count = 0;
+    for (int p = 0; p < l->width * l->height; p++) {
+        const int a = l->slot[p];
+        at[p] = -1;
+        if (a < 0 || p % l->width % TXI_ANNEAL_STEP || p / l->width % TXI_ANNEAL_STEP ||
+            !txi_match_holds(l, &t->match[a]))
+            continue;
+        sites[count].anchor = a;
+        sites[count].match = t->match[a];
+        sites[count].precision = 0.5 / (l->want[a] * unit / TXI_PATCH_AREA + 16);
+        at[p] = count++;
+    }
+    for (int i = 0; i < count; i++) {
+        const int p = l->anchor[sites[i].anchor];
+        for (int k = 0; k < TXI_ANNEAL_PAIRS; k++) {
+            const int x = p % l->width + txi_anneal_dx(k), y = p / l->width + txi_anneal_dy(k);
+            sites[i].pair[k] =
+                x < 0 || y < 0 || x >= l->width || y >= l->height ? -1 : at[y * l->width + x];
+        }
+    }
+    return count;
+}
+
+/* The sites' labels become the matches of all anchors, and the colours of the hole. */
+static void txi_anneal_apply(txi_canvas *t, const txi_site *sites, const int32_t *at) {
+    const txi_level *l = t->level;
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int p = l->anchor[a], half = TXI_ANNEAL_STEP / 2;
+        const int x = p % l->width, y = p / l->width;
+        const int sx = (x + half) / TXI_ANNEAL_STEP * TXI_ANNEAL_STEP;
+        const int sy = (y + half) / TXI_ANNEAL_STEP * TXI_ANNEAL_STEP;
+        const int i = sx < l->width && sy < l->height ? at[sy * l->width + sx] : -1;
+        if (i < 0) continue;
+        txi_match m = sites[i].match;
+        const txi_source *s = &l->source[m.pose];
+        m.x = (int16_t)(m.x + x - sx);
+        m.y = (int16_t)(m.y + y - sy);
+        if (txi_match_holds(l, &m)) t->match[a] = m;
+        /* the pixel in the middle of the anchor's patch, as the site's patch shows it */
+        const int u = x + TXI_PATCH / 2, v = y + TXI_PATCH / 2;
+        const size_t q = (size_t)(sites[i].match.y + v - sy) * (size_t)s->width +
+                         (size_t)(sites[i].match.x + u - sx);
+        if (l->state[v * l->width + u] == TXI_HOLE)
+            memcpy(t->color + 4 * (size_t)(v * l->width + u), s->color + 4 * q, 3);
+    }
+    t->fresh = 0;
+}
+
+/* Improve the onion's labelling of the coarsest level. */
+static txm_status txi_anneal_labels(txi_canvas *t, txm_env *env) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->width * (size_t)l->height;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    txi_site *sites =
+        (txi_site *)txm_arena_alloc(&scratch, (size_t)l->anchor_count, sizeof(txi_site));
+    int32_t *at = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
+    uint8_t *known = (uint8_t *)txm_arena_zero(&scratch, n, 4);
+    txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
+    const int count = status == TXM_OK ? txi_anneal_sites(t, sites, at) : 0;
+    for (size_t p = 0; p < n && count; p++) {
+        if (l->state[p] == TXI_KNOWN || l->state[p] == TXI_FOREIGN) memset(known + 4 * p, 255, 4);
+    }
+    txm_rng rng = txm_rng_make(t->seed, 4242);
+    const int moves = TXI_ANNEAL_MOVES;
+    double heat = TXI_ANNEAL_HOT;
+    const double cool =
+        txm_exp2(log(TXI_ANNEAL_COLD / TXI_ANNEAL_HOT) / moves * 1.4426950408889634);
+    for (int round = 0; round < moves && count && status == TXM_OK; round++, heat *= cool) {
+        for (int k = 0; k < count; k++) {
+            const int i = (int)txm_rng_below(&rng, (uint32_t)count);
+            txi_match m;
+            if (!txi_anneal_propose(l, sites, i, &rng, &m)) continue;
+            const double rise = txi_anneal_energy(t, sites, i, &m, known) -
+                                txi_anneal_energy(t, sites, i, &sites[i].match, known);
+            const double power = rise / heat * 1.4426950408889634;
+            if (rise > 0 && (power > 60 || txm_rng_double(&rng) >= txm_exp2(-power))) continue;
+            sites[i].match = m;
+        }
+        if (round % 64 == 0 && txm_progress(env, 0, "annealing")) status = txi_stopped(env);
+    }
+    if (status == TXM_OK && count) txi_anneal_apply(t, sites, at);
+    txm_arena_free(&scratch);
+    return status;
+}
+
 /* ---- votes --------------------------------------------------------------------------------------
 
    Each hole pixel is covered by up to 64 patches, whose matches propose a colour. Their weighted
@@ -12041,8 +12241,8 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
 /* What all pixels of a vote share. */
 typedef struct txi_ballot {
     txi_canvas *canvas;
-    int pull;                /* strength of the plan's strips, 0..256                         */
-    int32_t *chosen;         /* receives the anchor whose proposal is the best for each hole pixel, -1:
+    int pull;        /* strength of the plan's strips, 0..256                         */
+    int32_t *chosen; /* receives the anchor whose proposal is the best for each hole pixel, -1:
                                 there is none. NULL: not wanted                               */
     const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
 } txi_ballot;
@@ -12069,7 +12269,8 @@ static int txi_proposals(const txi_canvas *t, int p, txi_proposal *list) {
             if (a < 0 || t->match[a].pose < 0) continue;
             const txi_match *m = &t->match[a];
             const txi_source *s = &l->source[m->pose];
-            list[count].color = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
+            list[count].color =
+                s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
             list[count++].anchor = a;
         }
     }
@@ -12103,8 +12304,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
     const int pull = t->level->pull ? t->level->pull[p] * v->pull / 256 : 0;
     const uint8_t *strip = pull ? t->level->strip + 4 * (size_t)p : NULL;
     uint8_t *out = t->color + 4 * (size_t)p;
-    for (int c = 0; c < 3 && pull; c++)
-        mean[c] += (strip[c] - mean[c]) * pull / 255;
+    for (int c = 0; c < 3 && pull; c++) mean[c] += (strip[c] - mean[c]) * pull / 255;
     int64_t best = INT64_MAX;
     int chosen = -1;
     for (int k = 0; k < n; k++) {
@@ -12195,7 +12395,8 @@ static inline int txi_rgb_distance(const uint8_t *a, const uint8_t *b) {
 }
 
 /* What labels a at (x, y) and b at its neighbour (u, v) cost. */
-static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x, int y, int u, int v) {
+static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x, int y, int u,
+                                 int v) {
     if (a == b) return 0;
     return txi_rgb_distance(txi_label_color(l, a, x, y), txi_label_color(l, b, x, y)) +
            txi_rgb_distance(txi_label_color(l, a, u, v), txi_label_color(l, b, u, v)) + TXI_JOINT;
@@ -12240,12 +12441,14 @@ static int txi_expansion_region(txi_assembly *t, int32_t alpha, int reach) {
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
         if (reach >= 0 && t->label[p] != alpha) continue;
-        const int x0 = p % l->width - (reach < 0 ? 0 : reach), y0 = p / l->width - (reach < 0 ? 0 : reach);
+        const int x0 = p % l->width - (reach < 0 ? 0 : reach),
+                  y0 = p / l->width - (reach < 0 ? 0 : reach);
         const int side = reach < 0 ? 1 : 2 * reach + 1;
         for (int y = y0 < 0 ? 0 : y0; y < y0 + side && y < l->height; y++) {
             for (int x = x0 < 0 ? 0 : x0; x < x0 + side && x < l->width; x++) {
                 const int q = y * l->width + x;
-                if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP) continue;
+                if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP)
+                    continue;
                 t->node[q] = 0;
                 t->region[count++] = q;
                 if (x < low[0]) low[0] = x;
@@ -12275,7 +12478,8 @@ static void txi_expansion_pair(txi_assembly *t, int32_t alpha, int p, int q, int
     const txi_level *l = t->level;
     const int x = p % l->width, y = p / l->width, u = q % l->width, v = q / l->width;
     const int32_t a = t->label[p], b = t->label[q];
-    const int e00 = txi_joint_cost(l, a, b, x, y, u, v), e10 = txi_joint_cost(l, alpha, b, x, y, u, v);
+    const int e00 = txi_joint_cost(l, a, b, x, y, u, v),
+              e10 = txi_joint_cost(l, alpha, b, x, y, u, v);
     const int np = t->node[p], nq = t->node[q];
     if (nq < 0) { /* q keeps its label */
         t->flow.excess[np] += e10 - e00;
@@ -12298,11 +12502,14 @@ static int txi_expand(txi_assembly *t, int32_t alpha, int reach) {
     memset(t->flow.excess, 0, bytes);
     for (int k = 0; k < count; k++) {
         const int p = t->region[k], x = p % w, y = p / w;
-        t->flow.excess[t->node[p]] += txi_own_cost(t, alpha, x, y) - txi_own_cost(t, t->label[p], x, y);
+        t->flow.excess[t->node[p]] +=
+            txi_own_cost(t, alpha, x, y) - txi_own_cost(t, t->label[p], x, y);
         if (l->state[p + 1] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + 1, 0);
         if (l->state[p + w] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + w, 1);
-        if (l->state[p - 1] == TXI_HOLE && t->node[p - 1] < 0) txi_expansion_pair(t, alpha, p, p - 1, 0);
-        if (l->state[p - w] == TXI_HOLE && t->node[p - w] < 0) txi_expansion_pair(t, alpha, p, p - w, 0);
+        if (l->state[p - 1] == TXI_HOLE && t->node[p - 1] < 0)
+            txi_expansion_pair(t, alpha, p, p - 1, 0);
+        if (l->state[p - w] == TXI_HOLE && t->node[p - w] < 0)
+            txi_expansion_pair(t, alpha, p, p - w, 0);
     }
     txm_flow_solve(&t->flow);
     int changed = 0;
@@ -12371,7 +12578,8 @@ static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *q
             const int p = queue[first++];
             for (int k = 0; k < 4; k++) {
                 const int q = p + side[k];
-                if (l->state[q] != TXI_HOLE || piece[q] >= 0 || t->label[q] != t->label[p]) continue;
+                if (l->state[q] != TXI_HOLE || piece[q] >= 0 || t->label[q] != t->label[p])
+                    continue;
                 piece[q] = count;
                 queue[last++] = q;
             }
@@ -12388,10 +12596,10 @@ static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *q
    together from pieces of these [He and Sun 2012].                                             */
 
 enum {
-    TXI_OFFSET_WIDTH = 28,  /* pixels: least width of the hole at the level where this is done */
-    TXI_OFFSETS = 80,       /* labels                                                          */
+    TXI_OFFSET_WIDTH = 28, /* pixels: least width of the hole at the level where this is done */
+    TXI_OFFSETS = 80,      /* labels                                                          */
     TXI_OFFSET_SWEEPS = 6,
-    TXI_OFFSET_LEAST = 8,   /* pixels: shorter ones are not told from none                     */
+    TXI_OFFSET_LEAST = 8, /* pixels: shorter ones are not told from none                     */
     TXI_OFFSET_PASSES = 3
 };
 
@@ -12418,8 +12626,9 @@ static int txi_offset_level(const txi_level *l, int reach, txi_level *known, txm
         const int x = p % w, y = p / w;
         if (x == 0) known->anchor_row[y] = known->anchor_count;
         known->slot[p] = -1;
-        if (x < low[0] - reach || y < low[1] - reach || x > high[0] + reach || y > high[1] + reach ||
-            l->slot[p] >= 0 || x > w - TXI_PATCH || y > l->height - TXI_PATCH)
+        if (x < low[0] - reach || y < low[1] - reach || x > high[0] + reach ||
+            y > high[1] + reach || l->slot[p] >= 0 || x > w - TXI_PATCH ||
+            y > l->height - TXI_PATCH)
             continue;
         int all = 1;
         for (int k = 0; all && k < TXI_PATCH_AREA; k++) {
@@ -12511,19 +12720,22 @@ static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
         txm_arena_free(&scratch);
         return failed ? txi_no_memory(env) : TXM_OK;
     }
-    known.match = (txi_match *)txm_arena_zero(&scratch, (size_t)around.anchor_count, 2 * sizeof(txi_match));
+    known.match =
+        (txi_match *)txm_arena_zero(&scratch, (size_t)around.anchor_count, 2 * sizeof(txi_match));
     if (scratch.failed) status = txi_no_memory(env);
     if (status == TXM_OK) {
         known.old = known.match + around.anchor_count;
         for (int a = 0; a < around.anchor_count; a++) known.match[a].pose = -1;
         for (int k = 0; k < TXI_OFFSET_SWEEPS; k++) txi_search(&known, env);
     }
-    const int count = status == TXM_OK ? txi_offset_peaks(&known, labels, TXI_OFFSETS, &scratch) : 0;
+    const int count =
+        status == TXM_OK ? txi_offset_peaks(&known, labels, TXI_OFFSETS, &scratch) : 0;
     if (scratch.failed) status = txi_no_memory(env);
     assembly.color = t->color;
     assembly.drift = 0;
     assembly.price = t->price;
-    for (int pass = 0, changed = 1; pass < TXI_OFFSET_PASSES && changed && status == TXM_OK; pass++) {
+    for (int pass = 0, changed = 1; pass < TXI_OFFSET_PASSES && changed && status == TXM_OK;
+         pass++) {
         changed = 0;
         for (int k = 0; k < count && status == TXM_OK; k++) {
             changed += txi_expand(&assembly, labels[k], -1);
@@ -12572,8 +12784,9 @@ typedef struct txi_style {
     float detail_clamp;  /* a pixel's detail counts up to its square times the median          */
     float detail_offset; /* expected detail: standard deviations below the mean of the known   */
     int start;           /* pixels: about the width of the hole at the coarsest level          */
-    uint32_t poses;      /* which sources, one bit each, the lowest for the window as it is; 0 = all */
-    int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
+    int starts;          /* at the coarsest level; 1: without annealing; 0 = 2                 */
+    uint32_t poses; /* which sources, one bit each, the lowest for the window as it is; 0 = all */
+    int is_picture; /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
 /* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
@@ -12587,9 +12800,10 @@ enum {
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
     TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
+    TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
-    TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
+    TXI_POSE_SHARE = 20 /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
 /* What all hypotheses of a window share. */
@@ -12677,8 +12891,8 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
         txi_level *l = &f->level[k];
         int patches = 0;
         if (!txi_filler_level(f, k, env)) return txi_no_memory(env);
-        const int is_last = k == TXI_MAX_LEVELS - 1 ||
-                            txi_level_hole_width(l) * 10 < style->start * 14;
+        const int is_last =
+            k == TXI_MAX_LEVELS - 1 || txi_level_hole_width(l) * 10 < style->start * 14;
         memcpy(wanted, all, sizeof all);
         /* the finest level's others are made once it is known which are used */
         for (int i = 1; i < TXI_MAX_POSES && k == 0 && !is_last; i++) wanted[i] = 0;
@@ -12708,7 +12922,8 @@ static void txi_plan_load(const txi_plan *plan, const txi_window *w, txi_level *
         for (int x = 0; x < w->width; x++) {
             const size_t from = (size_t)y * (size_t)w->width + (size_t)x;
             const size_t to = (size_t)(y + TXI_EDGE) * (size_t)l->width + (size_t)(x + TXI_EDGE);
-            if (plan->color) l->guide[to] = (uint8_t)(plan->color[4 * from + 3] * TXI_GUIDE_MOST / 255);
+            if (plan->color)
+                l->guide[to] = (uint8_t)(plan->color[4 * from + 3] * TXI_GUIDE_MOST / 255);
             if (!plan->pull || !plan->color || l->state[to] != TXI_HOLE) continue;
             l->pull[to] = plan->pull[from];
             memcpy(l->strip + 4 * to, plan->color + 4 * from, 3);
@@ -12728,7 +12943,8 @@ static void txi_plan_halve(const txi_level *f, txi_level *l) {
                 const size_t from = (size_t)fy * (size_t)f->width + (size_t)fx;
                 if (f->guide[from] > l->guide[to]) l->guide[to] = f->guide[from];
                 pull += f->pull[from];
-                for (int c = 0; c < 3; c++) sum[c] += f->pull[from] * f->strip[4 * from + (size_t)c];
+                for (int c = 0; c < 3; c++)
+                    sum[c] += f->pull[from] * f->strip[4 * from + (size_t)c];
             }
             if (l->state[to] != TXI_HOLE || !pull) continue;
             l->pull[to] = (uint8_t)(pull / 4);
@@ -12791,8 +13007,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
     if (arena->failed) return 0;
     memcpy(t->color, l->color, 4 * n);
-    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST *
-                          65536);
+    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA /
+                          TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
     t->radius = l->width < l->height ? l->width : l->height;
     if (level == 0 && f->level_count > 1) t->radius = 16;
@@ -12856,17 +13072,6 @@ static txm_status txi_descend(const txi_filler *f, int level, const txi_match *f
     return TXM_OK;
 }
 
-/* ---- the calls ------------------------------------------------------------------------------ */
-
-/* Memory for a field. 0: there is none. */
-static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *field) {
-    field->level = f->level_count > 1 ? 1 : 0;
-    const txi_level *l = &f->level[field->level];
-    field->match = (txi_match *)txm_arena_zero(arena, (size_t)l->anchor_count, sizeof(txi_match));
-    field->color = (uint8_t *)txm_arena_zero(arena, (size_t)l->width * (size_t)l->height, 4);
-    return !arena->failed;
-}
-
 /* mean cost of the canvas' patches */
 static double txi_mean_cost(const txi_canvas *t) {
     double sum = 0;
@@ -12877,6 +13082,57 @@ static double txi_mean_cost(const txi_canvas *t) {
         count++;
     }
     return count ? sum / count : 0;
+}
+
+/* The coarsest level: rounds from the onion as it is, and from labellings annealed from it; the one with
+   the smallest costs is kept. */
+static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t, txm_env *env) {
+    const txi_level *l = t->level;
+    const size_t bytes = 4 * (size_t)l->width * (size_t)l->height;
+    const size_t matches = (size_t)l->anchor_count * sizeof(txi_match);
+    const uint64_t seed = t->seed;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    uint8_t *color = (uint8_t *)txm_arena_alloc(&scratch, bytes, 2);
+    txi_match *match = (txi_match *)txm_arena_alloc(&scratch, matches, 2);
+    txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
+    double least = 0;
+    if (status == TXM_OK) {
+        memcpy(color, t->color, bytes);
+        memcpy(match, t->match, matches);
+    }
+    const int starts = f->style.starts ? f->style.starts : TXI_FIRST_STARTS;
+    for (int k = 0; k < starts && status == TXM_OK; k++) {
+        memcpy(t->color, color, bytes);
+        memcpy(t->match, match, matches);
+        t->fresh = 0;
+        t->seed = seed + (uint64_t)k;
+        if (k) status = txi_anneal_labels(t, env);
+        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        const double cost = txi_mean_cost(t);
+        if (status != TXM_OK || (k && cost >= least)) continue;
+        least = cost;
+        memcpy(color + bytes, t->color, bytes);
+        memcpy((uint8_t *)match + matches, t->match, matches);
+    }
+    if (status == TXM_OK) {
+        memcpy(t->color, color + bytes, bytes);
+        memcpy(t->match, (uint8_t *)match + matches, matches);
+    }
+    t->seed = seed;
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* ---- the calls ------------------------------------------------------------------------------ */
+
+/* Memory for a field. 0: there is none. */
+static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *field) {
+    field->level = f->level_count > 1 ? 1 : 0;
+    const txi_level *l = &f->level[field->level];
+    field->match = (txi_match *)txm_arena_zero(arena, (size_t)l->anchor_count, sizeof(txi_match));
+    field->color = (uint8_t *)txm_arena_zero(arena, (size_t)l->width * (size_t)l->height, 4);
+    return !arena->failed;
 }
 
 /* How like the known part a field is, at its own level and at the coarser ones, whose patches see
@@ -12946,7 +13202,9 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
         else if (start == TXI_START_PIECES && level == first) status = txi_offset_fill(t, env);
         else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
-        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        if (status == TXM_OK && level == first && start == TXI_START_ONION)
+            status = txi_first_level(f, level, t, env);
+        else if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
         if (status == TXM_OK && level == field->level) {
             const txi_level *l = t->level;
             memcpy(field->match, t->match, (size_t)l->anchor_count * sizeof *t->match);
@@ -12983,17 +13241,21 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
             const size_t p = (size_t)y * (size_t)w->width + (size_t)x;
             if (w->state[p] != TXI_HOLE) continue;
             /* bilinear, in quarters of a pixel of the level */
-            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0, fy = scale ? (y & 1 ? 1 : 3) : 0;
-            const int px = ((x + scale) >> scale) - scale + TXI_EDGE, py = ((y + scale) >> scale) - scale + TXI_EDGE;
+            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0,
+                      fy = scale ? (y & 1 ? 1 : 3) : 0;
+            const int px = ((x + scale) >> scale) - scale + TXI_EDGE,
+                      py = ((y + scale) >> scale) - scale + TXI_EDGE;
             int sum[3] = {0, 0, 0}, total = 0;
             for (int k = 0; k < 4; k++) {
-                const size_t q = (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
+                const size_t q =
+                    (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
                 const int weight = (k & 1 ? fx : 4 - fx) * (k >> 1 ? fy : 4 - fy);
                 if (l->state[q] == TXI_VOID) continue;
                 total += weight;
                 for (int c = 0; c < 3; c++) sum[c] += weight * field->color[4 * q + (size_t)c];
             }
-            for (int c = 0; c < 3 && total; c++) color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
+            for (int c = 0; c < 3 && total; c++)
+                color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
         }
     }
 }
@@ -13029,7 +13291,8 @@ static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, 
 static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
     const int more = plan && plan->copies ? plan->pose_count : 0;
     if (!more) return 1;
-    txi_pose *all = (txi_pose *)txm_arena_alloc(f->arena, (size_t)(f->pose_count + more), sizeof *all);
+    txi_pose *all =
+        (txi_pose *)txm_arena_alloc(f->arena, (size_t)(f->pose_count + more), sizeof *all);
     if (!all) return 0;
     memcpy(all, f->pose, (size_t)f->pose_count * sizeof *all);
     memcpy(all + f->pose_count, plan->poses, (size_t)more * sizeof *all);
@@ -13070,7 +13333,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     const int passes = TXI_LEFT_OUT & TXI_PIECES ? 0 : TXI_ASSEMBLY_PASSES;
     for (int pass = 0, changed = 1; pass < passes && changed; pass++) {
         changed = 0;
-        for (int k = 0; k < kinds; k++) changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
+        for (int k = 0; k < kinds; k++)
+            changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
     }
     const int pieces = txi_assembly_pieces(&assembly, piece, queue);
     for (size_t k = 0; k < (size_t)w->width * (size_t)w->height; k++) {

@@ -288,6 +288,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/pose.h"
 #include "texinpaint/search.h"
 #include "texinpaint/onion.h"
+#include "texinpaint/anneal.h"
 #include "texinpaint/ballot.h"
 #include "texinpaint/assemble.h"
 #include "texinpaint/offset.h"

@@ -61,7 +61,8 @@ static inline int txi_rgb_distance(const uint8_t *a, const uint8_t *b) {
 }
 
 /* What labels a at (x, y) and b at its neighbour (u, v) cost. */
-static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x, int y, int u, int v) {
+static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x, int y, int u,
+                                 int v) {
     if (a == b) return 0;
     return txi_rgb_distance(txi_label_color(l, a, x, y), txi_label_color(l, b, x, y)) +
            txi_rgb_distance(txi_label_color(l, a, u, v), txi_label_color(l, b, u, v)) + TXI_JOINT;
@@ -106,12 +107,14 @@ static int txi_expansion_region(txi_assembly *t, int32_t alpha, int reach) {
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
         if (reach >= 0 && t->label[p] != alpha) continue;
-        const int x0 = p % l->width - (reach < 0 ? 0 : reach), y0 = p / l->width - (reach < 0 ? 0 : reach);
+        const int x0 = p % l->width - (reach < 0 ? 0 : reach),
+                  y0 = p / l->width - (reach < 0 ? 0 : reach);
         const int side = reach < 0 ? 1 : 2 * reach + 1;
         for (int y = y0 < 0 ? 0 : y0; y < y0 + side && y < l->height; y++) {
             for (int x = x0 < 0 ? 0 : x0; x < x0 + side && x < l->width; x++) {
                 const int q = y * l->width + x;
-                if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP) continue;
+                if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP)
+                    continue;
                 t->node[q] = 0;
                 t->region[count++] = q;
                 if (x < low[0]) low[0] = x;
@@ -141,7 +144,8 @@ static void txi_expansion_pair(txi_assembly *t, int32_t alpha, int p, int q, int
     const txi_level *l = t->level;
     const int x = p % l->width, y = p / l->width, u = q % l->width, v = q / l->width;
     const int32_t a = t->label[p], b = t->label[q];
-    const int e00 = txi_joint_cost(l, a, b, x, y, u, v), e10 = txi_joint_cost(l, alpha, b, x, y, u, v);
+    const int e00 = txi_joint_cost(l, a, b, x, y, u, v),
+              e10 = txi_joint_cost(l, alpha, b, x, y, u, v);
     const int np = t->node[p], nq = t->node[q];
     if (nq < 0) { /* q keeps its label */
         t->flow.excess[np] += e10 - e00;
@@ -164,11 +168,14 @@ static int txi_expand(txi_assembly *t, int32_t alpha, int reach) {
     memset(t->flow.excess, 0, bytes);
     for (int k = 0; k < count; k++) {
         const int p = t->region[k], x = p % w, y = p / w;
-        t->flow.excess[t->node[p]] += txi_own_cost(t, alpha, x, y) - txi_own_cost(t, t->label[p], x, y);
+        t->flow.excess[t->node[p]] +=
+            txi_own_cost(t, alpha, x, y) - txi_own_cost(t, t->label[p], x, y);
         if (l->state[p + 1] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + 1, 0);
         if (l->state[p + w] == TXI_HOLE) txi_expansion_pair(t, alpha, p, p + w, 1);
-        if (l->state[p - 1] == TXI_HOLE && t->node[p - 1] < 0) txi_expansion_pair(t, alpha, p, p - 1, 0);
-        if (l->state[p - w] == TXI_HOLE && t->node[p - w] < 0) txi_expansion_pair(t, alpha, p, p - w, 0);
+        if (l->state[p - 1] == TXI_HOLE && t->node[p - 1] < 0)
+            txi_expansion_pair(t, alpha, p, p - 1, 0);
+        if (l->state[p - w] == TXI_HOLE && t->node[p - w] < 0)
+            txi_expansion_pair(t, alpha, p, p - w, 0);
     }
     txm_flow_solve(&t->flow);
     int changed = 0;
@@ -237,7 +244,8 @@ static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *q
             const int p = queue[first++];
             for (int k = 0; k < 4; k++) {
                 const int q = p + side[k];
-                if (l->state[q] != TXI_HOLE || piece[q] >= 0 || t->label[q] != t->label[p]) continue;
+                if (l->state[q] != TXI_HOLE || piece[q] >= 0 || t->label[q] != t->label[p])
+                    continue;
                 piece[q] = count;
                 queue[last++] = q;
             }

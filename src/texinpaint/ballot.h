@@ -35,8 +35,8 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
 /* What all pixels of a vote share. */
 typedef struct txi_ballot {
     txi_canvas *canvas;
-    int pull;                /* strength of the plan's strips, 0..256                         */
-    int32_t *chosen;         /* receives the anchor whose proposal is the best for each hole pixel, -1:
+    int pull;        /* strength of the plan's strips, 0..256                         */
+    int32_t *chosen; /* receives the anchor whose proposal is the best for each hole pixel, -1:
                                 there is none. NULL: not wanted                               */
     const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
 } txi_ballot;
@@ -63,7 +63,8 @@ static int txi_proposals(const txi_canvas *t, int p, txi_proposal *list) {
             if (a < 0 || t->match[a].pose < 0) continue;
             const txi_match *m = &t->match[a];
             const txi_source *s = &l->source[m->pose];
-            list[count].color = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
+            list[count].color =
+                s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
             list[count++].anchor = a;
         }
     }
@@ -97,8 +98,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
     const int pull = t->level->pull ? t->level->pull[p] * v->pull / 256 : 0;
     const uint8_t *strip = pull ? t->level->strip + 4 * (size_t)p : NULL;
     uint8_t *out = t->color + 4 * (size_t)p;
-    for (int c = 0; c < 3 && pull; c++)
-        mean[c] += (strip[c] - mean[c]) * pull / 255;
+    for (int c = 0; c < 3 && pull; c++) mean[c] += (strip[c] - mean[c]) * pull / 255;
     int64_t best = INT64_MAX;
     int chosen = -1;
     for (int k = 0; k < n; k++) {

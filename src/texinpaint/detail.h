@@ -118,9 +118,9 @@ static void txi_box_line(float *v, int count, size_t step, int radius, float *co
 typedef struct txi_wish {
     int width, height, step; /* cells; pixels per cell                                         */
     float *weight, *first, *second; /* of the known patches                                    */
-    float *blur[3];          /* the same, filtered                                             */
+    float *blur[3]; /* the same, filtered                                             */
     float *copy;
-    float *result;           /* expected detail; below 0: not yet                              */
+    float *result; /* expected detail; below 0: not yet                              */
 } txi_wish;
 
 static void txi_wish_reach(txi_wish *g, int radius, float offset) {

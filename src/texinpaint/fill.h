@@ -2,7 +2,7 @@
 #define TEXINPAINT_FILL_H
 
 #include "offset.h"
-#include "onion.h"
+#include "anneal.h"
 
 /* ---- texture completion of a window ---------------------------------------------------------- */
 
@@ -12,8 +12,9 @@ typedef struct txi_style {
     float detail_clamp;  /* a pixel's detail counts up to its square times the median          */
     float detail_offset; /* expected detail: standard deviations below the mean of the known   */
     int start;           /* pixels: about the width of the hole at the coarsest level          */
-    uint32_t poses;      /* which sources, one bit each, the lowest for the window as it is; 0 = all */
-    int is_picture;      /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
+    int starts;          /* at the coarsest level; 1: without annealing; 0 = 2                 */
+    uint32_t poses; /* which sources, one bit each, the lowest for the window as it is; 0 = all */
+    int is_picture; /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
 /* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
@@ -27,9 +28,10 @@ enum {
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
     TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
+    TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
-    TXI_POSE_SHARE = 20   /* the finest level has the poses of at least 1 / 20 of all anchors   */
+    TXI_POSE_SHARE = 20 /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
 /* What all hypotheses of a window share. */
@@ -117,8 +119,8 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
         txi_level *l = &f->level[k];
         int patches = 0;
         if (!txi_filler_level(f, k, env)) return txi_no_memory(env);
-        const int is_last = k == TXI_MAX_LEVELS - 1 ||
-                            txi_level_hole_width(l) * 10 < style->start * 14;
+        const int is_last =
+            k == TXI_MAX_LEVELS - 1 || txi_level_hole_width(l) * 10 < style->start * 14;
         memcpy(wanted, all, sizeof all);
         /* the finest level's others are made once it is known which are used */
         for (int i = 1; i < TXI_MAX_POSES && k == 0 && !is_last; i++) wanted[i] = 0;
@@ -148,7 +150,8 @@ static void txi_plan_load(const txi_plan *plan, const txi_window *w, txi_level *
         for (int x = 0; x < w->width; x++) {
             const size_t from = (size_t)y * (size_t)w->width + (size_t)x;
             const size_t to = (size_t)(y + TXI_EDGE) * (size_t)l->width + (size_t)(x + TXI_EDGE);
-            if (plan->color) l->guide[to] = (uint8_t)(plan->color[4 * from + 3] * TXI_GUIDE_MOST / 255);
+            if (plan->color)
+                l->guide[to] = (uint8_t)(plan->color[4 * from + 3] * TXI_GUIDE_MOST / 255);
             if (!plan->pull || !plan->color || l->state[to] != TXI_HOLE) continue;
             l->pull[to] = plan->pull[from];
             memcpy(l->strip + 4 * to, plan->color + 4 * from, 3);
@@ -168,7 +171,8 @@ static void txi_plan_halve(const txi_level *f, txi_level *l) {
                 const size_t from = (size_t)fy * (size_t)f->width + (size_t)fx;
                 if (f->guide[from] > l->guide[to]) l->guide[to] = f->guide[from];
                 pull += f->pull[from];
-                for (int c = 0; c < 3; c++) sum[c] += f->pull[from] * f->strip[4 * from + (size_t)c];
+                for (int c = 0; c < 3; c++)
+                    sum[c] += f->pull[from] * f->strip[4 * from + (size_t)c];
             }
             if (l->state[to] != TXI_HOLE || !pull) continue;
             l->pull[to] = (uint8_t)(pull / 4);
@@ -231,8 +235,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
     if (arena->failed) return 0;
     memcpy(t->color, l->color, 4 * n);
-    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST *
-                          65536);
+    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA /
+                          TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
     t->radius = l->width < l->height ? l->width : l->height;
     if (level == 0 && f->level_count > 1) t->radius = 16;
@@ -296,17 +300,6 @@ static txm_status txi_descend(const txi_filler *f, int level, const txi_match *f
     return TXM_OK;
 }
 
-/* ---- the calls ------------------------------------------------------------------------------ */
-
-/* Memory for a field. 0: there is none. */
-static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *field) {
-    field->level = f->level_count > 1 ? 1 : 0;
-    const txi_level *l = &f->level[field->level];
-    field->match = (txi_match *)txm_arena_zero(arena, (size_t)l->anchor_count, sizeof(txi_match));
-    field->color = (uint8_t *)txm_arena_zero(arena, (size_t)l->width * (size_t)l->height, 4);
-    return !arena->failed;
-}
-
 /* mean cost of the canvas' patches */
 static double txi_mean_cost(const txi_canvas *t) {
     double sum = 0;
@@ -317,6 +310,57 @@ static double txi_mean_cost(const txi_canvas *t) {
         count++;
     }
     return count ? sum / count : 0;
+}
+
+/* The coarsest level: rounds from the onion as it is, and from labellings annealed from it; the one with
+   the smallest costs is kept. */
+static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t, txm_env *env) {
+    const txi_level *l = t->level;
+    const size_t bytes = 4 * (size_t)l->width * (size_t)l->height;
+    const size_t matches = (size_t)l->anchor_count * sizeof(txi_match);
+    const uint64_t seed = t->seed;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    uint8_t *color = (uint8_t *)txm_arena_alloc(&scratch, bytes, 2);
+    txi_match *match = (txi_match *)txm_arena_alloc(&scratch, matches, 2);
+    txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
+    double least = 0;
+    if (status == TXM_OK) {
+        memcpy(color, t->color, bytes);
+        memcpy(match, t->match, matches);
+    }
+    const int starts = f->style.starts ? f->style.starts : TXI_FIRST_STARTS;
+    for (int k = 0; k < starts && status == TXM_OK; k++) {
+        memcpy(t->color, color, bytes);
+        memcpy(t->match, match, matches);
+        t->fresh = 0;
+        t->seed = seed + (uint64_t)k;
+        if (k) status = txi_anneal_labels(t, env);
+        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        const double cost = txi_mean_cost(t);
+        if (status != TXM_OK || (k && cost >= least)) continue;
+        least = cost;
+        memcpy(color + bytes, t->color, bytes);
+        memcpy((uint8_t *)match + matches, t->match, matches);
+    }
+    if (status == TXM_OK) {
+        memcpy(t->color, color + bytes, bytes);
+        memcpy(t->match, (uint8_t *)match + matches, matches);
+    }
+    t->seed = seed;
+    txm_arena_free(&scratch);
+    return status;
+}
+
+/* ---- the calls ------------------------------------------------------------------------------ */
+
+/* Memory for a field. 0: there is none. */
+static int txi_field_make(const txi_filler *f, txm_arena *arena, txi_field *field) {
+    field->level = f->level_count > 1 ? 1 : 0;
+    const txi_level *l = &f->level[field->level];
+    field->match = (txi_match *)txm_arena_zero(arena, (size_t)l->anchor_count, sizeof(txi_match));
+    field->color = (uint8_t *)txm_arena_zero(arena, (size_t)l->width * (size_t)l->height, 4);
+    return !arena->failed;
 }
 
 /* How like the known part a field is, at its own level and at the coarser ones, whose patches see
@@ -386,7 +430,9 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
         else if (start == TXI_START_PIECES && level == first) status = txi_offset_fill(t, env);
         else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
-        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        if (status == TXM_OK && level == first && start == TXI_START_ONION)
+            status = txi_first_level(f, level, t, env);
+        else if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
         if (status == TXM_OK && level == field->level) {
             const txi_level *l = t->level;
             memcpy(field->match, t->match, (size_t)l->anchor_count * sizeof *t->match);
@@ -423,17 +469,21 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
             const size_t p = (size_t)y * (size_t)w->width + (size_t)x;
             if (w->state[p] != TXI_HOLE) continue;
             /* bilinear, in quarters of a pixel of the level */
-            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0, fy = scale ? (y & 1 ? 1 : 3) : 0;
-            const int px = ((x + scale) >> scale) - scale + TXI_EDGE, py = ((y + scale) >> scale) - scale + TXI_EDGE;
+            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0,
+                      fy = scale ? (y & 1 ? 1 : 3) : 0;
+            const int px = ((x + scale) >> scale) - scale + TXI_EDGE,
+                      py = ((y + scale) >> scale) - scale + TXI_EDGE;
             int sum[3] = {0, 0, 0}, total = 0;
             for (int k = 0; k < 4; k++) {
-                const size_t q = (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
+                const size_t q =
+                    (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
                 const int weight = (k & 1 ? fx : 4 - fx) * (k >> 1 ? fy : 4 - fy);
                 if (l->state[q] == TXI_VOID) continue;
                 total += weight;
                 for (int c = 0; c < 3; c++) sum[c] += weight * field->color[4 * q + (size_t)c];
             }
-            for (int c = 0; c < 3 && total; c++) color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
+            for (int c = 0; c < 3 && total; c++)
+                color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
         }
     }
 }
@@ -469,7 +519,8 @@ static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, 
 static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
     const int more = plan && plan->copies ? plan->pose_count : 0;
     if (!more) return 1;
-    txi_pose *all = (txi_pose *)txm_arena_alloc(f->arena, (size_t)(f->pose_count + more), sizeof *all);
+    txi_pose *all =
+        (txi_pose *)txm_arena_alloc(f->arena, (size_t)(f->pose_count + more), sizeof *all);
     if (!all) return 0;
     memcpy(all, f->pose, (size_t)f->pose_count * sizeof *all);
     memcpy(all + f->pose_count, plan->poses, (size_t)more * sizeof *all);
@@ -510,7 +561,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     const int passes = TXI_LEFT_OUT & TXI_PIECES ? 0 : TXI_ASSEMBLY_PASSES;
     for (int pass = 0, changed = 1; pass < passes && changed; pass++) {
         changed = 0;
-        for (int k = 0; k < kinds; k++) changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
+        for (int k = 0; k < kinds; k++)
+            changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
     }
     const int pieces = txi_assembly_pieces(&assembly, piece, queue);
     for (size_t k = 0; k < (size_t)w->width * (size_t)w->height; k++) {

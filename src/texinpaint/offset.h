@@ -10,10 +10,10 @@
    together from pieces of these [He and Sun 2012].                                             */
 
 enum {
-    TXI_OFFSET_WIDTH = 28,  /* pixels: least width of the hole at the level where this is done */
-    TXI_OFFSETS = 80,       /* labels                                                          */
+    TXI_OFFSET_WIDTH = 28, /* pixels: least width of the hole at the level where this is done */
+    TXI_OFFSETS = 80,      /* labels                                                          */
     TXI_OFFSET_SWEEPS = 6,
-    TXI_OFFSET_LEAST = 8,   /* pixels: shorter ones are not told from none                     */
+    TXI_OFFSET_LEAST = 8, /* pixels: shorter ones are not told from none                     */
     TXI_OFFSET_PASSES = 3
 };
 
@@ -40,8 +40,9 @@ static int txi_offset_level(const txi_level *l, int reach, txi_level *known, txm
         const int x = p % w, y = p / w;
         if (x == 0) known->anchor_row[y] = known->anchor_count;
         known->slot[p] = -1;
-        if (x < low[0] - reach || y < low[1] - reach || x > high[0] + reach || y > high[1] + reach ||
-            l->slot[p] >= 0 || x > w - TXI_PATCH || y > l->height - TXI_PATCH)
+        if (x < low[0] - reach || y < low[1] - reach || x > high[0] + reach ||
+            y > high[1] + reach || l->slot[p] >= 0 || x > w - TXI_PATCH ||
+            y > l->height - TXI_PATCH)
             continue;
         int all = 1;
         for (int k = 0; all && k < TXI_PATCH_AREA; k++) {
@@ -133,19 +134,22 @@ static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
         txm_arena_free(&scratch);
         return failed ? txi_no_memory(env) : TXM_OK;
     }
-    known.match = (txi_match *)txm_arena_zero(&scratch, (size_t)around.anchor_count, 2 * sizeof(txi_match));
+    known.match =
+        (txi_match *)txm_arena_zero(&scratch, (size_t)around.anchor_count, 2 * sizeof(txi_match));
     if (scratch.failed) status = txi_no_memory(env);
     if (status == TXM_OK) {
         known.old = known.match + around.anchor_count;
         for (int a = 0; a < around.anchor_count; a++) known.match[a].pose = -1;
         for (int k = 0; k < TXI_OFFSET_SWEEPS; k++) txi_search(&known, env);
     }
-    const int count = status == TXM_OK ? txi_offset_peaks(&known, labels, TXI_OFFSETS, &scratch) : 0;
+    const int count =
+        status == TXM_OK ? txi_offset_peaks(&known, labels, TXI_OFFSETS, &scratch) : 0;
     if (scratch.failed) status = txi_no_memory(env);
     assembly.color = t->color;
     assembly.drift = 0;
     assembly.price = t->price;
-    for (int pass = 0, changed = 1; pass < TXI_OFFSET_PASSES && changed && status == TXM_OK; pass++) {
+    for (int pass = 0, changed = 1; pass < TXI_OFFSET_PASSES && changed && status == TXM_OK;
+         pass++) {
         changed = 0;
         for (int k = 0; k < count && status == TXM_OK; k++) {
             changed += txi_expand(&assembly, labels[k], -1);

@@ -10,22 +10,22 @@
    resolution this is affordable, and random candidates instead would cost the structure.      */
 
 enum {
-    TXI_ONION_SHARE = 55,   /* percent of a patch that must be known                           */
-    TXI_ONION_FULL = 85,    /* percent from which patches off the lattice are compared, too    */
-    TXI_ONION_RING = 2,     /* pixels filled a pass                                            */
-    TXI_ONION_BEST = 8,     /* matches that are refined                                        */
-    TXI_ONION_REACH = 2,    /* pixels of the refinement                                        */
+    TXI_ONION_SHARE = 55,     /* percent of a patch that must be known                           */
+    TXI_ONION_FULL = 85,      /* percent from which patches off the lattice are compared, too    */
+    TXI_ONION_RING = 2,       /* pixels filled a pass                                            */
+    TXI_ONION_BEST = 8,       /* matches that are refined                                        */
+    TXI_ONION_REACH = 2,      /* pixels of the refinement                                        */
     TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
-    TXI_ONION_LEAST = 4000  /* places compared at least                                        */
+    TXI_ONION_LEAST = 4000    /* places compared at least                                        */
 };
 
 typedef struct txi_onion {
     const txi_canvas *canvas;
-    uint8_t *known;        /* 4 per pixel: 255 where it is known or filled                     */
+    uint8_t *known;         /* 4 per pixel: 255 where it is known or filled                     */
     const txi_match *place; /* source patches to compare with                                  */
     int place_count;
-    int32_t *todo;         /* anchors of this pass                                             */
-    txi_match *found;      /* of each anchor of the level; cost as of a full patch             */
+    int32_t *todo;    /* anchors of this pass                                             */
+    txi_match *found; /* of each anchor of the level; cost as of a full patch             */
     int todo_count;
 } txi_onion;
 
@@ -78,7 +78,8 @@ static void txi_onion_anchor(void *context, int index) {
     }
     for (int k = 0; k < o->place_count; k++) {
         const txi_match *m = &o->place[k];
-        const uint32_t cost = txi_onion_cost(o, a, known, m->pose, m->x, m->y, best[TXI_ONION_BEST - 1].cost);
+        const uint32_t cost =
+            txi_onion_cost(o, a, known, m->pose, m->x, m->y, best[TXI_ONION_BEST - 1].cost);
         if (cost < best[TXI_ONION_BEST - 1].cost) txi_onion_keep(best, m, cost);
     }
     top = best[0];
@@ -175,7 +176,8 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
         }
         if (n) o->todo[l->anchor_count + filled++] = p;
     }
-    for (int k = 0; k < filled; k++) memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);
+    for (int k = 0; k < filled; k++)
+        memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);
     return filled;
 }
 

@@ -11,9 +11,9 @@
 /* ---- levels of a window -------------------------------------------------------------------- */
 
 enum {
-    TXI_PATCH = 8,       /* pixels: side of the square patches that are compared               */
+    TXI_PATCH = 8, /* pixels: side of the square patches that are compared               */
     TXI_PATCH_AREA = TXI_PATCH * TXI_PATCH,
-    TXI_EDGE = 8,        /* pixels of void around each level, so that all patches lie inside   */
+    TXI_EDGE = 8, /* pixels of void around each level, so that all patches lie inside   */
     TXI_MAX_LEVELS = 8,
     TXI_MAX_POSES = 16,
     TXI_LEAST_PATCHES = 48, /* source patches that a coarse level must have; ours              */
@@ -40,17 +40,17 @@ typedef struct txi_source {
    TXI_EDGE pixels of void on all sides, or lists of numbers of pixels in these. */
 typedef struct txi_level {
     int width, height;
-    uint8_t *state;      /* TXI_VOID .. TXI_FOREIGN                                            */
-    uint8_t *color;      /* 4 per pixel; 0 where there is nothing known. The fourth is the guide */
-    uint8_t *mask;       /* 4 per pixel: 255 where the pixel is not void                       */
-    uint8_t *taps;       /* how the pixel and those right of and below it may be copied: TXI_TAP_ */
-    uint8_t *guide;      /* the plan's guide, strips and their pull, at this level; see fill.h  */
+    uint8_t *state; /* TXI_VOID .. TXI_FOREIGN                                            */
+    uint8_t *color; /* 4 per pixel; 0 where there is nothing known. The fourth is the guide */
+    uint8_t *mask;  /* 4 per pixel: 255 where the pixel is not void                       */
+    uint8_t *taps;  /* how the pixel and those right of and below it may be copied: TXI_TAP_ */
+    uint8_t *guide; /* the plan's guide, strips and their pull, at this level; see fill.h  */
     uint8_t *strip, *pull;
-    uint8_t *depth;      /* of hole pixels: pixels to the nearest known one, at most 255       */
-    int32_t *hole;       /* the hole's pixels                                                  */
+    uint8_t *depth; /* of hole pixels: pixels to the nearest known one, at most 255       */
+    int32_t *hole;  /* the hole's pixels                                                  */
     int hole_count;
-    int32_t *hole_row;   /* height + 1: the first of them in each row                          */
-    int32_t *anchor;     /* upper left corners of the patches that touch the hole              */
+    int32_t *hole_row; /* height + 1: the first of them in each row                          */
+    int32_t *anchor;   /* upper left corners of the patches that touch the hole              */
     int anchor_count;
     int32_t *anchor_row; /* height + 1                                                         */
     int32_t *slot;       /* the pixel's number as an anchor, -1: it is none                    */
@@ -120,7 +120,8 @@ static void txi_level_halve(const txi_level *f, txi_level *l) {
 }
 
 /* The colours of the hole at half resolution, from those of the finer level; the rest is not touched. */
-static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l, uint8_t *to) {
+static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l,
+                            uint8_t *to) {
     for (int i = 0; i < l->hole_count; i++) {
         const int x = l->hole[i] % l->width, y = l->hole[i] / l->width;
         int sum[4] = {0, 0, 0, 0}, count = 0;
@@ -208,7 +209,8 @@ static int txi_level_lists(txi_level *l, txm_arena *arena) {
         for (int y = 0; y < TXI_PATCH; y++)
             for (int x = 0; x < TXI_PATCH; x++) filled += l->state[p + y * w + x] != TXI_VOID;
         const int centre = p + (TXI_PATCH / 2) * (w + 1);
-        touch[p] = (uint8_t)(filled >= TXI_LEAST_FILLED || l->state[centre] == TXI_HOLE ? filled : 0);
+        touch[p] =
+            (uint8_t)(filled >= TXI_LEAST_FILLED || l->state[centre] == TXI_HOLE ? filled : 0);
         l->anchor_count += touch[p] != 0;
     }
     l->hole = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof(int32_t));

@@ -19,8 +19,8 @@ enum {
 /* The pose's axes. Pose 0 is the window as it is. */
 static void txi_pose_axes(int is_picture, int pose, txi_source *s) {
     /* in 1/16 turns, or degrees; poses that are near pose 0 come first */
-    static const int degrees[TXI_PICTURE_POSES] = {0, 5, -5, 10, -10, 15, -15, 20, -20,
-                                                   0, 5, -5, 10, -10};
+    static const int degrees[TXI_PICTURE_POSES] = {0,  5,   -5, 10, -10, 15, -15,
+                                                   20, -20, 0,  5,  -5,  10, -10};
     static const int turns[TXI_MESH_POSES] = {0, 1, 15, 2, 14, 3, 13, 4, 12, 5, 11, 6, 10, 7, 9, 8};
     double sine, cosine;
     txm_sincos(is_picture ? degrees[pose] * (TXM_PI / 180) : turns[pose] * (TXM_PI / 8), &sine,
@@ -99,7 +99,8 @@ static void txi_level_sample(const txi_level *l, size_t p, int fx, int fy, int t
     const uint8_t *row = l->color + 4 * p - pitch - 4;
     for (int y = 0; y < 4; y++, row += pitch) {
         for (int c = 0; c < 3; c++) {
-            const int line = row[c] * wx[0] + row[4 + c] * wx[1] + row[8 + c] * wx[2] + row[12 + c] * wx[3];
+            const int line =
+                row[c] * wx[0] + row[4 + c] * wx[1] + row[8 + c] * wx[2] + row[12 + c] * wx[3];
             sum[c] += line / 16 * wy[y];
         }
     }
@@ -120,7 +121,8 @@ static void txi_source_draw(const txi_level *l, txi_source *s) {
             memset(s->color + 4 * q, 0, 4);
             if (x < 0 || y < 0) continue;
             const int px = x / TXI_UNIT, py = y / TXI_UNIT;
-            if (px < TXI_EDGE || py < TXI_EDGE || px >= l->width - TXI_EDGE || py >= l->height - TXI_EDGE)
+            if (px < TXI_EDGE || py < TXI_EDGE || px >= l->width - TXI_EDGE ||
+                py >= l->height - TXI_EDGE)
                 continue;
             const size_t p = (size_t)py * (size_t)l->width + (size_t)px;
             const int fx = x % TXI_UNIT / (TXI_UNIT / TXI_PHASES);
@@ -147,9 +149,10 @@ static void txi_source_worth(const txi_level *l, txi_source *s, uint32_t *number
     }
     txi_patch_sums(e, s->width, s->height, (uint32_t *)(void *)columns, sums);
     for (size_t q = 0; q < n; q++)
-        s->worth[q] = (uint16_t)(sums[q] >> 20 == TXI_PATCH_AREA
-                                     ? 1 + ((sums[q] & 0xfffff) < 65534 ? (sums[q] & 0xfffff) : 65534)
-                                     : 0);
+        s->worth[q] =
+            (uint16_t)(sums[q] >> 20 == TXI_PATCH_AREA
+                           ? 1 + ((sums[q] & 0xfffff) < 65534 ? (sums[q] & 0xfffff) : 65534)
+                           : 0);
 }
 
 /* One source per call of the body. Each has its own scratch memory, allocated before. */

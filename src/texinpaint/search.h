@@ -12,8 +12,8 @@ enum {
 
 /* Which source patch an anchor's patch is like. */
 typedef struct txi_match {
-    int16_t x, y;  /* upper left corner in the source                                          */
-    int16_t pose;  /* number of the source; -1: none                                           */
+    int16_t x, y; /* upper left corner in the source                                          */
+    int16_t pose; /* number of the source; -1: none                                           */
     int16_t spare;
     uint32_t cost; /* squared differences of a full patch, and what missing detail costs       */
 } txi_match;
@@ -21,17 +21,17 @@ typedef struct txi_match {
 /* The state of a completion at one level. */
 typedef struct txi_canvas {
     const txi_level *level;
-    uint8_t *color;     /* 4 per pixel: the level's, and in the hole the current guess         */
-    txi_match *match;   /* one per anchor                                                      */
-    txi_match *old;     /* as it was before the sweep                                          */
-    uint16_t *weight;   /* of each anchor's vote                                               */
-    uint32_t price;     /* of one unit of missing detail, in 1/65536                           */
+    uint8_t *color;   /* 4 per pixel: the level's, and in the hole the current guess         */
+    txi_match *match; /* one per anchor                                                      */
+    txi_match *old;   /* as it was before the sweep                                          */
+    uint16_t *weight; /* of each anchor's vote                                               */
+    uint32_t price;   /* of one unit of missing detail, in 1/65536                           */
     uint64_t seed;
-    int sweep;          /* counts the sweeps                                                   */
-    int fresh;          /* the costs are up to date                                            */
-    int least;          /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
+    int sweep;  /* counts the sweeps                                                   */
+    int fresh;  /* the costs are up to date                                            */
+    int least;  /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
                            are                                                                 */
-    int radius;         /* pixels: where random tries begin                                    */
+    int radius; /* pixels: where random tries begin                                    */
 } txi_canvas;
 
 /* What the missing detail of a source patch costs. */
@@ -210,8 +210,10 @@ static txi_match txi_match_refine(const txi_level *coarse, const txi_level *fine
     const txi_source *from = &coarse->source[m->pose];
     const int p = fine->anchor[a];
     /* from the coarse patch's corner to the fine one's centre, in quarters of coarse pixels */
-    const int dx = 2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
-    const int dy = 2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
+    const int dx =
+        2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
+    const int dy =
+        2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
     int32_t wx, wy;
     txi_source_place(from, m->x, m->y, &wx, &wy);
     wx += from->a / 4 * dx + from->c / 4 * dy;
