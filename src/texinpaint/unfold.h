@@ -24,8 +24,9 @@ typedef struct txi_disk {
     uint32_t border;        /* one of them                                                       */
     uint32_t *slot;         /* 1 per face of the surface: its place in faces, or TXI_NO_FACE     */
     double bend;            /* curvature within the disk, in radians, since it was last slit      */
-    const double *depth;    /* 1 per vertex of the surface: it may be slit where this is above    */
-    double slit_from;       /* slit_from; NULL: nowhere                                          */
+    const double *depth;    /* 1 per vertex of the surface: it may be slit where this is above
+                               slit_from; NULL: nowhere                                          */
+    double slit_from;
 } txi_disk;
 
 /* Room for so many faces. */
