@@ -45,9 +45,11 @@ TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env 
         status = txi_surface_make(&job->domain, &job->memory, env);
     if (status == TXM_OK && desc->prior == TEXINPAINT_PRIOR_CREST) {
         texinpaint_crest_desc crest;
+        txi_stage stage;
         memset(&crest, 0, sizeof crest);
         crest.mesh = desc->mesh;
-        status = texinpaint_crest(&crest, env, &job->crests);
+        txi_stage_begin(&stage, env, 0, 0); /* the steps begin at 0 */
+        status = txi_stage_end(&stage, texinpaint_crest(&crest, &stage.env, &job->crests));
     }
     count = (size_t)desc->image.width * (size_t)desc->image.height;
     for (size_t i = 0; i < count && status == TXM_OK; i++) {
@@ -76,6 +78,14 @@ TEXINPAINT_API void texinpaint_free(texinpaint_job *job) {
 
 /* ---- steps ------------------------------------------------------------------------------------ */
 
+/* The targets of the window are written. */
+static void txi_count_window(texinpaint_job *job) {
+    const size_t count = job->window.target_count;
+    job->info.windows++;
+    job->info.written += count;
+    job->left -= count < job->left ? count : job->left;
+}
+
 /* Lay out the next window and complete it to half its resolution. */
 static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     txi_domain *domain = &job->domain;
@@ -102,6 +112,7 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     status = txi_choose(choice, &job->of_window, env);
     if (status == TXM_TOO_SMALL) { /* nothing to copy from: it stays smooth */
         txi_window_done(domain, w);
+        txi_count_window(job);
         return TXM_OK;
     }
     if (status == TXM_OK) job->phase = TXI_FINE;
@@ -142,15 +153,13 @@ static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
         for (int i = 0; i < job->domain.map_count; i++)
             txi_window_write(&job->domain, w, i, values[i]);
         txi_window_done(&job->domain, w);
-        job->info.windows++;
+        txi_count_window(job);
         job->info.line_ends += choice->lines.end_count;
         job->info.joins += h->curve_count;
-        job->info.written += w->target_count;
         if (w->target_count >= job->largest) {
             job->largest = w->target_count;
             job->info.structure = h->structure;
         }
-        job->left -= w->target_count < job->left ? w->target_count : job->left;
         job->phase = TXI_COARSE;
     }
     txm_arena_free(&arena);
@@ -169,20 +178,26 @@ static float txi_done(const texinpaint_job *job) {
 TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int *more) {
     txm_status status = TXM_OK;
     txi_stage stage;
+    size_t filled = 0;
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     const float from = txi_done(job);
     if (txm_progress(env, from, "complete")) return txi_stopped(env);
+    job->of_window.failed = 0; /* when a step is tried again */
     txi_stage_begin(&stage, env, from, from);
     switch (job->phase) {
     case TXI_PREVIEW:
-        status = txi_harmonic_fill(&job->domain, &stage.env);
+        status = txi_harmonic_fill(&job->domain, &job->info.holes, &stage.env);
         if (status == TXM_OK) job->phase = TXI_COARSE;
         break;
     case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;
     case TXI_FINE: status = txi_step_fine(job, &stage.env); break;
     case TXI_GUTTER:
-        status = txi_gutter(&job->domain, &job->of_window, &stage.env);
-        if (status == TXM_OK) job->phase = TXI_DONE;
+        txm_arena_free(&job->of_window);
+        status = txi_gutter(&job->domain, &job->of_window, &stage.env, &filled);
+        if (status != TXM_OK) break;
+        txm_arena_free(&job->of_window);
+        job->info.written += filled;
+        job->phase = TXI_DONE;
         break;
     default: break;
     }

@@ -196,6 +196,10 @@ static int txi_level_sources(txi_level *l, int is_picture, int pose_count, const
     }
     const int ok = !arena->failed && !scratch.failed;
     if (ok) txm_parallel_for(env, count, txi_sources_body, &task);
+    for (int k = 0; k < count && !ok; k++) { /* as before, for another try */
+        l->source[task.pose[k]].color = NULL;
+        l->built_count--;
+    }
     txm_arena_free(&scratch);
     return ok;
 }

@@ -533,10 +533,11 @@ static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
 }
 
 /* Missing texels outside the charts, at most desc->gutter from a texel in a chart, get the values of
-   the nearest one in all maps. They are not missing any longer. */
-static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env) {
+   the nearest one in all maps. They are not missing any longer. filled receives how many. */
+static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env, size_t *filled) {
     const int gutter = d->desc->gutter == 0 ? 8 : d->desc->gutter;
     const size_t count = (size_t)d->width * (size_t)d->height;
+    *filled = 0;
     if (!d->surface || gutter < 0) return TXM_OK;
     int32_t *nearest = (int32_t *)txm_arena_alloc(arena, count, sizeof(int32_t));
     uint8_t *known = (uint8_t *)txm_arena_alloc(arena, count, 1);
@@ -551,6 +552,7 @@ static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env) {
         if (dx * dx + dy * dy > (int64_t)gutter * gutter) continue;
         txi_copy_texel(d, (size_t)nearest[i], i);
         d->missing[i] = 0;
+        ++*filled;
     }
     return TXM_OK;
 }

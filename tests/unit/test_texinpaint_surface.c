@@ -627,6 +627,7 @@ static void test_random_meshes(void **state) {
 
 static void test_gutter(void **state) {
     txm_arena arena;
+    size_t count;
     (void)state;
     for (int gutter = -1; gutter < 6; gutter += 3) { /* none, 2, 5 */
         begin(64);
@@ -638,7 +639,8 @@ static void test_gutter(void **state) {
         domain();
         complete();
         txm_arena_init(&arena, NULL);
-        assert_int_equal(txi_gutter(&s.d, &arena, NULL), TXM_OK);
+        assert_int_equal(txi_gutter(&s.d, &arena, NULL, &count), TXM_OK);
+        assert_true(gutter > 0 ? count > 0 : count == 0);
         txm_arena_free(&arena);
         for (int y = 0; y < 64; y++) {
             for (int x = 0; x < 64; x++) {
@@ -753,13 +755,14 @@ static txm_status all_of_it(void *context, txm_env *env) {
     txm_arena domain_arena, arena;
     txi_window w;
     int found;
+    size_t filled;
     txi_domain d = s.d;
     (void)context;
     txm_arena_init(&domain_arena, env);
     txm_arena_init(&arena, env);
     txm_status status = txi_surface_make(&d, &domain_arena, env);
     if (status == TXM_OK) status = txi_windows_next(&d, &arena, env, &w, &found);
-    if (status == TXM_OK) status = txi_gutter(&d, &arena, env);
+    if (status == TXM_OK) status = txi_gutter(&d, &arena, env, &filled);
     txm_arena_free(&arena);
     txm_arena_free(&domain_arena);
     return status;
