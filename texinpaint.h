@@ -13815,7 +13815,8 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
     double score = 0;
     const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
     if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
-    score -= TXI_ENERGY_WEIGHT * log(ratio) / log(2.0);
+    /* relative to the detail that there is: where all is smooth all patches fit                     */
+    score -= TXI_ENERGY_WEIGHT * (log(ratio) - (h->detail - plain->detail)) / log(2.0);
     if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
     if (is_picture && h->curve_count > 0) {
         score += 0.15 * txi_straight_share(&c->lines, h->curves, h->curve_count);
