@@ -12247,7 +12247,8 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
         pairs[a].value = (uint32_t)a;
     }
     txm_sort_pairs(pairs, scratch, n);
-    const double s = 0.2 * pairs[n - 1 - (n - 1) / 4].key + 1;
+    const size_t percentile = n - 1 - (n - 1) / 4;
+    const double s = 0.2 * pairs[percentile].key + 1;
     for (size_t a = 0; a < n; a++) {
         const int centre = l->anchor[a] + (TXI_PATCH / 2) * (l->width + 1);
         const double x = t->match[a].cost / (2 * s) + fade * l->depth[centre];
