@@ -169,7 +169,8 @@ typedef struct texinpaint_job texinpaint_job;
 TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env *env,
                                            texinpaint_job **out);
 
-/* One step of the work. The first makes a preview: smooth colour in the hole, with the lines in it.
+/* One step of the work. The first makes a preview: smooth colours in the holes, and the lines through
+   the first hole. Then each window takes two: the first leaves a picture of half the resolution.
    After an error (cancelling included) the step may be tried again.
    env    its progress callback receives the fraction of all steps that is done
    more   receives 0 once nothing is left to do; NULL is allowed                              */
@@ -4629,30 +4630,14 @@ static txm_status txi_fill_all_labels(const txi_domain *d, const txi_texel_graph
     return status;
 }
 
-/* How many parts the graph has that are not connected. scratch: one number per node. */
-static int txi_graph_parts(const txi_texel_graph *g, uint32_t *scratch) {
-    int parts = 0;
-    for (uint32_t i = 0; i < g->count; i++) scratch[i] = i;
-    for (uint32_t i = 0; i < g->count; i++) {
-        for (uint32_t k = g->first[i]; k < g->first[i + 1]; k++) txi_join_sets(scratch, i, g->to[k]);
-    }
-    for (uint32_t i = 0; i < g->count; i++) parts += scratch[i] == i;
-    return parts;
-}
-
-/* Fill the unknown texels of all maps. parts: NULL, or receives how many holes there are. */
-static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, int *parts,
-                                 txm_arena *arena, txm_env *env) {
+/* Fill the unknown texels of all maps. */
+static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, txm_arena *arena,
+                                 txm_env *env) {
     txi_texel_graph g;
     txi_poisson_system system;
     int labels = 0;
     txm_status status = txi_graph_make(d, marks, arena, env, &g);
     if (status != TXM_OK || g.count == 0) return status;
-    if (parts) {
-        uint32_t *scratch = (uint32_t *)txm_arena_alloc(arena, g.count, sizeof(uint32_t));
-        if (!scratch) return txi_no_memory(env);
-        *parts = txi_graph_parts(&g, scratch);
-    }
     for (int map = 0; map < d->map_count; map++) labels += txi_is_label(d, map);
     if (labels) status = txi_fill_all_labels(d, &g, marks, arena, env);
     if (status == TXM_OK) status = txi_poisson_make(&g, 0, arena, env, &system);
@@ -4671,11 +4656,10 @@ static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, int 
 }
 
 /* Fill the missing texels that a chart covers smoothly, in all maps. d->missing is not changed.
-   holes   NULL, or receives how many connected parts are filled
    return  TXM_OK, TXM_TOO_SMALL if nothing is known, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY,
            TXM_CANCELLED; after these the missing texels of some maps may be filled
    cost    about 3 us per missing texel for three channels, 300 bytes                       */
-static txm_status txi_harmonic_fill(const txi_domain *d, int *holes, txm_env *env) {
+static txm_status txi_harmonic_fill(const txi_domain *d, txm_env *env) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
     size_t known = 0, unknown = 0;
     txm_arena arena;
@@ -4693,7 +4677,7 @@ static txm_status txi_harmonic_fill(const txi_domain *d, int *holes, txm_env *en
     if (unknown > 0 && known == 0)
         status = txm_fail(env, TXM_TOO_SMALL, "nothing in the charts is known");
     else if (unknown > 0)
-        status = txi_fill_nodes(d, marks, holes, &arena, env);
+        status = txi_fill_nodes(d, marks, &arena, env);
     txm_arena_free(&arena);
     return status;
 }
@@ -4719,7 +4703,7 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
     if (status == TXM_OK) status = txi_surface_make(&d, &arena, env);
     if (status == TXM_OK) {
         txi_stage_begin(&stage, env, 0, 0.95f);
-        status = txi_stage_end(&stage, txi_harmonic_fill(&d, NULL, &stage.env));
+        status = txi_stage_end(&stage, txi_harmonic_fill(&d, &stage.env));
     }
     if (status == TXM_OK && txm_progress(env, 0.95f, "gutters")) status = txi_stopped(env);
     if (status == TXM_OK) {
@@ -13880,6 +13864,127 @@ static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
     return status == TXM_OK ? txi_choose_show(c, env) : status;
 }
 
+/* ---- preview ------------------------------------------------------------------------------------
+   What a user sees first: smooth colours in the holes, and through the first hole its lines, drawn as
+   the mean colours across them. The texels stay missing.                                          */
+
+/* Paint the targets of a window in the picture. Pictures with alpha keep what they have, as colours of
+   a window lie over gray.
+   color  4 per window pixel                                                                       */
+static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *color, txm_env *env) {
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    const size_t channels = (size_t)d->maps[0].channels;
+    size_t bytes;
+    if (channels == 2 || channels == 4) return TXM_OK;
+    if (!txm_mul(pixels, channels, sizeof(float), &bytes)) return txi_no_memory(env);
+    float *values = (float *)txm_alloc(env, bytes);
+    if (!values) return txi_no_memory(env);
+    for (size_t i = 0; i < pixels; i++) {
+        for (size_t c = 0; c < channels; c++)
+            values[i * channels + c] = (float)color[4 * i + c] / 255.0f;
+    }
+    txi_window_write(d, w, 0, values);
+    txm_free(env, values);
+    return TXM_OK;
+}
+
+/* Keep only the targets that lie on the lines of a plan. */
+static void txi_keep_targets(txi_window *w, const txi_plan *plan) {
+    size_t kept = 0;
+    for (size_t i = 0; i < w->target_count; i++) {
+        const txi_target *t = &w->targets[i];
+        const int x = txm_clampi((int)floor((double)t->x + 0.5), 0, w->width - 1);
+        const int y = txm_clampi((int)floor((double)t->y + 0.5), 0, w->height - 1);
+        if (plan->pull[(size_t)y * (size_t)w->width + (size_t)x] >= 128) w->targets[kept++] = *t;
+    }
+    w->target_count = kept;
+}
+
+/* The lines through a window's hole, painted; its targets are then those on lines. */
+static txm_status txi_paint_lines(txi_domain *d, txi_window *w, txm_arena *arena, txm_env *env) {
+    txi_lines lines;
+    txi_curve *curves = NULL;
+    txi_plan plan;
+    int count = 0;
+    txm_status status = txi_trace(w, arena, env, &lines);
+    if (status == TXM_OK)
+        status = txi_join(w, &lines, NULL, TEXINPAINT_PICTURE, d->desc->alpha, d->desc->beta,
+                          d->desc->seed, arena, env, &curves, &count);
+    if (status != TXM_OK || count == 0) {
+        w->target_count = 0;
+        return status;
+    }
+    status = txi_cartoon(w, &lines, curves, count, arena, env, &plan);
+    if (status != TXM_OK) return status;
+    txi_keep_targets(w, &plan);
+    return txi_paint(d, w, plan.color, env);
+}
+
+/* Fill all holes smoothly, around the lines of the first if lines are wanted. */
+static txm_status txi_preview(txi_domain *d, txm_env *env) {
+    txi_window w;
+    txm_arena arena;
+    txi_stage stage;
+    int found = 0;
+    txm_status status = TXM_OK;
+    txm_arena_init(&arena, env);
+    memset(&w, 0, sizeof w);
+    if (d->desc->structure != TEXINPAINT_TEXTURE) {
+        txi_stage_begin(&stage, env, 0, 0.5f);
+        status = txi_windows_next(d, &arena, &stage.env, &w, &found);
+        if (status == TXM_OK && found) status = txi_paint_lines(d, &w, &arena, &stage.env);
+        status = txi_stage_end(&stage, status);
+    }
+    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 0;
+    if (status == TXM_OK) {
+        txi_stage_begin(&stage, env, 0.5f, 1);
+        status = txi_stage_end(&stage, txi_harmonic_fill(d, &stage.env));
+    }
+    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 1;
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- counting holes ------------------------------------------------------------------------------ */
+
+/* How many parts of the missing texels are connected: on the surface face by face, in a picture by
+   the sides and corners of pixels. */
+static txm_status txi_count_holes(const txi_domain *d, txm_env *env, int *holes) {
+    const txi_surface *s = d->surface;
+    const size_t count = s ? s->face_count : (size_t)d->width * (size_t)d->height;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint32_t *parent = (uint32_t *)txm_arena_alloc(&arena, count, sizeof *parent);
+    uint8_t *is_hole = (uint8_t *)txm_arena_zero(&arena, count, 1);
+    *holes = 0;
+    if (!parent || !is_hole) {
+        txm_arena_free(&arena);
+        return txi_no_memory(env);
+    }
+    for (size_t i = 0; i < count; i++) {
+        parent[i] = (uint32_t)i;
+        is_hole[i] = s ? s->hole_first[i + 1] > s->hole_first[i] : d->missing[i];
+    }
+    for (size_t i = 0; i < count; i++) {
+        for (size_t k = 0; k < 3 && s && is_hole[i]; k++) {
+            const uint32_t other = s->opposite[3 * i + k];
+            if (other != TXM_NO_SIDE && is_hole[other / 3])
+                txi_join_sets(parent, (uint32_t)i, other / 3);
+        }
+        if (s || !is_hole[i]) continue;
+        const int x = (int)(i % (size_t)d->width), y = (int)(i / (size_t)d->width);
+        static const int dx[4] = {-1, -1, 0, 1}, dy[4] = {0, -1, -1, -1};
+        for (int k = 0; k < 4; k++) {
+            if (x + dx[k] < 0 || x + dx[k] >= d->width || y + dy[k] < 0) continue;
+            const size_t other = (size_t)(y + dy[k]) * (size_t)d->width + (size_t)(x + dx[k]);
+            if (is_hole[other]) txi_join_sets(parent, (uint32_t)i, (uint32_t)other);
+        }
+    }
+    for (size_t i = 0; i < count; i++) *holes += is_hole[i] && parent[i] == i;
+    txm_arena_free(&arena);
+    return TXM_OK;
+}
+
 /* ---- jobs ------------------------------------------------------------------------------------ */
 
 enum { TXI_PREVIEW, TXI_COARSE, TXI_FINE, TXI_GUTTER, TXI_DONE }; /* what the next step does */
@@ -13932,6 +14037,7 @@ TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env 
         else if (job->domain.usable[i]) known++;
     }
     job->left = job->info.missing;
+    if (status == TXM_OK) status = txi_count_holes(&job->domain, env, &job->info.holes);
     if (status == TXM_OK && job->left && !known)
         status = txm_fail(env, TXM_TOO_SMALL, "no known texel to copy from: all are missing");
     if (status != TXM_OK) {
@@ -13984,6 +14090,7 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
         if (job->prior.line_count) choice->prior = &job->prior;
     }
     status = txi_choose(choice, &job->of_window, env);
+    if (status == TXM_OK) status = txi_paint(domain, w, choice->tried[choice->best].preview, env);
     if (status == TXM_TOO_SMALL) { /* nothing to copy from: it stays smooth */
         txi_window_done(domain, w);
         txi_count_window(job);
@@ -14060,7 +14167,7 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
     txi_stage_begin(&stage, env, from, from);
     switch (job->phase) {
     case TXI_PREVIEW:
-        status = txi_harmonic_fill(&job->domain, &job->info.holes, &stage.env);
+        status = txi_preview(&job->domain, &stage.env);
         if (status == TXM_OK) job->phase = TXI_COARSE;
         break;
     case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;

@@ -169,7 +169,8 @@ typedef struct texinpaint_job texinpaint_job;
 TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env *env,
                                            texinpaint_job **out);
 
-/* One step of the work. The first makes a preview: smooth colour in the hole, with the lines in it.
+/* One step of the work. The first makes a preview: smooth colours in the holes, and the lines through
+   the first hole. Then each window takes two: the first leaves a picture of half the resolution.
    After an error (cancelling included) the step may be tried again.
    env    its progress callback receives the fraction of all steps that is done
    more   receives 0 once nothing is left to do; NULL is allowed                              */
@@ -295,6 +296,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/fill.h"
 #include "texinpaint/blend.h"
 #include "texinpaint/choose.h"
+#include "texinpaint/preview.h"
 #include "texinpaint/job.h"
 #endif /* TEXINPAINT_IMPLEMENTATION */
 

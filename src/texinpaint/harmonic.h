@@ -317,30 +317,14 @@ static txm_status txi_fill_all_labels(const txi_domain *d, const txi_texel_graph
     return status;
 }
 
-/* How many parts the graph has that are not connected. scratch: one number per node. */
-static int txi_graph_parts(const txi_texel_graph *g, uint32_t *scratch) {
-    int parts = 0;
-    for (uint32_t i = 0; i < g->count; i++) scratch[i] = i;
-    for (uint32_t i = 0; i < g->count; i++) {
-        for (uint32_t k = g->first[i]; k < g->first[i + 1]; k++) txi_join_sets(scratch, i, g->to[k]);
-    }
-    for (uint32_t i = 0; i < g->count; i++) parts += scratch[i] == i;
-    return parts;
-}
-
-/* Fill the unknown texels of all maps. parts: NULL, or receives how many holes there are. */
-static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, int *parts,
-                                 txm_arena *arena, txm_env *env) {
+/* Fill the unknown texels of all maps. */
+static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, txm_arena *arena,
+                                 txm_env *env) {
     txi_texel_graph g;
     txi_poisson_system system;
     int labels = 0;
     txm_status status = txi_graph_make(d, marks, arena, env, &g);
     if (status != TXM_OK || g.count == 0) return status;
-    if (parts) {
-        uint32_t *scratch = (uint32_t *)txm_arena_alloc(arena, g.count, sizeof(uint32_t));
-        if (!scratch) return txi_no_memory(env);
-        *parts = txi_graph_parts(&g, scratch);
-    }
     for (int map = 0; map < d->map_count; map++) labels += txi_is_label(d, map);
     if (labels) status = txi_fill_all_labels(d, &g, marks, arena, env);
     if (status == TXM_OK) status = txi_poisson_make(&g, 0, arena, env, &system);
@@ -359,11 +343,10 @@ static txm_status txi_fill_nodes(const txi_domain *d, const uint8_t *marks, int 
 }
 
 /* Fill the missing texels that a chart covers smoothly, in all maps. d->missing is not changed.
-   holes   NULL, or receives how many connected parts are filled
    return  TXM_OK, TXM_TOO_SMALL if nothing is known, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY,
            TXM_CANCELLED; after these the missing texels of some maps may be filled
    cost    about 3 us per missing texel for three channels, 300 bytes                       */
-static txm_status txi_harmonic_fill(const txi_domain *d, int *holes, txm_env *env) {
+static txm_status txi_harmonic_fill(const txi_domain *d, txm_env *env) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
     size_t known = 0, unknown = 0;
     txm_arena arena;
@@ -381,7 +364,7 @@ static txm_status txi_harmonic_fill(const txi_domain *d, int *holes, txm_env *en
     if (unknown > 0 && known == 0)
         status = txm_fail(env, TXM_TOO_SMALL, "nothing in the charts is known");
     else if (unknown > 0)
-        status = txi_fill_nodes(d, marks, holes, &arena, env);
+        status = txi_fill_nodes(d, marks, &arena, env);
     txm_arena_free(&arena);
     return status;
 }
@@ -407,7 +390,7 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
     if (status == TXM_OK) status = txi_surface_make(&d, &arena, env);
     if (status == TXM_OK) {
         txi_stage_begin(&stage, env, 0, 0.95f);
-        status = txi_stage_end(&stage, txi_harmonic_fill(&d, NULL, &stage.env));
+        status = txi_stage_end(&stage, txi_harmonic_fill(&d, &stage.env));
     }
     if (status == TXM_OK && txm_progress(env, 0.95f, "gutters")) status = txi_stopped(env);
     if (status == TXM_OK) {

@@ -3,8 +3,7 @@
 
 #include "check.h"
 #include "choose.h"
-#include "crest.h"
-#include "harmonic.h"
+#include "preview.h"
 
 /* ---- jobs ------------------------------------------------------------------------------------ */
 
@@ -58,6 +57,7 @@ TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env 
         else if (job->domain.usable[i]) known++;
     }
     job->left = job->info.missing;
+    if (status == TXM_OK) status = txi_count_holes(&job->domain, env, &job->info.holes);
     if (status == TXM_OK && job->left && !known)
         status = txm_fail(env, TXM_TOO_SMALL, "no known texel to copy from: all are missing");
     if (status != TXM_OK) {
@@ -110,6 +110,7 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
         if (job->prior.line_count) choice->prior = &job->prior;
     }
     status = txi_choose(choice, &job->of_window, env);
+    if (status == TXM_OK) status = txi_paint(domain, w, choice->tried[choice->best].preview, env);
     if (status == TXM_TOO_SMALL) { /* nothing to copy from: it stays smooth */
         txi_window_done(domain, w);
         txi_count_window(job);
@@ -186,7 +187,7 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
     txi_stage_begin(&stage, env, from, from);
     switch (job->phase) {
     case TXI_PREVIEW:
-        status = txi_harmonic_fill(&job->domain, &job->info.holes, &stage.env);
+        status = txi_preview(&job->domain, &stage.env);
         if (status == TXM_OK) job->phase = TXI_COARSE;
         break;
     case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;

@@ -1,0 +1,130 @@
+#ifndef TEXINPAINT_PREVIEW_H
+#define TEXINPAINT_PREVIEW_H
+
+#include "harmonic.h"
+#include "join.h"
+#include "lay.h"
+#include "layout.h"
+
+/* ---- preview ------------------------------------------------------------------------------------
+   What a user sees first: smooth colours in the holes, and through the first hole its lines, drawn as
+   the mean colours across them. The texels stay missing.                                          */
+
+/* Paint the targets of a window in the picture. Pictures with alpha keep what they have, as colours of
+   a window lie over gray.
+   color  4 per window pixel                                                                       */
+static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *color, txm_env *env) {
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    const size_t channels = (size_t)d->maps[0].channels;
+    size_t bytes;
+    if (channels == 2 || channels == 4) return TXM_OK;
+    if (!txm_mul(pixels, channels, sizeof(float), &bytes)) return txi_no_memory(env);
+    float *values = (float *)txm_alloc(env, bytes);
+    if (!values) return txi_no_memory(env);
+    for (size_t i = 0; i < pixels; i++) {
+        for (size_t c = 0; c < channels; c++)
+            values[i * channels + c] = (float)color[4 * i + c] / 255.0f;
+    }
+    txi_window_write(d, w, 0, values);
+    txm_free(env, values);
+    return TXM_OK;
+}
+
+/* Keep only the targets that lie on the lines of a plan. */
+static void txi_keep_targets(txi_window *w, const txi_plan *plan) {
+    size_t kept = 0;
+    for (size_t i = 0; i < w->target_count; i++) {
+        const txi_target *t = &w->targets[i];
+        const int x = txm_clampi((int)floor((double)t->x + 0.5), 0, w->width - 1);
+        const int y = txm_clampi((int)floor((double)t->y + 0.5), 0, w->height - 1);
+        if (plan->pull[(size_t)y * (size_t)w->width + (size_t)x] >= 128) w->targets[kept++] = *t;
+    }
+    w->target_count = kept;
+}
+
+/* The lines through a window's hole, painted; its targets are then those on lines. */
+static txm_status txi_paint_lines(txi_domain *d, txi_window *w, txm_arena *arena, txm_env *env) {
+    txi_lines lines;
+    txi_curve *curves = NULL;
+    txi_plan plan;
+    int count = 0;
+    txm_status status = txi_trace(w, arena, env, &lines);
+    if (status == TXM_OK)
+        status = txi_join(w, &lines, NULL, TEXINPAINT_PICTURE, d->desc->alpha, d->desc->beta,
+                          d->desc->seed, arena, env, &curves, &count);
+    if (status != TXM_OK || count == 0) {
+        w->target_count = 0;
+        return status;
+    }
+    status = txi_cartoon(w, &lines, curves, count, arena, env, &plan);
+    if (status != TXM_OK) return status;
+    txi_keep_targets(w, &plan);
+    return txi_paint(d, w, plan.color, env);
+}
+
+/* Fill all holes smoothly, around the lines of the first if lines are wanted. */
+static txm_status txi_preview(txi_domain *d, txm_env *env) {
+    txi_window w;
+    txm_arena arena;
+    txi_stage stage;
+    int found = 0;
+    txm_status status = TXM_OK;
+    txm_arena_init(&arena, env);
+    memset(&w, 0, sizeof w);
+    if (d->desc->structure != TEXINPAINT_TEXTURE) {
+        txi_stage_begin(&stage, env, 0, 0.5f);
+        status = txi_windows_next(d, &arena, &stage.env, &w, &found);
+        if (status == TXM_OK && found) status = txi_paint_lines(d, &w, &arena, &stage.env);
+        status = txi_stage_end(&stage, status);
+    }
+    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 0;
+    if (status == TXM_OK) {
+        txi_stage_begin(&stage, env, 0.5f, 1);
+        status = txi_stage_end(&stage, txi_harmonic_fill(d, &stage.env));
+    }
+    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 1;
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- counting holes ------------------------------------------------------------------------------ */
+
+/* How many parts of the missing texels are connected: on the surface face by face, in a picture by
+   the sides and corners of pixels. */
+static txm_status txi_count_holes(const txi_domain *d, txm_env *env, int *holes) {
+    const txi_surface *s = d->surface;
+    const size_t count = s ? s->face_count : (size_t)d->width * (size_t)d->height;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint32_t *parent = (uint32_t *)txm_arena_alloc(&arena, count, sizeof *parent);
+    uint8_t *is_hole = (uint8_t *)txm_arena_zero(&arena, count, 1);
+    *holes = 0;
+    if (!parent || !is_hole) {
+        txm_arena_free(&arena);
+        return txi_no_memory(env);
+    }
+    for (size_t i = 0; i < count; i++) {
+        parent[i] = (uint32_t)i;
+        is_hole[i] = s ? s->hole_first[i + 1] > s->hole_first[i] : d->missing[i];
+    }
+    for (size_t i = 0; i < count; i++) {
+        for (size_t k = 0; k < 3 && s && is_hole[i]; k++) {
+            const uint32_t other = s->opposite[3 * i + k];
+            if (other != TXM_NO_SIDE && is_hole[other / 3])
+                txi_join_sets(parent, (uint32_t)i, other / 3);
+        }
+        if (s || !is_hole[i]) continue;
+        const int x = (int)(i % (size_t)d->width), y = (int)(i / (size_t)d->width);
+        static const int dx[4] = {-1, -1, 0, 1}, dy[4] = {0, -1, -1, -1};
+        for (int k = 0; k < 4; k++) {
+            if (x + dx[k] < 0 || x + dx[k] >= d->width || y + dy[k] < 0) continue;
+            const size_t other = (size_t)(y + dy[k]) * (size_t)d->width + (size_t)(x + dx[k]);
+            if (is_hole[other]) txi_join_sets(parent, (uint32_t)i, (uint32_t)other);
+        }
+    }
+    for (size_t i = 0; i < count; i++) *holes += is_hole[i] && parent[i] == i;
+    txm_arena_free(&arena);
+    return TXM_OK;
+}
+
+#endif /* TEXINPAINT_PREVIEW_H */
