@@ -92,16 +92,17 @@ static void make_ball(scene *s, const char *name, double share) {
     s->indices = (uint32_t *)need(malloc(3 * faces * sizeof(uint32_t)));
     uint32_t *to = s->indices;
     for (size_t k = 0; k < 6; k++) {
-        const double left = 10 + (double)(k % 3) * (CHART + 20), top = 10 + (double)(k / 3) * (CHART + 20);
+        const int left = 10 + (int)(k % 3) * (CHART + 20), top = 10 + (int)(k / 3) * (CHART + 20);
         for (size_t i = 0; i < row * row; i++) {
-            const double u = (double)(i % row) / STEPS, v = (double)(i / row) / STEPS;
+            const size_t column = i % row, line = i / row;
+            const double u = (double)column / STEPS, v = (double)line / STEPS;
             const size_t at = k * row * row + i;
             double p[3];
             on_ball((int)k, u, v, p);
             for (size_t n = 0; n < 3; n++) s->positions[3 * at + n] = (float)(floor(p[n] * 1e5 + 0.5) / 1e5);
             s->uv[2 * at] = (float)((left + u * CHART) / ATLAS);
             s->uv[2 * at + 1] = (float)((top + v * CHART) / ATLAS);
-            if (i % row == STEPS || i / row == STEPS) continue;
+            if (column == STEPS || line == STEPS) continue;
             const size_t corners[6] = {at, at + 1, at + row + 1, at, at + row + 1, at + row};
             for (int n = 0; n < 6; n++) *to++ = (uint32_t)corners[n];
         }
@@ -110,7 +111,7 @@ static void make_ball(scene *s, const char *name, double share) {
                 double p[3];
                 on_ball((int)k, txm_clampf(((float)x + 0.5f) / CHART, 0, 1),
                         txm_clampf(((float)y + 0.5f) / CHART, 0, 1), p);
-                const int px = (int)left + x, py = (int)top + y;
+                const int px = left + x, py = top + y;
                 const double wave = sin(30 * (0.3 * p[0] + 0.9 * p[1] + 0.2 * p[2]) +
                                         3 * sin(3 * p[0] + 1) + 2 * cos(4 * p[2]));
                 const int light = wave > 0, grain = (int)(txm_hash((uint64_t)(py * ATLAS + px)) >> 59);
@@ -134,7 +135,7 @@ static void cut_ellipse(scene *s) {
     const double rx = 0.14 * SIDE, ry = 0.05 * SIDE * SIDE / (TXM_PI * rx);
     for (int y = 0; y < SIDE; y++) {
         for (int x = 0; x < SIDE; x++) {
-            const double u = (x - SIDE / 2) / rx, v = (y - SIDE / 2) / ry;
+            const double u = (x - 0.5 * SIDE) / rx, v = (y - 0.5 * SIDE) / ry;
             if (u * u + v * v < 1) set_missing(s, x, y);
         }
     }

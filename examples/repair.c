@@ -131,7 +131,7 @@ int main(int argc, char **argv) {
     for (int i = 0; i < 2 && !w.failed; i++) {
         find_side(&w, side);
         snprintf(path, sizeof path, "%s-%d.png", argv[4], i);
-        draw_states(&w, side[0] + (i ? 55 : 0), side[1] * (i ? 0.5f : 1), path);
+        draw_states(&w, side[0] + (i ? 55.0f : 0.0f), side[1] * (i ? 0.5f : 1.0f), path);
     }
     if (w.failed) fprintf(stderr, "repair: %s\n", w.failed);
     for (int i = 0; i < STATES; i++) image_free(&w.states[i]);

@@ -48,7 +48,8 @@ static void on_cube(int k, double u, double v, double n, double c[3]) {
 static point at(const model *m, int k, double u, double v) {
     point p;
     if (m->is_ring) {
-        const double s = 2 * TXM_PI * (k % 4 + u) / 4, t = 2 * TXM_PI * (k / 4 + v) / 2;
+        const int row = k / 4;
+        const double s = 2 * TXM_PI * (k % 4 + u) / 4, t = 2 * TXM_PI * (row + v) / 2;
         const double r = 1 + 0.45 * cos(t);
         p.x = r * cos(s), p.y = 0.45 * sin(t), p.z = -r * sin(s);
         return p;
@@ -94,7 +95,8 @@ static void color(const model *m, int k, double u, double v, uint64_t grain, uns
         stripes(&p, grain, rgb);
         return;
     }
-    const int x = mirror(k % 4 + u, m->photo->width), y = mirror(k / 4 + v, m->photo->height);
+    const int row = k / 4;
+    const int x = mirror(k % 4 + u, m->photo->width), y = mirror(row + v, m->photo->height);
     memcpy(rgb, (const unsigned char *)txm_image_row_const(m->photo, y) + 3 * x, 3);
 }
 
@@ -127,7 +129,8 @@ static int write_obj(const model *m, const char *path, int side) {
     for (int k = 0; k < m->charts; k++) {
         const chart c = place(m, k, side);
         for (int i = 0; i < (STEPS + 1) * (STEPS + 1); i++) {
-            const double u = (double)(i % (STEPS + 1)) / STEPS, v = (double)(i / (STEPS + 1)) / STEPS;
+            const int column = i % (STEPS + 1), row = i / (STEPS + 1);
+            const double u = (double)column / STEPS, v = (double)row / STEPS;
             const double a = c.turned ? 1 - u : u, b = c.turned ? 1 - v : v;
             const point p = at(m, k, u, v);
             fprintf(file, "v %.5f %.5f %.5f\nvt %.6f %.6f\n", p.x + 0.0, p.y + 0.0, p.z + 0.0,
