@@ -82,7 +82,8 @@ typedef struct texinpaint_map {
     int is_normal;   /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2 in the
                         tangent space of the texture: turned with the pieces, kept at unit length.
                         x to the right, y up (OpenGL); 2 = y down (DirectX)                     */
-    int is_label;    /* values are labels, not quantities: never blended or interpolated        */
+    int is_label;    /* values are labels, not quantities: never blended or interpolated; without
+                        is_normal                                                               */
 } texinpaint_map;
 
 /* How lines are continued. */

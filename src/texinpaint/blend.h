@@ -211,8 +211,8 @@ static int txi_chunks(size_t count) {
 static void txi_blend_number(txi_blend *b) {
     const txi_window *w = b->w;
     for (int c = 0; c < b->channels; c++) {
-        b->low[c] = 1e30f;
-        b->high[c] = -1e30f;
+        b->low[c] = TXI_MOST_SAMPLE;
+        b->high[c] = -TXI_MOST_SAMPLE;
     }
     b->count = 0;
     for (int color = 0; color < 2; color++) {

@@ -18,11 +18,24 @@ static txm_status txi_check_size(const txm_image *im, const char *name, const tx
     return TXM_OK;
 }
 
+/* Are all samples finite, and not so large that sums of them are not? */
+static int txi_is_moderate(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    const size_t row_count = (size_t)im.width * (size_t)im.channels;
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < row_count; i++) {
+            if (!(row[i] >= -TXI_MOST_SAMPLE && row[i] <= TXI_MOST_SAMPLE)) return 0;
+        }
+    }
+    return 1;
+}
+
 static txm_status txi_check_picture(const txm_image *im, const char *name, const txm_image *like,
                                     txm_env *env) {
     const txm_status status = txi_check_size(im, name, like, env);
-    if (status == TXM_OK && !txm_image_is_finite(im))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite");
+    if (status == TXM_OK && !txi_is_moderate(im))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite, and at most 1e30");
     return status;
 }
 
@@ -44,6 +57,8 @@ static txm_status txi_check_maps(const texinpaint_desc *d, txm_env *env) {
         if (map->is_normal < 0 || map->is_normal > 2 || (map->is_normal && map->image.channels < 3))
             return txm_fail(env, TXM_BAD_ARGUMENT,
                             "is_normal must be 0 to 2, for maps with 3 or 4 channels");
+        if (map->is_normal && map->is_label)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "a map has is_normal or is_label, not both");
     }
     return TXM_OK;
 }

@@ -3,6 +3,8 @@
 
 #include "../texinpaint.h"
 
+#define TXI_MOST_SAMPLE 1e30f /* largest sample of a picture: squares of sums of them are finite doubles */
+
 /* ---- windows --------------------------------------------------------------------------------
    All completion is done in windows: flat pictures of a part of the surface (or of the picture) with
    a hole in it. The surface is laid out almost without distortion, so that a window's pixels have

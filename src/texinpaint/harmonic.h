@@ -56,7 +56,8 @@ static void txi_quantities_get(const txi_domain *d, const txi_quantities *q, uin
     const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
     const int channels = q->image->channels;
     for (int c = 0; c < channels; c++) out[c] = (double)txm_image_get(q->image, x, y, c);
-    for (int c = 0; c + 1 < channels && q->has_alpha; c++) out[c] *= out[channels - 1];
+    for (int c = 0; c + 1 < channels && q->has_alpha; c++)
+        out[c] *= fmin(fmax(out[channels - 1], 0), 1);
     for (int c = 0; c < 3 && q->is_normal; c++) out[c] = 2 * out[c] - 1;
     if (q->is_normal && d->surface) { /* the vector in the tangent plane, as one in space */
         txm_dvec3 axis[2];
@@ -90,7 +91,7 @@ static void txi_quantities_set(const txi_domain *d, const txi_quantities *q, uin
         for (int c = 0; c < 3; c++) in[c] = n > 1e-6 ? (in[c] / n + 1) / 2 : c == 2 ? 1 : 0.5;
     }
     for (int c = 0; c + 1 < channels && q->has_alpha; c++)
-        in[c] = in[channels - 1] > 1e-6 ? in[c] / in[channels - 1] : 0;
+        in[c] = in[channels - 1] > 1e-6 ? in[c] / fmin(in[channels - 1], 1) : 0;
     for (int c = 0; c < channels; c++) txm_image_set(q->image, x, y, c, txm_float(in[c]));
 }
 

@@ -225,7 +225,7 @@ static void draw_desc(source *s) {
     for (int i = 0; i < d->map_count; i++) {
         in.maps[i].image = draw_picture(s, in.pixels[i + 1], width, height);
         in.maps[i].is_normal = in.maps[i].image.channels > 2 ? pick(s, 3) : 0;
-        in.maps[i].is_label = pick(s, 3) == 0;
+        in.maps[i].is_label = pick(s, 3) == 0 && (in.maps[i].is_normal == 0 || pick(s, 20) == 0);
     }
     d->maps = in.maps;
     draw_mesh(s);
