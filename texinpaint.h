@@ -82,7 +82,8 @@ typedef struct texinpaint_map {
     int is_normal;   /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2 in the
                         tangent space of the texture: turned with the pieces, kept at unit length.
                         x to the right, y up (OpenGL); 2 = y down (DirectX)                     */
-    int is_label;    /* values are labels, not quantities: never blended or interpolated        */
+    int is_label;    /* values are labels, not quantities: never blended or interpolated; without
+                        is_normal                                                               */
 } texinpaint_map;
 
 /* How lines are continued. */
@@ -425,11 +426,24 @@ static txm_status txi_check_size(const txm_image *im, const char *name, const tx
     return TXM_OK;
 }
 
+/* Are all samples finite, and not so large that sums of them are not? */
+static int txi_is_moderate(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    const size_t row_count = (size_t)im.width * (size_t)im.channels;
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < row_count; i++) {
+            if (!(row[i] >= -TXI_MOST_SAMPLE && row[i] <= TXI_MOST_SAMPLE)) return 0;
+        }
+    }
+    return 1;
+}
+
 static txm_status txi_check_picture(const txm_image *im, const char *name, const txm_image *like,
                                     txm_env *env) {
     const txm_status status = txi_check_size(im, name, like, env);
-    if (status == TXM_OK && !txm_image_is_finite(im))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite");
+    if (status == TXM_OK && !txi_is_moderate(im))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "samples must be finite, and at most 1e30");
     return status;
 }
 
@@ -451,6 +465,8 @@ static txm_status txi_check_maps(const texinpaint_desc *d, txm_env *env) {
         if (map->is_normal < 0 || map->is_normal > 2 || (map->is_normal && map->image.channels < 3))
             return txm_fail(env, TXM_BAD_ARGUMENT,
                             "is_normal must be 0 to 2, for maps with 3 or 4 channels");
+        if (map->is_normal && map->is_label)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "a map has is_normal or is_label, not both");
     }
     return TXM_OK;
 }
@@ -1935,8 +1951,17 @@ static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t 
     taps->count = taps->texel[0] >= 0;
 }
 
-static double txi_texel_value(const txm_image *image, int64_t texel, int c) {
-    return txm_image_get(image, (int)(texel % image->width), (int)(texel / image->width), c);
+/* Are there colours that count times alpha? */
+static int txi_has_alpha(const txi_domain *d, int map) {
+    const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
+    return !(kind && (kind->is_normal || kind->is_label)) && d->maps[map].channels % 2 == 0;
+}
+
+/* A channel of a texel; colours times their alpha, if has_alpha. */
+static double txi_texel_value(const txm_image *image, int has_alpha, int64_t texel, int c) {
+    const int x = (int)(texel % image->width), y = (int)(texel / image->width), last = image->channels - 1;
+    const double value = txm_image_get(image, x, y, c);
+    return has_alpha && c < last ? value * txm_clampf(txm_image_get(image, x, y, last), 0, 1) : value;
 }
 
 /* The samples of a row, as they are stored. */
@@ -1953,7 +1978,8 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 }
 
 /* The channels of a map at a place all around which texels are known and of one chart. */
-static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, txm_vec2 p, float *out) {
+static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel, txm_vec2 p,
+                            float *out) {
     enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
     const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
@@ -1961,7 +1987,13 @@ static void txi_read_inside(const txm_image *image, const txi_kernel *kernel, tx
     double wx[N], wy[N], v[N * ROW];
     txi_kernel_at(kernel, p.x - fx, wx);
     txi_kernel_at(kernel, p.y - fy, wy);
-    for (int j = 0; j < N; j++) txi_load_row(image, x, y + j, N * channels, v + j * ROW);
+    for (int j = 0; j < N; j++) {
+        txi_load_row(image, x, y + j, N * channels, v + j * ROW);
+        for (int i = 0; i < N * channels && has_alpha; i++) {
+            const double alpha = v[j * ROW + i - i % channels + channels - 1] / unit;
+            if (i % channels < channels - 1) v[j * ROW + i] *= fmin(fmax(alpha, 0), 1);
+        }
+    }
     for (int c = 0; c < channels; c++) {
         const double *a = v + 2 * ROW + 2 * channels + c, *b = a + ROW; /* the inner four */
         const double low = fmin(fmin(a[0], a[channels]), fmin(b[0], b[channels]));
@@ -1996,28 +2028,30 @@ static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     return 1;
 }
 
-/* All channels of a map at pixel i of the window, which is not void. */
+/* All channels of a map at pixel i of the window, which is not void; colours times their alpha. */
 static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w, int map,
                            size_t i, float *out) {
     const txm_image *image = &d->maps[map];
-    const int label = map > 0 && d->desc->maps[map - 1].is_label;
+    const int label = map > 0 && d->desc->maps[map - 1].is_label, has_alpha = txi_has_alpha(d, map);
     txi_taps taps;
     if (!d->surface) { /* pixels of a picture are its texels */
         const int x = (int)w->texel[i].x, y = (int)w->texel[i].y;
-        const int known = !d->missing[(size_t)y * (size_t)d->width + (size_t)x];
-        for (int c = 0; c < image->channels; c++) out[c] = known ? txm_image_get(image, x, y, c) : 0;
+        const int64_t texel = (int64_t)y * d->width + x;
+        for (int c = 0; c < image->channels; c++)
+            out[c] = d->missing[texel] ? 0 : txm_float(txi_texel_value(image, has_alpha, texel, c));
         return;
     }
     if (!label && txi_is_inside(d, w->face[i], w->texel[i])) {
-        txi_read_inside(image, kernel, w->texel[i], out);
+        txi_read_inside(image, has_alpha, kernel, w->texel[i], out);
         return;
     }
     txi_taps_at(d, kernel, w->face[i], w->texel[i], label, &taps);
     for (int c = 0; c < image->channels; c++) {
         double sum = 0, low = 0, high = 0;
-        for (int k = 0; k < taps.count; k++) sum += taps.weight[k] * txi_texel_value(image, taps.texel[k], c);
+        for (int k = 0; k < taps.count; k++)
+            sum += taps.weight[k] * txi_texel_value(image, has_alpha, taps.texel[k], c);
         for (int k = 0; k < 4 && taps.is_limited; k++) {
-            const double v = txi_texel_value(image, taps.inner[k], c);
+            const double v = txi_texel_value(image, has_alpha, taps.inner[k], c);
             low = k ? fmin(low, v) : v;
             high = k ? fmax(high, v) : v;
         }
@@ -2030,18 +2064,15 @@ static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const 
    in the directions of the window (x right, y down, z out of the surface), so that they keep their
    direction on the surface across charts of the atlas, and with pieces that are turned.          */
 
-/* A sample of the texture as it is blended. */
+/* A sample of the texture, its colours already times their alpha, as it is blended. */
 static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
-    const int channels = d->maps[map].channels;
     if (kind && kind->is_normal) {
         const double x = 2 * (double)v[0] - 1;
         const double y = (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
         v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
         v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
         v[2] = txm_float(2 * (double)v[2] - 1);
-    } else if (!(kind && kind->is_label) && (channels == 2 || channels == 4)) {
-        for (int c = 0; c < channels - 1; c++) v[c] = v[c] * v[channels - 1];
     }
 }
 
@@ -2058,8 +2089,8 @@ static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored
         v[0] = txm_float(0.5 * (x * scale + 1));
         v[1] = txm_float(0.5 * (y * scale + 1));
         v[2] = length > 0 ? txm_float(0.5 * ((double)v[2] * scale + 1)) : 1;
-    } else if (!(kind && kind->is_label) && (channels == 2 || channels == 4)) {
-        const float alpha = v[channels - 1];
+    } else if (txi_has_alpha(d, map)) {
+        const float alpha = txm_minf(v[channels - 1], 1);
         for (int c = 0; c < channels - 1 && alpha > 1e-4f; c++) v[c] = v[c] / alpha;
     }
 }
@@ -2116,7 +2147,7 @@ static uint8_t txi_byte(double unit) {
 
 /* Fill state, of pixels that are not void, and color from the maps as they are now. */
 static void txi_window_colors(const txi_domain *d, txi_window *w) {
-    const int channels = d->maps[0].channels, has_alpha = channels == 2 || channels == 4;
+    const int channels = d->maps[0].channels, has_alpha = txi_has_alpha(d, 0);
     const size_t count = (size_t)w->width * (size_t)w->height;
     txi_kernel kernel;
     txi_kernel_init(&kernel);
@@ -2129,7 +2160,7 @@ static void txi_window_colors(const txi_domain *d, txi_window *w) {
         txi_read_pixel(d, &kernel, w, 0, i, v);
         const double alpha = has_alpha ? (double)txm_clampf(v[channels - 1], 0, 1) : 1;
         for (int c = 0; c < 3; c++)
-            out[c] = txi_byte(alpha * v[channels >= 3 ? c : 0] + (1 - alpha) * (128 / 255.0));
+            out[c] = txi_byte(v[channels >= 3 ? c : 0] + (1 - alpha) * (128 / 255.0));
     }
 }
 
@@ -4369,7 +4400,8 @@ static void txi_quantities_get(const txi_domain *d, const txi_quantities *q, uin
     const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
     const int channels = q->image->channels;
     for (int c = 0; c < channels; c++) out[c] = (double)txm_image_get(q->image, x, y, c);
-    for (int c = 0; c + 1 < channels && q->has_alpha; c++) out[c] *= out[channels - 1];
+    for (int c = 0; c + 1 < channels && q->has_alpha; c++)
+        out[c] *= fmin(fmax(out[channels - 1], 0), 1);
     for (int c = 0; c < 3 && q->is_normal; c++) out[c] = 2 * out[c] - 1;
     if (q->is_normal && d->surface) { /* the vector in the tangent plane, as one in space */
         txm_dvec3 axis[2];
@@ -4403,7 +4435,7 @@ static void txi_quantities_set(const txi_domain *d, const txi_quantities *q, uin
         for (int c = 0; c < 3; c++) in[c] = n > 1e-6 ? (in[c] / n + 1) / 2 : c == 2 ? 1 : 0.5;
     }
     for (int c = 0; c + 1 < channels && q->has_alpha; c++)
-        in[c] = in[channels - 1] > 1e-6 ? in[c] / in[channels - 1] : 0;
+        in[c] = in[channels - 1] > 1e-6 ? in[c] / fmin(in[channels - 1], 1) : 0;
     for (int c = 0; c < channels; c++) txm_image_set(q->image, x, y, c, txm_float(in[c]));
 }
 
@@ -13608,8 +13640,8 @@ static int txi_chunks(size_t count) {
 static void txi_blend_number(txi_blend *b) {
     const txi_window *w = b->w;
     for (int c = 0; c < b->channels; c++) {
-        b->low[c] = 1e30f;
-        b->high[c] = -1e30f;
+        b->low[c] = TXI_MOST_SAMPLE;
+        b->high[c] = -TXI_MOST_SAMPLE;
     }
     b->count = 0;
     for (int color = 0; color < 2; color++) {
