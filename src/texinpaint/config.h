@@ -3,8 +3,6 @@
 
 #include "../texinpaint.h"
 
-#define TXI_MOST_SAMPLE 1e30f /* largest sample of a picture: squares of sums of them are finite doubles */
-
 /* ---- windows --------------------------------------------------------------------------------
    All completion is done in windows: flat pictures of a part of the surface (or of the picture) with
    a hole in it. The surface is laid out almost without distortion, so that a window's pixels have
@@ -17,6 +15,7 @@ enum {
     TXI_FOREIGN = 3, /* known, but not to be copied from (desc.source)                         */
     TXI_MAX_CHANNELS = 4
 };
+#define TXI_MOST_SAMPLE 1e30f /* of a picture: squares of sums of samples are finite doubles    */
 
 /* A missing texel of the texture and where it lies in the window. */
 typedef struct txi_target {
