@@ -268,6 +268,7 @@ enum {
     TXI_FOREIGN = 3, /* known, but not to be copied from (desc.source)                         */
     TXI_MAX_CHANNELS = 4
 };
+#define TXI_MOST_SAMPLE 1e30f /* of a picture: squares of sums of samples are finite doubles    */
 
 /* A missing texel of the texture and where it lies in the window. */
 typedef struct txi_target {
