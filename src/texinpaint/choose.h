@@ -23,13 +23,14 @@ enum { TXI_HYPOTHESES = 3 };
 /* A hypothesis at half resolution. */
 typedef struct txi_hypothesis {
     int structure;      /* TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN                              */
+    int start;          /* TXI_START_ONION or TXI_START_PIECES                                   */
     txi_curve *curves;
     int curve_count;
     txi_plan plan;
-    int start;          /* TXI_START_ONION or TXI_START_PIECES                                   */
     txi_field field;
     uint8_t *preview;   /* 4 per window pixel                                                    */
     double energy, detail, score;
+    txm_arena memory;   /* of all this; empty if a better one has been found                     */
 } txi_hypothesis;
 
 /* What is known about a window that is being completed. */
@@ -39,11 +40,17 @@ typedef struct txi_choice {
     const txi_prior *prior; /* or NULL */
     uint64_t seed;
     txi_lines lines;
+    txm_arena of_lines; /* memory of lines; empty at the end                                     */
     txi_style style;
     txi_filler *filler;
     txi_hypothesis tried[TXI_HYPOTHESES];
     int count, best;
 } txi_choice;
+
+static void txi_choice_free(txi_choice *c) {
+    for (int i = 0; i < TXI_HYPOTHESES; i++) txm_arena_free(&c->tried[i].memory);
+    txm_arena_free(&c->of_lines);
+}
 
 /* Which hypotheses to try, and how strongly detail is asked for. */
 static void txi_choose_style(txi_choice *c, double grain) {
@@ -83,7 +90,8 @@ static void txi_choose_style(txi_choice *c, double grain) {
 }
 
 /* Complete one hypothesis to half resolution. */
-static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_arena *arena, txm_env *env) {
+static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env *env) {
+    txm_arena *arena = &h->memory;
     const size_t pixels = (size_t)c->w->width * (size_t)c->w->height;
     const texinpaint_desc *desc = c->domain->desc;
     const txi_plan *plan = NULL;
@@ -127,8 +135,8 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
     return status;
 }
 
-/* Show what was found and tried. */
-static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
+/* Show what was tried. */
+static txm_status txi_show_hypothesis(const txi_choice *c, const txi_hypothesis *h, txm_env *env) {
     static const char *const lines[] = {"", "lines-texture", "lines-picture", "lines-pattern"};
     static const char *const strips[] = {"", "strips-texture", "strips-picture", "strips-pattern"};
     static const char *const names[] = {"", "half-texture", "half-picture", "half-pattern"};
@@ -137,28 +145,47 @@ static txm_status txi_choose_show(const txi_choice *c, txm_env *env) {
     if (!c->domain->desc->show) return TXM_OK;
     uint8_t *rgb = (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
     if (!rgb) return txi_no_memory(env);
-    for (int i = 0; i < c->count; i++) {
-        const txi_hypothesis *h = &c->tried[i];
-        txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
-        txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
-        if (h->plan.color) {
-            txi_draw_strips(w, &h->plan, rgb);
-            txi_show(c->domain, strips[h->structure], rgb, w->width, w->height, 3);
-        }
-        for (size_t p = 0; p < (size_t)w->width * (size_t)w->height; p++) {
-            const uint8_t *from = (w->state[p] == TXI_HOLE ? h->preview : w->color) + 4 * p;
-            for (int k = 0; k < 3; k++) rgb[3 * p + (size_t)k] = from[k];
-        }
-        txi_show(c->domain, names[h->structure], rgb, w->width, w->height, 3);
+    txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
+    txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
+    if (h->plan.color) {
+        txi_draw_strips(w, &h->plan, rgb);
+        txi_show(c->domain, strips[h->structure], rgb, w->width, w->height, 3);
     }
+    for (size_t p = 0; p < (size_t)w->width * (size_t)w->height; p++) {
+        const uint8_t *from = (w->state[p] == TXI_HOLE ? h->preview : w->color) + 4 * p;
+        for (int k = 0; k < 3; k++) rgb[3 * p + (size_t)k] = from[k];
+    }
+    txi_show(c->domain, names[h->structure], rgb, w->width, w->height, 3);
     txm_free(env, rgb);
     return TXM_OK;
 }
 
-/* Complete a window to half its resolution; c->w, domain, prior and seed are set. */
+/* Complete all hypotheses to half resolution one after the other, and keep the best. */
+static txm_status txi_try_all(txi_choice *c, txm_env *env) {
+    txi_stage stage;
+    txm_status status = TXM_OK;
+    for (int i = 0; i < c->count && status == TXM_OK; i++) {
+        txi_hypothesis *h = &c->tried[i], *best = &c->tried[c->best];
+        txi_stage_begin(&stage, env, 0.1f + 0.9f * (float)i / (float)c->count,
+                        0.1f + 0.9f * (float)(i + 1) / (float)c->count);
+        status = txi_stage_end(&stage, txi_try_hypothesis(c, h, &stage.env));
+        if (status == TXM_OK) status = txi_judge(c, &c->tried[0], h, env);
+        if (status == TXM_OK) status = txi_show_hypothesis(c, h, env);
+        if (status != TXM_OK || i == c->best) continue;
+        if (h->score > best->score) c->best = i;
+        else best = h;
+        txm_arena_free(&best->memory);
+    }
+    return status;
+}
+
+/* Complete a window to half its resolution; c->w, domain, prior and seed are set, the rest is 0.
+   txi_choice_free frees what is not the arena's. */
 static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
     txi_stage stage;
-    txm_status status = txi_trace(c->w, arena, env, &c->lines);
+    txm_arena_init(&c->of_lines, env);
+    for (int i = 0; i < TXI_HYPOTHESES; i++) txm_arena_init(&c->tried[i].memory, env);
+    txm_status status = txi_trace(c->w, &c->of_lines, env, &c->lines);
     if (status != TXM_OK) return status;
     const double grain = txi_grain(c->w, env);
     if (grain < 0) return txi_no_memory(env);
@@ -166,18 +193,9 @@ static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
     txi_stage_begin(&stage, env, 0, 0.1f);
     status = txi_stage_end(&stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env,
                                                    &c->filler));
-    for (int i = 0; i < c->count && status == TXM_OK; i++) {
-        txi_stage_begin(&stage, env, 0.1f + 0.9f * (float)i / (float)c->count,
-                        0.1f + 0.9f * (float)(i + 1) / (float)c->count);
-        status = txi_stage_end(&stage, txi_try_hypothesis(c, &c->tried[i], arena, &stage.env));
-    }
-    if (status != TXM_OK) return status;
-    c->best = 0;
-    for (int i = 0; i < c->count && status == TXM_OK; i++) {
-        status = txi_judge(c, &c->tried[0], &c->tried[i], env);
-        if (c->tried[i].score > c->tried[c->best].score) c->best = i;
-    }
-    return status == TXM_OK ? txi_choose_show(c, env) : status;
+    if (status == TXM_OK) status = txi_try_all(c, env);
+    txm_arena_free(&c->of_lines);
+    return status;
 }
 
 #endif /* TEXINPAINT_CHOOSE_H */

@@ -72,6 +72,7 @@ TEXINPAINT_API void texinpaint_free(texinpaint_job *job) {
     if (!job) return;
     txm_arena memory = job->memory;
     texinpaint_crests_free(job->crests);
+    txi_choice_free(&job->choice);
     txm_arena_free(&job->of_window);
     txm_arena_free(&memory);
 }
@@ -92,6 +93,7 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     txi_window *w = &job->window;
     txi_choice *choice = &job->choice;
     int found = 0;
+    txi_choice_free(choice);
     txm_arena_free(&job->of_window);
     txm_status status = txi_windows_next(domain, &job->of_window, env, w, &found);
     if (status != TXM_OK) return status;
@@ -99,7 +101,6 @@ static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
         job->phase = TXI_GUTTER;
         return TXM_OK;
     }
-    txi_window_colors(domain, w);
     memset(choice, 0, sizeof *choice);
     choice->w = w;
     choice->domain = domain;
@@ -141,13 +142,14 @@ static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
     float *values[TEXINPAINT_MAX_MAPS] = {NULL};
     txm_arena_init(&arena, env);
     txi_copy *copies = (txi_copy *)txm_arena_alloc(&arena, pixels, sizeof *copies);
-    for (int i = 0; i < job->domain.map_count; i++)
-        values[i] = (float *)txm_arena_alloc(&arena, pixels, (size_t)job->domain.maps[i].channels *
-                                                                 sizeof(float));
     txm_status status = arena.failed ? txi_no_memory(env) : TXM_OK;
     if (status == TXM_OK)
         status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field, copies,
                                  &poses, &pose_count, env);
+    for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
+        values[i] = (float *)txm_arena_alloc(&arena, pixels, (size_t)job->domain.maps[i].channels *
+                                                                 sizeof(float));
+    if (arena.failed) status = txi_no_memory(env);
     for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
         status = txi_blend_window(job, i, copies, poses, values[i], env);
     if (status == TXM_OK) {
@@ -193,6 +195,7 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
     case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;
     case TXI_FINE: status = txi_step_fine(job, &stage.env); break;
     case TXI_GUTTER:
+        txi_choice_free(&job->choice);
         txm_arena_free(&job->of_window);
         status = txi_gutter(&job->domain, &job->of_window, &stage.env, &filled);
         if (status != TXM_OK) break;
