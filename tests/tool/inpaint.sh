@@ -110,7 +110,7 @@ for kind in ball ring; do
     check "a $kind" run 0 inpaint --mesh $kind.obj --texture $kind.png --mask $kind-mask.png -o $kind-out.png \
         --stats stats.json
     check "only the holes change" look kept $kind.png $kind-mask.png $kind-out.png
-    check "two holes" grep -q '"holes": 2' stats.json
+    check "two holes" grep -q '"holes": 2,' stats.json
     check "near to what was there" look near $kind-whole.png $kind-mask.png $kind-out.png 60
     check "--smooth" run 0 inpaint --mesh $kind.obj --texture $kind.png --mask $kind-mask.png -o s.png --smooth
     check "only the holes change" look kept $kind.png $kind-mask.png s.png
