@@ -41,7 +41,7 @@ static void refuse(const texinpaint_desc *d, txm_status expected, int calls) {
 static texinpaint_desc good_plane(void) {
     texinpaint_desc d = desc_of(picture, 3, TXM_U8);
     plane_of_two();
-    draw_plane(picture, 28, 14, 7);
+    draw_plane(picture, 28, 14, 5);
     use_mesh(&d);
     return d;
 }
@@ -281,7 +281,7 @@ static void begin_task(task *t, int is_mesh) {
         t->desc.prior = TEXINPAINT_PRIOR_CREST;
     } else {
         draw_stripes(picture, 3);
-        disk(30, 32, 8);
+        disk(30, 32, 6);
         t->desc = desc_of(picture, 3, TXM_U8);
     }
     for (int i = 0; i < PIXELS; i++) labels[i] = (uint8_t)(picture[3 * i] / 64);
@@ -302,9 +302,11 @@ static void test_faults(void **state) {
     static task t;
     for (int is_mesh = 0; is_mesh < 2; is_mesh++) {
         begin_task(&t, is_mesh);
-        assert_true(tk_sweep_outputs(run_task, &t, TK_ALLOCATION, task_outputs, 2) > 100);
+        if (is_mesh || tk_full())
+            assert_true(tk_sweep_outputs(run_task, &t, TK_ALLOCATION, task_outputs, 2) > 100);
         if (tk_full()) assert_true(tk_sweep_outputs(run_task, &t, TK_ONWARD, task_outputs, 2) > 100);
-        assert_true(tk_sweep_outputs(run_task, &t, TK_CANCEL, task_outputs, 2) > 10);
+        if (!is_mesh || tk_full())
+            assert_true(tk_sweep_outputs(run_task, &t, TK_CANCEL, task_outputs, 2) > 10);
     }
 }
 
