@@ -16,7 +16,7 @@
    cut finds the best set of pixels that change to it.                                         */
 
 enum {
-    TXI_JOINT = 40,       /* [recipe]                                                          */
+    TXI_JOINT = 40,       /* ours                                                              */
     TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
     TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
     TXI_LABEL_NONE = -1,  /* not in the hole                                                   */

@@ -27,7 +27,7 @@ enum {
     TXI_ASSEMBLY_LABELS = 1000,
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
-    TXI_DRIFT = 5,        /* from the vote's colours, in 1/256 [recipe: .02]                   */
+    TXI_DRIFT = 5,        /* from the vote's colours, in 1/256; ours                            */
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
@@ -244,7 +244,7 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
 }
 
 /* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels; the
-   recipe's strips were averages, and had to fade. */
+   strips of mere averages would have to fade. */
 static int txi_pull_at(int level) {
     return level > 1 ? 230 : level ? 200 : 170;
 }

@@ -7,7 +7,7 @@
 /* ---- flatten: a disk of faces in the plane ---------------------------------------------------- */
 
 enum {
-    TXI_ARAP_ROUNDS = 60 /* RECIPES; it ends earlier when nothing moves any more */
+    TXI_ARAP_ROUNDS = 60 /* ours; it ends earlier when nothing moves any more */
 };
 
 /* A disk laid out in the plane. */

@@ -30,7 +30,7 @@ typedef struct txi_link {
     txm_vec2 points[TXI_STEPS + 1];
 } txi_link;
 
-/* What a way of joining costs. All without unit; ours, from the recipe's experiments. */
+/* What a way of joining costs. All without unit; ours, from experiments. */
 typedef struct txi_rules {
     double unmatched; /* an end that is not joined                                               */
     double weak;      /* share of that for ends that are not long                                */

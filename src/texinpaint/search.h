@@ -7,7 +7,7 @@
 
 enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
-    TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances [recipe: 4] */
+    TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances; ours */
 };
 
 /* Which source patch an anchor's patch is like. */

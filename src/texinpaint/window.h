@@ -6,7 +6,7 @@
 /* ---- window: parts of plain pictures --------------------------------------------------------- */
 
 enum {
-    TXI_BAND_LEAST = 48,       /* pixels around a hole; RECIPES: 48 to 240                     */
+    TXI_BAND_LEAST = 48,       /* pixels around a hole; ours                                   */
     TXI_BAND_MOST = 240,
     TXI_SOURCE_LEAST = 20000,  /* pixels to copy from, if there are any; ours                  */
     TXI_SOURCE_RATIO = 4,      /* ... and times the hole                                       */
