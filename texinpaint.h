@@ -11872,7 +11872,8 @@ enum {
     TXI_ONION_BEST = 8,       /* matches that are refined                                        */
     TXI_ONION_REACH = 2,      /* pixels of the refinement                                        */
     TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
-    TXI_ONION_LEAST = 4000    /* places compared at least                                        */
+    TXI_ONION_LEAST = 4000,   /* places compared at least, for up to three times that work       */
+    TXI_ONION_FEWEST = 250    /* places compared for any amount of work                          */
 };
 
 typedef struct txi_onion {
@@ -12086,8 +12087,12 @@ static void txi_onion_rest(const txi_onion *o, txi_canvas *t) {
 static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
     const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
-    int most = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
-    if (most < TXI_ONION_LEAST) most = TXI_ONION_LEAST;
+    /* a hole that is long and thin has many anchors even at the coarsest level                      */
+    const int share_of_work = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
+    int most = 3 * share_of_work;
+    if (most > TXI_ONION_LEAST) most = TXI_ONION_LEAST;
+    if (most < share_of_work) most = share_of_work;
+    if (most < TXI_ONION_FEWEST) most = TXI_ONION_FEWEST;
     txm_arena scratch;
     txi_onion o;
     txm_status status = TXM_OK;
@@ -12902,6 +12907,8 @@ enum { TXI_START_ONION = 0, TXI_START_PIECES };
 
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
+    TXI_ANNEAL_MOST = 4000, /* anchors of the coarsest level; where there are more, in a long thin
+                           hole, it is not annealed: the onion fills that well                 */
     TXI_LEAST_ROUNDS = 2, /* at the finest                                                     */
     TXI_GUIDE_MOST = 100, /* of the guide channel where there is a line                        */
     TXI_ASSEMBLY_LABELS = 1000,
@@ -13209,7 +13216,8 @@ static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t,
         memcpy(color, t->color, bytes);
         memcpy(match, t->match, matches);
     }
-    const int starts = f->style.starts ? f->style.starts : TXI_FIRST_STARTS;
+    const int wanted = f->style.starts ? f->style.starts : TXI_FIRST_STARTS;
+    const int starts = l->anchor_count > TXI_ANNEAL_MOST ? 1 : wanted;
     for (int k = 0; k < starts && status == TXM_OK; k++) {
         memcpy(t->color, color, bytes);
         memcpy(t->match, match, matches);

@@ -22,6 +22,8 @@ enum { TXI_START_ONION = 0, TXI_START_PIECES };
 
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
+    TXI_ANNEAL_MOST = 4000, /* anchors of the coarsest level; where there are more, in a long thin
+                           hole, it is not annealed: the onion fills that well                 */
     TXI_LEAST_ROUNDS = 2, /* at the finest                                                     */
     TXI_GUIDE_MOST = 100, /* of the guide channel where there is a line                        */
     TXI_ASSEMBLY_LABELS = 1000,
@@ -329,7 +331,8 @@ static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t,
         memcpy(color, t->color, bytes);
         memcpy(match, t->match, matches);
     }
-    const int starts = f->style.starts ? f->style.starts : TXI_FIRST_STARTS;
+    const int wanted = f->style.starts ? f->style.starts : TXI_FIRST_STARTS;
+    const int starts = l->anchor_count > TXI_ANNEAL_MOST ? 1 : wanted;
     for (int k = 0; k < starts && status == TXM_OK; k++) {
         memcpy(t->color, color, bytes);
         memcpy(t->match, match, matches);

@@ -16,7 +16,8 @@ enum {
     TXI_ONION_BEST = 8,       /* matches that are refined                                        */
     TXI_ONION_REACH = 2,      /* pixels of the refinement                                        */
     TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
-    TXI_ONION_LEAST = 4000    /* places compared at least                                        */
+    TXI_ONION_LEAST = 4000,   /* places compared at least, for up to three times that work       */
+    TXI_ONION_FEWEST = 250    /* places compared for any amount of work                          */
 };
 
 typedef struct txi_onion {
@@ -230,8 +231,12 @@ static void txi_onion_rest(const txi_onion *o, txi_canvas *t) {
 static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
     const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
-    int most = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
-    if (most < TXI_ONION_LEAST) most = TXI_ONION_LEAST;
+    /* a hole that is long and thin has many anchors even at the coarsest level                      */
+    const int share_of_work = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
+    int most = 3 * share_of_work;
+    if (most > TXI_ONION_LEAST) most = TXI_ONION_LEAST;
+    if (most < share_of_work) most = share_of_work;
+    if (most < TXI_ONION_FEWEST) most = TXI_ONION_FEWEST;
     txm_arena scratch;
     txi_onion o;
     txm_status status = TXM_OK;
