@@ -8640,21 +8640,6 @@ static double txi_mean_bend(const txi_curve *curves, int count) {
     return count ? sum / count : 0;
 }
 
-/* Does the joining look as if there were no lines to join: many ends, joins that cost much and hardly
-   any sure one. Outlines of stones and grain have long ends, too, but they do not go on. For the joins
-   of TEXINPAINT_PICTURE. */
-static int txi_joins_doubtful(const txi_lines *l, const txi_curve *curves, int count) {
-    double cost = 0;
-    int ends = 0, sure = 0;
-    for (int i = 0; i < count; i++) {
-        const int n = 1 + (curves[i].ends[1] >= 0);
-        cost += (double)curves[i].cost;
-        ends += n;
-        if (n == 2 && curves[i].cost < 1) sure += 2;
-    }
-    return l->end_count > 8 && cost > 1.05 * ends && sure * 12 < l->end_count;
-}
-
 /* ---- pictures ---------------------------------------------------------------------------- */
 
 static void txi_dot(const txi_window *w, int scale, double x, double y, const uint8_t ink[3],
@@ -13785,7 +13770,7 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
     txi_blend_number(&b);
     txm_parallel_for(env, txi_chunks(b.count), txi_blend_values, &b);
     if (!is_label) txm_parallel_for(env, txi_chunks(b.count), txi_blend_links, &b);
-    const int sweeps = is_label || (TXI_LEFT_OUT & TXI_POISSON) ? 0 : TXI_BLEND_SWEEPS;
+    const int sweeps = is_label || (TXI_LEFT_OUT & TXI_POISSON) != 0 ? 0 : TXI_BLEND_SWEEPS;
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int color = 0; color < 2; color++) {
             b.first = color ? b.reds : 0;

@@ -275,7 +275,7 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
     txi_blend_number(&b);
     txm_parallel_for(env, txi_chunks(b.count), txi_blend_values, &b);
     if (!is_label) txm_parallel_for(env, txi_chunks(b.count), txi_blend_links, &b);
-    const int sweeps = is_label || (TXI_LEFT_OUT & TXI_POISSON) ? 0 : TXI_BLEND_SWEEPS;
+    const int sweeps = is_label || (TXI_LEFT_OUT & TXI_POISSON) != 0 ? 0 : TXI_BLEND_SWEEPS;
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int color = 0; color < 2; color++) {
             b.first = color ? b.reds : 0;

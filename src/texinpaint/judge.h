@@ -109,21 +109,6 @@ static double txi_mean_bend(const txi_curve *curves, int count) {
     return count ? sum / count : 0;
 }
 
-/* Does the joining look as if there were no lines to join: many ends, joins that cost much and hardly
-   any sure one. Outlines of stones and grain have long ends, too, but they do not go on. For the joins
-   of TEXINPAINT_PICTURE. */
-static int txi_joins_doubtful(const txi_lines *l, const txi_curve *curves, int count) {
-    double cost = 0;
-    int ends = 0, sure = 0;
-    for (int i = 0; i < count; i++) {
-        const int n = 1 + (curves[i].ends[1] >= 0);
-        cost += (double)curves[i].cost;
-        ends += n;
-        if (n == 2 && curves[i].cost < 1) sure += 2;
-    }
-    return l->end_count > 8 && cost > 1.05 * ends && sure * 12 < l->end_count;
-}
-
 /* ---- pictures ---------------------------------------------------------------------------- */
 
 static void txi_dot(const txi_window *w, int scale, double x, double y, const uint8_t ink[3],

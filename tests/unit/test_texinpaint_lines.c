@@ -216,7 +216,6 @@ static void test_bars_cross(void **state) {
         assert_true(txi_curve_bend(c) < 0.02);
     }
     assert_true(txi_straight_share(&r.lines, r.curves, r.count) > 0.99);
-    assert_false(txi_joins_doubtful(&r.lines, r.curves, r.count));
     txm_arena_free(&r.arena);
     free(s);
 }
