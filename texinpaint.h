@@ -895,8 +895,8 @@ static void txi_load_uv(const txi_domain *d, txi_surface *s) {
             u[k] = desc->uv[2 * entry];
             v[k] = desc->uv[2 * entry + 1];
         }
-        if (fabs(u[0]) > TXI_REPEATS) du = floor(u[0]);
-        if (fabs(v[0]) > TXI_REPEATS) dv = floor(v[0]);
+        if (fabs(u[0]) > (double)TXI_REPEATS) du = floor(u[0]);
+        if (fabs(v[0]) > (double)TXI_REPEATS) dv = floor(v[0]);
         for (size_t k = 0; k < 3; k++)
             s->uv[3 * f + k] = txm_v2(txm_float((u[k] - du) * d->width - 0.5),
                                       txm_float((v[k] - dv) * d->height - 0.5));
@@ -1923,13 +1923,13 @@ typedef struct txi_kernel {
 } txi_kernel;
 
 static void txi_kernel_init(txi_kernel *kernel) {
-    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / TXI_KERNEL_STEPS, kernel->weight[i]);
+    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
     for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;
 }
 
 static void txi_kernel_at(const txi_kernel *kernel, double t, double weight[TXI_TAPS]) {
-    const int i = (int)(t * TXI_KERNEL_STEPS);
-    const double part = t * TXI_KERNEL_STEPS - i;
+    const int i = (int)(t * (double)TXI_KERNEL_STEPS);
+    const double part = t * (double)TXI_KERNEL_STEPS - i;
     const double *a = kernel->weight[i], *b = kernel->weight[i < TXI_KERNEL_STEPS ? i + 1 : i];
     for (int k = 0; k < TXI_TAPS; k++) weight[k] = a[k] + part * (b[k] - a[k]);
 }
@@ -3001,7 +3001,7 @@ static txm_status txi_sheet_disk(txi_sheet *l) {
     g.stop = l->reach ? l->reach * pixel : outside + 3 * band;
     g.wanted = l->reach ? 1e300 : wanted > 8000 ? wanted : 8000;
     l->disk.depth = l->slit ? l->from_centre : l->from_hole;
-    l->disk.slit_from = (l->slit ? TXI_GAP : TXI_SEAM) * pixel;
+    l->disk.slit_from = (double)(l->slit ? TXI_GAP : TXI_SEAM) * pixel;
     return txi_disk_grow(&l->disk, s, l->centre, &g, l->env);
 }
 
@@ -3137,8 +3137,8 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         l->at[v] = txm_v2(txm_float(x), txm_float(y));
     }
     const txi_bounds box = txi_sheet_bounds(l);
-    if (box.right - box.left > TXI_SIDE_MOST || box.bottom - box.top > TXI_SIDE_MOST ||
-        (box.right - box.left + 4) * (box.bottom - box.top + 4) > TXI_WINDOW_MOST)
+    if (box.right - box.left > (double)TXI_SIDE_MOST || box.bottom - box.top > (double)TXI_SIDE_MOST ||
+        (box.right - box.left + 4) * (box.bottom - box.top + 4) > (double)TXI_WINDOW_MOST)
         return 0;
     if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
         size_t count, k = 0;
@@ -3407,7 +3407,7 @@ static txm_status txi_sheet_others(txi_sheet *l, txi_window *w, uint8_t *marks, 
                 if (!l->d->missing[texels[n]]) continue;
                 const txi_target t = txi_make_target(l, slot, texels[n]);
                 good = w->target_count < room && txi_is_shown(l, w, slot, &t) &&
-                       txi_from_marks(w, nearest, t.x, t.y) >= TXI_GAP;
+                       txi_from_marks(w, nearest, t.x, t.y) >= (double)TXI_GAP;
                 if (good) w->targets[w->target_count++] = t;
             }
         }
@@ -3432,7 +3432,7 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         y += weight[i] * t[i].y;
     }
     /* the window's pixels are texels, the first of the missing ones lies within */
-    const double half = 0.5 * TXI_FLAT_SIDE;
+    const double half = 0.5 * (double)TXI_FLAT_SIDE;
     txi_bounds box = {x - half, y - half, x + half, y + half};
     box.left = fmax(box.left, (double)txm_minf(t[0].x, txm_minf(t[1].x, t[2].x)) - 1);
     box.top = fmax(box.top, (double)txm_minf(t[0].y, txm_minf(t[1].y, t[2].y)) - 1);
@@ -5387,7 +5387,7 @@ static txm_status txi_crest_nodes(const txi_shape *s, int is_valley, txm_arena *
         const txm_dvec3 p = txm_mesh_point(&s->mesh, i);
         rounding = fmax(rounding, fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))));
     }
-    rounding *= TXI_CREST_ROUNDING / 16777216.0;
+    rounding *= (double)TXI_CREST_ROUNDING / 16777216.0;
     for (size_t i = 0; i < s->edge_count; i++) {
         const int crosses = txi_crest_crosses(s, i, is_valley, rounding, &crossing);
         node[i] = crosses ? (uint32_t)crossings++ : UINT32_MAX;
@@ -5772,7 +5772,7 @@ static size_t txi_places_slot(const txi_places *s, int64_t x, int64_t y, int64_t
 }
 
 static int64_t txi_places_cell(double x) {
-    return (int64_t)floor(x / TXI_PRIOR_REACH);
+    return (int64_t)floor(x / (double)TXI_PRIOR_REACH);
 }
 
 /* 0: no memory. */
@@ -5798,8 +5798,8 @@ static int txi_places_make(const txi_window *w, txm_arena *arena, txi_places *s)
         s->next[i] = s->head[slot];
         s->head[slot] = (uint32_t)i;
         for (int k = 0; k < 3; k++) {
-            s->low[k] = fmin(s->low[k], p[k] - TXI_PRIOR_REACH);
-            s->high[k] = fmax(s->high[k], p[k] + TXI_PRIOR_REACH);
+            s->low[k] = fmin(s->low[k], p[k] - (double)TXI_PRIOR_REACH);
+            s->high[k] = fmax(s->high[k], p[k] + (double)TXI_PRIOR_REACH);
         }
     }
     return 1;
@@ -6228,24 +6228,24 @@ static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
     f->reach = 2.5 * sigma;
     for (int i = 0; i <= TXI_VOTE_RADII; i++) {
-        const double l = f->reach * (i > 0 ? i : 0.01) / TXI_VOTE_RADII;
+        const double l = f->reach * (i > 0 ? i : 0.01) / (double)TXI_VOTE_RADII;
         f->ball[i][0] = f->ball[i][1] = 0;
         for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                             */
-            const double width = 0.70710678118654752 / TXI_VOTE_STICKS, s = width * (k + 0.5);
+            const double width = 0.70710678118654752 / (double)TXI_VOTE_STICKS, s = width * (k + 0.5);
             const double d = 2 * width * txi_decay(f, l, s);
             f->ball[i][0] += 1.5 * d * s * s;
             f->ball[i][1] += 0.75 * d * (1 - s * s);
         }
         for (int j = 0; j <= TXI_VOTE_ANGLES && plates; j++) {
             double sine, cosine, *e = f->plate[i][j];
-            txm_sincos(0.5 * TXM_PI * j / TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
+            txm_sincos(0.5 * TXM_PI * j / (double)TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
             e[0] = e[1] = e[2] = e[3] = 0;
             for (int k = 0; k < TXI_VOTE_STICKS; k++) {
                 double np, nq;
-                txm_sincos(0.5 * TXM_PI * (k + 0.5) / TXI_VOTE_STICKS, &nq, &np);
+                txm_sincos(0.5 * TXM_PI * (k + 0.5) / (double)TXI_VOTE_STICKS, &nq, &np);
                 const double s = np * sine;
                 if (s * s > 0.5) continue;
-                const double d = 2 * txi_decay(f, l, s) / TXI_VOTE_STICKS;
+                const double d = 2 * txi_decay(f, l, s) / (double)TXI_VOTE_STICKS;
                 const double rt = -2 * s * cosine, rp = np - 2 * s * sine;
                 e[0] += d * rt * rt;
                 e[1] += d * rt * rp;
@@ -6258,7 +6258,7 @@ static void txi_fields_make(txi_fields *f, double sigma, int plates) {
 
 /* The vote of a ball at v from it. */
 static void txi_vote_ball(const txi_fields *f, txm_dvec3 v, double weight, double t[6]) {
-    const double l = txm_d3_len(v), at = l * TXI_VOTE_RADII / f->reach;
+    const double l = txm_d3_len(v), at = l * (double)TXI_VOTE_RADII / f->reach;
     if (!(l > 0) || l >= f->reach) return;
     const int i = (int)at;
     const double r = at - i;
@@ -6273,7 +6273,7 @@ static void txi_vote_ball(const txi_fields *f, txm_dvec3 v, double weight, doubl
 /* The vote of a plate, a line in direction tangent (unit), at v from it. */
 static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, double weight,
                            double t[6]) {
-    const double l = txm_d3_len(v), at = l * TXI_VOTE_RADII / f->reach;
+    const double l = txm_d3_len(v), at = l * (double)TXI_VOTE_RADII / f->reach;
     double e[4], cosine = txm_d3_dot(tangent, v) / (l > 0 ? l : 1);
     if (!(l > 0) || l >= f->reach) return;
     if (cosine < 0) { /* the field is the same behind                                             */
@@ -6294,7 +6294,7 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
     const double sine = far_off / l;
     const double angle = sine < cosine ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
                                        : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
-    const double across = angle * TXI_VOTE_ANGLES / (0.5 * TXM_PI);
+    const double across = angle * (double)TXI_VOTE_ANGLES / (0.5 * TXM_PI);
     const int i = (int)at, j = txm_clampi((int)across, 0, TXI_VOTE_ANGLES - 1);
     const double r = at - i, a = across - j;
     for (int k = 0; k < 4; k++) {
@@ -6557,7 +6557,7 @@ static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
 }
 
 static int16_t txi_gradient_round(double slope) {
-    const double v = slope * TXI_GRADIENT_UNIT;
+    const double v = slope * (double)TXI_GRADIENT_UNIT;
     return (int16_t)(v < -32000 ? -32000 : v > 32000 ? 32000 : v < 0 ? v - 0.5 : v + 0.5);
 }
 
@@ -6611,7 +6611,7 @@ static void txi_gradient_pixel(txi_slopes *f, int x, int y, const int32_t *row0,
         f->gradient[6 * i + (size_t)c] = g;
         sum += (double)g * g;
     }
-    f->strength[i] = txm_float(sqrt(sum) / TXI_GRADIENT_UNIT);
+    f->strength[i] = txm_float(sqrt(sum) / (double)TXI_GRADIENT_UNIT);
 }
 
 static void txi_gradient_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {
@@ -6816,7 +6816,7 @@ typedef struct txi_walk {
 /* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
 static void txi_change_at(const txi_slopes *f, size_t i, double rx, double ry, double change[3]) {
     const int16_t *g = f->gradient + 6 * i;
-    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / TXI_GRADIENT_UNIT;
+    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / (double)TXI_GRADIENT_UNIT;
 }
 
 /* Correlation of two colour changes, -1..1. */
@@ -7185,7 +7185,7 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e)) return;
     e->strength = txm_float(strength);
     e->length = (float)e->count;
-    e->is_long = e->length >= TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
+    e->is_long = e->length >= (float)TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
     txi_profile(w, l, e);
     if (txi_end_exists(l, e)) return;
     l->point_count += e->count;
@@ -7778,7 +7778,7 @@ static void txi_prior_curve(const txi_prior *prior, const txi_link *k, txm_vec2 
         const double t = (double)i / steps, offset = oa + (ob - oa) * t;
         txm_vec2 at = txi_prior_at(line, count, k->from + ((double)k->to - k->from) * t, &along);
         at = txm_v2(txm_float(at.x - offset * along.y), txm_float(at.y + offset * along.x));
-        double s = (t < 0.5 ? t : 1 - t) * length / TXI_PRIOR_CATCH; /* 1: the line alone          */
+        double s = (t < 0.5 ? t : 1 - t) * length / (double)TXI_PRIOR_CATCH; /* 1: the line alone          */
         s = s > 1 ? 1 : s * s * (3 - 2 * s);
         out[i] = txi_between(out[i], at, s);
     }
@@ -8313,7 +8313,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
         double energy = 0;
         while (m->active_count) txi_deactivate(m, m->active[m->active_count - 1]);
         for (int i = 0; i < TXI_MOVES; i++) {
-            const double heat = 1.5 * txm_exp2(-7.0 * i / TXI_MOVES);
+            const double heat = 1.5 * txm_exp2(-7.0 * i / (double)TXI_MOVES);
             const int k = (int)txm_rng_below(&rng, (uint32_t)m->link_count);
             const double u = txm_rng_double(&rng);
             /* accepted with probability exp(-change / heat)                                      */
@@ -9307,7 +9307,7 @@ static int txi_stroke_end(const txi_curve *a, const txi_curve *b, int end, doubl
     const double mean = sum / n, spread = squares / n - mean * mean, size = mean < 0 ? -mean : mean;
     *width = mean;
     *of_b = votes > 0;
-    return size >= 2 && size <= TXI_STROKE_WIDEST && spread <= 0.04 * size * size + 1;
+    return size >= 2 && size <= (double)TXI_STROKE_WIDEST && spread <= 0.04 * size * size + 1;
 }
 
 /* The width of the stroke between two curves; 0: they are not its sides. Both must end alike. */
@@ -9490,7 +9490,7 @@ static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) 
 /* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width, along
    the normal. */
 static double txi_row_offset(double row, int inside, double half) {
-    const double k = row - TXI_STRIP_MARGIN;
+    const double k = row - (double)TXI_STRIP_MARGIN;
     if (k <= 0) return k - half;
     if (k >= inside) return k - inside + half;
     return half * (2 * k / inside - 1);
@@ -9498,9 +9498,9 @@ static double txi_row_offset(double row, int inside, double half) {
 
 /* The row, with fraction, at an offset from the middle: the inverse. */
 static double txi_offset_row(double offset, int inside, double half) {
-    if (offset <= -half) return TXI_STRIP_MARGIN + offset + half;
+    if (offset <= -half) return (double)TXI_STRIP_MARGIN + offset + half;
     if (offset >= half) return TXI_STRIP_MARGIN + inside + offset - half;
-    return TXI_STRIP_MARGIN + inside * (0.5 * offset / half + 0.5);
+    return (double)TXI_STRIP_MARGIN + inside * (0.5 * offset / half + 0.5);
 }
 
 /* ---- the frame of a line ---- */
@@ -9697,7 +9697,7 @@ static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first,
     const double sign = width[lo] > 0 ? 1 : -1;
     for (int i = lo; i < hi; i++) {
         const double d = sign * (double)width[i];
-        if (!(d >= 1 && d <= TXI_STRIP_INSIDE)) return 0;
+        if (!(d >= 1 && d <= (double)TXI_STRIP_INSIDE)) return 0;
     }
     for (int i = lo; i < hi; i++) {
         const txm_vec2 n = txi_normal_of(r->along[i]);
@@ -10199,7 +10199,7 @@ static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, i
     const double dx = x - (double)p.x, dy = y - (double)p.y, half = s->line.half[column];
     const double ahead = dx * t.x + dy * t.y + (column - at), across = dy * t.x - dx * t.y;
     *away = (across < 0 ? -across : across) - half;
-    if (ahead < -s->reach || ahead > s->reach || *away > TXI_STRIP_MARGIN) return 0;
+    if (ahead < -s->reach || ahead > s->reach || *away > (double)TXI_STRIP_MARGIN) return 0;
     *offset = (int)(ahead + s->reach + 0.5) - s->reach;
     *row = txm_clampi((int)(txi_offset_row(across, s->inside, half) + 0.5), 0, s->rows - 1);
     return 1;
@@ -10612,9 +10612,9 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
 /* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
    less towards the end of a line that ends in the hole. */
 static int txi_lay_pull(const txi_strip *s, double away, int column) {
-    double pull = away <= TXI_LAY_CORE
+    double pull = away <= (double)TXI_LAY_CORE
                       ? 1
-                      : (TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
+                      : ((double)TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
     if (s->is_open && s->line.count - 1 - column < TXI_LAY_FADE)
         pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
@@ -10638,7 +10638,7 @@ static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, si
     o->column = i + ahead;
     o->row = txi_offset_row(o->across, s->inside, o->half);
     o->claim = o->away > TXI_LAY_CLAIM ? txm_float(o->away - TXI_LAY_CLAIM) : 0;
-    return ahead <= 1.5 && ahead >= -1.5 && o->away < TXI_STRIP_MARGIN && o->claim < lay->claims[at];
+    return ahead <= 1.5 && ahead >= -1.5 && o->away < (double)TXI_STRIP_MARGIN && o->claim < lay->claims[at];
 }
 
 static uint8_t txi_lay_round(double value) {
@@ -10733,7 +10733,7 @@ static void txi_guide_at(const txi_window *w, txi_plan *plan, const uint8_t *tab
             const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
             const double dx = x - px, dy = y - py, distance = sqrt(dx * dx + dy * dy);
             if ((w->state[at] == TXI_HOLE) != in_hole || distance >= r) continue;
-            const uint8_t value = table[(int)(distance * TXI_GUIDE_STEPS + 0.5)];
+            const uint8_t value = table[(int)(distance * (double)TXI_GUIDE_STEPS + 0.5)];
             if (plan->color[4 * at + 3] < value) plan->color[4 * at + 3] = value;
         }
     }
@@ -10744,8 +10744,8 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
     uint8_t table[TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS + 1];
     const txi_window *w = all->w;
     for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
-        const double d = (double)i / (TXI_GUIDE_STEPS * TXI_GUIDE_SIGMA);
-        table[i] = (uint8_t)(TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+        const double d = (double)i / ((double)TXI_GUIDE_STEPS * (double)TXI_GUIDE_SIGMA);
+        table[i] = (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
     }
     for (int i = 0; lines && i < lines->thin_count; i++)
         txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,
@@ -11276,7 +11276,7 @@ static void txi_wish_reach(txi_wish *g, int radius, float offset) {
         const double mean = (double)g->blur[1][i] / g->blur[0][i];
         const double square = (double)g->blur[2][i] / g->blur[0][i] - mean * mean;
         const double level = exp(mean - (double)offset * sqrt(square > 0 ? square : 0));
-        g->result[i] = txm_float(level > TXI_WANT_FLOOR ? level - TXI_WANT_FLOOR : 0);
+        g->result[i] = txm_float(level > (double)TXI_WANT_FLOOR ? level - (double)TXI_WANT_FLOOR : 0);
     }
 }
 
@@ -11307,7 +11307,7 @@ static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_
         for (int k = 0; known && k < TXI_PATCH_AREA; k++)
             known = l->state[p + k / TXI_PATCH * l->width + k % TXI_PATCH] != TXI_VOID;
         if (!known) continue;
-        const double value = log((double)sums[p] + TXI_WANT_FLOOR);
+        const double value = log((double)sums[p] + (double)TXI_WANT_FLOOR);
         g.weight[i] = 1;
         g.first[i] = txm_float(value);
         g.second[i] = txm_float(value * value);
@@ -11318,7 +11318,7 @@ static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_
     for (int a = 0; a < l->anchor_count; a++) {
         const int x = l->anchor[a] % l->width / g.step, y = l->anchor[a] / l->width / g.step;
         const float r = g.result[(size_t)y * (size_t)g.width + (size_t)x];
-        l->want[a] = r > 0 ? (uint32_t)((double)r * TXI_WORTH_MOST / TXI_PATCH_AREA / l->clamp) : 0;
+        l->want[a] = r > 0 ? (uint32_t)((double)r * (double)TXI_WORTH_MOST / (double)TXI_PATCH_AREA / l->clamp) : 0;
     }
     return 1;
 }
@@ -11366,8 +11366,8 @@ static void txi_pose_axes(int is_picture, int pose, txi_source *s) {
     double sine, cosine;
     txm_sincos(is_picture ? degrees[pose] * (TXM_PI / 180) : turns[pose] * (TXM_PI / 8), &sine,
                &cosine);
-    const int32_t u = (int32_t)floor(cosine * TXI_UNIT + 0.5);
-    const int32_t v = (int32_t)floor(sine * TXI_UNIT + 0.5);
+    const int32_t u = (int32_t)floor(cosine * (double)TXI_UNIT + 0.5);
+    const int32_t v = (int32_t)floor(sine * (double)TXI_UNIT + 0.5);
     const int mirrored = is_picture && pose >= 9;
     s->a = mirrored ? -u : u;
     s->b = mirrored ? -v : v;
@@ -11999,7 +11999,7 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
             const txi_match *m = &o->found[a];
             const txi_source *s = &l->source[m->pose];
             color[n] = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
-            const double fit = m->cost / (400.0 * TXI_PATCH_AREA);
+            const double fit = m->cost / (400.0 * (double)TXI_PATCH_AREA);
             weight[n] = txm_exp2(-(fit < 500 ? fit : 500) * 1.4426950408889634) + 1e-30;
             total += weight[n];
             for (int c = 0; c < 3; c++) sum[c] += weight[n] * color[n][c];
@@ -12219,7 +12219,7 @@ static int txi_anneal_propose(const txi_level *l, const txi_site *sites, int i, 
 /* The lattice's sites, in the order of their anchors; returns their number. */
 static int txi_anneal_sites(const txi_canvas *t, txi_site *sites, int32_t *at) {
     const txi_level *l = t->level;
-    const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
+    const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
     int count = 0;
     for (int p = 0; p < l->width * l->height; p++) {
         const int a = l->slot[p];
@@ -12229,7 +12229,7 @@ static int txi_anneal_sites(const txi_canvas *t, txi_site *sites, int32_t *at) {
             continue;
         sites[count].anchor = a;
         sites[count].match = t->match[a];
-        sites[count].precision = 0.5 / (l->want[a] * unit / TXI_PATCH_AREA + 16);
+        sites[count].precision = 0.5 / (l->want[a] * unit / (double)TXI_PATCH_AREA + 16);
         at[p] = count++;
     }
     for (int i = 0; i < count; i++) {
@@ -12331,7 +12331,7 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
     for (size_t a = 0; a < n; a++) {
         const int centre = l->anchor[a] + (TXI_PATCH / 2) * (l->width + 1);
         const double x = t->match[a].cost / (2 * s) + fade * l->depth[centre];
-        const double w = x > 12 ? 0 : TXI_WEIGHT_ONE * txm_exp2(-x * 1.4426950408889634);
+        const double w = x > 12 ? 0 : (double)TXI_WEIGHT_ONE * txm_exp2(-x * 1.4426950408889634);
         t->weight[a] = (uint16_t)(1 + (int)w);
     }
 }
@@ -12980,10 +12980,10 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
     for (int k = 0; k < f->pose_count; k++) {
         txi_source s;
         txi_pose_axes(style->is_picture, k, &s);
-        f->pose[k].a = (float)s.a / TXI_UNIT;
-        f->pose[k].b = (float)s.b / TXI_UNIT;
-        f->pose[k].c = (float)s.c / TXI_UNIT;
-        f->pose[k].d = (float)s.d / TXI_UNIT;
+        f->pose[k].a = (float)s.a / (float)TXI_UNIT;
+        f->pose[k].b = (float)s.b / (float)TXI_UNIT;
+        f->pose[k].c = (float)s.c / (float)TXI_UNIT;
+        f->pose[k].d = (float)s.d / (float)TXI_UNIT;
     }
     for (int k = 0; k < TXI_MAX_POSES; k++) all[k] = style->poses == 0 || (style->poses >> k & 1);
     for (int k = 0; k < TXI_MAX_LEVELS; k++) {
@@ -13107,8 +13107,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
     if (arena->failed) return 0;
     memcpy(t->color, l->color, 4 * n);
-    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA /
-                          TXI_WORTH_MOST * 65536);
+    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * (double)TXI_PATCH_AREA /
+                          (double)TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
     t->radius = l->width < l->height ? l->width : l->height;
     if (level == 0 && f->level_count > 1) t->radius = 16;
@@ -13330,9 +13330,9 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
         const txi_match *m = &field->match[a];
         if (m->pose < 0) continue;
         const txi_source *s = &l->source[m->pose];
-        const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
+        const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
         const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
-        ratio += log((worth * unit + TXI_WANT_FLOOR) / (l->want[a] * unit + TXI_WANT_FLOOR));
+        ratio += log((worth * unit + (double)TXI_WANT_FLOOR) / (l->want[a] * unit + (double)TXI_WANT_FLOOR));
         count++;
     }
     *energy = field->energy;
@@ -13456,8 +13456,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
         int32_t px, py;
         txi_source_place(s, x + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
                          y + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
-        copy->x = (float)px / TXI_UNIT - TXI_EDGE;
-        copy->y = (float)py / TXI_UNIT - TXI_EDGE;
+        copy->x = (float)px / (float)TXI_UNIT - (float)TXI_EDGE;
+        copy->y = (float)py / (float)TXI_UNIT - (float)TXI_EDGE;
         copy->pose = label[p] >> 26;
         copy->piece = piece[p];
     }

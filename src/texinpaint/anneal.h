@@ -107,7 +107,7 @@ static int txi_anneal_propose(const txi_level *l, const txi_site *sites, int i, 
 /* The lattice's sites, in the order of their anchors; returns their number. */
 static int txi_anneal_sites(const txi_canvas *t, txi_site *sites, int32_t *at) {
     const txi_level *l = t->level;
-    const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
+    const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
     int count = 0;
     for (int p = 0; p < l->width * l->height; p++) {
         const int a = l->slot[p];
@@ -117,7 +117,7 @@ static int txi_anneal_sites(const txi_canvas *t, txi_site *sites, int32_t *at) {
             continue;
         sites[count].anchor = a;
         sites[count].match = t->match[a];
-        sites[count].precision = 0.5 / (l->want[a] * unit / TXI_PATCH_AREA + 16);
+        sites[count].precision = 0.5 / (l->want[a] * unit / (double)TXI_PATCH_AREA + 16);
         at[p] = count++;
     }
     for (int i = 0; i < count; i++) {

@@ -133,7 +133,7 @@ static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, i
     const double dx = x - (double)p.x, dy = y - (double)p.y, half = s->line.half[column];
     const double ahead = dx * t.x + dy * t.y + (column - at), across = dy * t.x - dx * t.y;
     *away = (across < 0 ? -across : across) - half;
-    if (ahead < -s->reach || ahead > s->reach || *away > TXI_STRIP_MARGIN) return 0;
+    if (ahead < -s->reach || ahead > s->reach || *away > (double)TXI_STRIP_MARGIN) return 0;
     *offset = (int)(ahead + s->reach + 0.5) - s->reach;
     *row = txm_clampi((int)(txi_offset_row(across, s->inside, half) + 0.5), 0, s->rows - 1);
     return 1;

@@ -98,7 +98,7 @@ static txm_status txi_crest_nodes(const txi_shape *s, int is_valley, txm_arena *
         const txm_dvec3 p = txm_mesh_point(&s->mesh, i);
         rounding = fmax(rounding, fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))));
     }
-    rounding *= TXI_CREST_ROUNDING / 16777216.0;
+    rounding *= (double)TXI_CREST_ROUNDING / 16777216.0;
     for (size_t i = 0; i < s->edge_count; i++) {
         const int crosses = txi_crest_crosses(s, i, is_valley, rounding, &crossing);
         node[i] = crosses ? (uint32_t)crossings++ : UINT32_MAX;

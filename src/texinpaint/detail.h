@@ -143,7 +143,7 @@ static void txi_wish_reach(txi_wish *g, int radius, float offset) {
         const double mean = (double)g->blur[1][i] / g->blur[0][i];
         const double square = (double)g->blur[2][i] / g->blur[0][i] - mean * mean;
         const double level = exp(mean - (double)offset * sqrt(square > 0 ? square : 0));
-        g->result[i] = txm_float(level > TXI_WANT_FLOOR ? level - TXI_WANT_FLOOR : 0);
+        g->result[i] = txm_float(level > (double)TXI_WANT_FLOOR ? level - (double)TXI_WANT_FLOOR : 0);
     }
 }
 
@@ -174,7 +174,7 @@ static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_
         for (int k = 0; known && k < TXI_PATCH_AREA; k++)
             known = l->state[p + k / TXI_PATCH * l->width + k % TXI_PATCH] != TXI_VOID;
         if (!known) continue;
-        const double value = log((double)sums[p] + TXI_WANT_FLOOR);
+        const double value = log((double)sums[p] + (double)TXI_WANT_FLOOR);
         g.weight[i] = 1;
         g.first[i] = txm_float(value);
         g.second[i] = txm_float(value * value);
@@ -185,7 +185,7 @@ static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_
     for (int a = 0; a < l->anchor_count; a++) {
         const int x = l->anchor[a] % l->width / g.step, y = l->anchor[a] / l->width / g.step;
         const float r = g.result[(size_t)y * (size_t)g.width + (size_t)x];
-        l->want[a] = r > 0 ? (uint32_t)((double)r * TXI_WORTH_MOST / TXI_PATCH_AREA / l->clamp) : 0;
+        l->want[a] = r > 0 ? (uint32_t)((double)r * (double)TXI_WORTH_MOST / (double)TXI_PATCH_AREA / l->clamp) : 0;
     }
     return 1;
 }

@@ -110,10 +110,10 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
     for (int k = 0; k < f->pose_count; k++) {
         txi_source s;
         txi_pose_axes(style->is_picture, k, &s);
-        f->pose[k].a = (float)s.a / TXI_UNIT;
-        f->pose[k].b = (float)s.b / TXI_UNIT;
-        f->pose[k].c = (float)s.c / TXI_UNIT;
-        f->pose[k].d = (float)s.d / TXI_UNIT;
+        f->pose[k].a = (float)s.a / (float)TXI_UNIT;
+        f->pose[k].b = (float)s.b / (float)TXI_UNIT;
+        f->pose[k].c = (float)s.c / (float)TXI_UNIT;
+        f->pose[k].d = (float)s.d / (float)TXI_UNIT;
     }
     for (int k = 0; k < TXI_MAX_POSES; k++) all[k] = style->poses == 0 || (style->poses >> k & 1);
     for (int k = 0; k < TXI_MAX_LEVELS; k++) {
@@ -237,8 +237,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
     if (arena->failed) return 0;
     memcpy(t->color, l->color, 4 * n);
-    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * TXI_PATCH_AREA /
-                          TXI_WORTH_MOST * 65536);
+    t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * (double)TXI_PATCH_AREA /
+                          (double)TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
     t->radius = l->width < l->height ? l->width : l->height;
     if (level == 0 && f->level_count > 1) t->radius = 16;
@@ -460,9 +460,9 @@ static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_
         const txi_match *m = &field->match[a];
         if (m->pose < 0) continue;
         const txi_source *s = &l->source[m->pose];
-        const double unit = (double)l->clamp * TXI_PATCH_AREA / TXI_WORTH_MOST;
+        const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
         const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
-        ratio += log((worth * unit + TXI_WANT_FLOOR) / (l->want[a] * unit + TXI_WANT_FLOOR));
+        ratio += log((worth * unit + (double)TXI_WANT_FLOOR) / (l->want[a] * unit + (double)TXI_WANT_FLOOR));
         count++;
     }
     *energy = field->energy;
@@ -586,8 +586,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
         int32_t px, py;
         txi_source_place(s, x + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
                          y + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
-        copy->x = (float)px / TXI_UNIT - TXI_EDGE;
-        copy->y = (float)py / TXI_UNIT - TXI_EDGE;
+        copy->x = (float)px / (float)TXI_UNIT - (float)TXI_EDGE;
+        copy->y = (float)py / (float)TXI_UNIT - (float)TXI_EDGE;
         copy->pose = label[p] >> 26;
         copy->piece = piece[p];
     }

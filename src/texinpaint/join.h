@@ -204,7 +204,7 @@ static void txi_anneal(txi_pairing *m, uint64_t seed, int *best) {
         double energy = 0;
         while (m->active_count) txi_deactivate(m, m->active[m->active_count - 1]);
         for (int i = 0; i < TXI_MOVES; i++) {
-            const double heat = 1.5 * txm_exp2(-7.0 * i / TXI_MOVES);
+            const double heat = 1.5 * txm_exp2(-7.0 * i / (double)TXI_MOVES);
             const int k = (int)txm_rng_below(&rng, (uint32_t)m->link_count);
             const double u = txm_rng_double(&rng);
             /* accepted with probability exp(-change / heat)                                      */

@@ -233,9 +233,9 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
 /* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
    less towards the end of a line that ends in the hole. */
 static int txi_lay_pull(const txi_strip *s, double away, int column) {
-    double pull = away <= TXI_LAY_CORE
+    double pull = away <= (double)TXI_LAY_CORE
                       ? 1
-                      : (TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
+                      : ((double)TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
     if (s->is_open && s->line.count - 1 - column < TXI_LAY_FADE)
         pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
@@ -259,7 +259,7 @@ static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, si
     o->column = i + ahead;
     o->row = txi_offset_row(o->across, s->inside, o->half);
     o->claim = o->away > TXI_LAY_CLAIM ? txm_float(o->away - TXI_LAY_CLAIM) : 0;
-    return ahead <= 1.5 && ahead >= -1.5 && o->away < TXI_STRIP_MARGIN && o->claim < lay->claims[at];
+    return ahead <= 1.5 && ahead >= -1.5 && o->away < (double)TXI_STRIP_MARGIN && o->claim < lay->claims[at];
 }
 
 static uint8_t txi_lay_round(double value) {
@@ -354,7 +354,7 @@ static void txi_guide_at(const txi_window *w, txi_plan *plan, const uint8_t *tab
             const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
             const double dx = x - px, dy = y - py, distance = sqrt(dx * dx + dy * dy);
             if ((w->state[at] == TXI_HOLE) != in_hole || distance >= r) continue;
-            const uint8_t value = table[(int)(distance * TXI_GUIDE_STEPS + 0.5)];
+            const uint8_t value = table[(int)(distance * (double)TXI_GUIDE_STEPS + 0.5)];
             if (plan->color[4 * at + 3] < value) plan->color[4 * at + 3] = value;
         }
     }
@@ -365,8 +365,8 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
     uint8_t table[TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS + 1];
     const txi_window *w = all->w;
     for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
-        const double d = (double)i / (TXI_GUIDE_STEPS * TXI_GUIDE_SIGMA);
-        table[i] = (uint8_t)(TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+        const double d = (double)i / ((double)TXI_GUIDE_STEPS * (double)TXI_GUIDE_SIGMA);
+        table[i] = (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
     }
     for (int i = 0; lines && i < lines->thin_count; i++)
         txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,

@@ -255,7 +255,7 @@ static txm_status txi_sheet_others(txi_sheet *l, txi_window *w, uint8_t *marks, 
                 if (!l->d->missing[texels[n]]) continue;
                 const txi_target t = txi_make_target(l, slot, texels[n]);
                 good = w->target_count < room && txi_is_shown(l, w, slot, &t) &&
-                       txi_from_marks(w, nearest, t.x, t.y) >= TXI_GAP;
+                       txi_from_marks(w, nearest, t.x, t.y) >= (double)TXI_GAP;
                 if (good) w->targets[w->target_count++] = t;
             }
         }
@@ -280,7 +280,7 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         y += weight[i] * t[i].y;
     }
     /* the window's pixels are texels, the first of the missing ones lies within */
-    const double half = 0.5 * TXI_FLAT_SIDE;
+    const double half = 0.5 * (double)TXI_FLAT_SIDE;
     txi_bounds box = {x - half, y - half, x + half, y + half};
     box.left = fmax(box.left, (double)txm_minf(t[0].x, txm_minf(t[1].x, t[2].x)) - 1);
     box.top = fmax(box.top, (double)txm_minf(t[0].y, txm_minf(t[1].y, t[2].y)) - 1);

@@ -204,7 +204,7 @@ static void txi_prior_curve(const txi_prior *prior, const txi_link *k, txm_vec2 
         const double t = (double)i / steps, offset = oa + (ob - oa) * t;
         txm_vec2 at = txi_prior_at(line, count, k->from + ((double)k->to - k->from) * t, &along);
         at = txm_v2(txm_float(at.x - offset * along.y), txm_float(at.y + offset * along.x));
-        double s = (t < 0.5 ? t : 1 - t) * length / TXI_PRIOR_CATCH; /* 1: the line alone          */
+        double s = (t < 0.5 ? t : 1 - t) * length / (double)TXI_PRIOR_CATCH; /* 1: the line alone          */
         s = s > 1 ? 1 : s * s * (3 - 2 * s);
         out[i] = txi_between(out[i], at, s);
     }

@@ -25,8 +25,8 @@ static void txi_pose_axes(int is_picture, int pose, txi_source *s) {
     double sine, cosine;
     txm_sincos(is_picture ? degrees[pose] * (TXM_PI / 180) : turns[pose] * (TXM_PI / 8), &sine,
                &cosine);
-    const int32_t u = (int32_t)floor(cosine * TXI_UNIT + 0.5);
-    const int32_t v = (int32_t)floor(sine * TXI_UNIT + 0.5);
+    const int32_t u = (int32_t)floor(cosine * (double)TXI_UNIT + 0.5);
+    const int32_t v = (int32_t)floor(sine * (double)TXI_UNIT + 0.5);
     const int mirrored = is_picture && pose >= 9;
     s->a = mirrored ? -u : u;
     s->b = mirrored ? -v : v;

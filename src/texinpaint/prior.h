@@ -97,7 +97,7 @@ static size_t txi_places_slot(const txi_places *s, int64_t x, int64_t y, int64_t
 }
 
 static int64_t txi_places_cell(double x) {
-    return (int64_t)floor(x / TXI_PRIOR_REACH);
+    return (int64_t)floor(x / (double)TXI_PRIOR_REACH);
 }
 
 /* 0: no memory. */
@@ -123,8 +123,8 @@ static int txi_places_make(const txi_window *w, txm_arena *arena, txi_places *s)
         s->next[i] = s->head[slot];
         s->head[slot] = (uint32_t)i;
         for (int k = 0; k < 3; k++) {
-            s->low[k] = fmin(s->low[k], p[k] - TXI_PRIOR_REACH);
-            s->high[k] = fmax(s->high[k], p[k] + TXI_PRIOR_REACH);
+            s->low[k] = fmin(s->low[k], p[k] - (double)TXI_PRIOR_REACH);
+            s->high[k] = fmax(s->high[k], p[k] + (double)TXI_PRIOR_REACH);
         }
     }
     return 1;

@@ -59,13 +59,13 @@ typedef struct txi_kernel {
 } txi_kernel;
 
 static void txi_kernel_init(txi_kernel *kernel) {
-    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / TXI_KERNEL_STEPS, kernel->weight[i]);
+    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
     for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;
 }
 
 static void txi_kernel_at(const txi_kernel *kernel, double t, double weight[TXI_TAPS]) {
-    const int i = (int)(t * TXI_KERNEL_STEPS);
-    const double part = t * TXI_KERNEL_STEPS - i;
+    const int i = (int)(t * (double)TXI_KERNEL_STEPS);
+    const double part = t * (double)TXI_KERNEL_STEPS - i;
     const double *a = kernel->weight[i], *b = kernel->weight[i < TXI_KERNEL_STEPS ? i + 1 : i];
     for (int k = 0; k < TXI_TAPS; k++) weight[k] = a[k] + part * (b[k] - a[k]);
 }

@@ -334,7 +334,7 @@ static txm_status txi_sheet_disk(txi_sheet *l) {
     g.stop = l->reach ? l->reach * pixel : outside + 3 * band;
     g.wanted = l->reach ? 1e300 : wanted > 8000 ? wanted : 8000;
     l->disk.depth = l->slit ? l->from_centre : l->from_hole;
-    l->disk.slit_from = (l->slit ? TXI_GAP : TXI_SEAM) * pixel;
+    l->disk.slit_from = (double)(l->slit ? TXI_GAP : TXI_SEAM) * pixel;
     return txi_disk_grow(&l->disk, s, l->centre, &g, l->env);
 }
 
@@ -470,8 +470,8 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         l->at[v] = txm_v2(txm_float(x), txm_float(y));
     }
     const txi_bounds box = txi_sheet_bounds(l);
-    if (box.right - box.left > TXI_SIDE_MOST || box.bottom - box.top > TXI_SIDE_MOST ||
-        (box.right - box.left + 4) * (box.bottom - box.top + 4) > TXI_WINDOW_MOST)
+    if (box.right - box.left > (double)TXI_SIDE_MOST || box.bottom - box.top > (double)TXI_SIDE_MOST ||
+        (box.right - box.left + 4) * (box.bottom - box.top + 4) > (double)TXI_WINDOW_MOST)
         return 0;
     if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
         size_t count, k = 0;

@@ -139,7 +139,7 @@ static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
 }
 
 static int16_t txi_gradient_round(double slope) {
-    const double v = slope * TXI_GRADIENT_UNIT;
+    const double v = slope * (double)TXI_GRADIENT_UNIT;
     return (int16_t)(v < -32000 ? -32000 : v > 32000 ? 32000 : v < 0 ? v - 0.5 : v + 0.5);
 }
 
@@ -193,7 +193,7 @@ static void txi_gradient_pixel(txi_slopes *f, int x, int y, const int32_t *row0,
         f->gradient[6 * i + (size_t)c] = g;
         sum += (double)g * g;
     }
-    f->strength[i] = txm_float(sqrt(sum) / TXI_GRADIENT_UNIT);
+    f->strength[i] = txm_float(sqrt(sum) / (double)TXI_GRADIENT_UNIT);
 }
 
 static void txi_gradient_band(const txi_slopes_job *job, int y0, int y1, int32_t *rows) {

@@ -107,7 +107,7 @@ static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) 
 /* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width, along
    the normal. */
 static double txi_row_offset(double row, int inside, double half) {
-    const double k = row - TXI_STRIP_MARGIN;
+    const double k = row - (double)TXI_STRIP_MARGIN;
     if (k <= 0) return k - half;
     if (k >= inside) return k - inside + half;
     return half * (2 * k / inside - 1);
@@ -115,9 +115,9 @@ static double txi_row_offset(double row, int inside, double half) {
 
 /* The row, with fraction, at an offset from the middle: the inverse. */
 static double txi_offset_row(double offset, int inside, double half) {
-    if (offset <= -half) return TXI_STRIP_MARGIN + offset + half;
+    if (offset <= -half) return (double)TXI_STRIP_MARGIN + offset + half;
     if (offset >= half) return TXI_STRIP_MARGIN + inside + offset - half;
-    return TXI_STRIP_MARGIN + inside * (0.5 * offset / half + 0.5);
+    return (double)TXI_STRIP_MARGIN + inside * (0.5 * offset / half + 0.5);
 }
 
 /* ---- the frame of a line ---- */
@@ -314,7 +314,7 @@ static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first,
     const double sign = width[lo] > 0 ? 1 : -1;
     for (int i = lo; i < hi; i++) {
         const double d = sign * (double)width[i];
-        if (!(d >= 1 && d <= TXI_STRIP_INSIDE)) return 0;
+        if (!(d >= 1 && d <= (double)TXI_STRIP_INSIDE)) return 0;
     }
     for (int i = lo; i < hi; i++) {
         const txm_vec2 n = txi_normal_of(r->along[i]);

@@ -97,7 +97,7 @@ static int txi_stroke_end(const txi_curve *a, const txi_curve *b, int end, doubl
     const double mean = sum / n, spread = squares / n - mean * mean, size = mean < 0 ? -mean : mean;
     *width = mean;
     *of_b = votes > 0;
-    return size >= 2 && size <= TXI_STROKE_WIDEST && spread <= 0.04 * size * size + 1;
+    return size >= 2 && size <= (double)TXI_STROKE_WIDEST && spread <= 0.04 * size * size + 1;
 }
 
 /* The width of the stroke between two curves; 0: they are not its sides. Both must end alike. */

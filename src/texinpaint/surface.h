@@ -196,8 +196,8 @@ static void txi_load_uv(const txi_domain *d, txi_surface *s) {
             u[k] = desc->uv[2 * entry];
             v[k] = desc->uv[2 * entry + 1];
         }
-        if (fabs(u[0]) > TXI_REPEATS) du = floor(u[0]);
-        if (fabs(v[0]) > TXI_REPEATS) dv = floor(v[0]);
+        if (fabs(u[0]) > (double)TXI_REPEATS) du = floor(u[0]);
+        if (fabs(v[0]) > (double)TXI_REPEATS) dv = floor(v[0]);
         for (size_t k = 0; k < 3; k++)
             s->uv[3 * f + k] = txm_v2(txm_float((u[k] - du) * d->width - 0.5),
                                       txm_float((v[k] - dv) * d->height - 0.5));

@@ -73,7 +73,7 @@ typedef struct txi_walk {
 /* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
 static void txi_change_at(const txi_slopes *f, size_t i, double rx, double ry, double change[3]) {
     const int16_t *g = f->gradient + 6 * i;
-    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / TXI_GRADIENT_UNIT;
+    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / (double)TXI_GRADIENT_UNIT;
 }
 
 /* Correlation of two colour changes, -1..1. */
@@ -442,7 +442,7 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e)) return;
     e->strength = txm_float(strength);
     e->length = (float)e->count;
-    e->is_long = e->length >= TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
+    e->is_long = e->length >= (float)TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
     txi_profile(w, l, e);
     if (txi_end_exists(l, e)) return;
     l->point_count += e->count;

@@ -105,24 +105,24 @@ static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
     f->reach = 2.5 * sigma;
     for (int i = 0; i <= TXI_VOTE_RADII; i++) {
-        const double l = f->reach * (i > 0 ? i : 0.01) / TXI_VOTE_RADII;
+        const double l = f->reach * (i > 0 ? i : 0.01) / (double)TXI_VOTE_RADII;
         f->ball[i][0] = f->ball[i][1] = 0;
         for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                             */
-            const double width = 0.70710678118654752 / TXI_VOTE_STICKS, s = width * (k + 0.5);
+            const double width = 0.70710678118654752 / (double)TXI_VOTE_STICKS, s = width * (k + 0.5);
             const double d = 2 * width * txi_decay(f, l, s);
             f->ball[i][0] += 1.5 * d * s * s;
             f->ball[i][1] += 0.75 * d * (1 - s * s);
         }
         for (int j = 0; j <= TXI_VOTE_ANGLES && plates; j++) {
             double sine, cosine, *e = f->plate[i][j];
-            txm_sincos(0.5 * TXM_PI * j / TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
+            txm_sincos(0.5 * TXM_PI * j / (double)TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
             e[0] = e[1] = e[2] = e[3] = 0;
             for (int k = 0; k < TXI_VOTE_STICKS; k++) {
                 double np, nq;
-                txm_sincos(0.5 * TXM_PI * (k + 0.5) / TXI_VOTE_STICKS, &nq, &np);
+                txm_sincos(0.5 * TXM_PI * (k + 0.5) / (double)TXI_VOTE_STICKS, &nq, &np);
                 const double s = np * sine;
                 if (s * s > 0.5) continue;
-                const double d = 2 * txi_decay(f, l, s) / TXI_VOTE_STICKS;
+                const double d = 2 * txi_decay(f, l, s) / (double)TXI_VOTE_STICKS;
                 const double rt = -2 * s * cosine, rp = np - 2 * s * sine;
                 e[0] += d * rt * rt;
                 e[1] += d * rt * rp;
@@ -135,7 +135,7 @@ static void txi_fields_make(txi_fields *f, double sigma, int plates) {
 
 /* The vote of a ball at v from it. */
 static void txi_vote_ball(const txi_fields *f, txm_dvec3 v, double weight, double t[6]) {
-    const double l = txm_d3_len(v), at = l * TXI_VOTE_RADII / f->reach;
+    const double l = txm_d3_len(v), at = l * (double)TXI_VOTE_RADII / f->reach;
     if (!(l > 0) || l >= f->reach) return;
     const int i = (int)at;
     const double r = at - i;
@@ -150,7 +150,7 @@ static void txi_vote_ball(const txi_fields *f, txm_dvec3 v, double weight, doubl
 /* The vote of a plate, a line in direction tangent (unit), at v from it. */
 static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, double weight,
                            double t[6]) {
-    const double l = txm_d3_len(v), at = l * TXI_VOTE_RADII / f->reach;
+    const double l = txm_d3_len(v), at = l * (double)TXI_VOTE_RADII / f->reach;
     double e[4], cosine = txm_d3_dot(tangent, v) / (l > 0 ? l : 1);
     if (!(l > 0) || l >= f->reach) return;
     if (cosine < 0) { /* the field is the same behind                                             */
@@ -171,7 +171,7 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
     const double sine = far_off / l;
     const double angle = sine < cosine ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
                                        : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
-    const double across = angle * TXI_VOTE_ANGLES / (0.5 * TXM_PI);
+    const double across = angle * (double)TXI_VOTE_ANGLES / (0.5 * TXM_PI);
     const int i = (int)at, j = txm_clampi((int)across, 0, TXI_VOTE_ANGLES - 1);
     const double r = at - i, a = across - j;
     for (int k = 0; k < 4; k++) {
