@@ -354,6 +354,8 @@ typedef struct txi_window {
     int width, height;
     uint8_t *state;  /* TXI_VOID .. TXI_FOREIGN, one per pixel                                 */
     uint8_t *color;  /* 4 per pixel, RGB as matched (over mid gray where alpha is below 1), 0   */
+    uint8_t *share;  /* of a hole pixel: how much of it is known, 0..255 = all, as it lies between known
+                        and missing texels; its color is that of the known part. NULL: nothing  */
     txm_vec2 *texel; /* where each pixel that is not void lies in the texture, in texels, texel
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
@@ -1884,6 +1886,7 @@ static txm_status txi_window_alloc(txi_window *w, int width, int height, txm_are
     w->height = height;
     w->state = (uint8_t *)txm_arena_zero(arena, count, 1);
     w->color = (uint8_t *)txm_arena_zero(arena, count, 4);
+    w->share = (uint8_t *)txm_arena_zero(arena, count, 1);
     w->texel = (txm_vec2 *)txm_arena_zero(arena, count, sizeof(txm_vec2));
     w->place = (txm_vec3 *)txm_arena_zero(arena, count, sizeof(txm_vec3));
     w->normal = (txm_vec3 *)txm_arena_zero(arena, count, sizeof(txm_vec3));
@@ -2218,7 +2221,19 @@ static uint8_t txi_byte(double unit) {
     return (uint8_t)(unit >= 1 ? 255 : unit > 0 ? unit * 255 + 0.5 : 0.5);
 }
 
-/* Fill state, of pixels that are not void, and color from the maps as they are now. */
+/* The bilinear weight of the known texels around a place, 0..255. */
+static uint8_t txi_known_share(const txi_domain *d, uint32_t face, txm_vec2 p) {
+    const double fx = floor((double)p.x), fy = floor((double)p.y);
+    double sum = 0;
+    for (int k = 0; k < 4; k++) {
+        const int64_t i = txi_tap(d, face, (int)fx + k % 2, (int)fy + k / 2);
+        const double u = k % 2 ? p.x - fx : 1 - (p.x - fx), v = k / 2 ? p.y - fy : 1 - (p.y - fy);
+        if (i >= 0 && !d->missing[i]) sum += u * v;
+    }
+    return (uint8_t)(255 * sum + 0.5);
+}
+
+/* Fill state, of pixels that are not void, share and color from the maps as they are now. */
 static void txi_window_colors(const txi_domain *d, txi_window *w) {
     const int channels = d->maps[0].channels, has_alpha = txi_has_alpha(d, 0);
     const size_t count = (size_t)w->width * (size_t)w->height;
@@ -2229,6 +2244,7 @@ static void txi_window_colors(const txi_domain *d, txi_window *w) {
         uint8_t *out = w->color + 4 * i;
         memset(out, 0, 4);
         if (w->state[i] != TXI_VOID) w->state[i] = txi_pixel_state(d, w->face[i], w->texel[i]);
+        w->share[i] = w->state[i] == TXI_HOLE ? txi_known_share(d, w->face[i], w->texel[i]) : 0;
         if (w->state[i] == TXI_VOID) continue;
         txi_read_pixel(d, &kernel, w, 0, i, v);
         const double alpha = has_alpha ? (double)txm_clampf(v[channels - 1], 0, 1) : 1;
@@ -3521,6 +3537,7 @@ static void txi_window_paste(txi_window *to, const txi_window *from, int left) {
         const size_t a = (size_t)y * n, b = (size_t)y * (size_t)to->width + (size_t)left;
         memcpy(to->state + b, from->state + a, n);
         memcpy(to->color + 4 * b, from->color + 4 * a, 4 * n);
+        memcpy(to->share + b, from->share + a, n);
         memcpy(to->texel + b, from->texel + a, n * sizeof *to->texel);
         memcpy(to->place + b, from->place + a, n * sizeof *to->place);
         memcpy(to->normal + b, from->normal + a, n * sizeof *to->normal);
@@ -12444,11 +12461,14 @@ static void txi_vote(txi_ballot *v, txm_env *env) {
      + sum over pixels:  drift * |A(p) - color(p)|^2 + (difference of the guides)^2
 
    where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first term is
-   |A(q) - known(q)|^2. This is minimised by expansion moves [7]: one label at a time, a minimum
+   rim * |A(q) - known(q)|^2; where a pixel is partly known, |A(p) - known(p)|^2 is added, share times.
+   This is minimised by expansion moves [7]: one label at a time, a minimum
    cut finds the best set of pixels that change to it.                                         */
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
+    TXI_JOINT_RIM = 3,    /* weight of a joint with what is known; ours                        */
+    TXI_JOINT_SHARE = 4,  /* ... and of what is known of the pixel itself; ours                */
     TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
     TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
     TXI_LABEL_NONE = -1,  /* not in the hole                                                   */
@@ -12464,6 +12484,7 @@ static inline int32_t txi_label(int pose, int dx, int dy) {
 typedef struct txi_assembly {
     const txi_level *level;
     const uint8_t *color; /* of the canvas                                                     */
+    const txi_window *window; /* of the level; NULL: no pixel is known in part                 */
     int32_t *label;       /* one per pixel of the level                                        */
     int drift;            /* in 1/256                                                          */
     uint32_t price;       /* of missing detail, as in txi_canvas; 0: it costs nothing          */
@@ -12522,11 +12543,16 @@ static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
     const int guide = label >= 0 ? own[3] - l->color[4 * p + 3] : 0;
     int cost = txi_rgb_distance(own, t->color + 4 * p) * t->drift / 256 + guide * guide;
     if (t->price && label >= 0) cost += txi_label_shortfall(t, label, x, y);
+    if (t->window && t->window->share) {
+        const size_t i = (size_t)(y - TXI_EDGE) * (size_t)t->window->width + (size_t)(x - TXI_EDGE);
+        const int share = t->window->share[i] * TXI_JOINT_SHARE;
+        if (share) cost += txi_rgb_distance(own, t->window->color + 4 * i) / 256 * share;
+    }
     for (int k = 0; k < 4; k++) {
         const int u = x + (k == 0) - (k == 1), v = y + (k == 2) - (k == 3);
         const size_t q = (size_t)v * (size_t)l->width + (size_t)u;
         if (l->state[q] != TXI_KNOWN && l->state[q] != TXI_FOREIGN) continue;
-        cost += txi_rgb_distance(txi_label_color(l, label, u, v), l->color + 4 * q);
+        cost += TXI_JOINT_RIM * txi_rgb_distance(txi_label_color(l, label, u, v), l->color + 4 * q);
     }
     return cost;
 }
@@ -13421,6 +13447,7 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     }
     int32_t *label = assembly.label;
     assembly.color = t->color;
+    assembly.window = w;
     assembly.drift = TXI_DRIFT;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
@@ -13503,12 +13530,17 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
    meet the known pixels. With v the copied values, a correction c of low frequency makes the jumps
    at seams and rim vanish, and leaves the detail inside of the pieces as it is:
 
-       minimise  sum w(p, q) (c(q) - c(p) + j(p, q))^2 + lambda sum c(p)^2
+       minimise  sum w(p, q) (c(q) - c(p) + j(p, q))^2 + sum w(p) (v(p) + c(p) - known(p))^2
+                 + lambda sum c(p)^2
 
    over neighbours p, q. Inside of a piece j = 0, w = 1. Across a seam j is what the step v(q) - v(p)
    is more than the mean of the steps at the same places in the two sources; at the rim, where
    c(q) = 0, more than the step in the source of p. A large j is no error of tone but an edge, which
-   is not to be smeared (an occluding stroke): w falls with it, to 0 (Tukey's weight).                                   */
+   is not to be smeared (an occluding stroke): w falls with it, to 0 (Tukey's weight).
+
+   Pixels of a window lie between texels. One with missing texels among those around it is a hole, though
+   most of it may be known: then known(p) is the colour of that part, and w(p) grows with its share.
+   Without this term, what is next to the rim would not be looked at, and the jump at the rim stays. */
 
 enum {
     TXI_BLEND_SWEEPS = 80, /* of successive over-relaxation; see docs/choices.md                  */
@@ -13519,6 +13551,10 @@ enum {
 #define TXI_BLEND_JUMP 0.14   /* of the range of values: 0.8 of the weight across a seam; none from
                                  three times that on                                            */
 #define TXI_RIM_JUMP 0.28     /* the same at the rim                                              */
+#define TXI_RIM_WEIGHT 4.0    /* w(p, q) of a small jump at the rim; ours                         */
+#define TXI_SHARE_LEAST 0.2   /* of a pixel that is known, from which on it counts; ours          */
+#define TXI_SHARE_WEIGHT 16.0 /* w(p) of a pixel that is known but for next to nothing; ours      */
+#define TXI_SHARE_JUMP 0.45   /* as TXI_RIM_JUMP, for v(p) - known(p)                             */
 
 /* One map of a window while it is blended. */
 typedef struct txi_blend {
@@ -13610,6 +13646,29 @@ static int txi_excess(const txi_blend *b, int32_t p, int32_t q, int dx, int dy, 
     return 1;
 }
 
+/* The weight of a jump whose square is so many times that of the allowed one [Tukey]. */
+static double txi_blend_weight(double square) {
+    return square < 9 ? (1 - square / 9) * (1 - square / 9) : 0;
+}
+
+/* Couple unknown i with what is known of its pixel. */
+static void txi_blend_share(txi_blend *b, size_t i) {
+    const size_t n = (size_t)b->channels, p = (size_t)b->pixel[i];
+    const double share = b->w->share ? b->w->share[p] / 255.0 : 0;
+    double square = 0;
+    if (!(share > TXI_SHARE_LEAST)) return;
+    for (size_t c = 0; c < n; c++) {
+        const double range = (double)b->high[c] - (double)b->low[c];
+        const double jump = ((double)b->known[p * n + c] - (double)b->value[i * n + c]) / TXI_SHARE_JUMP;
+        if (range > 0) square += jump * jump / (range * range);
+    }
+    const double weight = TXI_SHARE_WEIGHT * (share - TXI_SHARE_LEAST) / (1 - TXI_SHARE_LEAST) *
+                          txi_blend_weight(square / b->channels);
+    b->diagonal[i] += weight;
+    for (size_t c = 0; c < n; c++)
+        b->load[i * n + c] += weight * ((double)b->known[p * n + c] - (double)b->value[i * n + c]);
+}
+
 /* Couple unknown i with the pixel on its side k (right, left, below, above). */
 static void txi_blend_link(txi_blend *b, size_t i, int k) {
     static const int dx[4] = {1, -1, 0, 0}, dy[4] = {0, 0, 1, -1};
@@ -13643,7 +13702,7 @@ static void txi_blend_link(txi_blend *b, size_t i, int k) {
         }
         square /= b->channels;
     }
-    const double weight = square < 9 ? (1 - square / 9) * (1 - square / 9) : 0;
+    const double weight = (j < 0 ? TXI_RIM_WEIGHT : 1) * txi_blend_weight(square);
     b->side[4 * i + (size_t)k] = j;
     b->weight[4 * i + (size_t)k] = txm_float(weight);
     b->diagonal[i] += (double)b->weight[4 * i + (size_t)k];
@@ -13673,6 +13732,7 @@ static void txi_blend_links(void *context, int chunk) {
     for (const size_t end = i + TXI_BLEND_CHUNK; i < end && i < b->count; i++) {
         b->diagonal[i] = TXI_BLEND_SCREEN;
         for (int k = 0; k < 4; k++) txi_blend_link(b, i, k);
+        txi_blend_share(b, i);
     }
 }
 

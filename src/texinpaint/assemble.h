@@ -12,11 +12,14 @@
      + sum over pixels:  drift * |A(p) - color(p)|^2 + (difference of the guides)^2
 
    where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first term is
-   |A(q) - known(q)|^2. This is minimised by expansion moves [7]: one label at a time, a minimum
+   rim * |A(q) - known(q)|^2; where a pixel is partly known, |A(p) - known(p)|^2 is added, share times.
+   This is minimised by expansion moves [7]: one label at a time, a minimum
    cut finds the best set of pixels that change to it.                                         */
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
+    TXI_JOINT_RIM = 3,    /* weight of a joint with what is known; ours                        */
+    TXI_JOINT_SHARE = 4,  /* ... and of what is known of the pixel itself; ours                */
     TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
     TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
     TXI_LABEL_NONE = -1,  /* not in the hole                                                   */
@@ -32,6 +35,7 @@ static inline int32_t txi_label(int pose, int dx, int dy) {
 typedef struct txi_assembly {
     const txi_level *level;
     const uint8_t *color; /* of the canvas                                                     */
+    const txi_window *window; /* of the level; NULL: no pixel is known in part                 */
     int32_t *label;       /* one per pixel of the level                                        */
     int drift;            /* in 1/256                                                          */
     uint32_t price;       /* of missing detail, as in txi_canvas; 0: it costs nothing          */
@@ -90,11 +94,16 @@ static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
     const int guide = label >= 0 ? own[3] - l->color[4 * p + 3] : 0;
     int cost = txi_rgb_distance(own, t->color + 4 * p) * t->drift / 256 + guide * guide;
     if (t->price && label >= 0) cost += txi_label_shortfall(t, label, x, y);
+    if (t->window && t->window->share) {
+        const size_t i = (size_t)(y - TXI_EDGE) * (size_t)t->window->width + (size_t)(x - TXI_EDGE);
+        const int share = t->window->share[i] * TXI_JOINT_SHARE;
+        if (share) cost += txi_rgb_distance(own, t->window->color + 4 * i) / 256 * share;
+    }
     for (int k = 0; k < 4; k++) {
         const int u = x + (k == 0) - (k == 1), v = y + (k == 2) - (k == 3);
         const size_t q = (size_t)v * (size_t)l->width + (size_t)u;
         if (l->state[q] != TXI_KNOWN && l->state[q] != TXI_FOREIGN) continue;
-        cost += txi_rgb_distance(txi_label_color(l, label, u, v), l->color + 4 * q);
+        cost += TXI_JOINT_RIM * txi_rgb_distance(txi_label_color(l, label, u, v), l->color + 4 * q);
     }
     return cost;
 }

@@ -8,12 +8,17 @@
    meet the known pixels. With v the copied values, a correction c of low frequency makes the jumps
    at seams and rim vanish, and leaves the detail inside of the pieces as it is:
 
-       minimise  sum w(p, q) (c(q) - c(p) + j(p, q))^2 + lambda sum c(p)^2
+       minimise  sum w(p, q) (c(q) - c(p) + j(p, q))^2 + sum w(p) (v(p) + c(p) - known(p))^2
+                 + lambda sum c(p)^2
 
    over neighbours p, q. Inside of a piece j = 0, w = 1. Across a seam j is what the step v(q) - v(p)
    is more than the mean of the steps at the same places in the two sources; at the rim, where
    c(q) = 0, more than the step in the source of p. A large j is no error of tone but an edge, which
-   is not to be smeared (an occluding stroke): w falls with it, to 0 (Tukey's weight).                                   */
+   is not to be smeared (an occluding stroke): w falls with it, to 0 (Tukey's weight).
+
+   Pixels of a window lie between texels. One with missing texels among those around it is a hole, though
+   most of it may be known: then known(p) is the colour of that part, and w(p) grows with its share.
+   Without this term, what is next to the rim would not be looked at, and the jump at the rim stays. */
 
 enum {
     TXI_BLEND_SWEEPS = 80, /* of successive over-relaxation; see docs/choices.md                  */
@@ -24,6 +29,10 @@ enum {
 #define TXI_BLEND_JUMP 0.14   /* of the range of values: 0.8 of the weight across a seam; none from
                                  three times that on                                            */
 #define TXI_RIM_JUMP 0.28     /* the same at the rim                                              */
+#define TXI_RIM_WEIGHT 4.0    /* w(p, q) of a small jump at the rim; ours                         */
+#define TXI_SHARE_LEAST 0.2   /* of a pixel that is known, from which on it counts; ours          */
+#define TXI_SHARE_WEIGHT 16.0 /* w(p) of a pixel that is known but for next to nothing; ours      */
+#define TXI_SHARE_JUMP 0.45   /* as TXI_RIM_JUMP, for v(p) - known(p)                             */
 
 /* One map of a window while it is blended. */
 typedef struct txi_blend {
@@ -115,6 +124,29 @@ static int txi_excess(const txi_blend *b, int32_t p, int32_t q, int dx, int dy, 
     return 1;
 }
 
+/* The weight of a jump whose square is so many times that of the allowed one [Tukey]. */
+static double txi_blend_weight(double square) {
+    return square < 9 ? (1 - square / 9) * (1 - square / 9) : 0;
+}
+
+/* Couple unknown i with what is known of its pixel. */
+static void txi_blend_share(txi_blend *b, size_t i) {
+    const size_t n = (size_t)b->channels, p = (size_t)b->pixel[i];
+    const double share = b->w->share ? b->w->share[p] / 255.0 : 0;
+    double square = 0;
+    if (!(share > TXI_SHARE_LEAST)) return;
+    for (size_t c = 0; c < n; c++) {
+        const double range = (double)b->high[c] - (double)b->low[c];
+        const double jump = ((double)b->known[p * n + c] - (double)b->value[i * n + c]) / TXI_SHARE_JUMP;
+        if (range > 0) square += jump * jump / (range * range);
+    }
+    const double weight = TXI_SHARE_WEIGHT * (share - TXI_SHARE_LEAST) / (1 - TXI_SHARE_LEAST) *
+                          txi_blend_weight(square / b->channels);
+    b->diagonal[i] += weight;
+    for (size_t c = 0; c < n; c++)
+        b->load[i * n + c] += weight * ((double)b->known[p * n + c] - (double)b->value[i * n + c]);
+}
+
 /* Couple unknown i with the pixel on its side k (right, left, below, above). */
 static void txi_blend_link(txi_blend *b, size_t i, int k) {
     static const int dx[4] = {1, -1, 0, 0}, dy[4] = {0, 0, 1, -1};
@@ -148,7 +180,7 @@ static void txi_blend_link(txi_blend *b, size_t i, int k) {
         }
         square /= b->channels;
     }
-    const double weight = square < 9 ? (1 - square / 9) * (1 - square / 9) : 0;
+    const double weight = (j < 0 ? TXI_RIM_WEIGHT : 1) * txi_blend_weight(square);
     b->side[4 * i + (size_t)k] = j;
     b->weight[4 * i + (size_t)k] = txm_float(weight);
     b->diagonal[i] += (double)b->weight[4 * i + (size_t)k];
@@ -178,6 +210,7 @@ static void txi_blend_links(void *context, int chunk) {
     for (const size_t end = i + TXI_BLEND_CHUNK; i < end && i < b->count; i++) {
         b->diagonal[i] = TXI_BLEND_SCREEN;
         for (int k = 0; k < 4; k++) txi_blend_link(b, i, k);
+        txi_blend_share(b, i);
     }
 }
 

@@ -29,6 +29,8 @@ typedef struct txi_window {
     int width, height;
     uint8_t *state;  /* TXI_VOID .. TXI_FOREIGN, one per pixel                                 */
     uint8_t *color;  /* 4 per pixel, RGB as matched (over mid gray where alpha is below 1), 0   */
+    uint8_t *share;  /* of a hole pixel: how much of it is known, 0..255 = all, as it lies between known
+                        and missing texels; its color is that of the known part. NULL: nothing  */
     txm_vec2 *texel; /* where each pixel that is not void lies in the texture, in texels, texel
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */

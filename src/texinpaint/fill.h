@@ -551,6 +551,7 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     }
     int32_t *label = assembly.label;
     assembly.color = t->color;
+    assembly.window = w;
     assembly.drift = TXI_DRIFT;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];

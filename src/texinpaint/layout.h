@@ -369,6 +369,7 @@ static void txi_window_paste(txi_window *to, const txi_window *from, int left) {
         const size_t a = (size_t)y * n, b = (size_t)y * (size_t)to->width + (size_t)left;
         memcpy(to->state + b, from->state + a, n);
         memcpy(to->color + 4 * b, from->color + 4 * a, 4 * n);
+        memcpy(to->share + b, from->share + a, n);
         memcpy(to->texel + b, from->texel + a, n * sizeof *to->texel);
         memcpy(to->place + b, from->place + a, n * sizeof *to->place);
         memcpy(to->normal + b, from->normal + a, n * sizeof *to->normal);

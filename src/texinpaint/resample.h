@@ -20,6 +20,7 @@ static txm_status txi_window_alloc(txi_window *w, int width, int height, txm_are
     w->height = height;
     w->state = (uint8_t *)txm_arena_zero(arena, count, 1);
     w->color = (uint8_t *)txm_arena_zero(arena, count, 4);
+    w->share = (uint8_t *)txm_arena_zero(arena, count, 1);
     w->texel = (txm_vec2 *)txm_arena_zero(arena, count, sizeof(txm_vec2));
     w->place = (txm_vec3 *)txm_arena_zero(arena, count, sizeof(txm_vec3));
     w->normal = (txm_vec3 *)txm_arena_zero(arena, count, sizeof(txm_vec3));
@@ -354,7 +355,19 @@ static uint8_t txi_byte(double unit) {
     return (uint8_t)(unit >= 1 ? 255 : unit > 0 ? unit * 255 + 0.5 : 0.5);
 }
 
-/* Fill state, of pixels that are not void, and color from the maps as they are now. */
+/* The bilinear weight of the known texels around a place, 0..255. */
+static uint8_t txi_known_share(const txi_domain *d, uint32_t face, txm_vec2 p) {
+    const double fx = floor((double)p.x), fy = floor((double)p.y);
+    double sum = 0;
+    for (int k = 0; k < 4; k++) {
+        const int64_t i = txi_tap(d, face, (int)fx + k % 2, (int)fy + k / 2);
+        const double u = k % 2 ? p.x - fx : 1 - (p.x - fx), v = k / 2 ? p.y - fy : 1 - (p.y - fy);
+        if (i >= 0 && !d->missing[i]) sum += u * v;
+    }
+    return (uint8_t)(255 * sum + 0.5);
+}
+
+/* Fill state, of pixels that are not void, share and color from the maps as they are now. */
 static void txi_window_colors(const txi_domain *d, txi_window *w) {
     const int channels = d->maps[0].channels, has_alpha = txi_has_alpha(d, 0);
     const size_t count = (size_t)w->width * (size_t)w->height;
@@ -365,6 +378,7 @@ static void txi_window_colors(const txi_domain *d, txi_window *w) {
         uint8_t *out = w->color + 4 * i;
         memset(out, 0, 4);
         if (w->state[i] != TXI_VOID) w->state[i] = txi_pixel_state(d, w->face[i], w->texel[i]);
+        w->share[i] = w->state[i] == TXI_HOLE ? txi_known_share(d, w->face[i], w->texel[i]) : 0;
         if (w->state[i] == TXI_VOID) continue;
         txi_read_pixel(d, &kernel, w, 0, i, v);
         const double alpha = has_alpha ? (double)txm_clampf(v[channels - 1], 0, 1) : 1;

@@ -127,7 +127,7 @@ static void expect(double *wanted) {
                 const double unit = (high[c] - low[c]) * (hole ? TXI_BLEND_JUMP : TXI_RIM_JUMP);
                 square += jump[c] / unit * (jump[c] / unit) / CHANNELS;
             }
-            const double weight = square < 9 ? (1 - square / 9) * (1 - square / 9) : 0;
+            const double weight = (hole ? 1 : TXI_RIM_WEIGHT) * (square < 9 ? (1 - square / 9) * (1 - square / 9) : 0);
             a[i][i] += weight;
             if (hole) a[i][number[q]] -= weight;
             for (int c = 0; c < CHANNELS; c++) right[c][i] += weight * jump[c];
