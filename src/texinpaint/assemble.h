@@ -18,7 +18,7 @@
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
-    TXI_JOINT_RIM = 3,    /* weight of a joint with what is known; ours                        */
+    TXI_JOINT_RIM = 2,    /* weight of a joint with what is known; ours                        */
     TXI_JOINT_SHARE = 4,  /* ... and of what is known of the pixel itself; ours                */
     TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
     TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */

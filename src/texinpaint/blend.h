@@ -29,9 +29,9 @@ enum {
 #define TXI_BLEND_JUMP 0.14   /* of the range of values: 0.8 of the weight across a seam; none from
                                  three times that on                                            */
 #define TXI_RIM_JUMP 0.28     /* the same at the rim                                              */
-#define TXI_RIM_WEIGHT 4.0    /* w(p, q) of a small jump at the rim; ours                         */
+#define TXI_RIM_WEIGHT 1.5    /* w(p, q) of a small jump at the rim; ours                         */
 #define TXI_SHARE_LEAST 0.2   /* of a pixel that is known, from which on it counts; ours          */
-#define TXI_SHARE_WEIGHT 16.0 /* w(p) of a pixel that is known but for next to nothing; ours      */
+#define TXI_SHARE_WEIGHT 8.0  /* w(p) of a pixel that is known but for next to nothing; ours      */
 #define TXI_SHARE_JUMP 0.45   /* as TXI_RIM_JUMP, for v(p) - known(p)                             */
 
 /* One map of a window while it is blended. */
