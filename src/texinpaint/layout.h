@@ -454,6 +454,10 @@ static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *ar
     for (size_t i = 0; i < pixels; i++) usable += hole->state[i] == TXI_KNOWN;
     if (10 * usable < wanted && l->pixel > 0) status = txi_sheet_source(l, wanted, &source, &found);
     if (status != TXM_OK) return status;
+    if (found) { /* if both together are not too large for a window */
+        const int height = source.height > hole->height ? source.height : hole->height;
+        found = txi_side_fits(hole->width + TXI_GAP + source.width, height);
+    }
     return txi_window_join(w, hole, found ? &source : NULL, arena, l->env);
 }
 

@@ -17,7 +17,6 @@ enum {
     TXI_REACH_LEAST = 64,      /* ... the smallest that is tried                               */
     TXI_SEAM = 16,             /* pixels: what lies nearer to a cut through the hole is left to the
                                   next window                                                  */
-    TXI_SIDE_MOST = 8192,      /* pixels: longest side of a window                             */
     TXI_FLAT_SIDE = 512,       /* pixels: side of a window of a face that cannot be laid out   */
     TXI_SMALL_HOLE = 400       /* texels: however it is distorted, it is done at once          */
 };
@@ -470,7 +469,7 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         l->at[v] = txm_v2(txm_float(x), txm_float(y));
     }
     const txi_bounds box = txi_sheet_bounds(l);
-    if (box.right - box.left > (double)TXI_SIDE_MOST || box.bottom - box.top > (double)TXI_SIDE_MOST ||
+    if (!txi_side_fits(box.right - box.left + 4, box.bottom - box.top + 4) ||
         (box.right - box.left + 4) * (box.bottom - box.top + 4) > (double)TXI_WINDOW_MOST)
         return 0;
     if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */

@@ -13,6 +13,9 @@ enum {
     TXI_WINDOW_MOST = 1 << 20, /* pixels of a window; larger holes take several                */
     TXI_WINDOW_GROUP = 400000, /* pixels up to which the windows of near holes are joined      */
     TXI_WINDOW_SIDE = 1000,    /* pixels: side of a window in a hole that is larger            */
+    TXI_SIDE_MOST = 4000,      /* pixels: longest diagonal of a window: offsets between places in it,
+                                  turned copies included, fit 13 bits (assemble.h), and their
+                                  coordinates in 1/65536 pixels an int32_t (pose.h)             */
     TXI_MARGIN = 32            /* pixels: what lies nearer to a cut through a hole is left to the
                                   next window                                                  */
 };
@@ -46,6 +49,14 @@ static int txi_push(txi_list *list, txm_arena *arena, uint32_t item) {
 
 static size_t txi_box_area(txi_box b) {
     return (size_t)(b.right - b.left) * (size_t)(b.bottom - b.top);
+}
+
+/* May a window have these sides? */
+static int txi_side_fits(double width, double height) {
+    return width * width + height * height <= (double)TXI_SIDE_MOST * TXI_SIDE_MOST;
+}
+static int txi_box_fits(txi_box b) {
+    return txi_side_fits(b.right - b.left, b.bottom - b.top);
 }
 
 /* The box with a band around it, within the picture. */
@@ -130,7 +141,8 @@ static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena
                 if (!txi_flood(d, start, TXI_MARK_OTHER, others, arena, &hole)) return 0;
                 hole = txi_box_union(*box, hole);
                 const size_t count = ours->count + others->count - before;
-                if (txi_box_area(txi_box_grow(hole, txi_band(count), d)) > TXI_WINDOW_GROUP) continue;
+                const txi_box larger = txi_box_grow(hole, txi_band(count), d);
+                if (txi_box_area(larger) > TXI_WINDOW_GROUP || !txi_box_fits(larger)) continue;
                 for (size_t k = before; k < others->count; k++) {
                     d->missing[others->items[k]] = TXI_MARK_OURS;
                     if (!txi_push(ours, arena, others->items[k])) return 0;
@@ -159,6 +171,7 @@ static txi_box txi_window_box(const txi_domain *d, txi_box hole, size_t area) {
         const int next = band + band / 4;
         const txi_box larger = txi_box_grow(hole, next, d);
         if (usable >= wanted || txi_box_area(larger) == txi_box_area(box)) return box;
+        if (!txi_box_fits(larger)) return box;
         /* beyond the limit only if there is next to nothing */
         if (txi_box_area(larger) > TXI_WINDOW_MOST && usable >= TXI_SOURCE_LEAST / 64) return box;
         band = next;
@@ -221,7 +234,9 @@ static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *e
     if (!txi_flood(d, (uint32_t)(first - d->missing), TXI_MARK_OURS, &ours, &scratch, &box) ||
         !txi_gather(d, &ours, &others, &scratch, &box))
         status = txi_no_memory(env);
-    if (status == TXM_OK && txi_box_area(txi_box_grow(box, TXI_BAND_LEAST, d)) > TXI_WINDOW_MOST) {
+    if (status == TXM_OK &&
+        (txi_box_area(txi_box_grow(box, TXI_BAND_LEAST, d)) > TXI_WINDOW_MOST ||
+         !txi_box_fits(txi_box_grow(box, txi_band(ours.count), d)))) {
         const uint32_t rim = txi_rim(d, &ours);
         const int x = (int)(rim % (uint32_t)d->width), y = (int)(rim / (uint32_t)d->width);
         const txi_box pixel = {x, y, x + 1, y + 1};
