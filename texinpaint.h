@@ -486,6 +486,149 @@ static txm_status txi_stopped(txm_env *env) {
     return txm_fail(env, TXM_CANCELLED, "cancelled");
 }
 
+/* ---- places in a window -------------------------------------------------------------------- */
+
+static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
+    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
+}
+
+static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
+    const double x = (double)a.x - b.x, y = (double)a.y - b.y;
+    return sqrt(x * x + y * y);
+}
+
+static inline txm_vec2 txi_unit(double x, double y) {
+    const double n = sqrt(x * x + y * y);
+    return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
+}
+
+/* The pixel of a place, or -1 outside of the window. */
+static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
+    if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
+    const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
+    return (ptrdiff_t)row * width + column;
+}
+
+/* ---- distances --------------------------------------------------------------------------- */
+
+enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
+
+/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
+   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
+   row (Meijster, Roerdink, Hesselink 2000).
+   scratch  3 * max(width, height) numbers
+   cost     O(width * height)                                                                     */
+static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
+    int32_t *row = scratch, *hull = row + width, *from = hull + width;
+    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
+    for (int x = 0; x < width; x++) {
+        for (int pass = 0; pass < 2; pass++) {
+            int d = beyond;
+            for (int k = 0; k < height; k++) {
+                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
+                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
+                if (!pass || d < out[i]) out[i] = d;
+            }
+        }
+    }
+    for (int y = 0; y < height; y++) {
+        int32_t *o = out + (size_t)y * (size_t)width;
+        int top = 0;
+        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
+        hull[0] = from[0] = 0;
+        for (int x = 1; x < width; x++) {
+            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
+            for (; top >= 0; top--) {
+                const int h = hull[top], t = from[top];
+                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
+            }
+            if (top < 0) {
+                top = 0;
+                hull[0] = x;
+                from[0] = 0;
+                continue;
+            }
+            const int64_t h = hull[top];
+            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
+            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
+            if (at < width) {
+                hull[++top] = x;
+                from[top] = (int32_t)at;
+            }
+        }
+        for (int x = width - 1; x >= 0; x--) {
+            const int h = hull[top];
+            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
+            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
+            if (x == from[top] && top > 0) top--;
+        }
+    }
+}
+
+/* The nearest texel with a mark, of equally near ones the first in its row, then the upper one.
+
+   First the nearest mark in each column; then along each row the lower envelope of the parabolas
+   (x - i)^2 + dy(i)^2: those of the columns that come first somewhere are kept on a stack.
+
+   nearest  receives one texel number for each, -1 without any marks
+   cost     O(width * height); 4 bytes for each texel of a row and each row               */
+static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_env *env,
+                              int32_t *nearest) {
+    txm_arena scratch;
+    const size_t w = (size_t)width;
+    txm_arena_init(&scratch, env);
+    int32_t *row = (int32_t *)txm_arena_alloc(&scratch, w, sizeof(int32_t)); /* row of the mark */
+    int *stack = (int *)txm_arena_alloc(&scratch, w, sizeof(int));
+    int *from = (int *)txm_arena_alloc(&scratch, w, sizeof(int)); /* where each becomes nearest  */
+    if (scratch.failed) {
+        txm_arena_free(&scratch);
+        return txi_no_memory(env);
+    }
+    for (int x = 0; x < width; x++) {
+        int32_t last = -1;
+        for (int y = 0; y < height; y++) {
+            if (marks[(size_t)y * w + (size_t)x]) last = y;
+            nearest[(size_t)y * w + (size_t)x] = last;
+        }
+        last = -1;
+        for (int y = height - 1; y >= 0; y--) {
+            int32_t *n = &nearest[(size_t)y * w + (size_t)x];
+            if (marks[(size_t)y * w + (size_t)x]) last = y;
+            if (last >= 0 && (*n < 0 || last - y < y - *n)) *n = last;
+        }
+    }
+    for (int y = 0; y < height; y++) {
+        int count = 0;
+        memcpy(row, nearest + (size_t)y * w, w * sizeof *row);
+        for (int x = 0; x < width; x++) {
+            const int64_t dy = row[x] - y;
+            if (row[x] < 0) continue;
+            int begin = 0;
+            while (count > 0) { /* first place at which x is nearer than the top of the stack */
+                const int i = stack[count - 1];
+                const int64_t di = row[i] - y;
+                const int64_t sum = (int64_t)x * x + dy * dy - (int64_t)i * i - di * di;
+                const int64_t place = sum < 0 ? 0 : sum / (2 * (int64_t)(x - i)) + 1;
+                if (place > from[count - 1]) {
+                    begin = place < width ? (int)place : width;
+                    break;
+                }
+                count--;
+            }
+            if (begin >= width) continue;
+            stack[count] = x;
+            from[count++] = begin;
+        }
+        for (int x = 0, k = 0; x < width; x++) {
+            while (k + 1 < count && from[k + 1] <= x) k++;
+            nearest[(size_t)y * w + (size_t)x] =
+                count ? (int32_t)((size_t)row[stack[k]] * w + (size_t)stack[k]) : -1;
+        }
+    }
+    txm_arena_free(&scratch);
+    return TXM_OK;
+}
+
 /* ---- checks of what the caller gives ------------------------------------------------------- */
 
 #define TXI_MAX_UV 4096.0f /* repeats of the texture; beyond, a float no longer tells its texels apart */
@@ -2352,70 +2495,6 @@ static void txi_window_done(txi_domain *d, const txi_window *w) {
 
 /* ---- resample: gutters ----------------------------------------------------------------------- */
 
-/* The nearest texel with a mark, of equally near ones the first in its row, then the upper one.
-
-   First the nearest mark in each column; then along each row the lower envelope of the parabolas
-   (x - i)^2 + dy(i)^2: those of the columns that come first somewhere are kept on a stack.
-
-   nearest  receives one texel number for each, -1 without any marks
-   cost     O(width * height); 4 bytes for each texel of a row and each row               */
-static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_env *env,
-                              int32_t *nearest) {
-    txm_arena scratch;
-    const size_t w = (size_t)width;
-    txm_arena_init(&scratch, env);
-    int32_t *row = (int32_t *)txm_arena_alloc(&scratch, w, sizeof(int32_t)); /* row of the mark */
-    int *stack = (int *)txm_arena_alloc(&scratch, w, sizeof(int));
-    int *from = (int *)txm_arena_alloc(&scratch, w, sizeof(int)); /* where each becomes nearest  */
-    if (scratch.failed) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
-    for (int x = 0; x < width; x++) {
-        int32_t last = -1;
-        for (int y = 0; y < height; y++) {
-            if (marks[(size_t)y * w + (size_t)x]) last = y;
-            nearest[(size_t)y * w + (size_t)x] = last;
-        }
-        last = -1;
-        for (int y = height - 1; y >= 0; y--) {
-            int32_t *n = &nearest[(size_t)y * w + (size_t)x];
-            if (marks[(size_t)y * w + (size_t)x]) last = y;
-            if (last >= 0 && (*n < 0 || last - y < y - *n)) *n = last;
-        }
-    }
-    for (int y = 0; y < height; y++) {
-        int count = 0;
-        memcpy(row, nearest + (size_t)y * w, w * sizeof *row);
-        for (int x = 0; x < width; x++) {
-            const int64_t dy = row[x] - y;
-            if (row[x] < 0) continue;
-            int begin = 0;
-            while (count > 0) { /* first place at which x is nearer than the top of the stack */
-                const int i = stack[count - 1];
-                const int64_t di = row[i] - y;
-                const int64_t sum = (int64_t)x * x + dy * dy - (int64_t)i * i - di * di;
-                const int64_t place = sum < 0 ? 0 : sum / (2 * (int64_t)(x - i)) + 1;
-                if (place > from[count - 1]) {
-                    begin = place < width ? (int)place : width;
-                    break;
-                }
-                count--;
-            }
-            if (begin >= width) continue;
-            stack[count] = x;
-            from[count++] = begin;
-        }
-        for (int x = 0, k = 0; x < width; x++) {
-            while (k + 1 < count && from[k + 1] <= x) k++;
-            nearest[(size_t)y * w + (size_t)x] =
-                count ? (int32_t)((size_t)row[stack[k]] * w + (size_t)stack[k]) : -1;
-        }
-    }
-    txm_arena_free(&scratch);
-    return TXM_OK;
-}
-
 /* Copy all maps from one texel to another. */
 static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
     const size_t w = (size_t)d->width;
@@ -2462,6 +2541,9 @@ enum {
     TXI_WINDOW_MOST = 1 << 20, /* pixels of a window; larger holes take several                */
     TXI_WINDOW_GROUP = 400000, /* pixels up to which the windows of near holes are joined      */
     TXI_WINDOW_SIDE = 1000,    /* pixels: side of a window in a hole that is larger            */
+    TXI_SIDE_MOST = 4000,      /* pixels: longest diagonal of a window: offsets between places in it,
+                                  turned copies included, fit 13 bits (assemble.h), and their
+                                  coordinates in 1/65536 pixels an int32_t (pose.h)             */
     TXI_MARGIN = 32            /* pixels: what lies nearer to a cut through a hole is left to the
                                   next window                                                  */
 };
@@ -2495,6 +2577,14 @@ static int txi_push(txi_list *list, txm_arena *arena, uint32_t item) {
 
 static size_t txi_box_area(txi_box b) {
     return (size_t)(b.right - b.left) * (size_t)(b.bottom - b.top);
+}
+
+/* May a window have these sides? */
+static int txi_side_fits(double width, double height) {
+    return width * width + height * height <= (double)TXI_SIDE_MOST * TXI_SIDE_MOST;
+}
+static int txi_box_fits(txi_box b) {
+    return txi_side_fits(b.right - b.left, b.bottom - b.top);
 }
 
 /* The box with a band around it, within the picture. */
@@ -2579,7 +2669,8 @@ static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena
                 if (!txi_flood(d, start, TXI_MARK_OTHER, others, arena, &hole)) return 0;
                 hole = txi_box_union(*box, hole);
                 const size_t count = ours->count + others->count - before;
-                if (txi_box_area(txi_box_grow(hole, txi_band(count), d)) > TXI_WINDOW_GROUP) continue;
+                const txi_box larger = txi_box_grow(hole, txi_band(count), d);
+                if (txi_box_area(larger) > TXI_WINDOW_GROUP || !txi_box_fits(larger)) continue;
                 for (size_t k = before; k < others->count; k++) {
                     d->missing[others->items[k]] = TXI_MARK_OURS;
                     if (!txi_push(ours, arena, others->items[k])) return 0;
@@ -2608,6 +2699,7 @@ static txi_box txi_window_box(const txi_domain *d, txi_box hole, size_t area) {
         const int next = band + band / 4;
         const txi_box larger = txi_box_grow(hole, next, d);
         if (usable >= wanted || txi_box_area(larger) == txi_box_area(box)) return box;
+        if (!txi_box_fits(larger)) return box;
         /* beyond the limit only if there is next to nothing */
         if (txi_box_area(larger) > TXI_WINDOW_MOST && usable >= TXI_SOURCE_LEAST / 64) return box;
         band = next;
@@ -2670,7 +2762,9 @@ static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *e
     if (!txi_flood(d, (uint32_t)(first - d->missing), TXI_MARK_OURS, &ours, &scratch, &box) ||
         !txi_gather(d, &ours, &others, &scratch, &box))
         status = txi_no_memory(env);
-    if (status == TXM_OK && txi_box_area(txi_box_grow(box, TXI_BAND_LEAST, d)) > TXI_WINDOW_MOST) {
+    if (status == TXM_OK &&
+        (txi_box_area(txi_box_grow(box, TXI_BAND_LEAST, d)) > TXI_WINDOW_MOST ||
+         !txi_box_fits(txi_box_grow(box, txi_band(ours.count), d)))) {
         const uint32_t rim = txi_rim(d, &ours);
         const int x = (int)(rim % (uint32_t)d->width), y = (int)(rim / (uint32_t)d->width);
         const txi_box pixel = {x, y, x + 1, y + 1};
@@ -2700,7 +2794,6 @@ enum {
     TXI_REACH_LEAST = 64,      /* ... the smallest that is tried                               */
     TXI_SEAM = 16,             /* pixels: what lies nearer to a cut through the hole is left to the
                                   next window                                                  */
-    TXI_SIDE_MOST = 8192,      /* pixels: longest side of a window                             */
     TXI_FLAT_SIDE = 512,       /* pixels: side of a window of a face that cannot be laid out   */
     TXI_SMALL_HOLE = 400       /* texels: however it is distorted, it is done at once          */
 };
@@ -3153,7 +3246,7 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         l->at[v] = txm_v2(txm_float(x), txm_float(y));
     }
     const txi_bounds box = txi_sheet_bounds(l);
-    if (box.right - box.left > (double)TXI_SIDE_MOST || box.bottom - box.top > (double)TXI_SIDE_MOST ||
+    if (!txi_side_fits(box.right - box.left + 4, box.bottom - box.top + 4) ||
         (box.right - box.left + 4) * (box.bottom - box.top + 4) > (double)TXI_WINDOW_MOST)
         return 0;
     if (reference >= 0) { /* a missing texel of it comes to lie on a pixel */
@@ -3622,6 +3715,10 @@ static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *ar
     for (size_t i = 0; i < pixels; i++) usable += hole->state[i] == TXI_KNOWN;
     if (10 * usable < wanted && l->pixel > 0) status = txi_sheet_source(l, wanted, &source, &found);
     if (status != TXM_OK) return status;
+    if (found) { /* if both together are not too large for a window */
+        const int height = source.height > hole->height ? source.height : hole->height;
+        found = txi_side_fits(hole->width + TXI_GAP + source.width, height);
+    }
     return txi_window_join(w, hole, found ? &source : NULL, arena, l->env);
 }
 
@@ -6438,78 +6535,6 @@ static void txi_vote_sparse(const txi_fields *f, txi_tokens *k, int balls, const
     for (int i = 0; i < k->count; i++) txi_token_set(&k->at[i], scratch + 6 * (size_t)i);
 }
 
-/* ---- places in a window -------------------------------------------------------------------- */
-
-static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
-    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
-}
-
-static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
-    const double x = (double)a.x - b.x, y = (double)a.y - b.y;
-    return sqrt(x * x + y * y);
-}
-
-static inline txm_vec2 txi_unit(double x, double y) {
-    const double n = sqrt(x * x + y * y);
-    return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
-}
-
-/* ---- distances --------------------------------------------------------------------------- */
-
-enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
-
-/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
-   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
-   row (Meijster, Roerdink, Hesselink 2000).
-   scratch  3 * max(width, height) numbers
-   cost     O(width * height)                                                                     */
-static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
-    int32_t *row = scratch, *hull = row + width, *from = hull + width;
-    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
-    for (int x = 0; x < width; x++) {
-        for (int pass = 0; pass < 2; pass++) {
-            int d = beyond;
-            for (int k = 0; k < height; k++) {
-                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
-                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
-                if (!pass || d < out[i]) out[i] = d;
-            }
-        }
-    }
-    for (int y = 0; y < height; y++) {
-        int32_t *o = out + (size_t)y * (size_t)width;
-        int top = 0;
-        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
-        hull[0] = from[0] = 0;
-        for (int x = 1; x < width; x++) {
-            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
-            for (; top >= 0; top--) {
-                const int h = hull[top], t = from[top];
-                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
-            }
-            if (top < 0) {
-                top = 0;
-                hull[0] = x;
-                from[0] = 0;
-                continue;
-            }
-            const int64_t h = hull[top];
-            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
-            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
-            if (at < width) {
-                hull[++top] = x;
-                from[top] = (int32_t)at;
-            }
-        }
-        for (int x = width - 1; x >= 0; x--) {
-            const int h = hull[top];
-            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
-            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
-            if (x == from[top] && top > 0) top--;
-        }
-    }
-}
-
 /* ---- gradients --------------------------------------------------------------------------- */
 
 enum {
@@ -6754,13 +6779,6 @@ static double txi_strength_at(const txi_slopes *f, double x, double y) {
     const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
     const double u = x - ix, v = y - iy;
     return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
-}
-
-/* The pixel of a place, or -1 outside of the window. */
-static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
-    if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
-    const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
-    return (ptrdiff_t)row * width + column;
 }
 
 /* ---- lines near a hole ------------------------------------------------------------------------

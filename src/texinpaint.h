@@ -329,6 +329,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #define TEXINPAINT_IMPLEMENTED
 
 #include "texinpaint/config.h"
+#include "texinpaint/raster.h"
 #include "texinpaint/check.h"
 #include "texinpaint/surface.h"
 #include "texinpaint/geodesic.h"

@@ -1,6 +1,7 @@
 #ifndef TEXINPAINT_RESAMPLE_H
 #define TEXINPAINT_RESAMPLE_H
 
+#include "raster.h"
 #include "surface.h"
 
 /* ---- resample: between maps and windows ------------------------------------------------------ */
@@ -485,70 +486,6 @@ static void txi_window_done(txi_domain *d, const txi_window *w) {
 }
 
 /* ---- resample: gutters ----------------------------------------------------------------------- */
-
-/* The nearest texel with a mark, of equally near ones the first in its row, then the upper one.
-
-   First the nearest mark in each column; then along each row the lower envelope of the parabolas
-   (x - i)^2 + dy(i)^2: those of the columns that come first somewhere are kept on a stack.
-
-   nearest  receives one texel number for each, -1 without any marks
-   cost     O(width * height); 4 bytes for each texel of a row and each row               */
-static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_env *env,
-                              int32_t *nearest) {
-    txm_arena scratch;
-    const size_t w = (size_t)width;
-    txm_arena_init(&scratch, env);
-    int32_t *row = (int32_t *)txm_arena_alloc(&scratch, w, sizeof(int32_t)); /* row of the mark */
-    int *stack = (int *)txm_arena_alloc(&scratch, w, sizeof(int));
-    int *from = (int *)txm_arena_alloc(&scratch, w, sizeof(int)); /* where each becomes nearest  */
-    if (scratch.failed) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
-    for (int x = 0; x < width; x++) {
-        int32_t last = -1;
-        for (int y = 0; y < height; y++) {
-            if (marks[(size_t)y * w + (size_t)x]) last = y;
-            nearest[(size_t)y * w + (size_t)x] = last;
-        }
-        last = -1;
-        for (int y = height - 1; y >= 0; y--) {
-            int32_t *n = &nearest[(size_t)y * w + (size_t)x];
-            if (marks[(size_t)y * w + (size_t)x]) last = y;
-            if (last >= 0 && (*n < 0 || last - y < y - *n)) *n = last;
-        }
-    }
-    for (int y = 0; y < height; y++) {
-        int count = 0;
-        memcpy(row, nearest + (size_t)y * w, w * sizeof *row);
-        for (int x = 0; x < width; x++) {
-            const int64_t dy = row[x] - y;
-            if (row[x] < 0) continue;
-            int begin = 0;
-            while (count > 0) { /* first place at which x is nearer than the top of the stack */
-                const int i = stack[count - 1];
-                const int64_t di = row[i] - y;
-                const int64_t sum = (int64_t)x * x + dy * dy - (int64_t)i * i - di * di;
-                const int64_t place = sum < 0 ? 0 : sum / (2 * (int64_t)(x - i)) + 1;
-                if (place > from[count - 1]) {
-                    begin = place < width ? (int)place : width;
-                    break;
-                }
-                count--;
-            }
-            if (begin >= width) continue;
-            stack[count] = x;
-            from[count++] = begin;
-        }
-        for (int x = 0, k = 0; x < width; x++) {
-            while (k + 1 < count && from[k + 1] <= x) k++;
-            nearest[(size_t)y * w + (size_t)x] =
-                count ? (int32_t)((size_t)row[stack[k]] * w + (size_t)stack[k]) : -1;
-        }
-    }
-    txm_arena_free(&scratch);
-    return TXM_OK;
-}
 
 /* Copy all maps from one texel to another. */
 static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {

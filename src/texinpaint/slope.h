@@ -1,79 +1,7 @@
 #ifndef TEXINPAINT_SLOPE_H
 #define TEXINPAINT_SLOPE_H
 
-#include "config.h"
-
-/* ---- places in a window -------------------------------------------------------------------- */
-
-static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
-    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
-}
-
-static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
-    const double x = (double)a.x - b.x, y = (double)a.y - b.y;
-    return sqrt(x * x + y * y);
-}
-
-static inline txm_vec2 txi_unit(double x, double y) {
-    const double n = sqrt(x * x + y * y);
-    return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
-}
-
-/* ---- distances --------------------------------------------------------------------------- */
-
-enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
-
-/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
-   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
-   row (Meijster, Roerdink, Hesselink 2000).
-   scratch  3 * max(width, height) numbers
-   cost     O(width * height)                                                                     */
-static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
-    int32_t *row = scratch, *hull = row + width, *from = hull + width;
-    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
-    for (int x = 0; x < width; x++) {
-        for (int pass = 0; pass < 2; pass++) {
-            int d = beyond;
-            for (int k = 0; k < height; k++) {
-                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
-                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
-                if (!pass || d < out[i]) out[i] = d;
-            }
-        }
-    }
-    for (int y = 0; y < height; y++) {
-        int32_t *o = out + (size_t)y * (size_t)width;
-        int top = 0;
-        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
-        hull[0] = from[0] = 0;
-        for (int x = 1; x < width; x++) {
-            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
-            for (; top >= 0; top--) {
-                const int h = hull[top], t = from[top];
-                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
-            }
-            if (top < 0) {
-                top = 0;
-                hull[0] = x;
-                from[0] = 0;
-                continue;
-            }
-            const int64_t h = hull[top];
-            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
-            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
-            if (at < width) {
-                hull[++top] = x;
-                from[top] = (int32_t)at;
-            }
-        }
-        for (int x = width - 1; x >= 0; x--) {
-            const int h = hull[top];
-            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
-            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
-            if (x == from[top] && top > 0) top--;
-        }
-    }
-}
+#include "raster.h"
 
 /* ---- gradients --------------------------------------------------------------------------- */
 
@@ -319,13 +247,6 @@ static double txi_strength_at(const txi_slopes *f, double x, double y) {
     const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
     const double u = x - ix, v = y - iy;
     return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
-}
-
-/* The pixel of a place, or -1 outside of the window. */
-static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
-    if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
-    const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
-    return (ptrdiff_t)row * width + column;
 }
 
 #endif /* TEXINPAINT_SLOPE_H */
