@@ -382,6 +382,7 @@ typedef struct txi_copy {
     int32_t piece; /* pixels of one piece (same pose, continuous) have the same number; -1 = not
                       in the hole                                                             */
     int32_t pose;  /* index into the poses                                                    */
+    int32_t layer; /* pixels of one stroke that crosses others have the same number; 0 = no such  */
 } txi_copy;
 
 /* A line through the hole, completed: points about one pixel apart, from the known side through the
@@ -9448,6 +9449,7 @@ enum {
     TXI_STRIP_CELLS = 4 << 20, /* of all tables of overlaps, 4 bytes each: 16 MB                  */
     TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
     TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
+    TXI_STRIP_CLEAN = 24,    /* columns of a stroke that show all of it, from which on others are not used */
     TXI_STRIP_ONWARD = 12,   /* pixels that lines without an end are continued behind the hole      */
     TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
@@ -9476,6 +9478,9 @@ typedef struct txi_strip {
     int first, last;    /* columns with hole pixels                                              */
     int tail;           /* columns behind the hole are no known part of the line, or are missing   */
     int is_open;        /* the line ends in the hole                                             */
+    int is_bare;        /* a stroke that crosses others: see cover.h                               */
+    uint8_t *typical;   /* its usual colours, 3 per row; NULL: not known                           */
+    float tolerance;    /* levels; colours farther from the usual ones are not those of the stroke   */
     txi_ribbon line;
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
@@ -9705,6 +9710,25 @@ static void txi_ribbon_crop(txi_ribbon *r, int lo, int hi) {
     r->count = hi - lo;
 }
 
+/* Make a stroke of columns lo..hi - 1 of a line, its other side `width` to the right, or all to the left;
+   the other columns are cropped. 0: it would be narrower than a pixel or wider than TXI_STRIP_INSIDE. */
+static int txi_ribbon_widen_by(txi_ribbon *r, int lo, int hi, const float *width) {
+    const double sign = width[lo] > 0 ? 1 : -1;
+    for (int i = lo; i < hi; i++) {
+        const double d = sign * (double)width[i];
+        if (!(d >= 1 && d <= (double)TXI_STRIP_INSIDE)) return 0;
+    }
+    for (int i = lo; i < hi; i++) {
+        const txm_vec2 n = txi_normal_of(r->along[i]);
+        const double half = 0.5 * txi_running_mean(width + lo, hi - lo, 1, i - lo, 4);
+        r->place[i].x = txm_float((double)r->place[i].x + half * (double)n.x);
+        r->place[i].y = txm_float((double)r->place[i].y + half * (double)n.y);
+        r->half[i] = txm_float(half < 0 ? -half : half);
+    }
+    txi_ribbon_crop(r, lo, hi);
+    return 1;
+}
+
 /* Widen a line to the stroke between it and its partner, where both run along each other. 0: they do
    not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then unchanged.
    width  room for a float per column                                                            */
@@ -9729,20 +9753,17 @@ static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first,
         }
     }
     if (lo > first || hi <= last || hi - lo < 2) return 0;
-    const double sign = width[lo] > 0 ? 1 : -1;
-    for (int i = lo; i < hi; i++) {
-        const double d = sign * (double)width[i];
-        if (!(d >= 1 && d <= (double)TXI_STRIP_INSIDE)) return 0;
+    return txi_ribbon_widen_by(r, lo, hi, width);
+}
+
+/* The same for a partner that is the line itself, moved sideways: the points of both are paired. */
+static int txi_ribbon_widen_even(txi_ribbon *r, const txm_vec2 *points, const txm_vec2 *moved, float *width) {
+    for (int i = 0; i < r->count; i++) {
+        const txm_vec2 t = r->along[i];
+        const double x = (double)moved[i].x - points[i].x, y = (double)moved[i].y - points[i].y;
+        width[i] = txm_float(y * (double)t.x - x * (double)t.y);
     }
-    for (int i = lo; i < hi; i++) {
-        const txm_vec2 n = txi_normal_of(r->along[i]);
-        const double half = 0.5 * txi_running_mean(width + lo, hi - lo, 1, i - lo, 4);
-        r->place[i].x = txm_float((double)r->place[i].x + half * (double)n.x);
-        r->place[i].y = txm_float((double)r->place[i].y + half * (double)n.y);
-        r->half[i] = txm_float(half < 0 ? -half : half);
-    }
-    txi_ribbon_crop(r, lo, hi);
-    return 1;
+    return txi_ribbon_widen_by(r, 0, r->count, width);
 }
 
 /* ---- the strip's own columns ---- */
@@ -9827,16 +9848,51 @@ static int txi_columns_own(txi_strip *s, int mirrored) {
     return s->source_count - before;
 }
 
-/* The weight of a row's colours in costs, in quarters: rows far from the lines count less. */
-static int txi_row_weight(int j, int inside) {
-    const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > inside ? k - inside : 0;
+/* The weight of a row's colours in costs, in quarters: rows far from the lines count less, those beside a
+   bare stroke hardly or not. */
+static int txi_row_weight(const txi_strip *s, int j) {
+    const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > s->inside ? k - s->inside : 0;
+    if (s->is_bare) return out == 0 ? 4 : out == 1;
     return out <= 3 ? 4 : out <= 6 ? 3 : 2;
+}
+
+/* How far a colour is from the usual one of a row, levels. */
+static double txi_typical_distance(const txi_strip *s, int j, const uint8_t *color) {
+    int sum = 0;
+    for (int c = 0; c < 3; c++) {
+        const int d = color[c] - s->typical[3 * j + c];
+        sum += d * d;
+    }
+    return sqrt(sum / 3.0);
+}
+
+/* How many rows of a column, from the edge or `beside` rows beside it, do not show the bare stroke, but
+   something that covers it or lies beside it. */
+static int txi_column_other(const txi_strip *s, const uint8_t *color, int beside) {
+    int other = 0;
+    for (int j = TXI_STRIP_MARGIN - beside; j <= TXI_STRIP_MARGIN + s->inside + beside; j++)
+        other += txi_typical_distance(s, j, color + 3 * j) > (double)s->tolerance;
+    return other;
+}
+
+/* Of the usable source columns of a bare stroke only those stay that show it: edges and all, if there are
+   enough of them. */
+static void txi_columns_bare(txi_strip *s) {
+    int clean = 0;
+    for (int i = 0; i < s->source_count; i++)
+        clean += s->sources[i].before == 0 &&
+                 !txi_column_other(s, s->source_color + 3 * i * s->rows, 1);
+    for (int i = 0; i < s->source_count; i++) {
+        const uint8_t *color = s->source_color + 3 * i * s->rows;
+        const int other = txi_column_other(s, color, clean >= TXI_STRIP_CLEAN);
+        if (clean >= TXI_STRIP_CLEAN ? other > 0 : 6 * other > s->inside) s->sources[i].before = -1;
+    }
 }
 
 static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t *feature) {
     for (int j = 0; j < s->rows; j++)
         for (int c = 0; c < 3; c++)
-            feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(j, s->inside) / 4);
+            feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(s, j) / 4);
 }
 
 /* Colours and features of the sources. Where a row is not known the nearest known one towards the line
@@ -9844,7 +9900,7 @@ static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t 
 static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     const size_t rows = (size_t)s->rows, count = (size_t)s->source_count;
-    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside, beside = s->is_bare ? 1 : 2;
     s->features = (3 * s->rows + 15) / 16 * 16;
     s->source_color = (uint8_t *)txm_arena_alloc(arena, count * rows, 3);
     s->source_feature =
@@ -9860,7 +9916,7 @@ static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_aren
             int rgb[3];
             known[j] = txi_strip_pixel(w, (double)p.x, (double)p.y, rgb) == 2;
             n += known[j];
-            if (j >= low - 2 && j <= high + 2) whole &= known[j];
+            if (j >= low - beside && j <= high + beside) whole &= known[j];
             for (int c = 0; c < 3; c++) color[3 * j + c] = (uint8_t)rgb[c];
         }
         for (int j = low - 1; j >= 0; j--)
@@ -9868,8 +9924,9 @@ static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_aren
         for (int j = high + 1; j < s->rows; j++)
             if (!known[j]) memcpy(color + 3 * j, color + 3 * (j - 1), 3);
         txi_strip_feature(s, color, s->source_feature + i * (size_t)s->features);
-        a->before = whole && 3 * n >= 2 * s->rows ? 0 : -1;
+        a->before = whole && (s->is_bare || 3 * n >= 2 * s->rows) ? 0 : -1;
     }
+    if (s->is_bare) txi_columns_bare(s);
     txi_column *a = s->sources;
     for (int i = 1; i < s->source_count; i++)
         if (a[i].before == 0 && a[i].run == a[i - 1].run) a[i].before = a[i - 1].before + 1;
@@ -10104,6 +10161,442 @@ static void txi_strip_profile_at(const txi_strip *s, double column, double row, 
     }
 }
 
+/* ---- whole strokes ------------------------------------------------------------------------------
+   Where bars cross near the border of the hole, one of them hides an edge of the other, and that edge
+   has no end to join. The other edge is enough: it is joined from border to border, and on both sides
+   of the hole the bar has the same width and the same colour. So the hidden edge is the joined one,
+   moved by the width. Curves that were found for its ends without that knowledge are taken away.   */
+
+enum {
+    TXI_FLANK_KNOWN = 64,  /* pixels of the known part of a curve that a width is measured on; ours   */
+    TXI_FLANK_SKIP = 1,    /* pixels next to the hole that are left out                             */
+    TXI_FLANK_COLOR = 7,   /* of these so many for the colour                                      */
+    TXI_FLANK_LEAST = 7,   /* so many of them must agree about the width; ours                       */
+    TXI_CROSS_STEP = 3,    /* points of a curve from one to the next that is tested for crossings      */
+    TXI_FLANK_STEPS = 2 * (TXI_STROKE_WIDEST + 2)
+};
+#define TXI_FLANK_FROM 2.0    /* pixels from the curve at which the colour beside it is taken         */
+#define TXI_FLANK_TONE 32.0   /* levels; colours that differ more are never the same one; ours         */
+#define TXI_FLANK_CATCH 3.0   /* pixels; ends as near as that to the other edge belong to it; ours     */
+#define TXI_FLANK_DIFFER 0.25 /* share by which the widths on both sides of the hole may differ; ours */
+
+/* What lies beside a curve in its known part on one side of the hole. */
+typedef struct txi_flank {
+    double width;    /* pixels to the opposite edge; 0: not known                                   */
+    double color[3]; /* up to there, RGB                                                           */
+} txi_flank;
+
+/* RGB at a distance to the right of point i of a curve; 0: not known. */
+static int txi_flank_pixel(const txi_window *w, const txi_curve *c, int i, double away, int rgb[3]) {
+    const txm_vec2 t = txi_curve_along(c, i), p = c->points[i];
+    return txi_strip_pixel(w, (double)p.x - away * (double)t.y, (double)p.y + away * (double)t.x, rgb);
+}
+
+static double txi_flank_distance(const double color[3], const int rgb[3]) {
+    const double other[3] = {(double)rgb[0], (double)rgb[1], (double)rgb[2]};
+    return txi_end_color_distance(color, other);
+}
+
+/* The point of a curve that lies i pixels outwards from one end of the hole; -1: there is none. */
+static int txi_flank_point(const txi_curve *c, int end, int i) {
+    const int k = end ? c->last + 1 + i : c->first - 1 - i;
+    return k >= 0 && k < c->count ? k : -1;
+}
+
+/* The median of each channel beside the curve near the hole; side 1 right, -1 left. 0: too little is
+   known. */
+static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int side, double color[3]) {
+    int n = 0, values[3][TXI_FLANK_COLOR];
+    for (int i = TXI_FLANK_SKIP; n < TXI_FLANK_COLOR; i++) {
+        const int point = txi_flank_point(c, end, i);
+        int rgb[3];
+        if (point < 0 || i >= TXI_FLANK_KNOWN) break;
+        if (!txi_flank_pixel(w, c, point, TXI_FLANK_FROM * side, rgb)) continue;
+        for (int k = 0; k < 3; k++) {
+            int at = n; /* insertion sort */
+            for (; at > 0 && values[k][at - 1] > rgb[k]; at--) values[k][at] = values[k][at - 1];
+            values[k][at] = rgb[k];
+        }
+        n++;
+    }
+    for (int k = 0; k < 3 && n; k++) color[k] = values[k][n / 2];
+    return n >= 4;
+}
+
+/* How far the colour beside point i reaches: to where half of the step to the next colour is done. 0: to
+   something that is not known; -1: it is another colour. */
+static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, int side, const double color[3],
+                              double differs) {
+    int rgb[3];
+    for (int k = 0; k < TXI_FLANK_STEPS; k++) {
+        const double away = TXI_FLANK_FROM + 0.5 * k;
+        if (!txi_flank_pixel(w, c, i, away * side, rgb)) return 0;
+        if (txi_flank_distance(color, rgb) <= differs) continue;
+        if (k == 0) return -1;
+        if (!txi_flank_pixel(w, c, i, (away + 1.5) * side, rgb)) return 0;
+        const double next = txi_flank_distance(color, rgb);
+        for (int m = -1; m < 3; m++) {
+            if (!txi_flank_pixel(w, c, i, (away + 0.5 * m) * side, rgb)) return 0;
+            if (txi_flank_distance(color, rgb) > 0.5 * next) return away + 0.5 * m - 0.25;
+        }
+        return away;
+    }
+    return 0;
+}
+
+/* Measure what lies on one side of a curve (1 right, -1 left) at one end of the hole: its colour, and how
+   far that reaches by most of the points, as far as the curve has it at its side. 0: not even the
+   colour is known. */
+static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int side, txi_flank *f) {
+    double widths[TXI_FLANK_KNOWN], across[3];
+    int n = 0, most = 0, others = 0;
+    f->width = 0;
+    if (!txi_flank_color(w, c, end, side, f->color)) return 0;
+    if (!txi_flank_color(w, c, end, -side, across)) return 0;
+    const double contrast = txi_end_color_distance(f->color, across);
+    if (contrast < 8) return 0;
+    const double differs = contrast < 2 * TXI_FLANK_TONE ? 0.5 * contrast : TXI_FLANK_TONE;
+    for (int i = TXI_FLANK_SKIP; i < TXI_FLANK_KNOWN && others < 4; i++) {
+        const int point = txi_flank_point(c, end, i);
+        if (point < 0) break;
+        const double width = txi_flank_width(w, c, point, side, f->color, differs);
+        if (width > 0) widths[n++] = width;
+        others = width < 0 ? others + 1 : 0;
+    }
+    for (int i = 0; i < n; i++) {
+        double sum = 0;
+        int agree = 0;
+        for (int k = 0; k < n; k++) {
+            if (fabs(widths[k] - widths[i]) > 0.06 * widths[i] + 0.75) continue;
+            sum += widths[k];
+            agree++;
+        }
+        if (agree <= most) continue;
+        most = agree;
+        f->width = sum / agree;
+    }
+    if (most < TXI_FLANK_LEAST || 5 * most < 3 * n || f->width > (double)TXI_STROKE_WIDEST) f->width = 0;
+    return 1;
+}
+
+/* The other edge of a stroke of which c is one: its points moved by the width, which changes evenly from
+   one side of the hole to the other. */
+static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const txi_flank f[2], int side,
+                                 txm_arena *arena, txm_env *env, txi_curve *other) {
+    *other = *c;
+    other->points = (txm_vec2 *)txm_arena_alloc(arena, (size_t)c->count, sizeof *other->points);
+    if (!other->points) return txi_no_memory(env);
+    other->first = other->last = -1;
+    for (int i = 0; i < c->count; i++) {
+        const double part = (double)(i - c->first) / (c->last - c->first);
+        const double t = part < 0 ? 0 : part > 1 ? 1 : part;
+        const double away = side * (f[0].width + t * (f[1].width - f[0].width));
+        const txm_vec2 along = txi_curve_along(c, i), p = c->points[i];
+        const double x = (double)p.x - away * (double)along.y, y = (double)p.y + away * (double)along.x;
+        const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
+        other->points[i] = txm_v2(txm_float(x), txm_float(y));
+        if (at < 0 || w->state[at] != TXI_HOLE) continue;
+        if (other->first < 0) other->first = i;
+        other->last = i;
+    }
+    return TXM_OK;
+}
+
+/* Does an end lie on a curve? 1: at its front, 2: at its back, 0: not. */
+static int txi_end_on_curve(const txi_end *e, const txi_curve *c) {
+    double best = TXI_FLANK_CATCH * TXI_FLANK_CATCH;
+    int found = 0;
+    for (int i = 0; i < c->count; i++) {
+        const double x = (double)e->place.x - c->points[i].x, y = (double)e->place.y - c->points[i].y;
+        const txm_vec2 t = txi_curve_along(c, i);
+        const double dot = (double)t.x * e->heading.x + (double)t.y * e->heading.y;
+        if (x * x + y * y > best || (dot < 0.85 && dot > -0.85)) continue;
+        best = x * x + y * y;
+        found = dot > 0 ? 1 : 2;
+    }
+    return found;
+}
+
+/* Which curves give way to a new edge: those of its ends. Marks them in gone; 0: one of them is surer
+   than the new one, or none of them was seen to go on behind the hole without an end there. */
+static int txi_edge_replaces(const txi_lines *l, const txi_curve *curves, int count, int from,
+                             const int *partners, txi_curve *edge, uint8_t *gone) {
+    int found[2] = {-1, -1}, hidden = 0;
+    for (int i = 0; i < l->end_count; i++) {
+        const int on = txi_end_on_curve(&l->ends[i], edge);
+        if (!on || i == curves[from].ends[0] || i == curves[from].ends[1]) continue;
+        if (found[on - 1] < 0 || l->ends[i].length > l->ends[found[on - 1]].length) found[on - 1] = i;
+    }
+    if (found[0] < 0 && found[1] < 0) return 0;
+    for (int k = 0; k < count; k++) {
+        gone[k] = 0;
+        for (int s = 0; s < 4; s++) {
+            const int e = found[s / 2];
+            if (e < 0 || curves[k].ends[s % 2] != e || k == from) continue;
+            if (partners[k] >= 0) return 0;
+            if (curves[k].ends[1] >= 0 && curves[k].cost < curves[from].cost) return 0;
+            gone[k] = 1;
+            hidden |= curves[k].ends[1] < 0;
+        }
+    }
+    if (!hidden) return 0;
+    edge->ends[0] = found[0] >= 0 ? found[0] : found[1];
+    edge->ends[1] = found[0] >= 0 ? found[1] : -1;
+    return 1;
+}
+
+/* What lies on one side of a curve at both ends of the hole. 0: it is not the same, or its width is not
+   known. A width that is known at one end only counts for both. */
+static int txi_stroke_flanks(const txi_window *w, const txi_curve *c, int side, txi_flank f[2]) {
+    if (!txi_flank_make(w, c, 0, side, &f[0]) || !txi_flank_make(w, c, 1, side, &f[1])) return 0;
+    if (f[0].width <= 0) f[0].width = f[1].width;
+    if (f[1].width <= 0) f[1].width = f[0].width;
+    if (f[0].width <= 0) return 0;
+    const double mean = 0.5 * (f[0].width + f[1].width);
+    if (fabs(f[0].width - f[1].width) > TXI_FLANK_DIFFER * mean) return 0;
+    return txi_end_color_distance(f[0].color, f[1].color) <= 0.25 * (double)c->strength + 4;
+}
+
+/* Make a whole stroke of curve i, if it is one edge of it; *edge receives the other one. 0: it is not. */
+static int txi_whole_stroke(const txi_window *w, const txi_lines *l, const txi_curve *curves, int count,
+                            int i, const int *partners, txm_arena *arena, txm_env *env, uint8_t *gone,
+                            txi_curve *edge, txm_status *status) {
+    const txi_curve *c = &curves[i];
+    txi_flank f[2][2]; /* left and right, both ends */
+    int usable[2];
+    for (int k = 0; k < 2; k++) usable[k] = txi_stroke_flanks(w, c, k ? 1 : -1, f[k]);
+    const int first = usable[1] && (!usable[0] || f[1][0].width < f[0][0].width); /* the narrower one */
+    for (int n = 0; n < 2; n++) {
+        const int k = n ? !first : first;
+        if (!usable[k]) continue;
+        *status = txi_other_edge(w, c, f[k], k ? 1 : -1, arena, env, edge);
+        if (*status != TXM_OK) return 0;
+        if (edge->first >= 0 && txi_edge_replaces(l, curves, count, i, partners, edge, gone)) return 1;
+    }
+    return 0;
+}
+
+/* Does curve i cross another one in the hole? Only then an edge can be hidden by a stroke. */
+static int txi_curve_crosses(const txi_curve *curves, int count, int i) {
+    const txi_curve *a = &curves[i];
+    for (int k = 0; k < count; k++) {
+        const txi_curve *b = &curves[k];
+        if (k == i || b->count < 2) continue;
+        for (int m = a->first; m + TXI_CROSS_STEP <= a->last; m += TXI_CROSS_STEP) {
+            for (int n = b->first; n + TXI_CROSS_STEP <= b->last; n += TXI_CROSS_STEP) {
+                if (txi_segments_cross(a->points[m], a->points[m + TXI_CROSS_STEP], b->points[n],
+                                       b->points[n + TXI_CROSS_STEP]))
+                    return 1;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Complete strokes of which only one edge was joined.
+
+   curves  *count curves in the arena, replaced by an array with the new edges, which are partners of the
+           joined ones; curves that were found for their ends are gone
+   cost    O(curves * ends * points)                                                            */
+static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm_arena *arena, txm_env *env,
+                                    txi_curve **curves, int *count) {
+    const int most = 2 * *count;
+    int n = *count, kept = 0;
+    txm_arena scratch;
+    txm_status status = TXM_OK;
+    if (n == 0) return TXM_OK;
+    txm_arena_init(&scratch, env);
+    txi_curve *c = (txi_curve *)txm_arena_alloc(arena, (size_t)most, sizeof *c);
+    int *partners = (int *)txm_arena_alloc(&scratch, (size_t)most, sizeof *partners);
+    int *place = (int *)txm_arena_alloc(&scratch, (size_t)most, sizeof *place);
+    uint8_t *done = (uint8_t *)txm_arena_zero(&scratch, (size_t)most, 2);
+    float *widths = (float *)txm_arena_alloc(&scratch, (size_t)n, (size_t)n * sizeof *widths);
+    if (scratch.failed || arena->failed) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        memcpy(c, *curves, (size_t)n * sizeof *c);
+        txi_find_strokes(w, c, n, partners, widths);
+    }
+    for (int round = 0; round < *count && status == TXM_OK; round++) {
+        uint8_t *gone = done + most;
+        int i = -1;
+        for (int k = 0; k < *count; k++) {
+            if (done[k] || partners[k] >= 0 || c[k].ends[1] < 0 || c[k].last <= c[k].first) continue;
+            if (i < 0 || c[k].cost < c[i].cost) i = k;
+        }
+        if (i < 0) break;
+        done[i] = 1;
+        if (!txi_curve_crosses(c, n, i)) continue;
+        if (!txi_whole_stroke(w, l, c, n, i, partners, arena, env, gone, &c[n], &status)) continue;
+        for (int k = 0; k < n; k++) {
+            if (!gone[k]) continue;
+            c[k].count = 0;
+            c[k].ends[0] = c[k].ends[1] = -1;
+            done[k] = 1;
+        }
+        c[n].partner = partners[n] = i;
+        c[i].partner = partners[i] = n;
+        n++;
+        if (txm_progress(env, 0, "lines")) status = txi_stopped(env);
+    }
+    for (int k = 0; k < n && status == TXM_OK; k++) place[k] = c[k].count ? kept++ : -1;
+    for (int k = 0; k < n && status == TXM_OK; k++) {
+        if (place[k] < 0) continue;
+        c[place[k]] = c[k];
+        if (c[k].partner >= 0) c[place[k]].partner = place[c[k].partner];
+    }
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) return status;
+    *curves = c;
+    *count = kept;
+    return TXM_OK;
+}
+
+/* ---- strokes that cross -------------------------------------------------------------------------
+   Where two strokes cross in the hole one covers the other, and what lies beside one of them is not its
+   own. Such strokes are laid bare: as wide as they are and not with their surroundings. Which is on top
+   is seen where they cross in the known part, near the hole; where they do not, the narrower and stronger
+   one is: in pictures thin things lie before thick ones more often than behind them.               */
+
+enum {
+    TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours         */
+    TXI_COVER_TONE = 32,    /* levels; colours that differ more are never those of one stroke; ours     */
+    TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours                   */
+};
+
+/* How far four of five colours inside of a stroke are from the usual ones at most, in columns from..to;
+   texture, or something that covers it. 255: nothing is known. */
+static int txi_cover_spread(const txi_strip *s, int from, int to) {
+    int counts[256] = {0}, n = 0, value = 0;
+    for (int i = from; i <= to; i++) {
+        for (int j = TXI_STRIP_MARGIN + 1; j < TXI_STRIP_MARGIN + s->inside; j++) {
+            const size_t at = (size_t)i * (size_t)s->rows + (size_t)j;
+            if (!s->known[at]) continue;
+            counts[txm_clampi((int)txi_typical_distance(s, j, s->color + 3 * at), 0, 255)]++;
+            n++;
+        }
+    }
+    if (n == 0) return 255;
+    for (int sum = counts[0]; 5 * sum < 4 * n && value < 255; sum += counts[value]) value++;
+    return value;
+}
+
+/* The usual colour of each row of a stroke: the median of its known columns near the hole. */
+static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_arena *arena, txm_env *env) {
+    const int from = s->first > TXI_COVER_COLUMNS ? s->first - TXI_COVER_COLUMNS : 0;
+    const int behind = s->tail ? s->last : s->last + TXI_COVER_COLUMNS;
+    const int to = behind < s->line.count - 1 ? behind : s->line.count - 1;
+    s->typical = (uint8_t *)txm_arena_zero(arena, (size_t)s->rows, 3);
+    if (!s->typical) return txi_no_memory(env);
+    for (int k = 0; k < 3 * s->rows; k++) {
+        int counts[256] = {0}, n = 0, value = 0;
+        for (int i = from; i <= to; i++) {
+            const size_t at = (size_t)i * (size_t)s->rows + (size_t)(k / 3);
+            if ((i >= s->first && i <= s->last) || !s->known[at]) continue;
+            counts[s->color[3 * at + (size_t)(k % 3)]]++;
+            n++;
+        }
+        for (int sum = counts[0]; 2 * sum < n && value < 255; sum += counts[value]) value++;
+        s->typical[k] = (uint8_t)value;
+    }
+    const int before = txi_cover_spread(s, from, s->first - 1), after = txi_cover_spread(s, s->last + 1, to);
+    const float spread = 1.25f * (float)(before < after ? before : after);
+    s->tolerance = txm_maxf(txm_clampf(0.5f * curve->strength, 12, TXI_COVER_TONE), spread < 255 ? spread : 0);
+    return TXM_OK;
+}
+
+/* Where a place lies in a stroke: its distance from the middle in half widths (1 and more: beside it);
+   a large number beyond its ends. */
+static double txi_cover_across(const txi_strip *s, double x, double y) {
+    double best = 1e30;
+    int column = 0;
+    for (int i = 0; i < s->line.count; i += 2) {
+        const double dx = x - s->line.place[i].x, dy = y - s->line.place[i].y;
+        if (dx * dx + dy * dy >= best) continue;
+        best = dx * dx + dy * dy;
+        column = i;
+    }
+    const txm_vec2 t = s->line.along[column], p = s->line.place[column];
+    const double dx = x - p.x, dy = y - p.y, half = s->line.half[column];
+    const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
+    if (ahead > 3 || ahead < -3 || half <= 0) return 1e9;
+    return (across < 0 ? -across : across) / half;
+}
+
+/* How many places in the known part, near the hole, where a and b cross show the colour of a, less those
+   that show the colour of b. *inside: how many lie in both in the hole. */
+static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_strip *b, int *inside) {
+    const int middle = TXI_STRIP_MARGIN + a->inside / 2, other = TXI_STRIP_MARGIN + b->inside / 2;
+    int votes = 0;
+    *inside = 0;
+    for (int i = a->first - TXI_COVER_COLUMNS; i <= a->last + TXI_COVER_COLUMNS; i++) {
+        if (i < 0 || i >= a->line.count) continue;
+        const txm_vec2 n = txi_normal_of(a->line.along[i]), p = a->line.place[i];
+        for (int k = -2; k <= 2; k++) {
+            const double away = 0.4 * k * (double)a->line.half[i];
+            const double x = (double)p.x + away * (double)n.x, y = (double)p.y + away * (double)n.y;
+            const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
+            int rgb[3];
+            if (at < 0 || w->state[at] == TXI_VOID || txi_cover_across(b, x, y) > 0.8) continue;
+            if (w->state[at] == TXI_HOLE) ++*inside;
+            if (!txi_strip_pixel(w, x, y, rgb)) continue;
+            double of_a = 0, of_b = 0;
+            for (int c = 0; c < 3; c++) {
+                const double u = rgb[c] - a->typical[3 * middle + c], v = rgb[c] - b->typical[3 * other + c];
+                of_a += u * u / 3;
+                of_b += v * v / 3;
+            }
+            if (of_a < of_b && of_a < (double)(a->tolerance * a->tolerance)) votes++;
+            if (of_b < of_a && of_b < (double)(b->tolerance * b->tolerance)) votes--;
+        }
+    }
+    return votes;
+}
+
+/* Is a row of a bare stroke part of it? One row beside it is, too. */
+static int txi_cover_row(const txi_strip *s, int j) {
+    return j >= TXI_STRIP_MARGIN - 1 && j <= TXI_STRIP_MARGIN + s->inside + 1;
+}
+
+/* A stroke that crosses others: only what has its usual colours counts as known. */
+static void txi_cover_bare(txi_strip *s) {
+    s->is_bare = 1;
+    for (int i = 0; i < s->line.count; i++) {
+        for (int j = 0; j < s->rows; j++) {
+            const size_t at = (size_t)i * (size_t)s->rows + (size_t)j;
+            if (!txi_cover_row(s, j) ||
+                txi_typical_distance(s, j, s->color + 3 * at) > (double)s->tolerance)
+                s->known[at] = 0;
+        }
+    }
+}
+
+/* Find the strokes that cross in the hole, and what covers what.
+   above  count^2: 1 where stroke i lies on stroke j, seen in the known part
+   cost   O(strokes^2 * points^2), of those whose boxes overlap                                 */
+static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const txi_curve *curves, int count,
+                                 uint8_t *above, txm_arena *arena, txm_env *env) {
+    for (int i = 0; i < count; i++) {
+        if (strips[i].partner < 0) continue;
+        const txm_status status = txi_cover_typical(&strips[i], &curves[strips[i].curve], arena, env);
+        if (status != TXM_OK) return status;
+    }
+    for (int i = 0; i < count; i++) {
+        for (int j = i + 1; j < count; j++) {
+            int inside;
+            if (strips[i].partner < 0 || strips[j].partner < 0) continue;
+            const int votes = txi_cover_votes(w, &strips[i], &strips[j], &inside);
+            if (inside < 3) continue;
+            strips[i].is_bare = strips[j].is_bare = 1;
+            above[i * count + j] = votes >= TXI_COVER_VOTES;
+            above[j * count + i] = votes <= -TXI_COVER_VOTES;
+        }
+        if (txm_progress(env, 0, "strips")) return txi_stopped(env);
+    }
+    for (int i = 0; i < count; i++)
+        if (strips[i].is_bare) txi_cover_bare(&strips[i]);
+    return TXM_OK;
+}
+
 /* ---- the graph of all patches -------------------------------------------------------------------
    The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with those
    of the other.                                                                                 */
@@ -10170,8 +10663,11 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
         s->tail = curves[i].ends[1] < 0;
         s->is_open = is_open[i];
         s->line = lines[i];
+        const int even = p >= 0 && curves[i].partner == p && lines[i].count == curves[i].count &&
+                         curves[p].count == curves[i].count;
         if (p >= 0 && !done[p] && lines[p].count >= 2 &&
-            txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {
+            (even ? txi_ribbon_widen_even(&s->line, curves[i].points, curves[p].points, width)
+                  : txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width))) {
             double sum = 0;
             for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
             s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
@@ -10188,25 +10684,43 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     return TXM_OK;
 }
 
-/* The order in which strips cover each other: strokes over single lines, lines that go through over
-   those that end in the hole, then the stronger ones. */
+/* The order in which strips cover each other, as far as is not seen which lies on top: strokes that cross
+   others first, of these the narrower and stronger ones; strokes over single lines, lines that go through over those that
+   end in the hole, then the stronger ones. */
+static uint32_t txi_strip_rank(const txi_strip *s, const txi_curve *c) {
+    const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
+    const uint32_t through = c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0;
+    if (s->is_bare) return (1u << 30) + through + strength / (uint32_t)(s->inside + 1);
+    return (s->partner >= 0 ? 1u << 29 : 0) + through + strength;
+}
+
+/* The strips from top to bottom. Of those that nothing else that is left lies on (if there is none, of all)
+   the one of the highest rank comes next. */
 static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
                                    txm_env *env) {
     const size_t count = (size_t)all->count;
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, 2 * count, sizeof *pairs);
+    uint8_t *above = (uint8_t *)txm_arena_zero(arena, count, count);
+    uint8_t *placed = (uint8_t *)txm_arena_zero(arena, count, 1);
     if (arena->failed) return txi_no_memory(env);
-    for (size_t i = 0; i < count; i++) {
-        const txi_strip *s = &all->strips[i];
-        const txi_curve *c = &curves[s->curve];
-        const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
-        const uint32_t bonus = (s->partner >= 0 ? 1u << 29 : 0) +
-                               (c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0);
-        pairs[i].key = UINT32_MAX - bonus - strength;
-        pairs[i].value = (uint32_t)i;
+    const txm_status status =
+        txi_cover_find(all->w, all->strips, curves, all->count, above, arena, env);
+    for (int n = 0; n < all->count; n++) {
+        int best = -1, best_under = 0;
+        uint32_t best_rank = 0;
+        for (int i = 0; i < all->count; i++) {
+            int under = 0;
+            if (placed[i]) continue;
+            for (int j = 0; j < all->count; j++) under |= !placed[j] && above[(size_t)j * count + (size_t)i];
+            const uint32_t rank = txi_strip_rank(&all->strips[i], &curves[all->strips[i].curve]);
+            if (best >= 0 && (under > best_under || (under == best_under && rank <= best_rank))) continue;
+            best = i;
+            best_under = under;
+            best_rank = rank;
+        }
+        placed[best] = 1;
+        all->order[n] = best;
     }
-    txm_sort_pairs(pairs, pairs + count, count);
-    for (size_t i = 0; i < count; i++) all->order[i] = (int)pairs[i].value;
-    return TXM_OK;
+    return status;
 }
 
 /* ---- where strips meet ---- */
@@ -10430,6 +10944,8 @@ enum {
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
 };
 #define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
+#define TXI_LAY_BARE 1.0    /* the same for strokes that cross others                             */
+#define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches                  */
 #define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case              */
 
 /* ---- cuts and colours between patches ---- */
@@ -10582,6 +11098,13 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
     return 1;
 }
 
+/* What a pixel on the edge of a bare stroke is where another stroke lies under it: a piece of its inside. */
+typedef struct txi_lay_edge {
+    float x, y;       /* where that is copied from                                               */
+    uint8_t color[3];
+    uint8_t is_used;
+} txi_lay_edge;
+
 /* Which columns of a strip the pixels near it belong to. Arrays of one item per window pixel. */
 typedef struct txi_lay {
     txi_strips *all;
@@ -10589,6 +11112,7 @@ typedef struct txi_lay {
     txi_pose *poses;
     float *squares;   /* squared distance to the nearest column of the current strip               */
     int32_t *columns; /* that column, or -1                                                      */
+    txi_lay_edge *edges; /* NULL: no stroke is bare                                                */
     float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
 } txi_lay;
 
@@ -10647,16 +11171,16 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
 /* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
    less towards the end of a line that ends in the hole. */
 static int txi_lay_pull(const txi_strip *s, double away, int column) {
-    double pull = away <= (double)TXI_LAY_CORE
-                      ? 1
-                      : ((double)TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
+    const double core = s->is_bare ? TXI_LAY_BARE : (double)TXI_LAY_CORE;
+    const double margin = s->is_bare ? TXI_LAY_BARE + 1 : (double)TXI_STRIP_MARGIN;
+    double pull = away <= core ? 1 : (margin - away) / (margin - core);
     if (s->is_open && s->line.count - 1 - column < TXI_LAY_FADE)
         pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
-/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends, at its
-   side, or another strip has a better claim to it. */
+/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends or at its
+   side. */
 typedef struct txi_strip_spot {
     double column, row, across, away, half;
     float claim;
@@ -10672,8 +11196,9 @@ static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, si
     o->away = (o->across < 0 ? -o->across : o->across) - o->half;
     o->column = i + ahead;
     o->row = txi_offset_row(o->across, s->inside, o->half);
-    o->claim = o->away > TXI_LAY_CLAIM ? txm_float(o->away - TXI_LAY_CLAIM) : 0;
-    return ahead <= 1.5 && ahead >= -1.5 && o->away < (double)TXI_STRIP_MARGIN && o->claim < lay->claims[at];
+    const double core = s->is_bare ? 0 : TXI_LAY_CLAIM;
+    o->claim = o->away > core ? txm_float(o->away - core) : 0;
+    return ahead <= 1.5 && ahead >= -1.5 && o->away < (double)TXI_STRIP_MARGIN;
 }
 
 static uint8_t txi_lay_round(double value) {
@@ -10694,14 +11219,43 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
     const double mix = (forward ? o->column - centre : centre - o->column) / s->hop;
     double rgb[3];
     if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return 0;
+    if (s->is_bare && o->away > 0) { /* what lies beside the source is not always the usual background */
+        uint8_t beside[3];
+        for (int c = 0; c < 3; c++) beside[c] = txi_lay_round(rgb[c]);
+        if (txi_typical_distance(s, j, beside) > (double)s->tolerance) return 0;
+    }
     for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
         const double here = (double)offset[c], there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
         lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
+    if (lay->edges) {
+        txi_lay_edge *edge = &lay->edges[at];
+        edge->is_used = 0;
+        if (s->is_bare && o->away > -TXI_LAY_EDGE && o->half > 2 * TXI_LAY_EDGE) {
+            const double across = o->half - TXI_LAY_EDGE;
+            const double inner = txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
+            const txm_vec2 q = txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
+            edge->is_used = (uint8_t)txi_lay_pixel(lay->all->w, (double)q.x, (double)q.y, rgb);
+            for (int c = 0; c < 3; c++) edge->color[c] = txi_lay_round(rgb[c] + (double)offset[c]);
+            edge->x = q.x;
+            edge->y = q.y;
+        }
+    }
     lay->plan->copies[at].x = p.x;
     lay->plan->copies[at].y = p.y;
     lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
+    lay->plan->copies[at].layer = s->is_bare ? s->node + 1 : 0;
     return 1;
+}
+
+/* A stroke lies under the one that has a pixel: at the edge of that there is no background to be seen. */
+static void txi_lay_over(txi_lay *lay, size_t at) {
+    txi_lay_edge *edge = &lay->edges[at];
+    if (!edge->is_used) return;
+    edge->is_used = 0;
+    memcpy(lay->plan->color + 4 * at, edge->color, 3);
+    lay->plan->copies[at].x = edge->x;
+    lay->plan->copies[at].y = edge->y;
 }
 
 /* One pixel of a strip. */
@@ -10709,6 +11263,10 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
     const size_t at = (size_t)y * (size_t)lay->all->w->width + (size_t)x;
     txi_strip_spot o;
     if (!txi_lay_spot(lay, s, x, y, at, &o)) return;
+    if (o.claim >= lay->claims[at]) { /* it is another strip's */
+        if (s->is_bare && o.away < 0) txi_lay_over(lay, at);
+        return;
+    }
     const int pull = txi_lay_pull(s, o.away, lay->columns[at]);
     if (!pull) return;
     if (s->node_count) {
@@ -10819,6 +11377,11 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
     lay.squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.squares);
     lay.columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay.columns);
     lay.claims = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.claims);
+    lay.edges = NULL;
+    for (int i = 0; i < all->count; i++) {
+        if (all->strips[i].is_bare && !lay.edges && !scratch->failed)
+            lay.edges = (txi_lay_edge *)txm_arena_zero(scratch, pixels, sizeof *lay.edges);
+    }
     lay.poses = *poses = (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
     plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
     plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
@@ -10828,7 +11391,7 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
         lay.claims[i] = TXI_STRIP_MARGIN;
         plan->copies[i].x = plan->copies[i].y = 0;
         plan->copies[i].piece = -1;
-        plan->copies[i].pose = 0;
+        plan->copies[i].pose = plan->copies[i].layer = 0;
     }
     txi_lay_all(&lay);
     txi_guide(all, lines, plan);
@@ -13573,6 +14136,8 @@ enum {
 #define TXI_SHARE_LEAST 0.2   /* of a pixel that is known, from which on it counts; ours          */
 #define TXI_SHARE_WEIGHT 8.0  /* w(p) of a pixel that is known but for next to nothing; ours      */
 #define TXI_SHARE_JUMP 0.45   /* as TXI_RIM_JUMP, for v(p) - known(p)                             */
+#define TXI_LAYER_JUMP 0.05   /* the same at the edges and ends of strokes that cross others, which known
+                                 strokes may cover there                                         */
 
 /* One map of a window while it is blended. */
 typedef struct txi_blend {
@@ -13703,6 +14268,11 @@ static void txi_blend_link(txi_blend *b, size_t i, int k) {
     if (j < 0 && !txi_is_known(b->w, x, y)) return;
     vq = j < 0 ? b->known + (size_t)q * (size_t)b->channels : b->value + (size_t)j * (size_t)b->channels;
     scale = j < 0 ? TXI_RIM_JUMP : TXI_BLEND_JUMP;
+    const int32_t mine_layer = b->copies[p].layer, other_layer = j < 0 ? 0 : b->copies[q].layer;
+    if (mine_layer != other_layer) {
+        if (mine_layer && other_layer) return; /* one stroke covers the other */
+        scale = TXI_LAYER_JUMP;
+    }
     if (j < 0 || b->copies[p].piece != b->copies[q].piece) {
         const int mine = txi_excess(b, p, q, dx[k], dy[k], 0, vp, vq, jump);
         both = mine;
@@ -13959,6 +14529,8 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env *
     if (h->structure != TEXINPAINT_TEXTURE) {
         status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
                           arena, env, &h->curves, &h->curve_count);
+        if (status == TXM_OK && h->structure == TEXINPAINT_PICTURE)
+            status = txi_whole_strokes(c->w, &c->lines, arena, env, &h->curves, &h->curve_count);
         if (status == TXM_OK && h->curve_count > 0) {
             status = TXI_LEFT_OUT & TXI_STRIPS
                          ? txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, arena, env, &h->plan)

@@ -356,6 +356,8 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/belief.h"
 #include "texinpaint/stroke.h"
 #include "texinpaint/strip.h"
+#include "texinpaint/whole.h"
+#include "texinpaint/cover.h"
 #include "texinpaint/chain.h"
 #include "texinpaint/lay.h"
 #include "texinpaint/picture.h"

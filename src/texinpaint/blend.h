@@ -33,6 +33,8 @@ enum {
 #define TXI_SHARE_LEAST 0.2   /* of a pixel that is known, from which on it counts; ours          */
 #define TXI_SHARE_WEIGHT 8.0  /* w(p) of a pixel that is known but for next to nothing; ours      */
 #define TXI_SHARE_JUMP 0.45   /* as TXI_RIM_JUMP, for v(p) - known(p)                             */
+#define TXI_LAYER_JUMP 0.05   /* the same at the edges and ends of strokes that cross others, which known
+                                 strokes may cover there                                         */
 
 /* One map of a window while it is blended. */
 typedef struct txi_blend {
@@ -163,6 +165,11 @@ static void txi_blend_link(txi_blend *b, size_t i, int k) {
     if (j < 0 && !txi_is_known(b->w, x, y)) return;
     vq = j < 0 ? b->known + (size_t)q * (size_t)b->channels : b->value + (size_t)j * (size_t)b->channels;
     scale = j < 0 ? TXI_RIM_JUMP : TXI_BLEND_JUMP;
+    const int32_t mine_layer = b->copies[p].layer, other_layer = j < 0 ? 0 : b->copies[q].layer;
+    if (mine_layer != other_layer) {
+        if (mine_layer && other_layer) return; /* one stroke covers the other */
+        scale = TXI_LAYER_JUMP;
+    }
     if (j < 0 || b->copies[p].piece != b->copies[q].piece) {
         const int mine = txi_excess(b, p, q, dx[k], dy[k], 0, vp, vq, jump);
         both = mine;

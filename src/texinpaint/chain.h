@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_CHAIN_H
 #define TEXINPAINT_CHAIN_H
 
-#include "strip.h"
+#include "cover.h"
 
 /* ---- the graph of all patches -------------------------------------------------------------------
    The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with those
@@ -69,8 +69,11 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
         s->tail = curves[i].ends[1] < 0;
         s->is_open = is_open[i];
         s->line = lines[i];
+        const int even = p >= 0 && curves[i].partner == p && lines[i].count == curves[i].count &&
+                         curves[p].count == curves[i].count;
         if (p >= 0 && !done[p] && lines[p].count >= 2 &&
-            txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width)) {
+            (even ? txi_ribbon_widen_even(&s->line, curves[i].points, curves[p].points, width)
+                  : txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width))) {
             double sum = 0;
             for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
             s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
@@ -87,25 +90,43 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     return TXM_OK;
 }
 
-/* The order in which strips cover each other: strokes over single lines, lines that go through over
-   those that end in the hole, then the stronger ones. */
+/* The order in which strips cover each other, as far as is not seen which lies on top: strokes that cross
+   others first, of these the narrower and stronger ones; strokes over single lines, lines that go through over those that
+   end in the hole, then the stronger ones. */
+static uint32_t txi_strip_rank(const txi_strip *s, const txi_curve *c) {
+    const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
+    const uint32_t through = c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0;
+    if (s->is_bare) return (1u << 30) + through + strength / (uint32_t)(s->inside + 1);
+    return (s->partner >= 0 ? 1u << 29 : 0) + through + strength;
+}
+
+/* The strips from top to bottom. Of those that nothing else that is left lies on (if there is none, of all)
+   the one of the highest rank comes next. */
 static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
                                    txm_env *env) {
     const size_t count = (size_t)all->count;
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, 2 * count, sizeof *pairs);
+    uint8_t *above = (uint8_t *)txm_arena_zero(arena, count, count);
+    uint8_t *placed = (uint8_t *)txm_arena_zero(arena, count, 1);
     if (arena->failed) return txi_no_memory(env);
-    for (size_t i = 0; i < count; i++) {
-        const txi_strip *s = &all->strips[i];
-        const txi_curve *c = &curves[s->curve];
-        const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
-        const uint32_t bonus = (s->partner >= 0 ? 1u << 29 : 0) +
-                               (c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0);
-        pairs[i].key = UINT32_MAX - bonus - strength;
-        pairs[i].value = (uint32_t)i;
+    const txm_status status =
+        txi_cover_find(all->w, all->strips, curves, all->count, above, arena, env);
+    for (int n = 0; n < all->count; n++) {
+        int best = -1, best_under = 0;
+        uint32_t best_rank = 0;
+        for (int i = 0; i < all->count; i++) {
+            int under = 0;
+            if (placed[i]) continue;
+            for (int j = 0; j < all->count; j++) under |= !placed[j] && above[(size_t)j * count + (size_t)i];
+            const uint32_t rank = txi_strip_rank(&all->strips[i], &curves[all->strips[i].curve]);
+            if (best >= 0 && (under > best_under || (under == best_under && rank <= best_rank))) continue;
+            best = i;
+            best_under = under;
+            best_rank = rank;
+        }
+        placed[best] = 1;
+        all->order[n] = best;
     }
-    txm_sort_pairs(pairs, pairs + count, count);
-    for (size_t i = 0; i < count; i++) all->order[i] = (int)pairs[i].value;
-    return TXM_OK;
+    return status;
 }
 
 /* ---- where strips meet ---- */

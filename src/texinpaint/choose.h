@@ -6,6 +6,7 @@
 #include "judge.h"
 #include "lay.h"
 #include "prior.h"
+#include "whole.h"
 
 /* ---- hypotheses -------------------------------------------------------------------------------
    Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
@@ -99,6 +100,8 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env *
     if (h->structure != TEXINPAINT_TEXTURE) {
         status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
                           arena, env, &h->curves, &h->curve_count);
+        if (status == TXM_OK && h->structure == TEXINPAINT_PICTURE)
+            status = txi_whole_strokes(c->w, &c->lines, arena, env, &h->curves, &h->curve_count);
         if (status == TXM_OK && h->curve_count > 0) {
             status = TXI_LEFT_OUT & TXI_STRIPS
                          ? txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, arena, env, &h->plan)

@@ -57,6 +57,7 @@ typedef struct txi_copy {
     int32_t piece; /* pixels of one piece (same pose, continuous) have the same number; -1 = not
                       in the hole                                                             */
     int32_t pose;  /* index into the poses                                                    */
+    int32_t layer; /* pixels of one stroke that crosses others have the same number; 0 = no such  */
 } txi_copy;
 
 /* A line through the hole, completed: points about one pixel apart, from the known side through the

@@ -16,6 +16,8 @@ enum {
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
 };
 #define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
+#define TXI_LAY_BARE 1.0    /* the same for strokes that cross others                             */
+#define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches                  */
 #define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case              */
 
 /* ---- cuts and colours between patches ---- */
@@ -168,6 +170,13 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
     return 1;
 }
 
+/* What a pixel on the edge of a bare stroke is where another stroke lies under it: a piece of its inside. */
+typedef struct txi_lay_edge {
+    float x, y;       /* where that is copied from                                               */
+    uint8_t color[3];
+    uint8_t is_used;
+} txi_lay_edge;
+
 /* Which columns of a strip the pixels near it belong to. Arrays of one item per window pixel. */
 typedef struct txi_lay {
     txi_strips *all;
@@ -175,6 +184,7 @@ typedef struct txi_lay {
     txi_pose *poses;
     float *squares;   /* squared distance to the nearest column of the current strip               */
     int32_t *columns; /* that column, or -1                                                      */
+    txi_lay_edge *edges; /* NULL: no stroke is bare                                                */
     float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
 } txi_lay;
 
@@ -233,16 +243,16 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
 /* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
    less towards the end of a line that ends in the hole. */
 static int txi_lay_pull(const txi_strip *s, double away, int column) {
-    double pull = away <= (double)TXI_LAY_CORE
-                      ? 1
-                      : ((double)TXI_STRIP_MARGIN - away) / (TXI_STRIP_MARGIN - TXI_LAY_CORE);
+    const double core = s->is_bare ? TXI_LAY_BARE : (double)TXI_LAY_CORE;
+    const double margin = s->is_bare ? TXI_LAY_BARE + 1 : (double)TXI_STRIP_MARGIN;
+    double pull = away <= core ? 1 : (margin - away) / (margin - core);
     if (s->is_open && s->line.count - 1 - column < TXI_LAY_FADE)
         pull *= (double)(s->line.count - column) / (TXI_LAY_FADE + 1);
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
-/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends, at its
-   side, or another strip has a better claim to it. */
+/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends or at its
+   side. */
 typedef struct txi_strip_spot {
     double column, row, across, away, half;
     float claim;
@@ -258,8 +268,9 @@ static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, si
     o->away = (o->across < 0 ? -o->across : o->across) - o->half;
     o->column = i + ahead;
     o->row = txi_offset_row(o->across, s->inside, o->half);
-    o->claim = o->away > TXI_LAY_CLAIM ? txm_float(o->away - TXI_LAY_CLAIM) : 0;
-    return ahead <= 1.5 && ahead >= -1.5 && o->away < (double)TXI_STRIP_MARGIN && o->claim < lay->claims[at];
+    const double core = s->is_bare ? 0 : TXI_LAY_CLAIM;
+    o->claim = o->away > core ? txm_float(o->away - core) : 0;
+    return ahead <= 1.5 && ahead >= -1.5 && o->away < (double)TXI_STRIP_MARGIN;
 }
 
 static uint8_t txi_lay_round(double value) {
@@ -280,14 +291,43 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
     const double mix = (forward ? o->column - centre : centre - o->column) / s->hop;
     double rgb[3];
     if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return 0;
+    if (s->is_bare && o->away > 0) { /* what lies beside the source is not always the usual background */
+        uint8_t beside[3];
+        for (int c = 0; c < 3; c++) beside[c] = txi_lay_round(rgb[c]);
+        if (txi_typical_distance(s, j, beside) > (double)s->tolerance) return 0;
+    }
     for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
         const double here = (double)offset[c], there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
         lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
+    if (lay->edges) {
+        txi_lay_edge *edge = &lay->edges[at];
+        edge->is_used = 0;
+        if (s->is_bare && o->away > -TXI_LAY_EDGE && o->half > 2 * TXI_LAY_EDGE) {
+            const double across = o->half - TXI_LAY_EDGE;
+            const double inner = txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
+            const txm_vec2 q = txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
+            edge->is_used = (uint8_t)txi_lay_pixel(lay->all->w, (double)q.x, (double)q.y, rgb);
+            for (int c = 0; c < 3; c++) edge->color[c] = txi_lay_round(rgb[c] + (double)offset[c]);
+            edge->x = q.x;
+            edge->y = q.y;
+        }
+    }
     lay->plan->copies[at].x = p.x;
     lay->plan->copies[at].y = p.y;
     lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
+    lay->plan->copies[at].layer = s->is_bare ? s->node + 1 : 0;
     return 1;
+}
+
+/* A stroke lies under the one that has a pixel: at the edge of that there is no background to be seen. */
+static void txi_lay_over(txi_lay *lay, size_t at) {
+    txi_lay_edge *edge = &lay->edges[at];
+    if (!edge->is_used) return;
+    edge->is_used = 0;
+    memcpy(lay->plan->color + 4 * at, edge->color, 3);
+    lay->plan->copies[at].x = edge->x;
+    lay->plan->copies[at].y = edge->y;
 }
 
 /* One pixel of a strip. */
@@ -295,6 +335,10 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
     const size_t at = (size_t)y * (size_t)lay->all->w->width + (size_t)x;
     txi_strip_spot o;
     if (!txi_lay_spot(lay, s, x, y, at, &o)) return;
+    if (o.claim >= lay->claims[at]) { /* it is another strip's */
+        if (s->is_bare && o.away < 0) txi_lay_over(lay, at);
+        return;
+    }
     const int pull = txi_lay_pull(s, o.away, lay->columns[at]);
     if (!pull) return;
     if (s->node_count) {
@@ -405,6 +449,11 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
     lay.squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.squares);
     lay.columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay.columns);
     lay.claims = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.claims);
+    lay.edges = NULL;
+    for (int i = 0; i < all->count; i++) {
+        if (all->strips[i].is_bare && !lay.edges && !scratch->failed)
+            lay.edges = (txi_lay_edge *)txm_arena_zero(scratch, pixels, sizeof *lay.edges);
+    }
     lay.poses = *poses = (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
     plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
     plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
@@ -414,7 +463,7 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
         lay.claims[i] = TXI_STRIP_MARGIN;
         plan->copies[i].x = plan->copies[i].y = 0;
         plan->copies[i].piece = -1;
-        plan->copies[i].pose = 0;
+        plan->copies[i].pose = plan->copies[i].layer = 0;
     }
     txi_lay_all(&lay);
     txi_guide(all, lines, plan);

@@ -30,6 +30,7 @@ enum {
     TXI_STRIP_CELLS = 4 << 20, /* of all tables of overlaps, 4 bytes each: 16 MB                  */
     TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
     TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
+    TXI_STRIP_CLEAN = 24,    /* columns of a stroke that show all of it, from which on others are not used */
     TXI_STRIP_ONWARD = 12,   /* pixels that lines without an end are continued behind the hole      */
     TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
@@ -58,6 +59,9 @@ typedef struct txi_strip {
     int first, last;    /* columns with hole pixels                                              */
     int tail;           /* columns behind the hole are no known part of the line, or are missing   */
     int is_open;        /* the line ends in the hole                                             */
+    int is_bare;        /* a stroke that crosses others: see cover.h                               */
+    uint8_t *typical;   /* its usual colours, 3 per row; NULL: not known                           */
+    float tolerance;    /* levels; colours farther from the usual ones are not those of the stroke   */
     txi_ribbon line;
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
@@ -287,6 +291,25 @@ static void txi_ribbon_crop(txi_ribbon *r, int lo, int hi) {
     r->count = hi - lo;
 }
 
+/* Make a stroke of columns lo..hi - 1 of a line, its other side `width` to the right, or all to the left;
+   the other columns are cropped. 0: it would be narrower than a pixel or wider than TXI_STRIP_INSIDE. */
+static int txi_ribbon_widen_by(txi_ribbon *r, int lo, int hi, const float *width) {
+    const double sign = width[lo] > 0 ? 1 : -1;
+    for (int i = lo; i < hi; i++) {
+        const double d = sign * (double)width[i];
+        if (!(d >= 1 && d <= (double)TXI_STRIP_INSIDE)) return 0;
+    }
+    for (int i = lo; i < hi; i++) {
+        const txm_vec2 n = txi_normal_of(r->along[i]);
+        const double half = 0.5 * txi_running_mean(width + lo, hi - lo, 1, i - lo, 4);
+        r->place[i].x = txm_float((double)r->place[i].x + half * (double)n.x);
+        r->place[i].y = txm_float((double)r->place[i].y + half * (double)n.y);
+        r->half[i] = txm_float(half < 0 ? -half : half);
+    }
+    txi_ribbon_crop(r, lo, hi);
+    return 1;
+}
+
 /* Widen a line to the stroke between it and its partner, where both run along each other. 0: they do
    not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then unchanged.
    width  room for a float per column                                                            */
@@ -311,20 +334,17 @@ static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first,
         }
     }
     if (lo > first || hi <= last || hi - lo < 2) return 0;
-    const double sign = width[lo] > 0 ? 1 : -1;
-    for (int i = lo; i < hi; i++) {
-        const double d = sign * (double)width[i];
-        if (!(d >= 1 && d <= (double)TXI_STRIP_INSIDE)) return 0;
+    return txi_ribbon_widen_by(r, lo, hi, width);
+}
+
+/* The same for a partner that is the line itself, moved sideways: the points of both are paired. */
+static int txi_ribbon_widen_even(txi_ribbon *r, const txm_vec2 *points, const txm_vec2 *moved, float *width) {
+    for (int i = 0; i < r->count; i++) {
+        const txm_vec2 t = r->along[i];
+        const double x = (double)moved[i].x - points[i].x, y = (double)moved[i].y - points[i].y;
+        width[i] = txm_float(y * (double)t.x - x * (double)t.y);
     }
-    for (int i = lo; i < hi; i++) {
-        const txm_vec2 n = txi_normal_of(r->along[i]);
-        const double half = 0.5 * txi_running_mean(width + lo, hi - lo, 1, i - lo, 4);
-        r->place[i].x = txm_float((double)r->place[i].x + half * (double)n.x);
-        r->place[i].y = txm_float((double)r->place[i].y + half * (double)n.y);
-        r->half[i] = txm_float(half < 0 ? -half : half);
-    }
-    txi_ribbon_crop(r, lo, hi);
-    return 1;
+    return txi_ribbon_widen_by(r, 0, r->count, width);
 }
 
 /* ---- the strip's own columns ---- */
@@ -409,16 +429,51 @@ static int txi_columns_own(txi_strip *s, int mirrored) {
     return s->source_count - before;
 }
 
-/* The weight of a row's colours in costs, in quarters: rows far from the lines count less. */
-static int txi_row_weight(int j, int inside) {
-    const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > inside ? k - inside : 0;
+/* The weight of a row's colours in costs, in quarters: rows far from the lines count less, those beside a
+   bare stroke hardly or not. */
+static int txi_row_weight(const txi_strip *s, int j) {
+    const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > s->inside ? k - s->inside : 0;
+    if (s->is_bare) return out == 0 ? 4 : out == 1;
     return out <= 3 ? 4 : out <= 6 ? 3 : 2;
+}
+
+/* How far a colour is from the usual one of a row, levels. */
+static double txi_typical_distance(const txi_strip *s, int j, const uint8_t *color) {
+    int sum = 0;
+    for (int c = 0; c < 3; c++) {
+        const int d = color[c] - s->typical[3 * j + c];
+        sum += d * d;
+    }
+    return sqrt(sum / 3.0);
+}
+
+/* How many rows of a column, from the edge or `beside` rows beside it, do not show the bare stroke, but
+   something that covers it or lies beside it. */
+static int txi_column_other(const txi_strip *s, const uint8_t *color, int beside) {
+    int other = 0;
+    for (int j = TXI_STRIP_MARGIN - beside; j <= TXI_STRIP_MARGIN + s->inside + beside; j++)
+        other += txi_typical_distance(s, j, color + 3 * j) > (double)s->tolerance;
+    return other;
+}
+
+/* Of the usable source columns of a bare stroke only those stay that show it: edges and all, if there are
+   enough of them. */
+static void txi_columns_bare(txi_strip *s) {
+    int clean = 0;
+    for (int i = 0; i < s->source_count; i++)
+        clean += s->sources[i].before == 0 &&
+                 !txi_column_other(s, s->source_color + 3 * i * s->rows, 1);
+    for (int i = 0; i < s->source_count; i++) {
+        const uint8_t *color = s->source_color + 3 * i * s->rows;
+        const int other = txi_column_other(s, color, clean >= TXI_STRIP_CLEAN);
+        if (clean >= TXI_STRIP_CLEAN ? other > 0 : 6 * other > s->inside) s->sources[i].before = -1;
+    }
 }
 
 static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t *feature) {
     for (int j = 0; j < s->rows; j++)
         for (int c = 0; c < 3; c++)
-            feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(j, s->inside) / 4);
+            feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(s, j) / 4);
 }
 
 /* Colours and features of the sources. Where a row is not known the nearest known one towards the line
@@ -426,7 +481,7 @@ static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t 
 static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     const size_t rows = (size_t)s->rows, count = (size_t)s->source_count;
-    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside, beside = s->is_bare ? 1 : 2;
     s->features = (3 * s->rows + 15) / 16 * 16;
     s->source_color = (uint8_t *)txm_arena_alloc(arena, count * rows, 3);
     s->source_feature =
@@ -442,7 +497,7 @@ static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_aren
             int rgb[3];
             known[j] = txi_strip_pixel(w, (double)p.x, (double)p.y, rgb) == 2;
             n += known[j];
-            if (j >= low - 2 && j <= high + 2) whole &= known[j];
+            if (j >= low - beside && j <= high + beside) whole &= known[j];
             for (int c = 0; c < 3; c++) color[3 * j + c] = (uint8_t)rgb[c];
         }
         for (int j = low - 1; j >= 0; j--)
@@ -450,8 +505,9 @@ static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_aren
         for (int j = high + 1; j < s->rows; j++)
             if (!known[j]) memcpy(color + 3 * j, color + 3 * (j - 1), 3);
         txi_strip_feature(s, color, s->source_feature + i * (size_t)s->features);
-        a->before = whole && 3 * n >= 2 * s->rows ? 0 : -1;
+        a->before = whole && (s->is_bare || 3 * n >= 2 * s->rows) ? 0 : -1;
     }
+    if (s->is_bare) txi_columns_bare(s);
     txi_column *a = s->sources;
     for (int i = 1; i < s->source_count; i++)
         if (a[i].before == 0 && a[i].run == a[i - 1].run) a[i].before = a[i - 1].before + 1;
