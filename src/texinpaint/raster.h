@@ -3,8 +3,9 @@
 
 #include "config.h"
 
-/* ---- places in a window -------------------------------------------------------------------- */
+/* ---- rasters: places -------------------------------------------------------------------- */
 
+/* a (1 - t) + b t */
 static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
     return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
 }
@@ -14,93 +15,36 @@ static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
     return sqrt(x * x + y * y);
 }
 
+/* unit length in the same direction; (1, 0) for the zero vector */
 static inline txm_vec2 txi_unit(double x, double y) {
     const double n = sqrt(x * x + y * y);
     return n > 0 ? txm_v2(txm_float(x / n), txm_float(y / n)) : txm_v2(1, 0);
 }
 
-/* The pixel of a place, or -1 outside of the window. */
+/* The number of the pixel nearest to a place (pixel centres are whole numbers), -1 outside. */
 static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     if (!(x > -0.5 && y > -0.5 && x < width - 0.5 && y < height - 0.5)) return -1;
     const int column = (int)floor(x + 0.5), row = (int)floor(y + 0.5);
     return (ptrdiff_t)row * width + column;
 }
 
-/* ---- distances --------------------------------------------------------------------------- */
+/* ---- rasters: distances --------------------------------------------------------------------------- */
 
-enum { TXI_FAR = 1 << 28 }; /* squared distance to nothing                                       */
-
-/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, exact, in
-   integers; TXI_FAR if there is none. Columns first, then the lower envelope of parabolas along each
-   row (Meijster, Roerdink, Hesselink 2000).
-   scratch  3 * max(width, height) numbers
-   cost     O(width * height)                                                                     */
-static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
-    int32_t *row = scratch, *hull = row + width, *from = hull + width;
-    const int beyond = 16384; /* pixels; its square is TXI_FAR                                    */
-    for (int x = 0; x < width; x++) {
-        for (int pass = 0; pass < 2; pass++) {
-            int d = beyond;
-            for (int k = 0; k < height; k++) {
-                const size_t i = (size_t)(pass ? height - 1 - k : k) * (size_t)width + (size_t)x;
-                d = of[i] ? 0 : d < beyond ? d + 1 : beyond;
-                if (!pass || d < out[i]) out[i] = d;
-            }
-        }
-    }
-    for (int y = 0; y < height; y++) {
-        int32_t *o = out + (size_t)y * (size_t)width;
-        int top = 0;
-        for (int x = 0; x < width; x++) row[x] = o[x] >= beyond ? TXI_FAR : o[x] * o[x];
-        hull[0] = from[0] = 0;
-        for (int x = 1; x < width; x++) {
-            /* the parabola of x is the lowest from here on, compared with that on top of the hull */
-            for (; top >= 0; top--) {
-                const int h = hull[top], t = from[top];
-                if ((int64_t)(t - h) * (t - h) + row[h] <= (int64_t)(t - x) * (t - x) + row[x]) break;
-            }
-            if (top < 0) {
-                top = 0;
-                hull[0] = x;
-                from[0] = 0;
-                continue;
-            }
-            const int64_t h = hull[top];
-            const int64_t up = (int64_t)x * x - h * h + row[x] - row[h], down = 2 * (x - h);
-            const int64_t at = up >= 0 ? up / down + 1 : -((-up - 1) / down);
-            if (at < width) {
-                hull[++top] = x;
-                from[top] = (int32_t)at;
-            }
-        }
-        for (int x = width - 1; x >= 0; x--) {
-            const int h = hull[top];
-            const int64_t d = (int64_t)(x - h) * (x - h) + row[h];
-            o[x] = d < TXI_FAR ? (int32_t)d : TXI_FAR;
-            if (x == from[top] && top > 0) top--;
-        }
-    }
-}
-
-/* The nearest texel with a mark, of equally near ones the first in its row, then the upper one.
+/* The nearest pixel with a mark, of equally near ones the first in its row, then the upper one.
 
    First the nearest mark in each column; then along each row the lower envelope of the parabolas
-   (x - i)^2 + dy(i)^2: those of the columns that come first somewhere are kept on a stack.
+   (x - i)^2 + dy(i)^2 (Meijster, Roerdink, Hesselink 2000): those of the columns that are lowest
+   somewhere are kept on a stack. Exact, in integers.
 
-   nearest  receives one texel number for each, -1 without any marks
-   cost     O(width * height); 4 bytes for each texel of a row and each row               */
-static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_env *env,
+   scratch  3 * width numbers
+   nearest  receives one pixel number for each, -1 without any marks
+   cost     O(width * height)                                                                  */
+static void txi_nearest_marks(const uint8_t *marks, int width, int height, int32_t *scratch,
                               int32_t *nearest) {
-    txm_arena scratch;
     const size_t w = (size_t)width;
-    txm_arena_init(&scratch, env);
-    int32_t *row = (int32_t *)txm_arena_alloc(&scratch, w, sizeof(int32_t)); /* row of the mark */
-    int *stack = (int *)txm_arena_alloc(&scratch, w, sizeof(int));
-    int *from = (int *)txm_arena_alloc(&scratch, w, sizeof(int)); /* where each becomes nearest  */
-    if (scratch.failed) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
+    int32_t *row = scratch;      /* of the nearest mark in each column              */
+    int32_t *stack = row + w;    /* columns                                         */
+    int32_t *from = stack + w;   /* where each of these becomes the nearest          */
     for (int x = 0; x < width; x++) {
         int32_t last = -1;
         for (int y = 0; y < height; y++) {
@@ -142,8 +86,34 @@ static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_e
                 count ? (int32_t)((size_t)row[stack[k]] * w + (size_t)stack[k]) : -1;
         }
     }
-    txm_arena_free(&scratch);
-    return TXM_OK;
+}
+
+/* The same, with scratch memory of its own. */
+static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_env *env,
+                              int32_t *nearest) {
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    int32_t *scratch = (int32_t *)txm_arena_alloc(&arena, (size_t)width, 3 * sizeof(int32_t));
+    if (scratch) txi_nearest_marks(marks, width, height, scratch, nearest);
+    txm_arena_free(&arena);
+    return scratch ? TXM_OK : txi_no_memory(env);
+}
+
+enum { TXI_FAR = 1 << 28 }; /* squared distance, in pixels, to nothing */
+
+/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, in integers;
+   TXI_FAR if there is none, or if it is more.
+   scratch  3 * width numbers                                                                  */
+static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
+    txi_nearest_marks(of, width, height, scratch, out);
+    for (int y = 0; y < height; y++) {
+        for (int x = 0; x < width; x++) {
+            int32_t *at = &out[(size_t)y * (size_t)width + (size_t)x];
+            const int64_t dx = *at % width - x, dy = *at / width - y;
+            const int64_t d = *at < 0 ? TXI_FAR : dx * dx + dy * dy;
+            *at = (int32_t)(d < TXI_FAR ? d : TXI_FAR);
+        }
+    }
 }
 
 #endif /* TEXINPAINT_RASTER_H */
