@@ -26,6 +26,7 @@ enum {
 };
 #define TXI_ANNEAL_HOT 6.0 /* temperatures, in units of the exponents of (6) and (7)          */
 #define TXI_ANNEAL_COLD 0.3
+#define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(COLD / HOT): C libraries differ in the last bit */
 
 typedef struct txi_site {
     int anchor;
@@ -174,8 +175,7 @@ static txm_status txi_anneal_labels(txi_canvas *t, txm_env *env) {
     txm_rng rng = txm_rng_make(t->seed, 4242);
     const int moves = TXI_ANNEAL_MOVES;
     double heat = TXI_ANNEAL_HOT;
-    const double cool =
-        txm_exp2(log(TXI_ANNEAL_COLD / TXI_ANNEAL_HOT) / moves * 1.4426950408889634);
+    const double cool = txm_exp2(TXI_ANNEAL_FALL / moves * TXI_LOG2_E);
     for (int round = 0; round < moves && count && status == TXM_OK; round++, heat *= cool) {
         for (int k = 0; k < count; k++) {
             const int i = (int)txm_rng_below(&rng, (uint32_t)count);
@@ -183,7 +183,7 @@ static txm_status txi_anneal_labels(txi_canvas *t, txm_env *env) {
             if (!txi_anneal_propose(l, sites, i, &rng, &m)) continue;
             const double rise = txi_anneal_energy(t, sites, i, &m, known) -
                                 txi_anneal_energy(t, sites, i, &sites[i].match, known);
-            const double power = rise / heat * 1.4426950408889634;
+            const double power = rise / heat * TXI_LOG2_E;
             if (rise > 0 && (power > 60 || txm_rng_double(&rng) >= txm_exp2(-power))) continue;
             sites[i].match = m;
         }

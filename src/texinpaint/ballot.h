@@ -28,7 +28,7 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
     for (size_t a = 0; a < n; a++) {
         const int centre = l->anchor[a] + (TXI_PATCH / 2) * (l->width + 1);
         const double x = t->match[a].cost / (2 * s) + fade * l->depth[centre];
-        const double w = x > 12 ? 0 : (double)TXI_WEIGHT_ONE * txm_exp2(-x * 1.4426950408889634);
+        const double w = x > 12 ? 0 : (double)TXI_WEIGHT_ONE * txm_exp2(-x * TXI_LOG2_E);
         t->weight[a] = (uint16_t)(1 + (int)w);
     }
 }

@@ -48,7 +48,8 @@ typedef struct txi_beliefs {
     size_t *table_firsts; /* per link, where its table begins                                     */
     int32_t *tables;     /* pair costs of kept labels, rows are labels of the first node         */
     int *order, *parent; /* of the forest: nodes in the order of visits, link to the parent or -1 */
-    int *group, *shuffled; /* union of nodes, and a random order of them                         */
+    uint32_t *group;     /* sets of free nodes that are connected, see txi_root                  */
+    int *shuffled;       /* nodes in a random order                                              */
     uint8_t *is_free;    /* per node, 1: optimised in this move                                  */
     int64_t *sums;       /* per kept label                                                       */
     size_t *back_firsts; /* per node, where its labels begin in back                             */
@@ -210,18 +211,12 @@ static int64_t txi_belief_energy(const txi_beliefs *t, const int *x) {
     return sum;
 }
 
-/* The node that stands for the set of nodes that n has been united with. */
-static int txi_group_of(int *group, int n) {
-    while (group[n] != n) n = group[n] = group[group[n]];
-    return n;
-}
-
 /* Frees nodes in the order `shuffled` as long as no cycle arises among them. Returns how many. */
 static int txi_belief_free(txi_beliefs *t) {
     const txi_graph *g = t->graph;
     int count = 0;
     for (int n = 0; n < g->node_count; n++) {
-        t->group[n] = n;
+        t->group[n] = (uint32_t)n;
         t->is_free[n] = 0;
     }
     for (int k = 0; k < g->node_count; k++) {
@@ -232,7 +227,8 @@ static int txi_belief_free(txi_beliefs *t) {
             if (!t->is_free[m]) continue;
             for (size_t j = t->arms[n]; j < i && !cycle; j++) { /* two links to one tree */
                 const int o = txi_other_end(g, t->arm[j], n);
-                cycle = t->is_free[o] && txi_group_of(t->group, o) == txi_group_of(t->group, m);
+                cycle = t->is_free[o] &&
+                        txi_root(t->group, (uint32_t)o) == txi_root(t->group, (uint32_t)m);
             }
         }
         if (cycle) continue;
@@ -240,7 +236,7 @@ static int txi_belief_free(txi_beliefs *t) {
         count++;
         for (size_t i = t->arms[n]; i < t->arms[n + 1]; i++) {
             const int m = txi_other_end(g, t->arm[i], n);
-            if (t->is_free[m]) t->group[txi_group_of(t->group, m)] = n;
+            if (t->is_free[m]) txi_join_sets(t->group, (uint32_t)m, (uint32_t)n);
         }
     }
     return count;
@@ -467,7 +463,7 @@ static txm_status txi_belief_tables(txi_beliefs *t, txm_arena *arena, txm_env *e
     t->sums = (int64_t *)txm_arena_alloc(arena, kept + 1, sizeof *t->sums);
     t->order = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->order);
     t->parent = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->parent);
-    t->group = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->group);
+    t->group = (uint32_t *)txm_arena_alloc(arena, nodes + 1, sizeof *t->group);
     t->shuffled = (int *)txm_arena_alloc(arena, nodes + 1, sizeof *t->shuffled);
     t->is_free = (uint8_t *)txm_arena_alloc(arena, nodes + 1, 1);
     t->back_firsts = (size_t *)txm_arena_alloc(arena, nodes + 1, sizeof *t->back_firsts);

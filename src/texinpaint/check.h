@@ -172,8 +172,7 @@ static void txi_copy_picture(const txm_image *from, const txm_image *to) {
 }
 
 /* Copies of the maps in their given state, and which texels are missing and usable. Checked inputs;
-   a mask without pixels: none is missing. Without a mesh every texel is covered; with one,
-   txi_surface_make finds out. */
+   a mask without pixels: none is missing. txi_surface_make must follow, which sets covered. */
 static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *desc, txm_arena *arena,
                                   txm_env *env) {
     const size_t count = (size_t)desc->image.width * (size_t)desc->image.height;
@@ -194,7 +193,6 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
     }
     domain->missing = (uint8_t *)txm_arena_zero(arena, count, 1);
     domain->usable = (uint8_t *)txm_arena_zero(arena, count, 1);
-    domain->covered = (uint8_t *)txm_arena_zero(arena, count, 1);
     if (arena->failed) return txi_no_memory(env);
     for (int y = 0; y < domain->height; y++) {
         for (int x = 0; x < domain->width; x++) {
@@ -202,7 +200,6 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
             domain->missing[i] = desc->mask.pixels && txi_mask_at(&desc->mask, x, y);
             domain->usable[i] = !domain->missing[i] &&
                                 (!desc->source.pixels || txi_mask_at(&desc->source, x, y));
-            domain->covered[i] = desc->mesh.face_count == 0;
         }
     }
     return TXM_OK;

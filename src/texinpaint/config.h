@@ -154,12 +154,31 @@ enum {
 #define TXI_LEFT_OUT 0
 #endif
 
+#define TXI_LOG2_E 1.4426950408889634 /* exp(x) = txm_exp2(x TXI_LOG2_E) */
+
 static txm_status txi_no_memory(txm_env *env) {
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the completion");
 }
 
 static txm_status txi_stopped(txm_env *env) {
     return txm_fail(env, TXM_CANCELLED, "cancelled");
+}
+
+/* ---- sets ------------------------------------------------------------------------------------
+   Disjoint sets of numbers: parent[i] = i to begin with; a set is known by its root.            */
+
+/* the root of the set that i is in; halves the path to it */
+static uint32_t txi_root(uint32_t *parent, uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+/* Unite two sets; the smaller root remains. */
+static void txi_join_sets(uint32_t *parent, uint32_t a, uint32_t b) {
+    a = txi_root(parent, a);
+    b = txi_root(parent, b);
+    if (a < b) parent[b] = a;
+    else parent[a] = b;
 }
 
 #endif /* TEXINPAINT_CONFIG_H */

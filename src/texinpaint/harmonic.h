@@ -25,13 +25,9 @@ static txi_quantities txi_quantities_of(const txi_domain *d, int map) {
     txi_quantities q;
     q.image = &d->maps[map];
     q.is_normal = m ? m->is_normal : 0;
-    q.has_alpha = !q.is_normal && q.image->channels % 2 == 0;
+    q.has_alpha = txi_has_alpha(d, map);
     q.count = q.image->channels + (q.is_normal && d->surface ? 1 : 0);
     return q;
-}
-
-static int txi_is_label(const txi_domain *d, int map) {
-    return map > 0 && d->desc->maps[map - 1].is_label;
 }
 
 /* The directions in space of the x and y axes of a normal map at a texel: unit. */

@@ -40,8 +40,7 @@ TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env 
     job->memory = memory;
     txm_arena_init(&job->of_window, env);
     status = txi_domain_make(&job->domain, &job->desc, &job->memory, env);
-    if (status == TXM_OK && desc->mesh.face_count)
-        status = txi_surface_make(&job->domain, &job->memory, env);
+    if (status == TXM_OK) status = txi_surface_make(&job->domain, &job->memory, env);
     if (status == TXM_OK && desc->prior == TEXINPAINT_PRIOR_CREST) {
         texinpaint_crest_desc crest;
         txi_stage stage;

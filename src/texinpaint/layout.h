@@ -31,14 +31,12 @@ static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, siz
         p = txm_d3_mad(p, txm_d3_sub(l->flat.point[c[k]], l->origin), weight[k] / l->pixel);
         n = txm_vec3_add(n, txm_vec3_scale(l->normal[c[k]], txm_float(weight[k])));
     }
-    const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
     w->state[pixel] = TXI_KNOWN;
     w->face[pixel] = face;
     w->texel[pixel] = txm_v2(txm_float(x), txm_float(y));
     w->place[pixel] = txm_v3(txm_float(p.x), txm_float(p.y), txm_float(p.z));
     w->normal[pixel] = txm_vec3_normalize(n);
-    w->axis[pixel] = length > 0 ? txm_v2(txm_float(right[0] / length), txm_float(right[1] / length))
-                                : txm_v2(1, 0);
+    w->axis[pixel] = txi_unit(right[0], right[1]);
     w->mirrored[pixel] = (uint8_t)mirrored;
 }
 
@@ -151,11 +149,10 @@ static txi_target txi_make_target(const txi_sheet *l, size_t i, uint32_t texel) 
     double right[2] = {1, 0}, down[2] = {0, 1}, x, y;
     txi_sheet_texel(l, i, texel, &x, &y);
     txi_texel_steps(l, i, right, down);
-    const double length = sqrt(right[0] * right[0] + right[1] * right[1]);
     t.texel = texel;
     t.x = txm_float(x);
     t.y = txm_float(y);
-    t.axis = length > 0 ? txm_v2(txm_float(right[0] / length), txm_float(right[1] / length)) : txm_v2(1, 0);
+    t.axis = txi_unit(right[0], right[1]);
     t.mirrored = right[0] * down[1] - right[1] * down[0] < 0;
     return t;
 }

@@ -159,7 +159,7 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
             const txi_source *s = &l->source[m->pose];
             color[n] = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
             const double fit = m->cost / (400.0 * (double)TXI_PATCH_AREA);
-            weight[n] = txm_exp2(-(fit < 500 ? fit : 500) * 1.4426950408889634) + 1e-30;
+            weight[n] = txm_exp2(-(fit < 500 ? fit : 500) * TXI_LOG2_E) + 1e-30;
             total += weight[n];
             for (int c = 0; c < 3; c++) sum[c] += weight[n] * color[n][c];
             n++;

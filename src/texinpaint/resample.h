@@ -162,7 +162,12 @@ static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t 
     taps->count = taps->texel[0] >= 0;
 }
 
-/* Are there colours that count times alpha? */
+/* Are the samples of a map labels? */
+static int txi_is_label(const txi_domain *d, int map) {
+    return map > 0 && d->desc->maps[map - 1].is_label;
+}
+
+/* Does a map have colours, which count times their alpha? */
 static int txi_has_alpha(const txi_domain *d, int map) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     return !(kind && (kind->is_normal || kind->is_label)) && d->maps[map].channels % 2 == 0;
@@ -243,7 +248,7 @@ static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
 static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w, int map,
                            size_t i, float *out) {
     const txm_image *image = &d->maps[map];
-    const int label = map > 0 && d->desc->maps[map - 1].is_label, has_alpha = txi_has_alpha(d, map);
+    const int label = txi_is_label(d, map), has_alpha = txi_has_alpha(d, map);
     txi_taps taps;
     if (!d->surface) { /* pixels of a picture are its texels */
         const int x = (int)w->texel[i].x, y = (int)w->texel[i].y;
@@ -459,7 +464,7 @@ static int64_t txi_solid_near(const txi_window *w, double x, double y) {
    texel changes. */
 static void txi_window_write(txi_domain *d, const txi_window *w, int map, const float *values) {
     const txm_image *image = &d->maps[map];
-    const int channels = image->channels, label = map > 0 && d->desc->maps[map - 1].is_label;
+    const int channels = image->channels, label = txi_is_label(d, map);
     txi_kernel kernel;
     txi_kernel_init(&kernel);
     for (size_t i = 0; i < w->target_count; i++) {

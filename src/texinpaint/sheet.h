@@ -77,10 +77,7 @@ static int txi_is_hole(txi_sheet *l, uint32_t face) {
     int is_hole = 0;
     for (size_t i = 0; i < count && !is_hole; i++) is_hole = d->missing[texels[i]];
     if (!is_hole) {
-        const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
-        const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
-        const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
-        const size_t i = (size_t)py * (size_t)d->width + (size_t)px;
+        const size_t i = txi_face_texel(d, l->s, face);
         is_hole = d->missing[i] &&
                   (!d->covered[i] || l->s->chart[l->s->owner[i]] == l->s->chart[face]);
     }
@@ -270,10 +267,7 @@ static void txi_find_centre(txi_sheet *l) {
 
 /* Is the middle of a face texture that may be copied? */
 static int txi_is_usable_face(const txi_domain *d, uint32_t face) {
-    const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
-    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
-    const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
-    return d->usable[(size_t)py * (size_t)d->width + (size_t)px];
+    return d->usable[txi_face_texel(d, d->surface, face)];
 }
 
 static double txi_mean_of(const txi_surface *s, uint32_t face, const double *value) {
@@ -350,7 +344,7 @@ static txm_status txi_sheet_flat(txi_sheet *l) {
         const double apart = txi_mean_of(l->s, f, l->from_hole) / (40 * l->pixel);
         l->rigid[i] = 1;
         if (!l->reach && l->state[f] != TXI_SHEET_GROUP)
-            l->rigid[i] = 0.02 + 0.98 * txm_exp2(-fmin(apart * apart, 100) * 1.44269504088896341);
+            l->rigid[i] = 0.02 + 0.98 * txm_exp2(-fmin(apart * apart, 100) * TXI_LOG2_E);
     }
     txm_status status = txi_flat_init(&l->flat, l->s, &l->disk, point, l->scratch, l->env);
     if (status == TXM_OK) status = txi_flatten(&l->flat, l->rigid, 0.02 * l->pixel, l->env);

@@ -173,17 +173,6 @@ static txm_status txi_link_sides(const txm_mesh *mesh, txi_surface *s, txm_env *
 
 /* ---- surface: texels ------------------------------------------------------------------------- */
 
-static uint32_t txi_root(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-static void txi_join_sets(uint32_t *parent, uint32_t a, uint32_t b) {
-    a = txi_root(parent, a);
-    b = txi_root(parent, b);
-    if (a < b) parent[b] = a;
-    else parent[a] = b;
-}
-
 /* The corners of all faces in texels. Those that lie repeats away from the picture are moved, face by
    face, near to it, where numbers are exact. */
 static void txi_load_uv(const txi_domain *d, txi_surface *s) {
@@ -207,6 +196,15 @@ static void txi_load_uv(const txi_domain *d, txi_surface *s) {
 static int txi_wrap(int i, int n) {
     const int r = i % n;
     return r < 0 ? r + n : r;
+}
+
+/* The texel at the middle of a face: the only one that can be said to be its own where faces are
+   smaller than texels. */
+static size_t txi_face_texel(const txi_domain *d, const txi_surface *s, size_t face) {
+    const txm_vec2 *t = s->uv + 3 * face;
+    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+    return (size_t)py * (size_t)d->width + (size_t)px;
 }
 
 /* A face meets a texel: it owns it if none before it does; else, if both lie well over the texel, their

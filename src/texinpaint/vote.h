@@ -65,7 +65,7 @@ static double txi_arc(double s) {
 static double txi_decay(const txi_fields *f, double l, double sine) {
     const double s = l * txi_arc(sine * sine), k = 2 * sine / l;
     const double e = (s * s + f->c * k * k) / (f->sigma * f->sigma);
-    return e < 600 ? txm_exp2(-e * 1.4426950408889634) : 0;
+    return e < 600 ? txm_exp2(-e * TXI_LOG2_E) : 0;
 }
 
 static inline void txi_outer(double t[6], txm_dvec3 v, double weight) {
