@@ -1416,6 +1416,23 @@ static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     return top;
 }
 
+/* Fill parent, the elimination tree, and first, from how long the columns of L become. filled: 0. */
+static void txi_factor_tree(txi_factor *f) {
+    for (uint32_t k = 0; k < f->count; k++) {
+        f->parent[k] = UINT32_MAX;
+        f->flag[k] = k;
+        for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
+            for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
+                if (f->parent[i] == UINT32_MAX) f->parent[i] = k;
+                f->filled[i]++;
+                f->flag[i] = k;
+            }
+        }
+    }
+    f->first[0] = 0;
+    for (size_t k = 0; k < f->count; k++) f->first[k + 1] = f->first[k] + f->filled[k];
+}
+
 /* Find the order and the pattern of L for a graph of count unknowns at these points. */
 static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *point,
                                   size_t edge_count, const uint32_t *low, const uint32_t *high,
@@ -1466,20 +1483,7 @@ static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *
         f->up_row[at] = a > b ? b : a;
         f->up_edge[at] = (uint32_t)e;
     }
-    /* elimination tree, and how long the columns of L become */
-    for (uint32_t k = 0; k < count; k++) {
-        f->parent[k] = UINT32_MAX;
-        f->flag[k] = k;
-        for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
-            for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
-                if (f->parent[i] == UINT32_MAX) f->parent[i] = k;
-                f->filled[i]++;
-                f->flag[i] = k;
-            }
-        }
-    }
-    f->first[0] = 0;
-    for (size_t k = 0; k < count; k++) f->first[k + 1] = f->first[k] + f->filled[k];
+    txi_factor_tree(f);
     f->row = (uint32_t *)txm_arena_alloc(arena, f->first[count] + 1, sizeof(uint32_t));
     f->value = (double *)txm_arena_alloc(arena, f->first[count] + 1, sizeof(double));
     return arena->failed ? txi_no_memory(env) : TXM_OK;
@@ -1907,14 +1911,47 @@ static void txi_shape_corner(const double *shape, int k, double *x, double *y) {
     *y = k == 2 ? shape[2] : 0;
 }
 
+/* Turn face i as it lies best, a b being the cosine and sine of the angle, and add its part of the
+   right sides. */
+static void txi_arap_face(const txi_flat *flat, size_t i, double face_weight, double *right) {
+    double qx[3], qy[3], a = 0, b = 0;
+    size_t v[3];
+    for (int k = 0; k < 3; k++) {
+        txi_shape_corner(flat->shape + 3 * i, k, &qx[k], &qy[k]);
+        v[k] = flat->disk->corner[3 * i + (size_t)k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const int j = (k + 1) % 3;
+        const double c = flat->cot[3 * i + (size_t)k];
+        const double px = flat->xy[2 * v[j]] - flat->xy[2 * v[k]];
+        const double py = flat->xy[2 * v[j] + 1] - flat->xy[2 * v[k] + 1];
+        a += c * (px * (qx[j] - qx[k]) + py * (qy[j] - qy[k]));
+        b += c * (py * (qx[j] - qx[k]) - px * (qy[j] - qy[k]));
+    }
+    const double n = sqrt(a * a + b * b);
+    a = n > 0 ? a / n : 1;
+    b = n > 0 ? b / n : 0;
+    for (int k = 0; k < 3; k++) {
+        const int j = (k + 1) % 3;
+        const double c = flat->cot[3 * i + (size_t)k] * face_weight;
+        const double x = c * (a * (qx[j] - qx[k]) - b * (qy[j] - qy[k]));
+        const double y = c * (b * (qx[j] - qx[k]) + a * (qy[j] - qy[k]));
+        right[2 * v[j]] += x;
+        right[2 * v[j] + 1] += y;
+        right[2 * v[k]] -= x;
+        right[2 * v[k] + 1] -= y;
+    }
+}
+
 /* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over the
    sides of
 
        weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
 
    is least, q being the face in its own plane; again and again.
-   rotation, right  scratch, 2 per face and 2 per vertex
-   small_step       of vertices, in the unit of the surface: end when none moves farther      */
+   the local and the global step of [6], with weights of faces.
+   weight, diagonal, right  scratch, 1 per edge, 1 and 2 per vertex
+   small_step  of vertices, in the unit of the surface: end when none moves farther        */
 static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weight, double *weight,
                      double *diagonal, double *right, double small_step) {
     const txi_disk *disk = flat->disk;
@@ -1935,35 +1972,8 @@ static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weig
         memset(right, 0, vertices * 2 * sizeof *right);
         right[0] = hold * flat->xy[0];
         right[1] = hold * flat->xy[1];
-        for (size_t i = 0; i < disk->face_count; i++) {
-            double qx[3], qy[3], a = 0, b = 0;
-            size_t v[3];
-            for (int k = 0; k < 3; k++) {
-                txi_shape_corner(flat->shape + 3 * i, k, &qx[k], &qy[k]);
-                v[k] = disk->corner[3 * i + (size_t)k];
-            }
-            for (int k = 0; k < 3; k++) {
-                const int j = (k + 1) % 3;
-                const double c = flat->cot[3 * i + (size_t)k];
-                const double px = flat->xy[2 * v[j]] - flat->xy[2 * v[k]];
-                const double py = flat->xy[2 * v[j] + 1] - flat->xy[2 * v[k] + 1];
-                a += c * (px * (qx[j] - qx[k]) + py * (qy[j] - qy[k]));
-                b += c * (py * (qx[j] - qx[k]) - px * (qy[j] - qy[k]));
-            }
-            const double n = sqrt(a * a + b * b);
-            a = n > 0 ? a / n : 1;
-            b = n > 0 ? b / n : 0;
-            for (int k = 0; k < 3; k++) {
-                const int j = (k + 1) % 3;
-                const double c = flat->cot[3 * i + (size_t)k] * face_weight[i];
-                const double x = c * (a * (qx[j] - qx[k]) - b * (qy[j] - qy[k]));
-                const double y = c * (b * (qx[j] - qx[k]) + a * (qy[j] - qy[k]));
-                right[2 * v[j]] += x;
-                right[2 * v[j] + 1] += y;
-                right[2 * v[k]] -= x;
-                right[2 * v[k] + 1] -= y;
-            }
-        }
+        for (size_t i = 0; i < disk->face_count; i++)
+            txi_arap_face(flat, i, face_weight[i], right);
         txi_factor_solve(factor, right);
         double moved = 0;
         for (size_t v = 0; v < 2 * vertices; v++) {
@@ -12706,9 +12716,9 @@ enum {
     TXI_ANNEAL_MOVES = 600, /* per patch                                                       */
     TXI_ANNEAL_PAIRS = 8    /* patches that a patch overlaps                                   */
 };
-#define TXI_ANNEAL_HOT 6.0 /* temperatures, in units of the exponents of (6) and (7)          */
-#define TXI_ANNEAL_COLD 0.3
-#define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(COLD / HOT): C libraries differ in the last bit */
+#define TXI_ANNEAL_HOT 6.0 /* the first temperature, in units of the exponents of (6) and (7)          */
+#define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(0.3 / HOT): the last temperature is 0.3. Not
+                               computed, as C libraries differ in the last bit                 */
 
 typedef struct txi_site {
     int anchor;
@@ -13375,6 +13385,42 @@ static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_
     return (int)count;
 }
 
+/* The labels' colours, and as the match of each anchor the most frequent label of its patch that can be
+   copied. */
+static void txi_offset_apply(txi_canvas *t, const txi_assembly *assembly) {
+    const txi_level *l = t->level;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i], x = p % l->width, y = p / l->width;
+        const uint8_t *color = txi_label_color(l, assembly->label[p], x, y);
+        if (color) memcpy(t->color + 4 * (size_t)p, color, 3);
+    }
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int p = l->anchor[a];
+        txi_match best = t->match[a];
+        int most = 0;
+        for (int k = 0; k < TXI_PATCH_AREA; k++) {
+            const int q = p + k / TXI_PATCH * l->width + k % TXI_PATCH;
+            const int32_t label = assembly->label[q];
+            int same = 0;
+            if (label < 0) continue;
+            for (int i = k; i < TXI_PATCH_AREA; i++)
+                same += assembly->label[p + i / TXI_PATCH * l->width + i % TXI_PATCH] == label;
+            if (same <= most) continue;
+            txi_match m;
+            memset(&m, 0, sizeof m);
+            m.pose = (int16_t)(label >> 26);
+            m.x = (int16_t)(p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS);
+            m.y = (int16_t)(p / l->width + (label & 8191) - TXI_LABEL_BIAS);
+            if (!txi_match_mend(l, &m)) continue;
+            most = same;
+            best = m;
+        }
+        if (!most) best.pose = -1;
+        t->match[a] = best;
+    }
+    t->fresh = 0;
+}
+
 /* Fill the canvas' hole from pieces of the level, and set the matches accordingly. */
 static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
@@ -13419,36 +13465,7 @@ static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
             if (txm_progress(env, 0, "pieces")) status = txi_stopped(env);
         }
     }
-    for (int i = 0; i < l->hole_count; i++) {
-        const int p = l->hole[i], x = p % l->width, y = p / l->width;
-        const uint8_t *color = txi_label_color(l, assembly.label[p], x, y);
-        if (color) memcpy(t->color + 4 * (size_t)p, color, 3);
-    }
-    for (int a = 0; a < l->anchor_count; a++) { /* the most frequent label of its patch */
-        const int p = l->anchor[a];
-        txi_match best = t->match[a];
-        int most = 0;
-        for (int k = 0; k < TXI_PATCH_AREA; k++) {
-            const int q = p + k / TXI_PATCH * l->width + k % TXI_PATCH;
-            const int32_t label = assembly.label[q];
-            int same = 0;
-            if (label < 0) continue;
-            for (int i = k; i < TXI_PATCH_AREA; i++)
-                same += assembly.label[p + i / TXI_PATCH * l->width + i % TXI_PATCH] == label;
-            if (same <= most) continue;
-            txi_match m;
-            memset(&m, 0, sizeof m);
-            m.pose = (int16_t)(label >> 26);
-            m.x = (int16_t)(p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS);
-            m.y = (int16_t)(p / l->width + (label & 8191) - TXI_LABEL_BIAS);
-            if (!txi_match_mend(l, &m)) continue;
-            most = same;
-            best = m;
-        }
-        if (!most) best.pose = -1;
-        t->match[a] = best;
-    }
-    t->fresh = 0;
+    txi_offset_apply(t, &assembly);
     txm_arena_free(&scratch);
     return status;
 }

@@ -24,9 +24,9 @@ enum {
     TXI_ANNEAL_MOVES = 600, /* per patch                                                       */
     TXI_ANNEAL_PAIRS = 8    /* patches that a patch overlaps                                   */
 };
-#define TXI_ANNEAL_HOT 6.0 /* temperatures, in units of the exponents of (6) and (7)          */
-#define TXI_ANNEAL_COLD 0.3
-#define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(COLD / HOT): C libraries differ in the last bit */
+#define TXI_ANNEAL_HOT 6.0 /* the first temperature, in units of the exponents of (6) and (7)          */
+#define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(0.3 / HOT): the last temperature is 0.3. Not
+                               computed, as C libraries differ in the last bit                 */
 
 typedef struct txi_site {
     int anchor;

@@ -98,6 +98,23 @@ static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     return top;
 }
 
+/* Fill parent, the elimination tree, and first, from how long the columns of L become. filled: 0. */
+static void txi_factor_tree(txi_factor *f) {
+    for (uint32_t k = 0; k < f->count; k++) {
+        f->parent[k] = UINT32_MAX;
+        f->flag[k] = k;
+        for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
+            for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
+                if (f->parent[i] == UINT32_MAX) f->parent[i] = k;
+                f->filled[i]++;
+                f->flag[i] = k;
+            }
+        }
+    }
+    f->first[0] = 0;
+    for (size_t k = 0; k < f->count; k++) f->first[k + 1] = f->first[k] + f->filled[k];
+}
+
 /* Find the order and the pattern of L for a graph of count unknowns at these points. */
 static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *point,
                                   size_t edge_count, const uint32_t *low, const uint32_t *high,
@@ -148,20 +165,7 @@ static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *
         f->up_row[at] = a > b ? b : a;
         f->up_edge[at] = (uint32_t)e;
     }
-    /* elimination tree, and how long the columns of L become */
-    for (uint32_t k = 0; k < count; k++) {
-        f->parent[k] = UINT32_MAX;
-        f->flag[k] = k;
-        for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
-            for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
-                if (f->parent[i] == UINT32_MAX) f->parent[i] = k;
-                f->filled[i]++;
-                f->flag[i] = k;
-            }
-        }
-    }
-    f->first[0] = 0;
-    for (size_t k = 0; k < count; k++) f->first[k + 1] = f->first[k] + f->filled[k];
+    txi_factor_tree(f);
     f->row = (uint32_t *)txm_arena_alloc(arena, f->first[count] + 1, sizeof(uint32_t));
     f->value = (double *)txm_arena_alloc(arena, f->first[count] + 1, sizeof(double));
     return arena->failed ? txi_no_memory(env) : TXM_OK;

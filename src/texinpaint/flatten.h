@@ -151,14 +151,47 @@ static void txi_shape_corner(const double *shape, int k, double *x, double *y) {
     *y = k == 2 ? shape[2] : 0;
 }
 
+/* Turn face i as it lies best, a b being the cosine and sine of the angle, and add its part of the
+   right sides. */
+static void txi_arap_face(const txi_flat *flat, size_t i, double face_weight, double *right) {
+    double qx[3], qy[3], a = 0, b = 0;
+    size_t v[3];
+    for (int k = 0; k < 3; k++) {
+        txi_shape_corner(flat->shape + 3 * i, k, &qx[k], &qy[k]);
+        v[k] = flat->disk->corner[3 * i + (size_t)k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const int j = (k + 1) % 3;
+        const double c = flat->cot[3 * i + (size_t)k];
+        const double px = flat->xy[2 * v[j]] - flat->xy[2 * v[k]];
+        const double py = flat->xy[2 * v[j] + 1] - flat->xy[2 * v[k] + 1];
+        a += c * (px * (qx[j] - qx[k]) + py * (qy[j] - qy[k]));
+        b += c * (py * (qx[j] - qx[k]) - px * (qy[j] - qy[k]));
+    }
+    const double n = sqrt(a * a + b * b);
+    a = n > 0 ? a / n : 1;
+    b = n > 0 ? b / n : 0;
+    for (int k = 0; k < 3; k++) {
+        const int j = (k + 1) % 3;
+        const double c = flat->cot[3 * i + (size_t)k] * face_weight;
+        const double x = c * (a * (qx[j] - qx[k]) - b * (qy[j] - qy[k]));
+        const double y = c * (b * (qx[j] - qx[k]) + a * (qy[j] - qy[k]));
+        right[2 * v[j]] += x;
+        right[2 * v[j] + 1] += y;
+        right[2 * v[k]] -= x;
+        right[2 * v[k] + 1] -= y;
+    }
+}
+
 /* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over the
    sides of
 
        weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
 
    is least, q being the face in its own plane; again and again.
-   rotation, right  scratch, 2 per face and 2 per vertex
-   small_step       of vertices, in the unit of the surface: end when none moves farther      */
+   the local and the global step of [6], with weights of faces.
+   weight, diagonal, right  scratch, 1 per edge, 1 and 2 per vertex
+   small_step  of vertices, in the unit of the surface: end when none moves farther        */
 static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weight, double *weight,
                      double *diagonal, double *right, double small_step) {
     const txi_disk *disk = flat->disk;
@@ -179,35 +212,8 @@ static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weig
         memset(right, 0, vertices * 2 * sizeof *right);
         right[0] = hold * flat->xy[0];
         right[1] = hold * flat->xy[1];
-        for (size_t i = 0; i < disk->face_count; i++) {
-            double qx[3], qy[3], a = 0, b = 0;
-            size_t v[3];
-            for (int k = 0; k < 3; k++) {
-                txi_shape_corner(flat->shape + 3 * i, k, &qx[k], &qy[k]);
-                v[k] = disk->corner[3 * i + (size_t)k];
-            }
-            for (int k = 0; k < 3; k++) {
-                const int j = (k + 1) % 3;
-                const double c = flat->cot[3 * i + (size_t)k];
-                const double px = flat->xy[2 * v[j]] - flat->xy[2 * v[k]];
-                const double py = flat->xy[2 * v[j] + 1] - flat->xy[2 * v[k] + 1];
-                a += c * (px * (qx[j] - qx[k]) + py * (qy[j] - qy[k]));
-                b += c * (py * (qx[j] - qx[k]) - px * (qy[j] - qy[k]));
-            }
-            const double n = sqrt(a * a + b * b);
-            a = n > 0 ? a / n : 1;
-            b = n > 0 ? b / n : 0;
-            for (int k = 0; k < 3; k++) {
-                const int j = (k + 1) % 3;
-                const double c = flat->cot[3 * i + (size_t)k] * face_weight[i];
-                const double x = c * (a * (qx[j] - qx[k]) - b * (qy[j] - qy[k]));
-                const double y = c * (b * (qx[j] - qx[k]) + a * (qy[j] - qy[k]));
-                right[2 * v[j]] += x;
-                right[2 * v[j] + 1] += y;
-                right[2 * v[k]] -= x;
-                right[2 * v[k] + 1] -= y;
-            }
-        }
+        for (size_t i = 0; i < disk->face_count; i++)
+            txi_arap_face(flat, i, face_weight[i], right);
         txi_factor_solve(factor, right);
         double moved = 0;
         for (size_t v = 0; v < 2 * vertices; v++) {

@@ -112,6 +112,42 @@ static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_
     return (int)count;
 }
 
+/* The labels' colours, and as the match of each anchor the most frequent label of its patch that can be
+   copied. */
+static void txi_offset_apply(txi_canvas *t, const txi_assembly *assembly) {
+    const txi_level *l = t->level;
+    for (int i = 0; i < l->hole_count; i++) {
+        const int p = l->hole[i], x = p % l->width, y = p / l->width;
+        const uint8_t *color = txi_label_color(l, assembly->label[p], x, y);
+        if (color) memcpy(t->color + 4 * (size_t)p, color, 3);
+    }
+    for (int a = 0; a < l->anchor_count; a++) {
+        const int p = l->anchor[a];
+        txi_match best = t->match[a];
+        int most = 0;
+        for (int k = 0; k < TXI_PATCH_AREA; k++) {
+            const int q = p + k / TXI_PATCH * l->width + k % TXI_PATCH;
+            const int32_t label = assembly->label[q];
+            int same = 0;
+            if (label < 0) continue;
+            for (int i = k; i < TXI_PATCH_AREA; i++)
+                same += assembly->label[p + i / TXI_PATCH * l->width + i % TXI_PATCH] == label;
+            if (same <= most) continue;
+            txi_match m;
+            memset(&m, 0, sizeof m);
+            m.pose = (int16_t)(label >> 26);
+            m.x = (int16_t)(p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS);
+            m.y = (int16_t)(p / l->width + (label & 8191) - TXI_LABEL_BIAS);
+            if (!txi_match_mend(l, &m)) continue;
+            most = same;
+            best = m;
+        }
+        if (!most) best.pose = -1;
+        t->match[a] = best;
+    }
+    t->fresh = 0;
+}
+
 /* Fill the canvas' hole from pieces of the level, and set the matches accordingly. */
 static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
@@ -156,36 +192,7 @@ static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
             if (txm_progress(env, 0, "pieces")) status = txi_stopped(env);
         }
     }
-    for (int i = 0; i < l->hole_count; i++) {
-        const int p = l->hole[i], x = p % l->width, y = p / l->width;
-        const uint8_t *color = txi_label_color(l, assembly.label[p], x, y);
-        if (color) memcpy(t->color + 4 * (size_t)p, color, 3);
-    }
-    for (int a = 0; a < l->anchor_count; a++) { /* the most frequent label of its patch */
-        const int p = l->anchor[a];
-        txi_match best = t->match[a];
-        int most = 0;
-        for (int k = 0; k < TXI_PATCH_AREA; k++) {
-            const int q = p + k / TXI_PATCH * l->width + k % TXI_PATCH;
-            const int32_t label = assembly.label[q];
-            int same = 0;
-            if (label < 0) continue;
-            for (int i = k; i < TXI_PATCH_AREA; i++)
-                same += assembly.label[p + i / TXI_PATCH * l->width + i % TXI_PATCH] == label;
-            if (same <= most) continue;
-            txi_match m;
-            memset(&m, 0, sizeof m);
-            m.pose = (int16_t)(label >> 26);
-            m.x = (int16_t)(p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS);
-            m.y = (int16_t)(p / l->width + (label & 8191) - TXI_LABEL_BIAS);
-            if (!txi_match_mend(l, &m)) continue;
-            most = same;
-            best = m;
-        }
-        if (!most) best.pose = -1;
-        t->match[a] = best;
-    }
-    t->fresh = 0;
+    txi_offset_apply(t, &assembly);
     txm_arena_free(&scratch);
     return status;
 }
