@@ -329,9 +329,10 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #define TEXINPAINT_IMPLEMENTED
 
 /* ---- windows --------------------------------------------------------------------------------
-   All completion is done in windows: flat pictures of a part of the surface (or of the picture) with
-   a hole in it. The surface is laid out almost without distortion, so that a window's pixels have
-   about the same size, that of a texel in the hole. A pixel is TXI_HOLE if it is to be filled.     */
+   All completion is done in windows: flat pictures of a part of the surface (or of the picture)
+   with a hole in it. The surface is laid out almost without distortion, so that a window's
+   pixels have about the same size, that of a texel in the hole. A pixel is TXI_HOLE if it is to
+   be filled. */
 
 enum {
     TXI_VOID = 0,    /* no surface here                                                        */
@@ -347,15 +348,17 @@ typedef struct txi_target {
     uint32_t texel;  /* y * width + x in the texture                                           */
     float x, y;      /* window pixels; pixel centres are whole numbers                         */
     txm_vec2 axis;   /* direction of the texture's u axis in the window, unit                  */
-    int mirrored;    /* the texture is mirrored in the window: v axis = axis turned left, not right */
+    int mirrored;    /* the texture is mirrored in the window: v axis = axis turned left, not
+                        right                                                                    */
 } txi_target;
 
 typedef struct txi_window {
     int width, height;
     uint8_t *state;  /* TXI_VOID .. TXI_FOREIGN, one per pixel                                 */
     uint8_t *color;  /* 4 per pixel, RGB as matched (over mid gray where alpha is below 1), 0   */
-    uint8_t *share;  /* of a hole pixel: how much of it is known, 0..255 = all, as it lies between known
-                        and missing texels; its color is that of the known part. NULL: nothing  */
+    uint8_t *share;  /* of a hole pixel: how much of it is known, 0..255 = all, as it lies
+                        between known and missing texels; its color is that of the known part.
+                        NULL: nothing                                                            */
     txm_vec2 *texel; /* where each pixel that is not void lies in the texture, in texels, texel
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
@@ -394,23 +397,24 @@ typedef struct txi_curve {
     int ends[2];       /* the line ends that it joins; -1: it ends in the hole                 */
     float strength;    /* contrast of the line, in levels of 8 bits                            */
     int partner;       /* the curve along the other side of the same stroke, or -1             */
-    float cost;        /* of the join, without unit: about 0.5 for a sure one, 3 for a doubtful one */
+    float cost;        /* of the join, without unit: about 0.5 for a sure one, 3 for a doubtful
+                          one                                                                    */
 } txi_curve;
 
 /* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
 typedef struct txi_plan {
-    uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and in the
-                        fourth byte the guide channel: 255 on a line (known or completed), falling
-                        with the distance                                                      */
+    uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and
+                        in the fourth byte the guide channel: 255 on a line (known or completed),
+                        falling with the distance                                                */
     uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
-    const txi_pose *poses; /* that copies[].pose counts                                             */
+    const txi_pose *poses; /* that copies[].pose counts                                           */
     int pose_count;
 } txi_plan;
 
-/* Prior knowledge about where lines run [1, II.C], in a window: polylines, clipped to the window. Line k
-   has the points starts[k] .. starts[k + 1] - 1, two or more. line_count 0: no prior; the pointers
-   may be NULL then. */
+/* Prior knowledge about where lines run [1, II.C], in a window: polylines, clipped to the
+   window. Line k has the points starts[k] .. starts[k + 1] - 1, two or more. line_count 0: no
+   prior; the pointers may be NULL then. */
 typedef struct txi_prior {
     txm_vec2 *points; /* window pixels; pixel centres are whole numbers                        */
     int *starts;      /* line_count + 1                                                        */
@@ -462,8 +466,8 @@ static txm_status txi_stage_end(const txi_stage *stage, txm_status status) {
 }
 
 /* ---- ablation -------------------------------------------------------------------------------
-   Steps that bench/bench_inpaint.c leaves out one by one, to measure what each contributes: it defines
-   TXI_LEFT_OUT as a variable of its own. Everywhere else nothing is left out.                   */
+   Steps that bench/bench_inpaint.c leaves out one by one, to measure what each contributes: it
+   defines TXI_LEFT_OUT as a variable of its own. Everywhere else nothing is left out. */
 
 enum {
     TXI_VOTES = 1,    /* tensor votes for or against a join                                      */
@@ -510,7 +514,8 @@ static void txi_join_sets(uint32_t *parent, uint32_t a, uint32_t b) {
 
 /* a (1 - t) + b t */
 static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
-    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
+    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)),
+                  txm_float(a.y + t * ((double)b.y - a.y)));
 }
 
 static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
@@ -531,7 +536,7 @@ static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     return (ptrdiff_t)row * width + column;
 }
 
-/* ---- rasters: distances --------------------------------------------------------------------------- */
+/* ---- rasters: distances ---------------------------------------------------------------------- */
 
 /* The nearest pixel with a mark, of equally near ones the first in its row, then the upper one.
 
@@ -604,10 +609,11 @@ static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_e
 
 enum { TXI_FAR = 1 << 28 }; /* squared distance, in pixels, to nothing */
 
-/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, in integers;
-   TXI_FAR if there is none, or if it is more.
+/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, in
+   integers; TXI_FAR if there is none, or if it is more.
    scratch  3 * width numbers                                                                  */
-static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
+static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch,
+                          int32_t *out) {
     txi_nearest_marks(of, width, height, scratch, out);
     for (int y = 0; y < height; y++) {
         for (int x = 0; x < width; x++) {
@@ -621,7 +627,8 @@ static void txi_distances(const uint8_t *of, int width, int height, int32_t *scr
 
 /* ---- checks of what the caller gives ------------------------------------------------------- */
 
-#define TXI_MAX_UV 4096.0f /* repeats of the texture; beyond, a float no longer tells its texels apart */
+#define TXI_MAX_UV 4096.0f /* repeats of the texture; beyond, a float no longer tells its texels
+                              apart                                                              */
 
 static txm_status txi_check_size(const txm_image *im, const char *name, const txm_image *like,
                                  txm_env *env) {
@@ -712,8 +719,8 @@ static txm_status txi_check_lines(const texinpaint_desc *d, txm_env *env) {
                                     (uint64_t)i, 0);
         for (size_t k = 0; k < 3 * (size_t)line->count; k++) {
             if (!txm_is_finite(line->points[k]))
-                return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "line # has a point that is not finite",
-                                        (uint64_t)i, 0);
+                return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                        "line # has a point that is not finite", (uint64_t)i, 0);
         }
     }
     return TXM_OK;
@@ -839,7 +846,7 @@ static void txi_show(const txi_domain *domain, const char *name, uint8_t *pixels
 #define TXI_NO_FACE 0xffffffffu
 
 enum {
-    TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel     */
+    TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel    */
     TXI_TILE = 8,     /* ours: texels of a side                                                   */
     TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
 };
@@ -850,17 +857,18 @@ struct txi_surface {
     size_t face_count, vertex_count; /* vertices: welded, those at equal positions are one      */
     txm_dvec3 *point;    /* 1 per vertex                                                       */
     uint32_t *vertex;    /* 3 per face: its vertices                                           */
-    uint32_t *opposite;  /* 3 per face: the side beyond side k, which runs from corner k to the next;
-                            TXM_NO_SIDE at borders                                             */
+    uint32_t *opposite;  /* 3 per face: the side beyond side k, which runs from corner k to the
+                            next; TXM_NO_SIDE at borders                                         */
     txm_vec2 *uv;        /* 3 per face: its corners in texels, texel centres are whole numbers; not
                             wrapped                                                            */
     uint32_t *chart;     /* 1 per face: faces that are connected in the atlas, or that overlap
                             there, have the same number                                        */
     uint32_t *owner;     /* 1 per texel: the first face that covers its centre, or TXI_NO_FACE  */
-    uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] - 1] */
+    uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] -
+                                  1]                                                             */
     uint32_t *hole_first, *hole; /* the texels of face f that were missing, in the same form     */
-    uint32_t *tile;      /* 1 per TXI_TILE x TXI_TILE texels: the chart, if they all have the same, or
-                            TXI_NO_FACE                                                        */
+    uint32_t *tile;      /* 1 per TXI_TILE x TXI_TILE texels: the chart, if they all have the
+                            same, or TXI_NO_FACE                                                 */
     size_t tile_stride;  /* tiles in a row                                                     */
     size_t cursor;       /* no texel before this one is missing and covered                    */
 };
@@ -955,8 +963,8 @@ static int txi_is_sewn(const txi_surface *s, uint32_t a, uint32_t b) {
                fabs((double)q.y - t.y) < 1e-2;
 }
 
-/* Link those of the sides of an edge that have no opposite yet: two that run against one another, or
-   where there are more, pairs that also lie together in the atlas. */
+/* Link those of the sides of an edge that have no opposite yet: two that run against one
+   another, or where there are more, pairs that also lie together in the atlas. */
 static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_t *sides,
                           size_t count) {
     uint32_t open[TXI_FINS];
@@ -969,7 +977,8 @@ static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_
     }
     for (int i = 0; i < n; i++) {
         for (int j = i + 1; j < n && s->opposite[open[i]] == TXM_NO_SIDE; j++) {
-            if (indices[open[i]] == indices[open[j]] || s->opposite[open[j]] != TXM_NO_SIDE) continue;
+            if (indices[open[i]] == indices[open[j]] || s->opposite[open[j]] != TXM_NO_SIDE)
+                continue;
             if (n > 2 && !txi_is_sewn(s, open[i], open[j])) continue;
             s->opposite[open[i]] = open[j];
             s->opposite[open[j]] = open[i];
@@ -977,8 +986,8 @@ static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_
     }
 }
 
-/* Fill opposite: first by the vertices that the mesh names, then by those at equal positions, as files
-   are often cut along seams. Sides of neighbours that run the same way stay unlinked. */
+/* Fill opposite: first by the vertices that the mesh names, then by those at equal positions, as
+   files are often cut along seams. Sides of neighbours that run the same way stay unlinked. */
 static txm_status txi_link_sides(const txm_mesh *mesh, txi_surface *s, txm_env *env) {
     const size_t sides = 3 * s->face_count;
     txm_arena scratch;
@@ -1004,8 +1013,8 @@ static txm_status txi_link_sides(const txm_mesh *mesh, txi_surface *s, txm_env *
 
 /* ---- surface: texels ------------------------------------------------------------------------- */
 
-/* The corners of all faces in texels. Those that lie repeats away from the picture are moved, face by
-   face, near to it, where numbers are exact. */
+/* The corners of all faces in texels. Those that lie repeats away from the picture are moved,
+   face by face, near to it, where numbers are exact. */
 static void txi_load_uv(const txi_domain *d, txi_surface *s) {
     const texinpaint_desc *desc = d->desc;
     for (size_t f = 0; f < s->face_count; f++) {
@@ -1033,15 +1042,17 @@ static int txi_wrap(int i, int n) {
    smaller than texels. */
 static size_t txi_face_texel(const txi_domain *d, const txi_surface *s, size_t face) {
     const txm_vec2 *t = s->uv + 3 * face;
-    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
-    const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3,
+                 y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const int px = txi_wrap((int)floor(x + 0.5), d->width),
+              py = txi_wrap((int)floor(y + 0.5), d->height);
     return (size_t)py * (size_t)d->width + (size_t)px;
 }
 
-/* A face meets a texel: it owns it if none before it does; else, if both lie well over the texel, their
-   charts overlap. */
-static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texel, int x, int y, int width,
-                    int height) {
+/* A face meets a texel: it owns it if none before it does; else, if both lie well over the
+   texel, their charts overlap. */
+static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texel, int x, int y,
+                    int width, int height) {
     const uint32_t owner = s->owner[texel];
     double mine[3], theirs[3];
     if (owner == TXI_NO_FACE) {
@@ -1052,8 +1063,10 @@ static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texe
     if (!txi_weights(s->uv + 3 * (size_t)face, x, y, mine)) return;
     /* where the owner has this texel: shifted by whole pictures */
     const txm_vec2 *t = s->uv + 3 * (size_t)owner;
-    const double cx = ((double)t[0].x + t[1].x + t[2].x) / 3, cy = ((double)t[0].y + t[1].y + t[2].y) / 3;
-    const double sx = floor((cx - x) / width + 0.5) * width, sy = floor((cy - y) / height + 0.5) * height;
+    const double cx = ((double)t[0].x + t[1].x + t[2].x) / 3,
+                 cy = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const double sx = floor((cx - x) / width + 0.5) * width,
+                 sy = floor((cy - y) / height + 0.5) * height;
     if (!txi_weights(t, x + sx, y + sy, theirs)) return;
     for (int k = 0; k < 3; k++) {
         if (mine[k] < 0.02 || theirs[k] < 0.02) return;
@@ -1091,7 +1104,8 @@ static void txi_cover_face(const txi_domain *d, txi_surface *s, uint32_t *charts
         int end = (int)floor(to + 1e-6) + 1;
         if (end - begin > d->width) end = begin + d->width;
         for (int x = begin; x < end; x++)
-            txi_own(s, charts, face, row + (size_t)txi_wrap(x, d->width), x, y, d->width, d->height);
+            txi_own(s, charts, face, row + (size_t)txi_wrap(x, d->width), x, y, d->width,
+                    d->height);
     }
 }
 
@@ -1102,7 +1116,8 @@ static void txi_cover(txi_domain *d, txi_surface *s) {
     for (uint32_t f = 0; f < s->face_count; f++) s->chart[f] = f;
     for (uint32_t side = 0; side < 3 * s->face_count; side++) {
         const uint32_t other = s->opposite[side];
-        if (other < side && txi_is_sewn(s, side, other)) txi_join_sets(s->chart, side / 3, other / 3);
+        if (other < side && txi_is_sewn(s, side, other))
+            txi_join_sets(s->chart, side / 3, other / 3);
     }
     for (uint32_t f = 0; f < s->face_count; f++) txi_cover_face(d, s, s->chart, f);
     for (uint32_t f = 0; f < s->face_count; f++) s->chart[f] = txi_root(s->chart, f);
@@ -1123,8 +1138,9 @@ static void txi_fill_tiles(const txi_domain *d, txi_surface *s) {
     }
 }
 
-/* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at first[k] ..
-   first[k + 1] - 1. Only those with a mark, if there are marks. first: room for count + 1. */
+/* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at
+   first[k] .. first[k + 1] - 1. Only those with a mark, if there are marks. first: room for
+   count + 1. */
 static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks, size_t count,
                     uint32_t *first, uint32_t *items) {
     memset(first, 0, (count + 1) * sizeof *first);
@@ -1133,7 +1149,8 @@ static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks
     }
     for (size_t k = 1; k <= count; k++) first[k] += first[k - 1];
     const uint32_t total = first[count];
-    for (size_t i = key_count; i-- > 0;) { /* backwards, which leaves in first[k + 1] where k begins */
+    for (size_t i = key_count; i-- > 0;) { /* backwards, which leaves in first[k + 1] where k
+                                              begins                                             */
         if (keys[i] < count && (!marks || marks[i])) items[--first[keys[i] + 1]] = (uint32_t)i;
     }
     for (size_t k = 0; k < count; k++) first[k] = first[k + 1];
@@ -1142,7 +1159,8 @@ static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks
 
 /* Make d->surface, if desc has a mesh, and d->covered. d->missing must be set. A picture is covered
    everywhere.
-   cost    O(faces + texels), faces * log of the corners of a vertex; 80 bytes per face, 5 per texel */
+   cost    O(faces + texels), faces * log of the corners of a vertex; 80 bytes per face, 5 per
+           texel */
 static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env) {
     const txm_mesh *mesh = &d->desc->mesh;
     const size_t texels = (size_t)d->width * (size_t)d->height, faces = mesh->face_count;
@@ -1164,8 +1182,8 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
     s->chart = (uint32_t *)txm_arena_alloc(arena, faces, sizeof(uint32_t));
     s->owner = (uint32_t *)txm_arena_alloc(arena, texels, sizeof(uint32_t));
     s->tile_stride = (size_t)(d->width - 1) / TXI_TILE + 1;
-    s->tile = (uint32_t *)txm_arena_alloc(arena, s->tile_stride * ((size_t)(d->height - 1) / TXI_TILE + 1),
-                                          sizeof(uint32_t));
+    s->tile = (uint32_t *)txm_arena_alloc(
+        arena, s->tile_stride * ((size_t)(d->height - 1) / TXI_TILE + 1), sizeof(uint32_t));
     s->hole_first = (uint32_t *)txm_arena_alloc(arena, faces + 1, sizeof(uint32_t));
     s->first = (uint32_t *)txm_arena_alloc(arena, mesh->vertex_count + 1, sizeof(uint32_t));
     if (arena->failed) return txi_no_memory(env);
@@ -1192,7 +1210,8 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
 /* not reached */
 #define TXI_UNREACHED 1e300
 
-/* A vertex waits with the distance that it had when it was put in; the heap has the least on top. */
+/* A vertex waits with the distance that it had when it was put in; the heap has the least on
+   top. */
 typedef struct txi_wait {
     double distance;
     uint32_t vertex;
@@ -1233,7 +1252,8 @@ static txi_wait txi_heap_pop(txi_heap *heap) {
     const txi_wait top = heap->items[0], last = heap->items[--heap->count];
     size_t at = 0;
     for (size_t child = 1; child < heap->count; child = 2 * at + 1) {
-        if (child + 1 < heap->count && txi_wait_before(heap->items[child + 1], heap->items[child])) child++;
+        if (child + 1 < heap->count && txi_wait_before(heap->items[child + 1], heap->items[child]))
+            child++;
         if (!txi_wait_before(heap->items[child], last)) break;
         heap->items[at] = heap->items[child];
         at = child;
@@ -1242,9 +1262,9 @@ static txi_wait txi_heap_pop(txi_heap *heap) {
     return top;
 }
 
-/* The distance of c from a source whose distances from a and b are known, along straight lines through
-   the triangle a b c: unfolded into its plane, the source is where the circles about a and b with
-   these radii meet beyond a b.
+/* The distance of c from a source whose distances from a and b are known, along straight lines
+   through the triangle a b c: unfolded into its plane, the source is where the circles about a and
+   b with these radii meet beyond a b.
 
                 c            With a at 0 and b at (l, 0), the source is at (x, -y):
                / \               x = (l^2 + da^2 - db^2) / 2l,  y^2 = da^2 - x^2.
@@ -1279,14 +1299,14 @@ static int txi_geodesic_update(const txi_surface *s, txi_heap *heap, txm_arena *
     return txi_heap_push(heap, arena, d, c);
 }
 
-/* Distances along the surface from sources, by label correcting in the order of a heap; each triangle
-   unfolds the source that lies behind two of its corners into its plane, which is exact as long as
-   the unfolded triangles are: on planes, however the triangles are shaped. Elsewhere distances are
-   too long by a fraction of a percent. (Exact algorithms keep intervals of edges instead, which costs
-   ten times as much.)
+/* Distances along the surface from sources, by label correcting in the order of a heap; each
+   triangle unfolds the source that lies behind two of its corners into its plane, which is exact as
+   long as the unfolded triangles are: on planes, however the triangles are shaped. Elsewhere
+   distances are too long by a fraction of a percent. (Exact algorithms keep intervals of edges
+   instead, which costs ten times as much.)
 
-   Exact distances from one place, that is. From several, each triangle takes what reaches it for the rays of
-   one; from a line they come out too short by up to 2 %.
+   Exact distances from one place, that is. From several, each triangle takes what reaches it for
+   the rays of one; from a line they come out too short by up to 2 %.
 
    sources   vertices, start their distances (NULL = 0). For a place inside a triangle: its corners,
              with their distances from it. Two corners at 0 make their whole edge a source
@@ -1325,8 +1345,8 @@ static txm_status txi_geodesic(const txi_surface *s, const uint32_t *sources, co
 
 enum { TXI_LEAF = 48 /* ours: unknowns that are not divided further */ };
 
-/* A symmetric positive definite matrix whose pattern is a graph: A = P^T L D L^T P. Rows that are solved
-   early have few entries; see txi_dissect. */
+/* A symmetric positive definite matrix whose pattern is a graph: A = P^T L D L^T P. Rows that
+   are solved early have few entries; see txi_dissect. */
 typedef struct txi_factor {
     size_t count, edge_count;
     const uint32_t *low, *high; /* the two unknowns of each edge                                  */
@@ -1342,15 +1362,15 @@ typedef struct txi_factor {
     uint32_t *flag, *stack, *path;
 } txi_factor;
 
-/* The order of elimination: nested dissection by coordinates. The points are divided at the median along
-   the longest side of their bounding box; those beyond it that have neighbours before it separate the
-   rest and come last; so on with both halves. On surfaces L has O(n log n) entries.
+/* The order of elimination: nested dissection by coordinates. The points are divided at the median
+   along the longest side of their bounding box; those beyond it that have neighbours before it
+   separate the rest and come last; so on with both halves. On surfaces L has O(n log n) entries.
 
    first, next  the neighbours of point i: next[first[i]] .. next[first[i + 1] - 1]
    order        receives the points
    pairs        scratch, 2 per point; side: scratch, 1 per point                            */
-static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *first, const uint32_t *next,
-                        uint32_t *order, txm_pair *pairs, uint32_t *side) {
+static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *first,
+                        const uint32_t *next, uint32_t *order, txm_pair *pairs, uint32_t *side) {
     size_t begins[128], ends[128];
     int depth = 1;
     uint32_t stamp = 0;
@@ -1383,11 +1403,13 @@ static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *fi
             order[begin + k] = pairs[k].value;
             side[pairs[k].value] = stamp;
         }
-        size_t to = begin + half, last = 0; /* the separator is gathered in the scratch half of pairs */
+        size_t to = begin + half, last = 0; /* the separator is gathered in the scratch half of
+                                               pairs                                             */
         for (size_t k = half; k < n; k++) {
             const uint32_t v = pairs[k].value;
             int divides = 0;
-            for (uint32_t e = first[v]; e < first[v + 1] && !divides; e++) divides = side[next[e]] == stamp;
+            for (uint32_t e = first[v]; e < first[v + 1] && !divides; e++)
+                divides = side[next[e]] == stamp;
             if (divides) pairs[n + last++].value = v;
             else order[to++] = v;
         }
@@ -1399,9 +1421,9 @@ static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *fi
     }
 }
 
-/* Entries of row k of L: the nodes on the paths of the elimination tree from the entries of A above the
-   diagonal of column k towards k. Fills stack from top, in an order in which children come before
-   their parents; returns where it begins. */
+/* Entries of row k of L: the nodes on the paths of the elimination tree from the entries of A
+   above the diagonal of column k towards k. Fills stack from top, in an order in which children
+   come before their parents; returns where it begins. */
 static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     size_t top = f->count;
     f->flag[k] = k;
@@ -1416,7 +1438,8 @@ static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     return top;
 }
 
-/* Fill parent, the elimination tree, and first, from how long the columns of L become. filled: 0. */
+/* Fill parent, the elimination tree, and first, from how long the columns of L become. filled:
+   0. */
 static void txi_factor_tree(txi_factor *f) {
     for (uint32_t k = 0; k < f->count; k++) {
         f->parent[k] = UINT32_MAX;
@@ -1489,8 +1512,8 @@ static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *
     return arena->failed ? txi_no_memory(env) : TXM_OK;
 }
 
-/* Compute L and D, row by row, of the matrix with diagonal[i] and, for each edge, -weight[edge] in both
-   its places. */
+/* Compute L and D, row by row, of the matrix with diagonal[i] and, for each edge, -weight[edge]
+   in both its places. */
 static void txi_factor_make(txi_factor *f, const double *weight, const double *diagonal) {
     double *y = f->work;
     memset(f->filled, 0, f->count * sizeof *f->filled);
@@ -1554,8 +1577,8 @@ static void txi_factor_solve(const txi_factor *f, double *xy) {
 /* ours, radians: a disk that has more curvature than this is slit, from there to its border */
 #define TXI_BEND 0.8
 
-/* Faces that form a topological disk, glued along their sides. A vertex of the surface that the disk
-   meets from several parts of its border has a copy in each. */
+/* Faces that form a topological disk, glued along their sides. A vertex of the surface that the
+   disk meets from several parts of its border has a copy in each. */
 typedef struct txi_disk {
     uint32_t *faces;        /* of the surface                                                    */
     size_t face_count, room;
@@ -1598,7 +1621,8 @@ static uint32_t txi_new_vertex(txi_disk *disk) {
     return (uint32_t)disk->vertex_count++;
 }
 
-/* the side of the disk that this side of the surface is, TXM_NO_SIDE if its face is not in the disk */
+/* the side of the disk that this side of the surface is, TXM_NO_SIDE if its face is not in the
+   disk */
 static uint32_t txi_disk_side(const txi_disk *disk, uint32_t side) {
     if (side == TXM_NO_SIDE || disk->slot[side / 3] == TXI_NO_FACE) return TXM_NO_SIDE;
     return 3 * disk->slot[side / 3] + side % 3;
@@ -1628,15 +1652,16 @@ static void txi_disk_begin(txi_disk *disk, uint32_t face) {
     }
 }
 
-/* The angle of the vector (x, y), y at least 0: 0 to pi. With tan(a / 2) = y / (r + x), halved twice more,
-   then Taylor; only operations that give the same bits everywhere. */
+/* The angle of the vector (x, y), y at least 0: 0 to pi. With tan(a / 2) = y / (r + x), halved
+   twice more, then Taylor; only operations that give the same bits everywhere. */
 static double txi_angle(double x, double y) {
     const double r = sqrt(x * x + y * y);
     if (!(r > 0) || (x < 0 && y <= -x * 1e-9)) return r > 0 ? TXM_PI : 0;
     double t = y / (r + x), turns = 2;
     for (; turns < 16 || t > 0.2; turns *= 2) t /= 1 + sqrt(1 + t * t);
     const double tt = t * t;
-    return turns * t * (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt * (1.0 / 9 - tt / 11)))));
+    return turns * t *
+           (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt * (1.0 / 9 - tt / 11)))));
 }
 
 /* The curvature at a vertex of the surface: what the angles of its faces lack to a full turn. */
@@ -1652,11 +1677,12 @@ static double txi_angle_lack(const txi_surface *s, uint32_t vertex) {
     return sum;
 }
 
-/* A vertex is about to come to lie within the disk. Should the disk stay slit there, as it has become
-   too curved to lie flat? */
+/* A vertex is about to come to lie within the disk. Should the disk stay slit there, as it has
+   become too curved to lie flat? */
 static int txi_disk_slits(txi_disk *disk, const txi_surface *s, uint32_t vertex) {
     disk->bend += txi_angle_lack(s, vertex);
-    if (!disk->depth || disk->depth[vertex] <= disk->slit_from || fabs(disk->bend) < TXI_BEND) return 0;
+    if (!disk->depth || disk->depth[vertex] <= disk->slit_from || fabs(disk->bend) < TXI_BEND)
+        return 0;
     disk->bend = 0;
     return 1;
 }
@@ -1665,7 +1691,8 @@ static int txi_disk_slits(txi_disk *disk, const txi_surface *s, uint32_t vertex)
    sides before and behind them, and so on. At least three sides stay. */
 static void txi_disk_zip(txi_disk *disk, const txi_surface *s, uint32_t side) {
     while (disk->loop >= 5) {
-        const uint32_t other = disk->next[side], before = disk->prev[side], behind = disk->next[other];
+        const uint32_t other = disk->next[side], before = disk->prev[side],
+                       behind = disk->next[other];
         if (txi_disk_side(disk, s->opposite[txi_surface_side(disk, side)]) != other) return;
         if (txi_disk_slits(disk, s, s->vertex[txi_surface_side(disk, other)])) return;
         txi_join_sets(disk->parent, disk->corner[side], disk->corner[txi_next_corner(other)]);
@@ -1679,13 +1706,16 @@ static void txi_disk_zip(txi_disk *disk, const txi_surface *s, uint32_t side) {
 
 /* Add the face beyond a side of the border, which must not be in the disk yet:
 
-           c              The border runs  p, a b, q  before,  p, a c, c b, q  after. Where p and a c
-       n1 / \ n2          are the two sides of one edge they are glued, and a lies within; so are c b
+           c              The border runs  p, a b, q  before,  p, a c, c b, q  after. Where p and a
+                          c
+       n1 / \ n2          are the two sides of one edge they are glued, and a lies within; so are c
+                          b
          /   \            and q. Where an edge returns to another part of the border it is not: that
-    p > a --> b > q       would make a ring. It stays a cut.                                        */
+    p > a --> b > q       would make a ring. It stays a cut.                                      */
 static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
     const uint32_t o = s->opposite[txi_surface_side(disk, side)];
-    const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side], behind = disk->next[side];
+    const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side],
+                   behind = disk->next[side];
     const uint32_t base = 3 * i + o % 3, n1 = txi_next_corner(base), n2 = txi_next_corner(n1);
     disk->faces[i] = o / 3;
     disk->grown_from[i] = side / 3;
@@ -1701,11 +1731,13 @@ static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
     disk->loop++;
     disk->border = n1;
     txi_disk_zip(disk, s, n2);
-    if (disk->is_border[n1] && disk->is_border[disk->prev[n1]]) txi_disk_zip(disk, s, disk->prev[n1]);
+    if (disk->is_border[n1] && disk->is_border[disk->prev[n1]])
+        txi_disk_zip(disk, s, disk->prev[n1]);
 }
 
 /* Number the vertices from 0 and resolve the corners. point receives one for each. */
-static void txi_disk_finish(txi_disk *disk, const txi_surface *s, uint32_t *number, txm_dvec3 *point) {
+static void txi_disk_finish(txi_disk *disk, const txi_surface *s, uint32_t *number,
+                            txm_dvec3 *point) {
     uint32_t count = 0;
     for (size_t v = 0; v < disk->vertex_count; v++) number[v] = TXI_NO_FACE;
     for (size_t c = 0; c < 3 * disk->face_count; c++) {
@@ -1764,7 +1796,7 @@ static txm_status txi_disk_grow(txi_disk *disk, const txi_surface *s, uint32_t s
     return good ? TXM_OK : txi_no_memory(env);
 }
 
-/* ---- flatten: a disk of faces in the plane ---------------------------------------------------- */
+/* ---- flatten: a disk of faces in the plane --------------------------------------------------- */
 
 enum {
     TXI_ARAP_ROUNDS = 60 /* ours; it ends earlier when nothing moves any more */
@@ -1775,7 +1807,8 @@ typedef struct txi_flat {
     const txi_disk *disk;
     txm_dvec3 *point;       /* 1 per vertex                                                      */
     double *xy;             /* 2 per vertex, in the unit of the surface; faces counter-clockwise  */
-    double *shape;          /* 3 per face: in its own plane the corners are (0, 0), (s0, 0), (s1, s2) */
+    double *shape;          /* 3 per face: in its own plane the corners are (0, 0), (s0, 0),
+                               (s1, s2)                                                          */
     double *cot;            /* 3 per face: the cotangent of the angle opposite of side k          */
     size_t edge_count;
     uint32_t *low, *high;   /* the vertices of each edge                                         */
@@ -1859,9 +1892,9 @@ static txm_status txi_flat_init(txi_flat *flat, const txi_surface *s, const txi_
     return good ? TXM_OK : txi_no_memory(env);
 }
 
-/* The border on a circle, each vertex at its share of the length, the rest where each is the mean of
-   its neighbours, weighted by positive cotangents: no face is turned over (Tutte). The circle has the
-   area of the surface. weight and diagonal: scratch, 1 per edge and vertex. */
+/* The border on a circle, each vertex at its share of the length, the rest where each is the
+   mean of its neighbours, weighted by positive cotangents: no face is turned over (Tutte). The
+   circle has the area of the surface. weight and diagonal: scratch, 1 per edge and vertex. */
 static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double *diagonal,
                       uint8_t *fixed) {
     const txi_disk *disk = flat->disk;
@@ -1871,7 +1904,8 @@ static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double
     memset(weight, 0, flat->edge_count * sizeof *weight);
     memset(diagonal, 0, vertices * sizeof *diagonal);
     memset(fixed, 0, vertices);
-    for (size_t i = 0; i < disk->face_count; i++) area += flat->shape[3 * i] * flat->shape[3 * i + 2] / 2;
+    for (size_t i = 0; i < disk->face_count; i++)
+        area += flat->shape[3 * i] * flat->shape[3 * i + 2] / 2;
     for (size_t k = 0; k < disk->loop; k++, side = disk->next[side])
         length += txm_d3_dist(flat->point[disk->corner[side]],
                               flat->point[disk->corner[txi_next_corner(side)]]) + 1e-12;
@@ -1892,7 +1926,8 @@ static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double
     }
     for (size_t e = 0; e < flat->edge_count; e++) {
         for (int turn = 0; turn < 2; turn++) {
-            const size_t a = turn ? flat->high[e] : flat->low[e], b = turn ? flat->low[e] : flat->high[e];
+            const size_t a = turn ? flat->high[e] : flat->low[e],
+                         b = turn ? flat->low[e] : flat->high[e];
             if (fixed[a]) continue;
             diagonal[a] += weight[e];
             if (!fixed[b]) continue;
@@ -1943,8 +1978,8 @@ static void txi_arap_face(const txi_flat *flat, size_t i, double face_weight, do
     }
 }
 
-/* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over the
-   sides of
+/* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over
+   the sides of
 
        weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
 
@@ -1997,8 +2032,8 @@ static txm_status txi_flatten(txi_flat *flat, const double *face_weight, double 
     uint8_t *fixed = (uint8_t *)txm_arena_alloc(&scratch, vertices, 1);
     txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
     if (status == TXM_OK)
-        status = txi_factor_plan(&factor, vertices, flat->point, flat->edge_count, flat->low, flat->high,
-                                 &scratch, env);
+        status = txi_factor_plan(&factor, vertices, flat->point, flat->edge_count, flat->low,
+                                 flat->high, &scratch, env);
     if (status == TXM_OK) {
         txi_tutte(flat, &factor, weight, diagonal, fixed);
         txi_arap(flat, &factor, face_weight, weight, diagonal, right, small_step);
@@ -2036,9 +2071,9 @@ static txm_status txi_window_alloc(txi_window *w, int width, int height, txm_are
     return TXM_OK;
 }
 
-/* Interpolation is by the kernel of Lanczos with three lobes: from texels to pixels and back it keeps three
-   quarters of the energy of fine detail, the spline of Catmull and Rom half of it. Its weights for samples
-   at -2 .. 3, for a place t from 0 to below 1, which sum up to 1:
+/* Interpolation is by the kernel of Lanczos with three lobes: from texels to pixels and back it
+   keeps three quarters of the energy of fine detail, the spline of Catmull and Rom half of it. Its
+   weights for samples at -2 .. 3, for a place t from 0 to below 1, which sum up to 1:
 
        w(x) = sinc(pi x) sinc(pi x / 3),   x = t + 2 .. t - 3                                   */
 static void txi_lanczos(double t, double weight[TXI_TAPS]) {
@@ -2064,7 +2099,8 @@ typedef struct txi_kernel {
 } txi_kernel;
 
 static void txi_kernel_init(txi_kernel *kernel) {
-    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
+    for (int i = 0; i < TXI_KERNEL_STEPS; i++)
+        txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
     for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;
 }
 
@@ -2075,8 +2111,8 @@ static void txi_kernel_at(const txi_kernel *kernel, double t, double weight[TXI_
     for (int k = 0; k < TXI_TAPS; k++) weight[k] = a[k] + part * (b[k] - a[k]);
 }
 
-/* A value between the four samples around it, in excess of them by at most a quarter of their range: the
-   kernel must not ring at hard edges. */
+/* A value between the four samples around it, in excess of them by at most a quarter of their
+   range: the kernel must not ring at hard edges. */
 static double txi_limit(double value, double low, double high) {
     const double more = 0.25 * (high - low);
     return value < low - more ? low - more : value > high + more ? high + more : value;
@@ -2120,10 +2156,11 @@ typedef struct txi_taps {
     double weight[TXI_TAPS * TXI_TAPS];
 } txi_taps;
 
-/* The known texels around p that a pixel on this face may take: those of the kernel, if the inner four
-   are among them and little weight is lost; else those of the inner four, bilinear; else the nearest. */
-static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p, int is_label,
-                        txi_taps *taps) {
+/* The known texels around p that a pixel on this face may take: those of the kernel, if the
+   inner four are among them and little weight is lost; else those of the inner four, bilinear;
+   else the nearest. */
+static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p,
+                        int is_label, txi_taps *taps) {
     const double fx = floor((double)p.x), fy = floor((double)p.y), tx = p.x - fx, ty = p.y - fy;
     const int x = (int)fx, y = (int)fy;
     double wx[TXI_TAPS], wy[TXI_TAPS], part = 0, sum = 0;
@@ -2178,9 +2215,11 @@ static int txi_has_alpha(const txi_domain *d, int map) {
 
 /* A channel of a texel; colours times their alpha, if has_alpha. */
 static double txi_texel_value(const txm_image *image, int has_alpha, int64_t texel, int c) {
-    const int x = (int)(texel % image->width), y = (int)(texel / image->width), last = image->channels - 1;
+    const int x = (int)(texel % image->width), y = (int)(texel / image->width),
+              last = image->channels - 1;
     const double value = txm_image_get(image, x, y, c);
-    return has_alpha && c < last ? value * txm_clampf(txm_image_get(image, x, y, last), 0, 1) : value;
+    return has_alpha && c < last ? value * txm_clampf(txm_image_get(image, x, y, last), 0, 1)
+                                 : value;
 }
 
 /* The samples of a row, as they are stored. */
@@ -2197,8 +2236,8 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 }
 
 /* The channels of a map at a place all around which texels are known and of one chart. */
-static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel, txm_vec2 p,
-                            float *out) {
+static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel,
+                            txm_vec2 p, float *out) {
     enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
     const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
@@ -2228,8 +2267,8 @@ static void txi_read_inside(const txm_image *image, int has_alpha, const txi_ker
     }
 }
 
-/* Are all texels of the kernel at p known and of the chart of this face? Decided by tiles; 0 also where
-   that is not enough. */
+/* Are all texels of the kernel at p known and of the chart of this face? Decided by tiles; 0
+   also where that is not enough. */
 static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     const txi_surface *s = d->surface;
     const int x = (int)floor((double)p.x) - 2, y = (int)floor((double)p.y) - 2, side = TXI_TILE;
@@ -2241,15 +2280,16 @@ static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     }
     for (int j = 0; j < TXI_TAPS; j++) {
         static const uint8_t none[TXI_TAPS] = {0};
-        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS) != 0)
+        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS) !=
+            0)
             return 0;
     }
     return 1;
 }
 
 /* All channels of a map at pixel i of the window, which is not void; colours times their alpha. */
-static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w, int map,
-                           size_t i, float *out) {
+static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w,
+                           int map, size_t i, float *out) {
     const txm_image *image = &d->maps[map];
     const int label = txi_is_label(d, map), has_alpha = txi_has_alpha(d, map);
     txi_taps taps;
@@ -2279,16 +2319,18 @@ static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const 
 }
 
 /* ---- resample: values as they are blended ------------------------------------------------------
-   Samples of colours are times their alpha, as a transparent texel has no colour. Normals are vectors
-   in the directions of the window (x right, y down, z out of the surface), so that they keep their
-   direction on the surface across charts of the atlas, and with pieces that are turned.          */
+   Samples of colours are times their alpha, as a transparent texel has no colour. Normals are
+   vectors in the directions of the window (x right, y down, z out of the surface), so that they
+   keep their direction on the surface across charts of the atlas, and with pieces that are
+   turned. */
 
 /* A sample of the texture, its colours already times their alpha, as it is blended. */
 static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     if (kind && kind->is_normal) {
         const double x = 2 * (double)v[0] - 1;
-        const double y = (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        const double y =
+            (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
         v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
         v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
         v[2] = txm_float(2 * (double)v[2] - 1);
@@ -2317,8 +2359,8 @@ static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored
 /* ---- resample: from maps to windows, from windows to maps ---- */
 
 /* Every channel of a map at the window's pixels: values receives width * height * channels numbers,
-   in the units of txm_image_get. Interpolated from known texels of the pixel's own chart; labels are those
-   of the nearest texel. 0 where there is no known texel. */
+   in the units of txm_image_get. Interpolated from known texels of the pixel's own chart; labels
+   are those of the nearest texel. 0 where there is no known texel. */
 static void txi_window_read(const txi_domain *d, const txi_window *w, int map, float *values) {
     const size_t count = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[map].channels;
@@ -2342,7 +2384,8 @@ static uint8_t txi_pixel_state(const txi_domain *d, uint32_t face, txm_vec2 p) {
     double most = 0;
     int64_t nearest = -1;
     if (d->surface && txi_is_inside(d, face, p))
-        return d->usable[(size_t)floor((double)p.y + 0.5) * (size_t)d->width + (size_t)floor((double)p.x + 0.5)]
+        return d->usable[(size_t)floor((double)p.y + 0.5) * (size_t)d->width +
+                         (size_t)floor((double)p.x + 0.5)]
                    ? TXI_KNOWN
                    : TXI_FOREIGN;
     for (int k = 0; k < 4; k++) {
@@ -2396,10 +2439,11 @@ static void txi_window_colors(const txi_domain *d, txi_window *w) {
     }
 }
 
-/* The window's values at (x, y): by the kernel; where one of its pixels is void, bilinear from those of the
-   four around that are not. 0: all four are void. */
-static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int channels, int is_label,
-                            const float *values, double x, double y, float out[TXI_MAX_CHANNELS]) {
+/* The window's values at (x, y): by the kernel; where one of its pixels is void, bilinear from
+   those of the four around that are not. 0: all four are void. */
+static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int channels,
+                            int is_label, const float *values, double x, double y,
+                            float out[TXI_MAX_CHANNELS]) {
     enum { N = TXI_TAPS };
     const double fx = floor(x), fy = floor(y);
     const int left = (int)fx - 2, up = (int)fy - 2;
@@ -2472,7 +2516,8 @@ static void txi_window_write(txi_domain *d, const txi_window *w, int map, const 
     txi_kernel_init(&kernel);
     for (size_t i = 0; i < w->target_count; i++) {
         const txi_target *t = &w->targets[i];
-        const int x = (int)(t->texel % (uint32_t)d->width), y = (int)(t->texel / (uint32_t)d->width);
+        const int x = (int)(t->texel % (uint32_t)d->width),
+                  y = (int)(t->texel / (uint32_t)d->width);
         float value[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
         if (!txi_window_value(w, &kernel, channels, label, values, t->x, t->y, value)) {
             const int64_t pixel = txi_solid_near(w, t->x, t->y);
@@ -2502,12 +2547,14 @@ static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
         const txm_image *image = &d->maps[m];
         const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
         memcpy((uint8_t *)txm_image_row(image, (int)(to / w)) + to % w * bytes,
-               (const uint8_t *)txm_image_row_const(image, (int)(from / w)) + from % w * bytes, bytes);
+               (const uint8_t *)txm_image_row_const(image, (int)(from / w)) + from % w * bytes,
+               bytes);
     }
 }
 
-/* Missing texels outside the charts, at most desc->gutter from a texel in a chart, get the values of
-   the nearest one in all maps. They are not missing any longer. filled receives how many. */
+/* Missing texels outside the charts, at most desc->gutter from a texel in a chart, get the
+   values of the nearest one in all maps. They are not missing any longer. filled receives how
+   many. */
 static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env, size_t *filled) {
     const int gutter = d->desc->gutter == 0 ? 8 : d->desc->gutter;
     const size_t count = (size_t)d->width * (size_t)d->height;
@@ -2541,9 +2588,9 @@ enum {
     TXI_WINDOW_MOST = 1 << 20, /* pixels of a window; larger holes take several                */
     TXI_WINDOW_GROUP = 400000, /* pixels up to which the windows of near holes are joined      */
     TXI_WINDOW_SIDE = 1000,    /* pixels: side of a window in a hole that is larger            */
-    TXI_SIDE_MOST = 4000,      /* pixels: longest diagonal of a window: offsets between places in it,
-                                  turned copies included, fit 13 bits (assemble.h), and their
-                                  coordinates in 1/65536 pixels an int32_t (pose.h)             */
+    TXI_SIDE_MOST = 4000,      /* pixels: longest diagonal of a window: offsets between places in
+                                  it, turned copies included, fit 13 bits (assemble.h), and their
+                                  coordinates in 1/65536 pixels an int32_t (pose.h)              */
     TXI_MARGIN = 32            /* pixels: what lies nearer to a cut through a hole is left to the
                                   next window                                                  */
 };
@@ -2604,7 +2651,8 @@ static txi_box txi_box_union(txi_box a, txi_box b) {
     return a;
 }
 
-/* .9 times the diameter of a disk of this area, within limits: how much is laid out around a hole */
+/* .9 times the diameter of a disk of this area, within limits: how much is laid out around a
+   hole */
 static int txi_band(size_t area) {
     return txm_clampi((int)(0.9 * 1.13 * sqrt((double)area)), TXI_BAND_LEAST, TXI_BAND_MOST);
 }
@@ -2620,7 +2668,8 @@ static int txi_flood(txi_domain *d, uint32_t start, uint8_t mark, txi_list *list
     box->left = box->right = (int)(start % (uint32_t)w);
     box->top = box->bottom = (int)(start / (uint32_t)w);
     for (; at < list->count; at++) {
-        const int x = (int)(list->items[at] % (uint32_t)w), y = (int)(list->items[at] / (uint32_t)w);
+        const int x = (int)(list->items[at] % (uint32_t)w),
+                  y = (int)(list->items[at] / (uint32_t)w);
         const txi_box pixel = {x, y, x, y};
         *box = txi_box_union(*box, pixel);
         for (int k = 0; k < 9; k++) {
@@ -2655,13 +2704,15 @@ static uint32_t txi_rim(const txi_domain *d, const txi_list *hole) {
 
 /* Add the holes in a window to ours as long as it does not become too large. box receives the
    bounding box of all. 0: no memory. */
-static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena *arena, txi_box *box) {
+static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena *arena,
+                      txi_box *box) {
     for (int grown = 1; grown;) {
         const txi_box window = txi_box_grow(*box, txi_band(ours->count), d);
         grown = 0;
         for (int y = window.top; y < window.bottom && !grown; y++) {
             const size_t row = (size_t)y * (size_t)d->width;
-            const uint8_t *at = d->missing + row + window.left, *end = d->missing + row + window.right;
+            const uint8_t *at = d->missing + row + window.left,
+                          *end = d->missing + row + window.right;
             while (at < end && (at = (const uint8_t *)memchr(at, 1, (size_t)(end - at))) != NULL) {
                 const uint32_t start = (uint32_t)(at - d->missing);
                 const size_t before = others->count;
@@ -2827,8 +2878,8 @@ typedef struct txi_sheet {
     txm_dvec3 origin;      /* places are relative to it                                           */
 } txi_sheet;
 
-/* what a face of the surface is found to be: known, of a hole, of the hole that is completed, of one that is
-   completed along, of one that is left for later */
+/* what a face of the surface is found to be: known, of a hole, of the hole that is completed, of
+   one that is completed along, of one that is left for later */
 enum {
     TXI_SHEET_UNSEEN = 0,
     TXI_SHEET_KNOWN,
@@ -2838,8 +2889,8 @@ enum {
     TXI_SHEET_REFUSED
 };
 
-/* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing any
-   longer */
+/* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing
+   any longer */
 static const uint32_t *txi_face_texels(const txi_surface *s, uint32_t face, size_t *count) {
     *count = s->hole_first[face + 1] - s->hole_first[face];
     return s->hole + s->hole_first[face];
@@ -2862,8 +2913,10 @@ static int txi_is_hole(txi_sheet *l, uint32_t face) {
     return is_hole;
 }
 
-/* Where texel i lies in a face that owns it, in texels that are not wrapped, and its weights there. */
-static void txi_texel_weights(const txi_domain *d, uint32_t face, uint32_t texel, double weight[3]) {
+/* Where texel i lies in a face that owns it, in texels that are not wrapped, and its weights
+   there. */
+static void txi_texel_weights(const txi_domain *d, uint32_t face, uint32_t texel,
+                              double weight[3]) {
     const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
     const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
     double least_x = t[0].x, least_y = t[0].y, most_x = t[0].x, most_y = t[0].y, best = -1e300;
@@ -2895,7 +2948,8 @@ static txm_dvec3 txi_texel_point(const txi_domain *d, uint32_t face, uint32_t te
     double w[3];
     txm_dvec3 p = txm_d3(0, 0, 0);
     txi_texel_weights(d, face, texel, w);
-    for (uint32_t k = 0; k < 3; k++) p = txm_d3_mad(p, txi_corner_point(d->surface, 3 * face + k), w[k]);
+    for (uint32_t k = 0; k < 3; k++)
+        p = txm_d3_mad(p, txi_corner_point(d->surface, 3 * face + k), w[k]);
     return p;
 }
 
@@ -2908,9 +2962,10 @@ static size_t txi_missing_count(const txi_domain *d, uint32_t face) {
 
 /* ---- sheet: the hole ------------------------------------------------------------------------ */
 
-/* Add to list the hole that a face belongs to, connected across sides; its faces get this state. Faces
-   outside the disk, if there is one, end it: 0. -1: no memory. */
-static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi_disk *disk, txi_list *list) {
+/* Add to list the hole that a face belongs to, connected across sides; its faces get this state.
+   Faces outside the disk, if there is one, end it: 0. -1: no memory. */
+static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi_disk *disk,
+                           txi_list *list) {
     size_t at = list->count;
     int inside = 1;
     if (!txi_push(list, l->scratch, face)) return -1;
@@ -2920,7 +2975,8 @@ static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi
         if (disk && disk->slot[f] == TXI_NO_FACE) inside = 0;
         for (uint32_t k = 0; k < 3 && inside; k++) {
             const uint32_t o = l->s->opposite[3 * f + k];
-            if (o == TXM_NO_SIDE || !txi_is_hole(l, o / 3) || l->state[o / 3] != TXI_SHEET_HOLE) continue;
+            if (o == TXM_NO_SIDE || !txi_is_hole(l, o / 3) || l->state[o / 3] != TXI_SHEET_HOLE)
+                continue;
             if (!txi_push(list, l->scratch, o / 3)) return -1;
             l->state[o / 3] = state;
         }
@@ -2937,7 +2993,8 @@ static void txi_measure(txi_sheet *l) {
         const size_t missing = txi_missing_count(l->d, f);
         const txm_vec2 *t = l->s->uv + 3 * (size_t)f;
         if (!missing) continue;
-        area += (double)missing * txm_d3_len(txi_face_area2(l->s, f)) / fabs(txi_cross2(t[0], t[1], t[2]));
+        area += (double)missing * txm_d3_len(txi_face_area2(l->s, f)) /
+                fabs(txi_cross2(t[0], t[1], t[2]));
         l->texels += missing;
     }
     l->pixel = l->texels ? sqrt(area / (double)l->texels) : 0;
@@ -2975,7 +3032,8 @@ static txm_status txi_measure_from_hole(txi_sheet *l, double limit) {
 static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
     txm_status status = TXM_OK;
     txi_is_hole(l, seed);
-    if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+    if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0)
+        return txi_no_memory(l->env);
     txi_measure(l);
     for (int round = 0, grown = 1; round < TXI_ROUNDS && grown && l->pixel > 0; round++) {
         /* specks reach farther than holes that fill a window by themselves */
@@ -2988,7 +3046,8 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
                 const uint32_t f = l->s->corners[i] / 3;
                 const size_t before = l->group.count;
                 if (!txi_is_hole(l, f) || l->state[f] != TXI_SHEET_HOLE) continue;
-                if (txi_flood_faces(l, f, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+                if (txi_flood_faces(l, f, TXI_SHEET_GROUP, NULL, &l->group) < 0)
+                    return txi_no_memory(l->env);
                 size_t more = l->texels;
                 for (size_t k = before; k < l->group.count; k++)
                     more += txi_missing_count(l->d, l->group.items[k]);
@@ -3008,8 +3067,8 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
     return TXM_OK;
 }
 
-/* The face that the disk grows from: in the middle of the hole, or, if only a part of it is laid out, at
-   its rim. */
+/* The face that the disk grows from: in the middle of the hole, or, if only a part of it is laid
+   out, at its rim. */
 static void txi_find_centre(txi_sheet *l) {
     txm_dvec3 middle = txm_d3(0, 0, 0);
     double count = 0, least = 0;
@@ -3056,15 +3115,16 @@ static double txi_least_of(const txi_surface *s, uint32_t face, const double *va
     return fmin(value[v[0]], fmin(value[v[1]], value[v[2]]));
 }
 
-/* Grow the disk: the hole from its centre, then what is known around it; or everything around the centre
-   up to l->reach. */
+/* Grow the disk: the hole from its centre, then what is known around it; or everything around
+   the centre up to l->reach. */
 static txm_status txi_sheet_disk(txi_sheet *l) {
     const txi_surface *s = l->s;
     const double pixel = l->pixel, band = txi_band(l->texels) * pixel;
     txi_growth g;
     double start[3], extent = 0;
     const txm_dvec3 a = txi_corner_point(s, 3 * l->centre);
-    const txm_dvec3 b = txi_corner_point(s, 3 * l->centre + 1), c = txi_corner_point(s, 3 * l->centre + 2);
+    const txm_dvec3 b = txi_corner_point(s, 3 * l->centre + 1),
+                    c = txi_corner_point(s, 3 * l->centre + 2);
     const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(a, b), c), 1.0 / 3);
     start[0] = txm_d3_dist(a, middle);
     start[1] = txm_d3_dist(b, middle);
@@ -3111,8 +3171,10 @@ static txm_status txi_sheet_disk(txi_sheet *l) {
 /* Lay the disk out. The hole is kept rigid, what is known gives way the more the farther it is. */
 static txm_status txi_sheet_flat(txi_sheet *l) {
     const size_t faces = l->disk.face_count;
-    uint32_t *number = (uint32_t *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(uint32_t));
-    txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_dvec3));
+    uint32_t *number =
+        (uint32_t *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(uint32_t));
+    txm_dvec3 *point =
+        (txm_dvec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_dvec3));
     l->rigid = (double *)txm_arena_alloc(l->scratch, faces, sizeof(double));
     if (!number || !point || !l->rigid) return txi_no_memory(l->env);
     txi_disk_finish(&l->disk, l->s, number, point);
@@ -3128,8 +3190,8 @@ static txm_status txi_sheet_flat(txi_sheet *l) {
     return status;
 }
 
-/* The step in the window, y downwards, for a step of one texel to the right and one down, on face i of
-   the disk. 0: the face has no area in the atlas. */
+/* The step in the window, y downwards, for a step of one texel to the right and one down, on
+   face i of the disk. 0: the face has no area in the atlas. */
 static int txi_texel_steps(const txi_sheet *l, size_t i, double right[2], double down[2]) {
     const txm_vec2 *t = l->s->uv + 3 * (size_t)l->disk.faces[i];
     const uint32_t *c = l->disk.corner + 3 * i;
@@ -3152,7 +3214,8 @@ static uint32_t txi_main_chart(const txi_sheet *l, uint32_t *counts) {
     uint32_t best = l->s->chart[l->centre];
     memset(counts, 0, l->s->face_count * sizeof *counts);
     for (size_t i = 0; i < l->group.count; i++)
-        counts[l->s->chart[l->group.items[i]]] += (uint32_t)txi_missing_count(l->d, l->group.items[i]);
+        counts[l->s->chart[l->group.items[i]]] +=
+            (uint32_t)txi_missing_count(l->d, l->group.items[i]);
     for (uint32_t c = 0; c < l->s->face_count; c++) {
         if (counts[c] > counts[best]) best = c;
     }
@@ -3182,8 +3245,8 @@ static void txi_sheet_texel(const txi_sheet *l, size_t i, uint32_t texel, double
     }
 }
 
-/* What the window should show: the disk, but not more than three bands around the missing texels, as faces
-   may be much larger than the hole. */
+/* What the window should show: the disk, but not more than three bands around the missing
+   texels, as faces may be much larger than the hole. */
 static txi_bounds txi_sheet_bounds(const txi_sheet *l) {
     txi_bounds all = {1e300, 1e300, -1e300, -1e300}, hole = all;
     const double wide = 3 * txi_band(l->texels);
@@ -3210,9 +3273,9 @@ static txi_bounds txi_sheet_bounds(const txi_sheet *l) {
     return all;
 }
 
-/* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that on the
-   main chart texels and pixels coincide as well as they can, so that little is lost by interpolation.
-   0: it is not finite, or too large for a window. */
+/* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that
+   on the main chart texels and pixels coincide as well as they can, so that little is lost by
+   interpolation. 0: it is not finite, or too large for a window. */
 static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
     const txi_disk *disk = &l->disk;
     const uint32_t chart = txi_main_chart(l, counts);
@@ -3227,7 +3290,8 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         double u[2], v[2];
         const double n = l->is_source ? l->weight[disk->faces[i]]
                                       : (double)txi_missing_count(l->d, disk->faces[i]);
-        if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v)) continue;
+        if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v))
+            continue;
         c += n * u[0];
         s += n * u[1];
         if (reference < 0 && !l->is_source) reference = (int64_t)i;
@@ -3273,8 +3337,8 @@ static void txi_sheet_normals(txi_sheet *l) {
 }
 
 /* Fill a pixel that lies on face i of the disk. */
-static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, size_t i, const double weight[3],
-                          const double right[2], int mirrored) {
+static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, size_t i,
+                            const double weight[3], const double right[2], int mirrored) {
     const uint32_t face = l->disk.faces[i], *c = l->disk.corner + 3 * i;
     const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
     double x = 0, y = 0;
@@ -3301,8 +3365,8 @@ static int txi_lies_right(const txi_sheet *l, size_t i) {
     return txi_cross2(l->at[c[0]], l->at[c[1]], l->at[c[2]]) < -1e-9;
 }
 
-/* Is face i of the disk laid out with little distortion: its singular values between 1 / TXI_STRETCH
-   and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
+/* Is face i of the disk laid out with little distortion: its singular values between 1 /
+   TXI_STRETCH and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
 
        Q = |(a + d, c - b)| / 2,   R = |(a - d, c + b)| / 2.                                   */
 static int txi_is_true(const txi_sheet *l, size_t i) {
@@ -3313,14 +3377,16 @@ static int txi_is_true(const txi_sheet *l, size_t i) {
     if (!txi_lies_right(l, i)) return 0;
     if (!(shape[0] > 0 && shape[2] > 0)) return 1;
     const double a = (q[0] - p[0]) / shape[0], c = (q[1] - p[1]) / shape[0];
-    const double b = (r[0] - p[0] - a * shape[1]) / shape[2], d = (r[1] - p[1] - c * shape[1]) / shape[2];
+    const double b = (r[0] - p[0] - a * shape[1]) / shape[2],
+                 d = (r[1] - p[1] - c * shape[1]) / shape[2];
     const double m = sqrt((a + d) * (a + d) + (c - b) * (c - b)) / 2;
     const double n = sqrt((a - d) * (a - d) + (c + b) * (c + b)) / 2;
     return m + n < TXI_STRETCH && fabs(m - n) > 1 / TXI_STRETCH;
 }
 
-/* Go through the pixels whose centres face i of the disk covers. With fill they are filled unless another
-   face has been there first, the one nearer to the hole. Returns how many others cover within it. */
+/* Go through the pixels whose centres face i of the disk covers. With fill they are filled
+   unless another face has been there first, the one nearer to the hole. Returns how many others
+   cover within it. */
 static size_t txi_sheet_face(const txi_sheet *l, txi_window *w, size_t i, int fill) {
     txm_vec2 t[3];
     double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
@@ -3349,8 +3415,8 @@ static size_t txi_sheet_face(const txi_sheet *l, txi_window *w, size_t i, int fi
     return taken;
 }
 
-/* Fill the pixels that the disk covers. Left out is what is known but lies badly: faces that are much
-   distorted or lie over others, and those that were added behind them.
+/* Fill the pixels that the disk covers. Left out is what is known but lies badly: faces that are
+   much distorted or lie over others, and those that were added behind them.
    shown  receives 1 per face of the disk                                                      */
 static void txi_sheet_pixels(const txi_sheet *l, txi_window *w, uint8_t *shown) {
     w->spacing = l->pixel;
@@ -3366,8 +3432,8 @@ static void txi_sheet_pixels(const txi_sheet *l, txi_window *w, uint8_t *shown) 
 
 /* ---- layout: targets ------------------------------------------------------------------------- */
 
-/* Mark the pixels along the border of the disk where the surface goes on: all of it, or only where it
-   goes through the hole. Returns how many sides that were. */
+/* Mark the pixels along the border of the disk where the surface goes on: all of it, or only
+   where it goes through the hole. Returns how many sides that were. */
 static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, uint8_t *marks) {
     uint32_t side = l->disk.border;
     size_t count = 0;
@@ -3375,7 +3441,8 @@ static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, u
         const uint32_t here = txi_surface_side(&l->disk, side), beyond = l->s->opposite[here];
         if (beyond == TXM_NO_SIDE) continue;
         if (only_holes && (!txi_is_hole(l, here / 3) || !txi_is_hole(l, beyond / 3))) continue;
-        const txm_vec2 a = l->at[l->disk.corner[side]], b = l->at[l->disk.corner[txi_next_corner(side)]];
+        const txm_vec2 a = l->at[l->disk.corner[side]],
+                       b = l->at[l->disk.corner[txi_next_corner(side)]];
         const double dx = (double)b.x - a.x, dy = (double)b.y - a.y;
         const int steps = (int)(2 * sqrt(dx * dx + dy * dy)) + 1;
         for (int i = 0; i <= steps; i++) {
@@ -3412,7 +3479,8 @@ static txi_target txi_make_target(const txi_sheet *l, size_t i, uint32_t texel) 
     return t;
 }
 
-/* Does the window show the target where it is, and not another part of the disk that lies over it? */
+/* Does the window show the target where it is, and not another part of the disk that lies over
+   it? */
 static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const txi_target *t) {
     const int x = txm_clampi((int)((double)t->x + 0.5), 0, w->width - 1);
     const int y = txm_clampi((int)((double)t->y + 0.5), 0, w->height - 1);
@@ -3427,9 +3495,9 @@ static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const
     return txm_d3_dist(p, txm_d3(q.x, q.y, q.z)) < 4;
 }
 
-/* Collect the targets of the hole: those that lie well away from cuts through it, are hardly distorted and
-   not covered; all if that is none. Returns 0 if that is too few and a smaller part of the hole should be
-   tried. marks, nearest: scratch, 1 per pixel. */
+/* Collect the targets of the hole: those that lie well away from cuts through it, are hardly
+   distorted and not covered; all if that is none. Returns 0 if that is too few and a smaller
+   part of the hole should be tried. marks, nearest: scratch, 1 per pixel. */
 static int txi_sheet_targets(txi_sheet *l, txi_window *w, uint8_t *marks, int32_t *nearest,
                            txm_status *status) {
     const size_t pixels = (size_t)w->width * (size_t)w->height;
@@ -3518,8 +3586,8 @@ static txm_status txi_sheet_others(txi_sheet *l, txi_window *w, uint8_t *marks, 
 
 /* ---- layout: one window ---------------------------------------------------------------------- */
 
-/* The window of a face that cannot be laid out, as neither it nor what is around it has an area: its
-   part of the atlas. */
+/* The window of a face that cannot be laid out, as neither it nor what is around it has an area:
+   its part of the atlas. */
 static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w) {
     const txm_vec2 *t = l->s->uv + 3 * (size_t)l->centre;
     size_t count, k = 0;
@@ -3541,7 +3609,8 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
     const int left = (int)floor(box.left), top = (int)floor(box.top);
     const int width = (int)ceil(box.right) - left + 1, height = (int)ceil(box.bottom) - top + 1;
     txm_status status = txi_window_alloc(w, width, height, arena, l->env);
-    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
+    if (status == TXM_OK)
+        w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
     if (!w->targets) return txi_no_memory(l->env);
     for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
         const int px = left + (int)(i % (size_t)width), py = top + (int)(i / (size_t)width);
@@ -3587,7 +3656,8 @@ static txm_status txi_sheet_spread(txi_sheet *l, int *fits) {
     return TXM_OK;
 }
 
-/* Lay out the hole with l->reach, in a window of scratch memory. *again: it should be tried otherwise. */
+/* Lay out the hole with l->reach, in a window of scratch memory. *again: it should be tried
+   otherwise. */
 static txm_status txi_sheet_try(txi_sheet *l, txi_window *w, int *again) {
     int fits = 0;
     *again = 0;
@@ -3601,11 +3671,13 @@ static txm_status txi_sheet_try(txi_sheet *l, txi_window *w, int *again) {
     }
     const size_t pixels = (size_t)l->width * (size_t)l->height;
     size_t room = 0;
-    for (size_t i = 0; i < l->disk.face_count; i++) room += txi_missing_count(l->d, l->disk.faces[i]);
+    for (size_t i = 0; i < l->disk.face_count; i++)
+        room += txi_missing_count(l->d, l->disk.faces[i]);
     uint8_t *marks = (uint8_t *)txm_arena_alloc(l->scratch, pixels, 1);
     int32_t *nearest = (int32_t *)txm_arena_alloc(l->scratch, pixels, sizeof(int32_t));
     status = txi_window_alloc(w, l->width, l->height, l->scratch, l->env);
-    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(l->scratch, room, sizeof(txi_target));
+    if (status == TXM_OK)
+        w->targets = (txi_target *)txm_arena_alloc(l->scratch, room, sizeof(txi_target));
     if (l->scratch->failed) return txi_no_memory(l->env);
     txi_sheet_normals(l);
     txi_sheet_pixels(l, w, l->shown);
@@ -3650,10 +3722,12 @@ static txm_status txi_window_join(txi_window *w, const txi_window *hole, const t
     return TXM_OK;
 }
 
-/* The face that lies deepest in what may be copied from: farthest from all that may not. 0: there is none. */
+/* The face that lies deepest in what may be copied from: farthest from all that may not. 0:
+   there is none. */
 static int txi_find_source(txi_sheet *l, txm_status *status) {
     const txi_surface *s = l->s;
-    uint32_t *sources = (uint32_t *)txm_arena_alloc(l->scratch, s->face_count, 3 * sizeof(uint32_t));
+    uint32_t *sources =
+        (uint32_t *)txm_arena_alloc(l->scratch, s->face_count, 3 * sizeof(uint32_t));
     size_t count = 0;
     double deepest = -1;
     if (!sources) {
@@ -3693,9 +3767,10 @@ static txm_status txi_sheet_source(txi_sheet *l, size_t wanted, txi_window *w, i
     return TXM_OK;
 }
 
-/* The window as the caller gets it: with something to copy from beside it, if around the hole there is next
-   to nothing. */
-static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *arena, txi_window *w) {
+/* The window as the caller gets it: with something to copy from beside it, if around the hole
+   there is next to nothing. */
+static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *arena,
+                                   txi_window *w) {
     const size_t pixels = (size_t)hole->width * (size_t)hole->height;
     size_t usable = 0, wanted = TXI_SOURCE_RATIO * hole->target_count;
     txi_window source;
@@ -3713,10 +3788,10 @@ static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *ar
     return txi_window_join(w, hole, found ? &source : NULL, arena, l->env);
 }
 
-/* Lay out the hole of a face: all of it in one window if that can be done; else with cuts through it; else a
-   disk at its rim, smaller and smaller until it lies flat enough. */
-static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch, txm_arena *arena,
-                                   txm_env *env, txi_window *w) {
+/* Lay out the hole of a face: all of it in one window if that can be done; else with cuts
+   through it; else a disk at its rim, smaller and smaller until it lies flat enough. */
+static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch,
+                                   txm_arena *arena, txm_env *env, txi_window *w) {
     const txi_surface *s = d->surface;
     txi_sheet l;
     txi_window hole;
@@ -3757,9 +3832,9 @@ static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scra
     return status;
 }
 
-/* Lay out the next window with missing texels: of the first hole, in the order of the texture, or of a
-   part of it. found receives 0 if none are left; else the window has one target or more. Its memory is
-   the arena's; states and colours are set. */
+/* Lay out the next window with missing texels: of the first hole, in the order of the texture,
+   or of a part of it. found receives 0 if none are left; else the window has one target or more.
+   Its memory is the arena's; states and colours are set. */
 static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
                                    int *found) {
     txi_surface *s = d->surface;
@@ -3781,15 +3856,15 @@ static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env
 
        sum over links  w (u_i - u_j)^2   approximates   integral over the surface of |grad u|^2
 
-   so that its minimum is harmonic on the surface, however the atlas is stretched or sheared. With the
-   metric G of a face (per texel) the integral over a texel is  grad u . D grad u,  D = sqrt(det G) G^-1;
-   D is written as a sum of  w_e e e^T  with weights w_e >= 0 and three whole offsets e, which are the
-   links (Selling's reduction; for squares: right and down, both of weight 1). No weight is negative,
-   so that u never leaves the range of its boundary values.
+   so that its minimum is harmonic on the surface, however the atlas is stretched or sheared. With
+   the metric G of a face (per texel) the integral over a texel is  grad u . D grad u,
+   D = sqrt(det G) G^-1; D is written as a sum of  w_e e e^T  with weights w_e >= 0 and three whole
+   offsets e, which are the links (Selling's reduction; for squares: right and down, both of weight
+   1). No weight is negative, so that u never leaves the range of its boundary values.
 
-   An offset that leaves the face of a texel is walked along the surface. Where the walk crosses a seam
-   it ends between texels of another chart; the link is then shared out to the four around, bilinearly,
-   so that functions that are linear on the surface pass seams unchanged.                      */
+   An offset that leaves the face of a texel is walked along the surface. Where the walk crosses
+   a seam it ends between texels of another chart; the link is then shared out to the four
+   around, bilinearly, so that functions that are linear on the surface pass seams unchanged. */
 
 enum {
     TXI_WALK_MOST = 64,    /* faces that one walk may cross; ours                               */
@@ -3799,8 +3874,8 @@ enum {
 };
 #define TXI_SHEAR 64.0   /* ratio of the eigenvalues of D at most: offsets stay below 9 texels */
 
-/* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each in the
-   rows of both its nodes; those to known texels in `rim`. */
+/* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each
+   in the rows of both its nodes; those to known texels in `rim`. */
 typedef struct txi_texel_graph {
     size_t count;
     uint32_t *texel;       /* 1 per node                                                        */
@@ -3816,9 +3891,10 @@ typedef struct txi_stencil {
     double weight[TXI_STENCIL];
 } txi_stencil;
 
-/* D = (a b; b c), positive definite, as a sum of w e e^T. Starting with the superbase (1, 0), (0, 1),
-   (-1, -1), two vectors u, v of it with u . D v > 0 are replaced by -u, v, and u - v, until no two
-   are left; then  D = sum over pairs of  -(u . D v) (third vector, turned by 90 degrees) (...)^T. */
+/* D = (a b; b c), positive definite, as a sum of w e e^T. Starting with the superbase (1, 0),
+   (0, 1), (-1, -1), two vectors u, v of it with u . D v > 0 are replaced by -u, v, and u - v,
+   until no two are left; then  D = sum over pairs of  -(u . D v) (third vector, turned by 90
+   degrees) (...)^T. */
 static txi_stencil txi_stencil_of(double a, double b, double c) {
     txi_stencil s = {{1, 0, -1}, {0, 1, -1}, {0, 0, 0}};
     for (int round = 0, k = 0; round < 64 && k < 3; round++) {
@@ -3876,13 +3952,14 @@ static txi_stencil txi_face_stencil(const txi_domain *d, uint32_t face) {
 
 /* ---- graph: walks ------------------------------------------------------------------------- */
 
-/* The face on the other side of a side, and a place on the side, s of the way along it, and a step in
-   the plane of the first face turned into the plane of the second: place and step in texels of that
-   face. Sewn sides change neither. 0: the second face has no area. */
+/* The face on the other side of a side, and a place on the side, s of the way along it, and a
+   step in the plane of the first face turned into the plane of the second: place and step in
+   texels of that face. Sewn sides change neither. 0: the second face has no area. */
 static int txi_cross_side(const txi_surface *s, uint32_t side, double along, double place[2],
                           double step[2]) {
     const uint32_t other = s->opposite[side], next = txi_next_corner(other);
-    const txm_vec2 from = s->uv[next], to = s->uv[other]; /* the side as the first face runs along it */
+    const txm_vec2 from = s->uv[next], to = s->uv[other]; /* the side as the first face runs
+                                                             along it                            */
     txm_dvec3 pu, pv, qu, qv;
     if (txi_is_sewn(s, side, other)) return 1;
     if (!txi_face_axes(s, side / 3, &pu, &pv) || !txi_face_axes(s, other / 3, &qu, &qv)) return 0;
@@ -3906,7 +3983,8 @@ static int txi_cross_side(const txi_surface *s, uint32_t side, double along, dou
 
 /* Walk on the surface: from a place on a face, in its own texels, by a step. face and place receive
    where it ends. 0: at a border of the surface, or where a face has no area. */
-static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2], const double by[2]) {
+static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2],
+                            const double by[2]) {
     double step[2] = {by[0], by[1]};
     uint32_t entry = TXM_NO_SIDE;
     for (int count = 0; count < TXI_WALK_MOST; count++) {
@@ -3917,7 +3995,8 @@ static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2
         if (!txi_weights(t, place[0] + step[0], place[1] + step[1], there)) return 0;
         for (int k = 0; k < 3; k++) { /* side k is where the weight of corner k + 2 is 0 */
             const int c = (k + 2) % 3;
-            if (3 * *face + (uint32_t)k == entry || there[c] >= -1e-9 || !(here[c] > there[c])) continue;
+            if (3 * *face + (uint32_t)k == entry || there[c] >= -1e-9 || !(here[c] > there[c]))
+                continue;
             const double at = here[c] > 0 ? here[c] / (here[c] - there[c]) : 0;
             if (exit >= 0 && at >= first) continue;
             first = at;
@@ -3967,9 +4046,10 @@ static void txi_links_add(txi_links *links, int64_t texel, double weight) {
     links->weight[links->count++] = weight;
 }
 
-/* A link to a place between texels: to the four around it that exist, bilinearly, else to the nearest. */
-static void txi_links_share(const txi_domain *d, uint32_t face, const double place[2], double weight,
-                            txi_links *links) {
+/* A link to a place between texels: to the four around it that exist, bilinearly, else to the
+   nearest. */
+static void txi_links_share(const txi_domain *d, uint32_t face, const double place[2],
+                            double weight, txi_links *links) {
     const double fx = floor(place[0]), fy = floor(place[1]);
     double share[4], sum = 0;
     int64_t texel[4];
@@ -3992,7 +4072,8 @@ static void txi_links_share(const txi_domain *d, uint32_t face, const double pla
 /* The link of a texel by an offset. */
 static void txi_links_step(const txi_domain *d, uint32_t texel, uint32_t face, int x, int y,
                            double weight, txi_links *links) {
-    const int tx = (int)(texel % (uint32_t)d->width) + x, ty = (int)(texel / (uint32_t)d->width) + y;
+    const int tx = (int)(texel % (uint32_t)d->width) + x,
+              ty = (int)(texel / (uint32_t)d->width) + y;
     if (!d->surface) {
         txi_links_add(links, txi_tap(d, face, tx, ty), weight);
         return;
@@ -4016,8 +4097,8 @@ static void txi_links_step(const txi_domain *d, uint32_t texel, uint32_t face, i
     txi_links_share(d, face, place, weight, links);
 }
 
-/* All links that a texel makes; `weight` counts half for each of two unknown texels, as both make the
-   link between them, but in full where the other is known. */
+/* All links that a texel makes; `weight` counts half for each of two unknown texels, as both
+   make the link between them, but in full where the other is known. */
 static void txi_links_of(const txi_domain *d, uint32_t texel, txi_links *links) {
     const uint32_t face = d->surface ? d->surface->owner[texel] : TXI_NO_FACE;
     const txi_stencil s = txi_face_stencil(d, face);
@@ -4030,8 +4111,8 @@ static void txi_links_of(const txi_domain *d, uint32_t texel, txi_links *links) 
     }
 }
 
-/* Merge the links of one row that go to the same node: sorted by node. Returns their number. Rows of
-   very many links (where texels differ much in size) are left as they are. */
+/* Merge the links of one row that go to the same node: sorted by node. Returns their number.
+   Rows of very many links (where texels differ much in size) are left as they are. */
 static uint32_t txi_merge_links(uint32_t *to, float *weight, uint32_t count) {
     uint32_t kept = 0;
     if (count > TXI_MERGE_MOST) return count;
@@ -4060,7 +4141,8 @@ static uint32_t txi_merge_links(uint32_t *to, float *weight, uint32_t count) {
 /* What a texel is to a graph. */
 enum { TXI_NODE_NONE = 0, TXI_NODE_KNOWN = 1, TXI_NODE_UNKNOWN = 2 };
 
-/* Count the links of all nodes, or (filling) store them. node: 1 per texel, the node of unknown ones. */
+/* Count the links of all nodes, or (filling) store them. node: 1 per texel, the node of unknown
+   ones. */
 static void txi_graph_pass(const txi_domain *d, const uint8_t *marks, const uint32_t *node,
                            int filling, txi_texel_graph *g, size_t total[2]) {
     total[0] = total[1] = 0;
@@ -4148,8 +4230,10 @@ static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_
     return TXM_OK;
 }
 
-/* Set the marks of all nodes that links connect with the one given to 0. queue: room for 1 per node. */
-static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *queue, uint8_t *mark) {
+/* Set the marks of all nodes that links connect with the one given to 0. queue: room for 1 per
+   node. */
+static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *queue,
+                             uint8_t *mark) {
     size_t count = 1;
     queue[0] = from;
     mark[from] = 0;
@@ -4162,7 +4246,8 @@ static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *
     }
 }
 
-/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per node. */
+/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per
+   node. */
 static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t *island) {
     memset(island, 1, g->count);
     for (size_t i = 0; i < g->count; i++) {
@@ -4176,11 +4261,12 @@ static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t
 
        (A x)_i = ground_i x_i + sum over links  w_ij (x_i - x_j),
 
-   by conjugate gradients, preconditioned by a cycle over coarser graphs [3]. A coarser graph has one node
-   for each group of about four nodes that strong links connect; the weights between groups are the sums
-   of those between their members (Galerkin's product with piecewise constant interpolation). Each
-   level is solved by two steps of conjugate gradients, preconditioned by the next level: this "K cycle"
-   makes the number of iterations independent of the size, also for graphs without any regularity. */
+   by conjugate gradients, preconditioned by a cycle over coarser graphs [3]. A coarser graph has
+   one node for each group of about four nodes that strong links connect; the weights between
+   groups are the sums of those between their members (Galerkin's product with piecewise constant
+   interpolation). Each level is solved by two steps of conjugate gradients, preconditioned by
+   the next level: this "K cycle" makes the number of iterations independent of the size, also
+   for graphs without any regularity. */
 
 enum {
     TXI_GRID_LEVELS = 24,
@@ -4202,11 +4288,12 @@ typedef struct txi_grid_level {
 typedef struct txi_grid {
     txi_grid_level level[TXI_GRID_LEVELS];
     int levels;
-    double *direct; /* Cholesky factor of the last level, in rows; NULL: too large, it is smoothed */
+    double *direct; /* Cholesky factor of the last level, in rows; NULL: too large, it is
+                       smoothed                                                                  */
 } txi_grid;
 
-/* Group the nodes of a level in pairs: each with the free neighbour of the strongest link. Returns the
-   number of groups. */
+/* Group the nodes of a level in pairs: each with the free neighbour of the strongest link.
+   Returns the number of groups. */
 static uint32_t txi_grid_pair(size_t count, const uint32_t *first, const uint32_t *to,
                               const float *weight, uint32_t *group) {
     uint32_t groups = 0;
@@ -4228,7 +4315,8 @@ static uint32_t txi_grid_pair(size_t count, const uint32_t *first, const uint32_
 }
 
 /* The links between groups. members: the nodes in the order of their group, those of group g are
-   members[start[g]] .. members[start[g + 1] - 1]; place: scratch, 1 per group. Returns their number. */
+   members[start[g]] .. members[start[g + 1] - 1]; place: scratch, 1 per group. Returns their
+   number. */
 static uint32_t txi_grid_sum(const uint32_t *first, const uint32_t *to, const float *weight,
                              const uint32_t *group, uint32_t groups, const uint32_t *start,
                              const uint32_t *members, uint32_t *place, uint32_t *out_first,
@@ -4281,14 +4369,14 @@ static int txi_grid_coarsen(txi_grid_level *fine, txi_grid_level *coarse, txm_ar
     uint32_t *members = group + n, *place = members + n;
     const uint32_t pairs = txi_grid_pair(n, fine->first, fine->to, fine->weight, fine->group);
     txi_grid_members(n, fine->group, pairs, start, members);
-    txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, pairs, start, members, place, first,
-                 to, weight);
+    txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, pairs, start, members, place,
+                 first, to, weight);
     const uint32_t groups = txi_grid_pair(pairs, first, to, weight, group);
     for (size_t i = 0; i < n; i++) fine->group[i] = group[fine->group[i]];
     /* from the links of the fine graph again: those of the pairs are overwritten */
     txi_grid_members(n, fine->group, groups, start, members);
-    const uint32_t total = txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, groups, start,
-                                        members, place, first, to, weight);
+    const uint32_t total = txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, groups,
+                                        start, members, place, first, to, weight);
     uint32_t *kept = (uint32_t *)txm_arena_alloc(arena, (size_t)groups + 1, sizeof(uint32_t));
     uint32_t *kept_to = (uint32_t *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(uint32_t));
     float *kept_weight = (float *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(float));
@@ -4333,7 +4421,8 @@ static void txi_grid_factor(const txi_grid_level *l, double *a) {
     }
 }
 
-static void txi_grid_direct(const txi_grid *g, const txi_grid_level *l, const double *r, double *x) {
+static void txi_grid_direct(const txi_grid *g, const txi_grid_level *l, const double *r,
+                            double *x) {
     const size_t n = l->count;
     const double *a = g->direct;
     for (size_t i = 0; i < n; i++) {
@@ -4393,8 +4482,9 @@ static void txi_grid_cycle(const txi_grid *g, int level, const double *r, double
     txi_grid_sweep(l, r, x, 1);
 }
 
-/* Solve the system of a level below the first, r, by two steps of conjugate gradients; one if that is good
-   enough. r is lost. With c1, r1, v1 = A c1 of the first step, c2, r2, v2 of the second [3]:
+/* Solve the system of a level below the first, r, by two steps of conjugate gradients; one if that
+   is good enough. r is lost. With c1, r1, v1 = A c1 of the first step, c2, r2, v2 of the second
+   [3]:
 
        x = (a1 / p1 - f a2 / (p1 p2)) c1 + (a2 / p2) c2,
        p1 = c1.v1, a1 = c1.r1, f = c2.v1, p2 = c2.v2 - f^2 / p1, a2 = c2.r2                     */
@@ -4629,20 +4719,21 @@ static void txi_quantities_mean(const txi_domain *d, const txi_quantities *q, co
     for (int c = 0; c < q->count && count; c++) mean[c] /= (double)count;
 }
 
-/* ---- Poisson equation on the surface ---------------------------------------------------------- */
+/* ---- Poisson equation on the surface --------------------------------------------------------- */
 
 /* The equation for one graph; for any number of right sides. */
 typedef struct txi_poisson_system {
     const txi_texel_graph *g;
     txi_grid grid;
     double screen;
-    uint8_t *anchor; /* 1 per node: 1 for one node of each part that is not connected with the rim */
+    uint8_t *anchor; /* 1 per node: 1 for one node of each part that is not connected with the
+                        rim                                                                      */
 } txi_poisson_system;
 
 /* What is given along the links of a graph, in the order of their rows. */
 typedef struct txi_steps {
-    const float *link; /* 1 per link of `to`: how much u rises from the node to its neighbour; the other
-                          way round the same with the other sign. NULL: 0                      */
+    const float *link; /* 1 per link of `to`: how much u rises from the node to its neighbour;
+                          the other way round the same with the other sign. NULL: 0              */
     const float *rim;  /* 1 per link of `rim`, likewise. NULL: 0                                */
     const float *rim_value; /* 1 per link of `rim`: u there                                     */
 } txi_steps;
@@ -4678,8 +4769,8 @@ static txm_status txi_poisson_make(const txi_texel_graph *g, double screen, txm_
     return status;
 }
 
-/* Of all u with the given values at the rim that which rises along the links as nearly as possible as
-   wanted: the Poisson equation on the surface, across the seams of the atlas:
+/* Of all u with the given values at the rim that which rises along the links as nearly as possible
+   as wanted: the Poisson equation on the surface, across the seams of the atlas:
 
        minimise  sum over links  w (u_j - u_i - step)^2  +  screen sum (u_i - u0_i)^2
 
@@ -4690,8 +4781,8 @@ static txm_status txi_poisson_make(const txi_texel_graph *g, double screen, txm_
    tolerance  of the residual, relative
    return     TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED: u is then of no use
    cost       some 10 iterations of about 0.15 us per node                                  */
-static txm_status txi_surface_poisson(const txi_poisson_system *s, const txi_steps *steps, double *u,
-                                      double *scratch, double tolerance, txm_env *env) {
+static txm_status txi_surface_poisson(const txi_poisson_system *s, const txi_steps *steps,
+                                      double *u, double *scratch, double tolerance, txm_env *env) {
     const txi_texel_graph *g = s->g;
     for (size_t i = 0; i < g->count; i++) {
         double sum = (s->screen + s->anchor[i]) * u[i];
@@ -4715,10 +4806,9 @@ static txm_dvec3 txi_fill_point(const txi_domain *d, uint32_t texel) {
     return txm_d3((int)(texel % (uint32_t)d->width), y, 0);
 }
 
-/* For each node the known texel that is nearest, of those at the rim that its neighbours have: distances in
-   a straight line, spread from the rim along the links until nothing changes. It is nearest to within a
-   texel. Nodes of islands get
-   UINT32_MAX. */
+/* For each node the known texel that is nearest, of those at the rim that its neighbours have:
+   distances in a straight line, spread from the rim along the links until nothing changes. It is
+   nearest to within a texel. Nodes of islands get UINT32_MAX. */
 static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *g, uint32_t *source,
                                     txm_env *env) {
     txm_arena scratch;
@@ -4726,7 +4816,8 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
     txm_arena_init(&scratch, env);
     txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(&scratch, g->count, sizeof(txm_dvec3));
     double *least = (double *)txm_arena_alloc(&scratch, g->count, sizeof(double));
-    uint32_t *queue = (uint32_t *)txm_arena_alloc(&scratch, g->count, sizeof(uint32_t)); /* a ring */
+    /* a ring */
+    uint32_t *queue = (uint32_t *)txm_arena_alloc(&scratch, g->count, sizeof(uint32_t));
     uint8_t *queued = (uint8_t *)txm_arena_zero(&scratch, g->count, 1);
     if (scratch.failed) {
         txm_arena_free(&scratch);
@@ -4770,8 +4861,8 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
 }
 
 /* The label of the nearest known texel; the first known one of the map where there is none. */
-static void txi_fill_labels(const txi_domain *d, const txi_texel_graph *g, int map, const uint32_t *source,
-                            const uint8_t *marks) {
+static void txi_fill_labels(const txi_domain *d, const txi_texel_graph *g, int map,
+                            const uint32_t *source, const uint8_t *marks) {
     const txm_image *image = &d->maps[map];
     const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
     const size_t texels = (size_t)d->width * (size_t)d->height;
@@ -4949,8 +5040,10 @@ static size_t txi_spread_marks(const txi_domain *d, int is_solid, uint8_t *marks
     return known;
 }
 
-/* Give texels the values of the nearest one that is spread, at most `reach` away (0: any distance). */
-static txm_status txi_spread(const txi_domain *d, uint8_t *marks, int is_solid, int reach, txm_env *env) {
+/* Give texels the values of the nearest one that is spread, at most `reach` away
+   (0: any distance). */
+static txm_status txi_spread(const txi_domain *d, uint8_t *marks, int is_solid, int reach,
+                             txm_env *env) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
     const txm_image *image = &d->maps[0];
     const size_t bytes = txm_sample_bytes(image->sample), pixel = (size_t)image->channels * bytes;
@@ -5009,9 +5102,10 @@ TEXINPAINT_API txm_status texinpaint_dilate(const texinpaint_desc *desc, txm_env
 
        h(x, y) = (b0 x^2 + 2 b1 x y + b2 y^2) / 2 + (c0 x^3 + 3 c1 x^2 y + 3 c2 x y^2 + c3 y^3) / 6
 
-   fitted by least squares to the places and the normals of the neighbours (the normals give dh/dx and
-   dh/dy). Not in [2]: the normals come from a fit of their own, of places alone and with linear terms.
-   Mean normals of faces are off by so much where triangles are irregular that e gets a wrong sign. The eigenvalues and eigenvectors of (b0 b1; b1 b2) are the curvatures k and directions t,
+   fitted by least squares to the places and the normals of the neighbours (the normals give dh/dx
+   and dh/dy). Not in [2]: the normals come from a fit of their own, of places alone and with linear
+   terms. Mean normals of faces are off by so much where triangles are irregular that e gets a wrong
+   sign. The eigenvalues and eigenvectors of (b0 b1; b1 b2) are the curvatures k and directions t,
    convex surfaces having positive k, and the derivative of k along its own t is
 
        e = dk/dt = c0 t1^3 + 3 c1 t1^2 t2 + 3 c2 t1 t2^2 + c3 t2^3                              */
@@ -5049,8 +5143,8 @@ typedef struct txi_shape {
     int rings;
 } txi_shape;
 
-/* A mesh of triangles as one whose vertices in equal places are one (files repeat them for each chart),
-   without the faces of which two corners are in one place. The input is checked. */
+/* A mesh of triangles as one whose vertices in equal places are one (files repeat them for each
+   chart), without the faces of which two corners are in one place. The input is checked. */
 static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
                                   txm_mesh *welded) {
     txi_surface points;
@@ -5141,7 +5235,8 @@ static void txi_shape_normals(txi_shape *s, const uint8_t *flip) {
         txm_dvec3 p[3];
         txm_mesh_triangle(&s->mesh, f, p);
         for (size_t k = 0; k < 3; k++) {
-            const txm_dvec3 a = txm_d3_sub(p[(k + 1) % 3], p[k]), b = txm_d3_sub(p[(k + 2) % 3], p[k]);
+            const txm_dvec3 a = txm_d3_sub(p[(k + 1) % 3], p[k]),
+                            b = txm_d3_sub(p[(k + 2) % 3], p[k]);
             const double size = txm_d3_len2(a) * txm_d3_len2(b);
             txm_dvec3 *sum = &s->normal[s->mesh.indices[3 * f + k]];
             if (size > 0) *sum = txm_d3_mad(*sum, txm_d3_cross(a, b), (flip[f] ? -1 : 1) / size);
@@ -5215,7 +5310,8 @@ static int txi_fit_solve(txi_fit *fit) {
 }
 
 /* Curvatures from the coefficients b0 b1 b2 c0 c1 c2 c3, in a frame whose unit is `unit`. */
-static void txi_curvature_set(txi_curvature *out, const double *c, txm_dvec3 frame[2], double unit) {
+static void txi_curvature_set(txi_curvature *out, const double *c, txm_dvec3 frame[2],
+                              double unit) {
     const double mean = (c[0] + c[2]) / 2, half = (c[0] - c[2]) / 2;
     const double root = sqrt(half * half + c[1] * c[1]);
     /* the eigenvector of the larger value, by the longer of two formulas */
@@ -5258,8 +5354,8 @@ static int txi_patch_make(const txi_shape *s, uint32_t v, txi_patch *patch) {
     return 1;
 }
 
-/* Neighbour i in the frame: x, y and depth below the tangent plane; 0 where the surface is folded over
-   or another sheet, so that it is no graph over the plane. */
+/* Neighbour i in the frame: x, y and depth below the tangent plane; 0 where the surface is
+   folded over or another sheet, so that it is no graph over the plane. */
 static int txi_patch_place(const txi_shape *s, const txi_patch *patch, int i, double *x, double *y,
                            double *depth) {
     const float *p = s->mesh.positions;
@@ -5401,23 +5497,26 @@ static txm_status txi_shape_make(const txm_mesh *welded, int rings, txm_arena *a
    and valleys, the ridges of the surface turned inside out. Both are traced through the triangles,
    from crossing to crossing of their edges.
 
-   Not in [2]: lines are left out whose curvature hardly falls off to their sides, relative to its size
-   (k'' / k^3 has no unit; across the tip of an ellipse of axes 1 and c it is 3 (1 - c^2)). On a sphere, a
-   cylinder or a torus, where k_max has no extremum, they are artefacts of the mesh.             */
+   Not in [2]: lines are left out whose curvature hardly falls off to their sides, relative to
+   its size (k'' / k^3 has no unit; across the tip of an ellipse of axes 1 and c it is 3
+   (1 - c^2)). On a sphere, a cylinder or a torus, where k_max has no extremum, they are
+   artefacts of the mesh. */
 
 enum {
     TXI_CREST_PAIRED = 8,   /* links at a node that are paired; ours                           */
-    TXI_CREST_ROUNDING = 8, /* how far rounded positions are assumed to move derivatives, in units of
-                               2^-24 coordinate / edge^3; ours                                  */
+    TXI_CREST_ROUNDING = 8, /* how far rounded positions are assumed to move derivatives, in
+                               units of 2^-24 coordinate / edge^3; ours                          */
     TXI_CREST_NONE = -1
 };
-#define TXI_CREST_STRENGTH 2.0  /* default threshold: a line twice as long as its radius of curvature; ours */
+#define TXI_CREST_STRENGTH 2.0  /* default threshold: a line twice as long as its radius of
+                                   curvature; ours                                               */
 #define TXI_CREST_SHARE 0.02    /* and this share of the strongest line; ours                   */
 
-#define TXI_CREST_SHARP 0.3     /* least k'' / k^3, the mean along a line; ours: on spheres and tori of
-                                   thousands of triangles it stays below 0.2, on the ridges of animals
-                                   and figures above 0.55                                       */
-#define TXI_CREST_BESIDE 0.25   /* cosine between an edge and t below which it runs along a line; ours */
+#define TXI_CREST_SHARP 0.3     /* least k'' / k^3, the mean along a line; ours: on spheres and
+                                   tori of thousands of triangles it stays below 0.2, on the
+                                   ridges of animals and figures above 0.55                      */
+#define TXI_CREST_BESIDE 0.25   /* cosine between an edge and t below which it runs along a line;
+                                   ours                                                          */
 
 /* What counts at a vertex for ridges or for valleys. */
 typedef struct txi_crest_value {
@@ -5453,8 +5552,8 @@ typedef struct txi_crest_crossing {
     double k, sharp; /* curvature there, and k'' / k^3                                          */
 } txi_crest_crossing;
 
-/* Does a line cross the edge a b? The signs of t, and with it of e, are arbitrary: those of b are turned
-   to agree with a. */
+/* Does a line cross the edge a b? The signs of t, and with it of e, are arbitrary: those of b
+   are turned to agree with a. */
 static int txi_crest_crosses(const txi_shape *s, size_t edge, int is_valley, double rounding,
                              txi_crest_crossing *crossing) {
     const uint32_t a = s->ends[2 * edge], b = s->ends[2 * edge + 1];
@@ -5467,8 +5566,8 @@ static int txi_crest_crosses(const txi_shape *s, size_t edge, int is_valley, dou
                                    txm_d3_load(s->mesh.positions + 3 * (size_t)a));
     const double length = txm_d3_len(d), jump = fabs(p.e) + fabs(e);
     const int is_rounding = !(jump * length * length * length > rounding);
-    /* a maximum: from one of the two the curvature rises towards the other. Where a line runs along an
-       edge that cannot be told, and the edges beside it decide */
+    /* a maximum: from one of the two the curvature rises towards the other. Where a line runs
+       along an edge that cannot be told, and the edges beside it decide */
     const double along = txm_d3_dot(p.t, d), back = -txm_d3_dot(q.t, d) * turn;
     const int is_beside = fmax(fabs(along), fabs(back)) < TXI_CREST_BESIDE * length;
     if (!is_rounding && !is_beside && !(p.e * along > 0) && !(e * back > 0)) return 0;
@@ -5622,15 +5721,16 @@ static txi_crest_run txi_crest_follow(const txi_crest_net *net, int64_t begin, u
     return run;
 }
 
-/* All lines of a net that are sharp enough: first those that end somewhere, then the closed ones. runs: room for 1 per
-   link; seen: 1 per link. Returns their number. */
+/* All lines of a net that are sharp enough: first those that end somewhere, then the closed
+   ones. runs: room for 1 per link; seen: 1 per link. Returns their number. */
 static size_t txi_crest_collect(const txi_crest_net *net, int which, uint8_t *seen,
                                 txi_crest_run *runs) {
     size_t count = 0;
     memset(seen, 0, net->link_count);
     for (size_t i = 0; i < 4 * net->link_count; i++) {
         const int64_t end = (int64_t)(i < 2 * net->link_count ? i : i - 2 * net->link_count);
-        if (seen[end / 2] || (i < 2 * net->link_count && net->mate[end] != TXI_CREST_NONE)) continue;
+        if (seen[end / 2] || (i < 2 * net->link_count && net->mate[end] != TXI_CREST_NONE))
+            continue;
         runs[count] = txi_crest_follow(net, end, seen);
         runs[count].net = which;
         count += runs[count].sharp > TXI_CREST_SHARP * runs[count].length;
@@ -5659,8 +5759,8 @@ static txm_status txi_crest_trace(const txi_shape *s, int is_valley, txm_arena *
 
 /* Choose the lines at or above the threshold, the strongest first. chosen receives indices into the
    runs of both nets, the valleys' after the ridges'; scratch: as many. Returns their number. */
-static size_t txi_crest_choose(txi_crest_run *const runs[2], const size_t counts[2], float threshold,
-                               txm_pair *chosen, txm_pair *scratch) {
+static size_t txi_crest_choose(txi_crest_run *const runs[2], const size_t counts[2],
+                               float threshold, txm_pair *chosen, txm_pair *scratch) {
     double least = (double)threshold, most = 0;
     size_t count = 0;
     for (size_t i = 0; i < counts[0] + counts[1]; i++)
@@ -5782,9 +5882,9 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests) {
 
 /* ---- prior lines [1, II.C] --------------------------------------------------------------------
    Lines on the surface, crests or the caller's, as polylines in a window. To each belong up to two
-   assistant lines on either side, at a constant distance: where the known texture has edges that run
-   along the line, as a stripe that follows a crest has. [1] does not say how far away they are; here
-   that is measured in the window.                                                              */
+   assistant lines on either side, at a constant distance: where the known texture has edges that
+   run along the line, as a stripe that follows a crest has. [1] does not say how far away they
+   are; here that is measured in the window. */
 
 enum {
     TXI_PRIOR_REACH = 4,   /* window pixels: a line may be so far from the surface; ours        */
@@ -5792,14 +5892,16 @@ enum {
     TXI_PRIOR_SHORT = 6,   /* points, about pixels: shorter pieces are left out; ours           */
     TXI_PRIOR_WIDTH = 40,  /* window pixels: the farthest assistant line; ours                  */
     TXI_PRIOR_LEAST = 32,  /* known pixels along a line that a distance is measured at; ours    */
-    TXI_PRIOR_NEAR = 12,   /* window pixels: lines that stay farther from the hole are left out; ours */
+    TXI_PRIOR_NEAR = 12,   /* window pixels: lines that stay farther from the hole are left out;
+                              ours                                                               */
     TXI_PRIOR_BLUR = 5,    /* points: radius of the mean that smooths crest lines, thrice; ours:
                               they zigzag from triangle to triangle                             */
     TXI_PRIOR_CHORD = 6,   /* points to either side that give the direction of a line; ours     */
     TXI_PRIOR_STEP = 12,   /* levels of 8 bits: the mean step across an assistant line; ours    */
     TXI_PRIOR_AIDS = 2     /* assistant lines on each side; [1]                                 */
 };
-#define TXI_PRIOR_SURE 0.7 /* mean step over mean size of the steps: of one sign along the line; ours */
+#define TXI_PRIOR_SURE 0.7 /* mean step over mean size of the steps: of one sign along the line;
+                              ours                                                               */
 
 /* The lines of a window while they are collected. */
 typedef struct txi_prior_list {
@@ -5846,7 +5948,8 @@ static int txi_prior_add(txi_prior_list *list, txm_vec2 p, txm_arena *arena) {
     if (!txi_prior_reserve(list, 1, arena)) return 0;
     if (list->open > list->starts[list->count]) {
         const txm_vec2 last = list->points[list->open - 1];
-        const double dx = (double)p.x - last.x, dy = (double)p.y - last.y, apart = dx * dx + dy * dy;
+        const double dx = (double)p.x - last.x, dy = (double)p.y - last.y,
+                     apart = dx * dx + dy * dy;
         if (apart < 0.5625) return 1;
         if (apart > TXI_PRIOR_JUMP * TXI_PRIOR_JUMP) {
             txi_prior_close(list);
@@ -5947,7 +6050,8 @@ static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
     const int64_t i = txi_places_hold(s, p) ? txi_places_nearest(s, p) : -1;
     if (i < 0) return 0;
     const txm_vec3 q = s->w->place[i];
-    const txm_dvec3 u = txi_places_slope(s->w, (size_t)i, 0), v = txi_places_slope(s->w, (size_t)i, 1);
+    const txm_dvec3 u = txi_places_slope(s->w, (size_t)i, 0),
+                    v = txi_places_slope(s->w, (size_t)i, 1);
     const txm_dvec3 d = txm_d3_sub(p, txm_d3(q.x, q.y, q.z));
     const double e = txm_d3_len2(u), f = txm_d3_dot(u, v), g = txm_d3_len2(v);
     const double det = e * g - f * f, a = txm_d3_dot(d, u), b = txm_d3_dot(d, v);
@@ -5963,7 +6067,8 @@ static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
 }
 
 /* The part of a segment, from..to of 0..1, in the box. 0: none. */
-static int txi_places_clip(const txi_places *s, txm_dvec3 a, txm_dvec3 d, double *from, double *to) {
+static int txi_places_clip(const txi_places *s, txm_dvec3 a, txm_dvec3 d, double *from,
+                           double *to) {
     const double p[3] = {a.x, a.y, a.z}, q[3] = {d.x, d.y, d.z};
     *from = 0;
     *to = 1;
@@ -6009,8 +6114,8 @@ static int txi_prior_lay(const txi_places *s, const texinpaint_line *line, txi_p
     return 1;
 }
 
-/* The same for a line of a plain picture, whose window is a part of it: points are x, y in pixels, pixel
-   centres at one half. */
+/* The same for a line of a plain picture, whose window is a part of it: points are x, y in
+   pixels, pixel centres at one half. */
 static int txi_prior_copy(const txi_window *w, const texinpaint_line *line, txi_prior_list *list,
                           txm_arena *arena) {
     const double left = (double)w->place[0].x + 0.5, top = (double)w->place[0].y + 0.5;
@@ -6041,9 +6146,10 @@ static int txi_prior_copy(const txi_window *w, const texinpaint_line *line, txi_
     return 1;
 }
 
-/* ---- prior lines: assistants ------------------------------------------------------------------ */
+/* ---- prior lines: assistants ----------------------------------------------------------------- */
 
-/* the unit vector to the left of a line at point k of n, as y runs downwards; 0, 0: it has no direction */
+/* the unit vector to the left of a line at point k of n, as y runs downwards; 0, 0: it has no
+   direction */
 static txm_vec2 txi_prior_left(const txm_vec2 *points, int n, int k) {
     const txm_vec2 a = points[k > TXI_PRIOR_CHORD ? k - TXI_PRIOR_CHORD : 0];
     const txm_vec2 b = points[k + TXI_PRIOR_CHORD < n ? k + TXI_PRIOR_CHORD : n - 1];
@@ -6079,7 +6185,8 @@ static double txi_prior_edge(const txi_window *w, const txm_vec2 *points, int n,
         }
     }
     const double mean = fabs(sum[0]) + fabs(sum[1]) + fabs(sum[2]);
-    if (count < TXI_PRIOR_LEAST || mean < TXI_PRIOR_STEP * count || mean < TXI_PRIOR_SURE * size) return 0;
+    if (count < TXI_PRIOR_LEAST || mean < TXI_PRIOR_STEP * count || mean < TXI_PRIOR_SURE * size)
+        return 0;
     return mean / count;
 }
 
@@ -6102,7 +6209,8 @@ static int txi_prior_offset(const txi_window *w, txi_prior_list *list, int k, in
             if (!txi_prior_reserve(list, 1, arena)) return 0;
             continue;
         }
-        if (open) { /* where the line bends more than the distance allows, its parallel turns back */
+        if (open) { /* where the line bends more than the distance allows, its parallel turns
+                       back                                                                      */
             const txm_vec2 last = list->points[list->open - 1];
             if (((double)q.x - last.x) * -left.y + ((double)q.y - last.y) * left.x <= 0) continue;
         }
@@ -6112,7 +6220,8 @@ static int txi_prior_offset(const txi_window *w, txi_prior_list *list, int k, in
     return 1;
 }
 
-/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges. 0: no memory. */
+/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges. 0: no
+   memory. */
 static int txi_prior_assist(const txi_window *w, txi_prior_list *list, int k, int side,
                             txm_arena *arena) {
     enum { FIRST = 2, SLOTS = TXI_PRIOR_WIDTH - FIRST };
@@ -6157,7 +6266,8 @@ static void txi_prior_smooth(txm_vec2 *points, int n, txm_vec2 *scratch) {
 /* Does a line come near the hole? */
 static int txi_prior_is_near(const txi_window *w, const txm_vec2 *points, int n) {
     for (int k = 0; k < n; k++) {
-        const int x = (int)floor((double)points[k].x + 0.5), y = (int)floor((double)points[k].y + 0.5);
+        const int x = (int)floor((double)points[k].x + 0.5),
+                  y = (int)floor((double)points[k].y + 0.5);
         for (int dy = -TXI_PRIOR_NEAR; dy <= TXI_PRIOR_NEAR; dy += 4) {
             for (int dx = -TXI_PRIOR_NEAR; dx <= TXI_PRIOR_NEAR; dx += 4) {
                 const int u = x + dx, v = y + dy;
@@ -6183,8 +6293,8 @@ static void txi_prior_filter(const txi_window *w, txi_prior_list *list) {
     if (list->starts) list->starts[lines] = points;
 }
 
-/* The prior lines of a window that come near its hole: first all lines themselves, in pieces, then their
-   assistants.
+/* The prior lines of a window that come near its hole: first all lines themselves, in pieces, then
+   their assistants.
    crests  NULL: the lines of the description
    prior   lies in the arena
    return  TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED
@@ -6214,7 +6324,8 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
             (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)list.open, sizeof(txm_vec2));
         ok = copy != NULL;
         for (int k = 0; k < own && ok; k++)
-            txi_prior_smooth(list.points + list.starts[k], list.starts[k + 1] - list.starts[k], copy);
+            txi_prior_smooth(list.points + list.starts[k], list.starts[k + 1] - list.starts[k],
+                             copy);
     }
     for (int k = 0; k < own && ok; k++)
         ok = txi_prior_assist(w, &list, k, 1, arena) && txi_prior_assist(w, &list, k, -1, arena);
@@ -6228,9 +6339,10 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
 }
 
 /* ---- tensor voting ----------------------------------------------------------------------------
-   C. Tang, G. Medioni. Inference of integrated surface, curve and junction descriptions from sparse 3D
-   data. PAMI 1998. Each token, a point of a line or surface, tells its neighbours which direction they
-   would have if both were parts of one smooth line or surface. A symmetric tensor collects the votes:
+   C. Tang, G. Medioni. Inference of integrated surface, curve and junction descriptions from sparse
+   3D data. PAMI 1998. Each token, a point of a line or surface, tells its neighbours which
+   direction they would have if both were parts of one smooth line or surface. A symmetric tensor
+   collects the votes:
 
        T = l1 e1 e1' + l2 e2 e2' + l3 e3 e3',  l1 >= l2 >= l3                             [1, (1)]
          = (l1 - l2) e1 e1' + (l2 - l3) (e1 e1' + e2 e2') + l3 I
@@ -6240,9 +6352,9 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
    Tensors are stored as xx xy xz yy yz zz.                                                       */
 
 enum {
-    TXI_VOTE_RADII = 40,  /* entries of the tables of the fields along the distance                */
-    TXI_VOTE_ANGLES = 24, /* and along the angle, 0 to 90 degrees                                  */
-    TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn            */
+    TXI_VOTE_RADII = 40,  /* entries of the tables of the fields along the distance               */
+    TXI_VOTE_ANGLES = 24, /* and along the angle, 0 to 90 degrees                                 */
+    TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn           */
 };
 
 /* A token: where it is, and its tensor taken apart. */
@@ -6260,7 +6372,7 @@ typedef struct txi_fields {
     double c;         /* penalty of curvature                                                     */
     double reach;     /* no votes beyond                                                          */
     double ball[TXI_VOTE_RADII + 1][2];  /* along the connection, across it                       */
-    double plate[TXI_VOTE_RADII + 1][TXI_VOTE_ANGLES + 1][4]; /* tt, tp, pp, qq, see below         */
+    double plate[TXI_VOTE_RADII + 1][TXI_VOTE_ANGLES + 1][4]; /* tt, tp, pp, qq, see below        */
 } txi_fields;
 
 /* Tokens in buckets, for the search of neighbours. */
@@ -6283,7 +6395,8 @@ static double txi_arc(double s) {
 }
 
 /* The decay of a stick's vote over distance l at an angle theta between the connection and the
-   tangent plane: along the arc of length s = l theta / sin(theta) and curvature k = 2 sin(theta) / l
+   tangent plane: along the arc of length s = l theta / sin(theta) and curvature k = 2 sin(theta) /
+   l
 
        D = exp(-(s^2 + c k^2) / sigma^2)                                                          */
 static double txi_decay(const txi_fields *f, double l, double sine) {
@@ -6303,7 +6416,8 @@ static inline void txi_outer(double t[6], txm_dvec3 v, double weight) {
 
 /* The vote of a stick with unit normal n at v from it: the normal of the circle that touches the
    stick's tangent plane and goes through v. Nothing beyond 45 degrees. */
-static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double weight, double t[6]) {
+static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double weight,
+                           double t[6]) {
     const double l = txm_d3_len(v);
     if (!(l > 0) || l > f->reach) return;
     const txm_dvec3 u = txm_d3_scale(v, 1 / l);
@@ -6325,21 +6439,24 @@ static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double
    plates  0: no plates will vote, which saves most of the time                                  */
 static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->sigma = sigma;
-    /* so that an eighth of a circle and a straight line of the same length differ as in the paper */
+    /* so that an eighth of a circle and a straight line of the same length differ as in the
+       paper */
     f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
     f->reach = 2.5 * sigma;
     for (int i = 0; i <= TXI_VOTE_RADII; i++) {
         const double l = f->reach * (i > 0 ? i : 0.01) / (double)TXI_VOTE_RADII;
         f->ball[i][0] = f->ball[i][1] = 0;
-        for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                             */
-            const double width = 0.70710678118654752 / (double)TXI_VOTE_STICKS, s = width * (k + 0.5);
+        for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                            */
+            const double width = 0.70710678118654752 / (double)TXI_VOTE_STICKS,
+                         s = width * (k + 0.5);
             const double d = 2 * width * txi_decay(f, l, s);
             f->ball[i][0] += 1.5 * d * s * s;
             f->ball[i][1] += 0.75 * d * (1 - s * s);
         }
         for (int j = 0; j <= TXI_VOTE_ANGLES && plates; j++) {
             double sine, cosine, *e = f->plate[i][j];
-            txm_sincos(0.5 * TXM_PI * j / (double)TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
+            /* u = cosine t + sine p */
+            txm_sincos(0.5 * TXM_PI * j / (double)TXI_VOTE_ANGLES, &sine, &cosine);
             e[0] = e[1] = e[2] = e[3] = 0;
             for (int k = 0; k < TXI_VOTE_STICKS; k++) {
                 double np, nq;
@@ -6393,8 +6510,10 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
     const txm_dvec3 q = txm_d3_cross(tangent, p);
     /* the angle from its sine or cosine, whichever is less: theta = x * arc(x^2)                 */
     const double sine = far_off / l;
-    const double angle = sine < cosine ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
-                                       : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
+    const double angle =
+        sine < cosine
+            ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
+            : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
     const double across = angle * (double)TXI_VOTE_ANGLES / (0.5 * TXM_PI);
     const int i = (int)at, j = txm_clampi((int)across, 0, TXI_VOTE_ANGLES - 1);
     const double r = at - i, a = across - j;
@@ -6402,7 +6521,7 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
         e[k] = weight * ((f->plate[i][j][k] * (1 - a) + f->plate[i][j + 1][k] * a) * (1 - r) +
                          (f->plate[i + 1][j][k] * (1 - a) + f->plate[i + 1][j + 1][k] * a) * r);
     }
-    txi_outer(t, tangent, e[0] - e[1]); /* e1 (tp' + pt') = e1 ((t + p)(t + p)' - tt' - pp')       */
+    txi_outer(t, tangent, e[0] - e[1]); /* e1 (tp' + pt') = e1 ((t + p)(t + p)' - tt' - pp')      */
     txi_outer(t, p, e[2] - e[1]);
     txi_outer(t, txm_d3_add(tangent, p), e[1]);
     txi_outer(t, q, e[3]);
@@ -6433,14 +6552,15 @@ static void txi_token_set(txi_token *k, const double t[6]) {
     k->ball = value[2] > 0 ? value[2] : 0;
 }
 
-/* The surface as a constraint: lines lie in it, so that only the part of a tensor in the tangent plane
-   counts, P T P with P = I - n n'. A line in direction d, which is a plate (I - d d'), becomes the
-   stick m m' with m = n x d, which votes within the surface only. */
+/* The surface as a constraint: lines lie in it, so that only the part of a tensor in the tangent
+   plane counts, P T P with P = I - n n'. A line in direction d, which is a plate (I - d d'),
+   becomes the stick m m' with m = n x d, which votes within the surface only. */
 static void txi_onto_surface(double t[6], txm_dvec3 n) {
-    const txm_dvec3 tn = txm_d3(t[0] * n.x + t[1] * n.y + t[2] * n.z, t[1] * n.x + t[3] * n.y + t[4] * n.z,
-                                t[2] * n.x + t[4] * n.y + t[5] * n.z);
+    const txm_dvec3 tn =
+        txm_d3(t[0] * n.x + t[1] * n.y + t[2] * n.z, t[1] * n.x + t[3] * n.y + t[4] * n.z,
+               t[2] * n.x + t[4] * n.y + t[5] * n.z);
     const double nn = txm_d3_dot(n, tn);
-    /* T - n (Tn)' - (Tn) n' + (n'Tn) n n'                                                         */
+    /* T - n (Tn)' - (Tn) n' + (n'Tn) n n'                                                        */
     t[0] += -2 * n.x * tn.x + nn * n.x * n.x;
     t[1] += -n.x * tn.y - n.y * tn.x + nn * n.x * n.y;
     t[2] += -n.x * tn.z - n.z * tn.x + nn * n.x * n.z;
@@ -6510,8 +6630,8 @@ static void txi_votes_at(const txi_fields *f, const txi_tokens *k, txm_dvec3 pla
 }
 
 /* Sparse voting: each token receives the votes of the others, which replace its tensor. balls: the
-   first round, in which only the places are known. normals: one per token, the surface on which lines
-   lie, or NULL. scratch: 6 numbers per token. */
+   first round, in which only the places are known. normals: one per token, the surface on which
+   lines lie, or NULL. scratch: 6 numbers per token. */
 static void txi_vote_sparse(const txi_fields *f, txi_tokens *k, int balls, const txm_dvec3 *normals,
                             double *scratch) {
     for (int i = 0; i < k->count; i++) {
@@ -6551,14 +6671,16 @@ static const int txi_gradient_weight[TXI_GRADIENT_TAPS + 1] = {64, 45, 16, 3};
 
 /* The slopes of the planes through the known pixels around (x, y): 6 numbers, levels per pixel. */
 static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
-    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x, y */
+    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x,
+                                                          y                                      */
     for (int j = -TXI_GRADIENT_TAPS; j <= TXI_GRADIENT_TAPS; j++) {
         for (int i = -TXI_GRADIENT_TAPS; i <= TXI_GRADIENT_TAPS; i++) {
             const int px = x + i, py = y + j;
             if (px < 0 || py < 0 || px >= f->width || py >= f->height) continue;
             const size_t at = (size_t)py * (size_t)f->width + (size_t)px;
             if (!f->known[at]) continue;
-            const double w = txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
+            const double w =
+                txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
             m[0] += w;
             m[1] += w * i;
             m[2] += w * j;
@@ -6593,7 +6715,7 @@ static int16_t txi_gradient_round(double slope) {
 /* The job of one band of rows. rows: scratch of this band, 6 * width * (TXI_BAND_ROWS + 6) ints */
 typedef struct txi_slopes_job {
     txi_slopes *field;
-    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere   */
+    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere  */
     int32_t reach;
     int32_t *rows;
     int first;           /* band of index 0                                                     */
@@ -6608,8 +6730,8 @@ static void txi_gradient_row(const txi_slopes *f, int y, int32_t *out) {
         for (int k = 0; k < 3; k++) {
             out[6 * x + k] = 64 * p[k] + 45 * (p[k - 4] + p[k + 4]) + 16 * (p[k - 8] + p[k + 8]) +
                              3 * (p[k - 12] + p[k + 12]);
-            out[6 * x + 3 + k] =
-                45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) + 9 * (p[k + 12] - p[k - 12]);
+            out[6 * x + 3 + k] = 45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) +
+                                 9 * (p[k + 12] - p[k - 12]);
         }
     }
 }
@@ -6713,16 +6835,17 @@ static void txi_tensor_band(const txi_slopes_job *job, int y0, int y1, int32_t *
 static void txi_slopes_body(void *context, int index) {
     const txi_slopes_job *job = (const txi_slopes_job *)context;
     const int y0 = (job->first + index) * TXI_BAND_ROWS;
-    const int y1 = y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
+    const int y1 =
+        y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
     int32_t *rows = job->rows + (size_t)index * 6 * (size_t)job->field->width * (TXI_BAND_ROWS + 6);
     if (job->smooth) txi_tensor_band(job, y0, y1, rows);
     else txi_gradient_band(job, y0, y1, rows);
 }
 
-/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. The tensor's memory is
-   that of brief, it is not needed once lines have been followed. */
-static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach, txm_arena *arena,
-                                  txm_arena *brief, txm_env *env) {
+/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. The
+   tensor's memory is that of brief, it is not needed once lines have been followed. */
+static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach,
+                                  txm_arena *arena, txm_arena *brief, txm_env *env) {
     const size_t count = (size_t)f->width * (size_t)f->height;
     const int bands = (f->height + TXI_BAND_ROWS - 1) / TXI_BAND_ROWS;
     const int most = bands < TXI_BANDS ? bands : TXI_BANDS;
@@ -6738,8 +6861,8 @@ static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t re
     job.reach = reach;
     for (job.smooth = 0; job.smooth < 2; job.smooth++) {
         for (job.first = 0; job.first < bands; job.first += most)
-            txm_parallel_for(env, bands - job.first < most ? bands - job.first : most, txi_slopes_body,
-                             &job);
+            txm_parallel_for(env, bands - job.first < most ? bands - job.first : most,
+                             txi_slopes_body, &job);
     }
     return TXM_OK;
 }
@@ -6765,24 +6888,26 @@ static double txi_strength_at(const txi_slopes *f, double x, double y) {
     const int ix = (int)x, iy = (int)y;
     const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
     const double u = x - ix, v = y - iy;
-    return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
+    return (p[0] * (1 - u) + p[1] * u) * (1 - v) +
+           (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
 }
 
 /* ---- lines near a hole ------------------------------------------------------------------------
    The structure of [1, II.A]: points of strong colour gradient near the hole, thinned to lines, and
-   the ends of these lines at the border of the hole. A window is almost isometric to the surface, so
-   the gradient in the window is the gradient on the surface.                                       */
+   the ends of these lines at the border of the hole. A window is almost isometric to the
+   surface, so the gradient in the window is the gradient on the surface. */
 
 enum {
     TXI_PROFILE = 21,       /* samples of the colours across a line, half a pixel apart          */
     TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
-    TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
-    TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that         */
-    TXI_BENT_FIT = 40,      /* pixels; parabolas are fitted to as much of a line, or half of the width of
-                               the hole; ours                                                    */
-    TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own        */
+    TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat
+                               angles                                                            */
+    TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that       */
+    TXI_BENT_FIT = 40,      /* pixels; parabolas are fitted to as much of a line, or half of the
+                               width of the hole; ours                                           */
+    TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own     */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
 
@@ -6838,7 +6963,8 @@ typedef struct txi_walk {
 /* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
 static void txi_change_at(const txi_slopes *f, size_t i, double rx, double ry, double change[3]) {
     const int16_t *g = f->gradient + 6 * i;
-    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / (double)TXI_GRADIENT_UNIT;
+    for (int c = 0; c < 3; c++)
+        change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / (double)TXI_GRADIENT_UNIT;
 }
 
 /* Correlation of two colour changes, -1..1. */
@@ -6947,7 +7073,7 @@ static txm_status txi_thin_all(txi_lines *l, int32_t reach, txm_arena *arena, tx
     const size_t count = (size_t)f->width * (size_t)f->height;
     l->thin_at = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->thin_at);
     if (arena->failed) return txi_no_memory(env);
-    for (int pass = 0; pass < 2; pass++) { /* count, then keep                                     */
+    for (int pass = 0; pass < 2; pass++) { /* count, then keep                                    */
         int n = 0;
         for (int y = 0; y < f->height; y++) {
             for (int x = 0; x < f->width; x++) {
@@ -6991,8 +7117,8 @@ static txm_vec2 txi_inwards(const txi_lines *l, int x, int y) {
     return txi_unit(gx, gy);
 }
 
-/* Follow a line from a point near the border both ways: points from the border outwards. Returns how
-   many; walk receives the direction inwards at the first point. */
+/* Follow a line from a point near the border both ways: points from the border outwards. Returns
+   how many; walk receives the direction inwards at the first point. */
 static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards, txm_vec2 *points,
                       int capacity, double *strength) {
     const txi_slopes *f = &l->field;
@@ -7021,7 +7147,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
             const ptrdiff_t i = txi_pixel(f->width, f->height, k.x, k.y);
             if (way == 0) {
                 if (l->away[i] < 2) break;
-                if (l->away[i] > 36) return 0; /* it passes by                                     */
+                if (l->away[i] > 36) return 0; /* it passes by                                    */
                 back[inner++] = txm_v2(txm_float(k.x), txm_float(k.y));
             } else {
                 /* back at the border of the hole: it does not lead away from it                  */
@@ -7093,14 +7219,16 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
     return sqrt(error / i);
 }
 
-/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
-static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does
+   not. */
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
+                       txi_end *e) {
     const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
-        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
-           pieces a parabola is no arc                                                            */
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over
+           long pieces a parabola is no arc */
         const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
         const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
@@ -7111,7 +7239,7 @@ static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *
             break;
         n = n * 3 / 4;
     }
-    /* a corner near the hole: the first points alone are straight, in another direction            */
+    /* a corner near the hole: the first points alone are straight, in another direction          */
     if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
         const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
         if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
@@ -7119,7 +7247,7 @@ static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *
             n = TXI_CORNER;
         }
     }
-    for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels     */
+    for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels   */
         s = -0.25 * i;
         const ptrdiff_t at = txi_pixel(w->width, w->height, fit[0] + fit[1] * s + fit[2] * s * s,
                                        fit[3] + fit[4] * s + fit[5] * s * s);
@@ -7130,7 +7258,7 @@ static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *
     const double dx = fit[1] + 2 * fit[2] * s, dy = fit[4] + 2 * fit[5] * s;
     const double speed = sqrt(dx * dx + dy * dy);
     if (speed < 0.1) return 0;
-    for (int d = 0; d < 2; d++) { /* from now on s = 0 is the border                               */
+    for (int d = 0; d < 2; d++) { /* from now on s = 0 is the border                              */
         double *p = fit + 3 * d;
         p[0] += p[1] * s + p[2] * s * s;
         p[1] += 2 * p[2] * s;
@@ -7204,7 +7332,8 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     if (e->count < 5) return;
     const txm_vec2 p = l->points[e->first];
     const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
-    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e)) return;
+    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e))
+        return;
     e->strength = txm_float(strength);
     e->length = (float)e->count;
     e->is_long = e->length >= (float)TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
@@ -7214,12 +7343,13 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     l->end_count++;
 }
 
-/* Ends from points near the hole: 2.6 to 4.2 pixels from it, then up to 6 pixels, for lines that are lost
-   on their last pixels; the strongest first. */
+/* Ends from points near the hole: 2.6 to 4.2 pixels from it, then up to 6 pixels, for lines that
+   are lost on their last pixels; the strongest first. */
 static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
                                 txm_arena *scratch, txm_env *env) {
     const int room = (int)l->limit + TXI_INNER;
-    txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
+    txm_pair *order =
+        (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
     if (l->thin_count == 0) return TXM_OK;
     l->ends = (txi_end *)txm_arena_zero(arena, TXI_MAX_ENDS, sizeof *l->ends);
     l->points = (txm_vec2 *)txm_arena_alloc(arena, TXI_MAX_ENDS * (size_t)room, sizeof *l->points);
@@ -7301,20 +7431,20 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     for (int i = 0; i < lines->end_count && status == TXM_OK; i++) longs += lines->ends[i].is_long;
     if (lines->end_count && status == TXM_OK)
         lines->share_long = (float)longs / (float)lines->end_count;
-    lines->field.gap = lines->field.tensor = NULL; /* they were in scratch                           */
+    lines->field.gap = lines->field.tensor = NULL; /* they were in scratch                        */
     txm_arena_free(&scratch);
     return status;
 }
 
 /* ---- lines grow into the hole -----------------------------------------------------------------
-   [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places are
-   known. Then, round by round, each line takes the place of most saliency ahead of it as a new point,
-   whose tensor is set anew, until it is as near to another line as alpha, leaves the hole, has no
-   votes left, or beta rounds are over.
+   [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places
+   are known. Then, round by round, each line takes the place of most saliency ahead of it as a new
+   point, whose tensor is set anew, until it is as near to another line as alpha, leaves the hole,
+   has no votes left, or beta rounds are over.
 
-   The paper joins the two lines then. Here growth and the field of votes only say how well two ends go
-   together: lines that grow drift where there is a gap to bridge, and which ones meet first is
-   chance.                                                                                         */
+   The paper joins the two lines then. Here growth and the field of votes only say how well two ends
+   go together: lines that grow drift where there is a gap to bridge, and which ones meet first is
+   chance.                                                                                        */
 
 enum {
     TXI_TOKEN_STEP = 3,     /* pixels between the points of a line that vote; ours                */
@@ -7322,8 +7452,8 @@ enum {
     TXI_GROW_ROUNDS = 64    /* at most, if beta is 0                                              */
 };
 
-/* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
-   that are void count as flat. */
+/* The surface at a place: the point on it, the normal, and unit tangents along the window's
+   axes. Pixels that are void count as flat. */
 typedef struct txi_spot {
     txm_dvec3 place, normal, ex, ey;
     int used; /* of the dense map: votes are counted here                                         */
@@ -7334,12 +7464,13 @@ typedef struct txi_grown {
     txi_fields fields;
     txi_tokens tokens;
     int *owner;        /* one per token: the end of its line                                      */
-    int step;          /* pixels between the places of the dense map; a line grows as far in a round */
+    int step;          /* pixels between the places of the dense map; a line grows as far in a
+                          round                                                                  */
     int width, height; /* of the dense map, which covers the hole                                 */
     int left, top;     /* pixel of its first place                                                */
     txi_spot *spots; /* the places, NULL tangents outside of the hole                      */
     double *votes;     /* 6 per place                                                             */
-    uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                      */
+    uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                     */
     int end_count;
 } txi_grown;
 
@@ -7354,7 +7485,7 @@ static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
     s.ex = txm_d3(1, 0, 0);
     s.ey = txm_d3(0, 1, 0);
     if (w->state[i] == TXI_VOID) return s;
-    for (int d = 0; d < 2; d++) { /* differences to the neighbours that exist                      */
+    for (int d = 0; d < 2; d++) { /* differences to the neighbours that exist                     */
         const int at = d ? iy : ix, limit = d ? w->height : w->width;
         const size_t step = d ? (size_t)w->width : 1;
         const size_t low = at > 0 && w->state[i - step] != TXI_VOID ? i - step : i;
@@ -7374,7 +7505,8 @@ static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
 }
 
 static double txi_form(const double t[6], txm_dvec3 a, txm_dvec3 b) {
-    return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) + a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
+    return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) +
+           a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
            a.z * (t[2] * b.x + t[4] * b.y + t[5] * b.z);
 }
 
@@ -7388,7 +7520,7 @@ static void txi_grow_add(txi_grown *g, double x, double y, txm_dvec3 place, txm_
     txi_outer(t, normal, weight);
     g->owner[g->tokens.count] = owner;
     txi_tokens_add(&g->tokens, place, t);
-    /* a window is almost isometric: what is in reach on the surface is so in the window, nearly    */
+    /* a window is almost isometric: what is in reach on the surface is so in the window, nearly  */
     const int x0 = txm_clampi((int)(cx - reach), 0, g->width);
     const int x1 = txm_clampi((int)(cx + reach) + 2, 0, g->width);
     const int y0 = txm_clampi((int)(cy - reach), 0, g->height);
@@ -7403,8 +7535,8 @@ static void txi_grow_add(txi_grown *g, double x, double y, txm_dvec3 place, txm_
     }
 }
 
-/* The votes at a place of the window, from the four places of the dense map around it: a tensor in the
-   window's axes, xx xy yy. */
+/* The votes at a place of the window, from the four places of the dense map around it: a tensor
+   in the window's axes, xx xy yy. */
 static void txi_votes_in_window(const txi_grown *g, double x, double y, double t[3]) {
     const double cx = (x - g->left) / g->step, cy = (y - g->top) / g->step;
     const int ix = txm_clampi((int)floor(cx), 0, g->width - 2);
@@ -7424,7 +7556,8 @@ static void txi_votes_in_window(const txi_grown *g, double x, double y, double t
 }
 
 /* The lines' points as tokens: balls vote, then sticks of length one in the directions found. */
-static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
+static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *scratch,
+                                 txm_env *env) {
     const int room = l->end_count * TXI_TOKENS_OF_END;
     static const double unit[6] = {1, 0, 0, 1, 0, 1};
     txi_fields balls;
@@ -7450,7 +7583,7 @@ static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *sc
     txi_vote_sparse(&balls, &points, 1, normals, votes);
     for (int i = 0; i < points.count; i++) {
         const txi_token *k = &points.at[i];
-        if (k->stick <= 0) continue; /* it is alone                                                */
+        if (k->stick <= 0) continue; /* it is alone                                               */
         txi_grow_add(g, where[i].x, where[i].y, k->place, k->normal, 1, owner[i]);
     }
     return TXM_OK;
@@ -7474,13 +7607,13 @@ static int txi_grow_meets(const txi_grown *g, int end, txm_dvec3 place, double a
     return best < 0 ? -1 : g->owner[best];
 }
 
-/* One round of the line of an end: a step in that of seven directions, up to 45 degrees to either side,
-   which has the most votes for a line in this direction. 0: it has stopped. */
+/* One round of the line of an end: a step in that of seven directions, up to 45 degrees to
+   either side, which has the most votes for a line in this direction. 0: it has stopped. */
 static int txi_grow_step(txi_grown *g, int end, double least, txm_vec2 *tip, txm_vec2 *heading) {
     const txi_window *w = g->window;
     double best = least, bx = 0, by = 0, hx = 0, hy = 0;
     for (int i = 0; i < 7; i++) {
-        const int k = i & 1 ? (i + 1) / 2 : -(i / 2); /* straight on first                         */
+        const int k = i & 1 ? (i + 1) / 2 : -(i / 2); /* straight on first                        */
         double sine, cosine, t[3];
         txm_sincos(k * (TXM_PI / 12), &sine, &cosine);
         const double dx = heading->x * cosine - heading->y * sine;
@@ -7545,18 +7678,19 @@ static txm_status txi_grow_map(txi_grown *g, const txi_lines *l, txm_arena *scra
    alpha  pixels; lines as near as that have met; at most, and with 0, a step
    beta   rounds at most; 0: 64
    cost   O(tokens * places of the map in reach)                                                */
-static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
-                           txm_arena *scratch, txm_env *env) {
+static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l, float alpha,
+                           int beta, txm_arena *scratch, txm_env *env) {
     const int ends = l->end_count;
     int rounds = beta > 0 ? beta : TXI_GROW_ROUNDS;
     memset(g, 0, sizeof *g);
     g->window = w;
     g->end_count = ends;
-    /* far enough for votes to bridge the hole                                                     */
+    /* far enough for votes to bridge the hole                                                    */
     txi_fields_make(&g->fields, txm_clampf(0.25f * l->width, 6, 30), 0);
     g->step = txm_clampi((int)(g->fields.sigma / 5), 2, 6);
     const double meet = alpha > 0 && alpha < (float)g->step ? (double)alpha : g->step;
-    if (rounds > 1 + (int)(l->width / (float)g->step)) rounds = 1 + (int)(l->width / (float)g->step);
+    if (rounds > 1 + (int)(l->width / (float)g->step))
+        rounds = 1 + (int)(l->width / (float)g->step);
     const int room = ends * (TXI_TOKENS_OF_END + rounds);
     txm_status status = txi_tokens_make(&g->tokens, room, g->step + 1.0, scratch, env);
     if (status == TXM_OK) status = txi_grow_map(g, l, scratch, env);
@@ -7579,7 +7713,8 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
             if (!going[e]) continue;
             going[e] = (uint8_t)txi_grow_step(g, e, 0.05, &tips[e], &headings[e]);
             if (!going[e] || round < 2) continue;
-            const int other = txi_grow_meets(g, e, txi_spot_at(w, tips[e].x, tips[e].y).place, meet);
+            const int other =
+                txi_grow_meets(g, e, txi_spot_at(w, tips[e].x, tips[e].y).place, meet);
             if (other < 0) continue;
             g->met[(size_t)e * (size_t)ends + (size_t)other] = 1;
             g->met[(size_t)other * (size_t)ends + (size_t)e] = 1;
@@ -7588,8 +7723,8 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
     return TXM_OK;
 }
 
-/* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along) / sum;
-   0 where there are no votes. */
+/* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along)
+   / sum; 0 where there are no votes. */
 static double txi_votes_agree(const txi_grown *g, double x, double y, double dx, double dy) {
     double t[3];
     if (TXI_LEFT_OUT & TXI_VOTES) return 0;
@@ -8713,9 +8848,10 @@ static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_cu
 
    by min-sum belief propagation. All costs are integers, so that every build decides alike.
 
-   1. Pruning, as in priority belief propagation [5]: the nodes are visited in the order of how few of
-      their labels are plausible, then in the opposite order. Each one sends its cheapest labels only,
-      and keeps those that are cheapest by the messages from both visits.
+   1. Pruning, as in priority belief propagation [5]: the nodes are visited in the order of how few
+   of
+      their labels are plausible, then in the opposite order. Each one sends its cheapest labels
+      only, and keeps those that are cheapest by the messages from both visits.
    2. A graph without cycles: the exact minimum by dynamic programming.
    3. Else messages with damping, from which the labels are read node by node; then moves that fix
       some nodes, so that the others form a forest, and optimise all of these at once. The result
@@ -8733,8 +8869,10 @@ typedef struct txi_graph {
     const size_t *firsts; /* per node, where its costs begin in unary                          */
     const int32_t *unary; /* 0..TXI_COST_MOST                                                   */
     const int *ends;      /* 2 per link: different nodes                                        */
-    const uint8_t *late;  /* per link, non-zero: too expensive for pruning, not used there; NULL: 0 */
-    /* the cost of label a of the link's first node beside label b of its second, 0..TXI_COST_MOST */
+    const uint8_t *late;  /* per link, non-zero: too expensive for pruning, not used there; NULL:
+                             0                                                                   */
+    /* the cost of label a of the link's first node beside label b of its second,
+       0..TXI_COST_MOST */
     int32_t (*pair)(const void *context, int link, int a, int b);
     const void *context;
 } txi_graph;
@@ -8785,8 +8923,8 @@ static uint32_t txi_cost_key(int64_t cost) {
     return cost < 0 ? 0 : cost > UINT32_MAX ? UINT32_MAX : (uint32_t)cost;
 }
 
-/* The `keep` cheapest of count costs, as pairs of key and index; of equal ones the first. Returns how
-   many. scratch: count pairs. */
+/* The `keep` cheapest of count costs, as pairs of key and index; of equal ones the first.
+   Returns how many. scratch: count pairs. */
 static int txi_cheapest(const int64_t *costs, int count, int keep, txm_pair *pairs,
                         txm_pair *scratch) {
     int64_t least = costs[0];
@@ -8799,8 +8937,8 @@ static int txi_cheapest(const int64_t *costs, int count, int keep, txm_pair *pai
     return count < keep ? count : keep;
 }
 
-/* How many labels of a node cost less than the least plus an eighth of the range: the fewer, the surer
-   the node is of its label. */
+/* How many labels of a node cost less than the least plus an eighth of the range: the fewer, the
+   surer the node is of its label. */
 static int txi_plausible(const int64_t *costs, int count) {
     int64_t least = costs[0], most = costs[0];
     int plausible = 0;
@@ -8813,8 +8951,8 @@ static int txi_plausible(const int64_t *costs, int count) {
 }
 
 /* Messages from the chosen labels of a node along its links to nodes not yet visited. */
-static void txi_send_chosen(const txi_beliefs *t, int node, const txm_pair *chosen, int chosen_count,
-                            const uint8_t *visited, int64_t *costs) {
+static void txi_send_chosen(const txi_beliefs *t, int node, const txm_pair *chosen,
+                            int chosen_count, const uint8_t *visited, int64_t *costs) {
     const txi_graph *g = t->graph;
     for (size_t i = t->arms[node]; i < t->arms[node + 1]; i++) {
         const int link = t->arm[i], other = txi_other_end(g, link, node);
@@ -9058,7 +9196,8 @@ static int64_t *txi_belief_gather(txi_beliefs *t, int n, int64_t *messages, cons
     return sums;
 }
 
-/* New messages from a node along one link: half the old one, half the new one, the least of them 0. */
+/* New messages from a node along one link: half the old one, half the new one, the least of them
+   0. */
 static void txi_belief_send(txi_beliefs *t, int n, int link, int64_t *messages,
                             const size_t *firsts) {
     const txi_graph *g = t->graph;
@@ -9079,8 +9218,8 @@ static void txi_belief_send(txi_beliefs *t, int n, int link, int64_t *messages,
     for (int b = 0; b < t->kept_counts[m]; b++) out[b] -= base;
 }
 
-/* Reads labels node by node: the least sum of the unary cost, the pair costs with nodes already read
-   and the messages from the others. */
+/* Reads labels node by node: the least sum of the unary cost, the pair costs with nodes already
+   read and the messages from the others. */
 static void txi_belief_read(txi_beliefs *t, int *x, int64_t *messages, const size_t *firsts) {
     const txi_graph *g = t->graph;
     for (int n = 0; n < g->node_count; n++) {
@@ -9097,7 +9236,8 @@ static void txi_belief_read(txi_beliefs *t, int *x, int64_t *messages, const siz
     }
 }
 
-/* Messages for some rounds; x receives the best labels read after any of them. y: room for labels. */
+/* Messages for some rounds; x receives the best labels read after any of them. y: room for
+   labels. */
 static txm_status txi_belief_loopy(txi_beliefs *t, int *x, int *y, txm_arena *arena, txm_env *env) {
     const txi_graph *g = t->graph;
     size_t size = 0;
@@ -9191,14 +9331,14 @@ static txm_status txi_belief_tables(txi_beliefs *t, txm_arena *arena, txm_env *e
 
 /* Labels of low energy.
 
-   keep    labels of a node that are left after pruning, 1 or more; those of late links are only found
-           if they survive it
+   keep    labels of a node that are left after pruning, 1 or more; those of late links are only
+           found if they survive it
    labels  receives one label per node
    energy  receives E of them; may be NULL
    return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost    O(links * keep * (labels + keep * rounds)); memory of the arena                      */
-static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_arena *arena, int *labels,
-                             int64_t *energy, txm_env *env) {
+static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_arena *arena,
+                             int *labels, int64_t *energy, txm_env *env) {
     const size_t nodes = (size_t)g->node_count;
     txi_beliefs t;
     memset(&t, 0, sizeof t);
@@ -11452,8 +11592,8 @@ enum {
     TXI_LEAST_FILLED = 24   /* pixels that are not void in a patch to be matched; ours         */
 };
 
-/* How a pixel may be copied: not; by itself; interpolated with its neighbour to the right, below and
-   below right; by four pixels a direction. */
+/* How a pixel may be copied: not; by itself; interpolated with its neighbour to the right, below
+   and below right; by four pixels a direction. */
 enum { TXI_TAP_NONE = 0, TXI_TAP_ONE, TXI_TAP_LINEAR, TXI_TAP_CUBIC };
 
 /* A window at one level in one pose: what patches are copied from. Its pixel (i, j) is the level's
@@ -11551,7 +11691,8 @@ static void txi_level_halve(const txi_level *f, txi_level *l) {
     }
 }
 
-/* The colours of the hole at half resolution, from those of the finer level; the rest is not touched. */
+/* The colours of the hole at half resolution, from those of the finer level; the rest is not
+   touched. */
 static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l,
                             uint8_t *to) {
     for (int i = 0; i < l->hole_count; i++) {
@@ -11718,9 +11859,9 @@ static uint32_t txi_ssd(const uint8_t *a, size_t a_pitch, const uint8_t *mask, c
 
 /* ---- detail: how rough the texture is, and is expected to be ------------------------------------
 
-   In noise of variance v, a patch differs from a smooth one by v per pixel and from another rough one
-   by 2 v. So distances alone prefer smooth patches, and grain is smeared. Therefore patches with less
-   detail than expected pay the difference. The detail of a pixel is
+   In noise of variance v, a patch differs from a smooth one by v per pixel and from another rough
+   one by 2 v. So distances alone prefer smooth patches, and grain is smeared. Therefore patches
+   with less detail than expected pay the difference. The detail of a pixel is
 
        e(p) = min(clamp, sum over RGB of (p - mean of the usable pixels of 5x5)^2),
 
@@ -11856,7 +11997,8 @@ static void txi_wish_reach(txi_wish *g, int radius, float offset) {
         const double mean = (double)g->blur[1][i] / g->blur[0][i];
         const double square = (double)g->blur[2][i] / g->blur[0][i] - mean * mean;
         const double level = exp(mean - (double)offset * sqrt(square > 0 ? square : 0));
-        g->result[i] = txm_float(level > (double)TXI_WANT_FLOOR ? level - (double)TXI_WANT_FLOOR : 0);
+        g->result[i] =
+            txm_float(level > (double)TXI_WANT_FLOOR ? level - (double)TXI_WANT_FLOOR : 0);
     }
 }
 
@@ -11898,12 +12040,16 @@ static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_
     for (int a = 0; a < l->anchor_count; a++) {
         const int x = l->anchor[a] % l->width / g.step, y = l->anchor[a] / l->width / g.step;
         const float r = g.result[(size_t)y * (size_t)g.width + (size_t)x];
-        l->want[a] = r > 0 ? (uint32_t)((double)r * (double)TXI_WORTH_MOST / (double)TXI_PATCH_AREA / l->clamp) : 0;
+        l->want[a] =
+            r > 0
+                ? (uint32_t)((double)r * (double)TXI_WORTH_MOST / (double)TXI_PATCH_AREA / l->clamp)
+                : 0;
     }
     return 1;
 }
 
-/* Detail of a level: grain, clamp and the expectation of its anchors. want_it 0: the first two only. */
+/* Detail of a level: grain, clamp and the expectation of its anchors. want_it 0: the first two
+   only. */
 static int txi_level_detail(txi_level *l, float clamp, float offset, int want_it,
                             txm_arena *scratch) {
     const size_t n = (size_t)l->width * (size_t)l->height;
@@ -12133,7 +12279,7 @@ static int txi_source_patches(const txi_source *s) {
     return count;
 }
 
-/* ---- matches ---------------------------------------------------------------------------------- */
+/* ---- matches --------------------------------------------------------------------------------- */
 
 enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
@@ -12188,8 +12334,8 @@ static int txi_too_near(const txi_canvas *t, int a, const txi_source *s, int x, 
     return cx > -least && cx < least && cy > -least && cy < least;
 }
 
-/* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs limit
-   or more. */
+/* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs
+   limit or more. */
 static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uint32_t limit) {
     const txi_level *l = t->level;
     const txi_source *s = &l->source[pose];
@@ -12652,7 +12798,7 @@ static void txi_onion_rest(const txi_onion *o, txi_canvas *t) {
 static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
     const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
-    /* a hole that is long and thin has many anchors even at the coarsest level                      */
+    /* a hole that is long and thin has many anchors even at the coarsest level                   */
     const int share_of_work = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
     int most = 3 * share_of_work;
     if (most > TXI_ONION_LEAST) most = TXI_ONION_LEAST;
@@ -12697,18 +12843,19 @@ static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
 
 /* ---- the coarsest level: annealed labelling -----------------------------------------------------
 
-   Patches on a lattice of half their side cover the hole; each has a label, the source patch that it
-   shows. The labelling of largest probability [1, III.B]
+   Patches on a lattice of half their side cover the hole; each has a label, the source patch that
+   it shows. The labelling of largest probability [1, III.B]
 
        P(Psi | W) P(W)                                                                      (5)
        P(Psi | W) ~ exp(- sum over patches: D(p(x), known part) / (2 sigma(x)^2))           (6)
        P(W) ~ exp(- sum over overlapping pairs: D(p(x), p(y)) / (2 sigma(x, y)^2))          (7)
 
-   is sought by simulated annealing with Metropolis moves. sigma^2 is the context: the detail that is
-   expected of a patch per pixel (detail.h), so that rough texture may differ more. Missing detail
-   counts under (6), as everywhere else. The start is the onion's result, not a random labelling: from
-   a random one the structure is not found in reasonable time. Moves propose a neighbour's label
-   (shifted), the own one nearby, or any; they are not weighted for symmetry, as only the maximum is
+   is sought by simulated annealing with Metropolis moves. sigma^2 is the context: the detail that
+   is expected of a patch per pixel (detail.h), so that rough texture may differ more. Missing
+   detail counts under (6), as everywhere else. The start is the onion's result, not a random
+   labelling: from a random one the structure is not found in reasonable time. Moves propose a
+   neighbour's label (shifted), the own one nearby, or any; they are not weighted for symmetry, as
+   only the maximum is
    wanted.                                                                                     */
 
 enum {
@@ -12716,7 +12863,7 @@ enum {
     TXI_ANNEAL_MOVES = 600, /* per patch                                                       */
     TXI_ANNEAL_PAIRS = 8    /* patches that a patch overlaps                                   */
 };
-#define TXI_ANNEAL_HOT 6.0 /* the first temperature, in units of the exponents of (6) and (7)          */
+#define TXI_ANNEAL_HOT 6.0 /* the first temperature, in units of the exponents of (6) and (7)     */
 #define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(0.3 / HOT): the last temperature is 0.3. Not
                                computed, as C libraries differ in the last bit                 */
 
@@ -13276,7 +13423,7 @@ static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *q
     return count;
 }
 
-/* ---- coherent completion: few offsets, large pieces ----------------------------------------------
+/* ---- coherent completion: few offsets, large pieces ---------------------------------------------
 
    Patterns repeat at few offsets. They are found by matching the known patches around the hole with
    patches elsewhere; the most frequent offsets (in each pose) become labels, and the hole is put
@@ -13385,8 +13532,8 @@ static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_
     return (int)count;
 }
 
-/* The labels' colours, and as the match of each anchor the most frequent label of its patch that can be
-   copied. */
+/* The labels' colours, and as the match of each anchor the most frequent label of its patch that
+   can be copied. */
 static void txi_offset_apply(txi_canvas *t, const txi_assembly *assembly) {
     const txi_level *l = t->level;
     for (int i = 0; i < l->hole_count; i++) {
@@ -14620,13 +14767,14 @@ static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
 }
 
 /* ---- preview ------------------------------------------------------------------------------------
-   What a user sees first: smooth colours in the holes, and through the first hole its lines, drawn as
-   the mean colours across them. The texels stay missing.                                          */
+   What a user sees first: smooth colours in the holes, and through the first hole its lines,
+   drawn as the mean colours across them. The texels stay missing. */
 
-/* Paint the targets of a window in the picture. Pictures with alpha keep what they have, as colours of
-   a window lie over gray.
-   color  4 per window pixel                                                                       */
-static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *color, txm_env *env) {
+/* Paint the targets of a window in the picture. Pictures with alpha keep what they have, as colours
+   of a window lie over gray.
+   color  4 per window pixel                                                                      */
+static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *color,
+                            txm_env *env) {
     const size_t pixels = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[0].channels;
     size_t bytes;
@@ -14700,7 +14848,7 @@ static txm_status txi_preview(txi_domain *d, txm_env *env) {
     return status;
 }
 
-/* ---- counting holes ------------------------------------------------------------------------------ */
+/* ---- counting holes -------------------------------------------------------------------------- */
 
 /* How many parts of the missing texels are connected: on the surface face by face, in a picture by
    the sides and corners of pixels.
@@ -14719,8 +14867,9 @@ static txm_status txi_count_holes(const txi_domain *d, txm_env *env, int *holes)
     }
     for (size_t i = 0; i < count; i++) {
         parent[i] = (uint32_t)i;
-        is_hole[i] = s ? s->hole_first[i + 1] > s->hole_first[i] || d->missing[txi_face_texel(d, s, i)]
-                       : d->missing[i];
+        is_hole[i] =
+            s ? s->hole_first[i + 1] > s->hole_first[i] || d->missing[txi_face_texel(d, s, i)]
+              : d->missing[i];
     }
     for (size_t i = 0; i < count; i++) {
         for (size_t k = 0; k < 3 && s && is_hole[i]; k++) {
@@ -14813,7 +14962,7 @@ TEXINPAINT_API void texinpaint_free(texinpaint_job *job) {
     txm_arena_free(&memory);
 }
 
-/* ---- steps ------------------------------------------------------------------------------------ */
+/* ---- steps ----------------------------------------------------------------------------------- */
 
 /* The targets of the window are written. */
 static void txi_count_window(texinpaint_job *job) {
@@ -14880,8 +15029,8 @@ static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
     txi_copy *copies = (txi_copy *)txm_arena_alloc(&arena, pixels, sizeof *copies);
     txm_status status = arena.failed ? txi_no_memory(env) : TXM_OK;
     if (status == TXM_OK)
-        status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field, copies,
-                                 &poses, &pose_count, env);
+        status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field,
+                                 copies, &poses, &pose_count, env);
     for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
         values[i] = (float *)txm_arena_alloc(&arena, pixels, (size_t)job->domain.maps[i].channels *
                                                                  sizeof(float));

@@ -5,18 +5,19 @@
 
 /* ---- the coarsest level: annealed labelling -----------------------------------------------------
 
-   Patches on a lattice of half their side cover the hole; each has a label, the source patch that it
-   shows. The labelling of largest probability [1, III.B]
+   Patches on a lattice of half their side cover the hole; each has a label, the source patch that
+   it shows. The labelling of largest probability [1, III.B]
 
        P(Psi | W) P(W)                                                                      (5)
        P(Psi | W) ~ exp(- sum over patches: D(p(x), known part) / (2 sigma(x)^2))           (6)
        P(W) ~ exp(- sum over overlapping pairs: D(p(x), p(y)) / (2 sigma(x, y)^2))          (7)
 
-   is sought by simulated annealing with Metropolis moves. sigma^2 is the context: the detail that is
-   expected of a patch per pixel (detail.h), so that rough texture may differ more. Missing detail
-   counts under (6), as everywhere else. The start is the onion's result, not a random labelling: from
-   a random one the structure is not found in reasonable time. Moves propose a neighbour's label
-   (shifted), the own one nearby, or any; they are not weighted for symmetry, as only the maximum is
+   is sought by simulated annealing with Metropolis moves. sigma^2 is the context: the detail that
+   is expected of a patch per pixel (detail.h), so that rough texture may differ more. Missing
+   detail counts under (6), as everywhere else. The start is the onion's result, not a random
+   labelling: from a random one the structure is not found in reasonable time. Moves propose a
+   neighbour's label (shifted), the own one nearby, or any; they are not weighted for symmetry, as
+   only the maximum is
    wanted.                                                                                     */
 
 enum {
@@ -24,7 +25,7 @@ enum {
     TXI_ANNEAL_MOVES = 600, /* per patch                                                       */
     TXI_ANNEAL_PAIRS = 8    /* patches that a patch overlaps                                   */
 };
-#define TXI_ANNEAL_HOT 6.0 /* the first temperature, in units of the exponents of (6) and (7)          */
+#define TXI_ANNEAL_HOT 6.0 /* the first temperature, in units of the exponents of (6) and (7)     */
 #define TXI_ANNEAL_FALL (-2.9957322735539913) /* ln(0.3 / HOT): the last temperature is 0.3. Not
                                computed, as C libraries differ in the last bit                 */
 

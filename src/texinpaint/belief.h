@@ -10,9 +10,10 @@
 
    by min-sum belief propagation. All costs are integers, so that every build decides alike.
 
-   1. Pruning, as in priority belief propagation [5]: the nodes are visited in the order of how few of
-      their labels are plausible, then in the opposite order. Each one sends its cheapest labels only,
-      and keeps those that are cheapest by the messages from both visits.
+   1. Pruning, as in priority belief propagation [5]: the nodes are visited in the order of how few
+   of
+      their labels are plausible, then in the opposite order. Each one sends its cheapest labels
+      only, and keeps those that are cheapest by the messages from both visits.
    2. A graph without cycles: the exact minimum by dynamic programming.
    3. Else messages with damping, from which the labels are read node by node; then moves that fix
       some nodes, so that the others form a forest, and optimise all of these at once. The result
@@ -30,8 +31,10 @@ typedef struct txi_graph {
     const size_t *firsts; /* per node, where its costs begin in unary                          */
     const int32_t *unary; /* 0..TXI_COST_MOST                                                   */
     const int *ends;      /* 2 per link: different nodes                                        */
-    const uint8_t *late;  /* per link, non-zero: too expensive for pruning, not used there; NULL: 0 */
-    /* the cost of label a of the link's first node beside label b of its second, 0..TXI_COST_MOST */
+    const uint8_t *late;  /* per link, non-zero: too expensive for pruning, not used there; NULL:
+                             0                                                                   */
+    /* the cost of label a of the link's first node beside label b of its second,
+       0..TXI_COST_MOST */
     int32_t (*pair)(const void *context, int link, int a, int b);
     const void *context;
 } txi_graph;
@@ -82,8 +85,8 @@ static uint32_t txi_cost_key(int64_t cost) {
     return cost < 0 ? 0 : cost > UINT32_MAX ? UINT32_MAX : (uint32_t)cost;
 }
 
-/* The `keep` cheapest of count costs, as pairs of key and index; of equal ones the first. Returns how
-   many. scratch: count pairs. */
+/* The `keep` cheapest of count costs, as pairs of key and index; of equal ones the first.
+   Returns how many. scratch: count pairs. */
 static int txi_cheapest(const int64_t *costs, int count, int keep, txm_pair *pairs,
                         txm_pair *scratch) {
     int64_t least = costs[0];
@@ -96,8 +99,8 @@ static int txi_cheapest(const int64_t *costs, int count, int keep, txm_pair *pai
     return count < keep ? count : keep;
 }
 
-/* How many labels of a node cost less than the least plus an eighth of the range: the fewer, the surer
-   the node is of its label. */
+/* How many labels of a node cost less than the least plus an eighth of the range: the fewer, the
+   surer the node is of its label. */
 static int txi_plausible(const int64_t *costs, int count) {
     int64_t least = costs[0], most = costs[0];
     int plausible = 0;
@@ -110,8 +113,8 @@ static int txi_plausible(const int64_t *costs, int count) {
 }
 
 /* Messages from the chosen labels of a node along its links to nodes not yet visited. */
-static void txi_send_chosen(const txi_beliefs *t, int node, const txm_pair *chosen, int chosen_count,
-                            const uint8_t *visited, int64_t *costs) {
+static void txi_send_chosen(const txi_beliefs *t, int node, const txm_pair *chosen,
+                            int chosen_count, const uint8_t *visited, int64_t *costs) {
     const txi_graph *g = t->graph;
     for (size_t i = t->arms[node]; i < t->arms[node + 1]; i++) {
         const int link = t->arm[i], other = txi_other_end(g, link, node);
@@ -355,7 +358,8 @@ static int64_t *txi_belief_gather(txi_beliefs *t, int n, int64_t *messages, cons
     return sums;
 }
 
-/* New messages from a node along one link: half the old one, half the new one, the least of them 0. */
+/* New messages from a node along one link: half the old one, half the new one, the least of them
+   0. */
 static void txi_belief_send(txi_beliefs *t, int n, int link, int64_t *messages,
                             const size_t *firsts) {
     const txi_graph *g = t->graph;
@@ -376,8 +380,8 @@ static void txi_belief_send(txi_beliefs *t, int n, int link, int64_t *messages,
     for (int b = 0; b < t->kept_counts[m]; b++) out[b] -= base;
 }
 
-/* Reads labels node by node: the least sum of the unary cost, the pair costs with nodes already read
-   and the messages from the others. */
+/* Reads labels node by node: the least sum of the unary cost, the pair costs with nodes already
+   read and the messages from the others. */
 static void txi_belief_read(txi_beliefs *t, int *x, int64_t *messages, const size_t *firsts) {
     const txi_graph *g = t->graph;
     for (int n = 0; n < g->node_count; n++) {
@@ -394,7 +398,8 @@ static void txi_belief_read(txi_beliefs *t, int *x, int64_t *messages, const siz
     }
 }
 
-/* Messages for some rounds; x receives the best labels read after any of them. y: room for labels. */
+/* Messages for some rounds; x receives the best labels read after any of them. y: room for
+   labels. */
 static txm_status txi_belief_loopy(txi_beliefs *t, int *x, int *y, txm_arena *arena, txm_env *env) {
     const txi_graph *g = t->graph;
     size_t size = 0;
@@ -488,14 +493,14 @@ static txm_status txi_belief_tables(txi_beliefs *t, txm_arena *arena, txm_env *e
 
 /* Labels of low energy.
 
-   keep    labels of a node that are left after pruning, 1 or more; those of late links are only found
-           if they survive it
+   keep    labels of a node that are left after pruning, 1 or more; those of late links are only
+           found if they survive it
    labels  receives one label per node
    energy  receives E of them; may be NULL
    return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost    O(links * keep * (labels + keep * rounds)); memory of the arena                      */
-static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_arena *arena, int *labels,
-                             int64_t *energy, txm_env *env) {
+static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_arena *arena,
+                             int *labels, int64_t *energy, txm_env *env) {
     const size_t nodes = (size_t)g->node_count;
     txi_beliefs t;
     memset(&t, 0, sizeof t);

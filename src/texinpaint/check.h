@@ -5,7 +5,8 @@
 
 /* ---- checks of what the caller gives ------------------------------------------------------- */
 
-#define TXI_MAX_UV 4096.0f /* repeats of the texture; beyond, a float no longer tells its texels apart */
+#define TXI_MAX_UV 4096.0f /* repeats of the texture; beyond, a float no longer tells its texels
+                              apart                                                              */
 
 static txm_status txi_check_size(const txm_image *im, const char *name, const txm_image *like,
                                  txm_env *env) {
@@ -96,8 +97,8 @@ static txm_status txi_check_lines(const texinpaint_desc *d, txm_env *env) {
                                     (uint64_t)i, 0);
         for (size_t k = 0; k < 3 * (size_t)line->count; k++) {
             if (!txm_is_finite(line->points[k]))
-                return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "line # has a point that is not finite",
-                                        (uint64_t)i, 0);
+                return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                        "line # has a point that is not finite", (uint64_t)i, 0);
         }
     }
     return TXM_OK;

@@ -4,9 +4,10 @@
 #include "../texinpaint.h"
 
 /* ---- windows --------------------------------------------------------------------------------
-   All completion is done in windows: flat pictures of a part of the surface (or of the picture) with
-   a hole in it. The surface is laid out almost without distortion, so that a window's pixels have
-   about the same size, that of a texel in the hole. A pixel is TXI_HOLE if it is to be filled.     */
+   All completion is done in windows: flat pictures of a part of the surface (or of the picture)
+   with a hole in it. The surface is laid out almost without distortion, so that a window's
+   pixels have about the same size, that of a texel in the hole. A pixel is TXI_HOLE if it is to
+   be filled. */
 
 enum {
     TXI_VOID = 0,    /* no surface here                                                        */
@@ -22,15 +23,17 @@ typedef struct txi_target {
     uint32_t texel;  /* y * width + x in the texture                                           */
     float x, y;      /* window pixels; pixel centres are whole numbers                         */
     txm_vec2 axis;   /* direction of the texture's u axis in the window, unit                  */
-    int mirrored;    /* the texture is mirrored in the window: v axis = axis turned left, not right */
+    int mirrored;    /* the texture is mirrored in the window: v axis = axis turned left, not
+                        right                                                                    */
 } txi_target;
 
 typedef struct txi_window {
     int width, height;
     uint8_t *state;  /* TXI_VOID .. TXI_FOREIGN, one per pixel                                 */
     uint8_t *color;  /* 4 per pixel, RGB as matched (over mid gray where alpha is below 1), 0   */
-    uint8_t *share;  /* of a hole pixel: how much of it is known, 0..255 = all, as it lies between known
-                        and missing texels; its color is that of the known part. NULL: nothing  */
+    uint8_t *share;  /* of a hole pixel: how much of it is known, 0..255 = all, as it lies
+                        between known and missing texels; its color is that of the known part.
+                        NULL: nothing                                                            */
     txm_vec2 *texel; /* where each pixel that is not void lies in the texture, in texels, texel
                         centres are whole numbers                                              */
     txm_vec3 *place; /* on the surface, in units of window pixels; pictures: x, y, 0            */
@@ -69,23 +72,24 @@ typedef struct txi_curve {
     int ends[2];       /* the line ends that it joins; -1: it ends in the hole                 */
     float strength;    /* contrast of the line, in levels of 8 bits                            */
     int partner;       /* the curve along the other side of the same stroke, or -1             */
-    float cost;        /* of the join, without unit: about 0.5 for a sure one, 3 for a doubtful one */
+    float cost;        /* of the join, without unit: about 0.5 for a sure one, 3 for a doubtful
+                          one                                                                    */
 } txi_curve;
 
 /* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
 typedef struct txi_plan {
-    uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and in the
-                        fourth byte the guide channel: 255 on a line (known or completed), falling
-                        with the distance                                                      */
+    uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and
+                        in the fourth byte the guide channel: 255 on a line (known or completed),
+                        falling with the distance                                                */
     uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
-    const txi_pose *poses; /* that copies[].pose counts                                             */
+    const txi_pose *poses; /* that copies[].pose counts                                           */
     int pose_count;
 } txi_plan;
 
-/* Prior knowledge about where lines run [1, II.C], in a window: polylines, clipped to the window. Line k
-   has the points starts[k] .. starts[k + 1] - 1, two or more. line_count 0: no prior; the pointers
-   may be NULL then. */
+/* Prior knowledge about where lines run [1, II.C], in a window: polylines, clipped to the
+   window. Line k has the points starts[k] .. starts[k + 1] - 1, two or more. line_count 0: no
+   prior; the pointers may be NULL then. */
 typedef struct txi_prior {
     txm_vec2 *points; /* window pixels; pixel centres are whole numbers                        */
     int *starts;      /* line_count + 1                                                        */
@@ -137,8 +141,8 @@ static txm_status txi_stage_end(const txi_stage *stage, txm_status status) {
 }
 
 /* ---- ablation -------------------------------------------------------------------------------
-   Steps that bench/bench_inpaint.c leaves out one by one, to measure what each contributes: it defines
-   TXI_LEFT_OUT as a variable of its own. Everywhere else nothing is left out.                   */
+   Steps that bench/bench_inpaint.c leaves out one by one, to measure what each contributes: it
+   defines TXI_LEFT_OUT as a variable of its own. Everywhere else nothing is left out. */
 
 enum {
     TXI_VOTES = 1,    /* tensor votes for or against a join                                      */

@@ -11,23 +11,26 @@
    and valleys, the ridges of the surface turned inside out. Both are traced through the triangles,
    from crossing to crossing of their edges.
 
-   Not in [2]: lines are left out whose curvature hardly falls off to their sides, relative to its size
-   (k'' / k^3 has no unit; across the tip of an ellipse of axes 1 and c it is 3 (1 - c^2)). On a sphere, a
-   cylinder or a torus, where k_max has no extremum, they are artefacts of the mesh.             */
+   Not in [2]: lines are left out whose curvature hardly falls off to their sides, relative to
+   its size (k'' / k^3 has no unit; across the tip of an ellipse of axes 1 and c it is 3
+   (1 - c^2)). On a sphere, a cylinder or a torus, where k_max has no extremum, they are
+   artefacts of the mesh. */
 
 enum {
     TXI_CREST_PAIRED = 8,   /* links at a node that are paired; ours                           */
-    TXI_CREST_ROUNDING = 8, /* how far rounded positions are assumed to move derivatives, in units of
-                               2^-24 coordinate / edge^3; ours                                  */
+    TXI_CREST_ROUNDING = 8, /* how far rounded positions are assumed to move derivatives, in
+                               units of 2^-24 coordinate / edge^3; ours                          */
     TXI_CREST_NONE = -1
 };
-#define TXI_CREST_STRENGTH 2.0  /* default threshold: a line twice as long as its radius of curvature; ours */
+#define TXI_CREST_STRENGTH 2.0  /* default threshold: a line twice as long as its radius of
+                                   curvature; ours                                               */
 #define TXI_CREST_SHARE 0.02    /* and this share of the strongest line; ours                   */
 
-#define TXI_CREST_SHARP 0.3     /* least k'' / k^3, the mean along a line; ours: on spheres and tori of
-                                   thousands of triangles it stays below 0.2, on the ridges of animals
-                                   and figures above 0.55                                       */
-#define TXI_CREST_BESIDE 0.25   /* cosine between an edge and t below which it runs along a line; ours */
+#define TXI_CREST_SHARP 0.3     /* least k'' / k^3, the mean along a line; ours: on spheres and
+                                   tori of thousands of triangles it stays below 0.2, on the
+                                   ridges of animals and figures above 0.55                      */
+#define TXI_CREST_BESIDE 0.25   /* cosine between an edge and t below which it runs along a line;
+                                   ours                                                          */
 
 /* What counts at a vertex for ridges or for valleys. */
 typedef struct txi_crest_value {
@@ -63,8 +66,8 @@ typedef struct txi_crest_crossing {
     double k, sharp; /* curvature there, and k'' / k^3                                          */
 } txi_crest_crossing;
 
-/* Does a line cross the edge a b? The signs of t, and with it of e, are arbitrary: those of b are turned
-   to agree with a. */
+/* Does a line cross the edge a b? The signs of t, and with it of e, are arbitrary: those of b
+   are turned to agree with a. */
 static int txi_crest_crosses(const txi_shape *s, size_t edge, int is_valley, double rounding,
                              txi_crest_crossing *crossing) {
     const uint32_t a = s->ends[2 * edge], b = s->ends[2 * edge + 1];
@@ -77,8 +80,8 @@ static int txi_crest_crosses(const txi_shape *s, size_t edge, int is_valley, dou
                                    txm_d3_load(s->mesh.positions + 3 * (size_t)a));
     const double length = txm_d3_len(d), jump = fabs(p.e) + fabs(e);
     const int is_rounding = !(jump * length * length * length > rounding);
-    /* a maximum: from one of the two the curvature rises towards the other. Where a line runs along an
-       edge that cannot be told, and the edges beside it decide */
+    /* a maximum: from one of the two the curvature rises towards the other. Where a line runs
+       along an edge that cannot be told, and the edges beside it decide */
     const double along = txm_d3_dot(p.t, d), back = -txm_d3_dot(q.t, d) * turn;
     const int is_beside = fmax(fabs(along), fabs(back)) < TXI_CREST_BESIDE * length;
     if (!is_rounding && !is_beside && !(p.e * along > 0) && !(e * back > 0)) return 0;
@@ -232,15 +235,16 @@ static txi_crest_run txi_crest_follow(const txi_crest_net *net, int64_t begin, u
     return run;
 }
 
-/* All lines of a net that are sharp enough: first those that end somewhere, then the closed ones. runs: room for 1 per
-   link; seen: 1 per link. Returns their number. */
+/* All lines of a net that are sharp enough: first those that end somewhere, then the closed
+   ones. runs: room for 1 per link; seen: 1 per link. Returns their number. */
 static size_t txi_crest_collect(const txi_crest_net *net, int which, uint8_t *seen,
                                 txi_crest_run *runs) {
     size_t count = 0;
     memset(seen, 0, net->link_count);
     for (size_t i = 0; i < 4 * net->link_count; i++) {
         const int64_t end = (int64_t)(i < 2 * net->link_count ? i : i - 2 * net->link_count);
-        if (seen[end / 2] || (i < 2 * net->link_count && net->mate[end] != TXI_CREST_NONE)) continue;
+        if (seen[end / 2] || (i < 2 * net->link_count && net->mate[end] != TXI_CREST_NONE))
+            continue;
         runs[count] = txi_crest_follow(net, end, seen);
         runs[count].net = which;
         count += runs[count].sharp > TXI_CREST_SHARP * runs[count].length;
@@ -269,8 +273,8 @@ static txm_status txi_crest_trace(const txi_shape *s, int is_valley, txm_arena *
 
 /* Choose the lines at or above the threshold, the strongest first. chosen receives indices into the
    runs of both nets, the valleys' after the ridges'; scratch: as many. Returns their number. */
-static size_t txi_crest_choose(txi_crest_run *const runs[2], const size_t counts[2], float threshold,
-                               txm_pair *chosen, txm_pair *scratch) {
+static size_t txi_crest_choose(txi_crest_run *const runs[2], const size_t counts[2],
+                               float threshold, txm_pair *chosen, txm_pair *scratch) {
     double least = (double)threshold, most = 0;
     size_t count = 0;
     for (size_t i = 0; i < counts[0] + counts[1]; i++)

@@ -10,9 +10,10 @@
 
        h(x, y) = (b0 x^2 + 2 b1 x y + b2 y^2) / 2 + (c0 x^3 + 3 c1 x^2 y + 3 c2 x y^2 + c3 y^3) / 6
 
-   fitted by least squares to the places and the normals of the neighbours (the normals give dh/dx and
-   dh/dy). Not in [2]: the normals come from a fit of their own, of places alone and with linear terms.
-   Mean normals of faces are off by so much where triangles are irregular that e gets a wrong sign. The eigenvalues and eigenvectors of (b0 b1; b1 b2) are the curvatures k and directions t,
+   fitted by least squares to the places and the normals of the neighbours (the normals give dh/dx
+   and dh/dy). Not in [2]: the normals come from a fit of their own, of places alone and with linear
+   terms. Mean normals of faces are off by so much where triangles are irregular that e gets a wrong
+   sign. The eigenvalues and eigenvectors of (b0 b1; b1 b2) are the curvatures k and directions t,
    convex surfaces having positive k, and the derivative of k along its own t is
 
        e = dk/dt = c0 t1^3 + 3 c1 t1^2 t2 + 3 c2 t1 t2^2 + c3 t2^3                              */
@@ -50,8 +51,8 @@ typedef struct txi_shape {
     int rings;
 } txi_shape;
 
-/* A mesh of triangles as one whose vertices in equal places are one (files repeat them for each chart),
-   without the faces of which two corners are in one place. The input is checked. */
+/* A mesh of triangles as one whose vertices in equal places are one (files repeat them for each
+   chart), without the faces of which two corners are in one place. The input is checked. */
 static txm_status txi_welded_make(const txm_mesh *input, txm_arena *arena, txm_env *env,
                                   txm_mesh *welded) {
     txi_surface points;
@@ -142,7 +143,8 @@ static void txi_shape_normals(txi_shape *s, const uint8_t *flip) {
         txm_dvec3 p[3];
         txm_mesh_triangle(&s->mesh, f, p);
         for (size_t k = 0; k < 3; k++) {
-            const txm_dvec3 a = txm_d3_sub(p[(k + 1) % 3], p[k]), b = txm_d3_sub(p[(k + 2) % 3], p[k]);
+            const txm_dvec3 a = txm_d3_sub(p[(k + 1) % 3], p[k]),
+                            b = txm_d3_sub(p[(k + 2) % 3], p[k]);
             const double size = txm_d3_len2(a) * txm_d3_len2(b);
             txm_dvec3 *sum = &s->normal[s->mesh.indices[3 * f + k]];
             if (size > 0) *sum = txm_d3_mad(*sum, txm_d3_cross(a, b), (flip[f] ? -1 : 1) / size);
@@ -216,7 +218,8 @@ static int txi_fit_solve(txi_fit *fit) {
 }
 
 /* Curvatures from the coefficients b0 b1 b2 c0 c1 c2 c3, in a frame whose unit is `unit`. */
-static void txi_curvature_set(txi_curvature *out, const double *c, txm_dvec3 frame[2], double unit) {
+static void txi_curvature_set(txi_curvature *out, const double *c, txm_dvec3 frame[2],
+                              double unit) {
     const double mean = (c[0] + c[2]) / 2, half = (c[0] - c[2]) / 2;
     const double root = sqrt(half * half + c[1] * c[1]);
     /* the eigenvector of the larger value, by the longer of two formulas */
@@ -259,8 +262,8 @@ static int txi_patch_make(const txi_shape *s, uint32_t v, txi_patch *patch) {
     return 1;
 }
 
-/* Neighbour i in the frame: x, y and depth below the tangent plane; 0 where the surface is folded over
-   or another sheet, so that it is no graph over the plane. */
+/* Neighbour i in the frame: x, y and depth below the tangent plane; 0 where the surface is
+   folded over or another sheet, so that it is no graph over the plane. */
 static int txi_patch_place(const txi_shape *s, const txi_patch *patch, int i, double *x, double *y,
                            double *depth) {
     const float *p = s->mesh.positions;

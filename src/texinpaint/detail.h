@@ -5,9 +5,9 @@
 
 /* ---- detail: how rough the texture is, and is expected to be ------------------------------------
 
-   In noise of variance v, a patch differs from a smooth one by v per pixel and from another rough one
-   by 2 v. So distances alone prefer smooth patches, and grain is smeared. Therefore patches with less
-   detail than expected pay the difference. The detail of a pixel is
+   In noise of variance v, a patch differs from a smooth one by v per pixel and from another rough
+   one by 2 v. So distances alone prefer smooth patches, and grain is smeared. Therefore patches
+   with less detail than expected pay the difference. The detail of a pixel is
 
        e(p) = min(clamp, sum over RGB of (p - mean of the usable pixels of 5x5)^2),
 
@@ -143,7 +143,8 @@ static void txi_wish_reach(txi_wish *g, int radius, float offset) {
         const double mean = (double)g->blur[1][i] / g->blur[0][i];
         const double square = (double)g->blur[2][i] / g->blur[0][i] - mean * mean;
         const double level = exp(mean - (double)offset * sqrt(square > 0 ? square : 0));
-        g->result[i] = txm_float(level > (double)TXI_WANT_FLOOR ? level - (double)TXI_WANT_FLOOR : 0);
+        g->result[i] =
+            txm_float(level > (double)TXI_WANT_FLOOR ? level - (double)TXI_WANT_FLOOR : 0);
     }
 }
 
@@ -185,12 +186,16 @@ static int txi_level_want(txi_level *l, const uint32_t *sums, float offset, txm_
     for (int a = 0; a < l->anchor_count; a++) {
         const int x = l->anchor[a] % l->width / g.step, y = l->anchor[a] / l->width / g.step;
         const float r = g.result[(size_t)y * (size_t)g.width + (size_t)x];
-        l->want[a] = r > 0 ? (uint32_t)((double)r * (double)TXI_WORTH_MOST / (double)TXI_PATCH_AREA / l->clamp) : 0;
+        l->want[a] =
+            r > 0
+                ? (uint32_t)((double)r * (double)TXI_WORTH_MOST / (double)TXI_PATCH_AREA / l->clamp)
+                : 0;
     }
     return 1;
 }
 
-/* Detail of a level: grain, clamp and the expectation of its anchors. want_it 0: the first two only. */
+/* Detail of a level: grain, clamp and the expectation of its anchors. want_it 0: the first two
+   only. */
 static int txi_level_detail(txi_level *l, float clamp, float offset, int want_it,
                             txm_arena *scratch) {
     const size_t n = (size_t)l->width * (size_t)l->height;

@@ -7,8 +7,8 @@
 
 enum { TXI_LEAF = 48 /* ours: unknowns that are not divided further */ };
 
-/* A symmetric positive definite matrix whose pattern is a graph: A = P^T L D L^T P. Rows that are solved
-   early have few entries; see txi_dissect. */
+/* A symmetric positive definite matrix whose pattern is a graph: A = P^T L D L^T P. Rows that
+   are solved early have few entries; see txi_dissect. */
 typedef struct txi_factor {
     size_t count, edge_count;
     const uint32_t *low, *high; /* the two unknowns of each edge                                  */
@@ -24,15 +24,15 @@ typedef struct txi_factor {
     uint32_t *flag, *stack, *path;
 } txi_factor;
 
-/* The order of elimination: nested dissection by coordinates. The points are divided at the median along
-   the longest side of their bounding box; those beyond it that have neighbours before it separate the
-   rest and come last; so on with both halves. On surfaces L has O(n log n) entries.
+/* The order of elimination: nested dissection by coordinates. The points are divided at the median
+   along the longest side of their bounding box; those beyond it that have neighbours before it
+   separate the rest and come last; so on with both halves. On surfaces L has O(n log n) entries.
 
    first, next  the neighbours of point i: next[first[i]] .. next[first[i + 1] - 1]
    order        receives the points
    pairs        scratch, 2 per point; side: scratch, 1 per point                            */
-static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *first, const uint32_t *next,
-                        uint32_t *order, txm_pair *pairs, uint32_t *side) {
+static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *first,
+                        const uint32_t *next, uint32_t *order, txm_pair *pairs, uint32_t *side) {
     size_t begins[128], ends[128];
     int depth = 1;
     uint32_t stamp = 0;
@@ -65,11 +65,13 @@ static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *fi
             order[begin + k] = pairs[k].value;
             side[pairs[k].value] = stamp;
         }
-        size_t to = begin + half, last = 0; /* the separator is gathered in the scratch half of pairs */
+        size_t to = begin + half, last = 0; /* the separator is gathered in the scratch half of
+                                               pairs                                             */
         for (size_t k = half; k < n; k++) {
             const uint32_t v = pairs[k].value;
             int divides = 0;
-            for (uint32_t e = first[v]; e < first[v + 1] && !divides; e++) divides = side[next[e]] == stamp;
+            for (uint32_t e = first[v]; e < first[v + 1] && !divides; e++)
+                divides = side[next[e]] == stamp;
             if (divides) pairs[n + last++].value = v;
             else order[to++] = v;
         }
@@ -81,9 +83,9 @@ static void txi_dissect(size_t count, const txm_dvec3 *point, const uint32_t *fi
     }
 }
 
-/* Entries of row k of L: the nodes on the paths of the elimination tree from the entries of A above the
-   diagonal of column k towards k. Fills stack from top, in an order in which children come before
-   their parents; returns where it begins. */
+/* Entries of row k of L: the nodes on the paths of the elimination tree from the entries of A
+   above the diagonal of column k towards k. Fills stack from top, in an order in which children
+   come before their parents; returns where it begins. */
 static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     size_t top = f->count;
     f->flag[k] = k;
@@ -98,7 +100,8 @@ static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     return top;
 }
 
-/* Fill parent, the elimination tree, and first, from how long the columns of L become. filled: 0. */
+/* Fill parent, the elimination tree, and first, from how long the columns of L become. filled:
+   0. */
 static void txi_factor_tree(txi_factor *f) {
     for (uint32_t k = 0; k < f->count; k++) {
         f->parent[k] = UINT32_MAX;
@@ -171,8 +174,8 @@ static txm_status txi_factor_plan(txi_factor *f, size_t count, const txm_dvec3 *
     return arena->failed ? txi_no_memory(env) : TXM_OK;
 }
 
-/* Compute L and D, row by row, of the matrix with diagonal[i] and, for each edge, -weight[edge] in both
-   its places. */
+/* Compute L and D, row by row, of the matrix with diagonal[i] and, for each edge, -weight[edge]
+   in both its places. */
 static void txi_factor_make(txi_factor *f, const double *weight, const double *diagonal) {
     double *y = f->work;
     memset(f->filled, 0, f->count * sizeof *f->filled);

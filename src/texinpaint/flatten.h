@@ -4,7 +4,7 @@
 #include "factor.h"
 #include "unfold.h"
 
-/* ---- flatten: a disk of faces in the plane ---------------------------------------------------- */
+/* ---- flatten: a disk of faces in the plane --------------------------------------------------- */
 
 enum {
     TXI_ARAP_ROUNDS = 60 /* ours; it ends earlier when nothing moves any more */
@@ -15,7 +15,8 @@ typedef struct txi_flat {
     const txi_disk *disk;
     txm_dvec3 *point;       /* 1 per vertex                                                      */
     double *xy;             /* 2 per vertex, in the unit of the surface; faces counter-clockwise  */
-    double *shape;          /* 3 per face: in its own plane the corners are (0, 0), (s0, 0), (s1, s2) */
+    double *shape;          /* 3 per face: in its own plane the corners are (0, 0), (s0, 0),
+                               (s1, s2)                                                          */
     double *cot;            /* 3 per face: the cotangent of the angle opposite of side k          */
     size_t edge_count;
     uint32_t *low, *high;   /* the vertices of each edge                                         */
@@ -99,9 +100,9 @@ static txm_status txi_flat_init(txi_flat *flat, const txi_surface *s, const txi_
     return good ? TXM_OK : txi_no_memory(env);
 }
 
-/* The border on a circle, each vertex at its share of the length, the rest where each is the mean of
-   its neighbours, weighted by positive cotangents: no face is turned over (Tutte). The circle has the
-   area of the surface. weight and diagonal: scratch, 1 per edge and vertex. */
+/* The border on a circle, each vertex at its share of the length, the rest where each is the
+   mean of its neighbours, weighted by positive cotangents: no face is turned over (Tutte). The
+   circle has the area of the surface. weight and diagonal: scratch, 1 per edge and vertex. */
 static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double *diagonal,
                       uint8_t *fixed) {
     const txi_disk *disk = flat->disk;
@@ -111,7 +112,8 @@ static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double
     memset(weight, 0, flat->edge_count * sizeof *weight);
     memset(diagonal, 0, vertices * sizeof *diagonal);
     memset(fixed, 0, vertices);
-    for (size_t i = 0; i < disk->face_count; i++) area += flat->shape[3 * i] * flat->shape[3 * i + 2] / 2;
+    for (size_t i = 0; i < disk->face_count; i++)
+        area += flat->shape[3 * i] * flat->shape[3 * i + 2] / 2;
     for (size_t k = 0; k < disk->loop; k++, side = disk->next[side])
         length += txm_d3_dist(flat->point[disk->corner[side]],
                               flat->point[disk->corner[txi_next_corner(side)]]) + 1e-12;
@@ -132,7 +134,8 @@ static void txi_tutte(txi_flat *flat, txi_factor *factor, double *weight, double
     }
     for (size_t e = 0; e < flat->edge_count; e++) {
         for (int turn = 0; turn < 2; turn++) {
-            const size_t a = turn ? flat->high[e] : flat->low[e], b = turn ? flat->low[e] : flat->high[e];
+            const size_t a = turn ? flat->high[e] : flat->low[e],
+                         b = turn ? flat->low[e] : flat->high[e];
             if (fixed[a]) continue;
             diagonal[a] += weight[e];
             if (!fixed[b]) continue;
@@ -183,8 +186,8 @@ static void txi_arap_face(const txi_flat *flat, size_t i, double face_weight, do
     }
 }
 
-/* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over the
-   sides of
+/* As rigid as possible: turn each face as it lies best, then move the vertices so that the sum over
+   the sides of
 
        weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
 
@@ -237,8 +240,8 @@ static txm_status txi_flatten(txi_flat *flat, const double *face_weight, double 
     uint8_t *fixed = (uint8_t *)txm_arena_alloc(&scratch, vertices, 1);
     txm_status status = scratch.failed ? txi_no_memory(env) : TXM_OK;
     if (status == TXM_OK)
-        status = txi_factor_plan(&factor, vertices, flat->point, flat->edge_count, flat->low, flat->high,
-                                 &scratch, env);
+        status = txi_factor_plan(&factor, vertices, flat->point, flat->edge_count, flat->low,
+                                 flat->high, &scratch, env);
     if (status == TXM_OK) {
         txi_tutte(flat, &factor, weight, diagonal, fixed);
         txi_arap(flat, &factor, face_weight, weight, diagonal, right, small_step);

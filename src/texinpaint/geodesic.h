@@ -8,7 +8,8 @@
 /* not reached */
 #define TXI_UNREACHED 1e300
 
-/* A vertex waits with the distance that it had when it was put in; the heap has the least on top. */
+/* A vertex waits with the distance that it had when it was put in; the heap has the least on
+   top. */
 typedef struct txi_wait {
     double distance;
     uint32_t vertex;
@@ -49,7 +50,8 @@ static txi_wait txi_heap_pop(txi_heap *heap) {
     const txi_wait top = heap->items[0], last = heap->items[--heap->count];
     size_t at = 0;
     for (size_t child = 1; child < heap->count; child = 2 * at + 1) {
-        if (child + 1 < heap->count && txi_wait_before(heap->items[child + 1], heap->items[child])) child++;
+        if (child + 1 < heap->count && txi_wait_before(heap->items[child + 1], heap->items[child]))
+            child++;
         if (!txi_wait_before(heap->items[child], last)) break;
         heap->items[at] = heap->items[child];
         at = child;
@@ -58,9 +60,9 @@ static txi_wait txi_heap_pop(txi_heap *heap) {
     return top;
 }
 
-/* The distance of c from a source whose distances from a and b are known, along straight lines through
-   the triangle a b c: unfolded into its plane, the source is where the circles about a and b with
-   these radii meet beyond a b.
+/* The distance of c from a source whose distances from a and b are known, along straight lines
+   through the triangle a b c: unfolded into its plane, the source is where the circles about a and
+   b with these radii meet beyond a b.
 
                 c            With a at 0 and b at (l, 0), the source is at (x, -y):
                / \               x = (l^2 + da^2 - db^2) / 2l,  y^2 = da^2 - x^2.
@@ -95,14 +97,14 @@ static int txi_geodesic_update(const txi_surface *s, txi_heap *heap, txm_arena *
     return txi_heap_push(heap, arena, d, c);
 }
 
-/* Distances along the surface from sources, by label correcting in the order of a heap; each triangle
-   unfolds the source that lies behind two of its corners into its plane, which is exact as long as
-   the unfolded triangles are: on planes, however the triangles are shaped. Elsewhere distances are
-   too long by a fraction of a percent. (Exact algorithms keep intervals of edges instead, which costs
-   ten times as much.)
+/* Distances along the surface from sources, by label correcting in the order of a heap; each
+   triangle unfolds the source that lies behind two of its corners into its plane, which is exact as
+   long as the unfolded triangles are: on planes, however the triangles are shaped. Elsewhere
+   distances are too long by a fraction of a percent. (Exact algorithms keep intervals of edges
+   instead, which costs ten times as much.)
 
-   Exact distances from one place, that is. From several, each triangle takes what reaches it for the rays of
-   one; from a line they come out too short by up to 2 %.
+   Exact distances from one place, that is. From several, each triangle takes what reaches it for
+   the rays of one; from a line they come out too short by up to 2 %.
 
    sources   vertices, start their distances (NULL = 0). For a place inside a triangle: its corners,
              with their distances from it. Two corners at 0 make their whole edge a source

@@ -9,15 +9,15 @@
 
        sum over links  w (u_i - u_j)^2   approximates   integral over the surface of |grad u|^2
 
-   so that its minimum is harmonic on the surface, however the atlas is stretched or sheared. With the
-   metric G of a face (per texel) the integral over a texel is  grad u . D grad u,  D = sqrt(det G) G^-1;
-   D is written as a sum of  w_e e e^T  with weights w_e >= 0 and three whole offsets e, which are the
-   links (Selling's reduction; for squares: right and down, both of weight 1). No weight is negative,
-   so that u never leaves the range of its boundary values.
+   so that its minimum is harmonic on the surface, however the atlas is stretched or sheared. With
+   the metric G of a face (per texel) the integral over a texel is  grad u . D grad u,
+   D = sqrt(det G) G^-1; D is written as a sum of  w_e e e^T  with weights w_e >= 0 and three whole
+   offsets e, which are the links (Selling's reduction; for squares: right and down, both of weight
+   1). No weight is negative, so that u never leaves the range of its boundary values.
 
-   An offset that leaves the face of a texel is walked along the surface. Where the walk crosses a seam
-   it ends between texels of another chart; the link is then shared out to the four around, bilinearly,
-   so that functions that are linear on the surface pass seams unchanged.                      */
+   An offset that leaves the face of a texel is walked along the surface. Where the walk crosses
+   a seam it ends between texels of another chart; the link is then shared out to the four
+   around, bilinearly, so that functions that are linear on the surface pass seams unchanged. */
 
 enum {
     TXI_WALK_MOST = 64,    /* faces that one walk may cross; ours                               */
@@ -27,8 +27,8 @@ enum {
 };
 #define TXI_SHEAR 64.0   /* ratio of the eigenvalues of D at most: offsets stay below 9 texels */
 
-/* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each in the
-   rows of both its nodes; those to known texels in `rim`. */
+/* Nodes are unknown texels in the order of the picture. Links to other nodes lie in `to`, each
+   in the rows of both its nodes; those to known texels in `rim`. */
 typedef struct txi_texel_graph {
     size_t count;
     uint32_t *texel;       /* 1 per node                                                        */
@@ -44,9 +44,10 @@ typedef struct txi_stencil {
     double weight[TXI_STENCIL];
 } txi_stencil;
 
-/* D = (a b; b c), positive definite, as a sum of w e e^T. Starting with the superbase (1, 0), (0, 1),
-   (-1, -1), two vectors u, v of it with u . D v > 0 are replaced by -u, v, and u - v, until no two
-   are left; then  D = sum over pairs of  -(u . D v) (third vector, turned by 90 degrees) (...)^T. */
+/* D = (a b; b c), positive definite, as a sum of w e e^T. Starting with the superbase (1, 0),
+   (0, 1), (-1, -1), two vectors u, v of it with u . D v > 0 are replaced by -u, v, and u - v,
+   until no two are left; then  D = sum over pairs of  -(u . D v) (third vector, turned by 90
+   degrees) (...)^T. */
 static txi_stencil txi_stencil_of(double a, double b, double c) {
     txi_stencil s = {{1, 0, -1}, {0, 1, -1}, {0, 0, 0}};
     for (int round = 0, k = 0; round < 64 && k < 3; round++) {
@@ -104,13 +105,14 @@ static txi_stencil txi_face_stencil(const txi_domain *d, uint32_t face) {
 
 /* ---- graph: walks ------------------------------------------------------------------------- */
 
-/* The face on the other side of a side, and a place on the side, s of the way along it, and a step in
-   the plane of the first face turned into the plane of the second: place and step in texels of that
-   face. Sewn sides change neither. 0: the second face has no area. */
+/* The face on the other side of a side, and a place on the side, s of the way along it, and a
+   step in the plane of the first face turned into the plane of the second: place and step in
+   texels of that face. Sewn sides change neither. 0: the second face has no area. */
 static int txi_cross_side(const txi_surface *s, uint32_t side, double along, double place[2],
                           double step[2]) {
     const uint32_t other = s->opposite[side], next = txi_next_corner(other);
-    const txm_vec2 from = s->uv[next], to = s->uv[other]; /* the side as the first face runs along it */
+    const txm_vec2 from = s->uv[next], to = s->uv[other]; /* the side as the first face runs
+                                                             along it                            */
     txm_dvec3 pu, pv, qu, qv;
     if (txi_is_sewn(s, side, other)) return 1;
     if (!txi_face_axes(s, side / 3, &pu, &pv) || !txi_face_axes(s, other / 3, &qu, &qv)) return 0;
@@ -134,7 +136,8 @@ static int txi_cross_side(const txi_surface *s, uint32_t side, double along, dou
 
 /* Walk on the surface: from a place on a face, in its own texels, by a step. face and place receive
    where it ends. 0: at a border of the surface, or where a face has no area. */
-static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2], const double by[2]) {
+static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2],
+                            const double by[2]) {
     double step[2] = {by[0], by[1]};
     uint32_t entry = TXM_NO_SIDE;
     for (int count = 0; count < TXI_WALK_MOST; count++) {
@@ -145,7 +148,8 @@ static int txi_walk_surface(const txi_surface *s, uint32_t *face, double place[2
         if (!txi_weights(t, place[0] + step[0], place[1] + step[1], there)) return 0;
         for (int k = 0; k < 3; k++) { /* side k is where the weight of corner k + 2 is 0 */
             const int c = (k + 2) % 3;
-            if (3 * *face + (uint32_t)k == entry || there[c] >= -1e-9 || !(here[c] > there[c])) continue;
+            if (3 * *face + (uint32_t)k == entry || there[c] >= -1e-9 || !(here[c] > there[c]))
+                continue;
             const double at = here[c] > 0 ? here[c] / (here[c] - there[c]) : 0;
             if (exit >= 0 && at >= first) continue;
             first = at;
@@ -195,9 +199,10 @@ static void txi_links_add(txi_links *links, int64_t texel, double weight) {
     links->weight[links->count++] = weight;
 }
 
-/* A link to a place between texels: to the four around it that exist, bilinearly, else to the nearest. */
-static void txi_links_share(const txi_domain *d, uint32_t face, const double place[2], double weight,
-                            txi_links *links) {
+/* A link to a place between texels: to the four around it that exist, bilinearly, else to the
+   nearest. */
+static void txi_links_share(const txi_domain *d, uint32_t face, const double place[2],
+                            double weight, txi_links *links) {
     const double fx = floor(place[0]), fy = floor(place[1]);
     double share[4], sum = 0;
     int64_t texel[4];
@@ -220,7 +225,8 @@ static void txi_links_share(const txi_domain *d, uint32_t face, const double pla
 /* The link of a texel by an offset. */
 static void txi_links_step(const txi_domain *d, uint32_t texel, uint32_t face, int x, int y,
                            double weight, txi_links *links) {
-    const int tx = (int)(texel % (uint32_t)d->width) + x, ty = (int)(texel / (uint32_t)d->width) + y;
+    const int tx = (int)(texel % (uint32_t)d->width) + x,
+              ty = (int)(texel / (uint32_t)d->width) + y;
     if (!d->surface) {
         txi_links_add(links, txi_tap(d, face, tx, ty), weight);
         return;
@@ -244,8 +250,8 @@ static void txi_links_step(const txi_domain *d, uint32_t texel, uint32_t face, i
     txi_links_share(d, face, place, weight, links);
 }
 
-/* All links that a texel makes; `weight` counts half for each of two unknown texels, as both make the
-   link between them, but in full where the other is known. */
+/* All links that a texel makes; `weight` counts half for each of two unknown texels, as both
+   make the link between them, but in full where the other is known. */
 static void txi_links_of(const txi_domain *d, uint32_t texel, txi_links *links) {
     const uint32_t face = d->surface ? d->surface->owner[texel] : TXI_NO_FACE;
     const txi_stencil s = txi_face_stencil(d, face);
@@ -258,8 +264,8 @@ static void txi_links_of(const txi_domain *d, uint32_t texel, txi_links *links) 
     }
 }
 
-/* Merge the links of one row that go to the same node: sorted by node. Returns their number. Rows of
-   very many links (where texels differ much in size) are left as they are. */
+/* Merge the links of one row that go to the same node: sorted by node. Returns their number.
+   Rows of very many links (where texels differ much in size) are left as they are. */
 static uint32_t txi_merge_links(uint32_t *to, float *weight, uint32_t count) {
     uint32_t kept = 0;
     if (count > TXI_MERGE_MOST) return count;
@@ -288,7 +294,8 @@ static uint32_t txi_merge_links(uint32_t *to, float *weight, uint32_t count) {
 /* What a texel is to a graph. */
 enum { TXI_NODE_NONE = 0, TXI_NODE_KNOWN = 1, TXI_NODE_UNKNOWN = 2 };
 
-/* Count the links of all nodes, or (filling) store them. node: 1 per texel, the node of unknown ones. */
+/* Count the links of all nodes, or (filling) store them. node: 1 per texel, the node of unknown
+   ones. */
 static void txi_graph_pass(const txi_domain *d, const uint8_t *marks, const uint32_t *node,
                            int filling, txi_texel_graph *g, size_t total[2]) {
     total[0] = total[1] = 0;
@@ -376,8 +383,10 @@ static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_
     return TXM_OK;
 }
 
-/* Set the marks of all nodes that links connect with the one given to 0. queue: room for 1 per node. */
-static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *queue, uint8_t *mark) {
+/* Set the marks of all nodes that links connect with the one given to 0. queue: room for 1 per
+   node. */
+static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *queue,
+                             uint8_t *mark) {
     size_t count = 1;
     queue[0] = from;
     mark[from] = 0;
@@ -390,7 +399,8 @@ static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *
     }
 }
 
-/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per node. */
+/* Mark the nodes that no links connect with a known texel: 1 in `island`. queue: room for 1 per
+   node. */
 static void txi_graph_islands(const txi_texel_graph *g, uint32_t *queue, uint8_t *island) {
     memset(island, 1, g->count);
     for (size_t i = 0; i < g->count; i++) {

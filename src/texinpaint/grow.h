@@ -5,14 +5,14 @@
 #include "vote.h"
 
 /* ---- lines grow into the hole -----------------------------------------------------------------
-   [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places are
-   known. Then, round by round, each line takes the place of most saliency ahead of it as a new point,
-   whose tensor is set anew, until it is as near to another line as alpha, leaves the hole, has no
-   votes left, or beta rounds are over.
+   [1, II.B]: the points of the lines around the hole vote; ball tensors first, as only their places
+   are known. Then, round by round, each line takes the place of most saliency ahead of it as a new
+   point, whose tensor is set anew, until it is as near to another line as alpha, leaves the hole,
+   has no votes left, or beta rounds are over.
 
-   The paper joins the two lines then. Here growth and the field of votes only say how well two ends go
-   together: lines that grow drift where there is a gap to bridge, and which ones meet first is
-   chance.                                                                                         */
+   The paper joins the two lines then. Here growth and the field of votes only say how well two ends
+   go together: lines that grow drift where there is a gap to bridge, and which ones meet first is
+   chance.                                                                                        */
 
 enum {
     TXI_TOKEN_STEP = 3,     /* pixels between the points of a line that vote; ours                */
@@ -20,8 +20,8 @@ enum {
     TXI_GROW_ROUNDS = 64    /* at most, if beta is 0                                              */
 };
 
-/* The surface at a place: the point on it, the normal, and unit tangents along the window's axes. Pixels
-   that are void count as flat. */
+/* The surface at a place: the point on it, the normal, and unit tangents along the window's
+   axes. Pixels that are void count as flat. */
 typedef struct txi_spot {
     txm_dvec3 place, normal, ex, ey;
     int used; /* of the dense map: votes are counted here                                         */
@@ -32,12 +32,13 @@ typedef struct txi_grown {
     txi_fields fields;
     txi_tokens tokens;
     int *owner;        /* one per token: the end of its line                                      */
-    int step;          /* pixels between the places of the dense map; a line grows as far in a round */
+    int step;          /* pixels between the places of the dense map; a line grows as far in a
+                          round                                                                  */
     int width, height; /* of the dense map, which covers the hole                                 */
     int left, top;     /* pixel of its first place                                                */
     txi_spot *spots; /* the places, NULL tangents outside of the hole                      */
     double *votes;     /* 6 per place                                                             */
-    uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                      */
+    uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                     */
     int end_count;
 } txi_grown;
 
@@ -52,7 +53,7 @@ static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
     s.ex = txm_d3(1, 0, 0);
     s.ey = txm_d3(0, 1, 0);
     if (w->state[i] == TXI_VOID) return s;
-    for (int d = 0; d < 2; d++) { /* differences to the neighbours that exist                      */
+    for (int d = 0; d < 2; d++) { /* differences to the neighbours that exist                     */
         const int at = d ? iy : ix, limit = d ? w->height : w->width;
         const size_t step = d ? (size_t)w->width : 1;
         const size_t low = at > 0 && w->state[i - step] != TXI_VOID ? i - step : i;
@@ -72,7 +73,8 @@ static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
 }
 
 static double txi_form(const double t[6], txm_dvec3 a, txm_dvec3 b) {
-    return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) + a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
+    return a.x * (t[0] * b.x + t[1] * b.y + t[2] * b.z) +
+           a.y * (t[1] * b.x + t[3] * b.y + t[4] * b.z) +
            a.z * (t[2] * b.x + t[4] * b.y + t[5] * b.z);
 }
 
@@ -86,7 +88,7 @@ static void txi_grow_add(txi_grown *g, double x, double y, txm_dvec3 place, txm_
     txi_outer(t, normal, weight);
     g->owner[g->tokens.count] = owner;
     txi_tokens_add(&g->tokens, place, t);
-    /* a window is almost isometric: what is in reach on the surface is so in the window, nearly    */
+    /* a window is almost isometric: what is in reach on the surface is so in the window, nearly  */
     const int x0 = txm_clampi((int)(cx - reach), 0, g->width);
     const int x1 = txm_clampi((int)(cx + reach) + 2, 0, g->width);
     const int y0 = txm_clampi((int)(cy - reach), 0, g->height);
@@ -101,8 +103,8 @@ static void txi_grow_add(txi_grown *g, double x, double y, txm_dvec3 place, txm_
     }
 }
 
-/* The votes at a place of the window, from the four places of the dense map around it: a tensor in the
-   window's axes, xx xy yy. */
+/* The votes at a place of the window, from the four places of the dense map around it: a tensor
+   in the window's axes, xx xy yy. */
 static void txi_votes_in_window(const txi_grown *g, double x, double y, double t[3]) {
     const double cx = (x - g->left) / g->step, cy = (y - g->top) / g->step;
     const int ix = txm_clampi((int)floor(cx), 0, g->width - 2);
@@ -122,7 +124,8 @@ static void txi_votes_in_window(const txi_grown *g, double x, double y, double t
 }
 
 /* The lines' points as tokens: balls vote, then sticks of length one in the directions found. */
-static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *scratch, txm_env *env) {
+static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *scratch,
+                                 txm_env *env) {
     const int room = l->end_count * TXI_TOKENS_OF_END;
     static const double unit[6] = {1, 0, 0, 1, 0, 1};
     txi_fields balls;
@@ -148,7 +151,7 @@ static txm_status txi_grow_begin(txi_grown *g, const txi_lines *l, txm_arena *sc
     txi_vote_sparse(&balls, &points, 1, normals, votes);
     for (int i = 0; i < points.count; i++) {
         const txi_token *k = &points.at[i];
-        if (k->stick <= 0) continue; /* it is alone                                                */
+        if (k->stick <= 0) continue; /* it is alone                                               */
         txi_grow_add(g, where[i].x, where[i].y, k->place, k->normal, 1, owner[i]);
     }
     return TXM_OK;
@@ -172,13 +175,13 @@ static int txi_grow_meets(const txi_grown *g, int end, txm_dvec3 place, double a
     return best < 0 ? -1 : g->owner[best];
 }
 
-/* One round of the line of an end: a step in that of seven directions, up to 45 degrees to either side,
-   which has the most votes for a line in this direction. 0: it has stopped. */
+/* One round of the line of an end: a step in that of seven directions, up to 45 degrees to
+   either side, which has the most votes for a line in this direction. 0: it has stopped. */
 static int txi_grow_step(txi_grown *g, int end, double least, txm_vec2 *tip, txm_vec2 *heading) {
     const txi_window *w = g->window;
     double best = least, bx = 0, by = 0, hx = 0, hy = 0;
     for (int i = 0; i < 7; i++) {
-        const int k = i & 1 ? (i + 1) / 2 : -(i / 2); /* straight on first                         */
+        const int k = i & 1 ? (i + 1) / 2 : -(i / 2); /* straight on first                        */
         double sine, cosine, t[3];
         txm_sincos(k * (TXM_PI / 12), &sine, &cosine);
         const double dx = heading->x * cosine - heading->y * sine;
@@ -243,18 +246,19 @@ static txm_status txi_grow_map(txi_grown *g, const txi_lines *l, txm_arena *scra
    alpha  pixels; lines as near as that have met; at most, and with 0, a step
    beta   rounds at most; 0: 64
    cost   O(tokens * places of the map in reach)                                                */
-static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l, float alpha, int beta,
-                           txm_arena *scratch, txm_env *env) {
+static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l, float alpha,
+                           int beta, txm_arena *scratch, txm_env *env) {
     const int ends = l->end_count;
     int rounds = beta > 0 ? beta : TXI_GROW_ROUNDS;
     memset(g, 0, sizeof *g);
     g->window = w;
     g->end_count = ends;
-    /* far enough for votes to bridge the hole                                                     */
+    /* far enough for votes to bridge the hole                                                    */
     txi_fields_make(&g->fields, txm_clampf(0.25f * l->width, 6, 30), 0);
     g->step = txm_clampi((int)(g->fields.sigma / 5), 2, 6);
     const double meet = alpha > 0 && alpha < (float)g->step ? (double)alpha : g->step;
-    if (rounds > 1 + (int)(l->width / (float)g->step)) rounds = 1 + (int)(l->width / (float)g->step);
+    if (rounds > 1 + (int)(l->width / (float)g->step))
+        rounds = 1 + (int)(l->width / (float)g->step);
     const int room = ends * (TXI_TOKENS_OF_END + rounds);
     txm_status status = txi_tokens_make(&g->tokens, room, g->step + 1.0, scratch, env);
     if (status == TXM_OK) status = txi_grow_map(g, l, scratch, env);
@@ -277,7 +281,8 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
             if (!going[e]) continue;
             going[e] = (uint8_t)txi_grow_step(g, e, 0.05, &tips[e], &headings[e]);
             if (!going[e] || round < 2) continue;
-            const int other = txi_grow_meets(g, e, txi_spot_at(w, tips[e].x, tips[e].y).place, meet);
+            const int other =
+                txi_grow_meets(g, e, txi_spot_at(w, tips[e].x, tips[e].y).place, meet);
             if (other < 0) continue;
             g->met[(size_t)e * (size_t)ends + (size_t)other] = 1;
             g->met[(size_t)other * (size_t)ends + (size_t)e] = 1;
@@ -286,8 +291,8 @@ static txm_status txi_grow(txi_grown *g, const txi_window *w, const txi_lines *l
     return TXM_OK;
 }
 
-/* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along) / sum;
-   0 where there are no votes. */
+/* How far the votes agree with a line in direction (dx, dy) at a place, -1..1: (across - along)
+   / sum; 0 where there are no votes. */
 static double txi_votes_agree(const txi_grown *g, double x, double y, double dx, double dy) {
     double t[3];
     if (TXI_LEFT_OUT & TXI_VOTES) return 0;

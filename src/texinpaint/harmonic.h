@@ -107,20 +107,21 @@ static void txi_quantities_mean(const txi_domain *d, const txi_quantities *q, co
     for (int c = 0; c < q->count && count; c++) mean[c] /= (double)count;
 }
 
-/* ---- Poisson equation on the surface ---------------------------------------------------------- */
+/* ---- Poisson equation on the surface --------------------------------------------------------- */
 
 /* The equation for one graph; for any number of right sides. */
 typedef struct txi_poisson_system {
     const txi_texel_graph *g;
     txi_grid grid;
     double screen;
-    uint8_t *anchor; /* 1 per node: 1 for one node of each part that is not connected with the rim */
+    uint8_t *anchor; /* 1 per node: 1 for one node of each part that is not connected with the
+                        rim                                                                      */
 } txi_poisson_system;
 
 /* What is given along the links of a graph, in the order of their rows. */
 typedef struct txi_steps {
-    const float *link; /* 1 per link of `to`: how much u rises from the node to its neighbour; the other
-                          way round the same with the other sign. NULL: 0                      */
+    const float *link; /* 1 per link of `to`: how much u rises from the node to its neighbour;
+                          the other way round the same with the other sign. NULL: 0              */
     const float *rim;  /* 1 per link of `rim`, likewise. NULL: 0                                */
     const float *rim_value; /* 1 per link of `rim`: u there                                     */
 } txi_steps;
@@ -156,8 +157,8 @@ static txm_status txi_poisson_make(const txi_texel_graph *g, double screen, txm_
     return status;
 }
 
-/* Of all u with the given values at the rim that which rises along the links as nearly as possible as
-   wanted: the Poisson equation on the surface, across the seams of the atlas:
+/* Of all u with the given values at the rim that which rises along the links as nearly as possible
+   as wanted: the Poisson equation on the surface, across the seams of the atlas:
 
        minimise  sum over links  w (u_j - u_i - step)^2  +  screen sum (u_i - u0_i)^2
 
@@ -168,8 +169,8 @@ static txm_status txi_poisson_make(const txi_texel_graph *g, double screen, txm_
    tolerance  of the residual, relative
    return     TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED: u is then of no use
    cost       some 10 iterations of about 0.15 us per node                                  */
-static txm_status txi_surface_poisson(const txi_poisson_system *s, const txi_steps *steps, double *u,
-                                      double *scratch, double tolerance, txm_env *env) {
+static txm_status txi_surface_poisson(const txi_poisson_system *s, const txi_steps *steps,
+                                      double *u, double *scratch, double tolerance, txm_env *env) {
     const txi_texel_graph *g = s->g;
     for (size_t i = 0; i < g->count; i++) {
         double sum = (s->screen + s->anchor[i]) * u[i];
@@ -193,10 +194,9 @@ static txm_dvec3 txi_fill_point(const txi_domain *d, uint32_t texel) {
     return txm_d3((int)(texel % (uint32_t)d->width), y, 0);
 }
 
-/* For each node the known texel that is nearest, of those at the rim that its neighbours have: distances in
-   a straight line, spread from the rim along the links until nothing changes. It is nearest to within a
-   texel. Nodes of islands get
-   UINT32_MAX. */
+/* For each node the known texel that is nearest, of those at the rim that its neighbours have:
+   distances in a straight line, spread from the rim along the links until nothing changes. It is
+   nearest to within a texel. Nodes of islands get UINT32_MAX. */
 static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *g, uint32_t *source,
                                     txm_env *env) {
     txm_arena scratch;
@@ -204,7 +204,8 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
     txm_arena_init(&scratch, env);
     txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(&scratch, g->count, sizeof(txm_dvec3));
     double *least = (double *)txm_arena_alloc(&scratch, g->count, sizeof(double));
-    uint32_t *queue = (uint32_t *)txm_arena_alloc(&scratch, g->count, sizeof(uint32_t)); /* a ring */
+    /* a ring */
+    uint32_t *queue = (uint32_t *)txm_arena_alloc(&scratch, g->count, sizeof(uint32_t));
     uint8_t *queued = (uint8_t *)txm_arena_zero(&scratch, g->count, 1);
     if (scratch.failed) {
         txm_arena_free(&scratch);
@@ -248,8 +249,8 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
 }
 
 /* The label of the nearest known texel; the first known one of the map where there is none. */
-static void txi_fill_labels(const txi_domain *d, const txi_texel_graph *g, int map, const uint32_t *source,
-                            const uint8_t *marks) {
+static void txi_fill_labels(const txi_domain *d, const txi_texel_graph *g, int map,
+                            const uint32_t *source, const uint8_t *marks) {
     const txm_image *image = &d->maps[map];
     const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
     const size_t texels = (size_t)d->width * (size_t)d->height;
@@ -427,8 +428,10 @@ static size_t txi_spread_marks(const txi_domain *d, int is_solid, uint8_t *marks
     return known;
 }
 
-/* Give texels the values of the nearest one that is spread, at most `reach` away (0: any distance). */
-static txm_status txi_spread(const txi_domain *d, uint8_t *marks, int is_solid, int reach, txm_env *env) {
+/* Give texels the values of the nearest one that is spread, at most `reach` away
+   (0: any distance). */
+static txm_status txi_spread(const txi_domain *d, uint8_t *marks, int is_solid, int reach,
+                             txm_env *env) {
     const size_t texels = (size_t)d->width * (size_t)d->height;
     const txm_image *image = &d->maps[0];
     const size_t bytes = txm_sample_bytes(image->sample), pixel = (size_t)image->channels * bytes;

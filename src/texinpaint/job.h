@@ -76,7 +76,7 @@ TEXINPAINT_API void texinpaint_free(texinpaint_job *job) {
     txm_arena_free(&memory);
 }
 
-/* ---- steps ------------------------------------------------------------------------------------ */
+/* ---- steps ----------------------------------------------------------------------------------- */
 
 /* The targets of the window are written. */
 static void txi_count_window(texinpaint_job *job) {
@@ -143,8 +143,8 @@ static txm_status txi_step_fine(texinpaint_job *job, txm_env *env) {
     txi_copy *copies = (txi_copy *)txm_arena_alloc(&arena, pixels, sizeof *copies);
     txm_status status = arena.failed ? txi_no_memory(env) : TXM_OK;
     if (status == TXM_OK)
-        status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field, copies,
-                                 &poses, &pose_count, env);
+        status = txi_fill_finish(choice->filler, h->curve_count ? &h->plan : NULL, &h->field,
+                                 copies, &poses, &pose_count, env);
     for (int i = 0; i < job->domain.map_count && status == TXM_OK; i++)
         values[i] = (float *)txm_arena_alloc(&arena, pixels, (size_t)job->domain.maps[i].channels *
                                                                  sizeof(float));

@@ -18,8 +18,8 @@ static void txi_sheet_normals(txi_sheet *l) {
 }
 
 /* Fill a pixel that lies on face i of the disk. */
-static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, size_t i, const double weight[3],
-                          const double right[2], int mirrored) {
+static void txi_sheet_pixel(const txi_sheet *l, txi_window *w, size_t pixel, size_t i,
+                            const double weight[3], const double right[2], int mirrored) {
     const uint32_t face = l->disk.faces[i], *c = l->disk.corner + 3 * i;
     const txm_vec2 *t = l->s->uv + 3 * (size_t)face;
     double x = 0, y = 0;
@@ -46,8 +46,8 @@ static int txi_lies_right(const txi_sheet *l, size_t i) {
     return txi_cross2(l->at[c[0]], l->at[c[1]], l->at[c[2]]) < -1e-9;
 }
 
-/* Is face i of the disk laid out with little distortion: its singular values between 1 / TXI_STRETCH
-   and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
+/* Is face i of the disk laid out with little distortion: its singular values between 1 /
+   TXI_STRETCH and TXI_STRETCH? Those of the matrix (a b; c d) are Q + R and |Q - R|, with
 
        Q = |(a + d, c - b)| / 2,   R = |(a - d, c + b)| / 2.                                   */
 static int txi_is_true(const txi_sheet *l, size_t i) {
@@ -58,14 +58,16 @@ static int txi_is_true(const txi_sheet *l, size_t i) {
     if (!txi_lies_right(l, i)) return 0;
     if (!(shape[0] > 0 && shape[2] > 0)) return 1;
     const double a = (q[0] - p[0]) / shape[0], c = (q[1] - p[1]) / shape[0];
-    const double b = (r[0] - p[0] - a * shape[1]) / shape[2], d = (r[1] - p[1] - c * shape[1]) / shape[2];
+    const double b = (r[0] - p[0] - a * shape[1]) / shape[2],
+                 d = (r[1] - p[1] - c * shape[1]) / shape[2];
     const double m = sqrt((a + d) * (a + d) + (c - b) * (c - b)) / 2;
     const double n = sqrt((a - d) * (a - d) + (c + b) * (c + b)) / 2;
     return m + n < TXI_STRETCH && fabs(m - n) > 1 / TXI_STRETCH;
 }
 
-/* Go through the pixels whose centres face i of the disk covers. With fill they are filled unless another
-   face has been there first, the one nearer to the hole. Returns how many others cover within it. */
+/* Go through the pixels whose centres face i of the disk covers. With fill they are filled
+   unless another face has been there first, the one nearer to the hole. Returns how many others
+   cover within it. */
 static size_t txi_sheet_face(const txi_sheet *l, txi_window *w, size_t i, int fill) {
     txm_vec2 t[3];
     double right[2] = {1, 0}, down[2] = {0, 1}, weight[3];
@@ -94,8 +96,8 @@ static size_t txi_sheet_face(const txi_sheet *l, txi_window *w, size_t i, int fi
     return taken;
 }
 
-/* Fill the pixels that the disk covers. Left out is what is known but lies badly: faces that are much
-   distorted or lie over others, and those that were added behind them.
+/* Fill the pixels that the disk covers. Left out is what is known but lies badly: faces that are
+   much distorted or lie over others, and those that were added behind them.
    shown  receives 1 per face of the disk                                                      */
 static void txi_sheet_pixels(const txi_sheet *l, txi_window *w, uint8_t *shown) {
     w->spacing = l->pixel;
@@ -111,8 +113,8 @@ static void txi_sheet_pixels(const txi_sheet *l, txi_window *w, uint8_t *shown) 
 
 /* ---- layout: targets ------------------------------------------------------------------------- */
 
-/* Mark the pixels along the border of the disk where the surface goes on: all of it, or only where it
-   goes through the hole. Returns how many sides that were. */
+/* Mark the pixels along the border of the disk where the surface goes on: all of it, or only
+   where it goes through the hole. Returns how many sides that were. */
 static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, uint8_t *marks) {
     uint32_t side = l->disk.border;
     size_t count = 0;
@@ -120,7 +122,8 @@ static size_t txi_mark_cuts(txi_sheet *l, const txi_window *w, int only_holes, u
         const uint32_t here = txi_surface_side(&l->disk, side), beyond = l->s->opposite[here];
         if (beyond == TXM_NO_SIDE) continue;
         if (only_holes && (!txi_is_hole(l, here / 3) || !txi_is_hole(l, beyond / 3))) continue;
-        const txm_vec2 a = l->at[l->disk.corner[side]], b = l->at[l->disk.corner[txi_next_corner(side)]];
+        const txm_vec2 a = l->at[l->disk.corner[side]],
+                       b = l->at[l->disk.corner[txi_next_corner(side)]];
         const double dx = (double)b.x - a.x, dy = (double)b.y - a.y;
         const int steps = (int)(2 * sqrt(dx * dx + dy * dy)) + 1;
         for (int i = 0; i <= steps; i++) {
@@ -157,7 +160,8 @@ static txi_target txi_make_target(const txi_sheet *l, size_t i, uint32_t texel) 
     return t;
 }
 
-/* Does the window show the target where it is, and not another part of the disk that lies over it? */
+/* Does the window show the target where it is, and not another part of the disk that lies over
+   it? */
 static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const txi_target *t) {
     const int x = txm_clampi((int)((double)t->x + 0.5), 0, w->width - 1);
     const int y = txm_clampi((int)((double)t->y + 0.5), 0, w->height - 1);
@@ -172,9 +176,9 @@ static int txi_is_shown(const txi_sheet *l, const txi_window *w, size_t i, const
     return txm_d3_dist(p, txm_d3(q.x, q.y, q.z)) < 4;
 }
 
-/* Collect the targets of the hole: those that lie well away from cuts through it, are hardly distorted and
-   not covered; all if that is none. Returns 0 if that is too few and a smaller part of the hole should be
-   tried. marks, nearest: scratch, 1 per pixel. */
+/* Collect the targets of the hole: those that lie well away from cuts through it, are hardly
+   distorted and not covered; all if that is none. Returns 0 if that is too few and a smaller
+   part of the hole should be tried. marks, nearest: scratch, 1 per pixel. */
 static int txi_sheet_targets(txi_sheet *l, txi_window *w, uint8_t *marks, int32_t *nearest,
                            txm_status *status) {
     const size_t pixels = (size_t)w->width * (size_t)w->height;
@@ -263,8 +267,8 @@ static txm_status txi_sheet_others(txi_sheet *l, txi_window *w, uint8_t *marks, 
 
 /* ---- layout: one window ---------------------------------------------------------------------- */
 
-/* The window of a face that cannot be laid out, as neither it nor what is around it has an area: its
-   part of the atlas. */
+/* The window of a face that cannot be laid out, as neither it nor what is around it has an area:
+   its part of the atlas. */
 static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w) {
     const txm_vec2 *t = l->s->uv + 3 * (size_t)l->centre;
     size_t count, k = 0;
@@ -286,7 +290,8 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
     const int left = (int)floor(box.left), top = (int)floor(box.top);
     const int width = (int)ceil(box.right) - left + 1, height = (int)ceil(box.bottom) - top + 1;
     txm_status status = txi_window_alloc(w, width, height, arena, l->env);
-    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
+    if (status == TXM_OK)
+        w->targets = (txi_target *)txm_arena_alloc(arena, count, sizeof(txi_target));
     if (!w->targets) return txi_no_memory(l->env);
     for (size_t i = 0; i < (size_t)width * (size_t)height; i++) {
         const int px = left + (int)(i % (size_t)width), py = top + (int)(i / (size_t)width);
@@ -332,7 +337,8 @@ static txm_status txi_sheet_spread(txi_sheet *l, int *fits) {
     return TXM_OK;
 }
 
-/* Lay out the hole with l->reach, in a window of scratch memory. *again: it should be tried otherwise. */
+/* Lay out the hole with l->reach, in a window of scratch memory. *again: it should be tried
+   otherwise. */
 static txm_status txi_sheet_try(txi_sheet *l, txi_window *w, int *again) {
     int fits = 0;
     *again = 0;
@@ -346,11 +352,13 @@ static txm_status txi_sheet_try(txi_sheet *l, txi_window *w, int *again) {
     }
     const size_t pixels = (size_t)l->width * (size_t)l->height;
     size_t room = 0;
-    for (size_t i = 0; i < l->disk.face_count; i++) room += txi_missing_count(l->d, l->disk.faces[i]);
+    for (size_t i = 0; i < l->disk.face_count; i++)
+        room += txi_missing_count(l->d, l->disk.faces[i]);
     uint8_t *marks = (uint8_t *)txm_arena_alloc(l->scratch, pixels, 1);
     int32_t *nearest = (int32_t *)txm_arena_alloc(l->scratch, pixels, sizeof(int32_t));
     status = txi_window_alloc(w, l->width, l->height, l->scratch, l->env);
-    if (status == TXM_OK) w->targets = (txi_target *)txm_arena_alloc(l->scratch, room, sizeof(txi_target));
+    if (status == TXM_OK)
+        w->targets = (txi_target *)txm_arena_alloc(l->scratch, room, sizeof(txi_target));
     if (l->scratch->failed) return txi_no_memory(l->env);
     txi_sheet_normals(l);
     txi_sheet_pixels(l, w, l->shown);
@@ -395,10 +403,12 @@ static txm_status txi_window_join(txi_window *w, const txi_window *hole, const t
     return TXM_OK;
 }
 
-/* The face that lies deepest in what may be copied from: farthest from all that may not. 0: there is none. */
+/* The face that lies deepest in what may be copied from: farthest from all that may not. 0:
+   there is none. */
 static int txi_find_source(txi_sheet *l, txm_status *status) {
     const txi_surface *s = l->s;
-    uint32_t *sources = (uint32_t *)txm_arena_alloc(l->scratch, s->face_count, 3 * sizeof(uint32_t));
+    uint32_t *sources =
+        (uint32_t *)txm_arena_alloc(l->scratch, s->face_count, 3 * sizeof(uint32_t));
     size_t count = 0;
     double deepest = -1;
     if (!sources) {
@@ -438,9 +448,10 @@ static txm_status txi_sheet_source(txi_sheet *l, size_t wanted, txi_window *w, i
     return TXM_OK;
 }
 
-/* The window as the caller gets it: with something to copy from beside it, if around the hole there is next
-   to nothing. */
-static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *arena, txi_window *w) {
+/* The window as the caller gets it: with something to copy from beside it, if around the hole
+   there is next to nothing. */
+static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *arena,
+                                   txi_window *w) {
     const size_t pixels = (size_t)hole->width * (size_t)hole->height;
     size_t usable = 0, wanted = TXI_SOURCE_RATIO * hole->target_count;
     txi_window source;
@@ -458,10 +469,10 @@ static txm_status txi_sheet_finish(txi_sheet *l, txi_window *hole, txm_arena *ar
     return txi_window_join(w, hole, found ? &source : NULL, arena, l->env);
 }
 
-/* Lay out the hole of a face: all of it in one window if that can be done; else with cuts through it; else a
-   disk at its rim, smaller and smaller until it lies flat enough. */
-static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch, txm_arena *arena,
-                                   txm_env *env, txi_window *w) {
+/* Lay out the hole of a face: all of it in one window if that can be done; else with cuts
+   through it; else a disk at its rim, smaller and smaller until it lies flat enough. */
+static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scratch,
+                                   txm_arena *arena, txm_env *env, txi_window *w) {
     const txi_surface *s = d->surface;
     txi_sheet l;
     txi_window hole;
@@ -502,9 +513,9 @@ static txm_status txi_sheet_window(txi_domain *d, uint32_t seed, txm_arena *scra
     return status;
 }
 
-/* Lay out the next window with missing texels: of the first hole, in the order of the texture, or of a
-   part of it. found receives 0 if none are left; else the window has one target or more. Its memory is
-   the arena's; states and colours are set. */
+/* Lay out the next window with missing texels: of the first hole, in the order of the texture,
+   or of a part of it. found receives 0 if none are left; else the window has one target or more.
+   Its memory is the arena's; states and colours are set. */
 static txm_status txi_windows_next(txi_domain *d, txm_arena *arena, txm_env *env, txi_window *w,
                                    int *found) {
     txi_surface *s = d->surface;

@@ -8,11 +8,12 @@
 
        (A x)_i = ground_i x_i + sum over links  w_ij (x_i - x_j),
 
-   by conjugate gradients, preconditioned by a cycle over coarser graphs [3]. A coarser graph has one node
-   for each group of about four nodes that strong links connect; the weights between groups are the sums
-   of those between their members (Galerkin's product with piecewise constant interpolation). Each
-   level is solved by two steps of conjugate gradients, preconditioned by the next level: this "K cycle"
-   makes the number of iterations independent of the size, also for graphs without any regularity. */
+   by conjugate gradients, preconditioned by a cycle over coarser graphs [3]. A coarser graph has
+   one node for each group of about four nodes that strong links connect; the weights between
+   groups are the sums of those between their members (Galerkin's product with piecewise constant
+   interpolation). Each level is solved by two steps of conjugate gradients, preconditioned by
+   the next level: this "K cycle" makes the number of iterations independent of the size, also
+   for graphs without any regularity. */
 
 enum {
     TXI_GRID_LEVELS = 24,
@@ -34,11 +35,12 @@ typedef struct txi_grid_level {
 typedef struct txi_grid {
     txi_grid_level level[TXI_GRID_LEVELS];
     int levels;
-    double *direct; /* Cholesky factor of the last level, in rows; NULL: too large, it is smoothed */
+    double *direct; /* Cholesky factor of the last level, in rows; NULL: too large, it is
+                       smoothed                                                                  */
 } txi_grid;
 
-/* Group the nodes of a level in pairs: each with the free neighbour of the strongest link. Returns the
-   number of groups. */
+/* Group the nodes of a level in pairs: each with the free neighbour of the strongest link.
+   Returns the number of groups. */
 static uint32_t txi_grid_pair(size_t count, const uint32_t *first, const uint32_t *to,
                               const float *weight, uint32_t *group) {
     uint32_t groups = 0;
@@ -60,7 +62,8 @@ static uint32_t txi_grid_pair(size_t count, const uint32_t *first, const uint32_
 }
 
 /* The links between groups. members: the nodes in the order of their group, those of group g are
-   members[start[g]] .. members[start[g + 1] - 1]; place: scratch, 1 per group. Returns their number. */
+   members[start[g]] .. members[start[g + 1] - 1]; place: scratch, 1 per group. Returns their
+   number. */
 static uint32_t txi_grid_sum(const uint32_t *first, const uint32_t *to, const float *weight,
                              const uint32_t *group, uint32_t groups, const uint32_t *start,
                              const uint32_t *members, uint32_t *place, uint32_t *out_first,
@@ -113,14 +116,14 @@ static int txi_grid_coarsen(txi_grid_level *fine, txi_grid_level *coarse, txm_ar
     uint32_t *members = group + n, *place = members + n;
     const uint32_t pairs = txi_grid_pair(n, fine->first, fine->to, fine->weight, fine->group);
     txi_grid_members(n, fine->group, pairs, start, members);
-    txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, pairs, start, members, place, first,
-                 to, weight);
+    txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, pairs, start, members, place,
+                 first, to, weight);
     const uint32_t groups = txi_grid_pair(pairs, first, to, weight, group);
     for (size_t i = 0; i < n; i++) fine->group[i] = group[fine->group[i]];
     /* from the links of the fine graph again: those of the pairs are overwritten */
     txi_grid_members(n, fine->group, groups, start, members);
-    const uint32_t total = txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, groups, start,
-                                        members, place, first, to, weight);
+    const uint32_t total = txi_grid_sum(fine->first, fine->to, fine->weight, fine->group, groups,
+                                        start, members, place, first, to, weight);
     uint32_t *kept = (uint32_t *)txm_arena_alloc(arena, (size_t)groups + 1, sizeof(uint32_t));
     uint32_t *kept_to = (uint32_t *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(uint32_t));
     float *kept_weight = (float *)txm_arena_alloc(arena, (size_t)total + 1, sizeof(float));
@@ -165,7 +168,8 @@ static void txi_grid_factor(const txi_grid_level *l, double *a) {
     }
 }
 
-static void txi_grid_direct(const txi_grid *g, const txi_grid_level *l, const double *r, double *x) {
+static void txi_grid_direct(const txi_grid *g, const txi_grid_level *l, const double *r,
+                            double *x) {
     const size_t n = l->count;
     const double *a = g->direct;
     for (size_t i = 0; i < n; i++) {
@@ -225,8 +229,9 @@ static void txi_grid_cycle(const txi_grid *g, int level, const double *r, double
     txi_grid_sweep(l, r, x, 1);
 }
 
-/* Solve the system of a level below the first, r, by two steps of conjugate gradients; one if that is good
-   enough. r is lost. With c1, r1, v1 = A c1 of the first step, c2, r2, v2 of the second [3]:
+/* Solve the system of a level below the first, r, by two steps of conjugate gradients; one if that
+   is good enough. r is lost. With c1, r1, v1 = A c1 of the first step, c2, r2, v2 of the second
+   [3]:
 
        x = (a1 / p1 - f a2 / (p1 p2)) c1 + (a2 / p2) c2,
        p1 = c1.v1, a1 = c1.r1, f = c2.v1, p2 = c2.v2 - f^2 / p1, a2 = c2.r2                     */

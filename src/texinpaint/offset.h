@@ -3,7 +3,7 @@
 
 #include "assemble.h"
 
-/* ---- coherent completion: few offsets, large pieces ----------------------------------------------
+/* ---- coherent completion: few offsets, large pieces ---------------------------------------------
 
    Patterns repeat at few offsets. They are found by matching the known patches around the hole with
    patches elsewhere; the most frequent offsets (in each pose) become labels, and the hole is put
@@ -112,8 +112,8 @@ static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_
     return (int)count;
 }
 
-/* The labels' colours, and as the match of each anchor the most frequent label of its patch that can be
-   copied. */
+/* The labels' colours, and as the match of each anchor the most frequent label of its patch that
+   can be copied. */
 static void txi_offset_apply(txi_canvas *t, const txi_assembly *assembly) {
     const txi_level *l = t->level;
     for (int i = 0; i < l->hole_count; i++) {

@@ -231,7 +231,7 @@ static void txi_onion_rest(const txi_onion *o, txi_canvas *t) {
 static txm_status txi_onion_peel(txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
     const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
-    /* a hole that is long and thin has many anchors even at the coarsest level                      */
+    /* a hole that is long and thin has many anchors even at the coarsest level                   */
     const int share_of_work = TXI_ONION_WORK / (l->anchor_count / 2 + 1);
     int most = 3 * share_of_work;
     if (most > TXI_ONION_LEAST) most = TXI_ONION_LEAST;

@@ -20,8 +20,8 @@ enum {
     TXI_LEAST_FILLED = 24   /* pixels that are not void in a patch to be matched; ours         */
 };
 
-/* How a pixel may be copied: not; by itself; interpolated with its neighbour to the right, below and
-   below right; by four pixels a direction. */
+/* How a pixel may be copied: not; by itself; interpolated with its neighbour to the right, below
+   and below right; by four pixels a direction. */
 enum { TXI_TAP_NONE = 0, TXI_TAP_ONE, TXI_TAP_LINEAR, TXI_TAP_CUBIC };
 
 /* A window at one level in one pose: what patches are copied from. Its pixel (i, j) is the level's
@@ -119,7 +119,8 @@ static void txi_level_halve(const txi_level *f, txi_level *l) {
     }
 }
 
-/* The colours of the hole at half resolution, from those of the finer level; the rest is not touched. */
+/* The colours of the hole at half resolution, from those of the finer level; the rest is not
+   touched. */
 static void txi_color_halve(const txi_level *f, const uint8_t *from, const txi_level *l,
                             uint8_t *to) {
     for (int i = 0; i < l->hole_count; i++) {

@@ -7,13 +7,14 @@
 #include "layout.h"
 
 /* ---- preview ------------------------------------------------------------------------------------
-   What a user sees first: smooth colours in the holes, and through the first hole its lines, drawn as
-   the mean colours across them. The texels stay missing.                                          */
+   What a user sees first: smooth colours in the holes, and through the first hole its lines,
+   drawn as the mean colours across them. The texels stay missing. */
 
-/* Paint the targets of a window in the picture. Pictures with alpha keep what they have, as colours of
-   a window lie over gray.
-   color  4 per window pixel                                                                       */
-static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *color, txm_env *env) {
+/* Paint the targets of a window in the picture. Pictures with alpha keep what they have, as colours
+   of a window lie over gray.
+   color  4 per window pixel                                                                      */
+static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *color,
+                            txm_env *env) {
     const size_t pixels = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[0].channels;
     size_t bytes;
@@ -87,7 +88,7 @@ static txm_status txi_preview(txi_domain *d, txm_env *env) {
     return status;
 }
 
-/* ---- counting holes ------------------------------------------------------------------------------ */
+/* ---- counting holes -------------------------------------------------------------------------- */
 
 /* How many parts of the missing texels are connected: on the surface face by face, in a picture by
    the sides and corners of pixels.
@@ -106,8 +107,9 @@ static txm_status txi_count_holes(const txi_domain *d, txm_env *env, int *holes)
     }
     for (size_t i = 0; i < count; i++) {
         parent[i] = (uint32_t)i;
-        is_hole[i] = s ? s->hole_first[i + 1] > s->hole_first[i] || d->missing[txi_face_texel(d, s, i)]
-                       : d->missing[i];
+        is_hole[i] =
+            s ? s->hole_first[i + 1] > s->hole_first[i] || d->missing[txi_face_texel(d, s, i)]
+              : d->missing[i];
     }
     for (size_t i = 0; i < count; i++) {
         for (size_t k = 0; k < 3 && s && is_hole[i]; k++) {

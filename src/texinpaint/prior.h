@@ -6,9 +6,9 @@
 
 /* ---- prior lines [1, II.C] --------------------------------------------------------------------
    Lines on the surface, crests or the caller's, as polylines in a window. To each belong up to two
-   assistant lines on either side, at a constant distance: where the known texture has edges that run
-   along the line, as a stripe that follows a crest has. [1] does not say how far away they are; here
-   that is measured in the window.                                                              */
+   assistant lines on either side, at a constant distance: where the known texture has edges that
+   run along the line, as a stripe that follows a crest has. [1] does not say how far away they
+   are; here that is measured in the window. */
 
 enum {
     TXI_PRIOR_REACH = 4,   /* window pixels: a line may be so far from the surface; ours        */
@@ -16,14 +16,16 @@ enum {
     TXI_PRIOR_SHORT = 6,   /* points, about pixels: shorter pieces are left out; ours           */
     TXI_PRIOR_WIDTH = 40,  /* window pixels: the farthest assistant line; ours                  */
     TXI_PRIOR_LEAST = 32,  /* known pixels along a line that a distance is measured at; ours    */
-    TXI_PRIOR_NEAR = 12,   /* window pixels: lines that stay farther from the hole are left out; ours */
+    TXI_PRIOR_NEAR = 12,   /* window pixels: lines that stay farther from the hole are left out;
+                              ours                                                               */
     TXI_PRIOR_BLUR = 5,    /* points: radius of the mean that smooths crest lines, thrice; ours:
                               they zigzag from triangle to triangle                             */
     TXI_PRIOR_CHORD = 6,   /* points to either side that give the direction of a line; ours     */
     TXI_PRIOR_STEP = 12,   /* levels of 8 bits: the mean step across an assistant line; ours    */
     TXI_PRIOR_AIDS = 2     /* assistant lines on each side; [1]                                 */
 };
-#define TXI_PRIOR_SURE 0.7 /* mean step over mean size of the steps: of one sign along the line; ours */
+#define TXI_PRIOR_SURE 0.7 /* mean step over mean size of the steps: of one sign along the line;
+                              ours                                                               */
 
 /* The lines of a window while they are collected. */
 typedef struct txi_prior_list {
@@ -70,7 +72,8 @@ static int txi_prior_add(txi_prior_list *list, txm_vec2 p, txm_arena *arena) {
     if (!txi_prior_reserve(list, 1, arena)) return 0;
     if (list->open > list->starts[list->count]) {
         const txm_vec2 last = list->points[list->open - 1];
-        const double dx = (double)p.x - last.x, dy = (double)p.y - last.y, apart = dx * dx + dy * dy;
+        const double dx = (double)p.x - last.x, dy = (double)p.y - last.y,
+                     apart = dx * dx + dy * dy;
         if (apart < 0.5625) return 1;
         if (apart > TXI_PRIOR_JUMP * TXI_PRIOR_JUMP) {
             txi_prior_close(list);
@@ -171,7 +174,8 @@ static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
     const int64_t i = txi_places_hold(s, p) ? txi_places_nearest(s, p) : -1;
     if (i < 0) return 0;
     const txm_vec3 q = s->w->place[i];
-    const txm_dvec3 u = txi_places_slope(s->w, (size_t)i, 0), v = txi_places_slope(s->w, (size_t)i, 1);
+    const txm_dvec3 u = txi_places_slope(s->w, (size_t)i, 0),
+                    v = txi_places_slope(s->w, (size_t)i, 1);
     const txm_dvec3 d = txm_d3_sub(p, txm_d3(q.x, q.y, q.z));
     const double e = txm_d3_len2(u), f = txm_d3_dot(u, v), g = txm_d3_len2(v);
     const double det = e * g - f * f, a = txm_d3_dot(d, u), b = txm_d3_dot(d, v);
@@ -187,7 +191,8 @@ static int txi_places_find(const txi_places *s, txm_dvec3 p, txm_vec2 *out) {
 }
 
 /* The part of a segment, from..to of 0..1, in the box. 0: none. */
-static int txi_places_clip(const txi_places *s, txm_dvec3 a, txm_dvec3 d, double *from, double *to) {
+static int txi_places_clip(const txi_places *s, txm_dvec3 a, txm_dvec3 d, double *from,
+                           double *to) {
     const double p[3] = {a.x, a.y, a.z}, q[3] = {d.x, d.y, d.z};
     *from = 0;
     *to = 1;
@@ -233,8 +238,8 @@ static int txi_prior_lay(const txi_places *s, const texinpaint_line *line, txi_p
     return 1;
 }
 
-/* The same for a line of a plain picture, whose window is a part of it: points are x, y in pixels, pixel
-   centres at one half. */
+/* The same for a line of a plain picture, whose window is a part of it: points are x, y in
+   pixels, pixel centres at one half. */
 static int txi_prior_copy(const txi_window *w, const texinpaint_line *line, txi_prior_list *list,
                           txm_arena *arena) {
     const double left = (double)w->place[0].x + 0.5, top = (double)w->place[0].y + 0.5;
@@ -265,9 +270,10 @@ static int txi_prior_copy(const txi_window *w, const texinpaint_line *line, txi_
     return 1;
 }
 
-/* ---- prior lines: assistants ------------------------------------------------------------------ */
+/* ---- prior lines: assistants ----------------------------------------------------------------- */
 
-/* the unit vector to the left of a line at point k of n, as y runs downwards; 0, 0: it has no direction */
+/* the unit vector to the left of a line at point k of n, as y runs downwards; 0, 0: it has no
+   direction */
 static txm_vec2 txi_prior_left(const txm_vec2 *points, int n, int k) {
     const txm_vec2 a = points[k > TXI_PRIOR_CHORD ? k - TXI_PRIOR_CHORD : 0];
     const txm_vec2 b = points[k + TXI_PRIOR_CHORD < n ? k + TXI_PRIOR_CHORD : n - 1];
@@ -303,7 +309,8 @@ static double txi_prior_edge(const txi_window *w, const txm_vec2 *points, int n,
         }
     }
     const double mean = fabs(sum[0]) + fabs(sum[1]) + fabs(sum[2]);
-    if (count < TXI_PRIOR_LEAST || mean < TXI_PRIOR_STEP * count || mean < TXI_PRIOR_SURE * size) return 0;
+    if (count < TXI_PRIOR_LEAST || mean < TXI_PRIOR_STEP * count || mean < TXI_PRIOR_SURE * size)
+        return 0;
     return mean / count;
 }
 
@@ -326,7 +333,8 @@ static int txi_prior_offset(const txi_window *w, txi_prior_list *list, int k, in
             if (!txi_prior_reserve(list, 1, arena)) return 0;
             continue;
         }
-        if (open) { /* where the line bends more than the distance allows, its parallel turns back */
+        if (open) { /* where the line bends more than the distance allows, its parallel turns
+                       back                                                                      */
             const txm_vec2 last = list->points[list->open - 1];
             if (((double)q.x - last.x) * -left.y + ((double)q.y - last.y) * left.x <= 0) continue;
         }
@@ -336,7 +344,8 @@ static int txi_prior_offset(const txi_window *w, txi_prior_list *list, int k, in
     return 1;
 }
 
-/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges. 0: no memory. */
+/* The assistant lines of line k on one side (1 left, -1 right): at the strongest edges. 0: no
+   memory. */
 static int txi_prior_assist(const txi_window *w, txi_prior_list *list, int k, int side,
                             txm_arena *arena) {
     enum { FIRST = 2, SLOTS = TXI_PRIOR_WIDTH - FIRST };
@@ -381,7 +390,8 @@ static void txi_prior_smooth(txm_vec2 *points, int n, txm_vec2 *scratch) {
 /* Does a line come near the hole? */
 static int txi_prior_is_near(const txi_window *w, const txm_vec2 *points, int n) {
     for (int k = 0; k < n; k++) {
-        const int x = (int)floor((double)points[k].x + 0.5), y = (int)floor((double)points[k].y + 0.5);
+        const int x = (int)floor((double)points[k].x + 0.5),
+                  y = (int)floor((double)points[k].y + 0.5);
         for (int dy = -TXI_PRIOR_NEAR; dy <= TXI_PRIOR_NEAR; dy += 4) {
             for (int dx = -TXI_PRIOR_NEAR; dx <= TXI_PRIOR_NEAR; dx += 4) {
                 const int u = x + dx, v = y + dy;
@@ -407,8 +417,8 @@ static void txi_prior_filter(const txi_window *w, txi_prior_list *list) {
     if (list->starts) list->starts[lines] = points;
 }
 
-/* The prior lines of a window that come near its hole: first all lines themselves, in pieces, then their
-   assistants.
+/* The prior lines of a window that come near its hole: first all lines themselves, in pieces, then
+   their assistants.
    crests  NULL: the lines of the description
    prior   lies in the arena
    return  TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED
@@ -438,7 +448,8 @@ static txm_status txi_prior_make(const txi_domain *d, const texinpaint_crests *c
             (txm_vec2 *)txm_arena_alloc(&scratch, (size_t)list.open, sizeof(txm_vec2));
         ok = copy != NULL;
         for (int k = 0; k < own && ok; k++)
-            txi_prior_smooth(list.points + list.starts[k], list.starts[k + 1] - list.starts[k], copy);
+            txi_prior_smooth(list.points + list.starts[k], list.starts[k + 1] - list.starts[k],
+                             copy);
     }
     for (int k = 0; k < own && ok; k++)
         ok = txi_prior_assist(w, &list, k, 1, arena) && txi_prior_assist(w, &list, k, -1, arena);

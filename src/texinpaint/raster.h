@@ -7,7 +7,8 @@
 
 /* a (1 - t) + b t */
 static inline txm_vec2 txi_between(txm_vec2 a, txm_vec2 b, double t) {
-    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)), txm_float(a.y + t * ((double)b.y - a.y)));
+    return txm_v2(txm_float(a.x + t * ((double)b.x - a.x)),
+                  txm_float(a.y + t * ((double)b.y - a.y)));
 }
 
 static inline double txi_distance(txm_vec2 a, txm_vec2 b) {
@@ -28,7 +29,7 @@ static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     return (ptrdiff_t)row * width + column;
 }
 
-/* ---- rasters: distances --------------------------------------------------------------------------- */
+/* ---- rasters: distances ---------------------------------------------------------------------- */
 
 /* The nearest pixel with a mark, of equally near ones the first in its row, then the upper one.
 
@@ -101,10 +102,11 @@ static txm_status txi_nearest(const uint8_t *marks, int width, int height, txm_e
 
 enum { TXI_FAR = 1 << 28 }; /* squared distance, in pixels, to nothing */
 
-/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, in integers;
-   TXI_FAR if there is none, or if it is more.
+/* Squared Euclidean distances: out[i] = least |i - j|^2 over all pixels j with of[j] != 0, in
+   integers; TXI_FAR if there is none, or if it is more.
    scratch  3 * width numbers                                                                  */
-static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch, int32_t *out) {
+static void txi_distances(const uint8_t *of, int width, int height, int32_t *scratch,
+                          int32_t *out) {
     txi_nearest_marks(of, width, height, scratch, out);
     for (int y = 0; y < height; y++) {
         for (int x = 0; x < width; x++) {

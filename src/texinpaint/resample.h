@@ -33,9 +33,9 @@ static txm_status txi_window_alloc(txi_window *w, int width, int height, txm_are
     return TXM_OK;
 }
 
-/* Interpolation is by the kernel of Lanczos with three lobes: from texels to pixels and back it keeps three
-   quarters of the energy of fine detail, the spline of Catmull and Rom half of it. Its weights for samples
-   at -2 .. 3, for a place t from 0 to below 1, which sum up to 1:
+/* Interpolation is by the kernel of Lanczos with three lobes: from texels to pixels and back it
+   keeps three quarters of the energy of fine detail, the spline of Catmull and Rom half of it. Its
+   weights for samples at -2 .. 3, for a place t from 0 to below 1, which sum up to 1:
 
        w(x) = sinc(pi x) sinc(pi x / 3),   x = t + 2 .. t - 3                                   */
 static void txi_lanczos(double t, double weight[TXI_TAPS]) {
@@ -61,7 +61,8 @@ typedef struct txi_kernel {
 } txi_kernel;
 
 static void txi_kernel_init(txi_kernel *kernel) {
-    for (int i = 0; i < TXI_KERNEL_STEPS; i++) txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
+    for (int i = 0; i < TXI_KERNEL_STEPS; i++)
+        txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
     for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;
 }
 
@@ -72,8 +73,8 @@ static void txi_kernel_at(const txi_kernel *kernel, double t, double weight[TXI_
     for (int k = 0; k < TXI_TAPS; k++) weight[k] = a[k] + part * (b[k] - a[k]);
 }
 
-/* A value between the four samples around it, in excess of them by at most a quarter of their range: the
-   kernel must not ring at hard edges. */
+/* A value between the four samples around it, in excess of them by at most a quarter of their
+   range: the kernel must not ring at hard edges. */
 static double txi_limit(double value, double low, double high) {
     const double more = 0.25 * (high - low);
     return value < low - more ? low - more : value > high + more ? high + more : value;
@@ -117,10 +118,11 @@ typedef struct txi_taps {
     double weight[TXI_TAPS * TXI_TAPS];
 } txi_taps;
 
-/* The known texels around p that a pixel on this face may take: those of the kernel, if the inner four
-   are among them and little weight is lost; else those of the inner four, bilinear; else the nearest. */
-static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p, int is_label,
-                        txi_taps *taps) {
+/* The known texels around p that a pixel on this face may take: those of the kernel, if the
+   inner four are among them and little weight is lost; else those of the inner four, bilinear;
+   else the nearest. */
+static void txi_taps_at(const txi_domain *d, const txi_kernel *kernel, uint32_t face, txm_vec2 p,
+                        int is_label, txi_taps *taps) {
     const double fx = floor((double)p.x), fy = floor((double)p.y), tx = p.x - fx, ty = p.y - fy;
     const int x = (int)fx, y = (int)fy;
     double wx[TXI_TAPS], wy[TXI_TAPS], part = 0, sum = 0;
@@ -175,9 +177,11 @@ static int txi_has_alpha(const txi_domain *d, int map) {
 
 /* A channel of a texel; colours times their alpha, if has_alpha. */
 static double txi_texel_value(const txm_image *image, int has_alpha, int64_t texel, int c) {
-    const int x = (int)(texel % image->width), y = (int)(texel / image->width), last = image->channels - 1;
+    const int x = (int)(texel % image->width), y = (int)(texel / image->width),
+              last = image->channels - 1;
     const double value = txm_image_get(image, x, y, c);
-    return has_alpha && c < last ? value * txm_clampf(txm_image_get(image, x, y, last), 0, 1) : value;
+    return has_alpha && c < last ? value * txm_clampf(txm_image_get(image, x, y, last), 0, 1)
+                                 : value;
 }
 
 /* The samples of a row, as they are stored. */
@@ -194,8 +198,8 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 }
 
 /* The channels of a map at a place all around which texels are known and of one chart. */
-static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel, txm_vec2 p,
-                            float *out) {
+static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel,
+                            txm_vec2 p, float *out) {
     enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
     const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
@@ -225,8 +229,8 @@ static void txi_read_inside(const txm_image *image, int has_alpha, const txi_ker
     }
 }
 
-/* Are all texels of the kernel at p known and of the chart of this face? Decided by tiles; 0 also where
-   that is not enough. */
+/* Are all texels of the kernel at p known and of the chart of this face? Decided by tiles; 0
+   also where that is not enough. */
 static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     const txi_surface *s = d->surface;
     const int x = (int)floor((double)p.x) - 2, y = (int)floor((double)p.y) - 2, side = TXI_TILE;
@@ -238,15 +242,16 @@ static int txi_is_inside(const txi_domain *d, uint32_t face, txm_vec2 p) {
     }
     for (int j = 0; j < TXI_TAPS; j++) {
         static const uint8_t none[TXI_TAPS] = {0};
-        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS) != 0)
+        if (memcmp(d->missing + (size_t)(y + j) * (size_t)d->width + (size_t)x, none, TXI_TAPS) !=
+            0)
             return 0;
     }
     return 1;
 }
 
 /* All channels of a map at pixel i of the window, which is not void; colours times their alpha. */
-static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w, int map,
-                           size_t i, float *out) {
+static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const txi_window *w,
+                           int map, size_t i, float *out) {
     const txm_image *image = &d->maps[map];
     const int label = txi_is_label(d, map), has_alpha = txi_has_alpha(d, map);
     txi_taps taps;
@@ -276,16 +281,18 @@ static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const 
 }
 
 /* ---- resample: values as they are blended ------------------------------------------------------
-   Samples of colours are times their alpha, as a transparent texel has no colour. Normals are vectors
-   in the directions of the window (x right, y down, z out of the surface), so that they keep their
-   direction on the surface across charts of the atlas, and with pieces that are turned.          */
+   Samples of colours are times their alpha, as a transparent texel has no colour. Normals are
+   vectors in the directions of the window (x right, y down, z out of the surface), so that they
+   keep their direction on the surface across charts of the atlas, and with pieces that are
+   turned. */
 
 /* A sample of the texture, its colours already times their alpha, as it is blended. */
 static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     if (kind && kind->is_normal) {
         const double x = 2 * (double)v[0] - 1;
-        const double y = (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        const double y =
+            (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
         v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
         v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
         v[2] = txm_float(2 * (double)v[2] - 1);
@@ -314,8 +321,8 @@ static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored
 /* ---- resample: from maps to windows, from windows to maps ---- */
 
 /* Every channel of a map at the window's pixels: values receives width * height * channels numbers,
-   in the units of txm_image_get. Interpolated from known texels of the pixel's own chart; labels are those
-   of the nearest texel. 0 where there is no known texel. */
+   in the units of txm_image_get. Interpolated from known texels of the pixel's own chart; labels
+   are those of the nearest texel. 0 where there is no known texel. */
 static void txi_window_read(const txi_domain *d, const txi_window *w, int map, float *values) {
     const size_t count = (size_t)w->width * (size_t)w->height;
     const size_t channels = (size_t)d->maps[map].channels;
@@ -339,7 +346,8 @@ static uint8_t txi_pixel_state(const txi_domain *d, uint32_t face, txm_vec2 p) {
     double most = 0;
     int64_t nearest = -1;
     if (d->surface && txi_is_inside(d, face, p))
-        return d->usable[(size_t)floor((double)p.y + 0.5) * (size_t)d->width + (size_t)floor((double)p.x + 0.5)]
+        return d->usable[(size_t)floor((double)p.y + 0.5) * (size_t)d->width +
+                         (size_t)floor((double)p.x + 0.5)]
                    ? TXI_KNOWN
                    : TXI_FOREIGN;
     for (int k = 0; k < 4; k++) {
@@ -393,10 +401,11 @@ static void txi_window_colors(const txi_domain *d, txi_window *w) {
     }
 }
 
-/* The window's values at (x, y): by the kernel; where one of its pixels is void, bilinear from those of the
-   four around that are not. 0: all four are void. */
-static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int channels, int is_label,
-                            const float *values, double x, double y, float out[TXI_MAX_CHANNELS]) {
+/* The window's values at (x, y): by the kernel; where one of its pixels is void, bilinear from
+   those of the four around that are not. 0: all four are void. */
+static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int channels,
+                            int is_label, const float *values, double x, double y,
+                            float out[TXI_MAX_CHANNELS]) {
     enum { N = TXI_TAPS };
     const double fx = floor(x), fy = floor(y);
     const int left = (int)fx - 2, up = (int)fy - 2;
@@ -469,7 +478,8 @@ static void txi_window_write(txi_domain *d, const txi_window *w, int map, const 
     txi_kernel_init(&kernel);
     for (size_t i = 0; i < w->target_count; i++) {
         const txi_target *t = &w->targets[i];
-        const int x = (int)(t->texel % (uint32_t)d->width), y = (int)(t->texel / (uint32_t)d->width);
+        const int x = (int)(t->texel % (uint32_t)d->width),
+                  y = (int)(t->texel / (uint32_t)d->width);
         float value[TXI_MAX_CHANNELS] = {0, 0, 0, 0};
         if (!txi_window_value(w, &kernel, channels, label, values, t->x, t->y, value)) {
             const int64_t pixel = txi_solid_near(w, t->x, t->y);
@@ -499,12 +509,14 @@ static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
         const txm_image *image = &d->maps[m];
         const size_t bytes = (size_t)image->channels * txm_sample_bytes(image->sample);
         memcpy((uint8_t *)txm_image_row(image, (int)(to / w)) + to % w * bytes,
-               (const uint8_t *)txm_image_row_const(image, (int)(from / w)) + from % w * bytes, bytes);
+               (const uint8_t *)txm_image_row_const(image, (int)(from / w)) + from % w * bytes,
+               bytes);
     }
 }
 
-/* Missing texels outside the charts, at most desc->gutter from a texel in a chart, get the values of
-   the nearest one in all maps. They are not missing any longer. filled receives how many. */
+/* Missing texels outside the charts, at most desc->gutter from a texel in a chart, get the
+   values of the nearest one in all maps. They are not missing any longer. filled receives how
+   many. */
 static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env, size_t *filled) {
     const int gutter = d->desc->gutter == 0 ? 8 : d->desc->gutter;
     const size_t count = (size_t)d->width * (size_t)d->height;

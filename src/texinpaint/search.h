@@ -3,7 +3,7 @@
 
 #include "pose.h"
 
-/* ---- matches ---------------------------------------------------------------------------------- */
+/* ---- matches --------------------------------------------------------------------------------- */
 
 enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
@@ -58,8 +58,8 @@ static int txi_too_near(const txi_canvas *t, int a, const txi_source *s, int x, 
     return cx > -least && cx < least && cy > -least && cy < least;
 }
 
-/* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs limit
-   or more. */
+/* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs
+   limit or more. */
 static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uint32_t limit) {
     const txi_level *l = t->level;
     const txi_source *s = &l->source[pose];

@@ -50,8 +50,8 @@ typedef struct txi_sheet {
     txm_dvec3 origin;      /* places are relative to it                                           */
 } txi_sheet;
 
-/* what a face of the surface is found to be: known, of a hole, of the hole that is completed, of one that is
-   completed along, of one that is left for later */
+/* what a face of the surface is found to be: known, of a hole, of the hole that is completed, of
+   one that is completed along, of one that is left for later */
 enum {
     TXI_SHEET_UNSEEN = 0,
     TXI_SHEET_KNOWN,
@@ -61,8 +61,8 @@ enum {
     TXI_SHEET_REFUSED
 };
 
-/* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing any
-   longer */
+/* the missing texels of a face are left[0] .. left[count - 1], among others that are not missing
+   any longer */
 static const uint32_t *txi_face_texels(const txi_surface *s, uint32_t face, size_t *count) {
     *count = s->hole_first[face + 1] - s->hole_first[face];
     return s->hole + s->hole_first[face];
@@ -85,8 +85,10 @@ static int txi_is_hole(txi_sheet *l, uint32_t face) {
     return is_hole;
 }
 
-/* Where texel i lies in a face that owns it, in texels that are not wrapped, and its weights there. */
-static void txi_texel_weights(const txi_domain *d, uint32_t face, uint32_t texel, double weight[3]) {
+/* Where texel i lies in a face that owns it, in texels that are not wrapped, and its weights
+   there. */
+static void txi_texel_weights(const txi_domain *d, uint32_t face, uint32_t texel,
+                              double weight[3]) {
     const txm_vec2 *t = d->surface->uv + 3 * (size_t)face;
     const int x = (int)(texel % (uint32_t)d->width), y = (int)(texel / (uint32_t)d->width);
     double least_x = t[0].x, least_y = t[0].y, most_x = t[0].x, most_y = t[0].y, best = -1e300;
@@ -118,7 +120,8 @@ static txm_dvec3 txi_texel_point(const txi_domain *d, uint32_t face, uint32_t te
     double w[3];
     txm_dvec3 p = txm_d3(0, 0, 0);
     txi_texel_weights(d, face, texel, w);
-    for (uint32_t k = 0; k < 3; k++) p = txm_d3_mad(p, txi_corner_point(d->surface, 3 * face + k), w[k]);
+    for (uint32_t k = 0; k < 3; k++)
+        p = txm_d3_mad(p, txi_corner_point(d->surface, 3 * face + k), w[k]);
     return p;
 }
 
@@ -131,9 +134,10 @@ static size_t txi_missing_count(const txi_domain *d, uint32_t face) {
 
 /* ---- sheet: the hole ------------------------------------------------------------------------ */
 
-/* Add to list the hole that a face belongs to, connected across sides; its faces get this state. Faces
-   outside the disk, if there is one, end it: 0. -1: no memory. */
-static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi_disk *disk, txi_list *list) {
+/* Add to list the hole that a face belongs to, connected across sides; its faces get this state.
+   Faces outside the disk, if there is one, end it: 0. -1: no memory. */
+static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi_disk *disk,
+                           txi_list *list) {
     size_t at = list->count;
     int inside = 1;
     if (!txi_push(list, l->scratch, face)) return -1;
@@ -143,7 +147,8 @@ static int txi_flood_faces(txi_sheet *l, uint32_t face, uint8_t state, const txi
         if (disk && disk->slot[f] == TXI_NO_FACE) inside = 0;
         for (uint32_t k = 0; k < 3 && inside; k++) {
             const uint32_t o = l->s->opposite[3 * f + k];
-            if (o == TXM_NO_SIDE || !txi_is_hole(l, o / 3) || l->state[o / 3] != TXI_SHEET_HOLE) continue;
+            if (o == TXM_NO_SIDE || !txi_is_hole(l, o / 3) || l->state[o / 3] != TXI_SHEET_HOLE)
+                continue;
             if (!txi_push(list, l->scratch, o / 3)) return -1;
             l->state[o / 3] = state;
         }
@@ -160,7 +165,8 @@ static void txi_measure(txi_sheet *l) {
         const size_t missing = txi_missing_count(l->d, f);
         const txm_vec2 *t = l->s->uv + 3 * (size_t)f;
         if (!missing) continue;
-        area += (double)missing * txm_d3_len(txi_face_area2(l->s, f)) / fabs(txi_cross2(t[0], t[1], t[2]));
+        area += (double)missing * txm_d3_len(txi_face_area2(l->s, f)) /
+                fabs(txi_cross2(t[0], t[1], t[2]));
         l->texels += missing;
     }
     l->pixel = l->texels ? sqrt(area / (double)l->texels) : 0;
@@ -198,7 +204,8 @@ static txm_status txi_measure_from_hole(txi_sheet *l, double limit) {
 static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
     txm_status status = TXM_OK;
     txi_is_hole(l, seed);
-    if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+    if (txi_flood_faces(l, seed, TXI_SHEET_GROUP, NULL, &l->group) < 0)
+        return txi_no_memory(l->env);
     txi_measure(l);
     for (int round = 0, grown = 1; round < TXI_ROUNDS && grown && l->pixel > 0; round++) {
         /* specks reach farther than holes that fill a window by themselves */
@@ -211,7 +218,8 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
                 const uint32_t f = l->s->corners[i] / 3;
                 const size_t before = l->group.count;
                 if (!txi_is_hole(l, f) || l->state[f] != TXI_SHEET_HOLE) continue;
-                if (txi_flood_faces(l, f, TXI_SHEET_GROUP, NULL, &l->group) < 0) return txi_no_memory(l->env);
+                if (txi_flood_faces(l, f, TXI_SHEET_GROUP, NULL, &l->group) < 0)
+                    return txi_no_memory(l->env);
                 size_t more = l->texels;
                 for (size_t k = before; k < l->group.count; k++)
                     more += txi_missing_count(l->d, l->group.items[k]);
@@ -231,8 +239,8 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
     return TXM_OK;
 }
 
-/* The face that the disk grows from: in the middle of the hole, or, if only a part of it is laid out, at
-   its rim. */
+/* The face that the disk grows from: in the middle of the hole, or, if only a part of it is laid
+   out, at its rim. */
 static void txi_find_centre(txi_sheet *l) {
     txm_dvec3 middle = txm_d3(0, 0, 0);
     double count = 0, least = 0;
@@ -279,15 +287,16 @@ static double txi_least_of(const txi_surface *s, uint32_t face, const double *va
     return fmin(value[v[0]], fmin(value[v[1]], value[v[2]]));
 }
 
-/* Grow the disk: the hole from its centre, then what is known around it; or everything around the centre
-   up to l->reach. */
+/* Grow the disk: the hole from its centre, then what is known around it; or everything around
+   the centre up to l->reach. */
 static txm_status txi_sheet_disk(txi_sheet *l) {
     const txi_surface *s = l->s;
     const double pixel = l->pixel, band = txi_band(l->texels) * pixel;
     txi_growth g;
     double start[3], extent = 0;
     const txm_dvec3 a = txi_corner_point(s, 3 * l->centre);
-    const txm_dvec3 b = txi_corner_point(s, 3 * l->centre + 1), c = txi_corner_point(s, 3 * l->centre + 2);
+    const txm_dvec3 b = txi_corner_point(s, 3 * l->centre + 1),
+                    c = txi_corner_point(s, 3 * l->centre + 2);
     const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(a, b), c), 1.0 / 3);
     start[0] = txm_d3_dist(a, middle);
     start[1] = txm_d3_dist(b, middle);
@@ -334,8 +343,10 @@ static txm_status txi_sheet_disk(txi_sheet *l) {
 /* Lay the disk out. The hole is kept rigid, what is known gives way the more the farther it is. */
 static txm_status txi_sheet_flat(txi_sheet *l) {
     const size_t faces = l->disk.face_count;
-    uint32_t *number = (uint32_t *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(uint32_t));
-    txm_dvec3 *point = (txm_dvec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_dvec3));
+    uint32_t *number =
+        (uint32_t *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(uint32_t));
+    txm_dvec3 *point =
+        (txm_dvec3 *)txm_arena_alloc(l->scratch, l->disk.vertex_count, sizeof(txm_dvec3));
     l->rigid = (double *)txm_arena_alloc(l->scratch, faces, sizeof(double));
     if (!number || !point || !l->rigid) return txi_no_memory(l->env);
     txi_disk_finish(&l->disk, l->s, number, point);
@@ -351,8 +362,8 @@ static txm_status txi_sheet_flat(txi_sheet *l) {
     return status;
 }
 
-/* The step in the window, y downwards, for a step of one texel to the right and one down, on face i of
-   the disk. 0: the face has no area in the atlas. */
+/* The step in the window, y downwards, for a step of one texel to the right and one down, on
+   face i of the disk. 0: the face has no area in the atlas. */
 static int txi_texel_steps(const txi_sheet *l, size_t i, double right[2], double down[2]) {
     const txm_vec2 *t = l->s->uv + 3 * (size_t)l->disk.faces[i];
     const uint32_t *c = l->disk.corner + 3 * i;
@@ -375,7 +386,8 @@ static uint32_t txi_main_chart(const txi_sheet *l, uint32_t *counts) {
     uint32_t best = l->s->chart[l->centre];
     memset(counts, 0, l->s->face_count * sizeof *counts);
     for (size_t i = 0; i < l->group.count; i++)
-        counts[l->s->chart[l->group.items[i]]] += (uint32_t)txi_missing_count(l->d, l->group.items[i]);
+        counts[l->s->chart[l->group.items[i]]] +=
+            (uint32_t)txi_missing_count(l->d, l->group.items[i]);
     for (uint32_t c = 0; c < l->s->face_count; c++) {
         if (counts[c] > counts[best]) best = c;
     }
@@ -405,8 +417,8 @@ static void txi_sheet_texel(const txi_sheet *l, size_t i, uint32_t texel, double
     }
 }
 
-/* What the window should show: the disk, but not more than three bands around the missing texels, as faces
-   may be much larger than the hole. */
+/* What the window should show: the disk, but not more than three bands around the missing
+   texels, as faces may be much larger than the hole. */
 static txi_bounds txi_sheet_bounds(const txi_sheet *l) {
     txi_bounds all = {1e300, 1e300, -1e300, -1e300}, hole = all;
     const double wide = 3 * txi_band(l->texels);
@@ -433,9 +445,9 @@ static txi_bounds txi_sheet_bounds(const txi_sheet *l) {
     return all;
 }
 
-/* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that on the
-   main chart texels and pixels coincide as well as they can, so that little is lost by interpolation.
-   0: it is not finite, or too large for a window. */
+/* Place the disk in the window: pixels as large as texels of the hole, turned and moved so that
+   on the main chart texels and pixels coincide as well as they can, so that little is lost by
+   interpolation. 0: it is not finite, or too large for a window. */
 static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
     const txi_disk *disk = &l->disk;
     const uint32_t chart = txi_main_chart(l, counts);
@@ -450,7 +462,8 @@ static int txi_sheet_place(txi_sheet *l, uint32_t *counts) {
         double u[2], v[2];
         const double n = l->is_source ? l->weight[disk->faces[i]]
                                       : (double)txi_missing_count(l->d, disk->faces[i]);
-        if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v)) continue;
+        if (l->s->chart[disk->faces[i]] != chart || !(n > 0) || !txi_texel_steps(l, i, u, v))
+            continue;
         c += n * u[0];
         s += n * u[1];
         if (reference < 0 && !l->is_source) reference = (int64_t)i;

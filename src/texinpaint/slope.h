@@ -32,14 +32,16 @@ static const int txi_gradient_weight[TXI_GRADIENT_TAPS + 1] = {64, 45, 16, 3};
 
 /* The slopes of the planes through the known pixels around (x, y): 6 numbers, levels per pixel. */
 static void txi_slope(const txi_slopes *f, int x, int y, double slope[6]) {
-    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x, y */
+    double m[6] = {0, 0, 0, 0, 0, 0}, v[3][3] = {{0}}; /* 1, x, y, xx, xy, yy; per channel 1, x,
+                                                          y                                      */
     for (int j = -TXI_GRADIENT_TAPS; j <= TXI_GRADIENT_TAPS; j++) {
         for (int i = -TXI_GRADIENT_TAPS; i <= TXI_GRADIENT_TAPS; i++) {
             const int px = x + i, py = y + j;
             if (px < 0 || py < 0 || px >= f->width || py >= f->height) continue;
             const size_t at = (size_t)py * (size_t)f->width + (size_t)px;
             if (!f->known[at]) continue;
-            const double w = txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
+            const double w =
+                txi_gradient_weight[i < 0 ? -i : i] * txi_gradient_weight[j < 0 ? -j : j];
             m[0] += w;
             m[1] += w * i;
             m[2] += w * j;
@@ -74,7 +76,7 @@ static int16_t txi_gradient_round(double slope) {
 /* The job of one band of rows. rows: scratch of this band, 6 * width * (TXI_BAND_ROWS + 6) ints */
 typedef struct txi_slopes_job {
     txi_slopes *field;
-    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere   */
+    const int32_t *away; /* gradients are computed where this is at most reach; NULL: everywhere  */
     int32_t reach;
     int32_t *rows;
     int first;           /* band of index 0                                                     */
@@ -89,8 +91,8 @@ static void txi_gradient_row(const txi_slopes *f, int y, int32_t *out) {
         for (int k = 0; k < 3; k++) {
             out[6 * x + k] = 64 * p[k] + 45 * (p[k - 4] + p[k + 4]) + 16 * (p[k - 8] + p[k + 8]) +
                              3 * (p[k - 12] + p[k + 12]);
-            out[6 * x + 3 + k] =
-                45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) + 9 * (p[k + 12] - p[k - 12]);
+            out[6 * x + 3 + k] = 45 * (p[k + 4] - p[k - 4]) + 32 * (p[k + 8] - p[k - 8]) +
+                                 9 * (p[k + 12] - p[k - 12]);
         }
     }
 }
@@ -194,16 +196,17 @@ static void txi_tensor_band(const txi_slopes_job *job, int y0, int y1, int32_t *
 static void txi_slopes_body(void *context, int index) {
     const txi_slopes_job *job = (const txi_slopes_job *)context;
     const int y0 = (job->first + index) * TXI_BAND_ROWS;
-    const int y1 = y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
+    const int y1 =
+        y0 + TXI_BAND_ROWS < job->field->height ? y0 + TXI_BAND_ROWS : job->field->height;
     int32_t *rows = job->rows + (size_t)index * 6 * (size_t)job->field->width * (TXI_BAND_ROWS + 6);
     if (job->smooth) txi_tensor_band(job, y0, y1, rows);
     else txi_gradient_band(job, y0, y1, rows);
 }
 
-/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. The tensor's memory is
-   that of brief, it is not needed once lines have been followed. */
-static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach, txm_arena *arena,
-                                  txm_arena *brief, txm_env *env) {
+/* The gradients of a picture where it is known; away and reach as in txi_slopes_job. The
+   tensor's memory is that of brief, it is not needed once lines have been followed. */
+static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t reach,
+                                  txm_arena *arena, txm_arena *brief, txm_env *env) {
     const size_t count = (size_t)f->width * (size_t)f->height;
     const int bands = (f->height + TXI_BAND_ROWS - 1) / TXI_BAND_ROWS;
     const int most = bands < TXI_BANDS ? bands : TXI_BANDS;
@@ -219,8 +222,8 @@ static txm_status txi_slopes_make(txi_slopes *f, const int32_t *away, int32_t re
     job.reach = reach;
     for (job.smooth = 0; job.smooth < 2; job.smooth++) {
         for (job.first = 0; job.first < bands; job.first += most)
-            txm_parallel_for(env, bands - job.first < most ? bands - job.first : most, txi_slopes_body,
-                             &job);
+            txm_parallel_for(env, bands - job.first < most ? bands - job.first : most,
+                             txi_slopes_body, &job);
     }
     return TXM_OK;
 }
@@ -246,7 +249,8 @@ static double txi_strength_at(const txi_slopes *f, double x, double y) {
     const int ix = (int)x, iy = (int)y;
     const float *p = f->strength + (size_t)iy * (size_t)f->width + (size_t)ix;
     const double u = x - ix, v = y - iy;
-    return (p[0] * (1 - u) + p[1] * u) * (1 - v) + (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
+    return (p[0] * (1 - u) + p[1] * u) * (1 - v) +
+           (p[f->width] * (1 - u) + p[f->width + 1] * u) * v;
 }
 
 #endif /* TEXINPAINT_SLOPE_H */

@@ -8,7 +8,7 @@
 #define TXI_NO_FACE 0xffffffffu
 
 enum {
-    TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel     */
+    TXI_REPEATS = 64, /* ours: pictures that a face may cover in u or v; others cover no texel    */
     TXI_TILE = 8,     /* ours: texels of a side                                                   */
     TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
 };
@@ -19,17 +19,18 @@ struct txi_surface {
     size_t face_count, vertex_count; /* vertices: welded, those at equal positions are one      */
     txm_dvec3 *point;    /* 1 per vertex                                                       */
     uint32_t *vertex;    /* 3 per face: its vertices                                           */
-    uint32_t *opposite;  /* 3 per face: the side beyond side k, which runs from corner k to the next;
-                            TXM_NO_SIDE at borders                                             */
+    uint32_t *opposite;  /* 3 per face: the side beyond side k, which runs from corner k to the
+                            next; TXM_NO_SIDE at borders                                         */
     txm_vec2 *uv;        /* 3 per face: its corners in texels, texel centres are whole numbers; not
                             wrapped                                                            */
     uint32_t *chart;     /* 1 per face: faces that are connected in the atlas, or that overlap
                             there, have the same number                                        */
     uint32_t *owner;     /* 1 per texel: the first face that covers its centre, or TXI_NO_FACE  */
-    uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] - 1] */
+    uint32_t *first, *corners; /* the corners of vertex v: corners[first[v]] .. [first[v + 1] -
+                                  1]                                                             */
     uint32_t *hole_first, *hole; /* the texels of face f that were missing, in the same form     */
-    uint32_t *tile;      /* 1 per TXI_TILE x TXI_TILE texels: the chart, if they all have the same, or
-                            TXI_NO_FACE                                                        */
+    uint32_t *tile;      /* 1 per TXI_TILE x TXI_TILE texels: the chart, if they all have the
+                            same, or TXI_NO_FACE                                                 */
     size_t tile_stride;  /* tiles in a row                                                     */
     size_t cursor;       /* no texel before this one is missing and covered                    */
 };
@@ -124,8 +125,8 @@ static int txi_is_sewn(const txi_surface *s, uint32_t a, uint32_t b) {
                fabs((double)q.y - t.y) < 1e-2;
 }
 
-/* Link those of the sides of an edge that have no opposite yet: two that run against one another, or
-   where there are more, pairs that also lie together in the atlas. */
+/* Link those of the sides of an edge that have no opposite yet: two that run against one
+   another, or where there are more, pairs that also lie together in the atlas. */
 static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_t *sides,
                           size_t count) {
     uint32_t open[TXI_FINS];
@@ -138,7 +139,8 @@ static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_
     }
     for (int i = 0; i < n; i++) {
         for (int j = i + 1; j < n && s->opposite[open[i]] == TXM_NO_SIDE; j++) {
-            if (indices[open[i]] == indices[open[j]] || s->opposite[open[j]] != TXM_NO_SIDE) continue;
+            if (indices[open[i]] == indices[open[j]] || s->opposite[open[j]] != TXM_NO_SIDE)
+                continue;
             if (n > 2 && !txi_is_sewn(s, open[i], open[j])) continue;
             s->opposite[open[i]] = open[j];
             s->opposite[open[j]] = open[i];
@@ -146,8 +148,8 @@ static void txi_link_edge(txi_surface *s, const uint32_t *indices, const uint32_
     }
 }
 
-/* Fill opposite: first by the vertices that the mesh names, then by those at equal positions, as files
-   are often cut along seams. Sides of neighbours that run the same way stay unlinked. */
+/* Fill opposite: first by the vertices that the mesh names, then by those at equal positions, as
+   files are often cut along seams. Sides of neighbours that run the same way stay unlinked. */
 static txm_status txi_link_sides(const txm_mesh *mesh, txi_surface *s, txm_env *env) {
     const size_t sides = 3 * s->face_count;
     txm_arena scratch;
@@ -173,8 +175,8 @@ static txm_status txi_link_sides(const txm_mesh *mesh, txi_surface *s, txm_env *
 
 /* ---- surface: texels ------------------------------------------------------------------------- */
 
-/* The corners of all faces in texels. Those that lie repeats away from the picture are moved, face by
-   face, near to it, where numbers are exact. */
+/* The corners of all faces in texels. Those that lie repeats away from the picture are moved,
+   face by face, near to it, where numbers are exact. */
 static void txi_load_uv(const txi_domain *d, txi_surface *s) {
     const texinpaint_desc *desc = d->desc;
     for (size_t f = 0; f < s->face_count; f++) {
@@ -202,15 +204,17 @@ static int txi_wrap(int i, int n) {
    smaller than texels. */
 static size_t txi_face_texel(const txi_domain *d, const txi_surface *s, size_t face) {
     const txm_vec2 *t = s->uv + 3 * face;
-    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3, y = ((double)t[0].y + t[1].y + t[2].y) / 3;
-    const int px = txi_wrap((int)floor(x + 0.5), d->width), py = txi_wrap((int)floor(y + 0.5), d->height);
+    const double x = ((double)t[0].x + t[1].x + t[2].x) / 3,
+                 y = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const int px = txi_wrap((int)floor(x + 0.5), d->width),
+              py = txi_wrap((int)floor(y + 0.5), d->height);
     return (size_t)py * (size_t)d->width + (size_t)px;
 }
 
-/* A face meets a texel: it owns it if none before it does; else, if both lie well over the texel, their
-   charts overlap. */
-static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texel, int x, int y, int width,
-                    int height) {
+/* A face meets a texel: it owns it if none before it does; else, if both lie well over the
+   texel, their charts overlap. */
+static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texel, int x, int y,
+                    int width, int height) {
     const uint32_t owner = s->owner[texel];
     double mine[3], theirs[3];
     if (owner == TXI_NO_FACE) {
@@ -221,8 +225,10 @@ static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texe
     if (!txi_weights(s->uv + 3 * (size_t)face, x, y, mine)) return;
     /* where the owner has this texel: shifted by whole pictures */
     const txm_vec2 *t = s->uv + 3 * (size_t)owner;
-    const double cx = ((double)t[0].x + t[1].x + t[2].x) / 3, cy = ((double)t[0].y + t[1].y + t[2].y) / 3;
-    const double sx = floor((cx - x) / width + 0.5) * width, sy = floor((cy - y) / height + 0.5) * height;
+    const double cx = ((double)t[0].x + t[1].x + t[2].x) / 3,
+                 cy = ((double)t[0].y + t[1].y + t[2].y) / 3;
+    const double sx = floor((cx - x) / width + 0.5) * width,
+                 sy = floor((cy - y) / height + 0.5) * height;
     if (!txi_weights(t, x + sx, y + sy, theirs)) return;
     for (int k = 0; k < 3; k++) {
         if (mine[k] < 0.02 || theirs[k] < 0.02) return;
@@ -260,7 +266,8 @@ static void txi_cover_face(const txi_domain *d, txi_surface *s, uint32_t *charts
         int end = (int)floor(to + 1e-6) + 1;
         if (end - begin > d->width) end = begin + d->width;
         for (int x = begin; x < end; x++)
-            txi_own(s, charts, face, row + (size_t)txi_wrap(x, d->width), x, y, d->width, d->height);
+            txi_own(s, charts, face, row + (size_t)txi_wrap(x, d->width), x, y, d->width,
+                    d->height);
     }
 }
 
@@ -271,7 +278,8 @@ static void txi_cover(txi_domain *d, txi_surface *s) {
     for (uint32_t f = 0; f < s->face_count; f++) s->chart[f] = f;
     for (uint32_t side = 0; side < 3 * s->face_count; side++) {
         const uint32_t other = s->opposite[side];
-        if (other < side && txi_is_sewn(s, side, other)) txi_join_sets(s->chart, side / 3, other / 3);
+        if (other < side && txi_is_sewn(s, side, other))
+            txi_join_sets(s->chart, side / 3, other / 3);
     }
     for (uint32_t f = 0; f < s->face_count; f++) txi_cover_face(d, s, s->chart, f);
     for (uint32_t f = 0; f < s->face_count; f++) s->chart[f] = txi_root(s->chart, f);
@@ -292,8 +300,9 @@ static void txi_fill_tiles(const txi_domain *d, txi_surface *s) {
     }
 }
 
-/* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at first[k] ..
-   first[k + 1] - 1. Only those with a mark, if there are marks. first: room for count + 1. */
+/* Lists by key: items receives the numbers i of all keys[i] below count, those of key k at
+   first[k] .. first[k + 1] - 1. Only those with a mark, if there are marks. first: room for
+   count + 1. */
 static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks, size_t count,
                     uint32_t *first, uint32_t *items) {
     memset(first, 0, (count + 1) * sizeof *first);
@@ -302,7 +311,8 @@ static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks
     }
     for (size_t k = 1; k <= count; k++) first[k] += first[k - 1];
     const uint32_t total = first[count];
-    for (size_t i = key_count; i-- > 0;) { /* backwards, which leaves in first[k + 1] where k begins */
+    for (size_t i = key_count; i-- > 0;) { /* backwards, which leaves in first[k + 1] where k
+                                              begins                                             */
         if (keys[i] < count && (!marks || marks[i])) items[--first[keys[i] + 1]] = (uint32_t)i;
     }
     for (size_t k = 0; k < count; k++) first[k] = first[k + 1];
@@ -311,7 +321,8 @@ static void txi_bin(const uint32_t *keys, size_t key_count, const uint8_t *marks
 
 /* Make d->surface, if desc has a mesh, and d->covered. d->missing must be set. A picture is covered
    everywhere.
-   cost    O(faces + texels), faces * log of the corners of a vertex; 80 bytes per face, 5 per texel */
+   cost    O(faces + texels), faces * log of the corners of a vertex; 80 bytes per face, 5 per
+           texel */
 static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env) {
     const txm_mesh *mesh = &d->desc->mesh;
     const size_t texels = (size_t)d->width * (size_t)d->height, faces = mesh->face_count;
@@ -333,8 +344,8 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
     s->chart = (uint32_t *)txm_arena_alloc(arena, faces, sizeof(uint32_t));
     s->owner = (uint32_t *)txm_arena_alloc(arena, texels, sizeof(uint32_t));
     s->tile_stride = (size_t)(d->width - 1) / TXI_TILE + 1;
-    s->tile = (uint32_t *)txm_arena_alloc(arena, s->tile_stride * ((size_t)(d->height - 1) / TXI_TILE + 1),
-                                          sizeof(uint32_t));
+    s->tile = (uint32_t *)txm_arena_alloc(
+        arena, s->tile_stride * ((size_t)(d->height - 1) / TXI_TILE + 1), sizeof(uint32_t));
     s->hole_first = (uint32_t *)txm_arena_alloc(arena, faces + 1, sizeof(uint32_t));
     s->first = (uint32_t *)txm_arena_alloc(arena, mesh->vertex_count + 1, sizeof(uint32_t));
     if (arena->failed) return txi_no_memory(env);

@@ -5,19 +5,20 @@
 
 /* ---- lines near a hole ------------------------------------------------------------------------
    The structure of [1, II.A]: points of strong colour gradient near the hole, thinned to lines, and
-   the ends of these lines at the border of the hole. A window is almost isometric to the surface, so
-   the gradient in the window is the gradient on the surface.                                       */
+   the ends of these lines at the border of the hole. A window is almost isometric to the
+   surface, so the gradient in the window is the gradient on the surface. */
 
 enum {
     TXI_PROFILE = 21,       /* samples of the colours across a line, half a pixel apart          */
     TXI_MAX_ENDS = 512,     /* the strongest ones are kept; ours                                */
     TXI_TRACE_LEAST = 24,   /* pixels; lines are followed outwards over 0.8 of the width of the */
     TXI_TRACE_MOST = 120,   /* hole, but within these limits; ours                              */
-    TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat angles */
-    TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that         */
-    TXI_BENT_FIT = 40,      /* pixels; parabolas are fitted to as much of a line, or half of the width of
-                               the hole; ours                                                    */
-    TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own        */
+    TXI_INNER = 24,         /* steps towards the hole, from where an end was found; for flat
+                               angles                                                            */
+    TXI_END_REACHES = 30,   /* squared pixels; a line must come as near to the hole as that       */
+    TXI_BENT_FIT = 40,      /* pixels; parabolas are fitted to as much of a line, or half of the
+                               width of the hole; ours                                           */
+    TXI_CORNER = 12,        /* points next to the hole that may have a direction of their own     */
     TXI_LOOK_AHEAD = 45     /* pixels beyond the hole in which lines are looked for; ours       */
 };
 
@@ -73,7 +74,8 @@ typedef struct txi_walk {
 /* Derivative of RGB in direction (rx, ry) at a pixel, levels per pixel. */
 static void txi_change_at(const txi_slopes *f, size_t i, double rx, double ry, double change[3]) {
     const int16_t *g = f->gradient + 6 * i;
-    for (int c = 0; c < 3; c++) change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / (double)TXI_GRADIENT_UNIT;
+    for (int c = 0; c < 3; c++)
+        change[c] = (g[2 * c] * rx + g[2 * c + 1] * ry) / (double)TXI_GRADIENT_UNIT;
 }
 
 /* Correlation of two colour changes, -1..1. */
@@ -182,7 +184,7 @@ static txm_status txi_thin_all(txi_lines *l, int32_t reach, txm_arena *arena, tx
     const size_t count = (size_t)f->width * (size_t)f->height;
     l->thin_at = (int32_t *)txm_arena_alloc(arena, count, sizeof *l->thin_at);
     if (arena->failed) return txi_no_memory(env);
-    for (int pass = 0; pass < 2; pass++) { /* count, then keep                                     */
+    for (int pass = 0; pass < 2; pass++) { /* count, then keep                                    */
         int n = 0;
         for (int y = 0; y < f->height; y++) {
             for (int x = 0; x < f->width; x++) {
@@ -226,8 +228,8 @@ static txm_vec2 txi_inwards(const txi_lines *l, int x, int y) {
     return txi_unit(gx, gy);
 }
 
-/* Follow a line from a point near the border both ways: points from the border outwards. Returns how
-   many; walk receives the direction inwards at the first point. */
+/* Follow a line from a point near the border both ways: points from the border outwards. Returns
+   how many; walk receives the direction inwards at the first point. */
 static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards, txm_vec2 *points,
                       int capacity, double *strength) {
     const txi_slopes *f = &l->field;
@@ -256,7 +258,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
             const ptrdiff_t i = txi_pixel(f->width, f->height, k.x, k.y);
             if (way == 0) {
                 if (l->away[i] < 2) break;
-                if (l->away[i] > 36) return 0; /* it passes by                                     */
+                if (l->away[i] > 36) return 0; /* it passes by                                    */
                 back[inner++] = txm_v2(txm_float(k.x), txm_float(k.y));
             } else {
                 /* back at the border of the hole: it does not lead away from it                  */
@@ -328,14 +330,16 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
     return sqrt(error / i);
 }
 
-/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
-static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does
+   not. */
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
+                       txi_end *e) {
     const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
     double fit[6], line[6], s = 0;
     int n = e->count, found = 0;
     for (;;) {
-        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
-           pieces a parabola is no arc                                                            */
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over
+           long pieces a parabola is no arc */
         const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
         const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
@@ -346,7 +350,7 @@ static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *
             break;
         n = n * 3 / 4;
     }
-    /* a corner near the hole: the first points alone are straight, in another direction            */
+    /* a corner near the hole: the first points alone are straight, in another direction          */
     if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
         const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
         if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
@@ -354,7 +358,7 @@ static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *
             n = TXI_CORNER;
         }
     }
-    for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels     */
+    for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels   */
         s = -0.25 * i;
         const ptrdiff_t at = txi_pixel(w->width, w->height, fit[0] + fit[1] * s + fit[2] * s * s,
                                        fit[3] + fit[4] * s + fit[5] * s * s);
@@ -365,7 +369,7 @@ static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *
     const double dx = fit[1] + 2 * fit[2] * s, dy = fit[4] + 2 * fit[5] * s;
     const double speed = sqrt(dx * dx + dy * dy);
     if (speed < 0.1) return 0;
-    for (int d = 0; d < 2; d++) { /* from now on s = 0 is the border                               */
+    for (int d = 0; d < 2; d++) { /* from now on s = 0 is the border                              */
         double *p = fit + 3 * d;
         p[0] += p[1] * s + p[2] * s * s;
         p[1] += 2 * p[2] * s;
@@ -439,7 +443,8 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     if (e->count < 5) return;
     const txm_vec2 p = l->points[e->first];
     const ptrdiff_t at = txi_pixel(w->width, w->height, p.x, p.y);
-    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e)) return;
+    if (at < 0 || l->away[at] > TXI_END_REACHES || !txi_fit_end(w, l, l->points + e->first, e))
+        return;
     e->strength = txm_float(strength);
     e->length = (float)e->count;
     e->is_long = e->length >= (float)TXI_TRACE_LEAST || e->length >= 0.8f * l->limit;
@@ -449,12 +454,13 @@ static void txi_try_end(const txi_window *w, txi_lines *l, const txi_thin *t, in
     l->end_count++;
 }
 
-/* Ends from points near the hole: 2.6 to 4.2 pixels from it, then up to 6 pixels, for lines that are lost
-   on their last pixels; the strongest first. */
+/* Ends from points near the hole: 2.6 to 4.2 pixels from it, then up to 6 pixels, for lines that
+   are lost on their last pixels; the strongest first. */
 static txm_status txi_find_ends(const txi_window *w, txi_lines *l, txm_arena *arena,
                                 txm_arena *scratch, txm_env *env) {
     const int room = (int)l->limit + TXI_INNER;
-    txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
+    txm_pair *order =
+        (txm_pair *)txm_arena_alloc(scratch, (size_t)l->thin_count, 2 * sizeof *order);
     if (l->thin_count == 0) return TXM_OK;
     l->ends = (txi_end *)txm_arena_zero(arena, TXI_MAX_ENDS, sizeof *l->ends);
     l->points = (txm_vec2 *)txm_arena_alloc(arena, TXI_MAX_ENDS * (size_t)room, sizeof *l->points);
@@ -536,7 +542,7 @@ static txm_status txi_trace(const txi_window *w, txm_arena *arena, txm_env *env,
     for (int i = 0; i < lines->end_count && status == TXM_OK; i++) longs += lines->ends[i].is_long;
     if (lines->end_count && status == TXM_OK)
         lines->share_long = (float)longs / (float)lines->end_count;
-    lines->field.gap = lines->field.tensor = NULL; /* they were in scratch                           */
+    lines->field.gap = lines->field.tensor = NULL; /* they were in scratch                        */
     txm_arena_free(&scratch);
     return status;
 }

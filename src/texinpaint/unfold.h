@@ -8,8 +8,8 @@
 /* ours, radians: a disk that has more curvature than this is slit, from there to its border */
 #define TXI_BEND 0.8
 
-/* Faces that form a topological disk, glued along their sides. A vertex of the surface that the disk
-   meets from several parts of its border has a copy in each. */
+/* Faces that form a topological disk, glued along their sides. A vertex of the surface that the
+   disk meets from several parts of its border has a copy in each. */
 typedef struct txi_disk {
     uint32_t *faces;        /* of the surface                                                    */
     size_t face_count, room;
@@ -52,7 +52,8 @@ static uint32_t txi_new_vertex(txi_disk *disk) {
     return (uint32_t)disk->vertex_count++;
 }
 
-/* the side of the disk that this side of the surface is, TXM_NO_SIDE if its face is not in the disk */
+/* the side of the disk that this side of the surface is, TXM_NO_SIDE if its face is not in the
+   disk */
 static uint32_t txi_disk_side(const txi_disk *disk, uint32_t side) {
     if (side == TXM_NO_SIDE || disk->slot[side / 3] == TXI_NO_FACE) return TXM_NO_SIDE;
     return 3 * disk->slot[side / 3] + side % 3;
@@ -82,15 +83,16 @@ static void txi_disk_begin(txi_disk *disk, uint32_t face) {
     }
 }
 
-/* The angle of the vector (x, y), y at least 0: 0 to pi. With tan(a / 2) = y / (r + x), halved twice more,
-   then Taylor; only operations that give the same bits everywhere. */
+/* The angle of the vector (x, y), y at least 0: 0 to pi. With tan(a / 2) = y / (r + x), halved
+   twice more, then Taylor; only operations that give the same bits everywhere. */
 static double txi_angle(double x, double y) {
     const double r = sqrt(x * x + y * y);
     if (!(r > 0) || (x < 0 && y <= -x * 1e-9)) return r > 0 ? TXM_PI : 0;
     double t = y / (r + x), turns = 2;
     for (; turns < 16 || t > 0.2; turns *= 2) t /= 1 + sqrt(1 + t * t);
     const double tt = t * t;
-    return turns * t * (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt * (1.0 / 9 - tt / 11)))));
+    return turns * t *
+           (1 - tt * (1.0 / 3 - tt * (1.0 / 5 - tt * (1.0 / 7 - tt * (1.0 / 9 - tt / 11)))));
 }
 
 /* The curvature at a vertex of the surface: what the angles of its faces lack to a full turn. */
@@ -106,11 +108,12 @@ static double txi_angle_lack(const txi_surface *s, uint32_t vertex) {
     return sum;
 }
 
-/* A vertex is about to come to lie within the disk. Should the disk stay slit there, as it has become
-   too curved to lie flat? */
+/* A vertex is about to come to lie within the disk. Should the disk stay slit there, as it has
+   become too curved to lie flat? */
 static int txi_disk_slits(txi_disk *disk, const txi_surface *s, uint32_t vertex) {
     disk->bend += txi_angle_lack(s, vertex);
-    if (!disk->depth || disk->depth[vertex] <= disk->slit_from || fabs(disk->bend) < TXI_BEND) return 0;
+    if (!disk->depth || disk->depth[vertex] <= disk->slit_from || fabs(disk->bend) < TXI_BEND)
+        return 0;
     disk->bend = 0;
     return 1;
 }
@@ -119,7 +122,8 @@ static int txi_disk_slits(txi_disk *disk, const txi_surface *s, uint32_t vertex)
    sides before and behind them, and so on. At least three sides stay. */
 static void txi_disk_zip(txi_disk *disk, const txi_surface *s, uint32_t side) {
     while (disk->loop >= 5) {
-        const uint32_t other = disk->next[side], before = disk->prev[side], behind = disk->next[other];
+        const uint32_t other = disk->next[side], before = disk->prev[side],
+                       behind = disk->next[other];
         if (txi_disk_side(disk, s->opposite[txi_surface_side(disk, side)]) != other) return;
         if (txi_disk_slits(disk, s, s->vertex[txi_surface_side(disk, other)])) return;
         txi_join_sets(disk->parent, disk->corner[side], disk->corner[txi_next_corner(other)]);
@@ -133,13 +137,16 @@ static void txi_disk_zip(txi_disk *disk, const txi_surface *s, uint32_t side) {
 
 /* Add the face beyond a side of the border, which must not be in the disk yet:
 
-           c              The border runs  p, a b, q  before,  p, a c, c b, q  after. Where p and a c
-       n1 / \ n2          are the two sides of one edge they are glued, and a lies within; so are c b
+           c              The border runs  p, a b, q  before,  p, a c, c b, q  after. Where p and a
+                          c
+       n1 / \ n2          are the two sides of one edge they are glued, and a lies within; so are c
+                          b
          /   \            and q. Where an edge returns to another part of the border it is not: that
-    p > a --> b > q       would make a ring. It stays a cut.                                        */
+    p > a --> b > q       would make a ring. It stays a cut.                                      */
 static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
     const uint32_t o = s->opposite[txi_surface_side(disk, side)];
-    const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side], behind = disk->next[side];
+    const uint32_t i = (uint32_t)disk->face_count++, before = disk->prev[side],
+                   behind = disk->next[side];
     const uint32_t base = 3 * i + o % 3, n1 = txi_next_corner(base), n2 = txi_next_corner(n1);
     disk->faces[i] = o / 3;
     disk->grown_from[i] = side / 3;
@@ -155,11 +162,13 @@ static void txi_disk_add(txi_disk *disk, const txi_surface *s, uint32_t side) {
     disk->loop++;
     disk->border = n1;
     txi_disk_zip(disk, s, n2);
-    if (disk->is_border[n1] && disk->is_border[disk->prev[n1]]) txi_disk_zip(disk, s, disk->prev[n1]);
+    if (disk->is_border[n1] && disk->is_border[disk->prev[n1]])
+        txi_disk_zip(disk, s, disk->prev[n1]);
 }
 
 /* Number the vertices from 0 and resolve the corners. point receives one for each. */
-static void txi_disk_finish(txi_disk *disk, const txi_surface *s, uint32_t *number, txm_dvec3 *point) {
+static void txi_disk_finish(txi_disk *disk, const txi_surface *s, uint32_t *number,
+                            txm_dvec3 *point) {
     uint32_t count = 0;
     for (size_t v = 0; v < disk->vertex_count; v++) number[v] = TXI_NO_FACE;
     for (size_t c = 0; c < 3 * disk->face_count; c++) {

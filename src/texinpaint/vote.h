@@ -4,9 +4,10 @@
 #include "config.h"
 
 /* ---- tensor voting ----------------------------------------------------------------------------
-   C. Tang, G. Medioni. Inference of integrated surface, curve and junction descriptions from sparse 3D
-   data. PAMI 1998. Each token, a point of a line or surface, tells its neighbours which direction they
-   would have if both were parts of one smooth line or surface. A symmetric tensor collects the votes:
+   C. Tang, G. Medioni. Inference of integrated surface, curve and junction descriptions from sparse
+   3D data. PAMI 1998. Each token, a point of a line or surface, tells its neighbours which
+   direction they would have if both were parts of one smooth line or surface. A symmetric tensor
+   collects the votes:
 
        T = l1 e1 e1' + l2 e2 e2' + l3 e3 e3',  l1 >= l2 >= l3                             [1, (1)]
          = (l1 - l2) e1 e1' + (l2 - l3) (e1 e1' + e2 e2') + l3 I
@@ -16,9 +17,9 @@
    Tensors are stored as xx xy xz yy yz zz.                                                       */
 
 enum {
-    TXI_VOTE_RADII = 40,  /* entries of the tables of the fields along the distance                */
-    TXI_VOTE_ANGLES = 24, /* and along the angle, 0 to 90 degrees                                  */
-    TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn            */
+    TXI_VOTE_RADII = 40,  /* entries of the tables of the fields along the distance               */
+    TXI_VOTE_ANGLES = 24, /* and along the angle, 0 to 90 degrees                                 */
+    TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn           */
 };
 
 /* A token: where it is, and its tensor taken apart. */
@@ -36,7 +37,7 @@ typedef struct txi_fields {
     double c;         /* penalty of curvature                                                     */
     double reach;     /* no votes beyond                                                          */
     double ball[TXI_VOTE_RADII + 1][2];  /* along the connection, across it                       */
-    double plate[TXI_VOTE_RADII + 1][TXI_VOTE_ANGLES + 1][4]; /* tt, tp, pp, qq, see below         */
+    double plate[TXI_VOTE_RADII + 1][TXI_VOTE_ANGLES + 1][4]; /* tt, tp, pp, qq, see below        */
 } txi_fields;
 
 /* Tokens in buckets, for the search of neighbours. */
@@ -59,7 +60,8 @@ static double txi_arc(double s) {
 }
 
 /* The decay of a stick's vote over distance l at an angle theta between the connection and the
-   tangent plane: along the arc of length s = l theta / sin(theta) and curvature k = 2 sin(theta) / l
+   tangent plane: along the arc of length s = l theta / sin(theta) and curvature k = 2 sin(theta) /
+   l
 
        D = exp(-(s^2 + c k^2) / sigma^2)                                                          */
 static double txi_decay(const txi_fields *f, double l, double sine) {
@@ -79,7 +81,8 @@ static inline void txi_outer(double t[6], txm_dvec3 v, double weight) {
 
 /* The vote of a stick with unit normal n at v from it: the normal of the circle that touches the
    stick's tangent plane and goes through v. Nothing beyond 45 degrees. */
-static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double weight, double t[6]) {
+static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double weight,
+                           double t[6]) {
     const double l = txm_d3_len(v);
     if (!(l > 0) || l > f->reach) return;
     const txm_dvec3 u = txm_d3_scale(v, 1 / l);
@@ -101,21 +104,24 @@ static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double
    plates  0: no plates will vote, which saves most of the time                                  */
 static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->sigma = sigma;
-    /* so that an eighth of a circle and a straight line of the same length differ as in the paper */
+    /* so that an eighth of a circle and a straight line of the same length differ as in the
+       paper */
     f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
     f->reach = 2.5 * sigma;
     for (int i = 0; i <= TXI_VOTE_RADII; i++) {
         const double l = f->reach * (i > 0 ? i : 0.01) / (double)TXI_VOTE_RADII;
         f->ball[i][0] = f->ball[i][1] = 0;
-        for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                             */
-            const double width = 0.70710678118654752 / (double)TXI_VOTE_STICKS, s = width * (k + 0.5);
+        for (int k = 0; k < TXI_VOTE_STICKS; k++) { /* both signs of s                            */
+            const double width = 0.70710678118654752 / (double)TXI_VOTE_STICKS,
+                         s = width * (k + 0.5);
             const double d = 2 * width * txi_decay(f, l, s);
             f->ball[i][0] += 1.5 * d * s * s;
             f->ball[i][1] += 0.75 * d * (1 - s * s);
         }
         for (int j = 0; j <= TXI_VOTE_ANGLES && plates; j++) {
             double sine, cosine, *e = f->plate[i][j];
-            txm_sincos(0.5 * TXM_PI * j / (double)TXI_VOTE_ANGLES, &sine, &cosine); /* u = cosine t + sine p */
+            /* u = cosine t + sine p */
+            txm_sincos(0.5 * TXM_PI * j / (double)TXI_VOTE_ANGLES, &sine, &cosine);
             e[0] = e[1] = e[2] = e[3] = 0;
             for (int k = 0; k < TXI_VOTE_STICKS; k++) {
                 double np, nq;
@@ -169,8 +175,10 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
     const txm_dvec3 q = txm_d3_cross(tangent, p);
     /* the angle from its sine or cosine, whichever is less: theta = x * arc(x^2)                 */
     const double sine = far_off / l;
-    const double angle = sine < cosine ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
-                                       : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
+    const double angle =
+        sine < cosine
+            ? sine * txi_arc(sine * sine < 0.5 ? sine * sine : 0.5)
+            : 0.5 * TXM_PI - cosine * txi_arc(cosine * cosine < 0.5 ? cosine * cosine : 0.5);
     const double across = angle * (double)TXI_VOTE_ANGLES / (0.5 * TXM_PI);
     const int i = (int)at, j = txm_clampi((int)across, 0, TXI_VOTE_ANGLES - 1);
     const double r = at - i, a = across - j;
@@ -178,7 +186,7 @@ static void txi_vote_plate(const txi_fields *f, txm_dvec3 tangent, txm_dvec3 v, 
         e[k] = weight * ((f->plate[i][j][k] * (1 - a) + f->plate[i][j + 1][k] * a) * (1 - r) +
                          (f->plate[i + 1][j][k] * (1 - a) + f->plate[i + 1][j + 1][k] * a) * r);
     }
-    txi_outer(t, tangent, e[0] - e[1]); /* e1 (tp' + pt') = e1 ((t + p)(t + p)' - tt' - pp')       */
+    txi_outer(t, tangent, e[0] - e[1]); /* e1 (tp' + pt') = e1 ((t + p)(t + p)' - tt' - pp')      */
     txi_outer(t, p, e[2] - e[1]);
     txi_outer(t, txm_d3_add(tangent, p), e[1]);
     txi_outer(t, q, e[3]);
@@ -209,14 +217,15 @@ static void txi_token_set(txi_token *k, const double t[6]) {
     k->ball = value[2] > 0 ? value[2] : 0;
 }
 
-/* The surface as a constraint: lines lie in it, so that only the part of a tensor in the tangent plane
-   counts, P T P with P = I - n n'. A line in direction d, which is a plate (I - d d'), becomes the
-   stick m m' with m = n x d, which votes within the surface only. */
+/* The surface as a constraint: lines lie in it, so that only the part of a tensor in the tangent
+   plane counts, P T P with P = I - n n'. A line in direction d, which is a plate (I - d d'),
+   becomes the stick m m' with m = n x d, which votes within the surface only. */
 static void txi_onto_surface(double t[6], txm_dvec3 n) {
-    const txm_dvec3 tn = txm_d3(t[0] * n.x + t[1] * n.y + t[2] * n.z, t[1] * n.x + t[3] * n.y + t[4] * n.z,
-                                t[2] * n.x + t[4] * n.y + t[5] * n.z);
+    const txm_dvec3 tn =
+        txm_d3(t[0] * n.x + t[1] * n.y + t[2] * n.z, t[1] * n.x + t[3] * n.y + t[4] * n.z,
+               t[2] * n.x + t[4] * n.y + t[5] * n.z);
     const double nn = txm_d3_dot(n, tn);
-    /* T - n (Tn)' - (Tn) n' + (n'Tn) n n'                                                         */
+    /* T - n (Tn)' - (Tn) n' + (n'Tn) n n'                                                        */
     t[0] += -2 * n.x * tn.x + nn * n.x * n.x;
     t[1] += -n.x * tn.y - n.y * tn.x + nn * n.x * n.y;
     t[2] += -n.x * tn.z - n.z * tn.x + nn * n.x * n.z;
@@ -286,8 +295,8 @@ static void txi_votes_at(const txi_fields *f, const txi_tokens *k, txm_dvec3 pla
 }
 
 /* Sparse voting: each token receives the votes of the others, which replace its tensor. balls: the
-   first round, in which only the places are known. normals: one per token, the surface on which lines
-   lie, or NULL. scratch: 6 numbers per token. */
+   first round, in which only the places are known. normals: one per token, the surface on which
+   lines lie, or NULL. scratch: 6 numbers per token. */
 static void txi_vote_sparse(const txi_fields *f, txi_tokens *k, int balls, const txm_dvec3 *normals,
                             double *scratch) {
     for (int i = 0; i < k->count; i++) {

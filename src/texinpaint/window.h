@@ -13,9 +13,9 @@ enum {
     TXI_WINDOW_MOST = 1 << 20, /* pixels of a window; larger holes take several                */
     TXI_WINDOW_GROUP = 400000, /* pixels up to which the windows of near holes are joined      */
     TXI_WINDOW_SIDE = 1000,    /* pixels: side of a window in a hole that is larger            */
-    TXI_SIDE_MOST = 4000,      /* pixels: longest diagonal of a window: offsets between places in it,
-                                  turned copies included, fit 13 bits (assemble.h), and their
-                                  coordinates in 1/65536 pixels an int32_t (pose.h)             */
+    TXI_SIDE_MOST = 4000,      /* pixels: longest diagonal of a window: offsets between places in
+                                  it, turned copies included, fit 13 bits (assemble.h), and their
+                                  coordinates in 1/65536 pixels an int32_t (pose.h)              */
     TXI_MARGIN = 32            /* pixels: what lies nearer to a cut through a hole is left to the
                                   next window                                                  */
 };
@@ -76,7 +76,8 @@ static txi_box txi_box_union(txi_box a, txi_box b) {
     return a;
 }
 
-/* .9 times the diameter of a disk of this area, within limits: how much is laid out around a hole */
+/* .9 times the diameter of a disk of this area, within limits: how much is laid out around a
+   hole */
 static int txi_band(size_t area) {
     return txm_clampi((int)(0.9 * 1.13 * sqrt((double)area)), TXI_BAND_LEAST, TXI_BAND_MOST);
 }
@@ -92,7 +93,8 @@ static int txi_flood(txi_domain *d, uint32_t start, uint8_t mark, txi_list *list
     box->left = box->right = (int)(start % (uint32_t)w);
     box->top = box->bottom = (int)(start / (uint32_t)w);
     for (; at < list->count; at++) {
-        const int x = (int)(list->items[at] % (uint32_t)w), y = (int)(list->items[at] / (uint32_t)w);
+        const int x = (int)(list->items[at] % (uint32_t)w),
+                  y = (int)(list->items[at] / (uint32_t)w);
         const txi_box pixel = {x, y, x, y};
         *box = txi_box_union(*box, pixel);
         for (int k = 0; k < 9; k++) {
@@ -127,13 +129,15 @@ static uint32_t txi_rim(const txi_domain *d, const txi_list *hole) {
 
 /* Add the holes in a window to ours as long as it does not become too large. box receives the
    bounding box of all. 0: no memory. */
-static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena *arena, txi_box *box) {
+static int txi_gather(txi_domain *d, txi_list *ours, txi_list *others, txm_arena *arena,
+                      txi_box *box) {
     for (int grown = 1; grown;) {
         const txi_box window = txi_box_grow(*box, txi_band(ours->count), d);
         grown = 0;
         for (int y = window.top; y < window.bottom && !grown; y++) {
             const size_t row = (size_t)y * (size_t)d->width;
-            const uint8_t *at = d->missing + row + window.left, *end = d->missing + row + window.right;
+            const uint8_t *at = d->missing + row + window.left,
+                          *end = d->missing + row + window.right;
             while (at < end && (at = (const uint8_t *)memchr(at, 1, (size_t)(end - at))) != NULL) {
                 const uint32_t start = (uint32_t)(at - d->missing);
                 const size_t before = others->count;
