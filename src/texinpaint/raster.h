@@ -112,8 +112,8 @@ static void txi_distances(const uint8_t *of, int width, int height, int32_t *scr
         for (int x = 0; x < width; x++) {
             int32_t *at = &out[(size_t)y * (size_t)width + (size_t)x];
             const int64_t dx = *at % width - x, dy = *at / width - y;
-            const int64_t d = *at < 0 ? TXI_FAR : dx * dx + dy * dy;
-            *at = (int32_t)(d < TXI_FAR ? d : TXI_FAR);
+            const int64_t most = TXI_FAR, d = *at < 0 ? most : dx * dx + dy * dy;
+            *at = (int32_t)(d < most ? d : most);
         }
     }
 }
