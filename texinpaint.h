@@ -7219,34 +7219,41 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
     return sqrt(error / i);
 }
 
-/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does
-   not. */
-static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
-                       txi_end *e) {
+/* The curve of the first of count points, as in txi_end.fit with s = 0 at the first point. Returns to how
+   many points it was fitted. */
+static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count, double fit[6]) {
     const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
-    double fit[6], line[6], s = 0;
-    int n = e->count, found = 0;
+    double line[6];
+    int n = count;
     for (;;) {
-        /* a straight line unless a bent one is clearly better: the direction is more exact. Over
-           long pieces a parabola is no arc */
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
+           pieces a parabola is no arc                                                            */
         const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
         const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
-        if (is_straight) memcpy(fit, line, sizeof fit);
+        if (is_straight) memcpy(fit, line, sizeof line);
         if (n <= 8) break;
         if ((is_straight ? straight : rms) < 0.5 && txi_fit_start(points, n, fit) < 0.3 &&
             (is_straight || n <= bent))
             break;
         n = n * 3 / 4;
     }
-    /* a corner near the hole: the first points alone are straight, in another direction          */
+    /* a corner near the hole: the first points alone are straight, in another direction            */
     if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
         const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
         if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
-            memcpy(fit, line, sizeof fit);
+            memcpy(fit, line, sizeof line);
             n = TXI_CORNER;
         }
     }
+    return n;
+}
+
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+    double fit[6], s = 0;
+    int found = 0;
+    const int n = txi_fit_points(l, points, e->count, fit);
     for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels   */
         s = -0.25 * i;
         const ptrdiff_t at = txi_pixel(w->width, w->height, fit[0] + fit[1] * s + fit[2] * s * s,
@@ -8762,6 +8769,37 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
     *share = l->end_count && status == TXM_OK ? sum / l->end_count : 1;
     txm_arena_free(&arena);
     return status;
+}
+
+/* The share of 8 pixels over which the known lines go on as a fit to the rest of them says, 8 pixels
+   farther out than the hole: what can be asked of a completion. About 1 for stripes, less for lines that
+   meander; 1 if no line is long enough to tell.                                                 */
+static double txi_foreseen(const txi_lines *l) {
+    enum { SKIPPED = 2, FITTED = 12 }; /* points: near the hole, and to fit to at least          */
+    double sum = 0;
+    int count = 0;
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *e = &l->ends[i];
+        const txm_vec2 *p = l->points + e->first;
+        const int from = SKIPPED + TXI_GO_ON;
+        double fit[6];
+        int n = 0;
+        if (e->count < from + FITTED) continue;
+        txi_fit_points(l, p + from, e->count - from, fit);
+        for (; n < TXI_GO_ON; n++) {
+            const double s = -(n + 1), dx = -(fit[1] + 2 * fit[2] * s), dy = -(fit[4] + 2 * fit[5] * s);
+            const txm_vec2 at = p[from - 1 - n], before = p[from - n], after = p[from - 2 - n];
+            const txm_vec2 d = txi_unit((double)after.x - before.x, (double)after.y - before.y);
+            const double ox = at.x - (fit[0] + fit[1] * s + fit[2] * s * s);
+            const double oy = at.y - (fit[3] + fit[4] * s + fit[5] * s * s);
+            const double speed = sqrt(dx * dx + dy * dy);
+            if (speed <= 0 || fabs(ox * dy - oy * dx) > 2.5 * speed) break;
+            if (d.x * dx + d.y * dy < 0.906 * speed) break;
+        }
+        sum += n / (double)TXI_GO_ON;
+        count++;
+    }
+    return count ? sum / count : 1;
 }
 
 /* The bending energy of the part of a curve in the hole: the squared angle for an arc. */
@@ -14060,50 +14098,6 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
     return status == TXM_OK ? txi_field_judge(f, field, env) : status;
 }
 
-/* A look at a field, as a picture of the window, with two measures of how good it is.
-   color   4 per pixel of the window, whose hole pixels receive RGB
-   energy  mean cost of a patch; detail: mean of log(detail / expected detail)                  */
-static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_t *color,
-                             double *energy, double *detail) {
-    const txi_level *l = &f->level[field->level];
-    const txi_window *w = f->window;
-    double ratio = 0;
-    int count = 0;
-    for (int a = 0; a < l->anchor_count; a++) {
-        const txi_match *m = &field->match[a];
-        if (m->pose < 0) continue;
-        const txi_source *s = &l->source[m->pose];
-        const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
-        const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
-        ratio += log((worth * unit + (double)TXI_WANT_FLOOR) / (l->want[a] * unit + (double)TXI_WANT_FLOOR));
-        count++;
-    }
-    *energy = field->energy;
-    *detail = count ? ratio / count : 0;
-    for (int y = 0; y < w->height; y++) {
-        for (int x = 0; x < w->width; x++) {
-            const size_t p = (size_t)y * (size_t)w->width + (size_t)x;
-            if (w->state[p] != TXI_HOLE) continue;
-            /* bilinear, in quarters of a pixel of the level */
-            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0,
-                      fy = scale ? (y & 1 ? 1 : 3) : 0;
-            const int px = ((x + scale) >> scale) - scale + TXI_EDGE,
-                      py = ((y + scale) >> scale) - scale + TXI_EDGE;
-            int sum[3] = {0, 0, 0}, total = 0;
-            for (int k = 0; k < 4; k++) {
-                const size_t q =
-                    (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
-                const int weight = (k & 1 ? fx : 4 - fx) * (k >> 1 ? fy : 4 - fy);
-                if (l->state[q] == TXI_VOID) continue;
-                total += weight;
-                for (int c = 0; c < 3; c++) sum[c] += weight * field->color[4 * q + (size_t)c];
-            }
-            for (int c = 0; c < 3 && total; c++)
-                color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
-        }
-    }
-}
-
 /* Make those sources of the finest level that enough of the field's matches use. */
 static txm_status txi_finest_sources(txi_filler *f, const txi_field *field, txm_env *env) {
     txi_level *l = &f->level[0];
@@ -14240,6 +14234,133 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
     *pose_count = f->pose_count + (plan && plan->copies ? plan->pose_count : 0);
     txm_arena_free(&memory);
     return status;
+}
+
+/* ---- a look at a completion ---------------------------------------------------------------------
+
+   What a completion to half resolution will look like at the full one: its matches propose colours of
+   the window itself, which are as sharp as the known part. Half the resolution enlarged would not do,
+   as thin lines are lost on it.                                                                */
+
+enum {
+    TXI_LOOK_STEP = 2, /* pixels of the level between the patches that propose; ours            */
+    TXI_LOOK_MOST = (TXI_PATCH / TXI_LOOK_STEP) * (TXI_PATCH / TXI_LOOK_STEP)
+};
+
+/* What is looked at. */
+typedef struct txi_look {
+    const txi_filler *filler;
+    const txi_field *field;
+    const txi_plan *plan; /* or NULL */
+    uint8_t *color;       /* 4 per pixel of the window */
+} txi_look;
+
+/* Bilinear colour of the known pixels around (x, y), in units of 2^-8 pixels of the window. 0: none of
+   them is known. */
+static int txi_look_read(const txi_window *w, int64_t x, int64_t y, uint8_t *color) {
+    const int fx = (int)(x & 255), fy = (int)(y & 255);
+    int sum[3] = {0, 0, 0}, total = 0;
+    for (int k = 0; k < 4; k++) {
+        const int64_t px = x / 256 + (k & 1), py = y / 256 + (k >> 1);
+        const int weight = (k & 1 ? fx : 256 - fx) * (k >> 1 ? fy : 256 - fy);
+        if (px >= w->width || py >= w->height || weight == 0) continue;
+        const size_t p = (size_t)py * (size_t)w->width + (size_t)px;
+        if (w->state[p] != TXI_KNOWN) continue;
+        total += weight;
+        for (int c = 0; c < 3; c++) sum[c] += weight * w->color[4 * p + (size_t)c];
+    }
+    for (int c = 0; c < 3 && total; c++) color[c] = (uint8_t)((sum[c] + total / 2) / total);
+    return total > 0;
+}
+
+/* What the match of an anchor proposes for pixel (x, y) of the window. 0: nothing. */
+static int txi_look_propose(const txi_look *v, int anchor, int x, int y, uint8_t *color) {
+    const txi_level *l = &v->filler->level[v->field->level];
+    const txi_match *m = &v->field->match[anchor];
+    if (m->pose < 0) return 0;
+    const txi_source *s = &l->source[m->pose];
+    const int n = 1 << v->field->level, corner = l->anchor[anchor];
+    /* of the source, in 1 / 2n of its pixels                                                   */
+    const int64_t i = 2 * n * (m->x - corner % l->width + TXI_EDGE) + 2 * x + 1 - n;
+    const int64_t j = 2 * n * (m->y - corner / l->width + TXI_EDGE) + 2 * y + 1 - n;
+    /* of the window, in 1 / 2 TXI_UNIT of its pixels                                           */
+    const int64_t edge = (int64_t)TXI_UNIT * (n - 1 - 2 * n * TXI_EDGE);
+    const int64_t px = 2 * n * (int64_t)s->x + s->a * i + s->c * j + edge;
+    const int64_t py = 2 * n * (int64_t)s->y + s->b * i + s->d * j + edge;
+    const int64_t unit = 2 * TXI_UNIT / 256;
+    return txi_look_read(v->filler->window, px < 0 ? 0 : px / unit, py < 0 ? 0 : py / unit, color);
+}
+
+/* The colour of pixel (x, y): of the proposals the one nearest to their mean, as in a vote. */
+static void txi_look_pixel(const txi_look *v, int x, int y) {
+    const txi_level *l = &v->filler->level[v->field->level];
+    const int scale = v->field->level;
+    const size_t at = (size_t)y * (size_t)v->filler->window->width + (size_t)x;
+    const int p = ((y >> scale) + TXI_EDGE) * l->width + (x >> scale) + TXI_EDGE;
+    uint8_t list[TXI_LOOK_MOST][4], *out = v->color + 4 * at;
+    int count = 0, best = INT_MAX, mean[3] = {0, 0, 0};
+    if (v->plan && v->plan->pull && v->plan->pull[at] >= 128) { /* the strip itself             */
+        memcpy(out, v->plan->color + 4 * at, 3);
+        return;
+    }
+    for (int k = 0; k < TXI_LOOK_MOST; k++) {
+        const int dx = k % (TXI_PATCH / TXI_LOOK_STEP) * TXI_LOOK_STEP + 1;
+        const int dy = k / (TXI_PATCH / TXI_LOOK_STEP) * TXI_LOOK_STEP + 1;
+        const int anchor = l->slot[p - dy * l->width - dx];
+        if (anchor >= 0) count += txi_look_propose(v, anchor, x, y, list[count]);
+    }
+    if (count == 0) memcpy(out, v->field->color + 4 * (size_t)p, 3);
+    for (int pass = 0; pass < 2 && count; pass++) {
+        double sum[3] = {0, 0, 0}, total = 0;
+        for (int k = 0; k < count; k++) {
+            const double weight = pass ? 1.0 / (txi_color_distance(list[k], mean) + 64) : 1;
+            total += weight;
+            for (int c = 0; c < 3; c++) sum[c] += weight * list[k][c];
+        }
+        for (int c = 0; c < 3; c++) mean[c] = (int)(sum[c] / total + 0.5);
+    }
+    for (int k = 0; k < count; k++) {
+        const int d = txi_color_distance(list[k], mean);
+        if (d >= best) continue;
+        best = d;
+        memcpy(out, list[k], 3);
+    }
+}
+
+static void txi_look_row(void *context, int y) {
+    const txi_look *v = (const txi_look *)context;
+    const txi_window *w = v->filler->window;
+    for (int x = 0; x < w->width; x++) {
+        if (w->state[(size_t)y * (size_t)w->width + (size_t)x] == TXI_HOLE) txi_look_pixel(v, x, y);
+    }
+}
+
+/* A picture of a field, and a measure of how good it is.
+   plan    that it was completed with, or NULL
+   color   4 per pixel of the window, whose hole pixels receive RGB
+   return  mean of log(detail / expected detail) of the patches                                 */
+static double txi_look_at(const txi_filler *f, const txi_field *field, const txi_plan *plan,
+                          uint8_t *color, txm_env *env) {
+    const txi_level *l = &f->level[field->level];
+    const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
+    txi_look v;
+    double ratio = 0;
+    int count = 0;
+    for (int a = 0; a < l->anchor_count; a++) {
+        const txi_match *m = &field->match[a];
+        if (m->pose < 0) continue;
+        const txi_source *s = &l->source[m->pose];
+        const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
+        ratio += log((worth * unit + (double)TXI_WANT_FLOOR) /
+                     (l->want[a] * unit + (double)TXI_WANT_FLOOR));
+        count++;
+    }
+    v.filler = f;
+    v.field = field;
+    v.plan = plan;
+    v.color = color;
+    txm_parallel_for(env, f->window->height, txi_look_row, &v);
+    return count ? ratio / count : 0;
 }
 
 /* ---- Poisson blending [1, III.B] -------------------------------------------------------------
@@ -14577,11 +14698,15 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
    Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
    stripes and ruin labyrinths. So a window is completed to half its resolution without lines, with
    the lines of a picture and with those of a pattern, and the one that goes on best where the known
-   texture ends wins. Only the winner is completed at full resolution.                             */
+   texture ends wins. If it has lines, its strips of texture are compared with mean profiles of its
+   lines. Only the winner is completed at full resolution.                                         */
 
-enum { TXI_HYPOTHESES = 3 };
+enum { TXI_HYPOTHESES = 4 };
 #define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all   */
 #define TXI_SHARE_SMOOTH 0.15   /* the same between smooth parts, where short ends are no grain    */
+#define TXI_FORESEEN 0.7        /* share of the known lines that goes on as foreseen, below which it counts less
+                                   that completed ones do; ours                                   */
+#define TXI_MEAN_BEHIND 0.012   /* what mean profiles must be better by: all are a little smoother; ours */
 #define TXI_ENERGY_WEIGHT 0.12  /* share of ends that must go on for patches that cost twice as much */
 #define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture       */
 #define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried          */
@@ -14589,13 +14714,14 @@ enum { TXI_HYPOTHESES = 3 };
 /* A hypothesis at half resolution. */
 typedef struct txi_hypothesis {
     int structure;      /* TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN                              */
-    int start;          /* TXI_START_ONION or TXI_START_PIECES                                   */
+    int is_mean;        /* mean profiles along the lines instead of strips of texture              */
     txi_curve *curves;
     int curve_count;
+    uint64_t hash;      /* of the curves                                                         */
     txi_plan plan;
     txi_field field;
     uint8_t *preview;   /* 4 per window pixel                                                    */
-    double energy, detail, score;
+    double detail, score;
     txm_arena memory;   /* of all this; empty if a better one has been found                     */
 } txi_hypothesis;
 
@@ -14606,11 +14732,13 @@ typedef struct txi_choice {
     const txi_prior *prior; /* or NULL */
     uint64_t seed;
     txi_lines lines;
+    double foreseen;    /* share of the known lines that goes on as foreseen                        */
     txm_arena of_lines; /* memory of lines; empty at the end                                     */
     txi_style style;
     txi_filler *filler;
     txi_hypothesis tried[TXI_HYPOTHESES];
     int count, best;
+    int can_be_mean;    /* mean profiles are tried, too                                          */
 } txi_choice;
 
 static void txi_choice_free(txi_choice *c) {
@@ -14644,6 +14772,8 @@ static void txi_choose_style(txi_choice *c, double grain) {
     }
     if (TXI_LEFT_OUT & TXI_TURNS) c->style.poses = 1;
     if (TXI_LEFT_OUT & TXI_DETAIL) c->style.detail_weight = 0;
+    /* means have no grain                                                                            */
+    c->can_be_mean = grain <= TXI_GRAIN_TEXTURE && !(TXI_LEFT_OUT & TXI_STRIPS);
     c->count = 0;
     if (forced != TEXINPAINT_AUTO) {
         c->tried[c->count++].structure = forced;
@@ -14655,32 +14785,56 @@ static void txi_choose_style(txi_choice *c, double grain) {
         c->tried[c->count++].structure = TEXINPAINT_PATTERN;
 }
 
-/* Complete one hypothesis to half resolution. */
-static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env *env) {
-    txm_arena *arena = &h->memory;
-    const size_t pixels = (size_t)c->w->width * (size_t)c->w->height;
-    const texinpaint_desc *desc = c->domain->desc;
-    const txi_plan *plan = NULL;
-    txm_status status = TXM_OK;
-    if (h->structure != TEXINPAINT_TEXTURE) {
-        status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta, c->seed,
-                          arena, env, &h->curves, &h->curve_count);
-        if (status == TXM_OK && h->structure == TEXINPAINT_PICTURE)
-            status = txi_whole_strokes(c->w, &c->lines, arena, env, &h->curves, &h->curve_count);
-        if (status == TXM_OK && h->curve_count > 0) {
-            status = TXI_LEFT_OUT & TXI_STRIPS
-                         ? txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, arena, env, &h->plan)
-                         : txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, arena,
-                                         env, &h->plan, &h->plan.poses, &h->plan.pose_count);
-            plan = &h->plan;
+/* A number that differs for curves that differ. */
+static uint64_t txi_hash_curves(const txi_curve *curves, int count) {
+    uint64_t hash = (uint64_t)count;
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < curves[i].count; k++) {
+            uint64_t bits = 0;
+            memcpy(&bits, &curves[i].points[k], sizeof bits);
+            hash = txm_hash(hash ^ bits);
         }
     }
-    h->preview = (uint8_t *)txm_arena_alloc(arena, pixels, 4);
-    if (!h->preview || !txi_field_make(c->filler, arena, &h->field)) return txi_no_memory(env);
-    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, h->start, env, &h->field);
+    return hash;
+}
+
+/* Join the lines of a hypothesis. *known: an earlier one has the same. */
+static txm_status txi_join_hypothesis(const txi_choice *c, txi_hypothesis *h, txm_env *env,
+                                      int *known) {
+    const texinpaint_desc *desc = c->domain->desc;
+    *known = 0;
+    if (h->structure == TEXINPAINT_TEXTURE || h->curves) return TXM_OK;
+    txm_status status = txi_join(c->w, &c->lines, c->prior, h->structure, desc->alpha, desc->beta,
+                                 c->seed, &h->memory, env, &h->curves, &h->curve_count);
+    if (status == TXM_OK && h->structure == TEXINPAINT_PICTURE)
+        status = txi_whole_strokes(c->w, &c->lines, &h->memory, env, &h->curves, &h->curve_count);
+    if (status != TXM_OK) return status;
+    h->hash = txi_hash_curves(h->curves, h->curve_count);
+    for (const txi_hypothesis *o = c->tried; o < h; o++)
+        *known |= o->curve_count == h->curve_count && o->hash == h->hash;
+    return TXM_OK;
+}
+
+/* What the lines of a hypothesis say. */
+static txm_status txi_plan_hypothesis(const txi_choice *c, txi_hypothesis *h, txm_env *env) {
+    if (h->curve_count == 0) return TXM_OK;
+    if (h->is_mean || (TXI_LEFT_OUT & TXI_STRIPS))
+        return txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, &h->memory, env, &h->plan);
+    return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env, &h->plan,
+                         &h->plan.poses, &h->plan.pose_count);
+}
+
+/* Complete one hypothesis to half resolution. */
+static txm_status txi_fill_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env *env) {
+    const size_t pixels = (size_t)c->w->width * (size_t)c->w->height;
+    txm_status status = txi_plan_hypothesis(c, h, env);
+    const txi_plan *plan = h->curve_count ? &h->plan : NULL;
+    h->preview = (uint8_t *)txm_arena_alloc(&h->memory, pixels, 4);
+    if (!h->preview || !txi_field_make(c->filler, &h->memory, &h->field)) return txi_no_memory(env);
+    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
-    txi_fill_preview(c->filler, &h->field, h->preview, &h->energy, &h->detail);
+    h->detail = txi_look_at(c->filler, &h->field, plan, h->preview, env);
     return TXM_OK;
 }
 
@@ -14688,12 +14842,15 @@ static txm_status txi_try_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env *
 static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, txi_hypothesis *h,
                             txm_env *env) {
     const int is_picture = c->style.is_picture;
-    const double ratio = (h->energy + 1) / (plain->energy + 1);
+    const double ratio = (h->field.energy + 1) / (plain->field.energy + 1);
     double score = 0;
     const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
+    /* labyrinths have lines, but it cannot be foreseen where they go                                 */
+    if (c->foreseen < TXI_FORESEEN) score *= c->foreseen / TXI_FORESEEN;
     if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
     /* relative to the detail that there is: where all is smooth all patches fit                     */
     score -= TXI_ENERGY_WEIGHT * (log(ratio) - (h->detail - plain->detail)) / log(2.0);
+    if (h->is_mean) score -= TXI_MEAN_BEHIND;
     if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
     if (is_picture && h->curve_count > 0) {
         score += 0.15 * txi_straight_share(&c->lines, h->curves, h->curve_count);
@@ -14728,21 +14885,40 @@ static txm_status txi_show_hypothesis(const txi_choice *c, const txi_hypothesis 
     return TXM_OK;
 }
 
-/* Complete all hypotheses to half resolution one after the other, and keep the best. */
+/* Complete hypothesis i to half resolution; of it and the best so far keep the better one. */
+static txm_status txi_try_one(txi_choice *c, int i, txm_env *env) {
+    txi_hypothesis *h = &c->tried[i], *best = &c->tried[c->best];
+    int known;
+    txm_status status = txi_join_hypothesis(c, h, env, &known);
+    if (status == TXM_OK && !known) status = txi_fill_hypothesis(c, h, env);
+    if (status == TXM_OK && !known) status = txi_judge(c, &c->tried[0], h, env);
+    if (status == TXM_OK && !known) status = txi_show_hypothesis(c, h, env);
+    if (status != TXM_OK || i == c->best) return status;
+    if (!known && h->score > best->score) c->best = i;
+    else best = h;
+    txm_arena_free(&best->memory);
+    best->curves = NULL;
+    return TXM_OK;
+}
+
+/* Complete all hypotheses to half resolution one after the other, and keep the best; then its lines with
+   mean profiles instead of strips. */
 static txm_status txi_try_all(txi_choice *c, txm_env *env) {
     txi_stage stage;
     txm_status status = TXM_OK;
-    for (int i = 0; i < c->count && status == TXM_OK; i++) {
-        txi_hypothesis *h = &c->tried[i], *best = &c->tried[c->best];
-        txi_stage_begin(&stage, env, 0.1f + 0.9f * (float)i / (float)c->count,
-                        0.1f + 0.9f * (float)(i + 1) / (float)c->count);
-        status = txi_stage_end(&stage, txi_try_hypothesis(c, h, &stage.env));
-        if (status == TXM_OK) status = txi_judge(c, &c->tried[0], h, env);
-        if (status == TXM_OK) status = txi_show_hypothesis(c, h, env);
-        if (status != TXM_OK || i == c->best) continue;
-        if (h->score > best->score) c->best = i;
-        else best = h;
-        txm_arena_free(&best->memory);
+    const float share = 0.9f / (float)(c->count + 1);
+    for (int i = 0; i <= c->count && i < TXI_HYPOTHESES && status == TXM_OK; i++) {
+        txi_hypothesis *h = &c->tried[i];
+        if (i == c->count) {
+            const txi_hypothesis *best = &c->tried[c->best];
+            if (best->curve_count == 0 || !c->can_be_mean) break;
+            h->structure = best->structure;
+            h->is_mean = 1;
+            h->curves = best->curves;
+            h->curve_count = best->curve_count;
+        }
+        txi_stage_begin(&stage, env, 0.1f + share * (float)i, 0.1f + share * (float)(i + 1));
+        status = txi_stage_end(&stage, txi_try_one(c, i, &stage.env));
     }
     return status;
 }
@@ -14755,6 +14931,7 @@ static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
     for (int i = 0; i < TXI_HYPOTHESES; i++) txm_arena_init(&c->tried[i].memory, env);
     txm_status status = txi_trace(c->w, &c->of_lines, env, &c->lines);
     if (status != TXM_OK) return status;
+    c->foreseen = txi_foreseen(&c->lines);
     const double grain = txi_grain(c->w, env);
     if (grain < 0) return txi_no_memory(env);
     txi_choose_style(c, grain);

@@ -370,6 +370,7 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/assemble.h"
 #include "texinpaint/offset.h"
 #include "texinpaint/fill.h"
+#include "texinpaint/look.h"
 #include "texinpaint/blend.h"
 #include "texinpaint/choose.h"
 #include "texinpaint/preview.h"

@@ -447,50 +447,6 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
     return status == TXM_OK ? txi_field_judge(f, field, env) : status;
 }
 
-/* A look at a field, as a picture of the window, with two measures of how good it is.
-   color   4 per pixel of the window, whose hole pixels receive RGB
-   energy  mean cost of a patch; detail: mean of log(detail / expected detail)                  */
-static void txi_fill_preview(const txi_filler *f, const txi_field *field, uint8_t *color,
-                             double *energy, double *detail) {
-    const txi_level *l = &f->level[field->level];
-    const txi_window *w = f->window;
-    double ratio = 0;
-    int count = 0;
-    for (int a = 0; a < l->anchor_count; a++) {
-        const txi_match *m = &field->match[a];
-        if (m->pose < 0) continue;
-        const txi_source *s = &l->source[m->pose];
-        const double unit = (double)l->clamp * (double)TXI_PATCH_AREA / (double)TXI_WORTH_MOST;
-        const int worth = s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x] - 1;
-        ratio += log((worth * unit + (double)TXI_WANT_FLOOR) / (l->want[a] * unit + (double)TXI_WANT_FLOOR));
-        count++;
-    }
-    *energy = field->energy;
-    *detail = count ? ratio / count : 0;
-    for (int y = 0; y < w->height; y++) {
-        for (int x = 0; x < w->width; x++) {
-            const size_t p = (size_t)y * (size_t)w->width + (size_t)x;
-            if (w->state[p] != TXI_HOLE) continue;
-            /* bilinear, in quarters of a pixel of the level */
-            const int scale = field->level, fx = scale ? (x & 1 ? 1 : 3) : 0,
-                      fy = scale ? (y & 1 ? 1 : 3) : 0;
-            const int px = ((x + scale) >> scale) - scale + TXI_EDGE,
-                      py = ((y + scale) >> scale) - scale + TXI_EDGE;
-            int sum[3] = {0, 0, 0}, total = 0;
-            for (int k = 0; k < 4; k++) {
-                const size_t q =
-                    (size_t)(py + (k >> 1)) * (size_t)l->width + (size_t)(px + (k & 1));
-                const int weight = (k & 1 ? fx : 4 - fx) * (k >> 1 ? fy : 4 - fy);
-                if (l->state[q] == TXI_VOID) continue;
-                total += weight;
-                for (int c = 0; c < 3; c++) sum[c] += weight * field->color[4 * q + (size_t)c];
-            }
-            for (int c = 0; c < 3 && total; c++)
-                color[4 * p + (size_t)c] = (uint8_t)((sum[c] + total / 2) / total);
-        }
-    }
-}
-
 /* Make those sources of the finest level that enough of the field's matches use. */
 static txm_status txi_finest_sources(txi_filler *f, const txi_field *field, txm_env *env) {
     txi_level *l = &f->level[0];

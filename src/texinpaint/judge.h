@@ -76,6 +76,37 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
     return status;
 }
 
+/* The share of 8 pixels over which the known lines go on as a fit to the rest of them says, 8 pixels
+   farther out than the hole: what can be asked of a completion. About 1 for stripes, less for lines that
+   meander; 1 if no line is long enough to tell.                                                 */
+static double txi_foreseen(const txi_lines *l) {
+    enum { SKIPPED = 2, FITTED = 12 }; /* points: near the hole, and to fit to at least          */
+    double sum = 0;
+    int count = 0;
+    for (int i = 0; i < l->end_count; i++) {
+        const txi_end *e = &l->ends[i];
+        const txm_vec2 *p = l->points + e->first;
+        const int from = SKIPPED + TXI_GO_ON;
+        double fit[6];
+        int n = 0;
+        if (e->count < from + FITTED) continue;
+        txi_fit_points(l, p + from, e->count - from, fit);
+        for (; n < TXI_GO_ON; n++) {
+            const double s = -(n + 1), dx = -(fit[1] + 2 * fit[2] * s), dy = -(fit[4] + 2 * fit[5] * s);
+            const txm_vec2 at = p[from - 1 - n], before = p[from - n], after = p[from - 2 - n];
+            const txm_vec2 d = txi_unit((double)after.x - before.x, (double)after.y - before.y);
+            const double ox = at.x - (fit[0] + fit[1] * s + fit[2] * s * s);
+            const double oy = at.y - (fit[3] + fit[4] * s + fit[5] * s * s);
+            const double speed = sqrt(dx * dx + dy * dy);
+            if (speed <= 0 || fabs(ox * dy - oy * dx) > 2.5 * speed) break;
+            if (d.x * dx + d.y * dy < 0.906 * speed) break;
+        }
+        sum += n / (double)TXI_GO_ON;
+        count++;
+    }
+    return count ? sum / count : 1;
+}
+
 /* The bending energy of the part of a curve in the hole: the squared angle for an arc. */
 static double txi_curve_bend(const txi_curve *c) {
     double length, bend;
