@@ -7219,15 +7219,15 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
     return sqrt(error / i);
 }
 
-/* The curve of the first of count points, as in txi_end.fit with s = 0 at the first point. Returns to how
-   many points it was fitted. */
+/* The curve of the first of count points, as in txi_end.fit with s = 0 at the first point. Returns
+   to how many points it was fitted. */
 static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count, double fit[6]) {
     const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
     double line[6];
     int n = count;
     for (;;) {
-        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
-           pieces a parabola is no arc                                                            */
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over
+           long pieces a parabola is no arc */
         const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
         const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
@@ -7238,7 +7238,7 @@ static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count,
             break;
         n = n * 3 / 4;
     }
-    /* a corner near the hole: the first points alone are straight, in another direction            */
+    /* a corner near the hole: the first points alone are straight, in another direction          */
     if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
         const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
         if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
@@ -7249,8 +7249,10 @@ static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count,
     return n;
 }
 
-/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
-static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does
+   not. */
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
+                       txi_end *e) {
     double fit[6], s = 0;
     int found = 0;
     const int n = txi_fit_points(l, points, e->count, fit);
@@ -8700,10 +8702,10 @@ static txm_status txi_join(const txi_window *w, const txi_lines *l, const txi_pr
 
 /* ---- what a result keeps of the lines ---------------------------------------------------- */
 
-enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go on                */
+enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go on               */
 
-/* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an end:
-   no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
+/* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an
+   end: no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
    strength. */
 static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *e) {
     txi_walk k;
@@ -8732,8 +8734,8 @@ static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *
     return n;
 }
 
-/* The mean share of 8 pixels over which the line ends go on in a picture of the window with its hole
-   filled; 1 if there are no ends.
+/* The mean share of 8 pixels over which the line ends go on in a picture of the window with its
+   hole filled; 1 if there are no ends.
    color  4 per pixel
    share  receives 0..1
    cost   O(pixels)                                                                            */
@@ -8771,9 +8773,9 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
     return status;
 }
 
-/* The share of 8 pixels over which the known lines go on as a fit to the rest of them says, 8 pixels
-   farther out than the hole: what can be asked of a completion. About 1 for stripes, less for lines that
-   meander; 1 if no line is long enough to tell.                                                 */
+/* The share of 8 pixels over which the known lines go on as a fit to the rest of them says, 8
+   pixels farther out than the hole: what can be asked of a completion. About 1 for stripes, less
+   for lines that meander; 1 if no line is long enough to tell. */
 static double txi_foreseen(const txi_lines *l) {
     enum { SKIPPED = 2, FITTED = 12 }; /* points: near the hole, and to fit to at least          */
     double sum = 0;
@@ -8787,7 +8789,8 @@ static double txi_foreseen(const txi_lines *l) {
         if (e->count < from + FITTED) continue;
         txi_fit_points(l, p + from, e->count - from, fit);
         for (; n < TXI_GO_ON; n++) {
-            const double s = -(n + 1), dx = -(fit[1] + 2 * fit[2] * s), dy = -(fit[4] + 2 * fit[5] * s);
+            const double s = -(n + 1);
+            const double dx = -(fit[1] + 2 * fit[2] * s), dy = -(fit[4] + 2 * fit[5] * s);
             const txm_vec2 at = p[from - 1 - n], before = p[from - n], after = p[from - 2 - n];
             const txm_vec2 d = txi_unit((double)after.x - before.x, (double)after.y - before.y);
             const double ox = at.x - (fit[0] + fit[1] * s + fit[2] * s * s);
@@ -8808,7 +8811,7 @@ static double txi_curve_bend(const txi_curve *c) {
     txm_vec2 coarse[TXI_STEPS + 1];
     const int n = c->last - c->first;
     if (n < 2) return 0;
-    for (int i = 0; i <= TXI_STEPS; i++) /* coarse, so that steps of a pixel do not count           */
+    for (int i = 0; i <= TXI_STEPS; i++) /* coarse, so that steps of a pixel do not count         */
         coarse[i] = c->points[c->first + (n * i + TXI_STEPS / 2) / TXI_STEPS];
     if (n <= TXI_STEPS) txi_bend(c->points + c->first, n + 1, &length, &bend);
     else txi_bend(coarse, TXI_STEPS + 1, &length, &bend);
@@ -8845,18 +8848,20 @@ static void txi_dot(const txi_window *w, int scale, double x, double y, const ui
     memcpy(rgb + 3 * ((size_t)(int)py * (size_t)width + (size_t)(int)px), ink, 3);
 }
 
-/* Draw what was found over the colours of the window, enlarged scale times: points of lines in orange;
-   the traced ends in cyan (long) or yellow; curves in green, in red where they end in the hole.
+/* Draw what was found over the colours of the window, enlarged scale times: points of lines in
+   orange; the traced ends in cyan (long) or yellow; curves in green, in red where they end in the hole.
    rgb  3 * width * height * scale^2 bytes                                                      */
-static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_curve *curves, int count,
-                           int scale, uint8_t *rgb) {
-    static const uint8_t orange[3] = {255, 150, 0}, cyan[3] = {0, 220, 255}, yellow[3] = {255, 255, 0};
+static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_curve *curves,
+                           int count, int scale, uint8_t *rgb) {
+    static const uint8_t orange[3] = {255, 150, 0}, cyan[3] = {0, 220, 255};
+    static const uint8_t yellow[3] = {255, 255, 0};
     static const uint8_t green[3] = {0, 255, 0}, red[3] = {255, 0, 0};
     for (int y = 0; y < w->height * scale; y++) {
         for (int x = 0; x < w->width * scale; x++) {
             const size_t i = (size_t)(y / scale) * (size_t)w->width + (size_t)(x / scale);
             uint8_t *p = rgb + 3 * ((size_t)y * (size_t)w->width * (size_t)scale + (size_t)x);
-            for (int c = 0; c < 3; c++) p[c] = w->state[i] == TXI_VOID ? 0 : w->color[4 * i + (size_t)c];
+            for (int c = 0; c < 3; c++)
+                p[c] = w->state[i] == TXI_VOID ? 0 : w->color[4 * i + (size_t)c];
         }
     }
     for (int i = 0; i < l->thin_count; i++)
@@ -14238,9 +14243,9 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
 
 /* ---- a look at a completion ---------------------------------------------------------------------
 
-   What a completion to half resolution will look like at the full one: its matches propose colours of
-   the window itself, which are as sharp as the known part. Half the resolution enlarged would not do,
-   as thin lines are lost on it.                                                                */
+   What a completion to half resolution will look like at the full one: its matches propose colours
+   of the window itself, which are as sharp as the known part. Half the resolution enlarged would
+   not do, as thin lines are lost on it.                                                         */
 
 enum {
     TXI_LOOK_STEP = 2, /* pixels of the level between the patches that propose; ours            */
@@ -14255,8 +14260,8 @@ typedef struct txi_look {
     uint8_t *color;       /* 4 per pixel of the window */
 } txi_look;
 
-/* Bilinear colour of the known pixels around (x, y), in units of 2^-8 pixels of the window. 0: none of
-   them is known. */
+/* Bilinear colour of the known pixels around (x, y), in units of 2^-8 pixels of the window. 0: none
+   of them is known. */
 static int txi_look_read(const txi_window *w, int64_t x, int64_t y, uint8_t *color) {
     const int fx = (int)(x & 255), fy = (int)(y & 255);
     int sum[3] = {0, 0, 0}, total = 0;
@@ -14695,26 +14700,27 @@ static txm_status txi_blend_map(const txi_window *w, const txi_copy *copies, con
 }
 
 /* ---- hypotheses -------------------------------------------------------------------------------
-   Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
-   stripes and ruin labyrinths. So a window is completed to half its resolution without lines, with
-   the lines of a picture and with those of a pattern, and the one that goes on best where the known
-   texture ends wins. If it has lines, its strips of texture are compared with mean profiles of its
-   lines. Only the winner is completed at full resolution.                                         */
+   Whether the lines at a hole go on through it, and how, can be seen only in the result: lines
+   rescue stripes and ruin labyrinths. So a window is completed to half its resolution without
+   lines, with the lines of a picture and with those of a pattern, and the one that goes on best
+   where the known texture ends wins. If it has lines, its strips of texture are compared with mean
+   profiles of its lines. Only the winner is completed at full resolution.                       */
 
 enum { TXI_HYPOTHESES = 4 };
-#define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all   */
-#define TXI_SHARE_SMOOTH 0.15   /* the same between smooth parts, where short ends are no grain    */
-#define TXI_FORESEEN 0.7        /* share of the known lines that goes on as foreseen, below which it counts less
-                                   that completed ones do; ours                                   */
-#define TXI_MEAN_BEHIND 0.012   /* what mean profiles must be better by: all are a little smoother; ours */
-#define TXI_ENERGY_WEIGHT 0.12  /* share of ends that must go on for patches that cost twice as much */
-#define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture       */
-#define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried          */
+#define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all */
+#define TXI_SHARE_SMOOTH 0.15   /* the same between smooth parts, where short ends are no grain   */
+#define TXI_FORESEEN 0.7        /* share of the known lines that goes on as foreseen, below which
+                                   it counts less that completed ones do; ours                   */
+#define TXI_MEAN_BEHIND 0.012   /* what mean profiles must be better by: they are smoother; ours  */
+#define TXI_ENERGY_WEIGHT 0.12  /* share of ends that must go on for patches that cost twice as
+                                   much                                                          */
+#define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture     */
+#define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried        */
 
 /* A hypothesis at half resolution. */
 typedef struct txi_hypothesis {
     int structure;      /* TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN                              */
-    int is_mean;        /* mean profiles along the lines instead of strips of texture              */
+    int is_mean;        /* mean profiles along the lines instead of strips of texture             */
     txi_curve *curves;
     int curve_count;
     uint64_t hash;      /* of the curves                                                         */
@@ -14732,7 +14738,7 @@ typedef struct txi_choice {
     const txi_prior *prior; /* or NULL */
     uint64_t seed;
     txi_lines lines;
-    double foreseen;    /* share of the known lines that goes on as foreseen                        */
+    double foreseen;    /* share of the known lines that goes on as foreseen                      */
     txm_arena of_lines; /* memory of lines; empty at the end                                     */
     txi_style style;
     txi_filler *filler;
@@ -14772,7 +14778,7 @@ static void txi_choose_style(txi_choice *c, double grain) {
     }
     if (TXI_LEFT_OUT & TXI_TURNS) c->style.poses = 1;
     if (TXI_LEFT_OUT & TXI_DETAIL) c->style.detail_weight = 0;
-    /* means have no grain                                                                            */
+    /* means have no grain                                                                        */
     c->can_be_mean = grain <= TXI_GRAIN_TEXTURE && !(TXI_LEFT_OUT & TXI_STRIPS);
     c->count = 0;
     if (forced != TEXINPAINT_AUTO) {
@@ -14820,8 +14826,8 @@ static txm_status txi_plan_hypothesis(const txi_choice *c, txi_hypothesis *h, tx
     if (h->curve_count == 0) return TXM_OK;
     if (h->is_mean || (TXI_LEFT_OUT & TXI_STRIPS))
         return txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, &h->memory, env, &h->plan);
-    return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env, &h->plan,
-                         &h->plan.poses, &h->plan.pose_count);
+    return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env,
+                         &h->plan, &h->plan.poses, &h->plan.pose_count);
 }
 
 /* Complete one hypothesis to half resolution. */
@@ -14831,7 +14837,8 @@ static txm_status txi_fill_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env 
     const txi_plan *plan = h->curve_count ? &h->plan : NULL;
     h->preview = (uint8_t *)txm_arena_alloc(&h->memory, pixels, 4);
     if (!h->preview || !txi_field_make(c->filler, &h->memory, &h->field)) return txi_no_memory(env);
-    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
+    if (status == TXM_OK)
+        status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
     h->detail = txi_look_at(c->filler, &h->field, plan, h->preview, env);
@@ -14845,10 +14852,10 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
     const double ratio = (h->field.energy + 1) / (plain->field.energy + 1);
     double score = 0;
     const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
-    /* labyrinths have lines, but it cannot be foreseen where they go                                 */
+    /* labyrinths have lines, but it cannot be foreseen where they go                             */
     if (c->foreseen < TXI_FORESEEN) score *= c->foreseen / TXI_FORESEEN;
     if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
-    /* relative to the detail that there is: where all is smooth all patches fit                     */
+    /* relative to the detail that there is: where all is smooth all patches fit                  */
     score -= TXI_ENERGY_WEIGHT * (log(ratio) - (h->detail - plain->detail)) / log(2.0);
     if (h->is_mean) score -= TXI_MEAN_BEHIND;
     if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
@@ -14868,7 +14875,8 @@ static txm_status txi_show_hypothesis(const txi_choice *c, const txi_hypothesis 
     enum { SCALE = 3 };
     const txi_window *w = c->w;
     if (!c->domain->desc->show) return TXM_OK;
-    uint8_t *rgb = (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
+    uint8_t *rgb =
+        (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
     if (!rgb) return txi_no_memory(env);
     txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
     txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
@@ -14901,8 +14909,8 @@ static txm_status txi_try_one(txi_choice *c, int i, txm_env *env) {
     return TXM_OK;
 }
 
-/* Complete all hypotheses to half resolution one after the other, and keep the best; then its lines with
-   mean profiles instead of strips. */
+/* Complete all hypotheses to half resolution one after the other, and keep the best; then its lines
+   with mean profiles instead of strips. */
 static txm_status txi_try_all(txi_choice *c, txm_env *env) {
     txi_stage stage;
     txm_status status = TXM_OK;

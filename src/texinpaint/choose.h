@@ -10,26 +10,27 @@
 #include "whole.h"
 
 /* ---- hypotheses -------------------------------------------------------------------------------
-   Whether the lines at a hole go on through it, and how, can be seen only in the result: lines rescue
-   stripes and ruin labyrinths. So a window is completed to half its resolution without lines, with
-   the lines of a picture and with those of a pattern, and the one that goes on best where the known
-   texture ends wins. If it has lines, its strips of texture are compared with mean profiles of its
-   lines. Only the winner is completed at full resolution.                                         */
+   Whether the lines at a hole go on through it, and how, can be seen only in the result: lines
+   rescue stripes and ruin labyrinths. So a window is completed to half its resolution without
+   lines, with the lines of a picture and with those of a pattern, and the one that goes on best
+   where the known texture ends wins. If it has lines, its strips of texture are compared with mean
+   profiles of its lines. Only the winner is completed at full resolution.                       */
 
 enum { TXI_HYPOTHESES = 4 };
-#define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all   */
-#define TXI_SHARE_SMOOTH 0.15   /* the same between smooth parts, where short ends are no grain    */
-#define TXI_FORESEEN 0.7        /* share of the known lines that goes on as foreseen, below which it counts less
-                                   that completed ones do; ours                                   */
-#define TXI_MEAN_BEHIND 0.012   /* what mean profiles must be better by: all are a little smoother; ours */
-#define TXI_ENERGY_WEIGHT 0.12  /* share of ends that must go on for patches that cost twice as much */
-#define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture       */
-#define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried          */
+#define TXI_SHARE_LONG 0.45     /* of line ends that are long, from which there are lines at all */
+#define TXI_SHARE_SMOOTH 0.15   /* the same between smooth parts, where short ends are no grain   */
+#define TXI_FORESEEN 0.7        /* share of the known lines that goes on as foreseen, below which
+                                   it counts less that completed ones do; ours                   */
+#define TXI_MEAN_BEHIND 0.012   /* what mean profiles must be better by: they are smoother; ours  */
+#define TXI_ENERGY_WEIGHT 0.12  /* share of ends that must go on for patches that cost twice as
+                                   much                                                          */
+#define TXI_GRAIN_TEXTURE 0.08  /* grain without lines, above which a window is mere texture     */
+#define TXI_GRAIN_NO_PATTERN 0.28 /* grain with lines, above which patterns are not tried        */
 
 /* A hypothesis at half resolution. */
 typedef struct txi_hypothesis {
     int structure;      /* TEXINPAINT_TEXTURE .. TEXINPAINT_PATTERN                              */
-    int is_mean;        /* mean profiles along the lines instead of strips of texture              */
+    int is_mean;        /* mean profiles along the lines instead of strips of texture             */
     txi_curve *curves;
     int curve_count;
     uint64_t hash;      /* of the curves                                                         */
@@ -47,7 +48,7 @@ typedef struct txi_choice {
     const txi_prior *prior; /* or NULL */
     uint64_t seed;
     txi_lines lines;
-    double foreseen;    /* share of the known lines that goes on as foreseen                        */
+    double foreseen;    /* share of the known lines that goes on as foreseen                      */
     txm_arena of_lines; /* memory of lines; empty at the end                                     */
     txi_style style;
     txi_filler *filler;
@@ -87,7 +88,7 @@ static void txi_choose_style(txi_choice *c, double grain) {
     }
     if (TXI_LEFT_OUT & TXI_TURNS) c->style.poses = 1;
     if (TXI_LEFT_OUT & TXI_DETAIL) c->style.detail_weight = 0;
-    /* means have no grain                                                                            */
+    /* means have no grain                                                                        */
     c->can_be_mean = grain <= TXI_GRAIN_TEXTURE && !(TXI_LEFT_OUT & TXI_STRIPS);
     c->count = 0;
     if (forced != TEXINPAINT_AUTO) {
@@ -135,8 +136,8 @@ static txm_status txi_plan_hypothesis(const txi_choice *c, txi_hypothesis *h, tx
     if (h->curve_count == 0) return TXM_OK;
     if (h->is_mean || (TXI_LEFT_OUT & TXI_STRIPS))
         return txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, &h->memory, env, &h->plan);
-    return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env, &h->plan,
-                         &h->plan.poses, &h->plan.pose_count);
+    return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env,
+                         &h->plan, &h->plan.poses, &h->plan.pose_count);
 }
 
 /* Complete one hypothesis to half resolution. */
@@ -146,7 +147,8 @@ static txm_status txi_fill_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env 
     const txi_plan *plan = h->curve_count ? &h->plan : NULL;
     h->preview = (uint8_t *)txm_arena_alloc(&h->memory, pixels, 4);
     if (!h->preview || !txi_field_make(c->filler, &h->memory, &h->field)) return txi_no_memory(env);
-    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
+    if (status == TXM_OK)
+        status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
     h->detail = txi_look_at(c->filler, &h->field, plan, h->preview, env);
@@ -160,10 +162,10 @@ static txm_status txi_judge(const txi_choice *c, const txi_hypothesis *plain, tx
     const double ratio = (h->field.energy + 1) / (plain->field.energy + 1);
     double score = 0;
     const txm_status status = txi_continued(c->w, &c->lines, h->preview, env, &score);
-    /* labyrinths have lines, but it cannot be foreseen where they go                                 */
+    /* labyrinths have lines, but it cannot be foreseen where they go                             */
     if (c->foreseen < TXI_FORESEEN) score *= c->foreseen / TXI_FORESEEN;
     if (h->structure == TEXINPAINT_TEXTURE) score += is_picture ? 0.03 : 0.01;
-    /* relative to the detail that there is: where all is smooth all patches fit                     */
+    /* relative to the detail that there is: where all is smooth all patches fit                  */
     score -= TXI_ENERGY_WEIGHT * (log(ratio) - (h->detail - plain->detail)) / log(2.0);
     if (h->is_mean) score -= TXI_MEAN_BEHIND;
     if (h->detail < -0.3) score -= 0.4 * (-h->detail - 0.3);
@@ -183,7 +185,8 @@ static txm_status txi_show_hypothesis(const txi_choice *c, const txi_hypothesis 
     enum { SCALE = 3 };
     const txi_window *w = c->w;
     if (!c->domain->desc->show) return TXM_OK;
-    uint8_t *rgb = (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
+    uint8_t *rgb =
+        (uint8_t *)txm_alloc(env, (size_t)w->width * (size_t)w->height * 3 * SCALE * SCALE);
     if (!rgb) return txi_no_memory(env);
     txi_draw_lines(w, &c->lines, h->curves, h->curve_count, SCALE, rgb);
     txi_show(c->domain, lines[h->structure], rgb, w->width * SCALE, w->height * SCALE, 3);
@@ -216,8 +219,8 @@ static txm_status txi_try_one(txi_choice *c, int i, txm_env *env) {
     return TXM_OK;
 }
 
-/* Complete all hypotheses to half resolution one after the other, and keep the best; then its lines with
-   mean profiles instead of strips. */
+/* Complete all hypotheses to half resolution one after the other, and keep the best; then its lines
+   with mean profiles instead of strips. */
 static txm_status txi_try_all(txi_choice *c, txm_env *env) {
     txi_stage stage;
     txm_status status = TXM_OK;

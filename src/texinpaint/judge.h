@@ -5,10 +5,10 @@
 
 /* ---- what a result keeps of the lines ---------------------------------------------------- */
 
-enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go on                */
+enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go on               */
 
-/* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an end:
-   no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
+/* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an
+   end: no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
    strength. */
 static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *e) {
     txi_walk k;
@@ -37,8 +37,8 @@ static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *
     return n;
 }
 
-/* The mean share of 8 pixels over which the line ends go on in a picture of the window with its hole
-   filled; 1 if there are no ends.
+/* The mean share of 8 pixels over which the line ends go on in a picture of the window with its
+   hole filled; 1 if there are no ends.
    color  4 per pixel
    share  receives 0..1
    cost   O(pixels)                                                                            */
@@ -76,9 +76,9 @@ static txm_status txi_continued(const txi_window *w, const txi_lines *l, const u
     return status;
 }
 
-/* The share of 8 pixels over which the known lines go on as a fit to the rest of them says, 8 pixels
-   farther out than the hole: what can be asked of a completion. About 1 for stripes, less for lines that
-   meander; 1 if no line is long enough to tell.                                                 */
+/* The share of 8 pixels over which the known lines go on as a fit to the rest of them says, 8
+   pixels farther out than the hole: what can be asked of a completion. About 1 for stripes, less
+   for lines that meander; 1 if no line is long enough to tell. */
 static double txi_foreseen(const txi_lines *l) {
     enum { SKIPPED = 2, FITTED = 12 }; /* points: near the hole, and to fit to at least          */
     double sum = 0;
@@ -92,7 +92,8 @@ static double txi_foreseen(const txi_lines *l) {
         if (e->count < from + FITTED) continue;
         txi_fit_points(l, p + from, e->count - from, fit);
         for (; n < TXI_GO_ON; n++) {
-            const double s = -(n + 1), dx = -(fit[1] + 2 * fit[2] * s), dy = -(fit[4] + 2 * fit[5] * s);
+            const double s = -(n + 1);
+            const double dx = -(fit[1] + 2 * fit[2] * s), dy = -(fit[4] + 2 * fit[5] * s);
             const txm_vec2 at = p[from - 1 - n], before = p[from - n], after = p[from - 2 - n];
             const txm_vec2 d = txi_unit((double)after.x - before.x, (double)after.y - before.y);
             const double ox = at.x - (fit[0] + fit[1] * s + fit[2] * s * s);
@@ -113,7 +114,7 @@ static double txi_curve_bend(const txi_curve *c) {
     txm_vec2 coarse[TXI_STEPS + 1];
     const int n = c->last - c->first;
     if (n < 2) return 0;
-    for (int i = 0; i <= TXI_STEPS; i++) /* coarse, so that steps of a pixel do not count           */
+    for (int i = 0; i <= TXI_STEPS; i++) /* coarse, so that steps of a pixel do not count         */
         coarse[i] = c->points[c->first + (n * i + TXI_STEPS / 2) / TXI_STEPS];
     if (n <= TXI_STEPS) txi_bend(c->points + c->first, n + 1, &length, &bend);
     else txi_bend(coarse, TXI_STEPS + 1, &length, &bend);
@@ -150,18 +151,20 @@ static void txi_dot(const txi_window *w, int scale, double x, double y, const ui
     memcpy(rgb + 3 * ((size_t)(int)py * (size_t)width + (size_t)(int)px), ink, 3);
 }
 
-/* Draw what was found over the colours of the window, enlarged scale times: points of lines in orange;
-   the traced ends in cyan (long) or yellow; curves in green, in red where they end in the hole.
+/* Draw what was found over the colours of the window, enlarged scale times: points of lines in
+   orange; the traced ends in cyan (long) or yellow; curves in green, in red where they end in the hole.
    rgb  3 * width * height * scale^2 bytes                                                      */
-static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_curve *curves, int count,
-                           int scale, uint8_t *rgb) {
-    static const uint8_t orange[3] = {255, 150, 0}, cyan[3] = {0, 220, 255}, yellow[3] = {255, 255, 0};
+static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_curve *curves,
+                           int count, int scale, uint8_t *rgb) {
+    static const uint8_t orange[3] = {255, 150, 0}, cyan[3] = {0, 220, 255};
+    static const uint8_t yellow[3] = {255, 255, 0};
     static const uint8_t green[3] = {0, 255, 0}, red[3] = {255, 0, 0};
     for (int y = 0; y < w->height * scale; y++) {
         for (int x = 0; x < w->width * scale; x++) {
             const size_t i = (size_t)(y / scale) * (size_t)w->width + (size_t)(x / scale);
             uint8_t *p = rgb + 3 * ((size_t)y * (size_t)w->width * (size_t)scale + (size_t)x);
-            for (int c = 0; c < 3; c++) p[c] = w->state[i] == TXI_VOID ? 0 : w->color[4 * i + (size_t)c];
+            for (int c = 0; c < 3; c++)
+                p[c] = w->state[i] == TXI_VOID ? 0 : w->color[4 * i + (size_t)c];
         }
     }
     for (int i = 0; i < l->thin_count; i++)

@@ -5,9 +5,9 @@
 
 /* ---- a look at a completion ---------------------------------------------------------------------
 
-   What a completion to half resolution will look like at the full one: its matches propose colours of
-   the window itself, which are as sharp as the known part. Half the resolution enlarged would not do,
-   as thin lines are lost on it.                                                                */
+   What a completion to half resolution will look like at the full one: its matches propose colours
+   of the window itself, which are as sharp as the known part. Half the resolution enlarged would
+   not do, as thin lines are lost on it.                                                         */
 
 enum {
     TXI_LOOK_STEP = 2, /* pixels of the level between the patches that propose; ours            */
@@ -22,8 +22,8 @@ typedef struct txi_look {
     uint8_t *color;       /* 4 per pixel of the window */
 } txi_look;
 
-/* Bilinear colour of the known pixels around (x, y), in units of 2^-8 pixels of the window. 0: none of
-   them is known. */
+/* Bilinear colour of the known pixels around (x, y), in units of 2^-8 pixels of the window. 0: none
+   of them is known. */
 static int txi_look_read(const txi_window *w, int64_t x, int64_t y, uint8_t *color) {
     const int fx = (int)(x & 255), fy = (int)(y & 255);
     int sum[3] = {0, 0, 0}, total = 0;

@@ -330,15 +330,15 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
     return sqrt(error / i);
 }
 
-/* The curve of the first of count points, as in txi_end.fit with s = 0 at the first point. Returns to how
-   many points it was fitted. */
+/* The curve of the first of count points, as in txi_end.fit with s = 0 at the first point. Returns
+   to how many points it was fitted. */
 static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count, double fit[6]) {
     const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
     double line[6];
     int n = count;
     for (;;) {
-        /* a straight line unless a bent one is clearly better: the direction is more exact. Over long
-           pieces a parabola is no arc                                                            */
+        /* a straight line unless a bent one is clearly better: the direction is more exact. Over
+           long pieces a parabola is no arc */
         const double straight = txi_fit_line(points, n, 1, line);
         const double rms = txi_fit_line(points, n, 2, fit);
         const int is_straight = n <= 8 || straight < 1.25 * rms + 0.03;
@@ -349,7 +349,7 @@ static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count,
             break;
         n = n * 3 / 4;
     }
-    /* a corner near the hole: the first points alone are straight, in another direction            */
+    /* a corner near the hole: the first points alone are straight, in another direction          */
     if (n > TXI_CORNER && txi_fit_line(points, TXI_CORNER, 1, line) < 0.12) {
         const txm_vec2 p = txi_unit(line[1], line[4]), q = txi_unit(fit[1], fit[4]);
         if (fabs((double)p.x * q.y - (double)p.y * q.x) > 0.15) {
@@ -360,8 +360,10 @@ static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count,
     return n;
 }
 
-/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does not. */
-static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points, txi_end *e) {
+/* Fit the line, find where it enters the hole, its direction and curvature there. 0: it does
+   not. */
+static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
+                       txi_end *e) {
     double fit[6], s = 0;
     int found = 0;
     const int n = txi_fit_points(l, points, e->count, fit);
