@@ -373,7 +373,7 @@ typedef struct txi_window {
     size_t target_count;
 } txi_window;
 
-/* The pixels of a window come from these copies of the window itself. */
+/* How a copied piece is turned. Pixels come from the window itself and from turned copies of it. */
 typedef struct txi_pose {
     float a, b, c, d; /* a step to the right in the target is a step (a, b) in the source, a step
                          down is (c, d): a rotation, perhaps mirrored                          */
@@ -851,8 +851,8 @@ enum {
     TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
 };
 
-/* The mesh as a surface. Faces that name a vertex twice belong to nothing: their neighbours are
-   linked across them. */
+/* The mesh as a surface. Faces that name a vertex twice are linked with nothing; the faces to both
+   sides of such a one are linked with each other. */
 struct txi_surface {
     size_t face_count, vertex_count; /* vertices: welded, those at equal positions are one      */
     txm_dvec3 *point;    /* 1 per vertex                                                       */
@@ -912,7 +912,7 @@ static int txi_weights(const txm_vec2 t[3], double x, double y, double weight[3]
 
 /* ---- surface: vertices and sides ------------------------------------------------------------- */
 
-/* -0 is 0 */
+/* The bits of x, for -0 those of 0, so that equal numbers have equal bits. */
 static uint32_t txi_float_bits(float x) {
     uint32_t bits;
     const float plain = x + 0.0f;
@@ -1207,8 +1207,7 @@ static txm_status txi_surface_make(txi_domain *d, txm_arena *arena, txm_env *env
 
 /* ---- geodesic: distances along the surface --------------------------------------------------- */
 
-/* not reached */
-#define TXI_UNREACHED 1e300
+#define TXI_UNREACHED 1e300 /* the distance of what has not been reached */
 
 /* A vertex waits with the distance that it had when it was put in; the heap has the least on
    top. */
@@ -1305,8 +1304,9 @@ static int txi_geodesic_update(const txi_surface *s, txi_heap *heap, txm_arena *
    distances are too long by a fraction of a percent. (Exact algorithms keep intervals of edges
    instead, which costs ten times as much.)
 
-   Exact distances from one place, that is. From several, each triangle takes what reaches it for
-   the rays of one; from a line they come out too short by up to 2 %.
+   This holds for distances from one place. Several sources are not told apart: a triangle whose two
+   corners were reached from different ones unfolds them as if they were one. Distances from a line
+   come out too short by up to 2 %.
 
    sources   vertices, start their distances (NULL = 0). For a place inside a triangle: its corners,
              with their distances from it. Two corners at 0 make their whole edge a source
@@ -1801,6 +1801,8 @@ static txm_status txi_disk_grow(txi_disk *disk, const txi_surface *s, uint32_t s
 enum {
     TXI_ARAP_ROUNDS = 60 /* ours; it ends earlier when nothing moves any more */
 };
+#define TXI_COT_LEAST 0.05 /* ours: cotangents are limited to this range, as thin faces would */
+#define TXI_COT_MOST 20.0  /* make the system ill-conditioned and negative ones turn faces over */
 
 /* A disk laid out in the plane. */
 typedef struct txi_flat {
@@ -1842,8 +1844,7 @@ static void txi_flat_edges(txi_flat *flat, uint32_t *first, uint32_t *sides, uin
     }
 }
 
-/* The shapes of the faces and their cotangents, these between .05 and 20 so that thin faces do not
-   upset the system. */
+/* The shapes of the faces and their cotangents, limited. */
 static void txi_flat_shapes(txi_flat *flat, const txi_surface *s) {
     const txi_disk *disk = flat->disk;
     for (size_t i = 0; i < disk->face_count; i++) {
@@ -1858,8 +1859,8 @@ static void txi_flat_shapes(txi_flat *flat, const txi_surface *s) {
         for (int k = 0; k < 3; k++) {
             const txm_dvec3 at = p[(k + 2) % 3];
             const double dot = txm_d3_dot(txm_d3_sub(p[k], at), txm_d3_sub(p[(k + 1) % 3], at));
-            const double c = area > 0 ? dot / area : 20;
-            flat->cot[3 * i + (size_t)k] = c < 0.05 ? 0.05 : c > 20 ? 20 : c;
+            const double c = area > 0 ? dot / area : TXI_COT_MOST;
+            flat->cot[3 * i + (size_t)k] = fmin(fmax(c, TXI_COT_LEAST), TXI_COT_MOST);
         }
     }
 }
@@ -1983,8 +1984,9 @@ static void txi_arap_face(const txi_flat *flat, size_t i, double face_weight, do
 
        weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
 
-   is least, q being the face in its own plane; again and again.
-   the local and the global step of [6], with weights of faces.
+   is least, q being the face in its own plane; by turns (the local and the global step of [6]). The
+   weights of faces are not in [6]: what is known may be distorted more than the hole.
+
    weight, diagonal, right  scratch, 1 per edge, 1 and 2 per vertex
    small_step  of vertices, in the unit of the surface: end when none moves farther        */
 static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weight, double *weight,
@@ -2046,6 +2048,8 @@ static txm_status txi_flatten(txi_flat *flat, const double *face_weight, double 
 
 enum {
     TXI_NEAR = 3, /* texels; ours: how far a pixel between charts looks for a texel of its own   */
+    TXI_NEAR_SOLID = 8, /* pixels; ours: how far a target in void looks for a pixel that is not */
+    TXI_GUTTER_WIDTH = 8, /* texels; the default of desc.gutter                             */
     TXI_TAPS = 6, /* of the kernel, per axis                                                    */
     TXI_KERNEL_STEPS = 128 /* ours: places between two samples in the kernel's table            */
 };
@@ -2489,13 +2493,13 @@ static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int c
     return 1;
 }
 
-/* The pixel nearest to (x, y) that is not void, -1 if there is none within 8 pixels. */
+/* The pixel nearest to (x, y) that is not void, -1 if there is none within TXI_NEAR_SOLID. */
 static int64_t txi_solid_near(const txi_window *w, double x, double y) {
     const int cx = (int)floor(x + 0.5), cy = (int)floor(y + 0.5);
     int64_t best = -1;
     double least = 0;
-    for (int py = cy - 8; py <= cy + 8; py++) {
-        for (int px = cx - 8; px <= cx + 8; px++) {
+    for (int py = cy - TXI_NEAR_SOLID; py <= cy + TXI_NEAR_SOLID; py++) {
+        for (int px = cx - TXI_NEAR_SOLID; px <= cx + TXI_NEAR_SOLID; px++) {
             if (px < 0 || py < 0 || px >= w->width || py >= w->height) continue;
             const int64_t i = (int64_t)py * w->width + px;
             const double dx = px - x, dy = py - y, apart = dx * dx + dy * dy;
@@ -2556,7 +2560,7 @@ static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
    values of the nearest one in all maps. They are not missing any longer. filled receives how
    many. */
 static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env, size_t *filled) {
-    const int gutter = d->desc->gutter == 0 ? 8 : d->desc->gutter;
+    const int gutter = d->desc->gutter == 0 ? TXI_GUTTER_WIDTH : d->desc->gutter;
     const size_t count = (size_t)d->width * (size_t)d->height;
     *filled = 0;
     if (!d->surface || gutter < 0) return TXM_OK;
@@ -3036,7 +3040,7 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
         return txi_no_memory(l->env);
     txi_measure(l);
     for (int round = 0, grown = 1; round < TXI_ROUNDS && grown && l->pixel > 0; round++) {
-        /* specks reach farther than holes that fill a window by themselves */
+        /* small groups are joined with holes that are twice as far away */
         const int gap = l->texels < TXI_SPECKS ? 2 * TXI_GAP : TXI_GAP;
         grown = 0;
         status = txi_measure_from_hole(l, gap * l->pixel);
@@ -4274,6 +4278,9 @@ enum {
     TXI_GRID_ITERATIONS = 200 /* at most; then the result is taken as it is. 5 to 20 are usual  */
 };
 
+#define TXI_GRID_ENOUGH 0.0625 /* squared norm of the residual after one step of the two, relative,
+                                  from which the second is left out: 1/4 in [3]                  */
+
 typedef struct txi_grid_level {
     size_t count;
     const uint32_t *first, *to; /* links in rows, each in both                                  */
@@ -4501,7 +4508,7 @@ static void txi_grid_coarse(const txi_grid *g, int level) {
     const double p1 = txi_grid_dot(l->c, l->v, n), a1 = txi_grid_dot(l->c, l->r, n);
     const double step = p1 > 0 ? a1 / p1 : 0;
     for (size_t i = 0; i < n; i++) l->r[i] -= step * l->v[i];
-    if (!(p1 > 0) || txi_grid_dot(l->r, l->r, n) <= 0.0625 * norm) {
+    if (!(p1 > 0) || txi_grid_dot(l->r, l->r, n) <= TXI_GRID_ENOUGH * norm) {
         for (size_t i = 0; i < n; i++) l->x[i] = step * l->c[i];
         return;
     }
@@ -4769,8 +4776,8 @@ static txm_status txi_poisson_make(const txi_texel_graph *g, double screen, txm_
     return status;
 }
 
-/* Of all u with the given values at the rim that which rises along the links as nearly as possible
-   as wanted: the Poisson equation on the surface, across the seams of the atlas:
+/* The u that has the given values at the rim and whose differences along the links come nearest to
+   the given steps: the Poisson equation on the surface, across the seams of the atlas:
 
        minimise  sum over links  w (u_j - u_i - step)^2  +  screen sum (u_i - u0_i)^2
 
@@ -6357,6 +6364,8 @@ enum {
     TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn           */
 };
 
+#define TXI_VOTE_BEND 3.733 /* c = -16 ln(0.1) (sigma - 1) / pi^2 [4]                             */
+
 /* A token: where it is, and its tensor taken apart. */
 typedef struct txi_token {
     txm_dvec3 place;
@@ -6439,9 +6448,7 @@ static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double
    plates  0: no plates will vote, which saves most of the time                                  */
 static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->sigma = sigma;
-    /* so that an eighth of a circle and a straight line of the same length differ as in the
-       paper */
-    f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
+    f->c = sigma > 1 ? TXI_VOTE_BEND * (sigma - 1) : 0;
     f->reach = 2.5 * sigma;
     for (int i = 0; i <= TXI_VOTE_RADII; i++) {
         const double l = f->reach * (i > 0 ? i : 0.01) / (double)TXI_VOTE_RADII;
@@ -7477,7 +7484,7 @@ typedef struct txi_grown {
                           round                                                                  */
     int width, height; /* of the dense map, which covers the hole                                 */
     int left, top;     /* pixel of its first place                                                */
-    txi_spot *spots; /* the places, NULL tangents outside of the hole                      */
+    txi_spot *spots;   /* 1 per place of the dense map                                           */
     double *votes;     /* 6 per place                                                             */
     uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                     */
     int end_count;
@@ -12326,6 +12333,8 @@ static int txi_source_patches(const txi_source *s) {
 
 enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
+    TXI_MEND = 4,        /* pixels: how far a match that cannot be copied may be moved; ours   */
+    TXI_ANY_TRIES = 100, /* random patches, before all are gone through; ours                 */
     TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances; ours */
 };
 
@@ -12333,7 +12342,7 @@ enum {
 typedef struct txi_match {
     int16_t x, y; /* upper left corner in the source                                          */
     int16_t pose; /* number of the source; -1: none                                           */
-    int16_t spare;
+    int16_t spare; /* 0                                                                        */
     uint32_t cost; /* squared differences of a full patch, and what missing detail costs       */
 } txi_match;
 
@@ -12433,7 +12442,7 @@ static txi_match txi_match_any(const txi_level *l, txm_rng *rng) {
     txi_match m;
     memset(&m, 0, sizeof m);
     m.cost = UINT32_MAX;
-    for (int k = 0; k < 100; k++) {
+    for (int k = 0; k < TXI_ANY_TRIES; k++) {
         const int pose = l->built[txm_rng_below(rng, (uint32_t)l->built_count)];
         const txi_source *s = &l->source[pose];
         m.pose = (int16_t)pose;
@@ -12566,9 +12575,9 @@ static int txi_match_holds(const txi_level *l, const txi_match *m) {
            s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x];
 }
 
-/* Move a match to the nearest patch that may be copied, at most 4 pixels away. */
+/* Move a match to the nearest patch that may be copied, at most TXI_MEND pixels away. */
 static int txi_match_mend(const txi_level *l, txi_match *m) {
-    for (int r = 0; r <= 4; r++) {
+    for (int r = 0; r <= TXI_MEND; r++) {
         for (int y = -r; y <= r; y++) {
             for (int x = -r; x <= r; x++) {
                 txi_match near_one = *m;
@@ -12589,7 +12598,8 @@ static void txi_upsample(const txi_level *coarse, const txi_match *from, txi_can
     const txi_level *l = t->level;
     for (int a = 0; a < l->anchor_count; a++) {
         const int p = l->anchor[a];
-        /* the coarse patch with the nearest centre, else one next to it */
+        /* the coarse patch with the nearest centre, else one next to it: its corner is 2 pixels
+           nearer to the centre; 16 / 2 - 8 rounds down where the difference is negative */
         const int x = (p % l->width - TXI_EDGE + 16) / 2 - 8 - 2 + TXI_EDGE;
         const int y = (p / l->width - TXI_EDGE + 16) / 2 - 8 - 2 + TXI_EDGE;
         txm_rng rng = txm_rng_make(t->seed - 1, (uint64_t)a);
@@ -12624,6 +12634,7 @@ enum {
     TXI_ONION_FULL = 85,      /* percent from which patches off the lattice are compared, too    */
     TXI_ONION_RING = 2,       /* pixels filled a pass                                            */
     TXI_ONION_BEST = 8,       /* matches that are refined                                        */
+    TXI_ONION_SPREAD = 400,   /* squared levels per pixel: at this cost a patch has weight 1 / e */
     TXI_ONION_REACH = 2,      /* pixels of the refinement                                        */
     TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
     TXI_ONION_LEAST = 4000,   /* places compared at least, for up to three times that work       */
@@ -12768,7 +12779,7 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
             const txi_match *m = &o->found[a];
             const txi_source *s = &l->source[m->pose];
             color[n] = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
-            const double fit = m->cost / (400.0 * (double)TXI_PATCH_AREA);
+            const double fit = m->cost / ((double)TXI_ONION_SPREAD * (double)TXI_PATCH_AREA);
             weight[n] = txm_exp2(-(fit < 500 ? fit : 500) * TXI_LOG2_E) + 1e-30;
             total += weight[n];
             for (int c = 0; c < 3; c++) sum[c] += weight[n] * color[n][c];

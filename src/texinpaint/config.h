@@ -48,7 +48,7 @@ typedef struct txi_window {
     size_t target_count;
 } txi_window;
 
-/* The pixels of a window come from these copies of the window itself. */
+/* How a copied piece is turned. Pixels come from the window itself and from turned copies of it. */
 typedef struct txi_pose {
     float a, b, c, d; /* a step to the right in the target is a step (a, b) in the source, a step
                          down is (c, d): a rotation, perhaps mirrored                          */

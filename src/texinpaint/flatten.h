@@ -9,6 +9,8 @@
 enum {
     TXI_ARAP_ROUNDS = 60 /* ours; it ends earlier when nothing moves any more */
 };
+#define TXI_COT_LEAST 0.05 /* ours: cotangents are limited to this range, as thin faces would */
+#define TXI_COT_MOST 20.0  /* make the system ill-conditioned and negative ones turn faces over */
 
 /* A disk laid out in the plane. */
 typedef struct txi_flat {
@@ -50,8 +52,7 @@ static void txi_flat_edges(txi_flat *flat, uint32_t *first, uint32_t *sides, uin
     }
 }
 
-/* The shapes of the faces and their cotangents, these between .05 and 20 so that thin faces do not
-   upset the system. */
+/* The shapes of the faces and their cotangents, limited. */
 static void txi_flat_shapes(txi_flat *flat, const txi_surface *s) {
     const txi_disk *disk = flat->disk;
     for (size_t i = 0; i < disk->face_count; i++) {
@@ -66,8 +67,8 @@ static void txi_flat_shapes(txi_flat *flat, const txi_surface *s) {
         for (int k = 0; k < 3; k++) {
             const txm_dvec3 at = p[(k + 2) % 3];
             const double dot = txm_d3_dot(txm_d3_sub(p[k], at), txm_d3_sub(p[(k + 1) % 3], at));
-            const double c = area > 0 ? dot / area : 20;
-            flat->cot[3 * i + (size_t)k] = c < 0.05 ? 0.05 : c > 20 ? 20 : c;
+            const double c = area > 0 ? dot / area : TXI_COT_MOST;
+            flat->cot[3 * i + (size_t)k] = fmin(fmax(c, TXI_COT_LEAST), TXI_COT_MOST);
         }
     }
 }
@@ -191,8 +192,9 @@ static void txi_arap_face(const txi_flat *flat, size_t i, double face_weight, do
 
        weight(face) cot(side) |p_i - p_j - R(face) (q_i - q_j)|^2
 
-   is least, q being the face in its own plane; again and again.
-   the local and the global step of [6], with weights of faces.
+   is least, q being the face in its own plane; by turns (the local and the global step of [6]). The
+   weights of faces are not in [6]: what is known may be distorted more than the hole.
+
    weight, diagonal, right  scratch, 1 per edge, 1 and 2 per vertex
    small_step  of vertices, in the unit of the surface: end when none moves farther        */
 static void txi_arap(txi_flat *flat, txi_factor *factor, const double *face_weight, double *weight,

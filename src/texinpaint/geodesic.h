@@ -5,8 +5,7 @@
 
 /* ---- geodesic: distances along the surface --------------------------------------------------- */
 
-/* not reached */
-#define TXI_UNREACHED 1e300
+#define TXI_UNREACHED 1e300 /* the distance of what has not been reached */
 
 /* A vertex waits with the distance that it had when it was put in; the heap has the least on
    top. */
@@ -103,8 +102,9 @@ static int txi_geodesic_update(const txi_surface *s, txi_heap *heap, txm_arena *
    distances are too long by a fraction of a percent. (Exact algorithms keep intervals of edges
    instead, which costs ten times as much.)
 
-   Exact distances from one place, that is. From several, each triangle takes what reaches it for
-   the rays of one; from a line they come out too short by up to 2 %.
+   This holds for distances from one place. Several sources are not told apart: a triangle whose two
+   corners were reached from different ones unfolds them as if they were one. Distances from a line
+   come out too short by up to 2 %.
 
    sources   vertices, start their distances (NULL = 0). For a place inside a triangle: its corners,
              with their distances from it. Two corners at 0 make their whole edge a source

@@ -36,7 +36,7 @@ typedef struct txi_grown {
                           round                                                                  */
     int width, height; /* of the dense map, which covers the hole                                 */
     int left, top;     /* pixel of its first place                                                */
-    txi_spot *spots; /* the places, NULL tangents outside of the hole                      */
+    txi_spot *spots;   /* 1 per place of the dense map                                           */
     double *votes;     /* 6 per place                                                             */
     uint8_t *met;      /* end_count squared: 1: the lines of the two ends met                     */
     int end_count;

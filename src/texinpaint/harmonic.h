@@ -157,8 +157,8 @@ static txm_status txi_poisson_make(const txi_texel_graph *g, double screen, txm_
     return status;
 }
 
-/* Of all u with the given values at the rim that which rises along the links as nearly as possible
-   as wanted: the Poisson equation on the surface, across the seams of the atlas:
+/* The u that has the given values at the rim and whose differences along the links come nearest to
+   the given steps: the Poisson equation on the surface, across the seams of the atlas:
 
        minimise  sum over links  w (u_j - u_i - step)^2  +  screen sum (u_i - u0_i)^2
 

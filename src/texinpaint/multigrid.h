@@ -21,6 +21,9 @@ enum {
     TXI_GRID_ITERATIONS = 200 /* at most; then the result is taken as it is. 5 to 20 are usual  */
 };
 
+#define TXI_GRID_ENOUGH 0.0625 /* squared norm of the residual after one step of the two, relative,
+                                  from which the second is left out: 1/4 in [3]                  */
+
 typedef struct txi_grid_level {
     size_t count;
     const uint32_t *first, *to; /* links in rows, each in both                                  */
@@ -248,7 +251,7 @@ static void txi_grid_coarse(const txi_grid *g, int level) {
     const double p1 = txi_grid_dot(l->c, l->v, n), a1 = txi_grid_dot(l->c, l->r, n);
     const double step = p1 > 0 ? a1 / p1 : 0;
     for (size_t i = 0; i < n; i++) l->r[i] -= step * l->v[i];
-    if (!(p1 > 0) || txi_grid_dot(l->r, l->r, n) <= 0.0625 * norm) {
+    if (!(p1 > 0) || txi_grid_dot(l->r, l->r, n) <= TXI_GRID_ENOUGH * norm) {
         for (size_t i = 0; i < n; i++) l->x[i] = step * l->c[i];
         return;
     }

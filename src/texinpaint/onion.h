@@ -14,6 +14,7 @@ enum {
     TXI_ONION_FULL = 85,      /* percent from which patches off the lattice are compared, too    */
     TXI_ONION_RING = 2,       /* pixels filled a pass                                            */
     TXI_ONION_BEST = 8,       /* matches that are refined                                        */
+    TXI_ONION_SPREAD = 400,   /* squared levels per pixel: at this cost a patch has weight 1 / e */
     TXI_ONION_REACH = 2,      /* pixels of the refinement                                        */
     TXI_ONION_WORK = 3000000, /* comparisons, about                                            */
     TXI_ONION_LEAST = 4000,   /* places compared at least, for up to three times that work       */
@@ -158,7 +159,7 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
             const txi_match *m = &o->found[a];
             const txi_source *s = &l->source[m->pose];
             color[n] = s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
-            const double fit = m->cost / (400.0 * (double)TXI_PATCH_AREA);
+            const double fit = m->cost / ((double)TXI_ONION_SPREAD * (double)TXI_PATCH_AREA);
             weight[n] = txm_exp2(-(fit < 500 ? fit : 500) * TXI_LOG2_E) + 1e-30;
             total += weight[n];
             for (int c = 0; c < 3; c++) sum[c] += weight[n] * color[n][c];

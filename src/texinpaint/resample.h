@@ -8,6 +8,8 @@
 
 enum {
     TXI_NEAR = 3, /* texels; ours: how far a pixel between charts looks for a texel of its own   */
+    TXI_NEAR_SOLID = 8, /* pixels; ours: how far a target in void looks for a pixel that is not */
+    TXI_GUTTER_WIDTH = 8, /* texels; the default of desc.gutter                             */
     TXI_TAPS = 6, /* of the kernel, per axis                                                    */
     TXI_KERNEL_STEPS = 128 /* ours: places between two samples in the kernel's table            */
 };
@@ -451,13 +453,13 @@ static int txi_window_value(const txi_window *w, const txi_kernel *kernel, int c
     return 1;
 }
 
-/* The pixel nearest to (x, y) that is not void, -1 if there is none within 8 pixels. */
+/* The pixel nearest to (x, y) that is not void, -1 if there is none within TXI_NEAR_SOLID. */
 static int64_t txi_solid_near(const txi_window *w, double x, double y) {
     const int cx = (int)floor(x + 0.5), cy = (int)floor(y + 0.5);
     int64_t best = -1;
     double least = 0;
-    for (int py = cy - 8; py <= cy + 8; py++) {
-        for (int px = cx - 8; px <= cx + 8; px++) {
+    for (int py = cy - TXI_NEAR_SOLID; py <= cy + TXI_NEAR_SOLID; py++) {
+        for (int px = cx - TXI_NEAR_SOLID; px <= cx + TXI_NEAR_SOLID; px++) {
             if (px < 0 || py < 0 || px >= w->width || py >= w->height) continue;
             const int64_t i = (int64_t)py * w->width + px;
             const double dx = px - x, dy = py - y, apart = dx * dx + dy * dy;
@@ -518,7 +520,7 @@ static void txi_copy_texel(const txi_domain *d, size_t from, size_t to) {
    values of the nearest one in all maps. They are not missing any longer. filled receives how
    many. */
 static txm_status txi_gutter(txi_domain *d, txm_arena *arena, txm_env *env, size_t *filled) {
-    const int gutter = d->desc->gutter == 0 ? 8 : d->desc->gutter;
+    const int gutter = d->desc->gutter == 0 ? TXI_GUTTER_WIDTH : d->desc->gutter;
     const size_t count = (size_t)d->width * (size_t)d->height;
     *filled = 0;
     if (!d->surface || gutter < 0) return TXM_OK;

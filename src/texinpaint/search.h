@@ -7,6 +7,8 @@
 
 enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
+    TXI_MEND = 4,        /* pixels: how far a match that cannot be copied may be moved; ours   */
+    TXI_ANY_TRIES = 100, /* random patches, before all are gone through; ours                 */
     TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances; ours */
 };
 
@@ -14,7 +16,7 @@ enum {
 typedef struct txi_match {
     int16_t x, y; /* upper left corner in the source                                          */
     int16_t pose; /* number of the source; -1: none                                           */
-    int16_t spare;
+    int16_t spare; /* 0                                                                        */
     uint32_t cost; /* squared differences of a full patch, and what missing detail costs       */
 } txi_match;
 
@@ -114,7 +116,7 @@ static txi_match txi_match_any(const txi_level *l, txm_rng *rng) {
     txi_match m;
     memset(&m, 0, sizeof m);
     m.cost = UINT32_MAX;
-    for (int k = 0; k < 100; k++) {
+    for (int k = 0; k < TXI_ANY_TRIES; k++) {
         const int pose = l->built[txm_rng_below(rng, (uint32_t)l->built_count)];
         const txi_source *s = &l->source[pose];
         m.pose = (int16_t)pose;
@@ -247,9 +249,9 @@ static int txi_match_holds(const txi_level *l, const txi_match *m) {
            s->worth[(size_t)m->y * (size_t)s->width + (size_t)m->x];
 }
 
-/* Move a match to the nearest patch that may be copied, at most 4 pixels away. */
+/* Move a match to the nearest patch that may be copied, at most TXI_MEND pixels away. */
 static int txi_match_mend(const txi_level *l, txi_match *m) {
-    for (int r = 0; r <= 4; r++) {
+    for (int r = 0; r <= TXI_MEND; r++) {
         for (int y = -r; y <= r; y++) {
             for (int x = -r; x <= r; x++) {
                 txi_match near_one = *m;
@@ -270,7 +272,8 @@ static void txi_upsample(const txi_level *coarse, const txi_match *from, txi_can
     const txi_level *l = t->level;
     for (int a = 0; a < l->anchor_count; a++) {
         const int p = l->anchor[a];
-        /* the coarse patch with the nearest centre, else one next to it */
+        /* the coarse patch with the nearest centre, else one next to it: its corner is 2 pixels
+           nearer to the centre; 16 / 2 - 8 rounds down where the difference is negative */
         const int x = (p % l->width - TXI_EDGE + 16) / 2 - 8 - 2 + TXI_EDGE;
         const int y = (p / l->width - TXI_EDGE + 16) / 2 - 8 - 2 + TXI_EDGE;
         txm_rng rng = txm_rng_make(t->seed - 1, (uint64_t)a);

@@ -208,7 +208,7 @@ static txm_status txi_find_group(txi_sheet *l, uint32_t seed) {
         return txi_no_memory(l->env);
     txi_measure(l);
     for (int round = 0, grown = 1; round < TXI_ROUNDS && grown && l->pixel > 0; round++) {
-        /* specks reach farther than holes that fill a window by themselves */
+        /* small groups are joined with holes that are twice as far away */
         const int gap = l->texels < TXI_SPECKS ? 2 * TXI_GAP : TXI_GAP;
         grown = 0;
         status = txi_measure_from_hole(l, gap * l->pixel);

@@ -13,8 +13,8 @@ enum {
     TXI_FINS = 16     /* ours: sides of an edge that are compared with one another, at most       */
 };
 
-/* The mesh as a surface. Faces that name a vertex twice belong to nothing: their neighbours are
-   linked across them. */
+/* The mesh as a surface. Faces that name a vertex twice are linked with nothing; the faces to both
+   sides of such a one are linked with each other. */
 struct txi_surface {
     size_t face_count, vertex_count; /* vertices: welded, those at equal positions are one      */
     txm_dvec3 *point;    /* 1 per vertex                                                       */
@@ -74,7 +74,7 @@ static int txi_weights(const txm_vec2 t[3], double x, double y, double weight[3]
 
 /* ---- surface: vertices and sides ------------------------------------------------------------- */
 
-/* -0 is 0 */
+/* The bits of x, for -0 those of 0, so that equal numbers have equal bits. */
 static uint32_t txi_float_bits(float x) {
     uint32_t bits;
     const float plain = x + 0.0f;

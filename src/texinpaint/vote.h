@@ -22,6 +22,8 @@ enum {
     TXI_VOTE_STICKS = 32  /* sticks that are summed up for a plate, over a quarter turn           */
 };
 
+#define TXI_VOTE_BEND 3.733 /* c = -16 ln(0.1) (sigma - 1) / pi^2 [4]                             */
+
 /* A token: where it is, and its tensor taken apart. */
 typedef struct txi_token {
     txm_dvec3 place;
@@ -104,9 +106,7 @@ static void txi_vote_stick(const txi_fields *f, txm_dvec3 n, txm_dvec3 v, double
    plates  0: no plates will vote, which saves most of the time                                  */
 static void txi_fields_make(txi_fields *f, double sigma, int plates) {
     f->sigma = sigma;
-    /* so that an eighth of a circle and a straight line of the same length differ as in the
-       paper */
-    f->c = sigma > 1 ? 3.733 * (sigma - 1) : 0;
+    f->c = sigma > 1 ? TXI_VOTE_BEND * (sigma - 1) : 0;
     f->reach = 2.5 * sigma;
     for (int i = 0; i <= TXI_VOTE_RADII; i++) {
         const double l = f->reach * (i > 0 ? i : 0.01) / (double)TXI_VOTE_RADII;
