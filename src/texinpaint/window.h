@@ -228,7 +228,7 @@ static txm_status txi_picture_window(txi_domain *d, txm_arena *arena, txm_env *e
     txm_status status = TXM_OK;
     txm_arena scratch;
     txi_list ours, others;
-    txi_box box, window;
+    txi_box box = {0, 0, 0, 0}, window = box;
     int margin = 0;
     *found = first != NULL;
     if (!first) return TXM_OK;
