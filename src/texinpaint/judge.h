@@ -8,8 +8,8 @@
 enum { TXI_GO_ON = 8 }; /* pixels inside of the hole over which a line should go on               */
 
 /* Over how many of 8 pixels inside of the hole a line of the result follows the continuation of an
-   end: no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times the
-   strength. */
+   end: no farther than 2.5 pixels, within 25 degrees, with the same polarity and 0.45 to 2.2 times
+   the strength. */
 static int txi_goes_on(const txi_window *w, const txi_slopes *f, const txi_end *e) {
     txi_walk k;
     int n = 0;
@@ -152,7 +152,8 @@ static void txi_dot(const txi_window *w, int scale, double x, double y, const ui
 }
 
 /* Draw what was found over the colours of the window, enlarged scale times: points of lines in
-   orange; the traced ends in cyan (long) or yellow; curves in green, in red where they end in the hole.
+   orange; the traced ends in cyan (long) or yellow; curves in green, in red where they end in the
+   hole.
    rgb  3 * width * height * scale^2 bytes                                                      */
 static void txi_draw_lines(const txi_window *w, const txi_lines *l, const txi_curve *curves,
                            int count, int scale, uint8_t *rgb) {
