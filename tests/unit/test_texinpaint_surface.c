@@ -749,6 +749,47 @@ static void test_source_apart(void **state) {
     end();
 }
 
+/* A scratch along a panorama: its windows are no longer than offsets within them can be. */
+static void test_long_picture(void **state) {
+    enum { WIDTH = 9000, HEIGHT = 24 };
+    static uint8_t missing[WIDTH * HEIGHT], usable[WIDTH * HEIGHT], pixels[WIDTH * HEIGHT];
+    const txm_image image = {pixels, WIDTH, HEIGHT, 1, TXM_U8, 0};
+    texinpaint_desc desc;
+    txi_domain d;
+    txm_arena memory;
+    int left = 1;
+    (void)state;
+    memset(&desc, 0, sizeof desc);
+    memset(&d, 0, sizeof d);
+    desc.image = image;
+    d.desc = &desc;
+    d.width = WIDTH;
+    d.height = HEIGHT;
+    d.map_count = 1;
+    d.maps[0] = txm_image_resolve(image);
+    d.missing = missing;
+    d.usable = usable;
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        missing[i] = i / WIDTH > 7 && i / WIDTH < 16 && i % WIDTH > 50 && i % WIDTH < WIDTH - 50;
+        usable[i] = !missing[i];
+    }
+    txm_arena_init(&memory, NULL);
+    assert_int_equal(txi_surface_make(&d, &memory, NULL), TXM_OK);
+    for (int count = 0; left; count++) {
+        txm_arena arena;
+        txi_window w;
+        txm_arena_init(&arena, NULL);
+        assert_int_equal(txi_windows_next(&d, &arena, NULL, &w, &left), TXM_OK);
+        assert_true(count < 40);
+        if (left) {
+            assert_true(w.width <= TXI_SIDE_MOST && w.target_count > 0);
+            txi_window_done(&d, &w);
+        }
+        txm_arena_free(&arena);
+    }
+    txm_arena_free(&memory);
+}
+
 /* ---- faults --------------------------------------------------------------------------------- */
 
 static txm_status all_of_it(void *context, txm_env *env) {
@@ -801,7 +842,7 @@ int main(void) {
         cmocka_unit_test(test_bad_meshes),          cmocka_unit_test(test_random_meshes),
         cmocka_unit_test(test_gutter),              cmocka_unit_test(test_pictures),
         cmocka_unit_test(test_source),              cmocka_unit_test(test_source_apart),
-        cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_long_picture),        cmocka_unit_test(test_faults),
     };
     return cmocka_run_group_tests_name("texinpaint: surfaces and windows", tests, NULL, NULL);
 }
