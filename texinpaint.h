@@ -1078,7 +1078,7 @@ static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texe
 static void txi_cover_face(const txi_domain *d, txi_surface *s, uint32_t *charts, uint32_t face) {
     const txm_vec2 *t = s->uv + 3 * (size_t)face;
     const double area = txi_cross2(t[0], t[1], t[2]), turn = area < 0 ? -1 : 1;
-    double left = t[0].x, right = t[0].x, top = t[0].y, bottom = t[0].y;
+    double left = t[0].x, right = left, top = t[0].y, bottom = top;
     for (int k = 1; k < 3; k++) {
         left = fmin(left, t[k].x);
         right = fmax(right, t[k].x);
@@ -2103,6 +2103,7 @@ typedef struct txi_kernel {
 } txi_kernel;
 
 static void txi_kernel_init(txi_kernel *kernel) {
+    memset(kernel, 0, sizeof *kernel);
     for (int i = 0; i < TXI_KERNEL_STEPS; i++)
         txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
     for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;
@@ -7492,6 +7493,7 @@ typedef struct txi_grown {
 
 static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
     txi_spot s;
+    s.used = 0;
     const int ix = txm_clampi((int)floor(x + 0.5), 0, w->width - 1);
     const int iy = txm_clampi((int)floor(y + 0.5), 0, w->height - 1);
     const size_t i = (size_t)iy * (size_t)w->width + (size_t)ix;
@@ -9399,8 +9401,9 @@ static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_ar
     txm_status status = txi_belief_prune(&t, keep, arena, env);
     if (status == TXM_OK) status = txi_belief_tables(&t, arena, env);
     if (status != TXM_OK) return status;
-    int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x), *y = x + nodes;
+    int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x);
     if (!x) return txi_no_memory(env);
+    int *y = x + nodes;
 
     if (TXI_LEFT_OUT & TXI_BELIEF) {
         txi_belief_cheapest(&t, x);
@@ -13166,7 +13169,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
     const txi_canvas *t = v->canvas;
     txi_proposal list[TXI_PATCH_AREA];
     const int n = txi_proposals(t, p, list);
-    if (n == 0) return -1;
+    if (n <= 0) return -1;
     int mean[3] = {0, 0, 0};
     for (int pass = 0; pass < 2; pass++) {
         uint64_t sum[3] = {0, 0, 0}, total = 0;
@@ -13573,7 +13576,7 @@ static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_
             for (; low < kinds && pairs[low].key <= column + 2; low++) {
                 sum += pairs[low].value;
                 if (pairs[low].value > pairs[i].value ||
-                    (pairs[low].value == pairs[i].value && low < i))
+                    (low < i && pairs[low].value == pairs[i].value))
                     is_peak = 0;
             }
         }

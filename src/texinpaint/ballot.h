@@ -81,7 +81,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
     const txi_canvas *t = v->canvas;
     txi_proposal list[TXI_PATCH_AREA];
     const int n = txi_proposals(t, p, list);
-    if (n == 0) return -1;
+    if (n <= 0) return -1;
     int mean[3] = {0, 0, 0};
     for (int pass = 0; pass < 2; pass++) {
         uint64_t sum[3] = {0, 0, 0}, total = 0;

@@ -510,8 +510,9 @@ static txm_status txi_belief(const txi_graph *g, int keep, uint64_t seed, txm_ar
     txm_status status = txi_belief_prune(&t, keep, arena, env);
     if (status == TXM_OK) status = txi_belief_tables(&t, arena, env);
     if (status != TXM_OK) return status;
-    int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x), *y = x + nodes;
+    int *x = (int *)txm_arena_zero(arena, 3 * nodes + 1, sizeof *x);
     if (!x) return txi_no_memory(env);
+    int *y = x + nodes;
 
     if (TXI_LEFT_OUT & TXI_BELIEF) {
         txi_belief_cheapest(&t, x);

@@ -44,6 +44,7 @@ typedef struct txi_grown {
 
 static txi_spot txi_spot_at(const txi_window *w, double x, double y) {
     txi_spot s;
+    s.used = 0;
     const int ix = txm_clampi((int)floor(x + 0.5), 0, w->width - 1);
     const int iy = txm_clampi((int)floor(y + 0.5), 0, w->height - 1);
     const size_t i = (size_t)iy * (size_t)w->width + (size_t)ix;

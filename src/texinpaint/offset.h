@@ -98,7 +98,7 @@ static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_
             for (; low < kinds && pairs[low].key <= column + 2; low++) {
                 sum += pairs[low].value;
                 if (pairs[low].value > pairs[i].value ||
-                    (pairs[low].value == pairs[i].value && low < i))
+                    (low < i && pairs[low].value == pairs[i].value))
                     is_peak = 0;
             }
         }

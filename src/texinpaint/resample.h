@@ -63,6 +63,7 @@ typedef struct txi_kernel {
 } txi_kernel;
 
 static void txi_kernel_init(txi_kernel *kernel) {
+    memset(kernel, 0, sizeof *kernel);
     for (int i = 0; i < TXI_KERNEL_STEPS; i++)
         txi_lanczos((double)i / (double)TXI_KERNEL_STEPS, kernel->weight[i]);
     for (int k = 0; k < TXI_TAPS; k++) kernel->weight[TXI_KERNEL_STEPS][k] = k == 3;

@@ -240,7 +240,7 @@ static void txi_own(txi_surface *s, uint32_t *charts, uint32_t face, size_t texe
 static void txi_cover_face(const txi_domain *d, txi_surface *s, uint32_t *charts, uint32_t face) {
     const txm_vec2 *t = s->uv + 3 * (size_t)face;
     const double area = txi_cross2(t[0], t[1], t[2]), turn = area < 0 ? -1 : 1;
-    double left = t[0].x, right = t[0].x, top = t[0].y, bottom = t[0].y;
+    double left = t[0].x, right = left, top = t[0].y, bottom = top;
     for (int k = 1; k < 3; k++) {
         left = fmin(left, t[k].x);
         right = fmax(right, t[k].x);
