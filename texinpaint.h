@@ -13182,6 +13182,7 @@ static int txi_vote_pixel(const txi_ballot *v, int p) {
             total += w;
             for (int c = 0; c < 3; c++) sum[c] += (uint64_t)w * list[k].color[c];
         }
+        if (total == 0) return -1; /* not so: no weight is 0 */
         for (int c = 0; c < 3; c++) mean[c] = (int)((sum[c] + total / 2) / total);
     }
     const int pull = t->level->pull ? t->level->pull[p] * v->pull / 256 : 0;
