@@ -334,7 +334,7 @@ static double txi_fit_start(const txm_vec2 *points, int n, const double fit[6]) 
    to how many points it was fitted. */
 static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count, double fit[6]) {
     const int bent = l->width > 2 * TXI_BENT_FIT ? (int)(0.5f * l->width) : TXI_BENT_FIT;
-    double line[6];
+    double line[6] = {0};
     int n = count;
     for (;;) {
         /* a straight line unless a bent one is clearly better: the direction is more exact. Over
