@@ -11228,7 +11228,8 @@ static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *
             txi_patch_cut(s, k, all->cuts + (size_t)(s->node + k) * TXI_STRIP_ROWS);
         for (int j = 0; j < s->rows && s->node_count; j++) txi_row_offsets(s, j, e, offsets);
         for (int k = 0; k < s->node_count; k++) {
-            float *row = offsets + (size_t)k * 3 * TXI_STRIP_ROWS, smooth[3 * TXI_STRIP_ROWS];
+            float *row = offsets + (size_t)k * 3 * TXI_STRIP_ROWS;
+            float smooth[3 * TXI_STRIP_ROWS] = {0};
             for (int j = 0; j < 3 * s->rows; j++)
                 smooth[j] = txm_float(txi_running_mean(row + j % 3, s->rows, 3, j / 3, 2));
             memcpy(row, smooth, (size_t)(3 * s->rows) * sizeof *row);

@@ -11,6 +11,13 @@
 #include "files/mesh_io.h"
 #include "texinpaint.h"
 
+/* A picture of --debug, encoded. */
+typedef struct inpaint_shown {
+    char path[MAX_PATH];
+    unsigned char *bytes;
+    size_t size;
+} inpaint_shown;
+
 typedef struct inpaint_job {
     cli run;
 
@@ -32,11 +39,7 @@ typedef struct inpaint_job {
     txm_image out[TEXINPAINT_MAX_MAPS];
 
     /* the pictures of --debug, as PNG */
-    struct {
-        char path[MAX_PATH];
-        unsigned char *bytes;
-        size_t size;
-    } *shown;
+    inpaint_shown *shown;
     size_t shown_count;
     int show_status; /* of the last picture; after a failure no more are kept */
 } inpaint_job;

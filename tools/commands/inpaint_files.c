@@ -71,12 +71,12 @@ void inpaint_show(void *user, const char *name, const txm_image *picture) {
     const char *why;
     if (j->show_status) return;
     if ((n & (n - 1)) == 0) { /* room for 1, 2, 4, 8, ... */
-        void *grown = realloc(j->shown, (n ? 2 * n : 1) * sizeof *j->shown);
+        inpaint_shown *grown = (inpaint_shown *)realloc(j->shown, (n ? 2 * n : 1) * sizeof *grown);
         if (!grown) {
             j->show_status = fail_memory(&j->run);
             return;
         }
-        memcpy(&j->shown, &grown, sizeof grown);
+        j->shown = grown;
     }
     if (snprintf(j->shown[n].path, MAX_PATH, "%s/%02lu-%s.png", j->debug, (unsigned long)n + 1,
                  name) >= MAX_PATH)

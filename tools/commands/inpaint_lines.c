@@ -14,14 +14,16 @@
 /* The points of a line, `dimensions` numbers each, to `to`. 0: one of them is none. */
 static int get_points(const cJSON *list, int dimensions, float *to) {
     const cJSON *point, *number;
+    size_t at = 0; /* in to: 3 numbers a point */
     cJSON_ArrayForEach(point, list) {
+        size_t k = 0;
         if (!cJSON_IsArray(point) || cJSON_GetArraySize(point) != dimensions) return 0;
-        to[2] = 0;
+        to[at + 2] = 0;
         cJSON_ArrayForEach(number, point) {
             if (!cJSON_IsNumber(number) || !(fabs(number->valuedouble) <= MAX_COORDINATE)) return 0;
-            *to++ = (float)number->valuedouble;
+            to[at + k++] = (float)number->valuedouble;
         }
-        to += 3 - dimensions;
+        at += 3;
     }
     return 1;
 }
