@@ -10395,7 +10395,8 @@ static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int
         }
         n++;
     }
-    for (int k = 0; k < 3 && n; k++) color[k] = values[k][n / 2];
+    const int middle = n / 2;
+    for (int k = 0; k < 3 && n; k++) color[k] = values[k][middle];
     return n >= 4;
 }
 
