@@ -2633,7 +2633,7 @@ static size_t txi_box_area(txi_box b) {
 
 /* May a window have these sides? */
 static int txi_side_fits(double width, double height) {
-    return width * width + height * height <= (double)TXI_SIDE_MOST * TXI_SIDE_MOST;
+    return width * width + height * height <= (double)TXI_SIDE_MOST * (double)TXI_SIDE_MOST;
 }
 static int txi_box_fits(txi_box b) {
     return txi_side_fits(b.right - b.left, b.bottom - b.top);
