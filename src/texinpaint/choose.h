@@ -134,7 +134,7 @@ static txm_status txi_join_hypothesis(const txi_choice *c, txi_hypothesis *h, tx
 /* What the lines of a hypothesis say. */
 static txm_status txi_plan_hypothesis(const txi_choice *c, txi_hypothesis *h, txm_env *env) {
     if (h->curve_count == 0) return TXM_OK;
-    if (h->is_mean || (TXI_LEFT_OUT & TXI_STRIPS))
+    if (h->is_mean || (TXI_LEFT_OUT & TXI_STRIPS) != 0)
         return txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, &h->memory, env, &h->plan);
     return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env,
                          &h->plan, &h->plan.poses, &h->plan.pose_count);
