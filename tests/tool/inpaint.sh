@@ -190,6 +190,6 @@ done
 # ---- stopping, memory, progress
 "$root/build/scan" ball large 1024
 large="inpaint --mesh large.obj --texture large.png --mask large-mask.png"
-check "a signal stops it" stops n.png $large
-check "too little memory" starves 60000 n.png $large
+check "a signal stops it" stops stopped.png $large
+check "too little memory" starves 60000 starved.png $large
 if has_terminal; then check "a progress bar" shows_bar $large -o bar.png; fi
