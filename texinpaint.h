@@ -536,6 +536,14 @@ static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     return (ptrdiff_t)row * width + column;
 }
 
+/* The weights of Catmull-Rom interpolation at t = 0..1 between the middle two of four samples. */
+static void txi_cubic(double t, double weights[4]) {
+    weights[0] = 0.5 * t * (t * (2 - t) - 1);
+    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
+    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
+    weights[3] = 0.5 * t * t * (t - 1);
+}
+
 /* ---- rasters: distances ---------------------------------------------------------------------- */
 
 /* The nearest pixel with a mark, of equally near ones the first in its row, then the upper one.
@@ -11242,14 +11250,6 @@ static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *
 
 /* ---- pixels ---- */
 
-/* Catmull-Rom weights at t = 0..1 between the middle two of four samples */
-static void txi_lay_weights(double t, double weights[4]) {
-    weights[0] = 0.5 * t * (t * (2 - t) - 1);
-    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
-    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
-    weights[3] = 0.5 * t * t * (t - 1);
-}
-
 /* RGB at a place, Catmull-Rom, or bilinear where not all of its 16 pixels may be copied from; 0 if
    not even that is possible. */
 static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3]) {
@@ -11264,8 +11264,8 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
         if (w->state[corner + (size_t)(k / 4) * (size_t)w->width + (size_t)(k % 4)] != TXI_KNOWN)
             return 1;
     }
-    txi_lay_weights(x - bx, wx);
-    txi_lay_weights(y - by, wy);
+    txi_cubic(x - bx, wx);
+    txi_cubic(y - by, wy);
     for (int c = 0; c < 3; c++) {
         rgb[c] = 0;
         for (int k = 0; k < 16; k++)
@@ -14443,14 +14443,6 @@ static int txi_is_known(const txi_window *w, int x, int y) {
     if (x < 0 || y < 0 || x >= w->width || y >= w->height) return 0;
     const uint8_t s = w->state[(size_t)y * (size_t)w->width + (size_t)x];
     return s == TXI_KNOWN || s == TXI_FOREIGN;
-}
-
-/* The weights of Catmull-Rom interpolation at t = 0..1 between the middle two of four samples. */
-static void txi_cubic(double t, double weights[4]) {
-    weights[0] = 0.5 * t * (t * (2 - t) - 1);
-    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
-    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
-    weights[3] = 0.5 * t * t * (t - 1);
 }
 
 /* The value at a place of the window, from known pixels only. 0: none is known there. */

@@ -62,14 +62,6 @@ static int txi_is_known(const txi_window *w, int x, int y) {
     return s == TXI_KNOWN || s == TXI_FOREIGN;
 }
 
-/* The weights of Catmull-Rom interpolation at t = 0..1 between the middle two of four samples. */
-static void txi_cubic(double t, double weights[4]) {
-    weights[0] = 0.5 * t * (t * (2 - t) - 1);
-    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
-    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
-    weights[3] = 0.5 * t * t * (t - 1);
-}
-
 /* The value at a place of the window, from known pixels only. 0: none is known there. */
 static int txi_sample(const txi_blend *b, double x, double y, double *values) {
     const double bx = floor(x), by = floor(y);

@@ -137,14 +137,6 @@ static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *
 
 /* ---- pixels ---- */
 
-/* Catmull-Rom weights at t = 0..1 between the middle two of four samples */
-static void txi_lay_weights(double t, double weights[4]) {
-    weights[0] = 0.5 * t * (t * (2 - t) - 1);
-    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
-    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
-    weights[3] = 0.5 * t * t * (t - 1);
-}
-
 /* RGB at a place, Catmull-Rom, or bilinear where not all of its 16 pixels may be copied from; 0 if
    not even that is possible. */
 static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3]) {
@@ -159,8 +151,8 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
         if (w->state[corner + (size_t)(k / 4) * (size_t)w->width + (size_t)(k % 4)] != TXI_KNOWN)
             return 1;
     }
-    txi_lay_weights(x - bx, wx);
-    txi_lay_weights(y - by, wy);
+    txi_cubic(x - bx, wx);
+    txi_cubic(y - by, wy);
     for (int c = 0; c < 3; c++) {
         rgb[c] = 0;
         for (int k = 0; k < 16; k++)

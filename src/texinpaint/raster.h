@@ -29,6 +29,14 @@ static inline ptrdiff_t txi_pixel(int width, int height, double x, double y) {
     return (ptrdiff_t)row * width + column;
 }
 
+/* The weights of Catmull-Rom interpolation at t = 0..1 between the middle two of four samples. */
+static void txi_cubic(double t, double weights[4]) {
+    weights[0] = 0.5 * t * (t * (2 - t) - 1);
+    weights[1] = 0.5 * (t * t * (3 * t - 5) + 2);
+    weights[2] = 0.5 * t * (t * (4 - 3 * t) + 1);
+    weights[3] = 0.5 * t * t * (t - 1);
+}
+
 /* ---- rasters: distances ---------------------------------------------------------------------- */
 
 /* The nearest pixel with a mark, of equally near ones the first in its row, then the upper one.
