@@ -15105,15 +15105,13 @@ struct texinpaint_job {
     txi_choice choice;
 };
 
-TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env *env,
-                                           texinpaint_job **out) {
+/* texinpaint_begin for a description that has been checked. *out is NULL, and stays so after a
+   failure. */
+static txm_status txi_begin(const texinpaint_desc *desc, txm_env *env, texinpaint_job **out) {
     txm_arena memory;
     texinpaint_job *job;
+    txm_status status;
     size_t count, known = 0;
-    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
-    *out = NULL;
-    txm_status status = txi_check(desc, env);
-    if (status != TXM_OK) return status;
     txm_arena_init(&memory, env);
     job = (texinpaint_job *)txm_arena_zero(&memory, 1, sizeof *job);
     if (!job) return txi_no_memory(env);
@@ -15146,6 +15144,14 @@ TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env 
     }
     *out = job;
     return TXM_OK;
+}
+
+TEXINPAINT_API txm_status texinpaint_begin(const texinpaint_desc *desc, txm_env *env,
+                                           texinpaint_job **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    const txm_status status = txi_check(desc, env);
+    return status == TXM_OK ? txi_begin(desc, env, out) : status;
 }
 
 TEXINPAINT_API void texinpaint_free(texinpaint_job *job) {
@@ -15316,7 +15322,7 @@ TEXINPAINT_API txm_status texinpaint_complete(const texinpaint_desc *desc, txm_e
     int more = 1;
     txm_status status = txi_check(desc, env);
     if (status == TXM_OK) status = txi_check_outputs(desc, out, 1 + desc->map_count, env);
-    if (status == TXM_OK) status = texinpaint_begin(desc, env, &job);
+    if (status == TXM_OK) status = txi_begin(desc, env, &job);
     while (status == TXM_OK && more) status = texinpaint_step(job, env, &more);
     for (int i = 0; status == TXM_OK && i <= desc->map_count; i++)
         status = texinpaint_draw(job, i, env, &out[i]);
