@@ -12363,8 +12363,6 @@ typedef struct txi_canvas {
     uint64_t seed;
     int sweep;  /* counts the sweeps                                                   */
     int fresh;  /* the costs are up to date                                            */
-    int least;  /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
-                           are                                                                 */
     int radius; /* pixels: where random tries begin                                    */
 } txi_canvas;
 
@@ -12381,17 +12379,6 @@ static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int
     *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
 }
 
-/* is a source patch so near to the anchor's own place that it does not count? */
-static int txi_too_near(const txi_canvas *t, int a, const txi_source *s, int x, int y) {
-    const int p = t->level->anchor[a], half = (TXI_PATCH - 1) * TXI_UNIT / 2;
-    const int32_t least = t->least * TXI_UNIT;
-    int32_t cx, cy;
-    txi_match_centre(s, x, y, &cx, &cy);
-    cx -= p % t->level->width * TXI_UNIT + half;
-    cy -= p / t->level->width * TXI_UNIT + half;
-    return cx > -least && cx < least && cy > -least && cy < least;
-}
-
 /* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs
    limit or more. */
 static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uint32_t limit) {
@@ -12401,7 +12388,6 @@ static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uin
     const size_t q = (size_t)y * (size_t)s->width + (size_t)x, p = (size_t)l->anchor[a];
     const uint32_t worth = s->worth[q];
     if (!worth) return UINT32_MAX;
-    if (t->least && txi_too_near(t, a, s, x, y)) return UINT32_MAX;
     const uint32_t short_of = txi_shortfall(t, a, worth), filled = l->filled[a];
     if (short_of >= limit) return UINT32_MAX;
     const uint32_t rest = limit - short_of;
@@ -13238,6 +13224,7 @@ static void txi_vote(txi_ballot *v, txm_env *env) {
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
+    TXI_DRIFT = 5,        /* drift, in 1/256: from the vote's colours; ours                      */
     TXI_JOINT_RIM = 2,    /* weight of a joint with what is known; ours                        */
     TXI_JOINT_SHARE = 4,  /* ... and of what is known of the pixel itself; ours                */
     TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
@@ -13257,8 +13244,6 @@ typedef struct txi_assembly {
     const uint8_t *color; /* of the canvas                                                     */
     const txi_window *window; /* of the level; NULL: no pixel is known in part                 */
     int32_t *label;       /* one per pixel of the level                                        */
-    int drift;            /* in 1/256                                                          */
-    uint32_t price;       /* of missing detail, as in txi_canvas; 0: it costs nothing          */
     txm_flow flow;        /* room for all pixels of the hole's bounding box with a margin      */
     int32_t *node;        /* one per pixel of the level: its node in the flow, -1: not in it   */
     int32_t *region;      /* the pixels of the move                                            */
@@ -13292,19 +13277,6 @@ static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x
            txi_rgb_distance(txi_label_color(l, a, u, v), txi_label_color(l, b, u, v)) + TXI_JOINT;
 }
 
-/* What the missing detail of the patch around (x, y) costs, as the pixel's share. */
-static int txi_label_shortfall(const txi_assembly *t, int32_t label, int x, int y) {
-    const txi_level *l = t->level;
-    const txi_source *s = &l->source[label >> 26];
-    const int half = TXI_PATCH / 2, a = l->slot[(y - half) * l->width + x - half];
-    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS - half;
-    const int j = y + (label & 8191) - TXI_LABEL_BIAS - half;
-    if (a < 0 || i < 0 || j < 0) return 0;
-    const uint32_t worth = s->worth[(size_t)j * (size_t)s->width + (size_t)i];
-    if (!worth || worth > l->want[a]) return 0;
-    return (int)(((uint64_t)(l->want[a] - worth + 1) * t->price >> 16) / TXI_PATCH_AREA);
-}
-
 /* What a label costs at (x, y) whatever the neighbours in the hole have. */
 static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
     const txi_level *l = t->level;
@@ -13312,8 +13284,7 @@ static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
     const uint8_t *own = txi_label_color(l, label, x, y);
     if (!own) return TXI_NEVER;
     const int guide = label >= 0 ? own[3] - l->color[4 * p + 3] : 0;
-    int cost = txi_rgb_distance(own, t->color + 4 * p) * t->drift / 256 + guide * guide;
-    if (t->price && label >= 0) cost += txi_label_shortfall(t, label, x, y);
+    int cost = txi_rgb_distance(own, t->color + 4 * p) * TXI_DRIFT / 256 + guide * guide;
     if (t->window && t->window->share) {
         const size_t i = (size_t)(y - TXI_EDGE) * (size_t)t->window->width + (size_t)(x - TXI_EDGE);
         const int share = t->window->share[i] * TXI_JOINT_SHARE;
@@ -13484,200 +13455,6 @@ static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *q
     return count;
 }
 
-/* ---- coherent completion: few offsets, large pieces ---------------------------------------------
-
-   Patterns repeat at few offsets. They are found by matching the known patches around the hole with
-   patches elsewhere; the most frequent offsets (in each pose) become labels, and the hole is put
-   together from pieces of these [He and Sun 2012].                                             */
-
-enum {
-    TXI_OFFSET_WIDTH = 28, /* pixels: least width of the hole at the level where this is done */
-    TXI_OFFSETS = 80,      /* labels                                                          */
-    TXI_OFFSET_SWEEPS = 6,
-    TXI_OFFSET_LEAST = 8, /* pixels: shorter ones are not told from none                     */
-    TXI_OFFSET_PASSES = 3
-};
-
-/* A level whose anchors are its known patches near the hole, for matching these. */
-static int txi_offset_level(const txi_level *l, int reach, txi_level *known, txm_arena *arena) {
-    const int w = l->width, n = l->width * l->height;
-    *known = *l;
-    int low[2] = {INT_MAX, INT_MAX}, high[2] = {0, 0};
-    for (int i = 0; i < l->hole_count; i++) {
-        const int x = l->hole[i] % w, y = l->hole[i] / w;
-        if (x < low[0]) low[0] = x;
-        if (y < low[1]) low[1] = y;
-        if (x > high[0]) high[0] = x;
-        if (y > high[1]) high[1] = y;
-    }
-    known->slot = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
-    known->anchor = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
-    known->anchor_row = (int32_t *)txm_arena_alloc(arena, (size_t)l->height + 1, sizeof(int32_t));
-    known->filled = (uint8_t *)txm_arena_alloc(arena, (size_t)n, 1);
-    known->want = (uint32_t *)txm_arena_zero(arena, (size_t)n, sizeof(uint32_t));
-    if (arena->failed) return 0;
-    known->anchor_count = 0;
-    for (int p = 0; p < n; p++) {
-        const int x = p % w, y = p / w;
-        if (x == 0) known->anchor_row[y] = known->anchor_count;
-        known->slot[p] = -1;
-        if (x < low[0] - reach || y < low[1] - reach || x > high[0] + reach ||
-            y > high[1] + reach || l->slot[p] >= 0 || x > w - TXI_PATCH ||
-            y > l->height - TXI_PATCH)
-            continue;
-        int all = 1;
-        for (int k = 0; all && k < TXI_PATCH_AREA; k++) {
-            const uint8_t state = l->state[p + k / TXI_PATCH * w + k % TXI_PATCH];
-            all = state == TXI_KNOWN || state == TXI_FOREIGN;
-        }
-        if (!all) continue;
-        known->slot[p] = known->anchor_count;
-        known->filled[known->anchor_count] = TXI_PATCH_AREA;
-        known->anchor[known->anchor_count++] = p;
-    }
-    known->anchor_row[l->height] = known->anchor_count;
-    return known->anchor_count > 0;
-}
-
-/* The most frequent offsets of the matches, counted over squares of 3x3 offsets.
-   pairs  room for 2 per anchor                                                                */
-static int txi_offset_peaks(const txi_canvas *t, int32_t *labels, int most, txm_arena *arena) {
-    const txi_level *l = t->level;
-    const size_t n = (size_t)l->anchor_count;
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(arena, n, 2 * sizeof(txm_pair));
-    txm_pair *peaks = (txm_pair *)txm_arena_alloc(arena, n, 2 * sizeof(txm_pair));
-    if (arena->failed) return 0;
-    size_t kinds = 0, count = 0;
-    for (size_t a = 0; a < n; a++) {
-        const txi_match *m = &t->match[a];
-        const int p = l->anchor[a];
-        pairs[a].value = 1;
-        pairs[a].key = m->pose < 0 || m->cost == UINT32_MAX
-                           ? UINT32_MAX
-                           : (uint32_t)txi_label(m->pose, m->x - p % l->width, m->y - p / l->width);
-    }
-    txm_sort_pairs(pairs, pairs + n, n);
-    for (size_t i = 0; i < n && pairs[i].key != UINT32_MAX; i++) {
-        if (kinds && pairs[kinds - 1].key == pairs[i].key) {
-            pairs[kinds - 1].value++;
-        } else {
-            pairs[kinds].key = pairs[i].key;
-            pairs[kinds++].value = 1;
-        }
-    }
-    for (size_t i = 0; i < kinds; i++) { /* the sum over 3x3; a peak is the largest of them */
-        uint32_t sum = 0;
-        int is_peak = 1;
-        for (int dx = -1; dx <= 1; dx++) {
-            const uint32_t column = pairs[i].key + (uint32_t)(dx * 8192) - 1;
-            size_t low = 0, high = kinds;
-            while (low < high) {
-                const size_t middle = (low + high) / 2;
-                if (pairs[middle].key < column) low = middle + 1;
-                else high = middle;
-            }
-            for (; low < kinds && pairs[low].key <= column + 2; low++) {
-                sum += pairs[low].value;
-                if (pairs[low].value > pairs[i].value ||
-                    (low < i && pairs[low].value == pairs[i].value))
-                    is_peak = 0;
-            }
-        }
-        if (!is_peak) continue;
-        peaks[count].key = UINT32_MAX - sum;
-        peaks[count++].value = pairs[i].key;
-    }
-    txm_sort_pairs(peaks, peaks + n, count);
-    if (count > (size_t)most) count = (size_t)most;
-    for (size_t k = 0; k < count; k++) labels[k] = (int32_t)peaks[k].value;
-    return (int)count;
-}
-
-/* The labels' colours, and as the match of each anchor the most frequent label of its patch that
-   can be copied. */
-static void txi_offset_apply(txi_canvas *t, const txi_assembly *assembly) {
-    const txi_level *l = t->level;
-    for (int i = 0; i < l->hole_count; i++) {
-        const int p = l->hole[i], x = p % l->width, y = p / l->width;
-        const uint8_t *color = txi_label_color(l, assembly->label[p], x, y);
-        if (color) memcpy(t->color + 4 * (size_t)p, color, 3);
-    }
-    for (int a = 0; a < l->anchor_count; a++) {
-        const int p = l->anchor[a];
-        txi_match best = t->match[a];
-        int most = 0;
-        for (int k = 0; k < TXI_PATCH_AREA; k++) {
-            const int q = p + k / TXI_PATCH * l->width + k % TXI_PATCH;
-            const int32_t label = assembly->label[q];
-            int same = 0;
-            if (label < 0) continue;
-            for (int i = k; i < TXI_PATCH_AREA; i++)
-                same += assembly->label[p + i / TXI_PATCH * l->width + i % TXI_PATCH] == label;
-            if (same <= most) continue;
-            txi_match m;
-            memset(&m, 0, sizeof m);
-            m.pose = (int16_t)(label >> 26);
-            m.x = (int16_t)(p % l->width + (label >> 13 & 8191) - TXI_LABEL_BIAS);
-            m.y = (int16_t)(p / l->width + (label & 8191) - TXI_LABEL_BIAS);
-            if (!txi_match_mend(l, &m)) continue;
-            most = same;
-            best = m;
-        }
-        if (!most) best.pose = -1;
-        t->match[a] = best;
-    }
-    t->fresh = 0;
-}
-
-/* Fill the canvas' hole from pieces of the level, and set the matches accordingly. */
-static txm_status txi_offset_fill(txi_canvas *t, txm_env *env) {
-    const txi_level *l = t->level;
-    txm_arena scratch;
-    txi_level around;
-    txi_canvas known;
-    txi_assembly assembly;
-    int32_t labels[TXI_OFFSETS];
-    txm_status status = TXM_OK;
-    txm_arena_init(&scratch, env);
-    const int width = txi_level_hole_width(l);
-    known = *t;
-    known.level = &around;
-    known.least = TXI_OFFSET_LEAST;
-    known.sweep = 0;
-    known.fresh = 0;
-    if (!txi_offset_level(l, 3 * width / 2, &around, &scratch) ||
-        !txi_assembly_make(&assembly, l, &scratch)) {
-        const int failed = scratch.failed;
-        txm_arena_free(&scratch);
-        return failed ? txi_no_memory(env) : TXM_OK;
-    }
-    known.match =
-        (txi_match *)txm_arena_zero(&scratch, (size_t)around.anchor_count, 2 * sizeof(txi_match));
-    if (scratch.failed) status = txi_no_memory(env);
-    if (status == TXM_OK) {
-        known.old = known.match + around.anchor_count;
-        for (int a = 0; a < around.anchor_count; a++) known.match[a].pose = -1;
-        for (int k = 0; k < TXI_OFFSET_SWEEPS; k++) txi_search(&known, env);
-    }
-    const int count =
-        status == TXM_OK ? txi_offset_peaks(&known, labels, TXI_OFFSETS, &scratch) : 0;
-    if (scratch.failed) status = txi_no_memory(env);
-    assembly.color = t->color;
-    assembly.drift = 0;
-    assembly.price = t->price;
-    for (int pass = 0, changed = 1; pass < TXI_OFFSET_PASSES && changed && status == TXM_OK;
-         pass++) {
-        changed = 0;
-        for (int k = 0; k < count && status == TXM_OK; k++) {
-            changed += txi_expand(&assembly, labels[k], -1);
-            if (txm_progress(env, 0, "pieces")) status = txi_stopped(env);
-        }
-    }
-    txi_offset_apply(t, &assembly);
-    txm_arena_free(&scratch);
-    return status;
-}
-
 /* ---- texture completion of a window ---------------------------------------------------------- */
 
 /* How the texture is treated, chosen from what it is like. */
@@ -13692,7 +13469,6 @@ typedef struct txi_style {
 } txi_style;
 
 /* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
-enum { TXI_START_ONION = 0, TXI_START_PIECES };
 
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
@@ -13703,7 +13479,6 @@ enum {
     TXI_ASSEMBLY_LABELS = 1000,
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
-    TXI_DRIFT = 5,        /* from the vote's colours, in 1/256; ours                            */
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
@@ -14077,19 +13852,11 @@ static txm_status txi_field_judge(const txi_filler *f, txi_field *field, txm_env
     return status;
 }
 
-/* the level where a coherent completion begins */
-static int txi_offset_start(const txi_filler *f) {
-    int k = f->level_count - 1;
-    while (k > 0 && txi_level_hole_width(&f->level[k]) < TXI_OFFSET_WIDTH) k--;
-    return k;
-}
-
 /* Complete the hole at all levels from the coarsest to that of the field.
    plan   lines to follow, or NULL
-   start  TXI_START_ONION or TXI_START_PIECES
    field  from txi_field_make
    return TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED                                              */
-static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start, txm_env *env,
+static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *env,
                                   txi_field *field) {
     txm_arena memory[2];
     txi_canvas canvas[2];
@@ -14097,18 +13864,15 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
     if (status != TXM_OK) return status;
     txm_arena_init(&memory[0], env);
     txm_arena_init(&memory[1], env);
-    int first = f->level_count - 1;
-    if (start == TXI_START_PIECES) first = txi_offset_start(f);
+    const int first = f->level_count - 1;
     for (int level = first; level >= field->level && status == TXM_OK; level--) {
         const int now = level & 1;
         txi_canvas *t = &canvas[now];
         txm_arena_free(&memory[now]);
         if (!txi_canvas_make(f, level, t, &memory[now])) status = txi_no_memory(env);
-        else if (start == TXI_START_PIECES && level == first) status = txi_offset_fill(t, env);
         else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
-        if (status == TXM_OK && level == first && start == TXI_START_ONION)
-            status = txi_first_level(f, level, t, env);
+        if (status == TXM_OK && level == first) status = txi_first_level(f, level, t, env);
         else if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
         if (status == TXM_OK && level == field->level) {
             const txi_level *l = t->level;
@@ -14182,7 +13946,6 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     int32_t *label = assembly.label;
     assembly.color = t->color;
     assembly.window = w;
-    assembly.drift = TXI_DRIFT;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
         if (txi_plan_copy(plan, w, l, p)) label[p] = TXI_LABEL_STRIP;
@@ -14847,8 +14610,7 @@ static txm_status txi_fill_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env 
     const txi_plan *plan = h->curve_count ? &h->plan : NULL;
     h->preview = (uint8_t *)txm_arena_alloc(&h->memory, pixels, 4);
     if (!h->preview || !txi_field_make(c->filler, &h->memory, &h->field)) return txi_no_memory(env);
-    if (status == TXM_OK)
-        status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
+    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
     h->detail = txi_look_at(c->filler, &h->field, plan, h->preview, env);

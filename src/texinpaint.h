@@ -368,7 +368,6 @@ TEXINPAINT_API void texinpaint_crests_free(texinpaint_crests *crests);
 #include "texinpaint/anneal.h"
 #include "texinpaint/ballot.h"
 #include "texinpaint/assemble.h"
-#include "texinpaint/offset.h"
 #include "texinpaint/fill.h"
 #include "texinpaint/look.h"
 #include "texinpaint/blend.h"

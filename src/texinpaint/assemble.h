@@ -18,6 +18,7 @@
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
+    TXI_DRIFT = 5,        /* drift, in 1/256: from the vote's colours; ours                      */
     TXI_JOINT_RIM = 2,    /* weight of a joint with what is known; ours                        */
     TXI_JOINT_SHARE = 4,  /* ... and of what is known of the pixel itself; ours                */
     TXI_NOWHERE = 400000, /* what a neighbour costs that a label cannot copy; ours             */
@@ -37,8 +38,6 @@ typedef struct txi_assembly {
     const uint8_t *color; /* of the canvas                                                     */
     const txi_window *window; /* of the level; NULL: no pixel is known in part                 */
     int32_t *label;       /* one per pixel of the level                                        */
-    int drift;            /* in 1/256                                                          */
-    uint32_t price;       /* of missing detail, as in txi_canvas; 0: it costs nothing          */
     txm_flow flow;        /* room for all pixels of the hole's bounding box with a margin      */
     int32_t *node;        /* one per pixel of the level: its node in the flow, -1: not in it   */
     int32_t *region;      /* the pixels of the move                                            */
@@ -72,19 +71,6 @@ static inline int txi_joint_cost(const txi_level *l, int32_t a, int32_t b, int x
            txi_rgb_distance(txi_label_color(l, a, u, v), txi_label_color(l, b, u, v)) + TXI_JOINT;
 }
 
-/* What the missing detail of the patch around (x, y) costs, as the pixel's share. */
-static int txi_label_shortfall(const txi_assembly *t, int32_t label, int x, int y) {
-    const txi_level *l = t->level;
-    const txi_source *s = &l->source[label >> 26];
-    const int half = TXI_PATCH / 2, a = l->slot[(y - half) * l->width + x - half];
-    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS - half;
-    const int j = y + (label & 8191) - TXI_LABEL_BIAS - half;
-    if (a < 0 || i < 0 || j < 0) return 0;
-    const uint32_t worth = s->worth[(size_t)j * (size_t)s->width + (size_t)i];
-    if (!worth || worth > l->want[a]) return 0;
-    return (int)(((uint64_t)(l->want[a] - worth + 1) * t->price >> 16) / TXI_PATCH_AREA);
-}
-
 /* What a label costs at (x, y) whatever the neighbours in the hole have. */
 static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
     const txi_level *l = t->level;
@@ -92,8 +78,7 @@ static int txi_own_cost(const txi_assembly *t, int32_t label, int x, int y) {
     const uint8_t *own = txi_label_color(l, label, x, y);
     if (!own) return TXI_NEVER;
     const int guide = label >= 0 ? own[3] - l->color[4 * p + 3] : 0;
-    int cost = txi_rgb_distance(own, t->color + 4 * p) * t->drift / 256 + guide * guide;
-    if (t->price && label >= 0) cost += txi_label_shortfall(t, label, x, y);
+    int cost = txi_rgb_distance(own, t->color + 4 * p) * TXI_DRIFT / 256 + guide * guide;
     if (t->window && t->window->share) {
         const size_t i = (size_t)(y - TXI_EDGE) * (size_t)t->window->width + (size_t)(x - TXI_EDGE);
         const int share = t->window->share[i] * TXI_JOINT_SHARE;

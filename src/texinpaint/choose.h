@@ -147,8 +147,7 @@ static txm_status txi_fill_hypothesis(txi_choice *c, txi_hypothesis *h, txm_env 
     const txi_plan *plan = h->curve_count ? &h->plan : NULL;
     h->preview = (uint8_t *)txm_arena_alloc(&h->memory, pixels, 4);
     if (!h->preview || !txi_field_make(c->filler, &h->memory, &h->field)) return txi_no_memory(env);
-    if (status == TXM_OK)
-        status = txi_fill_coarse(c->filler, plan, TXI_START_ONION, env, &h->field);
+    if (status == TXM_OK) status = txi_fill_coarse(c->filler, plan, env, &h->field);
     if (status != TXM_OK) return status;
     memcpy(h->preview, c->w->color, 4 * pixels);
     h->detail = txi_look_at(c->filler, &h->field, plan, h->preview, env);

@@ -1,7 +1,7 @@
 #ifndef TEXINPAINT_FILL_H
 #define TEXINPAINT_FILL_H
 
-#include "offset.h"
+#include "assemble.h"
 #include "anneal.h"
 
 /* ---- texture completion of a window ---------------------------------------------------------- */
@@ -18,7 +18,6 @@ typedef struct txi_style {
 } txi_style;
 
 /* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
-enum { TXI_START_ONION = 0, TXI_START_PIECES };
 
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
@@ -29,7 +28,6 @@ enum {
     TXI_ASSEMBLY_LABELS = 1000,
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
-    TXI_DRIFT = 5,        /* from the vote's colours, in 1/256; ours                            */
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
@@ -403,19 +401,11 @@ static txm_status txi_field_judge(const txi_filler *f, txi_field *field, txm_env
     return status;
 }
 
-/* the level where a coherent completion begins */
-static int txi_offset_start(const txi_filler *f) {
-    int k = f->level_count - 1;
-    while (k > 0 && txi_level_hole_width(&f->level[k]) < TXI_OFFSET_WIDTH) k--;
-    return k;
-}
-
 /* Complete the hole at all levels from the coarsest to that of the field.
    plan   lines to follow, or NULL
-   start  TXI_START_ONION or TXI_START_PIECES
    field  from txi_field_make
    return TXM_OK, TXM_OUT_OF_MEMORY, TXM_CANCELLED                                              */
-static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start, txm_env *env,
+static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *env,
                                   txi_field *field) {
     txm_arena memory[2];
     txi_canvas canvas[2];
@@ -423,18 +413,15 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, int start
     if (status != TXM_OK) return status;
     txm_arena_init(&memory[0], env);
     txm_arena_init(&memory[1], env);
-    int first = f->level_count - 1;
-    if (start == TXI_START_PIECES) first = txi_offset_start(f);
+    const int first = f->level_count - 1;
     for (int level = first; level >= field->level && status == TXM_OK; level--) {
         const int now = level & 1;
         txi_canvas *t = &canvas[now];
         txm_arena_free(&memory[now]);
         if (!txi_canvas_make(f, level, t, &memory[now])) status = txi_no_memory(env);
-        else if (start == TXI_START_PIECES && level == first) status = txi_offset_fill(t, env);
         else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
-        if (status == TXM_OK && level == first && start == TXI_START_ONION)
-            status = txi_first_level(f, level, t, env);
+        if (status == TXM_OK && level == first) status = txi_first_level(f, level, t, env);
         else if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
         if (status == TXM_OK && level == field->level) {
             const txi_level *l = t->level;
@@ -508,7 +495,6 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, co
     int32_t *label = assembly.label;
     assembly.color = t->color;
     assembly.window = w;
-    assembly.drift = TXI_DRIFT;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
         if (txi_plan_copy(plan, w, l, p)) label[p] = TXI_LABEL_STRIP;

@@ -31,8 +31,6 @@ typedef struct txi_canvas {
     uint64_t seed;
     int sweep;  /* counts the sweeps                                                   */
     int fresh;  /* the costs are up to date                                            */
-    int least;  /* pixels: patches nearer to the anchor's own place are not matches; 0 = all
-                           are                                                                 */
     int radius; /* pixels: where random tries begin                                    */
 } txi_canvas;
 
@@ -49,17 +47,6 @@ static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int
     *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
 }
 
-/* is a source patch so near to the anchor's own place that it does not count? */
-static int txi_too_near(const txi_canvas *t, int a, const txi_source *s, int x, int y) {
-    const int p = t->level->anchor[a], half = (TXI_PATCH - 1) * TXI_UNIT / 2;
-    const int32_t least = t->least * TXI_UNIT;
-    int32_t cx, cy;
-    txi_match_centre(s, x, y, &cx, &cy);
-    cx -= p % t->level->width * TXI_UNIT + half;
-    cy -= p / t->level->width * TXI_UNIT + half;
-    return cx > -least && cx < least && cy > -least && cy < least;
-}
-
 /* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs
    limit or more. */
 static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uint32_t limit) {
@@ -69,7 +56,6 @@ static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uin
     const size_t q = (size_t)y * (size_t)s->width + (size_t)x, p = (size_t)l->anchor[a];
     const uint32_t worth = s->worth[q];
     if (!worth) return UINT32_MAX;
-    if (t->least && txi_too_near(t, a, s, x, y)) return UINT32_MAX;
     const uint32_t short_of = txi_shortfall(t, a, worth), filled = l->filled[a];
     if (short_of >= limit) return UINT32_MAX;
     const uint32_t rest = limit - short_of;
