@@ -286,6 +286,7 @@ enum {
     TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
     TXS_NAT = 16,        /* steps of a row's byte per nat of energy                          */
     TXS_FINE = 4,        /* steps of the summed energy per step of a byte                    */
+    TXS_NEVER = 1600,    /* such steps: the energy of a value that a band lacks              */
     TXS_PRECISE = 256,   /* steps of a controlled potential per step of a byte               */
     TXS_NOISE = 8192,    /* entries of the noise table                                       */
     TXS_WINDOW = 64,     /* weight of one count in the running histograms                    */
@@ -680,46 +681,15 @@ static txs_pick *txs_best_pick(void) {
 #endif
 }
 
-/* ---- the sampler --------------------------------------------------------------------------
+/* ---- potentials ---------------------------------------------------------------------------
 
-   Gibbs sampling of a canvas whose potentials are controlled: every potential is
+   Every potential is controlled:
 
        V = integral + proportional gain * (h - h_ref),
 
    h the current histogram of the canvas, h_ref the example's, so that the energy of values that are
    too frequent rises; the integral part follows the error once a sweep. [1] derives the potentials
-   from the statistics; controlling them needs far fewer sweeps.
-
-   Order and threads. A sweep visits one sub-lattice (x, y modulo 8) after another. The canvas is
-   divided into an even number of strips at least as high as a clique; all even strips are processed
-   in parallel, then all odd ones, so that no pixel changes while another thread reads it, and the
-   result does not depend on the number of threads.                                          */
-
-/* The ends of cliques at a pixel, and the clique types that have a tail there. */
-typedef struct txs_list {
-    txs_end ends[TXS_MAX_BANDS][TXS_MAX_ENDS]; /* sorted by form */
-    int end_count[TXS_MAX_BANDS][TXS_FORMS];
-    txs_tally tally[TXS_MAX_TYPES]; /* sorted by form */
-    int tally_count[TXS_FORMS];
-} txs_list;
-
-typedef struct txs_sampler {
-    const txs_level *level;
-    const txs_canvas *canvas;
-    int bands;
-    uint64_t seed;
-    txs_pick *pick;
-    txs_list list[4]; /* for pixels of each parity, (x & 1) + 2 (y & 1)   */
-    int16_t single[TXS_MAX_BANDS][TXS_VALUES];
-    uint8_t *tables;                /* TXS_TABLE bytes a type               */
-    int32_t (*histogram)[TXS_BINS]; /* TXS_WINDOW times the counts of the last sweep */
-    int32_t (*integral)[TXS_BINS];  /* 1/(TXS_NAT TXS_PRECISE) nat          */
-    int32_t (*counts)[TXS_BINS];    /* TXS_TASKS times all types            */
-    const int16_t *noise;
-    int strips, tasks, skip;          /* layout; one pixel in skip is counted */
-    int sublattice[TXS_GROUP], phase; /* of the pass                          */
-    uint64_t pass, sweep;
-} txs_sampler;
+   from the statistics; controlling them needs far fewer sweeps.                              */
 
 /* Minus a Gumbel variable, shuffled: entries i..i+31 for a random i are a noise row. */
 static void txs_noise_table(int16_t *noise) {
@@ -733,14 +703,15 @@ static void txs_noise_table(int16_t *noise) {
     memcpy(noise + TXS_NOISE, noise, TXS_VALUES * sizeof *noise);
 }
 
-/* The ends of clique type k, each with the band it lies in and its form; returns how many. */
-static int txs_type_ends(const txs_sampler *s, int k, txs_end ends[4], int band[4], int form[4]) {
-    const txs_type *t = &s->level->types[k];
-    const txs_canvas *c = s->canvas;
+/* The ends of a clique type on a canvas of so many bands, each with the band it lies in and its
+   form; returns how many. Their rows lie in the type's tables, TXS_TABLE bytes. */
+static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_t *tables,
+                         const txs_canvas *c, int bands, txs_end ends[4], int band[4],
+                         int form[4]) {
     const ptrdiff_t tail = t->band * c->plane, head = t->other * c->plane;
-    const ptrdiff_t parent = (s->bands + t->other) * c->plane;
+    const ptrdiff_t parent = (bands + t->other) * c->plane;
     const ptrdiff_t d = t->dy * c->stride + t->dx, e = t->ey * c->stride + t->ex;
-    const uint8_t *table = s->tables + (size_t)k * TXS_TABLE + 31;
+    const uint8_t *table = tables + 31;
     const ptrdiff_t block = TXS_CLASSES * TXS_ROW;
     for (int i = 0; i < 4; i++) {
         memset(&ends[i], 0, sizeof ends[i]);
@@ -765,11 +736,11 @@ static int txs_type_ends(const txs_sampler *s, int k, txs_end ends[4], int band[
     case TEXSYN_VALUES:
         form[0] = form[1] = 3;
         ends[0].o1 = head + d;
-        ends[0].classes = s->level->classes[t->other];
+        ends[0].classes = level->classes[t->other];
         ends[0].table = table - 31;
         band[1] = t->other;
         ends[1].o1 = tail - d;
-        ends[1].classes = s->level->classes[t->band];
+        ends[1].classes = level->classes[t->band];
         ends[1].table = table - 31 + TXS_CLASSES * TXS_VALUES;
         return 2;
     case TEXSYN_CORNER: /* the arms, the corner */
@@ -822,11 +793,10 @@ static int txs_most_ends(const txs_level *level, int bands) {
     return most;
 }
 
-/* Spread the potential v of type k (as bytes of rows) over the tables of its ends. */
-static void txs_expand(txs_sampler *s, int k, const uint8_t *v) {
-    const txs_type *t = &s->level->types[k];
+/* Spread the potential v of a type (as bytes of rows) over the tables of its ends. */
+static void txs_expand(const txs_level *level, const txs_type *t, const uint8_t *v,
+                       uint8_t *table) {
     const uint8_t *class_of = txs_difference_class;
-    uint8_t *table = s->tables + (size_t)k * TXS_TABLE;
     enum { N = TXS_CLASSES, ROW = TXS_ROW, BLOCK = TXS_CLASSES * TXS_ROW };
     switch (t->kind) {
     case TEXSYN_PAIR:
@@ -839,8 +809,8 @@ static void txs_expand(txs_sampler *s, int k, const uint8_t *v) {
     case TEXSYN_VALUES:
         for (int q = 0; q < N; q++) {
             for (int i = 0; i < TXS_VALUES; i++) {
-                table[q * TXS_VALUES + i] = v[s->level->classes[t->band][i] * N + q];
-                table[(N + q) * TXS_VALUES + i] = v[q * N + s->level->classes[t->other][i]];
+                table[q * TXS_VALUES + i] = v[level->classes[t->band][i] * N + q];
+                table[(N + q) * TXS_VALUES + i] = v[q * N + level->classes[t->other][i]];
             }
         }
         break;
@@ -871,30 +841,88 @@ static void txs_expand(txs_sampler *s, int k, const uint8_t *v) {
     }
 }
 
+/* How strongly the errors of a histogram act on its potential. */
+typedef struct txs_gain {
+    int proportional, integral; /* 1/TXS_WHOLE nat per unit of error, the latter once a sweep */
+} txs_gain;
+
+enum { TXS_WHOLE = 256 };
+
+/* Control one type: its potential v, in steps of 1/(TXS_NAT TXS_PRECISE) nat, from the errors of
+   its histogram; integrate as well if it is time. */
+static void txs_steer(const txs_type *t, txs_gain gain, int integrate, const int32_t *histogram,
+                      int32_t *integral, int32_t *v) {
+    const int nat = TXS_NAT * TXS_PRECISE, bins = txs_bin_count(t->kind);
+    const int32_t limit = (t->kind == TEXSYN_SINGLE ? 10 * TXS_NAT : 63) * TXS_PRECISE;
+    int64_t total = 1;
+    for (int i = 0; i < bins; i++) total += histogram[i];
+    const int64_t scale = ((int64_t)TXS_ONE << 24) / total;
+    for (int i = 0; i < bins; i++) {
+        int32_t error = (int32_t)((histogram[i] * scale) >> 24) - t->share[i];
+        int32_t pull = error * nat / TXS_ONE; /* for a gain of 1 nat per unit of error */
+        if (integrate)
+            integral[i] = txm_clampi(integral[i] + gain.integral * pull / TXS_WHOLE, -limit, limit);
+        v[i] = txm_clampi(integral[i] + gain.proportional * pull / TXS_WHOLE, -limit, limit);
+    }
+}
+
+/* Put a steered potential where the sampler looks it up: that of a single into the words that a
+   candidate's energy starts from, any other into the tables of the ends. */
+static void txs_publish(const txs_level *level, const txs_type *t, const int32_t *v,
+                        int16_t single[TXS_VALUES], uint8_t *table) {
+    uint8_t row[TXS_BINS];
+    for (int i = 0; i < txs_bin_count(t->kind); i++) {
+        if (t->kind == TEXSYN_SINGLE)
+            single[(i >> 1) + (i & 1) * 16] =
+                (int16_t)(i < level->values[t->band] ? v[i] / (TXS_PRECISE / TXS_FINE) : TXS_NEVER);
+        else row[i] = (uint8_t)((v[i] + TXS_ZERO * TXS_PRECISE) / TXS_PRECISE);
+    }
+    if (t->kind != TEXSYN_SINGLE) txs_expand(level, t, row, table);
+}
+
+/* ---- the sampler --------------------------------------------------------------------------
+
+   Gibbs sampling of a canvas, which is a torus, with controlled potentials.
+
+   Order and threads. A sweep visits one sub-lattice (x, y modulo 8) after another. The canvas is
+   divided into an even number of strips at least as high as a clique; all even strips are processed
+   in parallel, then all odd ones, so that no pixel changes while another thread reads it, and the
+   result does not depend on the number of threads.                                          */
+
+/* The ends of cliques at a pixel, and the clique types that have a tail there. */
+typedef struct txs_list {
+    txs_end ends[TXS_MAX_BANDS][TXS_MAX_ENDS]; /* sorted by form */
+    int end_count[TXS_MAX_BANDS][TXS_FORMS];
+    txs_tally tally[TXS_MAX_TYPES]; /* sorted by form */
+    int tally_count[TXS_FORMS];
+} txs_list;
+
+typedef struct txs_sampler {
+    const txs_level *level;
+    const txs_canvas *canvas;
+    int bands;
+    uint64_t seed;
+    txs_pick *pick;
+    txs_list list[4]; /* for pixels of each parity, (x & 1) + 2 (y & 1)   */
+    int16_t single[TXS_MAX_BANDS][TXS_VALUES];
+    uint8_t *tables;                /* TXS_TABLE bytes a type               */
+    int32_t (*histogram)[TXS_BINS]; /* TXS_WINDOW times the counts of the last sweep */
+    int32_t (*integral)[TXS_BINS];  /* 1/(TXS_NAT TXS_PRECISE) nat          */
+    int32_t (*counts)[TXS_BINS];    /* TXS_TASKS times all types            */
+    const int16_t *noise;
+    int strips, tasks, skip;          /* layout; one pixel in skip is counted */
+    int sublattice[TXS_GROUP], phase; /* of the pass                          */
+    uint64_t pass, sweep;
+} txs_sampler;
+
 /* Set all tables from the histograms' errors; integrate as well if it is time. */
 static void txs_control(txs_sampler *s, int integrate) {
-    const int gain = TXS_NAT * TXS_PRECISE;
+    const txs_gain gain = {(int)TXS_PROPORTIONAL * TXS_WHOLE, (int)TXS_INTEGRAL * TXS_WHOLE};
     for (int k = 0; k < s->level->type_count; k++) {
         const txs_type *t = &s->level->types[k];
-        const int bins = txs_bin_count(t->kind);
-        const int32_t limit = (t->kind == TEXSYN_SINGLE ? 10 * TXS_NAT : 63) * TXS_PRECISE;
-        uint8_t row[TXS_BINS];
-        int64_t total = 1;
-        for (int i = 0; i < bins; i++) total += s->histogram[k][i];
-        const int64_t scale = ((int64_t)TXS_ONE << 24) / total;
-        for (int i = 0; i < bins; i++) {
-            int32_t error = (int32_t)((s->histogram[k][i] * scale) >> 24) - t->share[i];
-            int32_t pull = error * gain / TXS_ONE; /* for a gain of 1 nat per unit of error */
-            if (integrate)
-                s->integral[k][i] =
-                    txm_clampi(s->integral[k][i] + TXS_INTEGRAL * pull, -limit, limit);
-            int32_t v = txm_clampi(s->integral[k][i] + TXS_PROPORTIONAL * pull, -limit, limit);
-            if (t->kind == TEXSYN_SINGLE)
-                s->single[t->band][(i >> 1) + (i & 1) * 16] =
-                    (int16_t)(i < s->level->values[t->band] ? v / (TXS_PRECISE / TXS_FINE) : 1600);
-            else row[i] = (uint8_t)((v + TXS_ZERO * TXS_PRECISE) / TXS_PRECISE);
-        }
-        if (t->kind != TEXSYN_SINGLE) txs_expand(s, k, row);
+        int32_t v[TXS_BINS];
+        txs_steer(t, gain, integrate, s->histogram[k], s->integral[k], v);
+        txs_publish(s->level, t, v, s->single[t->band], s->tables + (size_t)k * TXS_TABLE);
     }
 }
 
@@ -1036,7 +1064,9 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
             const txs_type *t = &s->level->types[k];
             txs_tally tally = txs_tally_make(t, s->level, s->canvas, s->bands);
             txs_end ends[4];
-            int band[4], forms[4], n = txs_type_ends(s, k, ends, band, forms);
+            int band[4], forms[4],
+                n = txs_type_ends(s->level, t, s->tables + (size_t)k * TXS_TABLE, s->canvas,
+                                  s->bands, ends, band, forms);
             for (int i = 0; i < n; i++) {
                 int *count = list->end_count[band[i]];
                 /* of a pair, end 0 is the head; only pairs have a phase */

@@ -258,6 +258,7 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 #include "texsyn/config.h"
 #include "texsyn/model.h"
 #include "texsyn/energy.h"
+#include "texsyn/potential.h"
 #include "texsyn/sampler.h"
 #include "texsyn/example.h"
 #include "texsyn/neighbourhood.h"

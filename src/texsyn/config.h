@@ -34,6 +34,7 @@ enum {
     TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
     TXS_NAT = 16,        /* steps of a row's byte per nat of energy                          */
     TXS_FINE = 4,        /* steps of the summed energy per step of a byte                    */
+    TXS_NEVER = 1600,    /* such steps: the energy of a value that a band lacks              */
     TXS_PRECISE = 256,   /* steps of a controlled potential per step of a byte               */
     TXS_NOISE = 8192,    /* entries of the noise table                                       */
     TXS_WINDOW = 64,     /* weight of one count in the running histograms                    */

@@ -1,18 +1,11 @@
 #ifndef TEXSYN_SAMPLER_H
 #define TEXSYN_SAMPLER_H
 
-#include "model.h"
-#include "energy.h"
+#include "potential.h"
 
 /* ---- the sampler --------------------------------------------------------------------------
 
-   Gibbs sampling of a canvas whose potentials are controlled: every potential is
-
-       V = integral + proportional gain * (h - h_ref),
-
-   h the current histogram of the canvas, h_ref the example's, so that the energy of values that are
-   too frequent rises; the integral part follows the error once a sweep. [1] derives the potentials
-   from the statistics; controlling them needs far fewer sweeps.
+   Gibbs sampling of a canvas, which is a torus, with controlled potentials.
 
    Order and threads. A sweep visits one sub-lattice (x, y modulo 8) after another. The canvas is
    divided into an even number of strips at least as high as a clique; all even strips are processed
@@ -45,180 +38,14 @@ typedef struct txs_sampler {
     uint64_t pass, sweep;
 } txs_sampler;
 
-/* Minus a Gumbel variable, shuffled: entries i..i+31 for a random i are a noise row. */
-static void txs_noise_table(int16_t *noise) {
-    txm_rng rng = txm_rng_make(1, 2);
-    for (int i = 0; i < TXS_NOISE; i++) {
-        double gumbel = log(-log((i + 0.5) / (double)TXS_NOISE));
-        int j = (int)txm_rng_below(&rng, (uint32_t)i + 1);
-        noise[i] = noise[j];
-        noise[j] = (int16_t)floor(gumbel * (TXS_NAT * TXS_FINE) + 0.5);
-    }
-    memcpy(noise + TXS_NOISE, noise, TXS_VALUES * sizeof *noise);
-}
-
-/* The ends of clique type k, each with the band it lies in and its form; returns how many. */
-static int txs_type_ends(const txs_sampler *s, int k, txs_end ends[4], int band[4], int form[4]) {
-    const txs_type *t = &s->level->types[k];
-    const txs_canvas *c = s->canvas;
-    const ptrdiff_t tail = t->band * c->plane, head = t->other * c->plane;
-    const ptrdiff_t parent = (s->bands + t->other) * c->plane;
-    const ptrdiff_t d = t->dy * c->stride + t->dx, e = t->ey * c->stride + t->ex;
-    const uint8_t *table = s->tables + (size_t)k * TXS_TABLE + 31;
-    const ptrdiff_t block = TXS_CLASSES * TXS_ROW;
-    for (int i = 0; i < 4; i++) {
-        memset(&ends[i], 0, sizeof ends[i]);
-        band[i] = t->band;
-        form[i] = 1;
-        ends[i].table = table + i * block;
-    }
-    switch (t->kind) {
-    case TEXSYN_SINGLE: return 0;
-    case TEXSYN_PAIR: /* the head, the tail */
-        form[0] = form[1] = 0;
-        band[0] = t->other;
-        ends[0].o1 = tail - d;
-        ends[1].o1 = head + d;
-        ends[1].table = table + TXS_ROW;
-        return 2;
-    case TEXSYN_PARENT:
-        form[0] = 0;
-        ends[0].o1 = parent;
-        ends[0].table = table + TXS_ROW;
-        return 1;
-    case TEXSYN_VALUES:
-        form[0] = form[1] = 3;
-        ends[0].o1 = head + d;
-        ends[0].classes = s->level->classes[t->other];
-        ends[0].table = table - 31;
-        band[1] = t->other;
-        ends[1].o1 = tail - d;
-        ends[1].classes = s->level->classes[t->band];
-        ends[1].table = table - 31 + TXS_CLASSES * TXS_VALUES;
-        return 2;
-    case TEXSYN_CORNER: /* the arms, the corner */
-        ends[0].o1 = ends[0].o3 = tail - d;
-        ends[0].o2 = tail + e - d;
-        ends[1].o1 = ends[1].o3 = tail - e;
-        ends[1].o2 = tail + d - e;
-        form[2] = 2;
-        ends[2].o1 = tail + d;
-        ends[2].o2 = tail + e;
-        ends[2].table = table + 2 * block + 31 * TXS_ROW;
-        return 3;
-    case TEXSYN_SCALE: /* the head, the tail */
-        ends[0].o1 = tail - d;
-        ends[0].o2 = parent + e - d;
-        ends[0].o3 = parent - e;
-        ends[1].o1 = tail + d;
-        ends[1].o2 = parent + e;
-        ends[1].o3 = parent + d - e;
-        return 2;
-    default: /* TEXSYN_PARALLEL: head and tail of the one difference, of the other */
-        ends[0].o1 = tail - d;
-        ends[0].o2 = head + e;
-        ends[0].o3 = head + e - d;
-        ends[1].o1 = tail + d;
-        ends[1].o2 = head + e + d;
-        ends[1].o3 = head + e;
-        band[2] = band[3] = t->other;
-        ends[2].o1 = head - d;
-        ends[2].o2 = tail - e;
-        ends[2].o3 = tail - e - d;
-        ends[3].o1 = head + d;
-        ends[3].o2 = tail - e + d;
-        ends[3].o3 = tail - e;
-        return 4;
-    }
-}
-
-/* Ends that a level's types put into one band, at most; a model must stay within TXS_MAX_ENDS. */
-static int txs_most_ends(const txs_level *level, int bands) {
-    int count[TXS_MAX_BANDS] = {0}, most = 0;
-    for (int k = 0; k < level->type_count; k++) {
-        const txs_type *t = &level->types[k];
-        static const int tail[] = {0, 1, 1, 1, 3, 2, 2}, head[] = {0, 1, 0, 1, 0, 0, 2};
-        count[t->band] += tail[t->kind];
-        count[t->other] += head[t->kind];
-    }
-    for (int b = 0; b < bands; b++)
-        if (count[b] > most) most = count[b];
-    return most;
-}
-
-/* Spread the potential v of type k (as bytes of rows) over the tables of its ends. */
-static void txs_expand(txs_sampler *s, int k, const uint8_t *v) {
-    const txs_type *t = &s->level->types[k];
-    const uint8_t *class_of = txs_difference_class;
-    uint8_t *table = s->tables + (size_t)k * TXS_TABLE;
-    enum { N = TXS_CLASSES, ROW = TXS_ROW, BLOCK = TXS_CLASSES * TXS_ROW };
-    switch (t->kind) {
-    case TEXSYN_PAIR:
-    case TEXSYN_PARENT:
-        for (int i = 0; i < TXS_DIFFERENCES; i++) {
-            table[i] = v[i];
-            table[ROW + i] = v[TXS_DIFFERENCES - 1 - i];
-        }
-        break;
-    case TEXSYN_VALUES:
-        for (int q = 0; q < N; q++) {
-            for (int i = 0; i < TXS_VALUES; i++) {
-                table[q * TXS_VALUES + i] = v[s->level->classes[t->band][i] * N + q];
-                table[(N + q) * TXS_VALUES + i] = v[q * N + s->level->classes[t->other][i]];
-            }
-        }
-        break;
-    case TEXSYN_CORNER:
-        for (int q = 0; q < N; q++) {
-            for (int i = 0; i < TXS_DIFFERENCES; i++) {
-                table[q * ROW + i] = v[class_of[i] * N + q];
-                table[BLOCK + q * ROW + i] = v[q * N + class_of[i]];
-            }
-        }
-        for (int delta = -31; delta <= 31; delta++) { /* difference 31 - i on one arm, delta more
-                                                         on the other */
-            uint8_t *row = table + 2 * BLOCK + (delta + 31) * ROW;
-            for (int i = 0; i < TXS_DIFFERENCES; i++)
-                row[i] = v[class_of[62 - i] * N + class_of[txm_clampi(62 - i + delta, 0, 62)]];
-        }
-        break;
-    default: /* TEXSYN_SCALE and, with the ends of the other difference, TEXSYN_PARALLEL */
-        for (int q = 0; q < N; q++) {
-            for (int i = 0; i < TXS_DIFFERENCES; i++) {
-                table[q * ROW + i] = v[class_of[i] * N + q];
-                table[BLOCK + q * ROW + i] = v[class_of[62 - i] * N + q];
-                if (t->kind == TEXSYN_SCALE) continue;
-                table[2 * BLOCK + q * ROW + i] = v[q * N + class_of[i]];
-                table[3 * BLOCK + q * ROW + i] = v[q * N + class_of[62 - i]];
-            }
-        }
-    }
-}
-
 /* Set all tables from the histograms' errors; integrate as well if it is time. */
 static void txs_control(txs_sampler *s, int integrate) {
-    const int gain = TXS_NAT * TXS_PRECISE;
+    const txs_gain gain = {(int)TXS_PROPORTIONAL * TXS_WHOLE, (int)TXS_INTEGRAL * TXS_WHOLE};
     for (int k = 0; k < s->level->type_count; k++) {
         const txs_type *t = &s->level->types[k];
-        const int bins = txs_bin_count(t->kind);
-        const int32_t limit = (t->kind == TEXSYN_SINGLE ? 10 * TXS_NAT : 63) * TXS_PRECISE;
-        uint8_t row[TXS_BINS];
-        int64_t total = 1;
-        for (int i = 0; i < bins; i++) total += s->histogram[k][i];
-        const int64_t scale = ((int64_t)TXS_ONE << 24) / total;
-        for (int i = 0; i < bins; i++) {
-            int32_t error = (int32_t)((s->histogram[k][i] * scale) >> 24) - t->share[i];
-            int32_t pull = error * gain / TXS_ONE; /* for a gain of 1 nat per unit of error */
-            if (integrate)
-                s->integral[k][i] =
-                    txm_clampi(s->integral[k][i] + TXS_INTEGRAL * pull, -limit, limit);
-            int32_t v = txm_clampi(s->integral[k][i] + TXS_PROPORTIONAL * pull, -limit, limit);
-            if (t->kind == TEXSYN_SINGLE)
-                s->single[t->band][(i >> 1) + (i & 1) * 16] =
-                    (int16_t)(i < s->level->values[t->band] ? v / (TXS_PRECISE / TXS_FINE) : 1600);
-            else row[i] = (uint8_t)((v + TXS_ZERO * TXS_PRECISE) / TXS_PRECISE);
-        }
-        if (t->kind != TEXSYN_SINGLE) txs_expand(s, k, row);
+        int32_t v[TXS_BINS];
+        txs_steer(t, gain, integrate, s->histogram[k], s->integral[k], v);
+        txs_publish(s->level, t, v, s->single[t->band], s->tables + (size_t)k * TXS_TABLE);
     }
 }
 
@@ -360,7 +187,9 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
             const txs_type *t = &s->level->types[k];
             txs_tally tally = txs_tally_make(t, s->level, s->canvas, s->bands);
             txs_end ends[4];
-            int band[4], forms[4], n = txs_type_ends(s, k, ends, band, forms);
+            int band[4], forms[4],
+                n = txs_type_ends(s->level, t, s->tables + (size_t)k * TXS_TABLE, s->canvas,
+                                  s->bands, ends, band, forms);
             for (int i = 0; i < n; i++) {
                 int *count = list->end_count[band[i]];
                 /* of a pair, end 0 is the head; only pairs have a phase */
