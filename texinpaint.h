@@ -2251,7 +2251,7 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 /* The channels of a map at a place all around which texels are known and of one chart. */
 static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel,
                             txm_vec2 p, float *out) {
-    enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
+    enum { N = TXI_TAPS, ROW = N * (int)TXI_MAX_CHANNELS };
     const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
     const double unit = image->sample == TXM_U8 ? 255 : image->sample == TXM_U16 ? 65535 : 1;
@@ -7198,7 +7198,6 @@ static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit
         }
     }
     for (int d = 0; d < 2; d++) {
-        double *out = fit + 3 * d;
         const double *r = v[d];
         const double a = m[2] - m[1] * m[1] / m[0], b = m[3] - m[1] * m[2] / m[0];
         const double c = m[4] - m[2] * m[2] / m[0];
@@ -7206,9 +7205,9 @@ static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit
         const double det = a * c - b * b;
         const double c2 = degree > 1 && det > 1e-12 ? (a * u - b * q) / det : 0;
         const double c1 = a > 1e-12 ? (q - b * c2) / a : 0;
-        out[0] = (r[0] - m[1] * c1 - m[2] * c2) / m[0] + (d ? points[0].y : points[0].x);
-        out[1] = c1 / scale;
-        out[2] = c2 / (scale * scale);
+        fit[3 * d] = (r[0] - m[1] * c1 - m[2] * c2) / m[0] + (d ? points[0].y : points[0].x);
+        fit[3 * d + 1] = c1 / scale;
+        fit[3 * d + 2] = c2 / (scale * scale);
     }
     s = 0;
     for (int i = 0; i < n; i++) {
@@ -7269,7 +7268,7 @@ static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count,
    not. */
 static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
                        txi_end *e) {
-    double fit[6], s = 0;
+    double fit[6] = {0}, s = 0;
     int found = 0;
     const int n = txi_fit_points(l, points, e->count, fit);
     for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels   */
@@ -8800,8 +8799,8 @@ static double txi_foreseen(const txi_lines *l) {
     for (int i = 0; i < l->end_count; i++) {
         const txi_end *e = &l->ends[i];
         const txm_vec2 *p = l->points + e->first;
-        const int from = SKIPPED + TXI_GO_ON;
-        double fit[6];
+        const int from = (int)SKIPPED + TXI_GO_ON;
+        double fit[6] = {0};
         int n = 0;
         if (e->count < from + FITTED) continue;
         txi_fit_points(l, p + from, e->count - from, fit);
@@ -12534,12 +12533,13 @@ static txi_match txi_match_refine(const txi_level *coarse, const txi_level *fine
         2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
     const int dy =
         2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
+    const int32_t edge = (int32_t)TXI_EDGE * TXI_UNIT;
     int32_t wx, wy;
     txi_source_place(from, m->x, m->y, &wx, &wy);
     wx += from->a / 4 * dx + from->c / 4 * dy;
     wy += from->b / 4 * dx + from->d / 4 * dy;
-    wx = 2 * (wx - TXI_EDGE * TXI_UNIT) + TXI_UNIT / 2 + TXI_EDGE * TXI_UNIT;
-    wy = 2 * (wy - TXI_EDGE * TXI_UNIT) + TXI_UNIT / 2 + TXI_EDGE * TXI_UNIT;
+    wx = 2 * (wx - edge) + TXI_UNIT / 2 + edge;
+    wy = 2 * (wy - edge) + TXI_UNIT / 2 + edge;
     int pose = m->pose, x, y;
     if (!fine->source[pose].color) { /* the pose that is turned least against it */
         int64_t most = INT64_MIN;
@@ -14030,7 +14030,8 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
 
 enum {
     TXI_LOOK_STEP = 2, /* pixels of the level between the patches that propose; ours            */
-    TXI_LOOK_MOST = (TXI_PATCH / TXI_LOOK_STEP) * (TXI_PATCH / TXI_LOOK_STEP)
+    TXI_LOOK_ROW = TXI_PATCH / TXI_LOOK_STEP, /* of them in a row over a pixel                  */
+    TXI_LOOK_MOST = TXI_LOOK_ROW * TXI_LOOK_ROW
 };
 
 /* What is looked at. */
@@ -14090,8 +14091,8 @@ static void txi_look_pixel(const txi_look *v, int x, int y) {
         return;
     }
     for (int k = 0; k < TXI_LOOK_MOST; k++) {
-        const int dx = k % (TXI_PATCH / TXI_LOOK_STEP) * TXI_LOOK_STEP + 1;
-        const int dy = k / (TXI_PATCH / TXI_LOOK_STEP) * TXI_LOOK_STEP + 1;
+        const int dx = k % TXI_LOOK_ROW * TXI_LOOK_STEP + 1;
+        const int dy = k / TXI_LOOK_ROW * TXI_LOOK_STEP + 1;
         const int anchor = l->slot[p - dy * l->width - dx];
         if (anchor >= 0) count += txi_look_propose(v, anchor, x, y, list[count]);
     }

@@ -86,8 +86,8 @@ static double txi_foreseen(const txi_lines *l) {
     for (int i = 0; i < l->end_count; i++) {
         const txi_end *e = &l->ends[i];
         const txm_vec2 *p = l->points + e->first;
-        const int from = SKIPPED + TXI_GO_ON;
-        double fit[6];
+        const int from = (int)SKIPPED + TXI_GO_ON;
+        double fit[6] = {0};
         int n = 0;
         if (e->count < from + FITTED) continue;
         txi_fit_points(l, p + from, e->count - from, fit);

@@ -11,7 +11,8 @@
 
 enum {
     TXI_LOOK_STEP = 2, /* pixels of the level between the patches that propose; ours            */
-    TXI_LOOK_MOST = (TXI_PATCH / TXI_LOOK_STEP) * (TXI_PATCH / TXI_LOOK_STEP)
+    TXI_LOOK_ROW = TXI_PATCH / TXI_LOOK_STEP, /* of them in a row over a pixel                  */
+    TXI_LOOK_MOST = TXI_LOOK_ROW * TXI_LOOK_ROW
 };
 
 /* What is looked at. */
@@ -71,8 +72,8 @@ static void txi_look_pixel(const txi_look *v, int x, int y) {
         return;
     }
     for (int k = 0; k < TXI_LOOK_MOST; k++) {
-        const int dx = k % (TXI_PATCH / TXI_LOOK_STEP) * TXI_LOOK_STEP + 1;
-        const int dy = k / (TXI_PATCH / TXI_LOOK_STEP) * TXI_LOOK_STEP + 1;
+        const int dx = k % TXI_LOOK_ROW * TXI_LOOK_STEP + 1;
+        const int dy = k / TXI_LOOK_ROW * TXI_LOOK_STEP + 1;
         const int anchor = l->slot[p - dy * l->width - dx];
         if (anchor >= 0) count += txi_look_propose(v, anchor, x, y, list[count]);
     }

@@ -203,7 +203,7 @@ static void txi_load_row(const txm_image *image, int x, int y, int count, double
 /* The channels of a map at a place all around which texels are known and of one chart. */
 static void txi_read_inside(const txm_image *image, int has_alpha, const txi_kernel *kernel,
                             txm_vec2 p, float *out) {
-    enum { N = TXI_TAPS, ROW = TXI_TAPS * TXI_MAX_CHANNELS };
+    enum { N = TXI_TAPS, ROW = N * (int)TXI_MAX_CHANNELS };
     const double fx = floor((double)p.x), fy = floor((double)p.y);
     const int x = (int)fx - 2, y = (int)fy - 2, channels = image->channels;
     const double unit = image->sample == TXM_U8 ? 255 : image->sample == TXM_U16 ? 65535 : 1;

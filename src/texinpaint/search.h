@@ -202,12 +202,13 @@ static txi_match txi_match_refine(const txi_level *coarse, const txi_level *fine
         2 * (p % fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor % coarse->width - TXI_EDGE);
     const int dy =
         2 * (p / fine->width - TXI_EDGE) + 7 - 1 - 4 * (coarse_anchor / coarse->width - TXI_EDGE);
+    const int32_t edge = (int32_t)TXI_EDGE * TXI_UNIT;
     int32_t wx, wy;
     txi_source_place(from, m->x, m->y, &wx, &wy);
     wx += from->a / 4 * dx + from->c / 4 * dy;
     wy += from->b / 4 * dx + from->d / 4 * dy;
-    wx = 2 * (wx - TXI_EDGE * TXI_UNIT) + TXI_UNIT / 2 + TXI_EDGE * TXI_UNIT;
-    wy = 2 * (wy - TXI_EDGE * TXI_UNIT) + TXI_UNIT / 2 + TXI_EDGE * TXI_UNIT;
+    wx = 2 * (wx - edge) + TXI_UNIT / 2 + edge;
+    wy = 2 * (wy - edge) + TXI_UNIT / 2 + edge;
     int pose = m->pose, x, y;
     if (!fine->source[pose].color) { /* the pose that is turned least against it */
         int64_t most = INT64_MIN;

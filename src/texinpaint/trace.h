@@ -293,7 +293,6 @@ static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit
         }
     }
     for (int d = 0; d < 2; d++) {
-        double *out = fit + 3 * d;
         const double *r = v[d];
         const double a = m[2] - m[1] * m[1] / m[0], b = m[3] - m[1] * m[2] / m[0];
         const double c = m[4] - m[2] * m[2] / m[0];
@@ -301,9 +300,9 @@ static double txi_fit_line(const txm_vec2 *points, int n, int degree, double fit
         const double det = a * c - b * b;
         const double c2 = degree > 1 && det > 1e-12 ? (a * u - b * q) / det : 0;
         const double c1 = a > 1e-12 ? (q - b * c2) / a : 0;
-        out[0] = (r[0] - m[1] * c1 - m[2] * c2) / m[0] + (d ? points[0].y : points[0].x);
-        out[1] = c1 / scale;
-        out[2] = c2 / (scale * scale);
+        fit[3 * d] = (r[0] - m[1] * c1 - m[2] * c2) / m[0] + (d ? points[0].y : points[0].x);
+        fit[3 * d + 1] = c1 / scale;
+        fit[3 * d + 2] = c2 / (scale * scale);
     }
     s = 0;
     for (int i = 0; i < n; i++) {
@@ -364,7 +363,7 @@ static int txi_fit_points(const txi_lines *l, const txm_vec2 *points, int count,
    not. */
 static int txi_fit_end(const txi_window *w, const txi_lines *l, const txm_vec2 *points,
                        txi_end *e) {
-    double fit[6], s = 0;
+    double fit[6] = {0}, s = 0;
     int found = 0;
     const int n = txi_fit_points(l, points, e->count, fit);
     for (int i = 0; i < 80 && !found; i++) { /* out of the picture in quarter pixels, 20 pixels   */
