@@ -63,6 +63,8 @@
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
      TEXSYN_MAX_PIXELS   refuse larger images; default 2^28
+     TEXSYN_ASSERT(x)    checks for errors in the library, which no input can trigger; default
+                         assert of <assert.h>
      TEXSYN_NO_SIMD      plain C only. Else SSE2 where the compiler has it and, with gcc and clang,
                          AVX2 where the processor has it. The bytes are the same.
 
@@ -264,6 +266,11 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 #include <immintrin.h>
 #define TXS_AVX2 1 /* compiled for AVX2 function by function, chosen when running */
 #endif
+#endif
+
+#ifndef TEXSYN_ASSERT
+#include <assert.h>
+#define TEXSYN_ASSERT(x) assert(x)
 #endif
 
 /* ---- constants -------------------------------------------------------------------------- */
@@ -2517,6 +2524,1651 @@ TEXSYN_API txm_status texsyn_synthesize(const texsyn_synth_desc *desc, txm_env *
     if (status == TXM_OK) status = texsyn_draw(job, env, out);
     texsyn_free(job);
     return status;
+}
+
+/* ---- the ground of a mosaic --------------------------------------------------------------
+
+   A mosaic is a picture of several textures, each pixel of which has the label of one of them. Its
+   parts are, in this order:
+
+     ground.h          a labelled picture and its pyramid: this part
+     mosaic.h          one level of it as a canvas of quantised values
+     mosaic_sampler.h  Gibbs sampling of that canvas
+     mosaic_learner.h  the statistics of its textures
+     tone.h            from quantised values back to smooth ones
+
+   How a caller uses them (fill.h does):
+
+     1. Make the ground: labels, what is known, and the values of what is known, each pixel in the
+        bands of its own label's model. txs_ground_halve makes the coarser levels.
+     2. For each level, coarse first: txs_mosaic_make and txs_mosaic_lay turn the ground into a
+        canvas; txs_mosaic_raise starts it from the coarser one.
+     3. txs_mosaic_learn finds the clique types of the level, on this canvas or on another one, and
+        leaves it synthesised; or, with models that are known, txs_mosaic_run synthesises only.
+     4. txs_tone_apply smooths within the steps of the quantisation.
+
+   Target statistics and canvas are separate: the source is a mosaic whose pixels are known (state
+   TXS_SOURCE), the canvas is one with free pixels (state TXS_FREE). Both may be the same object: a
+   picture with a hole. A composite texture is learned with the example as the source and its own
+   label map, all free, as the canvas, and then synthesised with a new label map.            */
+
+enum {
+    TXS_MAX_LABELS = 16,
+    TXS_NO_LABEL = 255 /* of pixels that no clique may contain */
+};
+
+enum txs_state {
+    TXS_FREE,  /* to be synthesised                                     */
+    TXS_KNOWN, /* fixed surroundings                                    */
+    TXS_SOURCE /* fixed, and the statistics of its label are taken here */
+};
+
+typedef struct txs_ground { /* one level of a labelled picture */
+    int width, height, bands;
+    float *value;   /* planes of the bands, at least where pixels are not free; NULL if all are */
+    uint8_t *label; /* 0.. or TXS_NO_LABEL */
+    uint8_t *state; /* of enum txs_state   */
+} txs_ground;
+
+/* Room for a ground; 0 if there is no memory. Labels and states are not set. */
+static int txs_ground_make(txs_ground *g, txm_arena *arena, int width, int height, int bands,
+                           int has_values) {
+    size_t pixels;
+    if (!txm_mul((size_t)width, (size_t)height, 1, &pixels)) return 0;
+    memset(g, 0, sizeof *g);
+    g->width = width;
+    g->height = height;
+    g->bands = bands;
+    g->label = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    g->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    if (has_values)
+        g->value = (float *)txm_arena_zero(arena, pixels, sizeof(float) * (size_t)bands);
+    return !arena->failed;
+}
+
+/* The label that most of count pixels have, the first of equals. */
+static int txs_majority(const uint8_t *labels, int count) {
+    int best = TXS_NO_LABEL, most = 0;
+    for (int i = 0; i < count; i++) {
+        int same = 0;
+        for (int j = 0; j < count; j++) same += labels[j] == labels[i];
+        if (labels[i] != TXS_NO_LABEL && same > most) {
+            most = same;
+            best = labels[i];
+        }
+    }
+    return best;
+}
+
+/* One pixel of the coarser level from the children of it that there are. */
+static void txs_halve_pixel(const txs_ground *fine, const size_t *child, int children,
+                            txs_ground *coarse, size_t to) {
+    uint8_t labels[4], least = TXS_SOURCE;
+    int label, count = 0, any_free = 0;
+    for (int i = 0; i < children; i++) labels[i] = fine->label[child[i]];
+    label = txs_majority(labels, children);
+    for (int i = 0; i < children; i++) {
+        const uint8_t state = fine->state[child[i]];
+        if (labels[i] != TXS_NO_LABEL && state == TXS_FREE) any_free = 1;
+        if (labels[i] == label && state < least) least = state;
+    }
+    coarse->label[to] = (uint8_t)label;
+    coarse->state[to] = any_free ? (uint8_t)TXS_FREE : least;
+    if (any_free || !coarse->value || label == TXS_NO_LABEL) return;
+    for (int b = 0; b < fine->bands; b++) {
+        const float *plane = fine->value + (size_t)b * (size_t)fine->width * (size_t)fine->height;
+        double sum = 0;
+        count = 0;
+        for (int i = 0; i < children; i++) {
+            if (labels[i] != label) continue;
+            sum += (double)plane[child[i]];
+            count++;
+        }
+        coarse->value[(size_t)b * (size_t)coarse->width * (size_t)coarse->height + to] =
+            txm_float(sum / count);
+    }
+}
+
+/* The next coarser level, of half the size, rounded up. A pixel takes the label of most of its
+   children and the mean of those; it is free if one of them is. */
+static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
+    for (int y = 0; y < coarse->height; y++) {
+        for (int x = 0; x < coarse->width; x++) {
+            size_t child[4];
+            int children = 0;
+            for (int i = 0; i < 4; i++) {
+                const int cx = 2 * x + i % 2, cy = 2 * y + i / 2;
+                if (cx < fine->width && cy < fine->height)
+                    child[children++] = (size_t)cy * (size_t)fine->width + (size_t)cx;
+            }
+            txs_halve_pixel(fine, child, children, coarse,
+                            (size_t)y * (size_t)coarse->width + (size_t)x);
+        }
+    }
+}
+
+/* How the bands of a label are quantised: from its source pixels. Returns how many these are; with
+   fewer than 2 nothing is set. dither: NULL, or receives the share of a step that is filled.
+   scratch: bands floats and bands bytes for each pixel of the ground. */
+static size_t txs_ground_quantise(const txs_ground *g, int label, int bands, txs_level *level,
+                                  float *values, uint8_t *bytes, float *dither) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    txs_source s;
+    size_t count = 0;
+    memset(&s, 0, sizeof s);
+    for (size_t i = 0; i < pixels; i++) count += g->state[i] == TXS_SOURCE && g->label[i] == label;
+    if (count < 2) return count;
+    for (int b = 0; b < bands; b++) {
+        size_t n = 0;
+        for (size_t i = 0; i < pixels; i++)
+            if (g->state[i] == TXS_SOURCE && g->label[i] == label)
+                values[(size_t)b * count + n++] = g->value[(size_t)b * pixels + i];
+    }
+    s.width = (int)count;
+    s.height = 1;
+    s.value = values;
+    s.canvas.pixels = bytes;
+    s.canvas.plane = (ptrdiff_t)count;
+    for (int b = 0; b < bands; b++) {
+        const float fill = txs_quantise_band(level, b, &s);
+        if (dither) dither[b] = fill;
+    }
+    return count;
+}
+
+/* ---- the canvas of a mosaic --------------------------------------------------------------
+
+   Planes of one level: the bands, each pixel quantised as its label's model says; the bands of the
+   coarser level at this resolution (only if the models use parents); then planes of labels. Outside
+   lies a margin without labels, so the canvas is no torus. Which members a clique may have is asked
+   of the planes of labels, at the same offsets as of the values:
+
+     label   of all pixels
+     sample  of source pixels, TXS_NO_LABEL elsewhere: where target statistics are taken
+     parent  of pixels that have a parent of their own label, TXS_NO_LABEL elsewhere        */
+typedef struct txs_mosaic {
+    txs_canvas canvas;
+    int labels, bands;
+    ptrdiff_t label, sample, parent; /* from plane 0 to these planes; parent 0 = no parents */
+    const uint8_t *state;            /* of the ground */
+} txs_mosaic;
+
+/* What a label's texture is on this level. */
+typedef struct txs_texture {
+    const texsyn_model *model;
+    txs_level *level;
+} txs_texture;
+
+static ptrdiff_t txs_pixel_offset(const txs_mosaic *m, int x, int y) {
+    return (y + m->canvas.margin) * m->canvas.stride + x + m->canvas.margin;
+}
+
+static uint8_t *txs_pixel(const txs_mosaic *m, int x, int y) {
+    return m->canvas.pixels + txs_pixel_offset(m, x, y);
+}
+
+static int txs_is_free(const txs_mosaic *m, int x, int y) {
+    return m->state[(size_t)y * (size_t)m->canvas.width + (size_t)x] == TXS_FREE &&
+           txs_pixel(m, x, y)[m->label] != TXS_NO_LABEL;
+}
+
+/* A canvas for a ground, with a margin as wide as the longest clique, and its planes of labels.
+   Returns 0 if there is no memory; release it with txs_mosaic_free. */
+static int txs_mosaic_make(txs_mosaic *m, const txm_env *env, const txs_ground *g, int labels,
+                           int margin, int has_parents) {
+    const int planes = g->bands * (has_parents ? 2 : 1);
+    memset(m, 0, sizeof *m);
+    if (!txs_canvas_make(&m->canvas, env, g->width, g->height, margin, planes + 2 + has_parents))
+        return 0;
+    m->labels = labels;
+    m->bands = g->bands;
+    m->label = planes * m->canvas.plane;
+    m->sample = m->label + m->canvas.plane;
+    m->parent = has_parents ? m->sample + m->canvas.plane : 0;
+    m->state = g->state;
+    memset(m->canvas.pixels + m->label, TXS_NO_LABEL,
+           (size_t)m->canvas.plane * (size_t)(2 + has_parents));
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            uint8_t *p = txs_pixel(m, x, y);
+            p[m->label] = g->label[i];
+            if (g->state[i] == TXS_SOURCE) p[m->sample] = g->label[i];
+        }
+    }
+    return 1;
+}
+
+static void txs_mosaic_free(txs_mosaic *m, const txm_env *env) {
+    txs_canvas_free(&m->canvas, env);
+}
+
+/* Quantise what is known; free pixels become even noise (step 2 of [1]). */
+static void txs_mosaic_lay(txs_mosaic *m, const txs_ground *g, const txs_texture *texture,
+                           uint64_t seed) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    txm_rng rng = txm_rng_make(seed, 3);
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            uint8_t *p = txs_pixel(m, x, y);
+            if (g->label[i] == TXS_NO_LABEL) continue;
+            const txs_texture *t = &texture[g->label[i]];
+            for (int b = 0; b < t->model->bands; b++) {
+                const int v =
+                    g->state[i] == TXS_FREE
+                        ? (int)txm_rng_below(&rng, (uint32_t)t->level->values[b])
+                        : txs_quantise(t->level, b, (double)g->value[(size_t)b * pixels + i]);
+                p[b * m->canvas.plane] = (uint8_t)v;
+            }
+        }
+    }
+}
+
+/* The pixels of the coarser canvas round a pixel that have its label: their offsets and weights;
+   returns the sum of the weights, of 16. */
+static int txs_parents_of(const txs_mosaic *coarse, int x, int y, int label, ptrdiff_t at[4],
+                          int weight[4]) {
+    int sum = 0;
+    for (int i = 0; i < 4; i++) {
+        const int cx = x / 2 + (i % 2 ? (x & 1 ? 1 : -1) : 0);
+        const int cy = y / 2 + (i / 2 ? (y & 1 ? 1 : -1) : 0);
+        at[i] = txs_pixel_offset(coarse, cx, cy); /* at most a pixel outside, in the margin */
+        weight[i] = coarse->canvas.pixels[at[i] + coarse->label] == label
+                        ? (i % 2 ? 1 : 3) * (i / 2 ? 1 : 3)
+                        : 0;
+        sum += weight[i];
+    }
+    return sum;
+}
+
+/* Values of the coarser level in sixteenths to values of this one. */
+typedef uint8_t txs_raise_map[TXS_MAX_BANDS][16 * TXS_VALUES];
+
+static void txs_raise_map_make(const txs_level *above, const txs_level *level, int bands,
+                               txs_raise_map map) {
+    for (int b = 0; b < bands; b++)
+        for (int q = 0; q < 16 * TXS_VALUES; q++)
+            map[b][q] = (uint8_t)txs_quantise(level, b, txs_value(above, b, q / 16.0));
+}
+
+/* Interpolate the coarser canvas among pixels of the same label: free pixels start from it, and it
+   becomes the parent planes if there are such. maps: one for each label. */
+static void txs_mosaic_raise(txs_mosaic *m, const txs_mosaic *coarse, const txs_texture *above,
+                             const txs_texture *texture, txs_raise_map *maps) {
+    for (int k = 0; k < m->labels; k++)
+        txs_raise_map_make(above[k].level, texture[k].level, texture[k].model->bands, maps[k]);
+    for (int y = 0; y < m->canvas.height; y++) {
+        for (int x = 0; x < m->canvas.width; x++) {
+            uint8_t *p = txs_pixel(m, x, y);
+            const int label = p[m->label], is_free = txs_is_free(m, x, y);
+            ptrdiff_t at[4];
+            int weight[4], sum;
+            if (label == TXS_NO_LABEL || (!is_free && !m->parent)) continue;
+            sum = txs_parents_of(coarse, x, y, label, at, weight);
+            if (!sum) continue;
+            for (int b = 0; b < texture[label].model->bands; b++) {
+                const uint8_t *q = coarse->canvas.pixels + b * coarse->canvas.plane;
+                int value = sum / 2;
+                for (int i = 0; i < 4; i++) value += 16 * weight[i] * q[at[i]];
+                const uint8_t v = maps[label][b][value / sum];
+                if (is_free) p[b * m->canvas.plane] = v;
+                if (m->parent) p[(m->bands + b) * m->canvas.plane] = v;
+            }
+            if (m->parent) p[m->parent] = (uint8_t)label;
+        }
+    }
+}
+
+enum { TXS_UNREACHED, TXS_REACHED, TXS_REACHED_NOW };
+
+/* Copy the values of a neighbour that has some already and the same label; 0 if there is none. */
+static int txs_grow_pixel(txs_mosaic *m, const uint8_t *reached, int x, int y, txm_rng *rng) {
+    const uint32_t first = txm_rng_below(rng, 8);
+    uint8_t *p = txs_pixel(m, x, y);
+    for (uint32_t k = 0; k < 8; k++) {
+        const int turn = (int)((first + k) & 7), at = turn + (turn > 3); /* of 3 x 3 without 4 */
+        const int nx = x + at % 3 - 1, ny = y + at / 3 - 1;
+        if (nx < 0 || ny < 0 || nx >= m->canvas.width || ny >= m->canvas.height) continue;
+        const uint8_t *q = txs_pixel(m, nx, ny);
+        if (reached[(size_t)ny * (size_t)m->canvas.width + (size_t)nx] != TXS_REACHED ||
+            q[m->label] != p[m->label])
+            continue;
+        for (int b = 0; b < m->bands; b++) p[b * m->canvas.plane] = q[b * m->canvas.plane];
+        return 1;
+    }
+    return 0;
+}
+
+/* Start free pixels from known ones: ring after ring, each pixel copies a neighbour. What is reached
+   from no known pixel keeps its value. reached: a byte for each pixel. */
+static void txs_mosaic_grow(txs_mosaic *m, uint8_t *reached, uint64_t seed) {
+    const int width = m->canvas.width, pixels = width * m->canvas.height;
+    txm_rng rng = txm_rng_make(seed, 5);
+    for (int i = 0; i < pixels; i++)
+        reached[i] = !txs_is_free(m, i % width, i / width) ? TXS_REACHED : TXS_UNREACHED;
+    for (int grown = 1; grown;) {
+        grown = 0;
+        for (int i = 0; i < pixels; i++) {
+            if (reached[i] != TXS_UNREACHED) continue;
+            if (!txs_grow_pixel(m, reached, i % width, i / width, &rng)) continue;
+            reached[i] = TXS_REACHED_NOW;
+            grown = 1;
+        }
+        for (int i = 0; i < pixels; i++)
+            if (reached[i] == TXS_REACHED_NOW) reached[i] = TXS_REACHED;
+    }
+}
+
+/* ---- who may be in a clique ----------------------------------------------------------- */
+
+/* The other members of a clique and their label: it counts if all of them have it. */
+typedef struct txs_guard {
+    ptrdiff_t at[3]; /* from a pixel of plane 0 into planes of labels */
+    int count, label;
+} txs_guard;
+
+static int txs_holds(const txs_guard *g, const uint8_t *p) {
+    for (int i = 0; i < g->count; i++)
+        if (p[g->at[i]] != g->label) return 0;
+    return 1;
+}
+
+/* The guard of a clique type for the pixel that is its given member. labels: the plane that the
+   members are looked up in. */
+static txs_guard txs_guard_make(const txs_mosaic *m, const txs_type *t, int label, int member,
+                                ptrdiff_t labels) {
+    int at[4][2], members = txs_members(t, at);
+    txs_guard g;
+    memset(&g, 0, sizeof g);
+    g.label = label;
+    if (t->kind == TEXSYN_PARENT) g.at[g.count++] = m->parent;
+    for (int i = 0; i < members; i++) {
+        const int is_parent = t->kind == TEXSYN_SCALE && i >= 2;
+        if (i == member) continue;
+        g.at[g.count++] = (at[i][1] - at[member][1]) * m->canvas.stride + at[i][0] - at[member][0] +
+                          (is_parent ? m->parent : labels);
+    }
+    return g;
+}
+
+/* Is a clique type of a kind that mosaics know? */
+static int txs_mosaic_knows(const txs_mosaic *m, const txs_type *t) {
+    if (t->kind > TEXSYN_PARALLEL) return 0;
+    return m->parent || (t->kind != TEXSYN_PARENT && t->kind != TEXSYN_SCALE);
+}
+
+/* ---- lists of pixels ------------------------------------------------------------------ */
+
+/* Pixels of one label: first those round which all pixels within the reach have the same label
+   ("pure"), so that nothing needs to be checked. */
+typedef struct txs_pixels {
+    int32_t *at; /* from the first byte of the canvas */
+    int pure, count;
+} txs_pixels;
+
+/* For each pixel: how far do the pixels to the left of it, and it, have equal labels? And the same
+   for the square. The planes of labels and of parents must agree. */
+static int txs_is_same(const txs_mosaic *m, const uint8_t *p, ptrdiff_t labels) {
+    return p[labels] != TXS_NO_LABEL && (!m->parent || p[m->parent] == p[labels]);
+}
+
+/* Mark (1) the pixels whose square of the given reach has one label only; purity: a byte for each
+   pixel, columns: a number for each column. */
+static void txs_find_pure(const txs_mosaic *m, ptrdiff_t labels, int reach, uint8_t *purity,
+                          int *columns) {
+    const int width = m->canvas.width, height = m->canvas.height, side = 2 * reach + 1;
+    memset(purity, 0, (size_t)width * (size_t)height);
+    for (int x = 0; x < width; x++) columns[x] = 0;
+    for (int y = 0; y < height; y++) {
+        const uint8_t *row = txs_pixel(m, 0, y), *above = row - m->canvas.stride;
+        for (int x = 0, run = 0; x < width; x++) {
+            const int same = txs_is_same(m, row + x, labels);
+            run = !same ? 0 : run && row[x - 1 + labels] == row[x + labels] ? run + 1 : 1;
+            /* columns[x]: rows whose last `side` pixels up to x have one label, the same in all */
+            if (run < side) columns[x] = 0;
+            else columns[x] = above[x + labels] == row[x + labels] ? columns[x] + 1 : 1;
+            if (columns[x] >= side)
+                purity[(size_t)(y - reach) * (size_t)width + (size_t)(x - reach)] = 1;
+        }
+    }
+}
+
+/* ---- sampling a mosaic -------------------------------------------------------------------
+
+   As sampler.h does, with these differences. Only free pixels are visited. They are listed by strip,
+   sub-lattice and label, and those of one list are drawn in batches, wherever they lie. Each label
+   has its own clique types, tables and histograms, which count cliques with a free tail. Pure pixels
+   look at no label; at others an end counts if its guard holds. Beside the types of the labels there
+   are crossing ones: VALUES whose tail has one label and whose head another, each in the classes of
+   its own model.                                                                             */
+
+/* A clique type across a border. */
+typedef struct txs_crossing {
+    int tail, head; /* labels */
+    txs_type type;  /* VALUES */
+} txs_crossing;
+
+enum {
+    TXS_MAX_CROSSINGS = 256, /* of one level */
+    TXS_CROSS_ENDS = 96,     /* of one label and band */
+    TXS_SOFT_CROSSING = 400  /* see txs_soften; ours, by trial */
+};
+
+/* What the pixels of one label and parity take part in. */
+typedef struct txs_part {
+    txs_list list;
+    txs_guard guard[TXS_MAX_BANDS][TXS_MAX_ENDS]; /* of the ends   */
+    txs_guard tally_guard[TXS_MAX_TYPES];         /* of the tallies */
+    txs_end cross[TXS_MAX_BANDS][TXS_CROSS_ENDS]; /* of crossing types */
+    txs_guard cross_guard[TXS_MAX_BANDS][TXS_CROSS_ENDS];
+    int cross_count[TXS_MAX_BANDS];
+} txs_part;
+
+typedef struct txs_brush { /* the sampler */
+    const txs_mosaic *mosaic;
+    const txs_texture *texture; /* of each label */
+    const txs_crossing *crossing;
+    int crossings;
+    int parities; /* 4 if there are parents, else 1 */
+    int refresh;  /* sub-lattices between two looks at the histograms */
+    int softness; /* see txs_soften */
+    uint64_t seed;
+    txs_pick *pick;
+    const int16_t *noise;
+    txs_part *part;                /* parities for each label */
+    int16_t (*single)[TXS_VALUES]; /* TXS_MAX_BANDS for each label */
+    /* of each type: its place is base[label] + index; those of crossing types follow */
+    int capacity, base[TXS_MAX_LABELS + 1];
+    int *active, active_count; /* places in use */
+    uint8_t *tables;
+    int32_t (*histogram)[TXS_BINS], (*integral)[TXS_BINS];
+    int32_t (*counts)[TXS_BINS]; /* TXS_TASKS times all places */
+    txs_gain *gain;
+    /* pixels: lists in the order of strips, sub-lattices, labels */
+    int32_t *pixel;
+    txs_pixels *list;
+    uint8_t *purity; /* of each pixel of the canvas */
+    int *columns;
+    size_t pixel_count, list_capacity;
+    int top, rows; /* of free pixels */
+    int skip[TXS_MAX_LABELS], free_count[TXS_MAX_LABELS];
+    int strips, tasks, phase, group, integrate;
+    int order[TXS_GRID * TXS_GRID];
+    uint64_t pass, sweep;
+} txs_brush;
+
+enum { TXS_ALL = TXS_GRID * TXS_GRID };
+
+/* ---- what a pixel takes part in ------------------------------------------------------- */
+
+/* Which member of the clique the ends of txs_type_ends are, by kind. */
+static const uint8_t txs_end_member[][4] = {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 0}, {0, 1, 0, 0},
+                                            {1, 2, 0, 0}, {1, 0, 0, 0}, {1, 0, 3, 2}};
+
+static void txs_part_add_ends(txs_brush *s, txs_part *part, int label, int k, int px, int py,
+                              int form) {
+    const txs_texture *texture = &s->texture[label];
+    const txs_type *t = &texture->level->types[k];
+    txs_end ends[4];
+    int band[4], forms[4];
+    const int n =
+        txs_type_ends(texture->level, t, s->tables + (size_t)(s->base[label] + k) * TXS_TABLE,
+                      &s->mosaic->canvas, s->mosaic->bands, ends, band, forms);
+    for (int i = 0; i < n; i++) {
+        int *count = part->list.end_count[band[i]];
+        const int at = count[0] + count[1] + count[2] + count[3];
+        /* of a pair, end 0 is the head; only pairs have a phase */
+        if (forms[i] != form || !txs_is_tail(t, px - (i ? 0 : t->dx), py - (i ? 0 : t->dy)))
+            continue;
+        if (at == TXS_MAX_ENDS) continue; /* cannot be: models are checked */
+        part->list.ends[band[i]][at] = ends[i];
+        part->guard[band[i]][at] =
+            txs_guard_make(s->mosaic, t, label, txs_end_member[t->kind][i], s->mosaic->label);
+        count[form]++;
+    }
+}
+
+/* Ends and tallies of the pixels of a label with parities px, py. */
+static void txs_part_fill(txs_brush *s, txs_part *part, int label, int px, int py) {
+    const txs_level *level = s->texture[label].level;
+    memset(part, 0, sizeof *part);
+    for (int form = 0, filled = 0; form < TXS_FORMS; form++) {
+        for (int k = 0; k < level->type_count; k++) {
+            const txs_type *t = &level->types[k];
+            if (!txs_mosaic_knows(s->mosaic, t)) continue;
+            txs_part_add_ends(s, part, label, k, px, py, form);
+            txs_tally tally = txs_tally_make(t, level, &s->mosaic->canvas, s->mosaic->bands);
+            if (tally.form != form || !txs_is_tail(t, px, py)) continue;
+            tally.type = k;
+            part->tally_guard[filled] = txs_guard_make(s->mosaic, t, label, 0, s->mosaic->label);
+            part->list.tally[filled++] = tally;
+            part->list.tally_count[form]++;
+        }
+    }
+}
+
+/* An end of a crossing type at pixels of `label`; the other member has the label `far_`. */
+static void txs_part_add_crossing(txs_brush *s, int label, int far_, int band, int far_band,
+                                  ptrdiff_t d, const uint8_t *table) {
+    for (int parity = 0; parity < s->parities; parity++) {
+        txs_part *part = &s->part[label * s->parities + parity];
+        const int at = part->cross_count[band];
+        if (at == TXS_CROSS_ENDS) return;
+        txs_end *e = &part->cross[band][at];
+        txs_guard *g = &part->cross_guard[band][at];
+        memset(e, 0, sizeof *e);
+        memset(g, 0, sizeof *g);
+        e->o1 = far_band * s->mosaic->canvas.plane + d;
+        e->classes = s->texture[far_].level->classes[far_band];
+        e->table = table;
+        g->at[g->count++] = s->mosaic->label + d;
+        g->label = far_;
+        part->cross_count[band]++;
+    }
+}
+
+static void txs_parts_fill(txs_brush *s) {
+    for (int k = 0; k < s->mosaic->labels; k++)
+        for (int parity = 0; parity < s->parities; parity++)
+            txs_part_fill(s, &s->part[k * s->parities + parity], k, parity & 1, parity >> 1);
+    for (int i = 0; i < s->crossings; i++) {
+        const txs_crossing *c = &s->crossing[i];
+        const txs_type *t = &c->type;
+        const ptrdiff_t d = t->dy * s->mosaic->canvas.stride + t->dx;
+        const uint8_t *table = s->tables + (size_t)(s->base[s->mosaic->labels] + i) * TXS_TABLE;
+        txs_part_add_crossing(s, c->tail, c->head, t->band, t->other, d, table);
+        txs_part_add_crossing(s, c->head, c->tail, t->other, t->band, -d,
+                              table + (int)TXS_CLASSES * TXS_VALUES);
+    }
+}
+
+/* ---- drawing -------------------------------------------------------------------------- */
+
+/* The candidate's energies at one end, as energy.h says. */
+static const uint8_t *txs_row(const txs_end *e, int form, const uint8_t *p) {
+    switch (form) {
+    case 0: return e->table - p[e->o1];
+    case 1: return e->table + txs_class(p[e->o2] - p[e->o3]) * TXS_ROW - p[e->o1];
+    case 2: return e->table + (p[e->o2] - p[e->o1]) * TXS_ROW - p[e->o1];
+    default: return e->table + e->classes[p[e->o1]] * TXS_VALUES;
+    }
+}
+
+/* Draw a value for one pixel and band, given the rows of its ends. */
+static void txs_draw_value(const txs_brush *s, int label, int band, const uint8_t **rows, int n,
+                           uint8_t *p, txm_rng *rng) {
+    const int values = s->texture[label].level->values[band];
+    rows[n] = txs_no_energy;
+    int v = s->pick(rows, (n + 1) & ~1, s->single[label * TXS_MAX_BANDS + band],
+                    s->noise + (txm_rng_next(rng) & (TXS_NOISE - 1)));
+    if (v >= values) v = values - 1;
+    p[band * s->mosaic->canvas.plane] = (uint8_t)v;
+}
+
+/* Draw some pure pixels of a list. */
+static void txs_draw_pure(const txs_brush *s, int label, const txs_list *list, const int32_t *at,
+                          int count, txm_rng *rng) {
+    const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
+    uint8_t *base = s->mosaic->canvas.pixels;
+    for (int b = 0; b < s->texture[label].model->bands; b++) {
+        const txs_end *e = list->ends[b], *stop = e + list->end_count[b][0];
+        int n = 0;
+        for (; e < stop; e++, n++) {
+            const uint8_t *p1 = base + e->o1, *table = e->table;
+            for (int i = 0; i < count; i++) rows[i][n] = table - p1[at[i]];
+        }
+        for (stop += list->end_count[b][1]; e < stop; e++, n++) {
+            const uint8_t *p1 = base + e->o1, *p2 = base + e->o2, *p3 = base + e->o3;
+            for (int i = 0; i < count; i++)
+                rows[i][n] = e->table + txs_class(p2[at[i]] - p3[at[i]]) * TXS_ROW - p1[at[i]];
+        }
+        for (stop += list->end_count[b][2]; e < stop; e++, n++) {
+            const uint8_t *p1 = base + e->o1, *p2 = base + e->o2;
+            for (int i = 0; i < count; i++)
+                rows[i][n] = e->table + (p2[at[i]] - p1[at[i]]) * TXS_ROW - p1[at[i]];
+        }
+        for (stop += list->end_count[b][3]; e < stop; e++, n++) {
+            const uint8_t *p1 = base + e->o1;
+            for (int i = 0; i < count; i++)
+                rows[i][n] = e->table + e->classes[p1[at[i]]] * TXS_VALUES;
+        }
+        for (int i = 0; i < count; i++) txs_draw_value(s, label, b, rows[i], n, base + at[i], rng);
+    }
+}
+
+/* Draw a pixel near another label or the border. */
+static void txs_draw_checked(const txs_brush *s, int label, const txs_part *part, uint8_t *p,
+                             txm_rng *rng) {
+    const uint8_t *rows[TXS_MAX_ENDS + 2];
+    for (int b = 0; b < s->texture[label].model->bands; b++) {
+        const txs_end *e = part->list.ends[b];
+        const txs_guard *g = part->guard[b];
+        int n = 0;
+        for (int form = 0; form < TXS_FORMS; form++)
+            for (int i = part->list.end_count[b][form]; i > 0; i--, e++, g++)
+                if (txs_holds(g, p)) rows[n++] = txs_row(e, form, p);
+        for (int i = 0; i < part->cross_count[b] && n < TXS_MAX_ENDS; i++)
+            if (txs_holds(&part->cross_guard[b][i], p))
+                rows[n++] = txs_row(&part->cross[b][i], 3, p);
+        txs_draw_value(s, label, b, rows, n, p, rng);
+    }
+}
+
+/* ---- counting ------------------------------------------------------------------------- */
+
+/* Count the cliques whose tail is p. counts: of all types. */
+static void txs_brush_count(const txs_brush *s, int label, const txs_part *part, int is_pure,
+                            const uint8_t *p, int32_t (*counts)[TXS_BINS]) {
+    if (is_pure) {
+        txs_count(&part->list, p, counts + s->base[label]);
+        return;
+    }
+    const int *of = part->list.tally_count, n = of[0] + of[1] + of[2] + of[3];
+    for (int i = 0; i < n; i++) {
+        const txs_tally *t = &part->list.tally[i];
+        if (txs_holds(&part->tally_guard[i], p)) counts[s->base[label] + t->type][txs_bin(t, p)]++;
+    }
+    for (int i = 0; i < s->crossings; i++) {
+        const txs_crossing *c = &s->crossing[i];
+        const txs_type *t = &c->type;
+        const uint8_t *q = p + t->dy * s->mosaic->canvas.stride + t->dx;
+        if (c->tail != label || q[s->mosaic->label] != c->head) continue;
+        const int v = p[t->band * s->mosaic->canvas.plane];
+        const int w = q[t->other * s->mosaic->canvas.plane];
+        counts[s->base[s->mosaic->labels] + i]
+              [s->texture[c->tail].level->classes[t->band][v] * TXS_CLASSES +
+               s->texture[c->head].level->classes[t->other][w]]++;
+    }
+}
+
+static const txs_pixels *txs_brush_list(const txs_brush *s, int strip, int sublattice, int label) {
+    return &s->list[((size_t)strip * TXS_ALL + (size_t)sublattice) * (size_t)s->mosaic->labels +
+                    (size_t)label];
+}
+
+static const txs_part *txs_brush_part(const txs_brush *s, int label, int sublattice) {
+    const int parity = s->parities == 1 ? 0 : (sublattice & 1) + 2 * (sublattice / TXS_GRID & 1);
+    return &s->part[label * s->parities + parity];
+}
+
+/* Count every skip-th pixel of a list. */
+static void txs_count_list(const txs_brush *s, int strip, int sublattice, int label,
+                           int32_t (*counts)[TXS_BINS]) {
+    const txs_pixels *list = txs_brush_list(s, strip, sublattice, label);
+    const txs_part *part = txs_brush_part(s, label, sublattice);
+    const int skip = s->skip[label];
+    for (int i = (strip + 5 * sublattice) % skip; i < list->count; i += skip)
+        txs_brush_count(s, label, part, i < list->pure, s->mosaic->canvas.pixels + list->at[i],
+                        counts);
+}
+
+/* ---- a sweep -------------------------------------------------------------------------- */
+
+static void txs_draw_list(const txs_brush *s, int strip, int sublattice, int label, uint64_t pass) {
+    const txs_pixels *list = txs_brush_list(s, strip, sublattice, label);
+    const txs_part *part = txs_brush_part(s, label, sublattice);
+    txm_rng rng =
+        txm_rng_make(s->seed ^ pass << 24, (uint64_t)strip * TXS_MAX_LABELS + (uint64_t)label);
+    for (int i = 0; i < list->pure; i += TXS_TOGETHER) {
+        const int n = list->pure - i;
+        txs_draw_pure(s, label, &part->list, list->at + i, n < TXS_TOGETHER ? n : (int)TXS_TOGETHER,
+                      &rng);
+    }
+    for (int i = list->pure; i < list->count; i++)
+        txs_draw_checked(s, label, part, s->mosaic->canvas.pixels + list->at[i], &rng);
+}
+
+/* One share of a pass: some of the strips of this phase, the group's sub-lattices in turn. */
+static void txs_brush_work(void *context, int task) {
+    const txs_brush *s = (const txs_brush *)context;
+    const int half = s->strips > 1 ? s->strips / 2 : 1;
+    int32_t(*counts)[TXS_BINS] = s->counts + (size_t)task * (size_t)s->capacity;
+    for (int i = half * task / s->tasks; i < half * (task + 1) / s->tasks; i++) {
+        const int strip = s->strips > 1 ? 2 * i + s->phase : 0;
+        for (int j = 0; j < s->refresh; j++) {
+            const int sublattice = s->order[s->group * s->refresh + j];
+            const uint64_t pass = s->pass * TXS_ALL + (uint64_t)j;
+            for (int k = 0; k < s->mosaic->labels; k++) {
+                txs_draw_list(s, strip, sublattice, k, pass);
+                txs_count_list(s, strip, sublattice, k, counts);
+            }
+        }
+    }
+}
+
+/* The clique type at a place. */
+static const txs_type *txs_brush_type(const txs_brush *s, int place, int *label) {
+    const int labels = s->mosaic->labels;
+    *label = place < s->base[labels] ? place / s->base[1] : labels;
+    return *label < labels ? &s->texture[*label].level->types[place - s->base[*label]]
+                           : &s->crossing[place - s->base[labels]].type;
+}
+
+/* Spread the potential of a crossing type over the tables of its ends. */
+static void txs_publish_crossing(const txs_brush *s, const txs_crossing *c, const int32_t *v,
+                                 uint8_t *table) {
+    const uint8_t *tail = s->texture[c->tail].level->classes[c->type.band];
+    const uint8_t *head = s->texture[c->head].level->classes[c->type.other];
+    enum { N = TXS_CLASSES };
+    uint8_t row[TXS_BINS];
+    for (int i = 0; i < TXS_BINS; i++)
+        row[i] = (uint8_t)((v[i] + TXS_ZERO * TXS_PRECISE) / TXS_PRECISE);
+    for (int q = 0; q < N; q++) {
+        for (int i = 0; i < TXS_VALUES; i++) {
+            table[q * TXS_VALUES + i] = row[tail[i] * N + q];
+            table[(N + q) * TXS_VALUES + i] = row[q * N + head[i]];
+        }
+    }
+}
+
+/* Bring the counts of a pass into the running histogram of a type, which forgets at the same rate,
+   and set the type's tables from its error. */
+static void txs_brush_control(txs_brush *s, int place) {
+    const int passes = TXS_ALL / s->refresh;
+    const int64_t keep = TXS_ONE - TXS_ONE / passes;
+    int32_t v[TXS_BINS], *histogram = s->histogram[place];
+    int label;
+    const txs_type *t = txs_brush_type(s, place, &label);
+    uint8_t *table = s->tables + (size_t)place * TXS_TABLE;
+    for (int i = 0; i < TXS_BINS; i++) histogram[i] = (int32_t)((histogram[i] * keep) >> 16);
+    for (int task = 0; task < s->tasks; task++) {
+        int32_t *count = s->counts[(size_t)task * (size_t)s->capacity + (size_t)place];
+        for (int i = 0; i < TXS_BINS; i++) histogram[i] += count[i] * TXS_WINDOW;
+        memset(count, 0, sizeof *s->counts);
+    }
+    txs_steer(t, s->gain[place], s->integrate, histogram, s->integral[place], v);
+    if (label == s->mosaic->labels)
+        txs_publish_crossing(s, &s->crossing[place - s->base[label]], v, table);
+    else
+        txs_publish(s->texture[label].level, t, v, s->single[label * TXS_MAX_BANDS + t->band],
+                    table);
+}
+
+enum { TXS_CONTROL_TASKS = 8 };
+
+static void txs_brush_control_some(void *context, int task) {
+    txs_brush *s = (txs_brush *)context;
+    for (int i = task; i < s->active_count; i += TXS_CONTROL_TASKS)
+        txs_brush_control(s, s->active[i]);
+}
+
+/* Visit every free pixel once. Progress from..to of the whole work. */
+static txm_status txs_brush_sweep(txs_brush *s, txm_env *env, const char *stage, float from,
+                                  float to) {
+    const int phases = s->strips > 1 ? 2 : 1, groups = TXS_ALL / s->refresh;
+    txm_rng rng = txm_rng_make(s->seed, ~s->sweep++);
+    for (int i = 0; i < TXS_ALL; i++) s->order[i] = i;
+    txm_shuffle(&rng, s->order, TXS_ALL);
+    for (s->group = 0; s->group < groups; s->group++, s->pass++) {
+        if (txm_progress(env, from + (to - from) * (float)s->group / (float)groups, stage))
+            return txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
+        for (s->phase = 0; s->phase < phases; s->phase++)
+            txm_parallel_for(env, s->tasks, txs_brush_work, s);
+        s->integrate = s->group + 1 == groups;
+        txm_parallel_for(env, TXS_CONTROL_TASKS, txs_brush_control_some, s);
+    }
+    return TXM_OK;
+}
+
+/* ---- laying out the work -------------------------------------------------------------- */
+
+static int txs_strip_of(const txs_brush *s, int y) {
+    return (int)(((int64_t)(y - s->top + 1) * s->strips - 1) / s->rows);
+}
+
+static txs_pixels *txs_list_of(txs_brush *s, int x, int y, int label) {
+    const int sublattice = x % TXS_GRID + y % TXS_GRID * TXS_GRID;
+    return &s->list[((size_t)txs_strip_of(s, y) * TXS_ALL + (size_t)sublattice) *
+                        (size_t)s->mosaic->labels +
+                    (size_t)label];
+}
+
+/* Call visit-like code for each free pixel: first count the pixels of each list, then fill them. */
+static void txs_list_pixels(txs_brush *s, int is_filling) {
+    const txs_mosaic *m = s->mosaic;
+    const int width = m->canvas.width;
+    for (int pure = 1; pure >= 0; pure--) {
+        for (int y = s->top; y < s->top + s->rows; y++) {
+            for (int x = 0; x < width; x++) {
+                if (!txs_is_free(m, x, y) ||
+                    s->purity[(size_t)y * (size_t)width + (size_t)x] != pure)
+                    continue;
+                txs_pixels *list = txs_list_of(s, x, y, txs_pixel(m, x, y)[m->label]);
+                if (is_filling) list->at[list->count] = (int32_t)txs_pixel_offset(m, x, y);
+                list->count++;
+                list->pure += pure;
+            }
+        }
+    }
+}
+
+static void txs_brush_list_all(txs_brush *s) {
+    const size_t lists = (size_t)s->strips * TXS_ALL * (size_t)s->mosaic->labels;
+    size_t filled = 0;
+    TEXSYN_ASSERT(lists <= s->list_capacity);
+    memset(s->list, 0, lists * sizeof *s->list);
+    memset(s->free_count, 0, sizeof s->free_count);
+    txs_list_pixels(s, 0);
+    for (size_t i = 0; i < lists; i++) {
+        s->list[i].at = s->pixel + filled;
+        filled += (size_t)s->list[i].count;
+        s->free_count[i % (size_t)s->mosaic->labels] += s->list[i].count;
+        s->list[i].count = s->list[i].pure = 0;
+    }
+    TEXSYN_ASSERT(filled == s->pixel_count);
+    txs_list_pixels(s, 1);
+}
+
+/* The largest distance between members of a clique of this level; at least what is worth a strip. */
+static int txs_brush_reach(const txs_brush *s) {
+    int reach = 1;
+    for (int i = 0; i < s->active_count; i++) {
+        int label, r = txs_reach(txs_brush_type(s, s->active[i], &label));
+        if (r > reach) reach = r;
+    }
+    return reach;
+}
+
+/* The gain of a type whose histogram counts n cliques: few cliques have noisy histograms, and
+   surroundings that are fixed. */
+static txs_gain txs_soften(int64_t n, int softness) {
+    txs_gain gain;
+    gain.proportional = (int)((int)TXS_PROPORTIONAL * TXS_WHOLE * n / (n + softness));
+    gain.integral = (int)((int)TXS_INTEGRAL * TXS_WHOLE * n / (n + softness));
+    return gain;
+}
+
+/* Which places are in use. */
+static void txs_brush_activate(txs_brush *s) {
+    const int labels = s->mosaic->labels;
+    s->active_count = 0;
+    for (int k = 0; k < labels; k++)
+        for (int i = 0; i < s->texture[k].level->type_count; i++)
+            if (txs_mosaic_knows(s->mosaic, &s->texture[k].level->types[i]))
+                s->active[s->active_count++] = s->base[k] + i;
+    for (int i = 0; i < s->crossings; i++) s->active[s->active_count++] = s->base[labels] + i;
+    TEXSYN_ASSERT(s->active_count <= s->capacity);
+}
+
+/* Lay out the work for the types as they are now, and count the canvas as it is. */
+static void txs_brush_start(txs_brush *s) {
+    enum { STRIP = 16 }; /* a strip is at least this high: less is too little work for a thread */
+    const int labels = s->mosaic->labels;
+    txs_brush_activate(s);
+    txs_parts_fill(s);
+    int reach = txs_brush_reach(s);
+    txs_find_pure(s->mosaic, s->mosaic->label, reach, s->purity, s->columns);
+    if (reach < STRIP) reach = STRIP;
+    s->strips = s->rows / reach & ~1;
+    if (s->strips < 2) s->strips = 1;
+    s->tasks = s->strips > 1 ? s->strips / 2 : 1;
+    if (s->tasks > TXS_TASKS) s->tasks = TXS_TASKS;
+    txs_brush_list_all(s);
+    for (int k = 0; k < labels; k++) s->skip[k] = s->free_count[k] / TXS_SAMPLES + 1;
+
+    for (int i = 0; i < s->active_count; i++) {
+        memset(s->histogram[s->active[i]], 0, sizeof *s->histogram);
+        for (int task = 0; task < TXS_TASKS; task++)
+            memset(s->counts[(size_t)task * (size_t)s->capacity + (size_t)s->active[i]], 0,
+                   sizeof *s->counts);
+    }
+    for (int strip = 0; strip < s->strips; strip++)
+        for (int sublattice = 0; sublattice < TXS_ALL; sublattice++)
+            for (int k = 0; k < labels; k++) txs_count_list(s, strip, sublattice, k, s->counts);
+    for (int i = 0; i < s->active_count; i++) {
+        const int place = s->active[i];
+        int64_t cliques = 0;
+        for (int j = 0; j < TXS_BINS; j++) cliques += s->counts[place][j];
+        s->gain[place] = place < s->base[labels]
+                             ? txs_soften(s->free_count[place / s->base[1]], s->softness)
+                             : txs_soften(cliques, TXS_SOFT_CROSSING);
+    }
+    s->integrate = 0;
+    for (int i = 0; i < s->active_count; i++) txs_brush_control(s, s->active[i]);
+}
+
+/* Forget what the control has found; start from the potentials of the types. */
+static void txs_brush_reset(txs_brush *s) {
+    txs_brush_activate(s);
+    for (int i = 0; i < s->active_count; i++) {
+        int label;
+        const txs_type *t = txs_brush_type(s, s->active[i], &label);
+        for (int j = 0; j < TXS_BINS; j++)
+            s->integral[s->active[i]][j] = t->potential[j] * TXS_PRECISE;
+    }
+}
+
+/* What txs_brush_make is told. */
+typedef struct txs_brush_plan {
+    int max_types; /* of one label, at most TXS_MAX_TYPES */
+    int max_crossings;
+    int refresh;  /* sub-lattices between two looks at the histograms: divides 64 */
+    int softness; /* the gains are those of sampler.h times n / (n + softness), n free pixels */
+    uint64_t seed;
+} txs_brush_plan;
+
+/* A sampler in the arena's memory; NULL if there is none. texture: one for each label. Call
+   txs_brush_reset before the first, txs_brush_start before each use with other types or labels. */
+static txs_brush *txs_brush_make(txm_arena *arena, const txs_mosaic *mosaic,
+                                 const txs_texture *texture, const txs_brush_plan *plan,
+                                 const int16_t *noise) {
+    const txs_canvas *c = &mosaic->canvas;
+    const size_t labels = (size_t)mosaic->labels;
+    txs_brush *s = (txs_brush *)txm_arena_zero(arena, 1, sizeof *s);
+    if (!s) return NULL;
+    s->mosaic = mosaic;
+    s->texture = texture;
+    s->parities = mosaic->parent ? 4 : 1;
+    s->refresh = plan->refresh;
+    s->softness = plan->softness;
+    s->seed = txm_hash(plan->seed);
+    s->pick = txs_best_pick();
+    s->noise = noise;
+    for (int k = 0; k <= mosaic->labels; k++) s->base[k] = k * plan->max_types;
+    s->capacity = s->base[mosaic->labels] + plan->max_crossings;
+    s->top = c->height;
+    for (int y = 0, bottom = 0; y < c->height; y++) {
+        for (int x = 0; x < c->width; x++) {
+            if (!txs_is_free(mosaic, x, y)) continue;
+            if (y < s->top) s->top = y;
+            bottom = y + 1;
+            s->rows = bottom - s->top;
+            s->pixel_count++;
+        }
+    }
+    if (!s->rows) s->top = 0, s->rows = 1;
+    s->list_capacity = ((size_t)s->rows / 16 + 1) * TXS_ALL * labels;
+    const size_t places = (size_t)s->capacity;
+    s->part = (txs_part *)txm_arena_alloc(arena, labels * (size_t)s->parities, sizeof *s->part);
+    s->single =
+        (int16_t(*)[TXS_VALUES])txm_arena_zero(arena, labels * TXS_MAX_BANDS, sizeof *s->single);
+    s->active = (int *)txm_arena_alloc(arena, places, sizeof *s->active);
+    s->tables = (uint8_t *)txm_arena_zero(arena, places, TXS_TABLE);
+    s->histogram = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, places, sizeof *s->histogram);
+    s->integral = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, places, sizeof *s->integral);
+    s->counts = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, places * TXS_TASKS, sizeof *s->counts);
+    s->gain = (txs_gain *)txm_arena_zero(arena, places, sizeof *s->gain);
+    s->pixel = (int32_t *)txm_arena_alloc(arena, s->pixel_count + 1, sizeof *s->pixel);
+    s->list = (txs_pixels *)txm_arena_alloc(arena, s->list_capacity, sizeof *s->list);
+    s->purity = (uint8_t *)txm_arena_alloc(arena, (size_t)c->width, (size_t)c->height);
+    s->columns = (int *)txm_arena_alloc(arena, (size_t)c->width, sizeof *s->columns);
+    return arena->failed ? NULL : s;
+}
+
+/* The noise of a lower temperature: percent of it. Both have TXS_NOISE + TXS_VALUES entries. */
+static void txs_cool_noise(const int16_t *noise, int percent, int16_t *cool) {
+    for (int i = 0; i < (int)TXS_NOISE + TXS_VALUES; i++)
+        cool[i] = (int16_t)(noise[i] * percent / 100);
+}
+
+/* ---- learning a mosaic -------------------------------------------------------------------
+
+   Greedy selection of clique types on one level as in neighbourhood.h, for all labels at once and
+   for the crossings of their borders. Targets are measured at the source pixels of one mosaic, what
+   was synthesised at the free pixels of another (or of the same).                           */
+
+typedef struct txs_study_plan {
+    int first, between, last; /* sweeps: at first, after each batch of types, at the end   */
+    int types, batch;         /* added for each label, at once                             */
+    int reach;                /* of pairs, in pixels of the level                          */
+    int refresh, softness;    /* of the sampler */
+    int crosses;              /* non-zero: crossing types as well                          */
+    uint64_t seed;
+    const int16_t *noise, *last_noise; /* the latter of the last sweep                     */
+} txs_study_plan;
+
+/* A crossing type that could be added. */
+typedef struct txs_cross_candidate {
+    txs_crossing crossing;
+    float weight, noise, distance; /* as of txs_candidate */
+} txs_cross_candidate;
+
+typedef struct txs_study {
+    const txs_study_plan *plan;
+    const txs_mosaic *source, *canvas;
+    int index;            /* of the level    */
+    int now;              /* label that is measured */
+    texsyn_model **model; /* of each label */
+    txs_texture texture[TXS_MAX_LABELS];
+    txs_learner learner[TXS_MAX_LABELS];
+    txs_pixels tails[TXS_MAX_LABELS];      /* of the source, TXS_TAILS at most  */
+    txs_pixels free_tails[TXS_MAX_LABELS]; /* of the canvas                     */
+    txs_crossing *crossing;
+    int crossings;
+    txs_cross_candidate *cross;
+    int cross_count;
+} txs_study;
+
+enum {
+    TXS_TAILS = 12000,    /* cliques counted of each type: as many as matter */
+    TXS_PRESELECTED = 32, /* types of a label at most, see txs_study_preselect */
+    TXS_CROSS_REACH = 5,  /* pixels, between the first bands; ours, by trial */
+    TXS_CROSS_BATCH = 3   /* crossing types added for each pair of labels at once */
+};
+
+/* ---- measuring ------------------------------------------------------------------------ */
+
+static void txs_normalise(const uint32_t *h, int64_t total, int32_t share[TXS_BINS]) {
+    for (int i = 0; i < TXS_BINS; i++)
+        share[i] = total ? (int32_t)(((int64_t)h[i] * TXS_ONE + total / 2) / total) : 0;
+}
+
+static int txs_is_tail_at(const txs_mosaic *m, const txs_type *t, int32_t at) {
+    const int x = (int)(at % m->canvas.stride) - m->canvas.margin;
+    const int y = (int)(at / m->canvas.stride) - m->canvas.margin;
+    return txs_is_tail(t, x & 1, y & 1);
+}
+
+/* Histogram of a clique type over its tails, whose label is asked of the plane `labels`. Returns the
+   number of cliques. */
+static int64_t txs_study_measure(const txs_mosaic *m, ptrdiff_t labels, const txs_pixels *tails,
+                                 int label, const txs_level *level, const txs_type *t,
+                                 int32_t share[TXS_BINS]) {
+    const txs_tally y = txs_tally_make(t, level, &m->canvas, m->bands);
+    const txs_guard guard = txs_guard_make(m, t, label, 0, labels);
+    const uint8_t *base = m->canvas.pixels;
+    uint32_t h[TXS_BINS];
+    int64_t total = 0;
+    int i = 0;
+    memset(h, 0, sizeof h);
+    if (t->phase) {
+        for (; i < tails->pure; i++)
+            if (txs_is_tail_at(m, t, tails->at[i])) h[txs_bin(&y, base + tails->at[i])]++;
+    } else if (y.form == 1) {
+        for (; i < tails->pure; i++) h[base[tails->at[i] + y.a] - base[tails->at[i] + y.b] + 31]++;
+    } else if (y.form == 2) {
+        for (; i < tails->pure; i++)
+            h[y.ca[base[tails->at[i] + y.a]] * TXS_CLASSES + y.cb[base[tails->at[i] + y.b]]]++;
+    } else {
+        for (; i < tails->pure; i++) h[txs_bin(&y, base + tails->at[i])]++;
+    }
+    for (; i < tails->count; i++) {
+        const uint8_t *p = base + tails->at[i];
+        if (txs_holds(&guard, p) && (!t->phase || txs_is_tail_at(m, t, tails->at[i])))
+            h[txs_bin(&y, p)]++;
+    }
+    for (i = 0; i < TXS_BINS; i++) total += h[i];
+    txs_normalise(h, total, share);
+    return total;
+}
+
+/* The same of a crossing type. */
+static int64_t txs_study_measure_crossing(const txs_study *s, const txs_mosaic *m, ptrdiff_t labels,
+                                          const txs_pixels *tails, const txs_crossing *c,
+                                          int32_t share[TXS_BINS]) {
+    const txs_type *t = &c->type;
+    const ptrdiff_t d = t->dy * m->canvas.stride + t->dx, plane = m->canvas.plane;
+    const uint8_t *tail = s->texture[c->tail].level->classes[t->band];
+    const uint8_t *head = s->texture[c->head].level->classes[t->other];
+    uint32_t h[TXS_BINS];
+    int64_t total = 0;
+    memset(h, 0, sizeof h);
+    for (int i = tails->pure; i < tails->count; i++) {
+        const uint8_t *p = m->canvas.pixels + tails->at[i], *q = p + d;
+        if (q[labels] != c->head) continue;
+        h[tail[p[t->band * plane]] * TXS_CLASSES + head[q[t->other * plane]]]++;
+        total++;
+    }
+    txs_normalise(h, total, share);
+    return total;
+}
+
+/* ---- tails ---------------------------------------------------------------------------- */
+
+/* Is the pixel one that tails lie at: a source pixel, or a free one? */
+static int txs_is_tail_of(const txs_mosaic *m, ptrdiff_t labels, int label, int x, int y) {
+    if (txs_pixel(m, x, y)[labels] != label) return 0;
+    return labels == m->sample || txs_is_free(m, x, y);
+}
+
+/* Evenly spread tails of a label, TXS_TAILS at most of either purity; tails->at has room for twice
+   as many. */
+static void txs_tails_find(const txs_mosaic *m, ptrdiff_t labels, int label, const uint8_t *purity,
+                           txs_pixels *tails) {
+    const int width = m->canvas.width, height = m->canvas.height;
+    tails->count = tails->pure = 0;
+    for (int pure = 1; pure >= 0; pure--) {
+        int64_t found = 0, seen = 0;
+        for (int pass = 0; pass < 2; pass++) {
+            for (int y = 0; y < height; y++) {
+                for (int x = 0; x < width; x++) {
+                    if (purity[(size_t)y * (size_t)width + (size_t)x] != pure ||
+                        !txs_is_tail_of(m, labels, label, x, y))
+                        continue;
+                    if (!pass) {
+                        found++;
+                        continue;
+                    }
+                    const int64_t wanted = found < TXS_TAILS ? found : (int)TXS_TAILS;
+                    if (seen * wanted / found != (seen + 1) * wanted / found)
+                        tails->at[tails->count++] = (int32_t)txs_pixel_offset(m, x, y);
+                    seen++;
+                }
+            }
+        }
+        if (pure) tails->pure = tails->count;
+    }
+    TEXSYN_ASSERT(tails->count <= 2 * TXS_TAILS);
+}
+
+/* Room for the tails of all labels, and what they are; 0 if there is no memory. */
+static int txs_tails_make(txm_arena *arena, const txs_mosaic *m, ptrdiff_t labels, int reach,
+                          txs_pixels *tails) {
+    const size_t width = (size_t)m->canvas.width, height = (size_t)m->canvas.height;
+    size_t room = width * height < TXS_TAILS ? width * height : (size_t)TXS_TAILS;
+    uint8_t *purity = (uint8_t *)txm_arena_alloc(arena, width, height);
+    int *columns = (int *)txm_arena_alloc(arena, width, sizeof *columns);
+    for (int k = 0; k < m->labels; k++)
+        tails[k].at = (int32_t *)txm_arena_alloc(arena, 2 * room, sizeof *tails[k].at);
+    if (arena->failed) return 0;
+    txs_find_pure(m, labels, reach, purity, columns);
+    for (int k = 0; k < m->labels; k++) txs_tails_find(m, labels, k, purity, &tails[k]);
+    return 1;
+}
+
+/* ---- the clique types of a label ------------------------------------------------------ */
+
+/* The preselected clique types, as txs_preselect has them; those that the source does not contain
+   are left out. */
+static void txs_study_preselect(txs_study *s, int label) {
+    texsyn_model *model = s->model[label];
+    txs_level *level = &model->level[s->index];
+    const int bands = model->bands, has_parents = s->source->parent != 0;
+    int kept = bands;
+    level->type_count = 0;
+    for (int b = 0; b < bands; b++) {
+        txs_type *t = txs_add_type(level, TEXSYN_SINGLE, b, b, 0, 0);
+        txs_study_measure(s->source, s->source->sample, &s->tails[label], label, level, t,
+                          t->share);
+        txs_make_classes(level, b);
+    }
+    for (int b = 0; b < bands; b++) {
+        for (int phase = has_parents; phase <= 2 * has_parents; phase++) {
+            txs_add_type(level, TEXSYN_PAIR, b, b, 1, 0)->phase = phase;
+            txs_add_type(level, TEXSYN_PAIR, b, b, 0, 1)->phase = phase;
+        }
+        if (has_parents) txs_add_type(level, TEXSYN_PARENT, b, b, 0, 0);
+        for (int o = b + 1; o < bands; o++) txs_add_type(level, TEXSYN_VALUES, b, o, 0, 0);
+    }
+    for (int k = bands; k < level->type_count; k++) {
+        txs_type t = level->types[k];
+        if (txs_study_measure(s->source, s->source->sample, &s->tails[label], label, level, &t,
+                              t.share) > 0)
+            level->types[kept++] = t;
+    }
+    level->type_count = kept;
+    TEXSYN_ASSERT(kept <= TXS_PRESELECTED);
+}
+
+/* Would two members of a clique be drawn together, being of one sub-lattice? */
+static int txs_draws_together(const txs_type *t) {
+    int at[4][2], n = t->kind == TEXSYN_SCALE ? 2 : txs_members(t, at);
+    txs_members(t, at);
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < i; j++) {
+            const int x = at[i][0] - at[j][0], y = at[i][1] - at[j][1];
+            if ((x || y) && x % TXS_GRID == 0 && y % TXS_GRID == 0) return 1;
+        }
+    }
+    return 0;
+}
+
+/* The candidates of a label: those of neighbourhood.h that a mosaic knows. */
+static void txs_study_list(txs_study *s, int label) {
+    txs_learner *a = &s->learner[label];
+    float seen[TXS_MAX_BANDS];
+    int kept = 0;
+    for (int b = 0; b < a->model->bands; b++) seen[b] = txs_visibility(a->level, b);
+    txs_list_candidates(a, s->plan->reach, seen);
+    for (int i = 0; i < a->candidate_count; i++)
+        if (txs_mosaic_knows(s->source, &a->candidates[i].type) &&
+            !txs_draws_together(&a->candidates[i].type))
+            a->candidates[kept++] = a->candidates[i];
+    a->candidate_count = kept;
+}
+
+/* Parallel bodies: measure a candidate in the source, on the canvas. */
+static void txs_study_source(void *context, int i) {
+    txs_study *s = (txs_study *)context;
+    txs_learner *a = &s->learner[s->now];
+    txs_candidate *c = &a->candidates[i];
+    const int64_t n = txs_study_measure(s->source, s->source->sample, &s->tails[s->now], s->now,
+                                        a->level, &c->type, c->type.share);
+    const int64_t m = s->free_tails[s->now].count + 1;
+    c->noise = n ? txm_float(sqrt(1.0 / (double)n + 1.0 / (double)m)) : 0;
+    if (!n) c->weight = 0;
+}
+
+static void txs_study_canvas(void *context, int i) {
+    txs_study *s = (txs_study *)context;
+    txs_learner *a = &s->learner[s->now];
+    txs_candidate *c = &a->candidates[i];
+    int32_t share[TXS_BINS];
+    const int64_t n = txs_study_measure(s->canvas, s->canvas->label, &s->free_tails[s->now], s->now,
+                                        a->level, &c->type, share);
+    c->distance = n ? txs_distance(share, c->type.share) : 0;
+}
+
+/* ---- crossing types ------------------------------------------------------------------- */
+
+static void txs_cross_add(txs_study *s, int tail, int head, int band, int other, int dx, int dy,
+                          int capacity) {
+    if (s->cross_count == capacity) return;
+    txs_cross_candidate *c = &s->cross[s->cross_count++];
+    memset(c, 0, sizeof *c);
+    c->crossing.tail = tail;
+    c->crossing.head = head;
+    c->crossing.type.kind = TEXSYN_VALUES;
+    c->crossing.type.band = band;
+    c->crossing.type.other = other;
+    c->crossing.type.dx = dx;
+    c->crossing.type.dy = dy;
+    c->weight = 1;
+}
+
+/* Within this distance are the candidates of a pair of bands. */
+static int txs_cross_reach(int band, int other) {
+    return band == 0 && other == 0 ? TXS_CROSS_REACH : 1;
+}
+
+/* All candidates of all pairs of labels; returns how many there can be. With no room only counts. */
+static int txs_cross_list(txs_study *s, int capacity) {
+    int count = 0;
+    s->cross_count = 0;
+    for (int k = 0; k < s->source->labels; k++) {
+        for (int l = k + 1; l < s->source->labels; l++) {
+            for (int b = 0; b < s->model[k]->bands; b++) {
+                for (int o = 0; o < s->model[l]->bands; o++) {
+                    const int r = txs_cross_reach(b, o);
+                    for (int y = -r; y <= r; y++) {
+                        for (int x = -r; x <= r; x++) {
+                            if (x * x + y * y > r * r || (!x && !y)) continue;
+                            count++;
+                            txs_cross_add(s, k, l, b, o, x, y, capacity);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    return count;
+}
+
+static void txs_cross_source(void *context, int i) {
+    txs_study *s = (txs_study *)context;
+    txs_cross_candidate *c = &s->cross[i];
+    const int64_t n =
+        txs_study_measure_crossing(s, s->source, s->source->sample, &s->tails[c->crossing.tail],
+                                   &c->crossing, c->crossing.type.share);
+    enum { FEW = 30 }; /* cliques: less is no statistic */
+    c->noise = n ? txm_float(sqrt(2.0 / (double)n)) : 0;
+    if (n < FEW) c->weight = 0;
+}
+
+static void txs_cross_canvas(void *context, int i) {
+    txs_study *s = (txs_study *)context;
+    txs_cross_candidate *c = &s->cross[i];
+    int32_t share[TXS_BINS];
+    const int64_t n = txs_study_measure_crossing(
+        s, s->canvas, s->canvas->label, &s->free_tails[c->crossing.tail], &c->crossing, share);
+    c->distance = n ? txs_distance(share, c->crossing.type.share) : 0;
+}
+
+/* Take candidate i into the level. */
+static void txs_cross_take(txs_study *s, int i) {
+    if (s->crossings == TXS_MAX_CROSSINGS) return;
+    s->crossing[s->crossings++] = s->cross[i].crossing;
+    s->cross[i] = s->cross[--s->cross_count];
+}
+
+/* The preselected crossing types: the four neighbours, in each band. */
+static void txs_cross_preselect(txs_study *s) {
+    for (int i = s->cross_count - 1; i >= 0; i--) {
+        const txs_cross_candidate *c = &s->cross[i];
+        const txs_type *t = &c->crossing.type;
+        if (c->weight > 0 && t->band == t->other && abs(t->dx) + abs(t->dy) == 1)
+            txs_cross_take(s, i);
+    }
+}
+
+/* The worst types of a pair of labels; returns how many. */
+static int txs_cross_add_worst(txs_study *s, int tail, int head) {
+    int added = 0;
+    for (; added < TXS_CROSS_BATCH; added++) {
+        int worst = -1;
+        for (int i = 0; i < s->cross_count; i++) {
+            const txs_cross_candidate *c = &s->cross[i];
+            if (c->crossing.tail != tail || c->crossing.head != head || c->weight <= 0 ||
+                !(c->distance > TXS_NOISE_SHARE * c->noise))
+                continue;
+            if (worst < 0 || c->distance > s->cross[worst].distance) worst = i;
+        }
+        if (worst < 0 || s->crossings == TXS_MAX_CROSSINGS) break;
+        txs_cross_take(s, worst);
+    }
+    return added;
+}
+
+/* ---- a level -------------------------------------------------------------------------- */
+
+/* Prepare everything that does not change while types are added. */
+static txm_status txs_study_begin(txs_study *s, txm_arena *arena, txm_env *env) {
+    const int labels = s->source->labels, reach = s->plan->reach;
+    for (int k = 0; k < labels; k++) {
+        txs_learner *a = &s->learner[k];
+        s->texture[k].model = s->model[k];
+        s->texture[k].level = &s->model[k]->level[s->index];
+        memset(a, 0, sizeof *a);
+        a->model = s->model[k];
+        a->index = s->source->parent ? s->index : s->model[k]->levels - 1;
+        a->level = &s->model[k]->level[s->index];
+        a->capacity = (2 * reach + 1) * (2 * reach + 1) * s->model[k]->bands + 400;
+        a->candidates =
+            (txs_candidate *)txm_arena_alloc(arena, (size_t)a->capacity, sizeof *a->candidates);
+    }
+    s->crossing = (txs_crossing *)txm_arena_zero(arena, TXS_MAX_CROSSINGS, sizeof *s->crossing);
+    const int crosses = s->plan->crosses ? txs_cross_list(s, 0) : 0;
+    if (crosses)
+        s->cross = (txs_cross_candidate *)txm_arena_alloc(arena, (size_t)crosses, sizeof *s->cross);
+    if (arena->failed || !txs_tails_make(arena, s->source, s->source->sample, reach, s->tails) ||
+        !txs_tails_make(arena, s->canvas, s->canvas->label, reach, s->free_tails))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn from the picture");
+    for (int k = 0; k < labels; k++) {
+        s->now = k;
+        txs_study_preselect(s, k);
+        txs_study_list(s, k);
+        txm_parallel_for(env, s->learner[k].candidate_count, txs_study_source, s);
+    }
+    if (crosses) {
+        txs_cross_list(s, crosses);
+        txm_parallel_for(env, s->cross_count, txs_cross_source, s);
+        txs_cross_preselect(s);
+    }
+    return TXM_OK;
+}
+
+/* Add the worst types of all labels and pairs of labels, `left` for each label at most; returns how
+   many. */
+static int txs_study_add(txs_study *s, int left, txm_env *env) {
+    const int labels = s->source->labels, batch = left < s->plan->batch ? left : s->plan->batch;
+    int added = 0;
+    for (int k = 0; k < labels; k++) {
+        s->now = k;
+        txm_parallel_for(env, s->learner[k].candidate_count, txs_study_canvas, s);
+        added += txs_add_worst(&s->learner[k], batch, TXS_THRESHOLD);
+    }
+    if (!s->plan->crosses) return added;
+    txm_parallel_for(env, s->cross_count, txs_cross_canvas, s);
+    for (int k = 0; k < labels; k++)
+        for (int l = k + 1; l < labels; l++) added += txs_cross_add_worst(s, k, l);
+    return added;
+}
+
+/* The mean of the controlled potentials over some sweeps is what a model keeps. */
+static void txs_study_keep(txs_study *s, const txs_brush *brush, int64_t (*sum)[TXS_BINS],
+                           int sweeps) {
+    const int labels = s->source->labels;
+    for (int k = 0; k < labels; k++)
+        txs_keep_potentials(&s->model[k]->level[s->index], sum + brush->base[k], sweeps);
+    for (int i = 0; i < s->crossings; i++) {
+        txs_level one; /* a level of this type only */
+        memset(&one, 0, sizeof one);
+        one.types = &s->crossing[i].type;
+        one.type_count = 1;
+        txs_keep_potentials(&one, sum + brush->base[labels] + i, sweeps);
+    }
+}
+
+/* The rounds of synthesis and of adding types, then the last sweeps. Fraction from..to of the whole. */
+static txm_status txs_study_run(txs_study *s, txs_brush *brush, int64_t (*sum)[TXS_BINS],
+                                txm_env *env, float from, float to) {
+    const txs_study_plan *plan = s->plan;
+    const int rounds = (plan->types + plan->batch - 1) / plan->batch;
+    const int kept = (plan->last + 1) / 2; /* of the last sweeps, half make the potentials */
+    const float sweep =
+        (to - from) / (float)(plan->first + rounds * (plan->between + 2) + plan->last);
+    int left = plan->types, sweeps = plan->first;
+    txm_status status;
+    for (;;) { /* what was synthesised so far, and its potentials, are kept */
+        brush->crossings = s->crossings;
+        txs_brush_start(brush);
+        for (int i = 0; i < sweeps; i++, from += sweep)
+            if ((status = txs_brush_sweep(brush, env, "learn", from, from + sweep)) != TXM_OK)
+                return status;
+        if (left <= 0 || !txs_study_add(s, left, env)) break;
+        left -= plan->batch;
+        sweeps = plan->between;
+        from += 2 * sweep; /* about what the measuring takes */
+    }
+    for (int i = 0; i < plan->last; i++, from += sweep) {
+        if (i + 1 == plan->last && plan->last_noise) brush->noise = plan->last_noise;
+        if ((status = txs_brush_sweep(brush, env, "learn", from, from + sweep)) != TXM_OK)
+            return status;
+        for (int k = 0; k < brush->active_count && i >= plan->last - kept; k++)
+            for (int j = 0; j < TXS_BINS; j++)
+                sum[brush->active[k]][j] += brush->integral[brush->active[k]][j];
+    }
+    txs_study_keep(s, brush, sum, kept);
+    return TXM_OK;
+}
+
+/* Learn level `index` of the models, one for each label, whose bands and quantisation are set and
+   whose level has room for TXS_MAX_TYPES types. The source and the canvas have been laid (and
+   raised); the latter's free pixels are synthesised. Crossing types go to crossing[], room for
+   TXS_MAX_CROSSINGS of them, and *crossings, unless these are NULL. Fraction from..to of the
+   whole. */
+static txm_status txs_mosaic_learn(const txs_study_plan *plan, int index, texsyn_model **model,
+                                   const txs_mosaic *source, txs_mosaic *canvas,
+                                   txs_crossing *crossing, int *crossings, txm_env *env, float from,
+                                   float to) {
+    const txs_brush_plan brush_plan = {TXS_PRESELECTED + plan->types,
+                                       plan->crosses ? (int)TXS_MAX_CROSSINGS : 0, plan->refresh,
+                                       plan->softness, plan->seed};
+    const size_t places =
+        (size_t)(canvas->labels * brush_plan.max_types + brush_plan.max_crossings);
+    txm_status status = TXM_OUT_OF_MEMORY;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    txs_study *s = (txs_study *)txm_arena_zero(&arena, 1, sizeof *s);
+    if (s) {
+        s->plan = plan;
+        s->source = source;
+        s->canvas = canvas;
+        s->index = index;
+        s->model = model;
+        status = txs_study_begin(s, &arena, env);
+    }
+    if (status == TXM_OK) {
+        txs_brush *brush = txs_brush_make(&arena, canvas, s->texture, &brush_plan, plan->noise);
+        int64_t(*sum)[TXS_BINS] = (int64_t(*)[TXS_BINS])txm_arena_zero(&arena, places, sizeof *sum);
+        status = TXM_OUT_OF_MEMORY;
+        if (!arena.failed) {
+            brush->crossing = s->crossing;
+            status = txs_study_run(s, brush, sum, env, from, to);
+        }
+    }
+    if (status == TXM_OK && crossing) {
+        memcpy(crossing, s->crossing, sizeof *crossing * (size_t)s->crossings);
+        *crossings = s->crossings;
+    }
+    if (status == TXM_OUT_OF_MEMORY) txm_fail(env, status, "no memory to learn from the picture");
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* Synthesise the free pixels of a canvas, which has been laid (and raised), with models that are
+   known. */
+static txm_status txs_mosaic_run(txs_mosaic *canvas, const txs_texture *texture,
+                                 const txs_brush_plan *plan, const txs_crossing *crossing,
+                                 int crossings, int sweeps, const int16_t *noise,
+                                 const int16_t *last_noise, txm_env *env, float from, float to) {
+    txm_status status = TXM_OK;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    txs_brush *brush = txs_brush_make(&arena, canvas, texture, plan, noise);
+    if (!brush) {
+        txm_arena_free(&arena);
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to synthesise");
+    }
+    brush->crossing = crossing;
+    brush->crossings = crossings;
+    txs_brush_reset(brush);
+    txs_brush_start(brush);
+    for (int i = 0; i < sweeps && status == TXM_OK; i++) {
+        const float at = from + (to - from) * (float)i / (float)sweeps;
+        if (i + 1 == sweeps && last_noise) brush->noise = last_noise;
+        status = txs_brush_sweep(brush, env, "synthesise", at,
+                                 from + (to - from) * (float)(i + 1) / (float)sweeps);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- values within their steps -----------------------------------------------------------
+
+   A sampled value is a step of the quantisation. Where within the step? Smooth shades want the
+   place that the neighbours suggest, grain a random one. What is taken is
+
+       mix * smooth + (1 - mix) * random,
+
+   with mix such that the mean difference of neighbours is that of the source. Positions are in
+   steps of the band, so a value is q + position.                                            */
+
+typedef struct txs_tone {
+    const txs_mosaic *mosaic;
+    const txs_ground *ground;
+    const txs_level *level;
+    int label, band;
+    float *at;    /* value of each pixel in steps: known ones, and the smooth of the free ones */
+    float *grain; /* the random place within the step                                          */
+    float spread; /* of it: the share of a step                                                */
+} txs_tone;
+
+/* A number -1/2..1/2 that belongs to a pixel and band. */
+static float txs_tone_noise(uint64_t seed, int x, int y, int band) {
+    const uint64_t bits =
+        txm_hash(((uint64_t)(unsigned)y << 32 | (unsigned)x) ^ txm_hash(seed + (uint64_t)band));
+    return (float)(bits >> 40) / 16777216.0f - 0.5f;
+}
+
+static size_t txs_tone_index(const txs_tone *t, int x, int y) {
+    return (size_t)y * (size_t)t->ground->width + (size_t)x;
+}
+
+/* Has the pixel the label, and is it there at all? */
+static int txs_tone_has(const txs_tone *t, int x, int y) {
+    return x >= 0 && y >= 0 && x < t->ground->width && y < t->ground->height &&
+           t->ground->label[txs_tone_index(t, x, y)] == t->label;
+}
+
+/* Known values in steps; free ones start at the middle of theirs. */
+static void txs_tone_start(txs_tone *t, uint64_t seed) {
+    const size_t pixels = (size_t)t->ground->width * (size_t)t->ground->height;
+    const double low = (double)t->level->low[t->band], step = (double)t->level->step[t->band];
+    for (int y = 0; y < t->ground->height; y++) {
+        for (int x = 0; x < t->ground->width; x++) {
+            const size_t i = txs_tone_index(t, x, y);
+            if (t->ground->label[i] != t->label) continue;
+            if (t->ground->state[i] == TXS_FREE) {
+                t->at[i] = txs_pixel(t->mosaic, x, y)[t->band * t->mosaic->canvas.plane];
+                t->grain[i] = t->spread * txs_tone_noise(seed, x, y, t->band);
+            } else {
+                const double value = (double)t->ground->value[(size_t)t->band * pixels + i];
+                t->at[i] = txm_float((value - low) / step);
+            }
+        }
+    }
+}
+
+/* Sweeps of Gauss and Seidel: free pixels move towards the mean of their neighbours, within their
+   step. */
+static void txs_tone_smooth(txs_tone *t, int sweeps) {
+    for (int sweep = 0; sweep < sweeps; sweep++) {
+        for (int y = 0; y < t->ground->height; y++) {
+            for (int x = 0; x < t->ground->width; x++) {
+                const size_t i = txs_tone_index(t, x, y);
+                double sum = 0;
+                int count = 0;
+                if (t->ground->state[i] != TXS_FREE || t->ground->label[i] != t->label) continue;
+                for (int k = 0; k < 4; k++) {
+                    const int nx = x + (k == 0) - (k == 1), ny = y + (k == 2) - (k == 3);
+                    if (!txs_tone_has(t, nx, ny)) continue;
+                    sum += (double)t->at[txs_tone_index(t, nx, ny)];
+                    count++;
+                }
+                if (!count) continue;
+                const float q = txs_pixel(t->mosaic, x, y)[t->band * t->mosaic->canvas.plane];
+                t->at[i] = txm_clampf(txm_float(sum / count), q - 0.5f, q + 0.5f);
+            }
+        }
+    }
+}
+
+/* A free pixel's value for a mix, or a known one's. */
+static double txs_tone_value(const txs_tone *t, int x, int y, double mix) {
+    const size_t i = txs_tone_index(t, x, y);
+    if (t->ground->state[i] != TXS_FREE) return (double)t->at[i];
+    const double q = txs_pixel(t->mosaic, x, y)[t->band * t->mosaic->canvas.plane];
+    return q + mix * ((double)t->at[i] - q) + (1 - mix) * (double)t->grain[i];
+}
+
+/* Mean difference of neighbours that both have a state; negative if there are none. */
+static double txs_tone_roughness(const txs_tone *t, int state, double mix) {
+    double sum = 0;
+    int64_t count = 0;
+    for (int y = 0; y < t->ground->height; y++) {
+        for (int x = 0; x < t->ground->width; x++) {
+            if (!txs_tone_has(t, x, y) || t->ground->state[txs_tone_index(t, x, y)] != state)
+                continue;
+            const double value = txs_tone_value(t, x, y, mix);
+            for (int k = 0; k < 2; k++) {
+                const int nx = x + !k, ny = y + k;
+                if (!txs_tone_has(t, nx, ny) ||
+                    t->ground->state[txs_tone_index(t, nx, ny)] != state)
+                    continue;
+                sum += fabs(txs_tone_value(t, nx, ny, mix) - value);
+                count++;
+            }
+        }
+    }
+    return count ? sum / (double)count : -1;
+}
+
+/* The mix that gives the free pixels the source's roughness. */
+static double txs_tone_mix(const txs_tone *t) {
+    enum { HALVINGS = 6 };
+    const double wanted = txs_tone_roughness(t, TXS_SOURCE, 0);
+    double low = 0, high = 1;
+    if (wanted < 0) return 1;
+    for (int i = 0; i < HALVINGS; i++) { /* more mix, less roughness */
+        const double mix = (low + high) / 2;
+        if (txs_tone_roughness(t, TXS_FREE, mix) > wanted) low = mix;
+        else high = mix;
+    }
+    return (low + high) / 2;
+}
+
+/* Give the free pixels of a label their values in one band of the ground, from the canvas.
+   at, grain: a number for each pixel. spread: the share of a step that the source's values fill. */
+static void txs_tone_apply(const txs_mosaic *m, txs_ground *g, const txs_texture *texture,
+                           int label, int band, float spread, uint64_t seed, float *at,
+                           float *grain) {
+    enum { SWEEPS = 8 };
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    txs_tone t = {m, g, texture[label].level, label, band, at, grain, spread};
+    txs_tone_start(&t, seed);
+    txs_tone_smooth(&t, SWEEPS);
+    const double mix = txs_tone_mix(&t);
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = txs_tone_index(&t, x, y);
+            if (g->state[i] != TXS_FREE || g->label[i] != label) continue;
+            const float steps = txm_float(txs_tone_value(&t, x, y, mix));
+            g->value[(size_t)band * pixels + i] =
+                txm_float(txs_value(t.level, band, (double)steps));
+        }
+    }
 }
 
 #endif /* TEXSYN_IMPLEMENTATION */

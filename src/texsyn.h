@@ -63,6 +63,8 @@
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
      TEXSYN_MAX_PIXELS   refuse larger images; default 2^28
+     TEXSYN_ASSERT(x)    checks for errors in the library, which no input can trigger; default
+                         assert of <assert.h>
      TEXSYN_NO_SIMD      plain C only. Else SSE2 where the compiler has it and, with gcc and clang,
                          AVX2 where the processor has it. The bytes are the same.
 
@@ -265,6 +267,11 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 #include "texsyn/file.h"
 #include "texsyn/learn.h"
 #include "texsyn/synthesis.h"
+#include "texsyn/ground.h"
+#include "texsyn/mosaic.h"
+#include "texsyn/mosaic_sampler.h"
+#include "texsyn/mosaic_learner.h"
+#include "texsyn/tone.h"
 #endif /* TEXSYN_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------

@@ -14,6 +14,11 @@
 #endif
 #endif
 
+#ifndef TEXSYN_ASSERT
+#include <assert.h>
+#define TEXSYN_ASSERT(x) assert(x)
+#endif
+
 /* ---- constants -------------------------------------------------------------------------- */
 
 enum {

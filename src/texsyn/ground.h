@@ -1,0 +1,156 @@
+#ifndef TEXSYN_GROUND_H
+#define TEXSYN_GROUND_H
+
+#include "example.h"
+
+/* ---- the ground of a mosaic --------------------------------------------------------------
+
+   A mosaic is a picture of several textures, each pixel of which has the label of one of them. Its
+   parts are, in this order:
+
+     ground.h          a labelled picture and its pyramid: this part
+     mosaic.h          one level of it as a canvas of quantised values
+     mosaic_sampler.h  Gibbs sampling of that canvas
+     mosaic_learner.h  the statistics of its textures
+     tone.h            from quantised values back to smooth ones
+
+   How a caller uses them (fill.h does):
+
+     1. Make the ground: labels, what is known, and the values of what is known, each pixel in the
+        bands of its own label's model. txs_ground_halve makes the coarser levels.
+     2. For each level, coarse first: txs_mosaic_make and txs_mosaic_lay turn the ground into a
+        canvas; txs_mosaic_raise starts it from the coarser one.
+     3. txs_mosaic_learn finds the clique types of the level, on this canvas or on another one, and
+        leaves it synthesised; or, with models that are known, txs_mosaic_run synthesises only.
+     4. txs_tone_apply smooths within the steps of the quantisation.
+
+   Target statistics and canvas are separate: the source is a mosaic whose pixels are known (state
+   TXS_SOURCE), the canvas is one with free pixels (state TXS_FREE). Both may be the same object: a
+   picture with a hole. A composite texture is learned with the example as the source and its own
+   label map, all free, as the canvas, and then synthesised with a new label map.            */
+
+enum {
+    TXS_MAX_LABELS = 16,
+    TXS_NO_LABEL = 255 /* of pixels that no clique may contain */
+};
+
+enum txs_state {
+    TXS_FREE,  /* to be synthesised                                     */
+    TXS_KNOWN, /* fixed surroundings                                    */
+    TXS_SOURCE /* fixed, and the statistics of its label are taken here */
+};
+
+typedef struct txs_ground { /* one level of a labelled picture */
+    int width, height, bands;
+    float *value;   /* planes of the bands, at least where pixels are not free; NULL if all are */
+    uint8_t *label; /* 0.. or TXS_NO_LABEL */
+    uint8_t *state; /* of enum txs_state   */
+} txs_ground;
+
+/* Room for a ground; 0 if there is no memory. Labels and states are not set. */
+static int txs_ground_make(txs_ground *g, txm_arena *arena, int width, int height, int bands,
+                           int has_values) {
+    size_t pixels;
+    if (!txm_mul((size_t)width, (size_t)height, 1, &pixels)) return 0;
+    memset(g, 0, sizeof *g);
+    g->width = width;
+    g->height = height;
+    g->bands = bands;
+    g->label = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    g->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    if (has_values)
+        g->value = (float *)txm_arena_zero(arena, pixels, sizeof(float) * (size_t)bands);
+    return !arena->failed;
+}
+
+/* The label that most of count pixels have, the first of equals. */
+static int txs_majority(const uint8_t *labels, int count) {
+    int best = TXS_NO_LABEL, most = 0;
+    for (int i = 0; i < count; i++) {
+        int same = 0;
+        for (int j = 0; j < count; j++) same += labels[j] == labels[i];
+        if (labels[i] != TXS_NO_LABEL && same > most) {
+            most = same;
+            best = labels[i];
+        }
+    }
+    return best;
+}
+
+/* One pixel of the coarser level from the children of it that there are. */
+static void txs_halve_pixel(const txs_ground *fine, const size_t *child, int children,
+                            txs_ground *coarse, size_t to) {
+    uint8_t labels[4], least = TXS_SOURCE;
+    int label, count = 0, any_free = 0;
+    for (int i = 0; i < children; i++) labels[i] = fine->label[child[i]];
+    label = txs_majority(labels, children);
+    for (int i = 0; i < children; i++) {
+        const uint8_t state = fine->state[child[i]];
+        if (labels[i] != TXS_NO_LABEL && state == TXS_FREE) any_free = 1;
+        if (labels[i] == label && state < least) least = state;
+    }
+    coarse->label[to] = (uint8_t)label;
+    coarse->state[to] = any_free ? (uint8_t)TXS_FREE : least;
+    if (any_free || !coarse->value || label == TXS_NO_LABEL) return;
+    for (int b = 0; b < fine->bands; b++) {
+        const float *plane = fine->value + (size_t)b * (size_t)fine->width * (size_t)fine->height;
+        double sum = 0;
+        count = 0;
+        for (int i = 0; i < children; i++) {
+            if (labels[i] != label) continue;
+            sum += (double)plane[child[i]];
+            count++;
+        }
+        coarse->value[(size_t)b * (size_t)coarse->width * (size_t)coarse->height + to] =
+            txm_float(sum / count);
+    }
+}
+
+/* The next coarser level, of half the size, rounded up. A pixel takes the label of most of its
+   children and the mean of those; it is free if one of them is. */
+static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
+    for (int y = 0; y < coarse->height; y++) {
+        for (int x = 0; x < coarse->width; x++) {
+            size_t child[4];
+            int children = 0;
+            for (int i = 0; i < 4; i++) {
+                const int cx = 2 * x + i % 2, cy = 2 * y + i / 2;
+                if (cx < fine->width && cy < fine->height)
+                    child[children++] = (size_t)cy * (size_t)fine->width + (size_t)cx;
+            }
+            txs_halve_pixel(fine, child, children, coarse,
+                            (size_t)y * (size_t)coarse->width + (size_t)x);
+        }
+    }
+}
+
+/* How the bands of a label are quantised: from its source pixels. Returns how many these are; with
+   fewer than 2 nothing is set. dither: NULL, or receives the share of a step that is filled.
+   scratch: bands floats and bands bytes for each pixel of the ground. */
+static size_t txs_ground_quantise(const txs_ground *g, int label, int bands, txs_level *level,
+                                  float *values, uint8_t *bytes, float *dither) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    txs_source s;
+    size_t count = 0;
+    memset(&s, 0, sizeof s);
+    for (size_t i = 0; i < pixels; i++) count += g->state[i] == TXS_SOURCE && g->label[i] == label;
+    if (count < 2) return count;
+    for (int b = 0; b < bands; b++) {
+        size_t n = 0;
+        for (size_t i = 0; i < pixels; i++)
+            if (g->state[i] == TXS_SOURCE && g->label[i] == label)
+                values[(size_t)b * count + n++] = g->value[(size_t)b * pixels + i];
+    }
+    s.width = (int)count;
+    s.height = 1;
+    s.value = values;
+    s.canvas.pixels = bytes;
+    s.canvas.plane = (ptrdiff_t)count;
+    for (int b = 0; b < bands; b++) {
+        const float fill = txs_quantise_band(level, b, &s);
+        if (dither) dither[b] = fill;
+    }
+    return count;
+}
+
+#endif /* TEXSYN_GROUND_H */
