@@ -249,6 +249,33 @@ TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image
 /* Release a job; NULL is allowed. */
 TEXSYN_API void texsyn_free(texsyn_job *job);
 
+/* ---- filling holes ---------------------------------------------------------------------- */
+
+typedef struct texsyn_fill_desc {
+    txm_image image;  /* 1, 3 or 4 channels, any sample type; not modified                       */
+    txm_image mask;   /* same size, TXM_U8; 1 channel: filled where 128 or more; more channels:
+                         where gray times alpha is at least half of its range. Any shape, anywhere */
+    txm_image source; /* same size and form as mask: where to learn from; pixels NULL = from all
+                         that is known near the hole                                             */
+    const texsyn_model *model; /* what to fill with, of as many channels; NULL = learn it        */
+    int quality;               /* -2 fast .. +2 best: fewer or more clique types and sweeps      */
+    uint64_t seed;             /* another seed, another filling                                  */
+} texsyn_fill_desc;
+
+/* Replace what is masked by texture that continues its surroundings: learned from the known pixels
+   near the hole and synthesised with them fixed, so that no seam shows ([1], section 3, object
+   removal). Holes are filled in windows of at most 256 x 256 pixels of hole.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    form of the image, may be the image itself: known pixels are copied, with the same bytes.
+          Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a mask
+          that is empty or covers all, known samples that are not finite or beyond a million;
+          TXM_TOO_SMALL if fewer than 256 pixels can be learned from; TXM_TOO_LARGE above
+          TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
+TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
+
 #ifdef __cplusplus
 }
 #endif
@@ -4169,6 +4196,676 @@ static void txs_tone_apply(const txs_mosaic *m, txs_ground *g, const txs_texture
                 txm_float(txs_value(t.level, band, (double)steps));
         }
     }
+}
+
+/* ---- filling -----------------------------------------------------------------------------
+
+   Holes are filled in windows of bounded size: small holes that lie close together share one, large
+   ones are cut into several, and what one window has filled is known to the next. A window is a
+   mosaic with one label. The texture is learned in the hole itself, on a canvas with known
+   surroundings, so that what is learned last is what is seen. There are no cliques with the coarser
+   level, which only is the start: they would let the seam of the coarse level show.         */
+
+enum {
+    TXS_FILL_CELL = 32,     /* pixels: holes nearer than this belong together */
+    TXS_FILL_CELLS = 8,     /* a side of what a window fills, at most */
+    TXS_FILL_MARGIN = 48,   /* known pixels round it, if it is wide */
+    TXS_FILL_THIN = 24,     /* pixels: width of a hole that counts as thin; its margin, too */
+    TXS_FILL_FEW = 256,     /* source pixels: with fewer nothing can be learned */
+    TXS_FILL_LEAST = 1024,  /* source pixels: with fewer another window's model serves */
+    TXS_FILL_ENOUGH = 4096, /* source pixels: a window grows until it has so many */
+    TXS_FILL_REACH = 10,    /* of cliques */
+    TXS_FILL_LEVELS = TXS_MAX_LEVELS,
+    TXS_TAKEN = TXS_SOURCE + 1, /* a state while holes are looked for */
+    TXS_FILL_REFRESH = 8,       /* sub-lattices */
+    TXS_FILL_SOFT = 4000,       /* pixels, see txs_soften: of a hole that is wide, of a thin one */
+    TXS_FILL_SOFT_THIN = 60000,
+    TXS_FILL_COOL = 60 /* percent: temperature of the last sweep */
+};
+
+/* A part of the hole to be filled at once, in pixels of the picture, and the window round it. */
+typedef struct txs_hole {
+    int x0, y0, x1, y1;
+    int64_t missing;
+    int left, top, width, height;
+    int64_t source; /* pixels to learn from in the window */
+} txs_hole;
+
+typedef struct txs_filler {
+    const texsyn_fill_desc *desc;
+    txm_image image; /* a copy, in which windows are filled */
+    uint8_t *state;  /* of each pixel: enum txs_state; TXS_FREE: still missing */
+    txs_hole *hole;
+    int hole_count;
+    int64_t missing, source;
+    int16_t *noise, *cool;
+    texsyn_model *given; /* without cliques that a mosaic does not know, or NULL */
+    texsyn_model *first; /* what the window with most known pixels has learned   */
+} txs_filler;
+
+/* ---- checks --------------------------------------------------------------------------- */
+
+/* Is the mask set here? Gray times alpha is at least half of its range. */
+static int txs_mask_at(const txm_image *mask, int x, int y) {
+    const txm_image m = txm_image_resolve(*mask);
+    const uint8_t *p = (const uint8_t *)txm_image_row_const(&m, y) + (size_t)x * (size_t)m.channels;
+    const int alpha = m.channels == 2 ? p[1] : m.channels == 4 ? p[3] : 255;
+    const int gray = m.channels < 3 ? p[0] : (54 * p[0] + 183 * p[1] + 19 * p[2] + 128) / 256;
+    return 2 * gray * alpha >= 255 * 255;
+}
+
+static txm_status txs_fill_check_mask(const txm_image *mask, const char *name,
+                                      const txm_image *image, txm_env *env) {
+    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (mask->sample != TXM_U8)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must have 8-bit samples");
+    if (mask->width != image->width || mask->height != image->height)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be as large as the image");
+    return TXM_OK;
+}
+
+static txm_status txs_fill_check(const texsyn_fill_desc *d, const txm_image *out, txm_env *env) {
+    txm_status status;
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "fill: desc is NULL");
+    if ((status = txm_image_check(&d->image, "image", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+        return status;
+    const int channels = d->image.channels ? d->image.channels : 1;
+    if (channels == 2) return txm_fail(env, TXM_BAD_ARGUMENT, "image: 2 channels; give 1, 3 or 4");
+    if ((status = txs_fill_check_mask(&d->mask, "mask", &d->image, env)) != TXM_OK) return status;
+    if (d->source.pixels &&
+        (status = txs_fill_check_mask(&d->source, "source", &d->image, env)) != TXM_OK)
+        return status;
+    if (d->model && d->model->channels != channels)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "model: must have the channels of the image");
+    if (d->quality < -2 || d->quality > 2)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "quality must be -2 to 2");
+    if ((status = txm_image_check(out, "out", 0, env)) != TXM_OK) return status;
+    if (out->width != d->image.width || out->height != d->image.height ||
+        (out->channels ? out->channels : 1) != channels || out->sample != d->image.sample)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: must have the form of the image");
+    return TXM_OK;
+}
+
+/* ---- the picture ---------------------------------------------------------------------- */
+
+/* A float sample that must be known and is NaN or too large? */
+static int txs_fill_is_sound(const txm_image *im, int x, int y) {
+    if (im->sample != TXM_F32) return 1;
+    for (int c = 0; c < im->channels; c++) {
+        const float v = txm_image_get(im, x, y, c);
+        if (!txm_is_finite((double)v) || !(fabsf(v) <= 1e6f)) return 0;
+    }
+    return 1;
+}
+
+/* Copy rows from one picture to another of the same form. */
+static void txs_copy_picture(const txm_image *from, const txm_image *to) {
+    const txm_image a = txm_image_resolve(*from), b = txm_image_resolve(*to);
+    const size_t row = (size_t)a.width * (size_t)a.channels * txm_sample_bytes(a.sample);
+    for (int y = 0; y < a.height; y++)
+        memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
+}
+
+/* The copy of the picture and what is known of it. */
+static txm_status txs_fill_open(txs_filler *f, txm_arena *arena, txm_env *env) {
+    const texsyn_fill_desc *d = f->desc;
+    const txm_image im = txm_image_resolve(d->image);
+    const size_t pixels = (size_t)im.width * (size_t)im.height;
+    f->image = im;
+    f->image.stride = 0;
+    f->image.pixels =
+        txm_arena_alloc(arena, pixels, (size_t)im.channels * txm_sample_bytes(im.sample));
+    f->image = txm_image_resolve(f->image);
+    f->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the picture");
+    txs_copy_picture(&im, &f->image);
+    for (int y = 0; y < im.height; y++) {
+        for (int x = 0; x < im.width; x++) {
+            uint8_t *state = &f->state[(size_t)y * (size_t)im.width + (size_t)x];
+            const int is_source = !d->source.pixels || txs_mask_at(&d->source, x, y);
+            *state = txs_mask_at(&d->mask, x, y) ? TXS_FREE : is_source ? TXS_SOURCE : TXS_KNOWN;
+            f->missing += *state == TXS_FREE;
+            f->source += *state == TXS_SOURCE;
+            if (*state != TXS_FREE && !txs_fill_is_sound(&im, x, y))
+                return txm_fail(env, TXM_BAD_ARGUMENT,
+                                "image: a known sample is NaN or beyond a million");
+        }
+    }
+    if (!f->missing)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "mask: is empty; white is what is to be filled");
+    if ((size_t)f->missing == pixels)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "mask: covers the whole picture; nothing is known");
+    if (f->source < TXS_FILL_FEW)
+        return txm_fail(env, TXM_TOO_SMALL,
+                        "fewer than 256 pixels (16 x 16) are known to learn from");
+    return TXM_OK;
+}
+
+/* ---- windows -------------------------------------------------------------------------- */
+
+/* Shrink a box to what is missing in it and in no hole yet, and take that. */
+static void txs_hole_take(txs_filler *f, txs_hole *h) {
+    const txs_hole box = *h;
+    h->x0 = box.x1;
+    h->y0 = box.y1;
+    h->x1 = box.x0;
+    h->y1 = box.y0;
+    h->missing = 0;
+    for (int y = box.y0; y < box.y1; y++) {
+        for (int x = box.x0; x < box.x1; x++) {
+            uint8_t *state = &f->state[(size_t)y * (size_t)f->image.width + (size_t)x];
+            if (*state != TXS_FREE) continue;
+            *state = TXS_TAKEN;
+            if (x < h->x0) h->x0 = x;
+            if (y < h->y0) h->y0 = y;
+            if (x >= h->x1) h->x1 = x + 1;
+            if (y >= h->y1) h->y1 = y + 1;
+            h->missing++;
+        }
+    }
+}
+
+/* The window round a hole with a margin, and how much can be learned there. */
+static void txs_hole_open(const txs_filler *f, txs_hole *h, int margin) {
+    h->left = h->x0 > margin ? h->x0 - margin : 0;
+    h->top = h->y0 > margin ? h->y0 - margin : 0;
+    h->width = (h->x1 < f->image.width - margin ? h->x1 + margin : f->image.width) - h->left;
+    h->height = (h->y1 < f->image.height - margin ? h->y1 + margin : f->image.height) - h->top;
+    h->source = 0;
+    for (int y = h->top; y < h->top + h->height; y++)
+        for (int x = h->left; x < h->left + h->width; x++)
+            h->source += f->state[(size_t)y * (size_t)f->image.width + (size_t)x] == TXS_SOURCE;
+}
+
+/* Mark the connected cells with missing pixels; returns the box of them in cells. */
+static txs_hole txs_take_cells(uint8_t *cell, int width, int height, int32_t *stack, int first) {
+    txs_hole box;
+    int count = 1;
+    memset(&box, 0, sizeof box);
+    box.x0 = box.x1 = first % width;
+    box.y0 = box.y1 = first / width;
+    cell[first] = 0;
+    stack[0] = first;
+    while (count) {
+        const int at = stack[--count], x = at % width, y = at / width;
+        if (x < box.x0) box.x0 = x;
+        if (y < box.y0) box.y0 = y;
+        if (x > box.x1) box.x1 = x;
+        if (y > box.y1) box.y1 = y;
+        for (int k = 0; k < 9; k++) {
+            const int nx = x + k % 3 - 1, ny = y + k / 3 - 1;
+            if (nx < 0 || ny < 0 || nx >= width || ny >= height || !cell[ny * width + nx]) continue;
+            cell[ny * width + nx] = 0;
+            stack[count++] = ny * width + nx;
+        }
+    }
+    box.x1++;
+    box.y1++;
+    return box;
+}
+
+/* Cut a box of cells into holes of bounded size. */
+static void txs_cut_hole(txs_filler *f, txs_hole box) {
+    const int w = box.x1 - box.x0, h = box.y1 - box.y0;
+    const int nx = (w + TXS_FILL_CELLS - 1) / TXS_FILL_CELLS;
+    const int ny = (h + TXS_FILL_CELLS - 1) / TXS_FILL_CELLS;
+    for (int i = 0; i < nx * ny; i++) {
+        const int x = i % nx, y = i / nx;
+        txs_hole part;
+        memset(&part, 0, sizeof part);
+        part.x0 = (box.x0 + w * x / nx) * TXS_FILL_CELL;
+        part.x1 = (box.x0 + w * (x + 1) / nx) * TXS_FILL_CELL;
+        part.y0 = (box.y0 + h * y / ny) * TXS_FILL_CELL;
+        part.y1 = (box.y0 + h * (y + 1) / ny) * TXS_FILL_CELL;
+        if (part.x1 > f->image.width) part.x1 = f->image.width;
+        if (part.y1 > f->image.height) part.y1 = f->image.height;
+        txs_hole_take(f, &part);
+        if (part.missing) f->hole[f->hole_count++] = part;
+    }
+}
+
+/* Find the holes and their windows: those with most to learn from first. Boxes may overlap; a window
+   fills all that is missing in its box, so a later one may find nothing. */
+static txm_status txs_find_holes(txs_filler *f, txm_arena *arena, txm_env *env) {
+    const int width = (f->image.width + TXS_FILL_CELL - 1) / TXS_FILL_CELL;
+    const int height = (f->image.height + TXS_FILL_CELL - 1) / TXS_FILL_CELL;
+    const size_t cells = (size_t)width * (size_t)height;
+    uint8_t *cell = (uint8_t *)txm_arena_zero(arena, cells, 1);
+    int32_t *stack = (int32_t *)txm_arena_alloc(arena, cells, sizeof *stack);
+    f->hole = (txs_hole *)txm_arena_alloc(arena, cells, sizeof *f->hole); /* one each at most */
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the windows");
+    for (int y = 0; y < f->image.height; y++)
+        for (int x = 0; x < f->image.width; x++)
+            if (f->state[(size_t)y * (size_t)f->image.width + (size_t)x] == TXS_FREE)
+                cell[y / TXS_FILL_CELL * width + x / TXS_FILL_CELL] = 1;
+    for (int i = 0; i < width * height; i++)
+        if (cell[i]) txs_cut_hole(f, txs_take_cells(cell, width, height, stack, i));
+    TEXSYN_ASSERT((size_t)f->hole_count <= cells);
+    for (size_t i = 0; i < (size_t)f->image.width * (size_t)f->image.height; i++)
+        if (f->state[i] == TXS_TAKEN) f->state[i] = TXS_FREE;
+    for (int i = 0; i < f->hole_count; i++) {
+        const int w = f->hole[i].x1 - f->hole[i].x0, h = f->hole[i].y1 - f->hole[i].y0;
+        txs_hole_open(f, &f->hole[i],
+                      (w < h ? w : h) <= TXS_FILL_THIN ? (int)TXS_FILL_THIN : (int)TXS_FILL_MARGIN);
+    }
+    for (int i = 1; i < f->hole_count; i++) { /* few: insertion sort, stable */
+        const txs_hole h = f->hole[i];
+        int j = i;
+        for (; j > 0 && f->hole[j - 1].source < h.source; j--) f->hole[j] = f->hole[j - 1];
+        f->hole[j] = h;
+    }
+    return TXM_OK;
+}
+
+/* ---- a window ------------------------------------------------------------------------- */
+
+/* What a window works with. */
+typedef struct txs_pane {
+    txs_hole hole;
+    txs_ground ground[TXS_FILL_LEVELS];
+    int levels, thin, margin;
+    txm_image view; /* of the picture */
+    texsyn_model *model;
+    float spread[TXS_MAX_BANDS];
+    txs_mosaic canvas, above;
+    uint8_t *reached; /* scratch, a byte for each pixel of the window */
+    int index;        /* of the window */
+} txs_pane;
+
+/* Distances in king's moves: of missing pixels from known ones (from_hole 0), or of known pixels from
+   missing ones (1). Returns the largest. */
+static int txs_distances(const txs_ground *g, int from_hole, int32_t *distance) {
+    const int width = g->width, height = g->height, far_ = width + height;
+    int most = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < width * height; i++) {
+            const int at = pass ? width * height - 1 - i : i, x = at % width, y = at / width;
+            const int step = pass ? 1 : -1, is_far = (g->state[at] == TXS_FREE) != from_hole;
+            int d = !is_far ? 0 : pass ? distance[at] : far_;
+            for (int k = -1; k <= 1 && is_far; k++) {
+                const int nx = x + k, ny = y + step;
+                if (nx < 0 || nx >= width || ny < 0 || ny >= height) continue;
+                if (distance[ny * width + nx] + 1 < d) d = distance[ny * width + nx] + 1;
+            }
+            if (is_far && x + step >= 0 && x + step < width && distance[at + step] + 1 < d)
+                d = distance[at + step] + 1;
+            distance[at] = d;
+            if (pass && d > most) most = d;
+        }
+    }
+    return most;
+}
+
+/* The width of the widest part of the hole. distance: a number for each pixel. */
+static int txs_hole_width(const txs_ground *g, int32_t *distance) {
+    return 2 * txs_distances(g, 0, distance);
+}
+
+/* Pyramid levels for a hole of this width; ours, by trial. */
+static int txs_hole_levels(int width) {
+    static const int from[TXS_FILL_LEVELS - 1] = {20, 40, 80, 240, 480};
+    int levels = 1;
+    while (levels < TXS_FILL_LEVELS && width >= from[levels - 1]) levels++;
+    return levels;
+}
+
+/* States and labels of the window: what is missing outside the hole's box has no label yet. */
+static void txs_pane_mark(const txs_filler *f, txs_pane *p) {
+    const txs_hole *h = &p->hole;
+    txs_ground *g = &p->ground[0];
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            const int px = h->left + x, py = h->top + y;
+            g->state[i] = f->state[(size_t)py * (size_t)f->image.width + (size_t)px];
+            const int is_inside = px >= h->x0 && px < h->x1 && py >= h->y0 && py < h->y1;
+            g->label[i] = g->state[i] == TXS_FREE && !is_inside ? TXS_NO_LABEL : 0;
+        }
+    }
+}
+
+static int64_t txs_count_source(const txs_ground *g) {
+    int64_t count = 0;
+    for (size_t i = 0; i < (size_t)g->width * (size_t)g->height; i++)
+        count += g->state[i] == TXS_SOURCE && g->label[i] != TXS_NO_LABEL;
+    return count;
+}
+
+/* Learn only from what is near the hole, if that is enough: a long scratch crosses much that
+   differs. distance: a number for each pixel. */
+static void txs_pane_narrow(txs_pane *p, int32_t *distance) {
+    txs_ground *g = &p->ground[0];
+    const int pixels = g->width * g->height;
+    int64_t near_ = 0;
+    txs_distances(g, 1, distance);
+    for (int i = 0; i < pixels; i++) near_ += g->state[i] == TXS_SOURCE && distance[i] <= p->margin;
+    if (near_ < TXS_FILL_ENOUGH) return;
+    for (int i = 0; i < pixels; i++)
+        if (g->state[i] == TXS_SOURCE && distance[i] > p->margin) g->state[i] = TXS_KNOWN;
+}
+
+/* The bands of the picture: principal components of the visible colours; alpha is a band if it
+   varies. Visible: not fully transparent. mask: a byte for each pixel of the window. */
+static void txs_pane_find_bands(txs_pane *p, uint8_t *mask) {
+    const txs_ground *g = &p->ground[0];
+    texsyn_model *m = p->model;
+    txs_source s;
+    int visible = 0, hidden = 0;
+    for (int i = 0; i < g->width * g->height; i++) {
+        mask[i] = g->state[i] == TXS_SOURCE;
+        if (!mask[i] || m->channels < 4) continue;
+        mask[i] = txm_image_get(&p->view, i % g->width, i / g->width, 3) > 0;
+        visible += mask[i];
+        hidden += !mask[i];
+    }
+    if (m->channels == 4 && !visible) /* all is transparent: any colour will do */
+        for (int i = 0; i < g->width * g->height; i++) mask[i] = g->state[i] == TXS_SOURCE;
+    memset(&s, 0, sizeof s);
+    s.width = g->width;
+    s.height = g->height;
+    s.mask = mask;
+    txs_find_bands(m, &p->view, &s);
+    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+}
+
+/* Values of the known pixels in bands; a transparent pixel has no colour, which is the mean one. */
+static void txs_pane_split(txs_pane *p) {
+    txs_ground *g = &p->ground[0];
+    const texsyn_model *m = p->model;
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            double c[4] = {0, 0, 0, 0};
+            if (g->state[i] == TXS_FREE) continue;
+            for (int k = 0; k < m->channels; k++)
+                c[k] = 255.0 * (double)txm_image_get(&p->view, x, y, k) - (double)m->mean[k];
+            if (m->channels == 4 && !(txm_image_get(&p->view, x, y, 3) > 0)) c[0] = c[1] = c[2] = 0;
+            for (int b = 0; b < m->bands; b++) {
+                double v = 0;
+                for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
+                g->value[(size_t)b * pixels + i] = txm_float(v);
+            }
+        }
+    }
+}
+
+/* Room for a model with all its types. */
+static texsyn_model *txs_fill_model_make(txm_arena *arena, int channels) {
+    texsyn_model *m = (texsyn_model *)txm_arena_zero(arena, 1, sizeof *m);
+    txs_type *types =
+        (txs_type *)txm_arena_zero(arena, (size_t)TXS_FILL_LEVELS * TXS_MAX_TYPES, sizeof *types);
+    if (arena->failed) return NULL;
+    m->channels = channels;
+    for (int i = 0; i < TXS_FILL_LEVELS; i++) m->level[i].types = types + i * TXS_MAX_TYPES;
+    return m;
+}
+
+/* A model as the canvas can use it: the cliques with the coarser level are left out, and neighbours
+   within a coarser pixel and across its border become one type again. */
+static void txs_flatten(const texsyn_model *from, texsyn_model *to) {
+    txs_type *types[TXS_FILL_LEVELS];
+    for (int i = 0; i < TXS_FILL_LEVELS; i++) types[i] = to->level[i].types;
+    *to = *from;
+    for (int i = 0; i < from->levels; i++) {
+        const txs_level *l = &from->level[i];
+        int kept = 0;
+        to->level[i].types = types[i];
+        for (int k = 0; k < l->type_count; k++) {
+            const txs_type *t = &l->types[k];
+            if (t->kind > TEXSYN_PARALLEL || t->kind == TEXSYN_PARENT || t->kind == TEXSYN_SCALE ||
+                t->phase == 2)
+                continue;
+            to->level[i].types[kept] = *t;
+            to->level[i].types[kept++].phase = 0;
+        }
+        to->level[i].type_count = kept;
+    }
+}
+
+/* ---- filling a window ----------------------------------------------------------------- */
+
+/* Work for the given quality, -2..2; ours, by trial. */
+static int txs_fill_types(int quality) {
+    static const int types[5] = {0, 6, 12, 18, 24};
+    return types[quality + 2];
+}
+
+static int txs_fill_sweeps(int quality) {
+    static const int sweeps[5] = {5, 8, 12, 18, 28};
+    return sweeps[quality + 2];
+}
+
+/* The ground of the window: its pixels, and the coarser levels as far as there is something to learn
+   from. With a known model only its own levels. */
+static txm_status txs_pane_prepare(const txs_filler *f, txs_pane *p, const texsyn_model *known,
+                                   txm_arena *arena, txm_env *env) {
+    const txs_hole *h = &p->hole;
+    const int channels = f->image.channels;
+    const size_t pixels = (size_t)h->width * (size_t)h->height;
+    txs_ground *g = p->ground;
+    p->view = f->image;
+    p->view.pixels = (char *)txm_image_row(&f->image, h->top) +
+                     (size_t)h->left * (size_t)channels * txm_sample_bytes(f->image.sample);
+    p->view.width = h->width;
+    p->view.height = h->height;
+    int32_t *scratch = (int32_t *)txm_arena_alloc(arena, pixels, sizeof *scratch);
+    p->reached = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    if (arena->failed || !txs_ground_make(&g[0], arena, h->width, h->height, channels, 1))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    txs_pane_mark(f, p);
+    const int width = txs_hole_width(&g[0], scratch);
+    p->thin = width <= TXS_FILL_THIN;
+    p->margin = p->thin ? (int)TXS_FILL_THIN : (int)TXS_FILL_MARGIN;
+    txs_pane_narrow(p, scratch);
+    int levels = txs_hole_levels(width);
+    if (known && levels > known->levels) levels = known->levels;
+    if (!known) txs_pane_find_bands(p, p->reached);
+    txs_pane_split(p);
+    for (p->levels = 1; p->levels < levels; p->levels++) {
+        const txs_ground *fine = &g[p->levels - 1];
+        txs_ground *coarse = &g[p->levels];
+        if (!txs_ground_make(coarse, arena, (fine->width + 1) / 2, (fine->height + 1) / 2, channels,
+                             1))
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+        txs_ground_halve(fine, coarse);
+        if (txs_count_source(coarse) < TXS_FILL_FEW) break;
+    }
+    p->model->levels = p->levels;
+    return TXM_OK;
+}
+
+/* Quantise the levels of the window. */
+static txm_status txs_pane_quantise(txs_pane *p, txm_arena *arena, txm_env *env) {
+    const size_t room =
+        (size_t)p->ground[0].width * (size_t)p->ground[0].height * (size_t)p->model->bands;
+    float *values = (float *)txm_arena_alloc(arena, room, sizeof *values);
+    uint8_t *bytes = (uint8_t *)txm_arena_alloc(arena, room, 1);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    for (int i = 0; i < p->levels; i++)
+        txs_ground_quantise(&p->ground[i], 0, p->model->bands, &p->model->level[i], values, bytes,
+                            i ? NULL : p->spread);
+    return TXM_OK;
+}
+
+/* Learn or synthesise one level of the window. */
+static txm_status txs_pane_level(const txs_filler *f, txs_pane *p, int index, int is_known,
+                                 txm_env *env, float from, float to) {
+    const int quality = f->desc->quality;
+    const uint64_t seed = txm_hash(f->desc->seed + 977u * (uint64_t)p->index) + (uint64_t)index;
+    const txs_texture texture = {p->model, &p->model->level[index]};
+    const int softness = p->thin ? TXS_FILL_SOFT_THIN : TXS_FILL_SOFT;
+    const int16_t *last = index ? NULL : f->cool;
+    txs_raise_map maps[1];
+    int reach = TXS_FILL_REACH;
+    for (int k = 0; k < texture.level->type_count && is_known; k++)
+        if (txs_reach(&texture.level->types[k]) > reach)
+            reach = txs_reach(&texture.level->types[k]);
+    if (!txs_mosaic_make(&p->canvas, env, &p->ground[index], 1, reach, 0))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    txs_mosaic_lay(&p->canvas, &p->ground[index], &texture, seed);
+    if (p->above.canvas.pixels) {
+        const txs_texture above = {p->model, &p->model->level[index + 1]};
+        txs_mosaic_raise(&p->canvas, &p->above, &above, &texture, maps);
+        txs_mosaic_free(&p->above, env);
+    } else {
+        txs_mosaic_grow(&p->canvas, p->reached, seed);
+    }
+    if (is_known) {
+        const txs_brush_plan plan = {TXS_MAX_TYPES, 0, TXS_FILL_REFRESH, softness, seed};
+        return txs_mosaic_run(&p->canvas, &texture, &plan, NULL, 0, txs_fill_sweeps(quality),
+                              f->noise, last, env, from, to);
+    }
+    const txs_study_plan plan = {4,
+                                 3,
+                                 txs_fill_sweeps(quality),
+                                 txs_fill_types(quality),
+                                 6,
+                                 TXS_FILL_REACH,
+                                 TXS_FILL_REFRESH,
+                                 softness,
+                                 0,
+                                 seed,
+                                 f->noise,
+                                 last};
+    return txs_mosaic_learn(&plan, index, &p->model, &p->canvas, &p->canvas, NULL, NULL, env, from,
+                            to);
+}
+
+/* The samples of a pixel from the bands of the window's ground. */
+static void txs_pane_paint(const txs_pane *p, int x, int y) {
+    const texsyn_model *m = p->model;
+    const txs_ground *g = &p->ground[0];
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+    for (int c = 0; c < m->channels; c++) {
+        double v = (double)m->mean[c];
+        for (int b = 0; b < m->bands; b++) /* a product of two floats is exact in double */
+            v += (double)m->basis[b][c] * (double)g->value[(size_t)b * pixels + i];
+        txm_image_set(&p->view, x, y, c, txm_float(v / 255));
+    }
+}
+
+/* From the canvas to the picture. */
+static txm_status txs_pane_close(txs_filler *f, txs_pane *p, txm_arena *arena, txm_env *env) {
+    txs_ground *g = &p->ground[0];
+    const txs_texture texture = {p->model, &p->model->level[0]};
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    float *at = (float *)txm_arena_alloc(arena, pixels, sizeof *at);
+    float *grain = (float *)txm_arena_alloc(arena, pixels, sizeof *grain);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    for (int b = 0; b < p->model->bands; b++)
+        txs_tone_apply(&p->canvas, g, &texture, 0, b, p->spread[b], f->desc->seed, at, grain);
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            if (g->state[i] != TXS_FREE || g->label[i] == TXS_NO_LABEL) continue;
+            txs_pane_paint(p, x, y);
+            f->state[(size_t)(p->hole.top + y) * (size_t)f->image.width +
+                     (size_t)(p->hole.left + x)] = TXS_KNOWN;
+        }
+    }
+    return TXM_OK;
+}
+
+/* Take a copy of a model that is known instead of learning one. */
+static void txs_pane_adopt(txs_pane *p, const texsyn_model *known) {
+    txs_flatten(known, p->model);
+    memcpy(p->spread, known->dither, sizeof p->spread);
+}
+
+/* Fill one window with a model that is known, or learn one; *model receives it, in models' memory. */
+static txm_status txs_fill_window(txs_filler *f, int index, const texsyn_model *known,
+                                  txm_arena *models, texsyn_model **model, txm_env *env, float from,
+                                  float to) {
+    txm_status status;
+    txm_arena arena;
+    float total = 0;
+    txm_arena_init(&arena, env);
+    txs_pane *p = (txs_pane *)txm_arena_zero(&arena, 1, sizeof *p);
+    *model = txs_fill_model_make(models, f->image.channels);
+    if (!p || !*model) {
+        txm_arena_free(&arena);
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    }
+    p->hole = f->hole[index];
+    p->model = *model;
+    p->index = index;
+    if (known) txs_pane_adopt(p, known);
+    status = txs_pane_prepare(f, p, known, &arena, env);
+    if (status == TXM_OK && !known) status = txs_pane_quantise(p, &arena, env);
+    for (int i = 0; i < p->levels; i++) total += 1.0f / (float)(1 << 2 * i);
+    for (int i = p->levels - 1; i >= 0 && status == TXM_OK; i--) {
+        const float next = from + (to - from) / (float)(1 << 2 * i) / total;
+        status = txs_pane_level(f, p, i, known != NULL, env, from, i ? next : to);
+        from = next;
+        if (i && status == TXM_OK) {
+            p->above = p->canvas;
+            p->canvas.canvas.pixels = NULL;
+        }
+    }
+    if (status == TXM_OK) status = txs_pane_close(f, p, &arena, env);
+    memcpy((*model)->dither, p->spread, sizeof p->spread);
+    txs_mosaic_free(&p->canvas, env);
+    txs_mosaic_free(&p->above, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* All windows. What the first has learned serves those that have little to learn from. */
+static txm_status txs_fill_windows(txs_filler *f, txm_arena *arena, txm_env *env) {
+    txm_status status = TXM_OK;
+    const texsyn_model *given = f->given;
+    double done = 0;
+    for (int i = 0; i < f->hole_count && status == TXM_OK; i++) {
+        txs_hole *h = &f->hole[i];
+        const float from = (float)(done / (double)f->missing);
+        txm_arena own; /* of this window's model */
+        texsyn_model *model;
+        done += (double)h->missing;
+        txm_arena_init(&own, env);
+        for (int margin = TXS_FILL_MARGIN;
+             i == 0 && !given && h->source < TXS_FILL_ENOUGH && h->source < f->source;
+             margin = txm_clampi(2 * margin, 0, 1 << 24))
+            txs_hole_open(f, h, margin);
+        const texsyn_model *known = given ? given : h->source < TXS_FILL_LEAST ? f->first : NULL;
+        status = txs_fill_window(f, i, known, i ? &own : arena, &model, env, from,
+                                 (float)(done / (double)f->missing));
+        if (i == 0) f->first = model;
+        txm_arena_free(&own);
+    }
+    return status;
+}
+
+/* ---- public: filling ------------------------------------------------------------------ */
+
+TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out) {
+    txm_arena arena;
+    txs_filler filler;
+    txm_status status = txs_fill_check(desc, &out, env);
+    if (status != TXM_OK) return status;
+    memset(&filler, 0, sizeof filler);
+    filler.desc = desc;
+    txm_arena_init(&arena, env);
+    status = txs_fill_open(&filler, &arena, env);
+    if (status == TXM_OK) status = txs_find_holes(&filler, &arena, env);
+    if (status == TXM_OK) {
+        const size_t entries = (size_t)TXS_NOISE + TXS_VALUES;
+        filler.noise = (int16_t *)txm_arena_alloc(&arena, entries, sizeof *filler.noise);
+        filler.cool = (int16_t *)txm_arena_alloc(&arena, entries, sizeof *filler.cool);
+        if (desc->model) filler.given = txs_fill_model_make(&arena, filler.image.channels);
+        if (arena.failed) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to fill");
+    }
+    if (status == TXM_OK) {
+        txs_noise_table(filler.noise);
+        txs_cool_noise(filler.noise, TXS_FILL_COOL, filler.cool);
+        if (filler.given) txs_flatten(desc->model, filler.given);
+        status = txs_fill_windows(&filler, &arena, env);
+    }
+    if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
+    txm_arena_free(&arena);
+    return status;
 }
 
 #endif /* TEXSYN_IMPLEMENTATION */

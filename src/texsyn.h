@@ -249,6 +249,33 @@ TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image
 /* Release a job; NULL is allowed. */
 TEXSYN_API void texsyn_free(texsyn_job *job);
 
+/* ---- filling holes ---------------------------------------------------------------------- */
+
+typedef struct texsyn_fill_desc {
+    txm_image image;  /* 1, 3 or 4 channels, any sample type; not modified                       */
+    txm_image mask;   /* same size, TXM_U8; 1 channel: filled where 128 or more; more channels:
+                         where gray times alpha is at least half of its range. Any shape, anywhere */
+    txm_image source; /* same size and form as mask: where to learn from; pixels NULL = from all
+                         that is known near the hole                                             */
+    const texsyn_model *model; /* what to fill with, of as many channels; NULL = learn it        */
+    int quality;               /* -2 fast .. +2 best: fewer or more clique types and sweeps      */
+    uint64_t seed;             /* another seed, another filling                                  */
+} texsyn_fill_desc;
+
+/* Replace what is masked by texture that continues its surroundings: learned from the known pixels
+   near the hole and synthesised with them fixed, so that no seam shows ([1], section 3, object
+   removal). Holes are filled in windows of at most 256 x 256 pixels of hole.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    form of the image, may be the image itself: known pixels are copied, with the same bytes.
+          Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a mask
+          that is empty or covers all, known samples that are not finite or beyond a million;
+          TXM_TOO_SMALL if fewer than 256 pixels can be learned from; TXM_TOO_LARGE above
+          TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
+TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
+
 #ifdef __cplusplus
 }
 #endif
@@ -272,6 +299,7 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 #include "texsyn/mosaic_sampler.h"
 #include "texsyn/mosaic_learner.h"
 #include "texsyn/tone.h"
+#include "texsyn/fill.h"
 #endif /* TEXSYN_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------
