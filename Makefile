@@ -118,13 +118,15 @@ bench: $(BENCHES) $(PLAIN) samples
 
 $(BUILD)/bench/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $< $(TIMED) -o $@ -lm
+	$(COMPILE) $< $(filter %.o,$^) -o $@ -lm
 
 # the same without SIMD, for comparison
 $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD \
-	    $< $(TIMED) -o $@ -lm
+	    $< $(filter %.o,$^) -o $@ -lm
+
+$(BUILD)/bench/bench_inpaint $(BUILD)/bench/plain/bench_inpaint: $(MESHES)
 
 # ---- demo, tests, lint
 

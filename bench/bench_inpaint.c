@@ -1,12 +1,13 @@
 /* bench_inpaint.c - seconds and memory of completion, and what each step contributes
    SPDX-License-Identifier: MIT OR Unlicense
 
-   bench_inpaint [--ablation DIR] PICTURE...
+   bench_inpaint [--ablation DIR] [PICTURE | FOLDER]...
 
    The first table completes holes in textures of 1024 x 1024 texels on a ball of 19,200 triangles, in
-   drawn bars, and in each PICTURE, which is repeated in mirror images to 512 x 512 pixels. The second
-   leaves out one step at a time; DIR receives a picture of what each made of the bars, and of a part of
-   the ball's texture. Seconds are of the clock.
+   drawn bars, and in each PICTURE, which is repeated in mirror images to 512 x 512 pixels. A FOLDER
+   is a case with a known answer: truth.png, mask.png, and mesh.obj if truth.png is the texture of a
+   mesh. The second table leaves out one step at a time; DIR receives a picture of what each made.
+   Seconds are of the clock; those of the second table, of the processor.
 
      edges   F measure of the edges in the hole against the true ones, within 2 pixels and 30 degrees:
              1 is the truth
@@ -19,8 +20,9 @@ static int bench_left_out;
 #include "texinpaint.h"
 
 #include "bench.h"
+#include "files/mesh_io.h"
 
-enum { STEPS = 40, CHART = 320, ATLAS = 1024, SIDE = 512, MOST_SCENES = 16 };
+enum { STEPS = 40, CHART = 320, ATLAS = 1024, SIDE = 512, MOST_SCENES = 32, MOST_PATH = 1024 };
 
 /* Something to complete, and the truth. */
 typedef struct scene {
@@ -28,6 +30,7 @@ typedef struct scene {
     txm_image truth, mask;
     float *positions, *uv;
     uint32_t *indices;
+    mesh_data mesh; /* of a folder */
     texinpaint_desc desc;
     int is_drawn; /* its edges tell how well lines go on */
 } scene;
@@ -53,6 +56,7 @@ static void end_scene(scene *s) {
     free(s->positions);
     free(s->uv);
     free(s->indices);
+    mesh_free(&s->mesh);
 }
 
 static unsigned char *pixel(const scene *s, int x, int y) {
@@ -180,6 +184,36 @@ static void make_picture(scene *s, const char *path) {
     image_free(&in);
 }
 
+/* A file of a folder into path: is there one? */
+static int find_file(const char *folder, const char *name, char path[MOST_PATH]) {
+    snprintf(path, MOST_PATH, "%s/%s", folder, name);
+    return access(path, R_OK) == 0;
+}
+
+/* A case with a known answer. Whether lines go on is measured as in drawn scenes. */
+static void make_case(scene *s, const char *folder) {
+    char path[MOST_PATH];
+    const char *why;
+    memset(s, 0, sizeof *s);
+    snprintf(s->name, sizeof s->name, "%s", file_name(folder));
+    find_file(folder, "truth.png", path);
+    if (!image_read(path, 3, &s->truth, &why)) give_up(path, why);
+    find_file(folder, "mask.png", path);
+    if (!image_read(path, 1, &s->mask, &why)) give_up(path, why);
+    if (s->mask.width != s->truth.width || s->mask.height != s->truth.height)
+        give_up(path, "not as large as truth.png");
+    s->is_drawn = 1;
+    s->desc.image = s->truth;
+    s->desc.mask = s->mask;
+    s->desc.seed = 1;
+    if (!find_file(folder, "mesh.obj", path)) return;
+    if (!mesh_read(path, 0, &s->mesh, &why)) give_up(path, why);
+    if (!s->mesh.uvs) give_up(path, "no texture coordinates");
+    s->desc.mesh = mesh_view(&s->mesh);
+    s->desc.uv = s->mesh.uvs;
+    s->desc.uv_count = 3 * s->mesh.triangle_count;
+}
+
 /* ---- how good a result is -------------------------------------------------------------------- */
 
 static int luma(const txm_image *im, int x, int y) {
@@ -299,7 +333,7 @@ static void times(const scene *scenes, int count, txm_image *out) {
 }
 
 static void keep_picture(const char *folder, const char *name, const scene *s, const txm_image *out) {
-    char path[1024];
+    char path[MOST_PATH];
     const char *why;
     snprintf(path, sizeof path, "%s/%s-%s.png", folder, s->name, name);
     if (!image_write(path, out, &why)) give_up(path, why);
@@ -332,7 +366,7 @@ static void ablation(const scene *scenes, int count, txm_image *out, const char 
             s.desc.structure = rows[r].structure;
             bench_left_out = rows[r].left_out;
             const result one = run(&s, 1, out + i, &preview);
-            const marks m = judge(&s, out + i, one.seconds);
+            const marks m = judge(&s, out + i, one.cpu);
             bench_left_out = 0;
             if (s.is_drawn) sum.edges += m.edges;
             else sum.detail += m.detail, sum.border += m.border;
@@ -356,8 +390,11 @@ int main(int argc, char **argv) {
     make_ball(&scenes[count++], "ball, 5 %", 0.05);
     make_ball(&scenes[count++], "ball, 10 %", 0.10);
     make_bars(&scenes[count++]);
-    for (int i = has_folder ? 3 : 1; i < argc && count < MOST_SCENES; i++)
-        make_picture(&scenes[count++], argv[i]);
+    for (int i = has_folder ? 3 : 1; i < argc && count < MOST_SCENES; i++) {
+        char path[MOST_PATH];
+        if (find_file(argv[i], "truth.png", path)) make_case(&scenes[count++], argv[i]);
+        else make_picture(&scenes[count++], argv[i]);
+    }
     for (int i = 0; i < count; i++) {
         if (!image_new(scenes[i].truth.width, scenes[i].truth.height, 3, TXM_U8, &out[i]))
             give_up(scenes[i].name, "out of memory");
