@@ -6,7 +6,9 @@
    The first table completes holes in textures of 1024 x 1024 texels on a ball of 19,200 triangles, in
    drawn bars, and in each PICTURE, which is repeated in mirror images to 512 x 512 pixels. A FOLDER
    is a case with a known answer: truth.png, mask.png, and mesh.obj if truth.png is the texture of a
-   mesh. The second table leaves out one step at a time; DIR receives a picture of what each made.
+   mesh. The second table leaves out one step at a time; DIR receives a picture of what each made,
+   and sheet.png, which shows a part of the last three: the truth, the hole, then what was made in the
+   order of the table.
    Seconds are of the clock; those of the second table, of the processor.
 
      edges   F measure of the edges in the hole against the true ones, within 2 pixels and 30 degrees:
@@ -21,6 +23,8 @@ static int bench_left_out;
 
 #include "bench.h"
 #include "files/mesh_io.h"
+
+#include <limits.h>
 
 enum { STEPS = 40, CHART = 320, ATLAS = 1024, SIDE = 512, MOST_SCENES = 32, MOST_PATH = 1024 };
 
@@ -339,6 +343,67 @@ static void keep_picture(const char *folder, const char *name, const scene *s, c
     if (!image_write(path, out, &why)) give_up(path, why);
 }
 
+/* ---- the sheet ------------------------------------------------------------------------------- */
+
+enum {
+    SHEET_SCENES = 3, /* the last ones                                                            */
+    SHEET_LINES = 2,  /* of tiles, for each scene                                                 */
+    SHEET_COLUMNS = 7,
+    TILE = 128,  /* pixels of a side                                                              */
+    TILE_GAP = 2,
+    TILE_STEP = 8, /* pixels between the places that are tried                                    */
+    HOLE_GRAY = 128
+};
+
+/* The corner of the tile that shows most of the hole. */
+static void find_tile(const scene *s, int corner[2]) {
+    int most = -1;
+    for (int y = 0; y + TILE <= s->truth.height; y += TILE_STEP) {
+        for (int x = 0; x + TILE <= s->truth.width; x += TILE_STEP) {
+            int count = 0;
+            for (int k = 0; k < TILE * TILE; k += TILE_STEP)
+                count += is_missing(s, x + k % TILE, y + k / TILE) != 0;
+            if (count <= most) continue;
+            most = count;
+            corner[0] = x;
+            corner[1] = y;
+        }
+    }
+}
+
+static void make_sheet(txm_image *sheet) {
+    if (!image_new(SHEET_COLUMNS * (TILE + TILE_GAP) - TILE_GAP,
+                   SHEET_SCENES * SHEET_LINES * (TILE + TILE_GAP) - TILE_GAP, 3, TXM_U8, sheet))
+        give_up("sheet", "out of memory");
+    memset(sheet->pixels, UCHAR_MAX, 3 * (size_t)sheet->width * (size_t)sheet->height);
+}
+
+/* Tile number k of a scene, which is line * SHEET_LINES further down; with is_hole it is gray there. */
+static void add_tile(txm_image *sheet, int line, int k, const scene *s, const txm_image *from,
+                     int is_hole) {
+    const int left = k % SHEET_COLUMNS * (TILE + TILE_GAP);
+    const int top = (line * SHEET_LINES + k / SHEET_COLUMNS) * (TILE + TILE_GAP);
+    int corner[2] = {0, 0};
+    if (k >= SHEET_LINES * SHEET_COLUMNS) return;
+    find_tile(s, corner);
+    for (int y = 0; y < TILE && corner[1] + y < from->height; y++) {
+        for (int x = 0; x < TILE && corner[0] + x < from->width; x++) {
+            const size_t to = (size_t)(top + y) * (size_t)sheet->width + (size_t)(left + x);
+            const size_t at = (size_t)(corner[1] + y) * (size_t)from->width + (size_t)(corner[0] + x);
+            unsigned char *rgb = (unsigned char *)sheet->pixels + 3 * to;
+            if (is_hole && is_missing(s, corner[0] + x, corner[1] + y)) memset(rgb, HOLE_GRAY, 3);
+            else memcpy(rgb, (const unsigned char *)from->pixels + 3 * at, 3);
+        }
+    }
+}
+
+static void keep_sheet(const char *folder, const txm_image *sheet) {
+    char path[MOST_PATH];
+    const char *why;
+    snprintf(path, sizeof path, "%s/sheet.png", folder);
+    if (!image_write(path, sheet, &why)) give_up(path, why);
+}
+
 static void ablation(const scene *scenes, int count, txm_image *out, const char *folder) {
     static const struct {
         const char *name;
@@ -357,6 +422,13 @@ static void ablation(const scene *scenes, int count, txm_image *out, const char 
                 {"Poisson blending", TXI_POISSON, TEXINPAINT_AUTO}};
     printf("\nwithout one step, one thread; edges: mean of drawn scenes, the rest: mean of pictures, of "
            "scenes without\nthem\n\nwithout                  edges detail border seconds\n");
+    const int unshown = count - SHEET_SCENES;
+    txm_image sheet;
+    make_sheet(&sheet);
+    for (int i = unshown; i < count; i++) {
+        add_tile(&sheet, i - unshown, 0, &scenes[i], &scenes[i].truth, 0);
+        add_tile(&sheet, i - unshown, 1, &scenes[i], &scenes[i].truth, 1);
+    }
     for (size_t r = 0; r < sizeof rows / sizeof rows[0]; r++) {
         marks sum = {0, 0, 0, 0};
         int drawn = 0;
@@ -373,12 +445,15 @@ static void ablation(const scene *scenes, int count, txm_image *out, const char 
             drawn += s.is_drawn;
             sum.seconds += m.seconds;
             if (folder) keep_picture(folder, rows[r].name, &s, out + i);
+            if (i >= unshown) add_tile(&sheet, i - unshown, 2 + (int)r, &s, out + i, 0);
         }
         const double others = count > drawn ? count - drawn : 1;
         printf("%-24s %5.3f %6.2f %6.2f %7.2f\n", rows[r].name, drawn ? sum.edges / drawn : 0,
                sum.detail / others, sum.border / others, sum.seconds / count);
         fflush(stdout);
     }
+    if (folder) keep_sheet(folder, &sheet);
+    image_free(&sheet);
 }
 
 int main(int argc, char **argv) {
