@@ -61,9 +61,10 @@
      Then the rest, from coarse to fine: 8 x 8 patches are matched with turned (pictures: little, and
      mirrored) copies of the known part, at first in rings from the rim inwards, and by annealing
      [1, III.B]; later by a randomised search [8]. A patch that has less detail than expected at its
-     place costs more, so that grain does not fade. At the finest level each pixel is a copy of one
-     place; the pieces are joined along minimum cuts [7], and a Poisson equation takes away what steps of
-     tone are left at seams and rim.
+     place costs more, so that grain does not fade, and so does one that is copied twice or from
+     nearby, so that nothing is seen to repeat. At the finest level each pixel is a copy of one place;
+     the pieces are joined along minimum cuts [7], and a Poisson equation takes away what steps of tone
+     are left at seams and rim.
      This is done to half resolution without lines, with few lines (as in pictures of things) and with
      all ends joined (as in patterns); the one that goes on best at the rim and has the patches most
      like the surroundings wins and is completed.
@@ -12340,8 +12341,13 @@ enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
     TXI_MEND = 4,        /* pixels: how far a match that cannot be copied may be moved; ours   */
     TXI_ANY_TRIES = 100, /* random patches, before all are gone through; ours                 */
+    TXI_USE_ONE = 64,    /* of txi_canvas.use: copied once, on average                         */
+    TXI_USE_MOST = 16 * TXI_USE_ONE, /* more counts as this                                    */
     TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances; ours */
 };
+
+#define TXI_REPEAT_WEIGHT 1.0 /* of the expected detail of a patch: what each use but the first costs;
+                                 see docs/choices.md                                            */
 
 /* Which source patch an anchor's patch is like. */
 typedef struct txi_match {
@@ -12363,6 +12369,11 @@ typedef struct txi_canvas {
     int sweep;  /* counts the sweeps                                                   */
     int fresh;  /* the costs are up to date                                            */
     int radius; /* pixels: where random tries begin                                    */
+    uint16_t *use;   /* of each pixel of the level: how often the patch around it is copied, in
+                        1/TXI_USE_ONE                                                        */
+    int32_t *chosen; /* of each hole pixel: the anchor whose proposal it has, -1: none       */
+    int reach;       /* pixels: sources nearer to their target are as if used up to once more */
+    uint32_t toll;   /* for each further use of a patch, per unit of expected detail, in 1/65536 */
 } txi_canvas;
 
 /* What the missing detail of a source patch costs. */
@@ -12376,6 +12387,24 @@ static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int
     txi_source_place(s, x, y, cx, cy);
     *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
     *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
+}
+
+/* What a source patch costs because the eye sees that it repeats: for each use but the first, and for
+   lying near the place that it is copied to. Relative to the expected detail, so that it counts as
+   much in smooth texture as in rough one. */
+static uint32_t txi_repeated(const txi_canvas *t, int a, const txi_source *s, int x, int y) {
+    const int width = t->level->width, p = t->level->anchor[a], half = TXI_PATCH / 2;
+    int32_t cx, cy;
+    txi_match_centre(s, x, y, &cx, &cy);
+    cx /= TXI_UNIT;
+    cy /= TXI_UNIT;
+    const int dx = cx - p % width - half, dy = cy - p / width - half;
+    const int64_t square = (int64_t)dx * dx + (int64_t)dy * dy;
+    const int64_t most = (int64_t)t->reach * t->reach;
+    int64_t uses = t->use[cy * width + cx] - TXI_USE_ONE;
+    if (uses < 0) uses = 0;
+    if (square < most) uses += TXI_USE_ONE * (most - square) / most;
+    return (uint32_t)((t->level->want[a] * (uint64_t)uses / TXI_USE_ONE * t->toll) >> 16);
 }
 
 /* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs
@@ -12399,7 +12428,9 @@ static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uin
                                       s->color + 4 * q, 4 * (size_t)s->width, rest);
         d = part * TXI_PATCH_AREA / filled;
     }
-    return d >= rest ? UINT32_MAX : d + short_of;
+    if (d >= rest) return UINT32_MAX;
+    d += short_of + txi_repeated(t, a, s, x, y);
+    return d >= limit ? UINT32_MAX : d;
 }
 
 /* Take the patch if it is better. */
@@ -13087,7 +13118,8 @@ static txm_status txi_anneal_labels(txi_canvas *t, txm_env *env) {
 
 enum {
     TXI_WEIGHT_ONE = 4095, /* largest weight of a match                                       */
-    TXI_OUTLIER_BINS = 2048
+    TXI_OUTLIER_BINS = 2048,
+    TXI_BALLOT_SCRATCH = 3
 };
 
 /* Weights exp(-cost / (2 s)) exp(-fade * depth), s = 0.2 times the 75th percentile of the costs. */
@@ -13113,8 +13145,7 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
 typedef struct txi_ballot {
     txi_canvas *canvas;
     int pull;        /* strength of the plan's strips, 0..256                         */
-    int32_t *chosen; /* receives the anchor whose proposal is the best for each hole pixel, -1:
-                                there is none. NULL: not wanted                               */
+    uint32_t *scratch; /* TXI_BALLOT_SCRATCH per pixel of the level                         */
     const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
 } txi_ballot;
 
@@ -13199,13 +13230,40 @@ static void txi_vote_band(void *context, int index) {
     const int to = txm_clampi(index * TXI_BAND + TXI_BAND, 0, l->height);
     for (int i = l->hole_row[from]; i < l->hole_row[to]; i++) {
         const int chosen = txi_vote_pixel(v, l->hole[i]);
-        if (v->chosen) v->chosen[i] = chosen;
+        v->canvas->chosen[i] = chosen;
+    }
+}
+
+/* Count how often what surrounds each pixel of the level is copied. */
+static void txi_count_use(const txi_ballot *v) {
+    const txi_canvas *t = v->canvas;
+    const txi_level *l = t->level;
+    const int w = l->width, half = TXI_PATCH / 2;
+    const size_t n = (size_t)w * (size_t)l->height;
+    uint32_t *count = v->scratch, *sums = count + n, *columns = sums + n;
+    memset(count, 0, n * sizeof *count);
+    for (int i = 0; i < l->hole_count; i++) {
+        if (t->chosen[i] < 0) continue;
+        const txi_match *m = &t->match[t->chosen[i]];
+        const int corner = l->anchor[t->chosen[i]], p = l->hole[i];
+        int32_t x, y;
+        txi_source_place(&l->source[m->pose], m->x + p % w - corner % w, m->y + p / w - corner / w,
+                         &x, &y);
+        count[(y + TXI_UNIT / 2) / TXI_UNIT * w + (x + TXI_UNIT / 2) / TXI_UNIT] += TXI_USE_ONE;
+    }
+    txi_patch_sums(count, w, l->height, columns, sums);
+    for (int y = half; y < l->height; y++) {
+        for (int x = half; x < w; x++) {
+            const uint32_t use = sums[(y - half) * w + x - half] / TXI_PATCH_AREA;
+            t->use[y * w + x] = (uint16_t)(use < TXI_USE_MOST ? use : TXI_USE_MOST);
+        }
     }
 }
 
 /* Replace the hole's colours by a vote. */
 static void txi_vote(txi_ballot *v, txm_env *env) {
     txm_parallel_for(env, v->canvas->level->height / TXI_BAND + 1, txi_vote_band, v);
+    txi_count_use(v);
     v->canvas->fresh = 0;
 }
 
@@ -13482,6 +13540,7 @@ enum {
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
+    TXI_REPEAT_REACH = 2, /* half widths of the hole: sources that near cost more               */
     TXI_POSE_SHARE = 20 /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
@@ -13684,10 +13743,15 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     t->match = (txi_match *)txm_arena_zero(arena, anchors, sizeof(txi_match));
     t->old = (txi_match *)txm_arena_alloc(arena, anchors, sizeof(txi_match));
     t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
+    t->use = (uint16_t *)txm_arena_zero(arena, n, sizeof *t->use);
+    t->chosen = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof *t->chosen);
     if (arena->failed) return 0;
     memcpy(t->color, l->color, 4 * n);
     t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * (double)TXI_PATCH_AREA /
                           (double)TXI_WORTH_MOST * 65536);
+    t->reach = 1 + txi_level_hole_width(l) * TXI_REPEAT_REACH / 2;
+    t->toll = (uint32_t)(TXI_REPEAT_WEIGHT * l->clamp * (double)TXI_PATCH_AREA /
+                         (double)TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
     t->radius = l->width < l->height ? l->width : l->height;
     if (level == 0 && f->level_count > 1) t->radius = 16;
@@ -13705,25 +13769,35 @@ static int txi_rounds(int level, int level_count) {
     return TXI_LEAST_ROUNDS + (TXI_MOST_ROUNDS - TXI_LEAST_ROUNDS) * level / (level_count - 1);
 }
 
+/* A ballot on a level, and pairs for its weights. 0: there is no memory. */
+static int txi_ballot_make(const txi_filler *f, int level, txi_canvas *t, txm_arena *arena,
+                           txi_ballot *ballot, txm_pair **pairs) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
+    memset(ballot, 0, sizeof *ballot);
+    ballot->canvas = t;
+    ballot->outlier = f->outlier;
+    ballot->pull = txi_pull_at(level);
+    ballot->scratch =
+        (uint32_t *)txm_arena_alloc(arena, n, TXI_BALLOT_SCRATCH * sizeof *ballot->scratch);
+    *pairs = (txm_pair *)txm_arena_alloc(arena, anchors, 2 * sizeof **pairs);
+    return !arena->failed;
+}
+
 /* Rounds of searches and votes at a level whose matches are given. */
-static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, int32_t *chosen,
-                             txm_env *env) {
+static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, txm_env *env) {
     const size_t anchors = (size_t)t->level->anchor_count;
     const int rounds = txi_rounds(level, f->level_count);
     txm_status status = TXM_OK;
     txm_arena scratch;
     txi_ballot ballot;
+    txm_pair *pairs;
     txm_arena_init(&scratch, env);
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, anchors, 2 * sizeof(txm_pair));
-    ballot.canvas = t;
-    ballot.outlier = f->outlier;
-    ballot.chosen = chosen;
-    if (!pairs) status = txi_no_memory(env);
+    if (!txi_ballot_make(f, level, t, &scratch, &ballot, &pairs)) status = txi_no_memory(env);
     for (int round = 0; round < rounds && status == TXM_OK; round++) {
         const int sweeps = round == 0 ? 4 : 2;
         for (int k = 0; k < sweeps; k++) txi_search(t, env);
         txi_weigh(t, 0.08, pairs, pairs + anchors);
-        ballot.pull = txi_pull_at(level);
         txi_vote(&ballot, env);
         if (txm_progress(env, 0, "filling")) status = txi_stopped(env);
     }
@@ -13737,18 +13811,17 @@ static txm_status txi_descend(const txi_filler *f, int level, const txi_match *f
     const size_t anchors = (size_t)t->level->anchor_count;
     txm_arena scratch;
     txi_ballot ballot;
+    txm_pair *pairs;
+    txm_status status = TXM_OK;
     txm_arena_init(&scratch, env);
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, anchors, 2 * sizeof(txm_pair));
-    if (!pairs) return txi_no_memory(env);
-    txi_upsample(&f->level[level + 1], from, t);
-    txi_weigh(t, 0.08, pairs, pairs + anchors);
-    ballot.canvas = t;
-    ballot.outlier = f->outlier;
-    ballot.chosen = NULL;
-    ballot.pull = txi_pull_at(level);
-    txi_vote(&ballot, env);
+    if (!txi_ballot_make(f, level, t, &scratch, &ballot, &pairs)) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        txi_upsample(&f->level[level + 1], from, t);
+        txi_weigh(t, 0.08, pairs, pairs + anchors);
+        txi_vote(&ballot, env);
+    }
     txm_arena_free(&scratch);
-    return TXM_OK;
+    return status;
 }
 
 /* mean cost of the canvas' patches */
@@ -13785,10 +13858,11 @@ static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t,
     for (int k = 0; k < starts && status == TXM_OK; k++) {
         memcpy(t->color, color, bytes);
         memcpy(t->match, match, matches);
+        memset(t->use, 0, (size_t)l->width * (size_t)l->height * sizeof *t->use);
         t->fresh = 0;
         t->seed = seed + (uint64_t)k;
         if (k) status = txi_anneal_labels(t, env);
-        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        if (status == TXM_OK) status = txi_refine(f, level, t, env);
         const double cost = txi_mean_cost(t);
         if (status != TXM_OK || (k && cost >= least)) continue;
         least = cost;
@@ -13873,7 +13947,7 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *
         else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
         if (status == TXM_OK && level == first) status = txi_first_level(f, level, t, env);
-        else if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        else if (status == TXM_OK) status = txi_refine(f, level, t, env);
         if (status == TXM_OK && level == field->level) {
             const txi_level *l = t->level;
             memcpy(field->match, t->match, (size_t)l->anchor_count * sizeof *t->match);
@@ -13927,8 +14001,9 @@ static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
 
 /* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
    strips pull by more than half they are kept. */
-static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const int32_t *chosen,
+static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
                                     const txi_plan *plan, txi_copy *copies, txm_env *env) {
+    const int32_t *chosen = t->chosen;
     const txi_level *l = &f->level[0];
     const size_t n = (size_t)l->width * (size_t)l->height;
     const txi_window *w = f->window;
@@ -14002,19 +14077,15 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
     txm_status status = txi_filler_plan(f, plan, env);
     if (status == TXM_OK && field->level) status = txi_finest_sources(f, field, env);
     const txi_level *l = &f->level[0];
-    int32_t *chosen = NULL;
-    if (status == TXM_OK) {
-        chosen = (int32_t *)txm_arena_alloc(&memory, (size_t)l->hole_count, sizeof(int32_t));
-        if (!txi_canvas_make(f, 0, &t, &memory)) status = txi_no_memory(env);
-    }
+    if (status == TXM_OK && !txi_canvas_make(f, 0, &t, &memory)) status = txi_no_memory(env);
     if (status == TXM_OK && field->level) {
         status = txi_descend(f, 0, field->match, &t, env);
     } else if (status == TXM_OK) {
         memcpy(t.match, field->match, (size_t)l->anchor_count * sizeof *t.match);
         memcpy(t.color, field->color, 4 * (size_t)l->width * (size_t)l->height);
     }
-    if (status == TXM_OK) status = txi_refine(f, 0, &t, chosen, env);
-    if (status == TXM_OK) status = txi_finish_pieces(f, &t, chosen, plan, copies, env);
+    if (status == TXM_OK) status = txi_refine(f, 0, &t, env);
+    if (status == TXM_OK) status = txi_finish_pieces(f, &t, plan, copies, env);
     if (status == TXM_OK && !txi_finish_poses(f, plan)) status = txi_no_memory(env);
     *poses = f->pose;
     *pose_count = f->pose_count + (plan && plan->copies ? plan->pose_count : 0);

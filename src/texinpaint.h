@@ -61,9 +61,10 @@
      Then the rest, from coarse to fine: 8 x 8 patches are matched with turned (pictures: little, and
      mirrored) copies of the known part, at first in rings from the rim inwards, and by annealing
      [1, III.B]; later by a randomised search [8]. A patch that has less detail than expected at its
-     place costs more, so that grain does not fade. At the finest level each pixel is a copy of one
-     place; the pieces are joined along minimum cuts [7], and a Poisson equation takes away what steps of
-     tone are left at seams and rim.
+     place costs more, so that grain does not fade, and so does one that is copied twice or from
+     nearby, so that nothing is seen to repeat. At the finest level each pixel is a copy of one place;
+     the pieces are joined along minimum cuts [7], and a Poisson equation takes away what steps of tone
+     are left at seams and rim.
      This is done to half resolution without lines, with few lines (as in pictures of things) and with
      all ends joined (as in patterns); the one that goes on best at the rim and has the patches most
      like the surroundings wins and is completed.

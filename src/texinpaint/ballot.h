@@ -11,7 +11,8 @@
 
 enum {
     TXI_WEIGHT_ONE = 4095, /* largest weight of a match                                       */
-    TXI_OUTLIER_BINS = 2048
+    TXI_OUTLIER_BINS = 2048,
+    TXI_BALLOT_SCRATCH = 3
 };
 
 /* Weights exp(-cost / (2 s)) exp(-fade * depth), s = 0.2 times the 75th percentile of the costs. */
@@ -37,8 +38,7 @@ static void txi_weigh(txi_canvas *t, double fade, txm_pair *pairs, txm_pair *scr
 typedef struct txi_ballot {
     txi_canvas *canvas;
     int pull;        /* strength of the plan's strips, 0..256                         */
-    int32_t *chosen; /* receives the anchor whose proposal is the best for each hole pixel, -1:
-                                there is none. NULL: not wanted                               */
+    uint32_t *scratch; /* TXI_BALLOT_SCRATCH per pixel of the level                         */
     const uint16_t *outlier; /* 4095 (d / 16 + 1)^-0.6 for d = 96 k, a squared distance       */
 } txi_ballot;
 
@@ -123,13 +123,40 @@ static void txi_vote_band(void *context, int index) {
     const int to = txm_clampi(index * TXI_BAND + TXI_BAND, 0, l->height);
     for (int i = l->hole_row[from]; i < l->hole_row[to]; i++) {
         const int chosen = txi_vote_pixel(v, l->hole[i]);
-        if (v->chosen) v->chosen[i] = chosen;
+        v->canvas->chosen[i] = chosen;
+    }
+}
+
+/* Count how often what surrounds each pixel of the level is copied. */
+static void txi_count_use(const txi_ballot *v) {
+    const txi_canvas *t = v->canvas;
+    const txi_level *l = t->level;
+    const int w = l->width, half = TXI_PATCH / 2;
+    const size_t n = (size_t)w * (size_t)l->height;
+    uint32_t *count = v->scratch, *sums = count + n, *columns = sums + n;
+    memset(count, 0, n * sizeof *count);
+    for (int i = 0; i < l->hole_count; i++) {
+        if (t->chosen[i] < 0) continue;
+        const txi_match *m = &t->match[t->chosen[i]];
+        const int corner = l->anchor[t->chosen[i]], p = l->hole[i];
+        int32_t x, y;
+        txi_source_place(&l->source[m->pose], m->x + p % w - corner % w, m->y + p / w - corner / w,
+                         &x, &y);
+        count[(y + TXI_UNIT / 2) / TXI_UNIT * w + (x + TXI_UNIT / 2) / TXI_UNIT] += TXI_USE_ONE;
+    }
+    txi_patch_sums(count, w, l->height, columns, sums);
+    for (int y = half; y < l->height; y++) {
+        for (int x = half; x < w; x++) {
+            const uint32_t use = sums[(y - half) * w + x - half] / TXI_PATCH_AREA;
+            t->use[y * w + x] = (uint16_t)(use < TXI_USE_MOST ? use : TXI_USE_MOST);
+        }
     }
 }
 
 /* Replace the hole's colours by a vote. */
 static void txi_vote(txi_ballot *v, txm_env *env) {
     txm_parallel_for(env, v->canvas->level->height / TXI_BAND + 1, txi_vote_band, v);
+    txi_count_use(v);
     v->canvas->fresh = 0;
 }
 

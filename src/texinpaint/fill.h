@@ -31,6 +31,7 @@ enum {
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
+    TXI_REPEAT_REACH = 2, /* half widths of the hole: sources that near cost more               */
     TXI_POSE_SHARE = 20 /* the finest level has the poses of at least 1 / 20 of all anchors   */
 };
 
@@ -233,10 +234,15 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     t->match = (txi_match *)txm_arena_zero(arena, anchors, sizeof(txi_match));
     t->old = (txi_match *)txm_arena_alloc(arena, anchors, sizeof(txi_match));
     t->weight = (uint16_t *)txm_arena_alloc(arena, anchors, sizeof(uint16_t));
+    t->use = (uint16_t *)txm_arena_zero(arena, n, sizeof *t->use);
+    t->chosen = (int32_t *)txm_arena_alloc(arena, (size_t)l->hole_count, sizeof *t->chosen);
     if (arena->failed) return 0;
     memcpy(t->color, l->color, 4 * n);
     t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * (double)TXI_PATCH_AREA /
                           (double)TXI_WORTH_MOST * 65536);
+    t->reach = 1 + txi_level_hole_width(l) * TXI_REPEAT_REACH / 2;
+    t->toll = (uint32_t)(TXI_REPEAT_WEIGHT * l->clamp * (double)TXI_PATCH_AREA /
+                         (double)TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
     t->radius = l->width < l->height ? l->width : l->height;
     if (level == 0 && f->level_count > 1) t->radius = 16;
@@ -254,25 +260,35 @@ static int txi_rounds(int level, int level_count) {
     return TXI_LEAST_ROUNDS + (TXI_MOST_ROUNDS - TXI_LEAST_ROUNDS) * level / (level_count - 1);
 }
 
+/* A ballot on a level, and pairs for its weights. 0: there is no memory. */
+static int txi_ballot_make(const txi_filler *f, int level, txi_canvas *t, txm_arena *arena,
+                           txi_ballot *ballot, txm_pair **pairs) {
+    const txi_level *l = t->level;
+    const size_t n = (size_t)l->width * (size_t)l->height, anchors = (size_t)l->anchor_count;
+    memset(ballot, 0, sizeof *ballot);
+    ballot->canvas = t;
+    ballot->outlier = f->outlier;
+    ballot->pull = txi_pull_at(level);
+    ballot->scratch =
+        (uint32_t *)txm_arena_alloc(arena, n, TXI_BALLOT_SCRATCH * sizeof *ballot->scratch);
+    *pairs = (txm_pair *)txm_arena_alloc(arena, anchors, 2 * sizeof **pairs);
+    return !arena->failed;
+}
+
 /* Rounds of searches and votes at a level whose matches are given. */
-static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, int32_t *chosen,
-                             txm_env *env) {
+static txm_status txi_refine(const txi_filler *f, int level, txi_canvas *t, txm_env *env) {
     const size_t anchors = (size_t)t->level->anchor_count;
     const int rounds = txi_rounds(level, f->level_count);
     txm_status status = TXM_OK;
     txm_arena scratch;
     txi_ballot ballot;
+    txm_pair *pairs;
     txm_arena_init(&scratch, env);
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, anchors, 2 * sizeof(txm_pair));
-    ballot.canvas = t;
-    ballot.outlier = f->outlier;
-    ballot.chosen = chosen;
-    if (!pairs) status = txi_no_memory(env);
+    if (!txi_ballot_make(f, level, t, &scratch, &ballot, &pairs)) status = txi_no_memory(env);
     for (int round = 0; round < rounds && status == TXM_OK; round++) {
         const int sweeps = round == 0 ? 4 : 2;
         for (int k = 0; k < sweeps; k++) txi_search(t, env);
         txi_weigh(t, 0.08, pairs, pairs + anchors);
-        ballot.pull = txi_pull_at(level);
         txi_vote(&ballot, env);
         if (txm_progress(env, 0, "filling")) status = txi_stopped(env);
     }
@@ -286,18 +302,17 @@ static txm_status txi_descend(const txi_filler *f, int level, const txi_match *f
     const size_t anchors = (size_t)t->level->anchor_count;
     txm_arena scratch;
     txi_ballot ballot;
+    txm_pair *pairs;
+    txm_status status = TXM_OK;
     txm_arena_init(&scratch, env);
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, anchors, 2 * sizeof(txm_pair));
-    if (!pairs) return txi_no_memory(env);
-    txi_upsample(&f->level[level + 1], from, t);
-    txi_weigh(t, 0.08, pairs, pairs + anchors);
-    ballot.canvas = t;
-    ballot.outlier = f->outlier;
-    ballot.chosen = NULL;
-    ballot.pull = txi_pull_at(level);
-    txi_vote(&ballot, env);
+    if (!txi_ballot_make(f, level, t, &scratch, &ballot, &pairs)) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        txi_upsample(&f->level[level + 1], from, t);
+        txi_weigh(t, 0.08, pairs, pairs + anchors);
+        txi_vote(&ballot, env);
+    }
     txm_arena_free(&scratch);
-    return TXM_OK;
+    return status;
 }
 
 /* mean cost of the canvas' patches */
@@ -334,10 +349,11 @@ static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t,
     for (int k = 0; k < starts && status == TXM_OK; k++) {
         memcpy(t->color, color, bytes);
         memcpy(t->match, match, matches);
+        memset(t->use, 0, (size_t)l->width * (size_t)l->height * sizeof *t->use);
         t->fresh = 0;
         t->seed = seed + (uint64_t)k;
         if (k) status = txi_anneal_labels(t, env);
-        if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        if (status == TXM_OK) status = txi_refine(f, level, t, env);
         const double cost = txi_mean_cost(t);
         if (status != TXM_OK || (k && cost >= least)) continue;
         least = cost;
@@ -422,7 +438,7 @@ static txm_status txi_fill_coarse(txi_filler *f, const txi_plan *plan, txm_env *
         else if (level == first) status = txi_onion_peel(t, env);
         else status = txi_descend(f, level, canvas[!now].match, t, env);
         if (status == TXM_OK && level == first) status = txi_first_level(f, level, t, env);
-        else if (status == TXM_OK) status = txi_refine(f, level, t, NULL, env);
+        else if (status == TXM_OK) status = txi_refine(f, level, t, env);
         if (status == TXM_OK && level == field->level) {
             const txi_level *l = t->level;
             memcpy(field->match, t->match, (size_t)l->anchor_count * sizeof *t->match);
@@ -476,8 +492,9 @@ static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
 
 /* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
    strips pull by more than half they are kept. */
-static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const int32_t *chosen,
+static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
                                     const txi_plan *plan, txi_copy *copies, txm_env *env) {
+    const int32_t *chosen = t->chosen;
     const txi_level *l = &f->level[0];
     const size_t n = (size_t)l->width * (size_t)l->height;
     const txi_window *w = f->window;
@@ -551,19 +568,15 @@ static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi
     txm_status status = txi_filler_plan(f, plan, env);
     if (status == TXM_OK && field->level) status = txi_finest_sources(f, field, env);
     const txi_level *l = &f->level[0];
-    int32_t *chosen = NULL;
-    if (status == TXM_OK) {
-        chosen = (int32_t *)txm_arena_alloc(&memory, (size_t)l->hole_count, sizeof(int32_t));
-        if (!txi_canvas_make(f, 0, &t, &memory)) status = txi_no_memory(env);
-    }
+    if (status == TXM_OK && !txi_canvas_make(f, 0, &t, &memory)) status = txi_no_memory(env);
     if (status == TXM_OK && field->level) {
         status = txi_descend(f, 0, field->match, &t, env);
     } else if (status == TXM_OK) {
         memcpy(t.match, field->match, (size_t)l->anchor_count * sizeof *t.match);
         memcpy(t.color, field->color, 4 * (size_t)l->width * (size_t)l->height);
     }
-    if (status == TXM_OK) status = txi_refine(f, 0, &t, chosen, env);
-    if (status == TXM_OK) status = txi_finish_pieces(f, &t, chosen, plan, copies, env);
+    if (status == TXM_OK) status = txi_refine(f, 0, &t, env);
+    if (status == TXM_OK) status = txi_finish_pieces(f, &t, plan, copies, env);
     if (status == TXM_OK && !txi_finish_poses(f, plan)) status = txi_no_memory(env);
     *poses = f->pose;
     *pose_count = f->pose_count + (plan && plan->copies ? plan->pose_count : 0);

@@ -9,8 +9,13 @@ enum {
     TXI_BAND = 16,       /* rows of anchors or pixels that are worked on one after the other   */
     TXI_MEND = 4,        /* pixels: how far a match that cannot be copied may be moved; ours   */
     TXI_ANY_TRIES = 100, /* random patches, before all are gone through; ours                 */
+    TXI_USE_ONE = 64,    /* of txi_canvas.use: copied once, on average                         */
+    TXI_USE_MOST = 16 * TXI_USE_ONE, /* more counts as this                                    */
     TXI_RANDOM_TRIES = 4 /* per anchor and sweep, besides those at falling distances; ours */
 };
+
+#define TXI_REPEAT_WEIGHT 1.0 /* of the expected detail of a patch: what each use but the first costs;
+                                 see docs/choices.md                                            */
 
 /* Which source patch an anchor's patch is like. */
 typedef struct txi_match {
@@ -32,6 +37,11 @@ typedef struct txi_canvas {
     int sweep;  /* counts the sweeps                                                   */
     int fresh;  /* the costs are up to date                                            */
     int radius; /* pixels: where random tries begin                                    */
+    uint16_t *use;   /* of each pixel of the level: how often the patch around it is copied, in
+                        1/TXI_USE_ONE                                                        */
+    int32_t *chosen; /* of each hole pixel: the anchor whose proposal it has, -1: none       */
+    int reach;       /* pixels: sources nearer to their target are as if used up to once more */
+    uint32_t toll;   /* for each further use of a patch, per unit of expected detail, in 1/65536 */
 } txi_canvas;
 
 /* What the missing detail of a source patch costs. */
@@ -45,6 +55,24 @@ static void txi_match_centre(const txi_source *s, int x, int y, int32_t *cx, int
     txi_source_place(s, x, y, cx, cy);
     *cx += (s->a + s->c) * (TXI_PATCH - 1) / 2;
     *cy += (s->b + s->d) * (TXI_PATCH - 1) / 2;
+}
+
+/* What a source patch costs because the eye sees that it repeats: for each use but the first, and for
+   lying near the place that it is copied to. Relative to the expected detail, so that it counts as
+   much in smooth texture as in rough one. */
+static uint32_t txi_repeated(const txi_canvas *t, int a, const txi_source *s, int x, int y) {
+    const int width = t->level->width, p = t->level->anchor[a], half = TXI_PATCH / 2;
+    int32_t cx, cy;
+    txi_match_centre(s, x, y, &cx, &cy);
+    cx /= TXI_UNIT;
+    cy /= TXI_UNIT;
+    const int dx = cx - p % width - half, dy = cy - p / width - half;
+    const int64_t square = (int64_t)dx * dx + (int64_t)dy * dy;
+    const int64_t most = (int64_t)t->reach * t->reach;
+    int64_t uses = t->use[cy * width + cx] - TXI_USE_ONE;
+    if (uses < 0) uses = 0;
+    if (square < most) uses += TXI_USE_ONE * (most - square) / most;
+    return (uint32_t)((t->level->want[a] * (uint64_t)uses / TXI_USE_ONE * t->toll) >> 16);
 }
 
 /* Cost of the patch (x, y) of a source for anchor a, UINT32_MAX if it cannot be copied or costs
@@ -68,7 +96,9 @@ static uint32_t txi_cost(const txi_canvas *t, int a, int pose, int x, int y, uin
                                       s->color + 4 * q, 4 * (size_t)s->width, rest);
         d = part * TXI_PATCH_AREA / filled;
     }
-    return d >= rest ? UINT32_MAX : d + short_of;
+    if (d >= rest) return UINT32_MAX;
+    d += short_of + txi_repeated(t, a, s, x, y);
+    return d >= limit ? UINT32_MAX : d;
 }
 
 /* Take the patch if it is better. */
