@@ -59,9 +59,10 @@ static void txs_tone_start(txs_tone *t, uint64_t seed) {
     }
 }
 
-/* Sweeps of Gauss and Seidel: free pixels move towards the mean of their neighbours, within their
-   step. */
+/* Sweeps of Gauss and Seidel: free pixels move towards the mean of their neighbours, within that
+   share of their step that the source's values fill. */
 static void txs_tone_smooth(txs_tone *t, int sweeps) {
+    const float limit = t->spread / 2;
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int y = 0; y < t->ground->height; y++) {
             for (int x = 0; x < t->ground->width; x++) {
@@ -77,7 +78,7 @@ static void txs_tone_smooth(txs_tone *t, int sweeps) {
                 }
                 if (!count) continue;
                 const float q = txs_pixel(t->mosaic, x, y)[t->band * t->mosaic->canvas.plane];
-                t->at[i] = txm_clampf(txm_float(sum / count), q - 0.5f, q + 0.5f);
+                t->at[i] = txm_clampf(txm_float(sum / count), q - limit, q + limit);
             }
         }
     }
