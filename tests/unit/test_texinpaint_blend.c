@@ -8,9 +8,7 @@
 
 #include <cmocka.h>
 
-#define TEXINPAINT_STATIC
-#define TEXINPAINT_IMPLEMENTATION
-#include "texinpaint.h"
+#include "texinpaint/blend.h"
 
 #include "testkit.h"
 

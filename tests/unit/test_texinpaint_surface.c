@@ -9,9 +9,7 @@
 
 #include <cmocka.h>
 
-#define TEXINPAINT_STATIC
-#define TEXINPAINT_IMPLEMENTATION
-#include "texinpaint.h"
+#include "texinpaint/layout.h"
 
 #include "testkit.h"
 
