@@ -23,17 +23,61 @@
        const tk_output outputs[1] = {{pixels, sizeof pixels}};
        assert_true(tk_sweep_outputs(draw, &job, TK_CANCEL, outputs, 1) > 4);
 
-     Every place is tried with FULL=1 in the environment, as `make check` has it; else calls 1, 2, 3,
-     5, 8, 13, ... and the last. Where a call may be tried again after a fault (steps of a job), see
-     tk_places. */
+     Tried are calls 1, 2, 3, 5, 8, 13, ... and the last. With FULL=1 in the environment, as
+     `make check` has it, they are counted by themselves for each place in the code, which is the
+     chain of callers: of all places that allocate or report, the first times that they are reached.
+     So the cost does not grow with the square of what a loop repeats, and no place is left out.
+     Where a call may be tried again after a fault (steps of a job), see tk_places. */
 #ifndef FAULTS_H
 #define FAULTS_H
 
 #include "texmath.h"
 
+#include <execinfo.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* ---- places in the code ------------------------------------------------------------------ */
+
+enum { TK_CALLERS = 48, TK_MOST_CALLS = 1 << 16 };
+
+/* Which place in the code each call of a hook came from; those after TK_MOST_CALLS are not noted. */
+typedef struct tk_trace {
+    uint64_t from[TK_MOST_CALLS]; /* a hash of the addresses of all callers                    */
+    long count;
+} tk_trace;
+
+static inline void tk_note(tk_trace *trace) {
+    void *caller[TK_CALLERS];
+    uint64_t hash = 0;
+    if (!trace || trace->count >= TK_MOST_CALLS) return;
+    for (int n = backtrace(caller, TK_CALLERS); n > 0; n--)
+        hash = (hash ^ (uint64_t)(uintptr_t)caller[n - 1]) * UINT64_C(0x9e3779b97f4a7c15);
+    trace->from[trace->count++] = hash;
+}
+
+/* 1, 2, 3, 5, 8, 13, ...: the first of these numbers that is above n. */
+static inline long tk_above(long n) {
+    long a = 1, b = 2;
+    while (a <= n) {
+        const long next = a + b;
+        a = b;
+        b = next;
+    }
+    return a;
+}
+
+/* The call after `call` that is for its place in the code the 1st, 2nd, 3rd, 5th ...; the last is one,
+   and so are those that are not noted. 0 behind the last. */
+static inline long tk_next_traced(const tk_trace *trace, long call, long last) {
+    while (++call < last && call <= trace->count) {
+        long nth = 0;
+        for (long i = 0; i < call; i++) nth += trace->from[i] == trace->from[call - 1];
+        if (tk_above(nth - 1) == nth) return call;
+    }
+    return call <= last ? call : 0;
+}
 
 /* ---- memory ----------------------------------------------------------------------------- */
 
@@ -42,6 +86,7 @@ typedef struct tk_memory {
     long fail_at;       /* the call of this number fails, from 1; 0 = none                     */
     int fail_onward;    /* non-zero: every later call fails too                                */
     size_t limit;       /* bytes: requests that take live_bytes above this fail; 0 = none      */
+    tk_trace *trace;    /* where the calls came from is noted there; or NULL                   */
     long calls;         /* out: allocations asked for, the failed ones too                     */
     long failed;        /* out: allocations refused                                            */
     long blocks;        /* out: blocks not yet released                                        */
@@ -58,6 +103,7 @@ enum { TK_HEAD = 16, TK_TAIL = 8, TK_GUARD = 0x5a, TK_FRESH = 0xa5, TK_DEAD = 0x
 static inline void *tk_allocate(void *user, size_t bytes) {
     tk_memory *m = (tk_memory *)user;
     m->calls++;
+    tk_note(m->trace);
     int refuse =
         m->fail_at && (m->calls == m->fail_at || (m->fail_onward && m->calls > m->fail_at));
     if (m->limit && (bytes > m->limit || m->live_bytes > m->limit - bytes)) refuse = 1;
@@ -112,6 +158,7 @@ static inline long tk_leaks(const tk_memory *m) {
 /* A progress callback that watches its contract and cancels at a chosen call. All zero = never. */
 typedef struct tk_progress {
     long cancel_at; /* the call of this number, and all later ones, cancel; from 1; 0 = none   */
+    tk_trace *trace; /* where the calls came from is noted there; or NULL                      */
     long calls;     /* out: calls so far                                                       */
     long late;      /* out: calls after the one that cancelled; a good module makes none       */
     long errors;    /* out: fractions outside 0..1 (NaN too), falling ones, missing stage names */
@@ -122,6 +169,7 @@ static inline int tk_report(void *user, float fraction, const char *stage) {
     tk_progress *p = (tk_progress *)user;
     p->late += p->cancel_at && p->calls >= p->cancel_at;
     p->calls++;
+    tk_note(p->trace);
     if (!(fraction >= p->last && fraction <= 1.0f) || !stage || !stage[0]) p->errors++;
     p->last = fraction;
     return p->cancel_at && p->calls >= p->cancel_at;
@@ -164,7 +212,7 @@ typedef struct tk_output {
 
 enum { TK_UNTOUCHED = 0x6b };
 
-/* Is everything tried (FULL=1), or a sample? */
+/* Are all places in the code tried (FULL=1), or a sample? */
 static inline int tk_full(void) {
     const char *full = getenv("FULL");
     return full && strcmp(full, "1") == 0;
@@ -173,20 +221,26 @@ static inline int tk_full(void) {
 /* The place after `place` that a sweep over 1..last tries, beginning with place 0; 0 behind the last.
    Everything with FULL=1, else 1, 2, 3, 5, 8, 13, ... and last. */
 static inline long tk_places(long place, long last) {
-    long a = 1, b = 2;
     if (place >= last) return 0;
-    if (tk_full()) return place + 1;
-    while (a <= place) {
-        const long next = a + b;
-        a = b;
-        b = next;
-    }
-    return a < last ? a : last;
+    const long next = tk_full() ? place + 1 : tk_above(place);
+    return next < last ? next : last;
 }
 
-static inline long tk_sweep_outputs(tk_call *call, void *context, tk_kind kind,
-                                    const tk_output *outputs, int output_count) {
+/* The place after `place` that a sweep tries: with FULL=1 of those that tk_next_traced names every
+   stride-th and the last. 0 behind the last. */
+static inline long tk_next_place(const tk_trace *trace, long place, long last, int stride) {
+    long next = place;
+    if (!tk_full()) return tk_places(place, last);
+    for (int i = 0; i < stride && next < last; i++) next = tk_next_traced(trace, next, last);
+    return next > place ? next : 0;
+}
+
+/* tk_sweep with outputs that must be left alone. A stride above 1 thins out what FULL=1 tries: for
+   calls of which each run takes long, if other tests sweep what they stand on. */
+static inline long tk_sweep_thinned(tk_call *call, void *context, tk_kind kind,
+                                    const tk_output *outputs, int output_count, int stride) {
     static const char *const names[3] = {"allocation", "allocations from", "report"};
+    static tk_trace trace;
     long last = 0, place = 0;
     do {
         tk_memory memory;
@@ -197,6 +251,10 @@ static inline long tk_sweep_outputs(tk_call *call, void *context, tk_kind kind,
         if (kind == TK_CANCEL) progress.cancel_at = place;
         else memory.fail_at = place;
         memory.fail_onward = kind == TK_ONWARD && place > 0;
+        if (place == 0 && tk_full()) {
+            trace.count = 0;
+            *(kind == TK_CANCEL ? &progress.trace : &memory.trace) = &trace;
+        }
         txm_env env = tk_env(&memory, &progress);
         for (int i = 0; i < output_count; i++)
             memset(outputs[i].bytes, TK_UNTOUCHED, outputs[i].count);
@@ -220,12 +278,18 @@ static inline long tk_sweep_outputs(tk_call *call, void *context, tk_kind kind,
             return -1;
         }
         if (place == 0) last = kind == TK_CANCEL ? progress.calls : memory.calls;
-        place = tk_places(place, last);
+        place = tk_next_place(&trace, place, last, stride);
     } while (place);
     return last;
 }
 
-/* First undisturbed, then with a fault at each place of a kind (or at a sample of them) in turn.
+static inline long tk_sweep_outputs(tk_call *call, void *context, tk_kind kind,
+                                    const tk_output *outputs, int output_count) {
+    return tk_sweep_thinned(call, context, kind, outputs, output_count, 1);
+}
+
+/* First undisturbed, then with a fault at each place of a kind in turn, or at a sample of them (see
+   above).
    Whatever goes wrong is printed.
 
    return  how many places of this kind the undisturbed call has: demand as many as the work must

@@ -15,7 +15,7 @@ function follow(file, i, n, names) {
 }
 FNR == 1 { file = name_of(FILENAME) }
 /^#include "/ { split($0, word, "\""); includes[file] = includes[file] " " name_of(word[2]) }
-/tk_(sweep|sweep_outputs|places|full)\(/ { sweeps[file] = 1 }
+/tk_(sweep|sweep_outputs|sweep_thinned|places|full)\(/ { sweeps[file] = 1 }
 /^#define [A-Z_]*_IMPLEMENTATION/ {
     sub(/_IMPLEMENTATION.*/, "", $2)
     holds[file, tolower($2)] = 1

@@ -77,6 +77,43 @@ static void test_places(void **state) {
     else unsetenv("FULL");
 }
 
+/* Of two places in the code, reached in turn with calls 1 and 2, 3 and 4 ..., both are tried the 1st, 2nd,
+   3rd, 5th ... time that they are reached. */
+static void test_traced_places(void **state) {
+    static const long tried[12] = {1, 2, 3, 4, 5, 6, 9, 10, 15, 16, 20, 0};
+    static tk_trace trace;
+    (void)state;
+    trace.count = 19;
+    for (long i = 0; i < trace.count; i++) trace.from[i] = 7 + (uint64_t)i % 2;
+    long call = 0;
+    for (int i = 0; i < 12; i++) assert_int_equal(call = tk_next_traced(&trace, call, 20), tried[i]);
+    assert_int_equal(tk_next_traced(&trace, 0, 0), 0);
+    const char *full = getenv("FULL");
+    const int was_full = tk_full();
+    setenv("FULL", "1", 1);
+    static const long thinned[4] = {4, 10, 20, 0};
+    call = 0;
+    for (int i = 0; i < 4; i++) assert_int_equal(call = tk_next_place(&trace, call, 20, 4), thinned[i]);
+    if (full) setenv("FULL", was_full ? "1" : "0", 1);
+    else unsetenv("FULL");
+    assert_int_equal(tk_next_traced(&trace, 21, 22), 22); /* not noted */
+}
+
+static void call_once(tk_trace *trace) {
+    tk_memory memory = {.trace = trace};
+    tk_release(&memory, tk_allocate(&memory, 1));
+}
+
+/* A place in the code is told by its callers. */
+static void test_trace(void **state) {
+    static tk_trace trace;
+    (void)state;
+    for (int i = 0; i < 2; i++) call_once(&trace);
+    call_once(&trace);
+    assert_int_equal(trace.count, 3);
+    assert_true(trace.from[0] == trace.from[1] && trace.from[1] != trace.from[2]);
+}
+
 /* A release of a foreign block, one of a block twice, and an overrun are counted. */
 static void test_memory(void **state) {
     tk_memory memory;
@@ -102,6 +139,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sweep),
         cmocka_unit_test(test_places),
+        cmocka_unit_test(test_traced_places),
+        cmocka_unit_test(test_trace),
         cmocka_unit_test(test_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -297,16 +297,23 @@ static txm_status run_task(void *context, txm_env *env) {
     return texinpaint_complete(&t->desc, env, out);
 }
 
+/* A run takes half a second. Each stage is swept by the test of its own parts, place by place; here it is
+   what a whole completion does when one of them fails, so with FULL=1 a thinned sweep will do. */
+enum { ALLOCATION_STRIDE = 23, ONWARD_STRIDE = 97, REPORT_STRIDE = 5 };
+
+static long sweep(task *t, tk_kind kind, int stride) {
+    return tk_sweep_thinned(run_task, t, kind, task_outputs, 2, stride);
+}
+
 static void test_faults(void **state) {
     (void)state;
     static task t;
     for (int is_mesh = 0; is_mesh < 2; is_mesh++) {
         begin_task(&t, is_mesh);
         if (is_mesh || tk_full())
-            assert_true(tk_sweep_outputs(run_task, &t, TK_ALLOCATION, task_outputs, 2) > 100);
-        if (tk_full()) assert_true(tk_sweep_outputs(run_task, &t, TK_ONWARD, task_outputs, 2) > 100);
-        if (!is_mesh || tk_full())
-            assert_true(tk_sweep_outputs(run_task, &t, TK_CANCEL, task_outputs, 2) > 10);
+            assert_true(sweep(&t, TK_ALLOCATION, ALLOCATION_STRIDE) > 100);
+        if (tk_full()) assert_true(sweep(&t, TK_ONWARD, ONWARD_STRIDE) > 100);
+        if (!is_mesh || tk_full()) assert_true(sweep(&t, TK_CANCEL, REPORT_STRIDE) > 10);
     }
 }
 
@@ -340,7 +347,7 @@ static void test_steps_tried_again(void **state) {
                 status = texinpaint_step(job, &env, &more);
                 if (status != TXM_OK)
                     assert_int_equal(status, cancels ? TXM_CANCELLED : TXM_OUT_OF_MEMORY);
-                if (cancels) place = tk_full() ? place + 1 : place * 3 + 1;
+                if (cancels) place = place * (tk_full() ? 2 : 3) + 1;
             }
             assert_int_equal(status, TXM_OK);
             assert_int_equal(progress.errors, 0);
