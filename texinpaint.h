@@ -9608,34 +9608,36 @@ static void txi_find_strokes(const txi_window *w, const txi_curve *curves, int c
 }
 
 /* ---- strips: lines made straight ---------------------------------------------------------------
-   The texture along a line is treated in the line's own frame: column c is a place on the line, row j
-   lies across it, along the normal [1, III.A: frame v, d, n]. Two lines with the same contrast close
-   to each other, the sides of a stroke, are one strip; its rows between the lines are stretched to the
-   width that the stroke has at each column:
+   The texture along a line is treated in the line's own frame: column c is a place on the line, row
+   j lies across it, along the normal [1, III.A: frame v, d, n]. Two lines with the same contrast
+   close to each other, the sides of a stroke, are one strip; its rows between the lines are
+   stretched to the width that the stroke has at each column:
 
        margin rows  |  inside + 1 rows from line to line (1 row: a single line)  |  margin rows
 
    In this frame the paper's rotated candidates (each source patch turned so that its line has the
-   direction of the target's) need no search: every source is turned exactly, at each column, and laid
-   with its line on the target's line. The paper's search over +-10 degrees makes up for lines that are
-   known roughly; here they are registered to a fraction of a pixel against the mean profile of the
-   line. And the costs of all pairs of candidates become sums along diagonals of one table.       */
+   direction of the target's) need no search: every source is turned exactly, at each column, and
+   laid with its line on the target's line. The paper's search over +-10 degrees makes up for lines
+   that are known roughly; here they are registered to a fraction of a pixel against the mean
+   profile of the line. And the costs of all pairs of candidates become sums along diagonals of one
+   table. */
 
 enum {
-    TXI_STRIP_MARGIN = 10,   /* rows on each side, pixels; ours                                  */
-    TXI_STRIP_INSIDE = TXI_STROKE_WIDEST, /* most rows between the lines of a stroke               */
+    TXI_STRIP_MARGIN = 10, /* rows on each side, pixels; ours                                  */
+    TXI_STRIP_INSIDE = TXI_STROKE_WIDEST, /* most rows between the lines of a stroke              */
     TXI_STRIP_ROWS = 2 * TXI_STRIP_MARGIN + 1 + TXI_STRIP_INSIDE,
-    TXI_STRIP_REACH = 8,     /* columns of a patch on each side of its centre: radius r [1, III.A] */
-    TXI_STRIP_HOP = 6,       /* columns between neighbouring patches, so that they overlap        */
-    TXI_STRIP_REACH_LEAST = 3, /* of patches where little of a line is known                       */
+    TXI_STRIP_REACH = 8, /* columns of a patch on each side of its centre: radius r [1, III.A] */
+    TXI_STRIP_HOP = 6,   /* columns between neighbouring patches, so that they overlap        */
+    TXI_STRIP_REACH_LEAST = 3, /* of patches where little of a line is known                      */
     TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
-    TXI_STRIP_COLUMNS_LEAST = 128, /* and so many at least, however many strips there are          */
+    TXI_STRIP_COLUMNS_LEAST = 128, /* and so many at least, however many strips there are         */
     TXI_STRIP_CELLS = 4 << 20, /* of all tables of overlaps, 4 bytes each: 16 MB                  */
-    TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
-    TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
-    TXI_STRIP_CLEAN = 24,    /* columns of a stroke that show all of it, from which on others are not used */
-    TXI_STRIP_ONWARD = 12,   /* pixels that lines without an end are continued behind the hole      */
-    TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
+    TXI_STRIP_OTHERS = 3, /* most other lines a strip takes texture from                       */
+    TXI_STRIP_KEEP = 24,  /* candidates of a patch after pruning                               */
+    TXI_STRIP_CLEAN = 24, /* columns of a stroke that show all of it, from which on no others are
+                             used                                                            */
+    TXI_STRIP_ONWARD = 12,  /* pixels that lines without an end are continued behind the hole    */
+    TXI_STRIP_PROFILE = 12, /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
 };
 
@@ -9660,25 +9662,25 @@ typedef struct txi_strip {
     int curve, partner; /* indices of the curves; partner -1: a single line                       */
     int inside, rows;
     int first, last;    /* columns with hole pixels                                              */
-    int tail;           /* columns behind the hole are no known part of the line, or are missing   */
+    int tail;           /* columns behind the hole are no known part of the line, or are missing  */
     int is_open;        /* the line ends in the hole                                             */
-    int is_bare;        /* a stroke that crosses others: see cover.h                               */
-    uint8_t *typical;   /* its usual colours, 3 per row; NULL: not known                           */
-    float tolerance;    /* levels; colours farther from the usual ones are not those of the stroke   */
+    int is_bare;        /* a stroke that crosses others: see cover.h                              */
+    uint8_t *typical;   /* its usual colours, 3 per row; NULL: not known                          */
+    float tolerance;   /* levels; colours farther from the usual ones are not those of the stroke */
     txi_ribbon line;
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
     txi_column *sources;
     int source_count, room; /* room: most of them                                                */
     uint8_t *source_color; /* 3 per source column and row                                         */
-    int16_t *source_feature; /* features per source column: colours, weighted                      */
-    int features;        /* 3 * rows, rounded up to a multiple of 16                               */
+    int16_t *source_feature; /* features per source column: colours, weighted                     */
+    int features;        /* 3 * rows, rounded up to a multiple of 16                              */
     int reach, hop;
     int *labels;         /* source columns that are centres of whole patches                      */
     int label_count;
-    int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                 */
-    float *profile;      /* 2 * 3 * rows: mean colours in front of the hole and behind it; NULL: none */
-    int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop       */
+    int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                */
+    float *profile;  /* 2 * 3 * rows: mean colours in front of the hole and behind it; NULL: none */
+    int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop      */
     int *chosen;         /* per patch: the source column chosen                                   */
 } txi_strip;
 
@@ -9686,8 +9688,8 @@ static txm_vec2 txi_normal_of(txm_vec2 along) {
     return txm_v2(-along.y, along.x);
 }
 
-/* RGB at a place, bilinear, from 16 bits of fraction. Returns 0 if a pixel needed is not known, 1 if
-   all are, 2 if all may be copied from; rgb is black for 0. */
+/* RGB at a place, bilinear, at a place rounded to 1/256 of a pixel. Returns 0 if a pixel needed is
+   not known, 1 if all are, 2 if all may be copied from; rgb is black for 0. */
 static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) {
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!(x >= 0 && y >= 0 && x <= w->width - 1 && y <= w->height - 1)) return 0;
@@ -9711,8 +9713,8 @@ static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) 
     return best;
 }
 
-/* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width, along
-   the normal. */
+/* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width,
+   along the normal. */
 static double txi_row_offset(double row, int inside, double half) {
     const double k = row - (double)TXI_STRIP_MARGIN;
     if (k <= 0) return k - half;
@@ -9759,17 +9761,19 @@ static txm_status txi_ribbon_make(const txm_vec2 *points, int count, txm_arena *
     return TXM_OK;
 }
 
-/* The points of a curve. One that goes through the hole, but meets no line on the other side of it, is
-   continued straight on there, so that its strip fits what is known; is_open receives 0 for it, 1 for one
-   that ends in the hole. points: room for TXI_STRIP_ONWARD more than the curve has. Returns how many. */
-static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *points, int *is_open) {
+/* The points of a curve. One that goes through the hole, but meets no line on the other side of it,
+   is continued straight on there, so that its strip fits what is known; is_open receives 0 for it,
+   1 for one that ends in the hole. points: room for TXI_STRIP_ONWARD more than the curve has.
+   Returns how many. */
+static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *points,
+                            int *is_open) {
     const int n = c->count;
     memcpy(points, c->points, (size_t)n * sizeof *points);
     *is_open = c->ends[1] < 0;
     if (c->ends[1] >= 0 || n < 4) return n;
     const txm_vec2 p = points[n - 1], t = txi_curve_along(c, n - 2);
-    const ptrdiff_t beyond =
-        txi_pixel(w->width, w->height, (double)p.x + 3 * (double)t.x, (double)p.y + 3 * (double)t.y);
+    const ptrdiff_t beyond = txi_pixel(w->width, w->height, (double)p.x + 3 * (double)t.x,
+                                       (double)p.y + 3 * (double)t.y);
     if (beyond < 0 || (w->state[beyond] != TXI_KNOWN && w->state[beyond] != TXI_FOREIGN)) return n;
     *is_open = 0;
     for (int i = 0; i < TXI_STRIP_ONWARD; i++)
@@ -9779,7 +9783,7 @@ static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *p
 }
 
 enum {
-    TXI_REGISTER_SIDE = 12,  /* samples on each side of a line, half a pixel apart                 */
+    TXI_REGISTER_SIDE = 12,  /* samples on each side of a line, half a pixel apart                */
     TXI_REGISTER_TAPS = 2 * TXI_REGISTER_SIDE + 1,
     TXI_REGISTER_SHIFT = 3   /* most samples that a line is moved                                 */
 };
@@ -9840,7 +9844,8 @@ static void txi_register_fill(float *shift, const uint8_t *known, int count) {
 }
 
 /* Move the columns of a single line across it, so that its known part looks alike everywhere: each
-   column is registered against the mean profile. Missing columns are moved as those at their ends. */
+   column is registered against the mean profile. Missing columns are moved as those at their
+   ends. */
 static txm_status txi_ribbon_register(const txi_window *w, txi_ribbon *r, txm_arena *scratch,
                                       txm_env *env) {
     enum { SIZE = 3 * TXI_REGISTER_TAPS };
@@ -9894,8 +9899,9 @@ static void txi_ribbon_crop(txi_ribbon *r, int lo, int hi) {
     r->count = hi - lo;
 }
 
-/* Make a stroke of columns lo..hi - 1 of a line, its other side `width` to the right, or all to the left;
-   the other columns are cropped. 0: it would be narrower than a pixel or wider than TXI_STRIP_INSIDE. */
+/* Make a stroke of columns lo..hi - 1 of a line, its other side `width` to the right, or all to the
+   left; the other columns are cropped. 0: it would be narrower than a pixel or wider than
+   TXI_STRIP_INSIDE. */
 static int txi_ribbon_widen_by(txi_ribbon *r, int lo, int hi, const float *width) {
     const double sign = width[lo] > 0 ? 1 : -1;
     for (int i = lo; i < hi; i++) {
@@ -9913,8 +9919,9 @@ static int txi_ribbon_widen_by(txi_ribbon *r, int lo, int hi, const float *width
     return 1;
 }
 
-/* Widen a line to the stroke between it and its partner, where both run along each other. 0: they do
-   not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then unchanged.
+/* Widen a line to the stroke between it and its partner, where both run along each other. 0: they
+   do not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then
+   unchanged.
    width  room for a float per column                                                            */
 static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first, int last,
                             float *width) {
@@ -9941,7 +9948,8 @@ static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first,
 }
 
 /* The same for a partner that is the line itself, moved sideways: the points of both are paired. */
-static int txi_ribbon_widen_even(txi_ribbon *r, const txm_vec2 *points, const txm_vec2 *moved, float *width) {
+static int txi_ribbon_widen_even(txi_ribbon *r, const txm_vec2 *points, const txm_vec2 *moved,
+                                 float *width) {
     for (int i = 0; i < r->count; i++) {
         const txm_vec2 t = r->along[i];
         const double x = (double)moved[i].x - points[i].x, y = (double)moved[i].y - points[i].y;
@@ -10002,8 +10010,8 @@ static txm_vec2 txi_column_place(const txi_column *a, double t) {
                   txm_float((double)a->place.y + u * (double)a->along.x));
 }
 
-/* Add columns from..to of a line to a strip's sources: forwards, or backwards (turned by half a turn),
-   or mirrored (backwards, but with the rows as they are). */
+/* Add columns from..to of a line to a strip's sources: forwards, or backwards (turned by half a
+   turn), or mirrored (backwards, but with the rows as they are). */
 static void txi_columns_add(txi_strip *s, const txi_ribbon *r, int from, int to, int backwards,
                            int mirrored) {
     const int room = s->room - s->source_count;
@@ -10032,8 +10040,8 @@ static int txi_columns_own(txi_strip *s, int mirrored) {
     return s->source_count - before;
 }
 
-/* The weight of a row's colours in costs, in quarters: rows far from the lines count less, those beside a
-   bare stroke hardly or not. */
+/* The weight of a row's colours in costs, in quarters: rows far from the lines count less, those
+   beside a bare stroke hardly or not. */
 static int txi_row_weight(const txi_strip *s, int j) {
     const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > s->inside ? k - s->inside : 0;
     if (s->is_bare) return out == 0 ? 4 : out == 1;
@@ -10050,8 +10058,8 @@ static double txi_typical_distance(const txi_strip *s, int j, const uint8_t *col
     return sqrt(sum / 3.0);
 }
 
-/* How many rows of a column, from the edge or `beside` rows beside it, do not show the bare stroke, but
-   something that covers it or lies beside it. */
+/* How many rows of a column, from the edge or `beside` rows beside it, do not show the bare stroke,
+   but something that covers it or lies beside it. */
 static int txi_column_other(const txi_strip *s, const uint8_t *color, int beside) {
     int other = 0;
     for (int j = TXI_STRIP_MARGIN - beside; j <= TXI_STRIP_MARGIN + s->inside + beside; j++)
@@ -10059,8 +10067,8 @@ static int txi_column_other(const txi_strip *s, const uint8_t *color, int beside
     return other;
 }
 
-/* Of the usable source columns of a bare stroke only those stay that show it: edges and all, if there are
-   enough of them. */
+/* Of the usable source columns of a bare stroke only those stay that show it: edges and all, if
+   there are enough of them. */
 static void txi_columns_bare(txi_strip *s) {
     int clean = 0;
     for (int i = 0; i < s->source_count; i++)
@@ -10079,12 +10087,13 @@ static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t 
             feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(s, j) / 4);
 }
 
-/* Colours and features of the sources. Where a row is not known the nearest known one towards the line
-   counts. A column whose middle is not known, or less than two thirds, breaks its run. */
+/* Colours and features of the sources. Where a row is not known the nearest known one towards the
+   line counts. A column whose middle is not known, or less than two thirds, breaks its run. */
 static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     const size_t rows = (size_t)s->rows, count = (size_t)s->source_count;
-    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside, beside = s->is_bare ? 1 : 2;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside,
+              beside = s->is_bare ? 1 : 2;
     s->features = (3 * s->rows + 15) / 16 * 16;
     s->source_color = (uint8_t *)txm_arena_alloc(arena, count * rows, 3);
     s->source_feature =
@@ -10137,7 +10146,8 @@ static int32_t txi_feature_ssd(const int16_t *a, const int16_t *b, const int16_t
    centred at source column a and the next one, at b, overlap in 2 reach - hop + 1 columns:
 
        E(a, b) = sum of C(a + k, b - hop + k), k = hop - reach .. reach
-               = S(a + hop - reach, b - reach),  S(p, q) = sum of C(p + m, q + m), m = 0 .. 2 reach - hop
+               = S(a + hop - reach, b - reach),
+       S(p, q) = sum of C(p + m, q + m), m = 0 .. 2 reach - hop
 
    overlap receives S, by running sums along diagonals.
    values  room for source_count int32                                                           */
@@ -10201,8 +10211,8 @@ static void txi_strip_unary(const txi_strip *s, int patch, int16_t *feature, int
             const int64_t sum =
                 (int64_t)unary[i] +
                 txi_feature_ssd(feature,
-                                s->source_feature + (size_t)(s->labels[i] + k) * (size_t)width, mask,
-                                width);
+                                s->source_feature + (size_t)(s->labels[i] + k) * (size_t)width,
+                                mask, width);
             unary[i] = (int32_t)(sum < TXI_COST_MOST ? sum : (int64_t)TXI_COST_MOST);
         }
     }
@@ -10210,8 +10220,8 @@ static void txi_strip_unary(const txi_strip *s, int patch, int16_t *feature, int
 
 /* ---- other lines as sources ---- */
 
-/* Mean squared difference between the mean of a strip's known columns and the profile of an end of a
-   line, read from left to right (turned 0) or from right to left. */
+/* Mean squared difference between the mean of a strip's known columns and the profile of an end of
+   a line, read from left to right (turned 0) or from right to left. */
 static double txi_strip_unlike(const double *mean, const txi_end *e, int turned) {
     double sum = 0;
     for (int t = -5; t <= 5; t++) {
@@ -10262,8 +10272,8 @@ static int txi_strip_others(const txi_strip *s, const txi_lines *lines, const in
     return n;
 }
 
-/* All sources of a strip: its own known columns; where these are few, columns of similar other lines,
-   and its own mirrored. */
+/* All sources of a strip: its own known columns; where these are few, columns of similar other
+   lines, and its own mirrored. */
 static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
                                     const txi_curve *curve, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
@@ -10291,10 +10301,13 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
 
 /* ---- profiles ---- */
 
-/* The mean colours of the known columns next to the hole, row by row, on one side of it. Rows of which
-   nothing is known are like the next one towards the lines. 0: the rows of the lines are not known. */
+/* The mean colours of the known columns next to the hole, row by row, on one side of it. Rows of
+   which nothing is known are like the next one towards the lines. 0: the rows of the lines are not
+   known. */
 static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
-    const int from = end ? s->last + 1 : s->first > TXI_STRIP_PROFILE ? s->first - TXI_STRIP_PROFILE : 0;
+    const int from = end                            ? s->last + 1
+                     : s->first > TXI_STRIP_PROFILE ? s->first - TXI_STRIP_PROFILE
+                                                    : 0;
     const int behind = end ? from + TXI_STRIP_PROFILE : s->first;
     const int to = behind < s->line.count ? behind : s->line.count;
     const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
@@ -10307,7 +10320,8 @@ static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
             for (int c = 0; c < 3 && s->known[at]; c++) sum[c] += s->color[3 * at + (size_t)c];
             known[j] += s->known[at];
         }
-        for (int c = 0; c < 3 && known[j]; c++) profile[3 * j + c] = (float)sum[c] / (float)known[j];
+        for (int c = 0; c < 3 && known[j]; c++)
+            profile[3 * j + c] = (float)sum[c] / (float)known[j];
         if (!known[j] && j >= low && j <= high) return 0;
     }
     for (int j = low - 1; j >= 0; j--)
@@ -10346,34 +10360,39 @@ static void txi_strip_profile_at(const txi_strip *s, double column, double row, 
 }
 
 /* ---- whole strokes ------------------------------------------------------------------------------
-   Where bars cross near the border of the hole, one of them hides an edge of the other, and that edge
-   has no end to join. The other edge is enough: it is joined from border to border, and on both sides
-   of the hole the bar has the same width and the same colour. So the hidden edge is the joined one,
-   moved by the width. Curves that were found for its ends without that knowledge are taken away.   */
+   Where bars cross near the border of the hole, one of them hides an edge of the other, and that
+   edge has no end to join. The other edge is enough: it is joined from border to border, and on
+   both sides of the hole the bar has the same width and the same colour. So the hidden edge is the
+   joined one, moved by the width. Curves that were found for its ends without that knowledge are
+   taken away. */
 
 enum {
-    TXI_FLANK_KNOWN = 64,  /* pixels of the known part of a curve that a width is measured on; ours   */
-    TXI_FLANK_SKIP = 1,    /* pixels next to the hole that are left out                             */
-    TXI_FLANK_COLOR = 7,   /* of these so many for the colour                                      */
-    TXI_FLANK_LEAST = 7,   /* so many of them must agree about the width; ours                       */
-    TXI_CROSS_STEP = 3,    /* points of a curve from one to the next that is tested for crossings      */
+    TXI_FLANK_KNOWN =
+        64,              /* pixels of the known part of a curve that a width is measured on; ours */
+    TXI_FLANK_SKIP = 1,  /* pixels next to the hole that are left out                           */
+    TXI_FLANK_COLOR = 7, /* of these so many for the colour                                     */
+    TXI_FLANK_LEAST = 7, /* so many of them must agree about the width; ours                    */
+    TXI_CROSS_STEP = 3,  /* points of a curve from one to the next that is tested for crossings */
     TXI_FLANK_STEPS = 2 * (TXI_STROKE_WIDEST + 2)
 };
-#define TXI_FLANK_FROM 2.0    /* pixels from the curve at which the colour beside it is taken         */
-#define TXI_FLANK_TONE 32.0   /* levels; colours that differ more are never the same one; ours         */
-#define TXI_FLANK_CATCH 3.0   /* pixels; ends as near as that to the other edge belong to it; ours     */
-#define TXI_FLANK_DIFFER 0.25 /* share by which the widths on both sides of the hole may differ; ours */
+#define TXI_FLANK_FROM 2.0    /* pixels from the curve at which the colour beside it is taken     */
+#define TXI_FLANK_TONE 32.0   /* levels; colours that differ more are never the same one; ours    */
+#define TXI_FLANK_CATCH 3.0  /* pixels; ends as near as that to the other edge belong to it; ours */
+#define TXI_FLANK_DIFFER \
+    0.25 /* share by which the widths on both sides of the hole may differ; ours */
 
 /* What lies beside a curve in its known part on one side of the hole. */
 typedef struct txi_flank {
-    double width;    /* pixels to the opposite edge; 0: not known                                   */
-    double color[3]; /* up to there, RGB                                                           */
+    double width;    /* pixels to the opposite edge; 0: not known                                 */
+    double color[3]; /* up to there, RGB                                                          */
 } txi_flank;
 
 /* RGB at a distance to the right of point i of a curve; 0: not known. */
-static int txi_flank_pixel(const txi_window *w, const txi_curve *c, int i, double away, int rgb[3]) {
+static int txi_flank_pixel(const txi_window *w, const txi_curve *c, int i, double away,
+                           int rgb[3]) {
     const txm_vec2 t = txi_curve_along(c, i), p = c->points[i];
-    return txi_strip_pixel(w, (double)p.x - away * (double)t.y, (double)p.y + away * (double)t.x, rgb);
+    return txi_strip_pixel(w, (double)p.x - away * (double)t.y, (double)p.y + away * (double)t.x,
+                           rgb);
 }
 
 static double txi_flank_distance(const double color[3], const int rgb[3]) {
@@ -10387,9 +10406,10 @@ static int txi_flank_point(const txi_curve *c, int end, int i) {
     return k >= 0 && k < c->count ? k : -1;
 }
 
-/* The median of each channel beside the curve near the hole; side 1 right, -1 left. 0: too little is
-   known. */
-static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int side, double color[3]) {
+/* The median of each channel beside the curve near the hole; side 1 right, -1 left. 0: too little
+   is known. */
+static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int side,
+                           double color[3]) {
     int n = 0, values[3][TXI_FLANK_COLOR];
     for (int i = TXI_FLANK_SKIP; n < TXI_FLANK_COLOR; i++) {
         const int point = txi_flank_point(c, end, i);
@@ -10408,10 +10428,10 @@ static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int
     return n >= 4;
 }
 
-/* How far the colour beside point i reaches: to where half of the step to the next colour is done. 0: to
-   something that is not known; -1: it is another colour. */
-static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, int side, const double color[3],
-                              double differs) {
+/* How far the colour beside point i reaches: to where half of the step to the next colour is done.
+   0: to something that is not known; -1: it is another colour. */
+static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, int side,
+                              const double color[3], double differs) {
     int rgb[3];
     for (int k = 0; k < TXI_FLANK_STEPS; k++) {
         const double away = TXI_FLANK_FROM + 0.5 * k;
@@ -10429,10 +10449,11 @@ static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, in
     return 0;
 }
 
-/* Measure what lies on one side of a curve (1 right, -1 left) at one end of the hole: its colour, and how
-   far that reaches by most of the points, as far as the curve has it at its side. 0: not even the
-   colour is known. */
-static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int side, txi_flank *f) {
+/* Measure what lies on one side of a curve (1 right, -1 left) at one end of the hole: its colour,
+   and how far that reaches by most of the points, as far as the curve has it at its side. 0: not
+   even the colour is known. */
+static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int side,
+                          txi_flank *f) {
     double widths[TXI_FLANK_KNOWN], across[3];
     int n = 0, most = 0, others = 0;
     f->width = 0;
@@ -10460,14 +10481,15 @@ static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int 
         most = agree;
         f->width = sum / agree;
     }
-    if (most < TXI_FLANK_LEAST || 5 * most < 3 * n || f->width > (double)TXI_STROKE_WIDEST) f->width = 0;
+    if (most < TXI_FLANK_LEAST || 5 * most < 3 * n || f->width > (double)TXI_STROKE_WIDEST)
+        f->width = 0;
     return 1;
 }
 
-/* The other edge of a stroke of which c is one: its points moved by the width, which changes evenly from
-   one side of the hole to the other. */
-static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const txi_flank f[2], int side,
-                                 txm_arena *arena, txm_env *env, txi_curve *other) {
+/* The other edge of a stroke of which c is one: its points moved by the width, which changes evenly
+   from one side of the hole to the other. */
+static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const txi_flank f[2],
+                                 int side, txm_arena *arena, txm_env *env, txi_curve *other) {
     *other = *c;
     other->points = (txm_vec2 *)txm_arena_alloc(arena, (size_t)c->count, sizeof *other->points);
     if (!other->points) return txi_no_memory(env);
@@ -10477,7 +10499,8 @@ static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const 
         const double t = part < 0 ? 0 : part > 1 ? 1 : part;
         const double away = side * (f[0].width + t * (f[1].width - f[0].width));
         const txm_vec2 along = txi_curve_along(c, i), p = c->points[i];
-        const double x = (double)p.x - away * (double)along.y, y = (double)p.y + away * (double)along.x;
+        const double x = (double)p.x - away * (double)along.y,
+                     y = (double)p.y + away * (double)along.x;
         const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
         other->points[i] = txm_v2(txm_float(x), txm_float(y));
         if (at < 0 || w->state[at] != TXI_HOLE) continue;
@@ -10492,7 +10515,8 @@ static int txi_end_on_curve(const txi_end *e, const txi_curve *c) {
     double best = TXI_FLANK_CATCH * TXI_FLANK_CATCH;
     int found = 0;
     for (int i = 0; i < c->count; i++) {
-        const double x = (double)e->place.x - c->points[i].x, y = (double)e->place.y - c->points[i].y;
+        const double x = (double)e->place.x - c->points[i].x,
+                     y = (double)e->place.y - c->points[i].y;
         const txm_vec2 t = txi_curve_along(c, i);
         const double dot = (double)t.x * e->heading.x + (double)t.y * e->heading.y;
         if (x * x + y * y > best || (dot < 0.85 && dot > -0.85)) continue;
@@ -10502,15 +10526,17 @@ static int txi_end_on_curve(const txi_end *e, const txi_curve *c) {
     return found;
 }
 
-/* Which curves give way to a new edge: those of its ends. Marks them in gone; 0: one of them is surer
-   than the new one, or none of them was seen to go on behind the hole without an end there. */
+/* Which curves give way to a new edge: those of its ends. Marks them in gone; 0: one of them is
+   surer than the new one, or none of them was seen to go on behind the hole without an end
+   there. */
 static int txi_edge_replaces(const txi_lines *l, const txi_curve *curves, int count, int from,
                              const int *partners, txi_curve *edge, uint8_t *gone) {
     int found[2] = {-1, -1}, hidden = 0;
     for (int i = 0; i < l->end_count; i++) {
         const int on = txi_end_on_curve(&l->ends[i], edge);
         if (!on || i == curves[from].ends[0] || i == curves[from].ends[1]) continue;
-        if (found[on - 1] < 0 || l->ends[i].length > l->ends[found[on - 1]].length) found[on - 1] = i;
+        if (found[on - 1] < 0 || l->ends[i].length > l->ends[found[on - 1]].length)
+            found[on - 1] = i;
     }
     if (found[0] < 0 && found[1] < 0) return 0;
     for (int k = 0; k < count; k++) {
@@ -10530,8 +10556,8 @@ static int txi_edge_replaces(const txi_lines *l, const txi_curve *curves, int co
     return 1;
 }
 
-/* What lies on one side of a curve at both ends of the hole. 0: it is not the same, or its width is not
-   known. A width that is known at one end only counts for both. */
+/* What lies on one side of a curve at both ends of the hole. 0: it is not the same, or its width is
+   not known. A width that is known at one end only counts for both. */
 static int txi_stroke_flanks(const txi_window *w, const txi_curve *c, int side, txi_flank f[2]) {
     if (!txi_flank_make(w, c, 0, side, &f[0]) || !txi_flank_make(w, c, 1, side, &f[1])) return 0;
     if (f[0].width <= 0) f[0].width = f[1].width;
@@ -10542,21 +10568,24 @@ static int txi_stroke_flanks(const txi_window *w, const txi_curve *c, int side, 
     return txi_end_color_distance(f[0].color, f[1].color) <= 0.25 * (double)c->strength + 4;
 }
 
-/* Make a whole stroke of curve i, if it is one edge of it; *edge receives the other one. 0: it is not. */
-static int txi_whole_stroke(const txi_window *w, const txi_lines *l, const txi_curve *curves, int count,
-                            int i, const int *partners, txm_arena *arena, txm_env *env, uint8_t *gone,
-                            txi_curve *edge, txm_status *status) {
+/* Make a whole stroke of curve i, if it is one edge of it; *edge receives the other one. 0: it is
+   not. */
+static int txi_whole_stroke(const txi_window *w, const txi_lines *l, const txi_curve *curves,
+                            int count, int i, const int *partners, txm_arena *arena, txm_env *env,
+                            uint8_t *gone, txi_curve *edge, txm_status *status) {
     const txi_curve *c = &curves[i];
     txi_flank f[2][2]; /* left and right, both ends */
     int usable[2];
     for (int k = 0; k < 2; k++) usable[k] = txi_stroke_flanks(w, c, k ? 1 : -1, f[k]);
-    const int first = usable[1] && (!usable[0] || f[1][0].width < f[0][0].width); /* the narrower one */
+    const int first =
+        usable[1] && (!usable[0] || f[1][0].width < f[0][0].width); /* the narrower one */
     for (int n = 0; n < 2; n++) {
         const int k = n ? !first : first;
         if (!usable[k]) continue;
         *status = txi_other_edge(w, c, f[k], k ? 1 : -1, arena, env, edge);
         if (*status != TXM_OK) return 0;
-        if (edge->first >= 0 && txi_edge_replaces(l, curves, count, i, partners, edge, gone)) return 1;
+        if (edge->first >= 0 && txi_edge_replaces(l, curves, count, i, partners, edge, gone))
+            return 1;
     }
     return 0;
 }
@@ -10580,11 +10609,12 @@ static int txi_curve_crosses(const txi_curve *curves, int count, int i) {
 
 /* Complete strokes of which only one edge was joined.
 
-   curves  *count curves in the arena, replaced by an array with the new edges, which are partners of the
+   curves  *count curves in the arena, replaced by an array with the new edges, which are partners
+   of the
            joined ones; curves that were found for their ends are gone
    cost    O(curves * ends * points)                                                            */
-static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm_arena *arena, txm_env *env,
-                                    txi_curve **curves, int *count) {
+static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm_arena *arena,
+                                    txm_env *env, txi_curve **curves, int *count) {
     const int most = 2 * *count;
     int n = *count, kept = 0;
     txm_arena scratch;
@@ -10605,7 +10635,8 @@ static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm
         uint8_t *gone = done + most;
         int i = -1;
         for (int k = 0; k < *count; k++) {
-            if (done[k] || partners[k] >= 0 || c[k].ends[1] < 0 || c[k].last <= c[k].first) continue;
+            if (done[k] || partners[k] >= 0 || c[k].ends[1] < 0 || c[k].last <= c[k].first)
+                continue;
             if (i < 0 || c[k].cost < c[i].cost) i = k;
         }
         if (i < 0) break;
@@ -10637,19 +10668,20 @@ static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm
 }
 
 /* ---- strokes that cross -------------------------------------------------------------------------
-   Where two strokes cross in the hole one covers the other, and what lies beside one of them is not its
-   own. Such strokes are laid bare: as wide as they are and not with their surroundings. Which is on top
-   is seen where they cross in the known part, near the hole; where they do not, the narrower and stronger
-   one is: in pictures thin things lie before thick ones more often than behind them.               */
+   Where two strokes cross in the hole one covers the other, and what lies beside one of them is not
+   its own. Such strokes are laid bare: as wide as they are and not with their surroundings. Which
+   is on top is seen where they cross in the known part, near the hole; where they do not, the
+   narrower and stronger one is: in pictures thin things lie before thick ones more often than
+   behind them. */
 
 enum {
-    TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours         */
-    TXI_COVER_TONE = 32,    /* levels; colours that differ more are never those of one stroke; ours     */
-    TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours                   */
+    TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours    */
+    TXI_COVER_TONE = 32,  /* levels; colours that differ more are never those of one stroke; ours */
+    TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours              */
 };
 
-/* How far four of five colours inside of a stroke are from the usual ones at most, in columns from..to;
-   texture, or something that covers it. 255: nothing is known. */
+/* How far four of five colours inside of a stroke are from the usual ones at most, in columns
+   from..to; texture, or something that covers it. 255: nothing is known. */
 static int txi_cover_spread(const txi_strip *s, int from, int to) {
     int counts[256] = {0}, n = 0, value = 0;
     for (int i = from; i <= to; i++) {
@@ -10666,7 +10698,8 @@ static int txi_cover_spread(const txi_strip *s, int from, int to) {
 }
 
 /* The usual colour of each row of a stroke: the median of its known columns near the hole. */
-static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_arena *arena, txm_env *env) {
+static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_arena *arena,
+                                    txm_env *env) {
     const int from = s->first > TXI_COVER_COLUMNS ? s->first - TXI_COVER_COLUMNS : 0;
     const int behind = s->tail ? s->last : s->last + TXI_COVER_COLUMNS;
     const int to = behind < s->line.count - 1 ? behind : s->line.count - 1;
@@ -10683,14 +10716,16 @@ static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_ar
         for (int sum = counts[0]; 2 * sum < n && value < 255; sum += counts[value]) value++;
         s->typical[k] = (uint8_t)value;
     }
-    const int before = txi_cover_spread(s, from, s->first - 1), after = txi_cover_spread(s, s->last + 1, to);
+    const int before = txi_cover_spread(s, from, s->first - 1),
+              after = txi_cover_spread(s, s->last + 1, to);
     const float spread = 1.25f * (float)(before < after ? before : after);
-    s->tolerance = txm_maxf(txm_clampf(0.5f * curve->strength, 12, TXI_COVER_TONE), spread < 255 ? spread : 0);
+    s->tolerance =
+        txm_maxf(txm_clampf(0.5f * curve->strength, 12, TXI_COVER_TONE), spread < 255 ? spread : 0);
     return TXM_OK;
 }
 
-/* Where a place lies in a stroke: its distance from the middle in half widths (1 and more: beside it);
-   a large number beyond its ends. */
+/* Where a place lies in a stroke: its distance from the middle in half widths (1 and more: beside
+   it); a large number beyond its ends. */
 static double txi_cover_across(const txi_strip *s, double x, double y) {
     double best = 1e30;
     int column = 0;
@@ -10707,9 +10742,10 @@ static double txi_cover_across(const txi_strip *s, double x, double y) {
     return (across < 0 ? -across : across) / half;
 }
 
-/* How many places in the known part, near the hole, where a and b cross show the colour of a, less those
-   that show the colour of b. *inside: how many lie in both in the hole. */
-static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_strip *b, int *inside) {
+/* How many places in the known part, near the hole, where a and b cross show the colour of a, less
+   those that show the colour of b. *inside: how many lie in both in the hole. */
+static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_strip *b,
+                           int *inside) {
     const int middle = TXI_STRIP_MARGIN + a->inside / 2, other = TXI_STRIP_MARGIN + b->inside / 2;
     int votes = 0;
     *inside = 0;
@@ -10726,7 +10762,8 @@ static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_st
             if (!txi_strip_pixel(w, x, y, rgb)) continue;
             double of_a = 0, of_b = 0;
             for (int c = 0; c < 3; c++) {
-                const double u = rgb[c] - a->typical[3 * middle + c], v = rgb[c] - b->typical[3 * other + c];
+                const double u = rgb[c] - a->typical[3 * middle + c],
+                             v = rgb[c] - b->typical[3 * other + c];
                 of_a += u * u / 3;
                 of_b += v * v / 3;
             }
@@ -10758,11 +10795,12 @@ static void txi_cover_bare(txi_strip *s) {
 /* Find the strokes that cross in the hole, and what covers what.
    above  count^2: 1 where stroke i lies on stroke j, seen in the known part
    cost   O(strokes^2 * points^2), of those whose boxes overlap                                 */
-static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const txi_curve *curves, int count,
-                                 uint8_t *above, txm_arena *arena, txm_env *env) {
+static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const txi_curve *curves,
+                                 int count, uint8_t *above, txm_arena *arena, txm_env *env) {
     for (int i = 0; i < count; i++) {
         if (strips[i].partner < 0) continue;
-        const txm_status status = txi_cover_typical(&strips[i], &curves[strips[i].curve], arena, env);
+        const txm_status status =
+            txi_cover_typical(&strips[i], &curves[strips[i].curve], arena, env);
         if (status != TXM_OK) return status;
     }
     for (int i = 0; i < count; i++) {
@@ -10783,11 +10821,11 @@ static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const t
 }
 
 /* ---- the graph of all patches -------------------------------------------------------------------
-   The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with those
-   of the other.                                                                                 */
+   The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with
+   those of the other. */
 
 enum {
-    TXI_MEETING_SAMPLES = 32, /* most places that two patches are compared at                       */
+    TXI_MEETING_SAMPLES = 32, /* most places that two patches are compared at                     */
     TXI_MEETING_STEP = 2,     /* pixels between them                                              */
     TXI_MEETINGS_MOST = 4096
 };
@@ -10802,13 +10840,13 @@ typedef struct txi_strips {
     int *counts, *ends; /* of the graph                                                          */
     size_t *firsts;
     int32_t *unary;
-    int *link_strip;   /* which strip a link belongs to; -1 - k: it is meeting k                   */
+    int *link_strip;   /* which strip a link belongs to; -1 - k: it is meeting k                  */
     struct txi_meeting *meetings; /* where strips meet                                            */
     int meeting_count;
     uint8_t *late;     /* per link: a meeting                                                     */
     int *labels;       /* per node: the index of the label chosen                                 */
-    int *cuts;         /* rows_most per node: the column from which on the next patch counts       */
-    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                        */
+    int *cuts;         /* rows_most per node: the column from which on the next patch counts      */
+    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                       */
 } txi_strips;
 
 /* Strips of all curves; the sides of a stroke are one. */
@@ -10851,8 +10889,9 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
         const int even = p >= 0 && curves[i].partner == p && lines[i].count == curves[i].count &&
                          curves[p].count == curves[i].count;
         if (p >= 0 && !done[p] && lines[p].count >= 2 &&
-            (even ? txi_ribbon_widen_even(&s->line, curves[i].points, curves[p].points, width)
-                  : txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width))) {
+            (even
+                 ? txi_ribbon_widen_even(&s->line, curves[i].points, curves[p].points, width)
+                 : txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width))) {
             double sum = 0;
             for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
             s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
@@ -10869,9 +10908,9 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     return TXM_OK;
 }
 
-/* The order in which strips cover each other, as far as is not seen which lies on top: strokes that cross
-   others first, of these the narrower and stronger ones; strokes over single lines, lines that go through over those that
-   end in the hole, then the stronger ones. */
+/* The order in which strips cover each other, as far as is not seen which lies on top: strokes that
+   cross others first, of these the narrower and stronger ones; strokes over single lines, lines
+   that go through over those that end in the hole, then the stronger ones. */
 static uint32_t txi_strip_rank(const txi_strip *s, const txi_curve *c) {
     const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
     const uint32_t through = c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0;
@@ -10879,8 +10918,8 @@ static uint32_t txi_strip_rank(const txi_strip *s, const txi_curve *c) {
     return (s->partner >= 0 ? 1u << 29 : 0) + through + strength;
 }
 
-/* The strips from top to bottom. Of those that nothing else that is left lies on (if there is none, of all)
-   the one of the highest rank comes next. */
+/* The strips from top to bottom. Of those that nothing else that is left lies on (if there is none,
+   of all) the one of the highest rank comes next. */
 static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
                                    txm_env *env) {
     const size_t count = (size_t)all->count;
@@ -10895,9 +10934,11 @@ static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm
         for (int i = 0; i < all->count; i++) {
             int under = 0;
             if (placed[i]) continue;
-            for (int j = 0; j < all->count; j++) under |= !placed[j] && above[(size_t)j * count + (size_t)i];
+            for (int j = 0; j < all->count; j++)
+                under |= !placed[j] && above[(size_t)j * count + (size_t)i];
             const uint32_t rank = txi_strip_rank(&all->strips[i], &curves[all->strips[i].curve]);
-            if (best >= 0 && (under > best_under || (under == best_under && rank <= best_rank))) continue;
+            if (best >= 0 && (under > best_under || (under == best_under && rank <= best_rank)))
+                continue;
             best = i;
             best_under = under;
             best_rank = rank;
@@ -10910,11 +10951,11 @@ static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm
 
 /* ---- where strips meet ---- */
 
-/* Two patches of different strips that overlap, and where their colours are compared: near the line on
-   which one strip gives way to the other. */
+/* Two patches of different strips that overlap, and where their colours are compared: near the line
+   on which one strip gives way to the other. */
 typedef struct txi_meeting {
     int strip[2], patch[2], count;
-    int8_t offset[TXI_MEETING_SAMPLES][2];  /* columns from the centre of each patch               */
+    int8_t offset[TXI_MEETING_SAMPLES][2];  /* columns from the centre of each patch              */
     uint8_t row[TXI_MEETING_SAMPLES][2];
 } txi_meeting;
 
@@ -10924,9 +10965,10 @@ static txm_vec2 txi_patch_centre(const txi_strip *s, int patch) {
     return s->line.place[column < s->line.count ? column : s->line.count - 1];
 }
 
-/* Where a place lies in a patch: column offset and row, and its distance from the stroke. 0: outside. */
-static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, int *offset, int *row,
-                            double *away) {
+/* Where a place lies in a patch: column offset and row, and its distance from the stroke. 0:
+   outside. */
+static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, int *offset,
+                            int *row, double *away) {
     const int at = s->first + patch * s->hop;
     const int column = at < s->line.count ? at : s->line.count - 1;
     const txm_vec2 t = s->line.along[column], p = s->line.place[column];
@@ -10975,8 +11017,8 @@ static int32_t txi_meeting_cost(const txi_strips *all, const txi_meeting *m, int
     return sum * TXI_MEETING_STEP * TXI_MEETING_STEP / 4; /* rows off the lines count a quarter */
 }
 
-/* All pairs of patches of different strips whose centres are close: of each patch the nearest one of
-   each other strip. */
+/* All pairs of patches of different strips whose centres are close: of each patch the nearest one
+   of each other strip. */
 static txm_status txi_meetings_find(txi_strips *all, txm_arena *arena, txm_env *env) {
     all->meetings =
         (txi_meeting *)txm_arena_alloc(arena, TXI_MEETINGS_MOST, sizeof *all->meetings);
@@ -11034,8 +11076,8 @@ static void txi_strips_body(void *context, int index) {
 
 /* The sources of all strips, and the graph of all patches. profiles: there are to be none; strips
    without patches get profiles. */
-static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines, const txi_curve *curves,
-                                   txm_arena *arena, txm_env *env) {
+static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines,
+                                   const txi_curve *curves, txm_arena *arena, txm_env *env) {
     size_t labels = 0;
     int room = TXI_STRIP_COLUMNS;
     while (room > TXI_STRIP_COLUMNS_LEAST && room * room > TXI_STRIP_CELLS / (all->count + 1))
@@ -11095,7 +11137,8 @@ static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_line
     return TXM_OK;
 }
 
-static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena, txm_env *env) {
+static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena,
+                                    txm_env *env) {
     txi_graph g;
     memset(&g, 0, sizeof g);
     g.node_count = all->node_count;
@@ -11118,20 +11161,20 @@ static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *a
 
 /* ---- laying the strips --------------------------------------------------------------------------
    Each hole pixel near a completed line belongs to the strip of the nearest line, or of the topmost
-   stroke that it lies in; it is copied from the strip's source columns.                             */
+   stroke that it lies in; it is copied from the strip's source columns.                          */
 
 enum {
     TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
-    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
-    TXI_LAY_TONE = 24,       /* levels; larger differences are none of tone, and not evened out    */
+    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole            */
+    TXI_LAY_TONE = 24,       /* levels; larger differences are none of tone, and not evened out   */
     TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
-    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
+    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                            */
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
 };
 #define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
 #define TXI_LAY_BARE 1.0    /* the same for strokes that cross others                             */
-#define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches                  */
-#define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case              */
+#define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches               */
+#define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case            */
 
 /* ---- cuts and colours between patches ---- */
 
@@ -11160,9 +11203,9 @@ static void txi_patch_cut(const txi_strip *s, int k, int *cut) {
     for (int j = 0; j < s->rows; j++) cut[j] += s->first + k * s->hop + 1;
 }
 
-/* What the colours of row j of a patch lack: against the known part (from = 0), or of the next patch
-   against this one in their overlap (1). Mean RGB differences into d; returns a weight, 0..1: the share
-   of the row that is compared, less for differences that are no matter of tone. */
+/* What the colours of row j of a patch lack: against the known part (from = 0), or of the next
+   patch against this one in their overlap (1). Mean RGB differences into d; returns a weight, 0..1:
+   the share of the row that is compared, less for differences that are no matter of tone. */
 static double txi_row_difference(const txi_strip *s, int k, int j, int from, double d[3]) {
     int sum[3] = {0, 0, 0}, hits = 0;
     for (int m = from ? s->hop - s->reach : -s->reach; m <= s->reach; m++) {
@@ -11189,13 +11232,14 @@ static double txi_row_difference(const txi_strip *s, int k, int j, int from, dou
     return (double)hits / whole / (1 + tone * tone);
 }
 
-/* What is to be added to the colours of row j in each patch, so that patches meet without a step and
-   the ends meet the known part: the offsets e minimise
+/* What is to be added to the colours of row j in each patch, so that patches meet without a step
+   and the ends meet the known part: the offsets e minimise
 
        sum over k of v(k) (e(k+1) - e(k) - d(k))^2 + w(k) (e(k) - g(k))^2 + 0.001 e(k)^2
 
    d: mean difference of neighbours in their overlap, g: of the known part; v, w: their weights. The
-   matrix has three diagonals and is solved by elimination. e: 4 doubles per patch, RGB and a factor. */
+   matrix has three diagonals and is solved by elimination. e: 4 doubles per patch, RGB and a
+   factor. */
 static void txi_row_offsets(const txi_strip *s, int j, double *e, float *offsets) {
     const int n = s->node_count;
     double before[3] = {0, 0, 0}, v_before = 0;
@@ -11276,7 +11320,8 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
     return 1;
 }
 
-/* What a pixel on the edge of a bare stroke is where another stroke lies under it: a piece of its inside. */
+/* What a pixel on the edge of a bare stroke is where another stroke lies under it: a piece of its
+   inside. */
 typedef struct txi_lay_edge {
     float x, y;       /* where that is copied from                                               */
     uint8_t color[3];
@@ -11288,10 +11333,10 @@ typedef struct txi_lay {
     txi_strips *all;
     txi_plan *plan;
     txi_pose *poses;
-    float *squares;   /* squared distance to the nearest column of the current strip               */
+    float *squares;   /* squared distance to the nearest column of the current strip              */
     int32_t *columns; /* that column, or -1                                                      */
-    txi_lay_edge *edges; /* NULL: no stroke is bare                                                */
-    float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
+    txi_lay_edge *edges; /* NULL: no stroke is bare                                               */
+    float *claims;    /* distance to the core of the strip that has the pixel; large: none        */
 } txi_lay;
 
 /* The pixels within `radius` of a place, clipped to the window: x0, y0, x1, y1, inclusive. */
@@ -11302,7 +11347,8 @@ static void txi_lay_around(const txi_window *w, txm_vec2 p, int radius, int box[
     box[3] = txm_clampi((int)p.y + radius + 1, 0, w->height - 1);
 }
 
-/* For each hole pixel near a strip its nearest column; -1 for all others in the box of the strip. */
+/* For each hole pixel near a strip its nearest column; -1 for all others in the box of the
+   strip. */
 static void txi_lay_nearest(txi_lay *lay, const txi_strip *s, int box[4]) {
     const txi_window *w = lay->all->w;
     float widest = 0;
@@ -11346,8 +11392,8 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
     return column >= cut[row] ? k + 1 : k;
 }
 
-/* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
-   less towards the end of a line that ends in the hole. */
+/* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end,
+   and less towards the end of a line that ends in the hole. */
 static int txi_lay_pull(const txi_strip *s, double away, int column) {
     const double core = s->is_bare ? TXI_LAY_BARE : (double)TXI_LAY_CORE;
     const double margin = s->is_bare ? TXI_LAY_BARE + 1 : (double)TXI_STRIP_MARGIN;
@@ -11357,14 +11403,15 @@ static int txi_lay_pull(const txi_strip *s, double away, int column) {
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
-/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends or at its
-   side. */
+/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends
+   or at its side. */
 typedef struct txi_strip_spot {
     double column, row, across, away, half;
     float claim;
 } txi_strip_spot;
 
-static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, size_t at, txi_strip_spot *o) {
+static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, size_t at,
+                        txi_strip_spot *o) {
     const int i = lay->columns[at];
     const txm_vec2 t = s->line.along[i], p = s->line.place[i];
     const double dx = x - (double)p.x, dy = y - (double)p.y;
@@ -11383,8 +11430,8 @@ static uint8_t txi_lay_round(double value) {
     return (uint8_t)(value < 0 ? 0 : value > 254.5 ? 255 : (int)(value + 0.5));
 }
 
-/* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is not
-   known there. */
+/* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is
+   not known there. */
 static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_spot *o, size_t at) {
     const int j = txm_clampi((int)(o->row + 0.5), 0, s->rows - 1);
     const int k = txi_lay_patch(lay, s, o->column, j), centre = s->first + k * s->hop;
@@ -11397,13 +11444,15 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
     const double mix = (forward ? o->column - centre : centre - o->column) / s->hop;
     double rgb[3];
     if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return 0;
-    if (s->is_bare && o->away > 0) { /* what lies beside the source is not always the usual background */
+    if (s->is_bare &&
+        o->away > 0) { /* what lies beside the source is not always the usual background */
         uint8_t beside[3];
         for (int c = 0; c < 3; c++) beside[c] = txi_lay_round(rgb[c]);
         if (txi_typical_distance(s, j, beside) > (double)s->tolerance) return 0;
     }
     for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
-        const double here = (double)offset[c], there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
+        const double here = (double)offset[c],
+                     there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
         lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
     if (lay->edges) {
@@ -11411,8 +11460,10 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
         edge->is_used = 0;
         if (s->is_bare && o->away > -TXI_LAY_EDGE && o->half > 2 * TXI_LAY_EDGE) {
             const double across = o->half - TXI_LAY_EDGE;
-            const double inner = txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
-            const txm_vec2 q = txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
+            const double inner =
+                txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
+            const txm_vec2 q =
+                txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
             edge->is_used = (uint8_t)txi_lay_pixel(lay->all->w, (double)q.x, (double)q.y, rgb);
             for (int c = 0; c < 3; c++) edge->color[c] = txi_lay_round(rgb[c] + (double)offset[c]);
             edge->x = q.x;
@@ -11426,7 +11477,8 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
     return 1;
 }
 
-/* A stroke lies under the one that has a pixel: at the edge of that there is no background to be seen. */
+/* A stroke lies under the one that has a pixel: at the edge of that there is no background to be
+   seen. */
 static void txi_lay_over(txi_lay *lay, size_t at) {
     txi_lay_edge *edge = &lay->edges[at];
     if (!edge->is_used) return;
@@ -11510,13 +11562,15 @@ static void txi_guide_at(const txi_window *w, txi_plan *plan, const uint8_t *tab
     }
 }
 
-/* 100 exp(-d^2 / (2 * 1.5^2)) near known lines, outside of the hole, and near the completed ones. */
+/* 100 exp(-d^2 / (2 * 1.5^2)) near known lines, outside of the hole, and near the completed
+   ones. */
 static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *plan) {
     uint8_t table[TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS + 1];
     const txi_window *w = all->w;
     for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
         const double d = (double)i / ((double)TXI_GUIDE_STEPS * (double)TXI_GUIDE_SIGMA);
-        table[i] = (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+        table[i] =
+            (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
     }
     for (int i = 0; lines && i < lines->thin_count; i++)
         txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,
@@ -11538,8 +11592,8 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
 /* ---- the plan ---- */
 
 static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *lines,
-                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
-                               txm_env *env, txi_plan *plan, txi_pose **poses) {
+                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena,
+                               txm_arena *scratch, txm_env *env, txi_plan *plan, txi_pose **poses) {
     const txi_window *w = all->w;
     const size_t pixels = (size_t)w->width * (size_t)w->height;
     txi_lay lay;
@@ -11560,7 +11614,8 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
         if (all->strips[i].is_bare && !lay.edges && !scratch->failed)
             lay.edges = (txi_lay_edge *)txm_arena_zero(scratch, pixels, sizeof *lay.edges);
     }
-    lay.poses = *poses = (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
+    lay.poses = *poses =
+        (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
     plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
     plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     plan->copies = (txi_copy *)txm_arena_alloc(arena, pixels, sizeof *plan->copies);
@@ -11578,7 +11633,8 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
 
 /* Lay strips of texture along the completed lines of a window [1, III.A].
 
-   lines   of the window: other lines to take texture from, and the known lines of the guide channel;
+   lines   of the window: other lines to take texture from, and the known lines of the guide
+   channel;
            NULL: none
    curves  the completed lines, count of them; may be none
    arena   holds plan and poses
@@ -11586,10 +11642,11 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
            have one piece and one pose per patch
    poses   receives pose_count poses
    return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED; after a failure *plan and *poses are NULL
-   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61        */
-static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
-                                int count, uint64_t seed, txm_arena *arena, txm_env *env,
-                                txi_plan *plan, const txi_pose **poses, int *pose_count) {
+   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61      */
+static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines,
+                                const txi_curve *curves, int count, uint64_t seed, txm_arena *arena,
+                                txm_env *env, txi_plan *plan, const txi_pose **poses,
+                                int *pose_count) {
     txi_strips all;
     txi_pose *made = NULL;
     txm_arena scratch;
@@ -11606,8 +11663,8 @@ static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, con
     return status;
 }
 
-/* The same without texture: the colours across each line are the mean ones of its known ends, blended
-   along it. plan->copies has no pieces. */
+/* The same without texture: the colours across each line are the mean ones of its known ends,
+   blended along it. plan->copies has no pieces. */
 static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
                               int count, txm_arena *arena, txm_env *env, txi_plan *plan) {
     txi_strips all;
@@ -11624,11 +11681,13 @@ static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const
     return status;
 }
 
-/* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per pixel. */
+/* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per
+   pixel. */
 static void txi_draw_strips(const txi_window *w, const txi_plan *plan, uint8_t *rgb) {
     for (size_t i = 0; i < (size_t)w->width * (size_t)w->height; i++) {
         for (size_t c = 0; c < 3; c++) {
-            const int laid = (plan->color[4 * i + c] * plan->pull[i] + 90 * (255 - plan->pull[i])) / 255;
+            const int laid =
+                (plan->color[4 * i + c] * plan->pull[i] + 90 * (255 - plan->pull[i])) / 255;
             rgb[3 * i + c] = w->state[i] == TXI_VOID ? 0
                              : w->state[i] == TXI_HOLE ? (uint8_t)laid
                                                        : w->color[4 * i + c];
@@ -13267,18 +13326,19 @@ static void txi_vote(txi_ballot *v, txm_env *env) {
     v->canvas->fresh = 0;
 }
 
-/* ---- pieces ---------------------------------------------------------------------------------------
+/* ---- pieces -----------------------------------------------------------------------------------
 
    Each hole pixel gets a label: the source, and the offset from the target to it. Pixels of equal
    labels are one piece, copied as it is. The labels minimise
 
-       sum over pairs of neighbours p, q with labels A != B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
+       sum over pairs of neighbours p, q with labels A != B:
+           |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
      + sum over pixels:  drift * |A(p) - color(p)|^2 + (difference of the guides)^2
 
-   where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first term is
-   rim * |A(q) - known(q)|^2; where a pixel is partly known, |A(p) - known(p)|^2 is added, share times.
-   This is minimised by expansion moves [7]: one label at a time, a minimum
-   cut finds the best set of pixels that change to it.                                         */
+   where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first
+   term is rim * |A(q) - known(q)|^2; where a pixel is partly known, |A(p) - known(p)|^2 is added,
+   share times. This is minimised by expansion moves [7]: one label at a time, a minimum cut finds
+   the best set of pixels that change to it. */
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
@@ -13448,7 +13508,9 @@ static int txi_expand(txi_assembly *t, int32_t alpha, int reach) {
     return changed;
 }
 
-/* The labels in use, most frequent first, at most most of them. pairs: room for 2 per hole pixel. */
+/* The labels in use, the most frequent first, no more than `most`; returns how many.
+   labels  room for one per hole pixel
+   pairs   room for 2 per hole pixel                                                           */
 static int txi_labels_used(const txi_assembly *t, int32_t *labels, int most, txm_pair *pairs) {
     const txi_level *l = t->level;
     const size_t n = (size_t)l->hole_count;
@@ -13485,8 +13547,8 @@ static int txi_assembly_make(txi_assembly *t, const txi_level *l, txm_arena *are
     return 1;
 }
 
-/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. Returns how many
-   there are. */
+/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. Returns how
+   many there are. */
 static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
     const txi_level *l = t->level;
     const int w = l->width;
@@ -13525,8 +13587,6 @@ typedef struct txi_style {
     uint32_t poses; /* which sources, one bit each, the lowest for the window as it is; 0 = all */
     int is_picture; /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
-
-/* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
 
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
@@ -13583,8 +13643,8 @@ static int txi_filler_level(txi_filler *f, int k, txm_env *env) {
     return ok;
 }
 
-/* Grain of a window: (median + 1/2) / (mean + 1/2) of the detail of its known pixels, 0..1. Large in
-   stochastic textures, small where there are edges between smooth parts. Below 0: no memory.   */
+/* Grain of a window: (median + 1/2) / (mean + 1/2) of the detail of its known pixels, 0..1. Large
+   in stochastic textures, small where there are edges between smooth parts. Below 0: no memory. */
 static double txi_grain(const txi_window *w, txm_env *env) {
     txi_level l;
     txm_arena arena;
@@ -13758,8 +13818,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     return 1;
 }
 
-/* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels; the
-   strips of mere averages would have to fade. */
+/* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels;
+   the strips of mere averages would have to fade. */
 static int txi_pull_at(int level) {
     return level > 1 ? 230 : level ? 200 : 170;
 }
@@ -13836,8 +13896,8 @@ static double txi_mean_cost(const txi_canvas *t) {
     return count ? sum / count : 0;
 }
 
-/* The coarsest level: rounds from the onion as it is, and from labellings annealed from it; the one with
-   the smallest costs is kept. */
+/* The coarsest level: rounds from the onion as it is, and from labellings annealed from it; the one
+   with the smallest costs is kept. */
 static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
     const size_t bytes = 4 * (size_t)l->width * (size_t)l->height;
@@ -14066,8 +14126,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
 
 /* Complete the finest level, and say where each hole pixel is copied from.
    copies  one per pixel of the window
-   poses   receives the filler's poses and after them the plan's, which copies[].pose counts; they live
-           as long as the filler                                                               */
+   poses   receives the filler's poses and after them the plan's, which copies[].pose counts; they
+           live as long as the filler */
 static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi_field *field,
                                   txi_copy *copies, const txi_pose **poses, int *pose_count,
                                   txm_env *env) {

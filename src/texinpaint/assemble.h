@@ -3,18 +3,19 @@
 
 #include "ballot.h"
 
-/* ---- pieces ---------------------------------------------------------------------------------------
+/* ---- pieces -----------------------------------------------------------------------------------
 
    Each hole pixel gets a label: the source, and the offset from the target to it. Pixels of equal
    labels are one piece, copied as it is. The labels minimise
 
-       sum over pairs of neighbours p, q with labels A != B:  |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
+       sum over pairs of neighbours p, q with labels A != B:
+           |A(p) - B(p)|^2 + |A(q) - B(q)|^2 + joint
      + sum over pixels:  drift * |A(p) - color(p)|^2 + (difference of the guides)^2
 
-   where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first term is
-   rim * |A(q) - known(q)|^2; where a pixel is partly known, |A(p) - known(p)|^2 is added, share times.
-   This is minimised by expansion moves [7]: one label at a time, a minimum
-   cut finds the best set of pixels that change to it.                                         */
+   where A(p) is the colour that A copies to p. At the rim of the hole q is known, and the first
+   term is rim * |A(q) - known(q)|^2; where a pixel is partly known, |A(p) - known(p)|^2 is added,
+   share times. This is minimised by expansion moves [7]: one label at a time, a minimum cut finds
+   the best set of pixels that change to it. */
 
 enum {
     TXI_JOINT = 40,       /* ours                                                              */
@@ -184,7 +185,9 @@ static int txi_expand(txi_assembly *t, int32_t alpha, int reach) {
     return changed;
 }
 
-/* The labels in use, most frequent first, at most most of them. pairs: room for 2 per hole pixel. */
+/* The labels in use, the most frequent first, no more than `most`; returns how many.
+   labels  room for one per hole pixel
+   pairs   room for 2 per hole pixel                                                           */
 static int txi_labels_used(const txi_assembly *t, int32_t *labels, int most, txm_pair *pairs) {
     const txi_level *l = t->level;
     const size_t n = (size_t)l->hole_count;
@@ -221,8 +224,8 @@ static int txi_assembly_make(txi_assembly *t, const txi_level *l, txm_arena *are
     return 1;
 }
 
-/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. Returns how many
-   there are. */
+/* Number the pieces: connected pixels of equal labels. queue: room for all hole pixels. Returns how
+   many there are. */
 static int txi_assembly_pieces(const txi_assembly *t, int32_t *piece, int32_t *queue) {
     const txi_level *l = t->level;
     const int w = l->width;

@@ -4,11 +4,11 @@
 #include "cover.h"
 
 /* ---- the graph of all patches -------------------------------------------------------------------
-   The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with those
-   of the other.                                                                                 */
+   The patches of a strip are a chain. Where strips meet or cross, patches of one are linked with
+   those of the other. */
 
 enum {
-    TXI_MEETING_SAMPLES = 32, /* most places that two patches are compared at                       */
+    TXI_MEETING_SAMPLES = 32, /* most places that two patches are compared at                     */
     TXI_MEETING_STEP = 2,     /* pixels between them                                              */
     TXI_MEETINGS_MOST = 4096
 };
@@ -23,13 +23,13 @@ typedef struct txi_strips {
     int *counts, *ends; /* of the graph                                                          */
     size_t *firsts;
     int32_t *unary;
-    int *link_strip;   /* which strip a link belongs to; -1 - k: it is meeting k                   */
+    int *link_strip;   /* which strip a link belongs to; -1 - k: it is meeting k                  */
     struct txi_meeting *meetings; /* where strips meet                                            */
     int meeting_count;
     uint8_t *late;     /* per link: a meeting                                                     */
     int *labels;       /* per node: the index of the label chosen                                 */
-    int *cuts;         /* rows_most per node: the column from which on the next patch counts       */
-    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                        */
+    int *cuts;         /* rows_most per node: the column from which on the next patch counts      */
+    float *offsets;    /* 3 * TXI_STRIP_ROWS per node: added to its colours                       */
 } txi_strips;
 
 /* Strips of all curves; the sides of a stroke are one. */
@@ -72,8 +72,9 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
         const int even = p >= 0 && curves[i].partner == p && lines[i].count == curves[i].count &&
                          curves[p].count == curves[i].count;
         if (p >= 0 && !done[p] && lines[p].count >= 2 &&
-            (even ? txi_ribbon_widen_even(&s->line, curves[i].points, curves[p].points, width)
-                  : txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width))) {
+            (even
+                 ? txi_ribbon_widen_even(&s->line, curves[i].points, curves[p].points, width)
+                 : txi_ribbon_widen(&s->line, &lines[p], curves[i].first, curves[i].last, width))) {
             double sum = 0;
             for (int k = 0; k < s->line.count; k++) sum += 2 * (double)s->line.half[k];
             s->inside = txm_clampi((int)(sum / s->line.count + 0.5), 1, TXI_STRIP_INSIDE);
@@ -90,9 +91,9 @@ static txm_status txi_strips_make(const txi_window *w, const txi_curve *curves, 
     return TXM_OK;
 }
 
-/* The order in which strips cover each other, as far as is not seen which lies on top: strokes that cross
-   others first, of these the narrower and stronger ones; strokes over single lines, lines that go through over those that
-   end in the hole, then the stronger ones. */
+/* The order in which strips cover each other, as far as is not seen which lies on top: strokes that
+   cross others first, of these the narrower and stronger ones; strokes over single lines, lines
+   that go through over those that end in the hole, then the stronger ones. */
 static uint32_t txi_strip_rank(const txi_strip *s, const txi_curve *c) {
     const uint32_t strength = (uint32_t)(txm_clampf(c->strength, 0, 1e6f) * 16.0f);
     const uint32_t through = c->ends[0] >= 0 && c->ends[1] >= 0 ? 1u << 28 : 0;
@@ -100,8 +101,8 @@ static uint32_t txi_strip_rank(const txi_strip *s, const txi_curve *c) {
     return (s->partner >= 0 ? 1u << 29 : 0) + through + strength;
 }
 
-/* The strips from top to bottom. Of those that nothing else that is left lies on (if there is none, of all)
-   the one of the highest rank comes next. */
+/* The strips from top to bottom. Of those that nothing else that is left lies on (if there is none,
+   of all) the one of the highest rank comes next. */
 static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm_arena *arena,
                                    txm_env *env) {
     const size_t count = (size_t)all->count;
@@ -116,9 +117,11 @@ static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm
         for (int i = 0; i < all->count; i++) {
             int under = 0;
             if (placed[i]) continue;
-            for (int j = 0; j < all->count; j++) under |= !placed[j] && above[(size_t)j * count + (size_t)i];
+            for (int j = 0; j < all->count; j++)
+                under |= !placed[j] && above[(size_t)j * count + (size_t)i];
             const uint32_t rank = txi_strip_rank(&all->strips[i], &curves[all->strips[i].curve]);
-            if (best >= 0 && (under > best_under || (under == best_under && rank <= best_rank))) continue;
+            if (best >= 0 && (under > best_under || (under == best_under && rank <= best_rank)))
+                continue;
             best = i;
             best_under = under;
             best_rank = rank;
@@ -131,11 +134,11 @@ static txm_status txi_strips_order(txi_strips *all, const txi_curve *curves, txm
 
 /* ---- where strips meet ---- */
 
-/* Two patches of different strips that overlap, and where their colours are compared: near the line on
-   which one strip gives way to the other. */
+/* Two patches of different strips that overlap, and where their colours are compared: near the line
+   on which one strip gives way to the other. */
 typedef struct txi_meeting {
     int strip[2], patch[2], count;
-    int8_t offset[TXI_MEETING_SAMPLES][2];  /* columns from the centre of each patch               */
+    int8_t offset[TXI_MEETING_SAMPLES][2];  /* columns from the centre of each patch              */
     uint8_t row[TXI_MEETING_SAMPLES][2];
 } txi_meeting;
 
@@ -145,9 +148,10 @@ static txm_vec2 txi_patch_centre(const txi_strip *s, int patch) {
     return s->line.place[column < s->line.count ? column : s->line.count - 1];
 }
 
-/* Where a place lies in a patch: column offset and row, and its distance from the stroke. 0: outside. */
-static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, int *offset, int *row,
-                            double *away) {
+/* Where a place lies in a patch: column offset and row, and its distance from the stroke. 0:
+   outside. */
+static int txi_patch_locate(const txi_strip *s, int patch, double x, double y, int *offset,
+                            int *row, double *away) {
     const int at = s->first + patch * s->hop;
     const int column = at < s->line.count ? at : s->line.count - 1;
     const txm_vec2 t = s->line.along[column], p = s->line.place[column];
@@ -196,8 +200,8 @@ static int32_t txi_meeting_cost(const txi_strips *all, const txi_meeting *m, int
     return sum * TXI_MEETING_STEP * TXI_MEETING_STEP / 4; /* rows off the lines count a quarter */
 }
 
-/* All pairs of patches of different strips whose centres are close: of each patch the nearest one of
-   each other strip. */
+/* All pairs of patches of different strips whose centres are close: of each patch the nearest one
+   of each other strip. */
 static txm_status txi_meetings_find(txi_strips *all, txm_arena *arena, txm_env *env) {
     all->meetings =
         (txi_meeting *)txm_arena_alloc(arena, TXI_MEETINGS_MOST, sizeof *all->meetings);
@@ -255,8 +259,8 @@ static void txi_strips_body(void *context, int index) {
 
 /* The sources of all strips, and the graph of all patches. profiles: there are to be none; strips
    without patches get profiles. */
-static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines, const txi_curve *curves,
-                                   txm_arena *arena, txm_env *env) {
+static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_lines *lines,
+                                   const txi_curve *curves, txm_arena *arena, txm_env *env) {
     size_t labels = 0;
     int room = TXI_STRIP_COLUMNS;
     while (room > TXI_STRIP_COLUMNS_LEAST && room * room > TXI_STRIP_CELLS / (all->count + 1))
@@ -316,7 +320,8 @@ static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_line
     return TXM_OK;
 }
 
-static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena, txm_env *env) {
+static txm_status txi_strips_choose(txi_strips *all, uint64_t seed, txm_arena *arena,
+                                    txm_env *env) {
     txi_graph g;
     memset(&g, 0, sizeof g);
     g.node_count = all->node_count;

@@ -4,19 +4,20 @@
 #include "strip.h"
 
 /* ---- strokes that cross -------------------------------------------------------------------------
-   Where two strokes cross in the hole one covers the other, and what lies beside one of them is not its
-   own. Such strokes are laid bare: as wide as they are and not with their surroundings. Which is on top
-   is seen where they cross in the known part, near the hole; where they do not, the narrower and stronger
-   one is: in pictures thin things lie before thick ones more often than behind them.               */
+   Where two strokes cross in the hole one covers the other, and what lies beside one of them is not
+   its own. Such strokes are laid bare: as wide as they are and not with their surroundings. Which
+   is on top is seen where they cross in the known part, near the hole; where they do not, the
+   narrower and stronger one is: in pictures thin things lie before thick ones more often than
+   behind them. */
 
 enum {
-    TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours         */
-    TXI_COVER_TONE = 32,    /* levels; colours that differ more are never those of one stroke; ours     */
-    TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours                   */
+    TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours    */
+    TXI_COVER_TONE = 32,  /* levels; colours that differ more are never those of one stroke; ours */
+    TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours              */
 };
 
-/* How far four of five colours inside of a stroke are from the usual ones at most, in columns from..to;
-   texture, or something that covers it. 255: nothing is known. */
+/* How far four of five colours inside of a stroke are from the usual ones at most, in columns
+   from..to; texture, or something that covers it. 255: nothing is known. */
 static int txi_cover_spread(const txi_strip *s, int from, int to) {
     int counts[256] = {0}, n = 0, value = 0;
     for (int i = from; i <= to; i++) {
@@ -33,7 +34,8 @@ static int txi_cover_spread(const txi_strip *s, int from, int to) {
 }
 
 /* The usual colour of each row of a stroke: the median of its known columns near the hole. */
-static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_arena *arena, txm_env *env) {
+static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_arena *arena,
+                                    txm_env *env) {
     const int from = s->first > TXI_COVER_COLUMNS ? s->first - TXI_COVER_COLUMNS : 0;
     const int behind = s->tail ? s->last : s->last + TXI_COVER_COLUMNS;
     const int to = behind < s->line.count - 1 ? behind : s->line.count - 1;
@@ -50,14 +52,16 @@ static txm_status txi_cover_typical(txi_strip *s, const txi_curve *curve, txm_ar
         for (int sum = counts[0]; 2 * sum < n && value < 255; sum += counts[value]) value++;
         s->typical[k] = (uint8_t)value;
     }
-    const int before = txi_cover_spread(s, from, s->first - 1), after = txi_cover_spread(s, s->last + 1, to);
+    const int before = txi_cover_spread(s, from, s->first - 1),
+              after = txi_cover_spread(s, s->last + 1, to);
     const float spread = 1.25f * (float)(before < after ? before : after);
-    s->tolerance = txm_maxf(txm_clampf(0.5f * curve->strength, 12, TXI_COVER_TONE), spread < 255 ? spread : 0);
+    s->tolerance =
+        txm_maxf(txm_clampf(0.5f * curve->strength, 12, TXI_COVER_TONE), spread < 255 ? spread : 0);
     return TXM_OK;
 }
 
-/* Where a place lies in a stroke: its distance from the middle in half widths (1 and more: beside it);
-   a large number beyond its ends. */
+/* Where a place lies in a stroke: its distance from the middle in half widths (1 and more: beside
+   it); a large number beyond its ends. */
 static double txi_cover_across(const txi_strip *s, double x, double y) {
     double best = 1e30;
     int column = 0;
@@ -74,9 +78,10 @@ static double txi_cover_across(const txi_strip *s, double x, double y) {
     return (across < 0 ? -across : across) / half;
 }
 
-/* How many places in the known part, near the hole, where a and b cross show the colour of a, less those
-   that show the colour of b. *inside: how many lie in both in the hole. */
-static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_strip *b, int *inside) {
+/* How many places in the known part, near the hole, where a and b cross show the colour of a, less
+   those that show the colour of b. *inside: how many lie in both in the hole. */
+static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_strip *b,
+                           int *inside) {
     const int middle = TXI_STRIP_MARGIN + a->inside / 2, other = TXI_STRIP_MARGIN + b->inside / 2;
     int votes = 0;
     *inside = 0;
@@ -93,7 +98,8 @@ static int txi_cover_votes(const txi_window *w, const txi_strip *a, const txi_st
             if (!txi_strip_pixel(w, x, y, rgb)) continue;
             double of_a = 0, of_b = 0;
             for (int c = 0; c < 3; c++) {
-                const double u = rgb[c] - a->typical[3 * middle + c], v = rgb[c] - b->typical[3 * other + c];
+                const double u = rgb[c] - a->typical[3 * middle + c],
+                             v = rgb[c] - b->typical[3 * other + c];
                 of_a += u * u / 3;
                 of_b += v * v / 3;
             }
@@ -125,11 +131,12 @@ static void txi_cover_bare(txi_strip *s) {
 /* Find the strokes that cross in the hole, and what covers what.
    above  count^2: 1 where stroke i lies on stroke j, seen in the known part
    cost   O(strokes^2 * points^2), of those whose boxes overlap                                 */
-static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const txi_curve *curves, int count,
-                                 uint8_t *above, txm_arena *arena, txm_env *env) {
+static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const txi_curve *curves,
+                                 int count, uint8_t *above, txm_arena *arena, txm_env *env) {
     for (int i = 0; i < count; i++) {
         if (strips[i].partner < 0) continue;
-        const txm_status status = txi_cover_typical(&strips[i], &curves[strips[i].curve], arena, env);
+        const txm_status status =
+            txi_cover_typical(&strips[i], &curves[strips[i].curve], arena, env);
         if (status != TXM_OK) return status;
     }
     for (int i = 0; i < count; i++) {

@@ -17,8 +17,6 @@ typedef struct txi_style {
     int is_picture; /* sources: 0 = turned over the full circle, 1 = little, and mirrored */
 } txi_style;
 
-/* How a completion begins: ring by ring at the coarsest level, or with large pieces at few offsets. */
-
 enum {
     TXI_MOST_ROUNDS = 12, /* of searches and a vote, at the coarsest level                     */
     TXI_ANNEAL_MOST = 4000, /* anchors of the coarsest level; where there are more, in a long thin
@@ -74,8 +72,8 @@ static int txi_filler_level(txi_filler *f, int k, txm_env *env) {
     return ok;
 }
 
-/* Grain of a window: (median + 1/2) / (mean + 1/2) of the detail of its known pixels, 0..1. Large in
-   stochastic textures, small where there are edges between smooth parts. Below 0: no memory.   */
+/* Grain of a window: (median + 1/2) / (mean + 1/2) of the detail of its known pixels, 0..1. Large
+   in stochastic textures, small where there are edges between smooth parts. Below 0: no memory. */
 static double txi_grain(const txi_window *w, txm_env *env) {
     txi_level l;
     txm_arena arena;
@@ -249,8 +247,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     return 1;
 }
 
-/* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels; the
-   strips of mere averages would have to fade. */
+/* How strongly the plan's strips pull, 0..256. They are real texture, so they pull at all levels;
+   the strips of mere averages would have to fade. */
 static int txi_pull_at(int level) {
     return level > 1 ? 230 : level ? 200 : 170;
 }
@@ -327,8 +325,8 @@ static double txi_mean_cost(const txi_canvas *t) {
     return count ? sum / count : 0;
 }
 
-/* The coarsest level: rounds from the onion as it is, and from labellings annealed from it; the one with
-   the smallest costs is kept. */
+/* The coarsest level: rounds from the onion as it is, and from labellings annealed from it; the one
+   with the smallest costs is kept. */
 static txm_status txi_first_level(const txi_filler *f, int level, txi_canvas *t, txm_env *env) {
     const txi_level *l = t->level;
     const size_t bytes = 4 * (size_t)l->width * (size_t)l->height;
@@ -557,8 +555,8 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
 
 /* Complete the finest level, and say where each hole pixel is copied from.
    copies  one per pixel of the window
-   poses   receives the filler's poses and after them the plan's, which copies[].pose counts; they live
-           as long as the filler                                                               */
+   poses   receives the filler's poses and after them the plan's, which copies[].pose counts; they
+           live as long as the filler */
 static txm_status txi_fill_finish(txi_filler *f, const txi_plan *plan, const txi_field *field,
                                   txi_copy *copies, const txi_pose **poses, int *pose_count,
                                   txm_env *env) {

@@ -5,20 +5,20 @@
 
 /* ---- laying the strips --------------------------------------------------------------------------
    Each hole pixel near a completed line belongs to the strip of the nearest line, or of the topmost
-   stroke that it lies in; it is copied from the strip's source columns.                             */
+   stroke that it lies in; it is copied from the strip's source columns.                          */
 
 enum {
     TXI_LAY_CORE = 3,        /* pixels from a line within which its strip counts fully            */
-    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole             */
-    TXI_LAY_TONE = 24,       /* levels; larger differences are none of tone, and not evened out    */
+    TXI_LAY_FADE = 8,        /* columns before the end of a line that ends in the hole            */
+    TXI_LAY_TONE = 24,       /* levels; larger differences are none of tone, and not evened out   */
     TXI_GUIDE_TOP = 100,     /* guide channel on a line                                          */
-    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                             */
+    TXI_GUIDE_RADIUS = 5,    /* pixels; beyond, the guide channel is 0                            */
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
 };
 #define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
 #define TXI_LAY_BARE 1.0    /* the same for strokes that cross others                             */
-#define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches                  */
-#define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case              */
+#define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches               */
+#define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case            */
 
 /* ---- cuts and colours between patches ---- */
 
@@ -47,9 +47,9 @@ static void txi_patch_cut(const txi_strip *s, int k, int *cut) {
     for (int j = 0; j < s->rows; j++) cut[j] += s->first + k * s->hop + 1;
 }
 
-/* What the colours of row j of a patch lack: against the known part (from = 0), or of the next patch
-   against this one in their overlap (1). Mean RGB differences into d; returns a weight, 0..1: the share
-   of the row that is compared, less for differences that are no matter of tone. */
+/* What the colours of row j of a patch lack: against the known part (from = 0), or of the next
+   patch against this one in their overlap (1). Mean RGB differences into d; returns a weight, 0..1:
+   the share of the row that is compared, less for differences that are no matter of tone. */
 static double txi_row_difference(const txi_strip *s, int k, int j, int from, double d[3]) {
     int sum[3] = {0, 0, 0}, hits = 0;
     for (int m = from ? s->hop - s->reach : -s->reach; m <= s->reach; m++) {
@@ -76,13 +76,14 @@ static double txi_row_difference(const txi_strip *s, int k, int j, int from, dou
     return (double)hits / whole / (1 + tone * tone);
 }
 
-/* What is to be added to the colours of row j in each patch, so that patches meet without a step and
-   the ends meet the known part: the offsets e minimise
+/* What is to be added to the colours of row j in each patch, so that patches meet without a step
+   and the ends meet the known part: the offsets e minimise
 
        sum over k of v(k) (e(k+1) - e(k) - d(k))^2 + w(k) (e(k) - g(k))^2 + 0.001 e(k)^2
 
    d: mean difference of neighbours in their overlap, g: of the known part; v, w: their weights. The
-   matrix has three diagonals and is solved by elimination. e: 4 doubles per patch, RGB and a factor. */
+   matrix has three diagonals and is solved by elimination. e: 4 doubles per patch, RGB and a
+   factor. */
 static void txi_row_offsets(const txi_strip *s, int j, double *e, float *offsets) {
     const int n = s->node_count;
     double before[3] = {0, 0, 0}, v_before = 0;
@@ -163,7 +164,8 @@ static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3])
     return 1;
 }
 
-/* What a pixel on the edge of a bare stroke is where another stroke lies under it: a piece of its inside. */
+/* What a pixel on the edge of a bare stroke is where another stroke lies under it: a piece of its
+   inside. */
 typedef struct txi_lay_edge {
     float x, y;       /* where that is copied from                                               */
     uint8_t color[3];
@@ -175,10 +177,10 @@ typedef struct txi_lay {
     txi_strips *all;
     txi_plan *plan;
     txi_pose *poses;
-    float *squares;   /* squared distance to the nearest column of the current strip               */
+    float *squares;   /* squared distance to the nearest column of the current strip              */
     int32_t *columns; /* that column, or -1                                                      */
-    txi_lay_edge *edges; /* NULL: no stroke is bare                                                */
-    float *claims;    /* distance to the core of the strip that has the pixel; large: none         */
+    txi_lay_edge *edges; /* NULL: no stroke is bare                                               */
+    float *claims;    /* distance to the core of the strip that has the pixel; large: none        */
 } txi_lay;
 
 /* The pixels within `radius` of a place, clipped to the window: x0, y0, x1, y1, inclusive. */
@@ -189,7 +191,8 @@ static void txi_lay_around(const txi_window *w, txm_vec2 p, int radius, int box[
     box[3] = txm_clampi((int)p.y + radius + 1, 0, w->height - 1);
 }
 
-/* For each hole pixel near a strip its nearest column; -1 for all others in the box of the strip. */
+/* For each hole pixel near a strip its nearest column; -1 for all others in the box of the
+   strip. */
 static void txi_lay_nearest(txi_lay *lay, const txi_strip *s, int box[4]) {
     const txi_window *w = lay->all->w;
     float widest = 0;
@@ -233,8 +236,8 @@ static int txi_lay_patch(const txi_lay *lay, const txi_strip *s, double column, 
     return column >= cut[row] ? k + 1 : k;
 }
 
-/* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end, and
-   less towards the end of a line that ends in the hole. */
+/* How much a strip's colours count, 0..255: fully within the core, not at all at the margin's end,
+   and less towards the end of a line that ends in the hole. */
 static int txi_lay_pull(const txi_strip *s, double away, int column) {
     const double core = s->is_bare ? TXI_LAY_BARE : (double)TXI_LAY_CORE;
     const double margin = s->is_bare ? TXI_LAY_BARE + 1 : (double)TXI_STRIP_MARGIN;
@@ -244,14 +247,15 @@ static int txi_lay_pull(const txi_strip *s, double away, int column) {
     return pull <= 0 ? 0 : (int)(255 * pull + 0.5);
 }
 
-/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends or at its
-   side. */
+/* Where a pixel lies in the strip, in the frame of its nearest column. 0: beyond the strip's ends
+   or at its side. */
 typedef struct txi_strip_spot {
     double column, row, across, away, half;
     float claim;
 } txi_strip_spot;
 
-static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, size_t at, txi_strip_spot *o) {
+static int txi_lay_spot(const txi_lay *lay, const txi_strip *s, int x, int y, size_t at,
+                        txi_strip_spot *o) {
     const int i = lay->columns[at];
     const txm_vec2 t = s->line.along[i], p = s->line.place[i];
     const double dx = x - (double)p.x, dy = y - (double)p.y;
@@ -270,8 +274,8 @@ static uint8_t txi_lay_round(double value) {
     return (uint8_t)(value < 0 ? 0 : value > 254.5 ? 255 : (int)(value + 0.5));
 }
 
-/* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is not
-   known there. */
+/* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is
+   not known there. */
 static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_spot *o, size_t at) {
     const int j = txm_clampi((int)(o->row + 0.5), 0, s->rows - 1);
     const int k = txi_lay_patch(lay, s, o->column, j), centre = s->first + k * s->hop;
@@ -284,13 +288,15 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
     const double mix = (forward ? o->column - centre : centre - o->column) / s->hop;
     double rgb[3];
     if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return 0;
-    if (s->is_bare && o->away > 0) { /* what lies beside the source is not always the usual background */
+    if (s->is_bare &&
+        o->away > 0) { /* what lies beside the source is not always the usual background */
         uint8_t beside[3];
         for (int c = 0; c < 3; c++) beside[c] = txi_lay_round(rgb[c]);
         if (txi_typical_distance(s, j, beside) > (double)s->tolerance) return 0;
     }
     for (int c = 0; c < 3; c++) { /* offsets run linearly from centre to centre */
-        const double here = (double)offset[c], there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
+        const double here = (double)offset[c],
+                     there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
         lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
     if (lay->edges) {
@@ -298,8 +304,10 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
         edge->is_used = 0;
         if (s->is_bare && o->away > -TXI_LAY_EDGE && o->half > 2 * TXI_LAY_EDGE) {
             const double across = o->half - TXI_LAY_EDGE;
-            const double inner = txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
-            const txm_vec2 q = txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
+            const double inner =
+                txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
+            const txm_vec2 q =
+                txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
             edge->is_used = (uint8_t)txi_lay_pixel(lay->all->w, (double)q.x, (double)q.y, rgb);
             for (int c = 0; c < 3; c++) edge->color[c] = txi_lay_round(rgb[c] + (double)offset[c]);
             edge->x = q.x;
@@ -313,7 +321,8 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
     return 1;
 }
 
-/* A stroke lies under the one that has a pixel: at the edge of that there is no background to be seen. */
+/* A stroke lies under the one that has a pixel: at the edge of that there is no background to be
+   seen. */
 static void txi_lay_over(txi_lay *lay, size_t at) {
     txi_lay_edge *edge = &lay->edges[at];
     if (!edge->is_used) return;
@@ -397,13 +406,15 @@ static void txi_guide_at(const txi_window *w, txi_plan *plan, const uint8_t *tab
     }
 }
 
-/* 100 exp(-d^2 / (2 * 1.5^2)) near known lines, outside of the hole, and near the completed ones. */
+/* 100 exp(-d^2 / (2 * 1.5^2)) near known lines, outside of the hole, and near the completed
+   ones. */
 static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *plan) {
     uint8_t table[TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS + 1];
     const txi_window *w = all->w;
     for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
         const double d = (double)i / ((double)TXI_GUIDE_STEPS * (double)TXI_GUIDE_SIGMA);
-        table[i] = (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+        table[i] =
+            (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
     }
     for (int i = 0; lines && i < lines->thin_count; i++)
         txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,
@@ -425,8 +436,8 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
 /* ---- the plan ---- */
 
 static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *lines,
-                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena, txm_arena *scratch,
-                               txm_env *env, txi_plan *plan, txi_pose **poses) {
+                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena,
+                               txm_arena *scratch, txm_env *env, txi_plan *plan, txi_pose **poses) {
     const txi_window *w = all->w;
     const size_t pixels = (size_t)w->width * (size_t)w->height;
     txi_lay lay;
@@ -447,7 +458,8 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
         if (all->strips[i].is_bare && !lay.edges && !scratch->failed)
             lay.edges = (txi_lay_edge *)txm_arena_zero(scratch, pixels, sizeof *lay.edges);
     }
-    lay.poses = *poses = (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
+    lay.poses = *poses =
+        (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
     plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
     plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     plan->copies = (txi_copy *)txm_arena_alloc(arena, pixels, sizeof *plan->copies);
@@ -465,7 +477,8 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
 
 /* Lay strips of texture along the completed lines of a window [1, III.A].
 
-   lines   of the window: other lines to take texture from, and the known lines of the guide channel;
+   lines   of the window: other lines to take texture from, and the known lines of the guide
+   channel;
            NULL: none
    curves  the completed lines, count of them; may be none
    arena   holds plan and poses
@@ -473,10 +486,11 @@ static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *l
            have one piece and one pose per patch
    poses   receives pose_count poses
    return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED; after a failure *plan and *poses are NULL
-   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61        */
-static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
-                                int count, uint64_t seed, txm_arena *arena, txm_env *env,
-                                txi_plan *plan, const txi_pose **poses, int *pose_count) {
+   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61      */
+static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines,
+                                const txi_curve *curves, int count, uint64_t seed, txm_arena *arena,
+                                txm_env *env, txi_plan *plan, const txi_pose **poses,
+                                int *pose_count) {
     txi_strips all;
     txi_pose *made = NULL;
     txm_arena scratch;
@@ -493,8 +507,8 @@ static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines, con
     return status;
 }
 
-/* The same without texture: the colours across each line are the mean ones of its known ends, blended
-   along it. plan->copies has no pieces. */
+/* The same without texture: the colours across each line are the mean ones of its known ends,
+   blended along it. plan->copies has no pieces. */
 static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
                               int count, txm_arena *arena, txm_env *env, txi_plan *plan) {
     txi_strips all;
@@ -511,11 +525,13 @@ static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const
     return status;
 }
 
-/* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per pixel. */
+/* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per
+   pixel. */
 static void txi_draw_strips(const txi_window *w, const txi_plan *plan, uint8_t *rgb) {
     for (size_t i = 0; i < (size_t)w->width * (size_t)w->height; i++) {
         for (size_t c = 0; c < 3; c++) {
-            const int laid = (plan->color[4 * i + c] * plan->pull[i] + 90 * (255 - plan->pull[i])) / 255;
+            const int laid =
+                (plan->color[4 * i + c] * plan->pull[i] + 90 * (255 - plan->pull[i])) / 255;
             rgb[3 * i + c] = w->state[i] == TXI_VOID ? 0
                              : w->state[i] == TXI_HOLE ? (uint8_t)laid
                                                        : w->color[4 * i + c];

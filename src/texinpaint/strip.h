@@ -5,34 +5,36 @@
 #include "stroke.h"
 
 /* ---- strips: lines made straight ---------------------------------------------------------------
-   The texture along a line is treated in the line's own frame: column c is a place on the line, row j
-   lies across it, along the normal [1, III.A: frame v, d, n]. Two lines with the same contrast close
-   to each other, the sides of a stroke, are one strip; its rows between the lines are stretched to the
-   width that the stroke has at each column:
+   The texture along a line is treated in the line's own frame: column c is a place on the line, row
+   j lies across it, along the normal [1, III.A: frame v, d, n]. Two lines with the same contrast
+   close to each other, the sides of a stroke, are one strip; its rows between the lines are
+   stretched to the width that the stroke has at each column:
 
        margin rows  |  inside + 1 rows from line to line (1 row: a single line)  |  margin rows
 
    In this frame the paper's rotated candidates (each source patch turned so that its line has the
-   direction of the target's) need no search: every source is turned exactly, at each column, and laid
-   with its line on the target's line. The paper's search over +-10 degrees makes up for lines that are
-   known roughly; here they are registered to a fraction of a pixel against the mean profile of the
-   line. And the costs of all pairs of candidates become sums along diagonals of one table.       */
+   direction of the target's) need no search: every source is turned exactly, at each column, and
+   laid with its line on the target's line. The paper's search over +-10 degrees makes up for lines
+   that are known roughly; here they are registered to a fraction of a pixel against the mean
+   profile of the line. And the costs of all pairs of candidates become sums along diagonals of one
+   table. */
 
 enum {
-    TXI_STRIP_MARGIN = 10,   /* rows on each side, pixels; ours                                  */
-    TXI_STRIP_INSIDE = TXI_STROKE_WIDEST, /* most rows between the lines of a stroke               */
+    TXI_STRIP_MARGIN = 10, /* rows on each side, pixels; ours                                  */
+    TXI_STRIP_INSIDE = TXI_STROKE_WIDEST, /* most rows between the lines of a stroke              */
     TXI_STRIP_ROWS = 2 * TXI_STRIP_MARGIN + 1 + TXI_STRIP_INSIDE,
-    TXI_STRIP_REACH = 8,     /* columns of a patch on each side of its centre: radius r [1, III.A] */
-    TXI_STRIP_HOP = 6,       /* columns between neighbouring patches, so that they overlap        */
-    TXI_STRIP_REACH_LEAST = 3, /* of patches where little of a line is known                       */
+    TXI_STRIP_REACH = 8, /* columns of a patch on each side of its centre: radius r [1, III.A] */
+    TXI_STRIP_HOP = 6,   /* columns between neighbouring patches, so that they overlap        */
+    TXI_STRIP_REACH_LEAST = 3, /* of patches where little of a line is known                      */
     TXI_STRIP_COLUMNS = 448, /* most columns of sources for a strip                               */
-    TXI_STRIP_COLUMNS_LEAST = 128, /* and so many at least, however many strips there are          */
+    TXI_STRIP_COLUMNS_LEAST = 128, /* and so many at least, however many strips there are         */
     TXI_STRIP_CELLS = 4 << 20, /* of all tables of overlaps, 4 bytes each: 16 MB                  */
-    TXI_STRIP_OTHERS = 3,    /* most other lines a strip takes texture from                       */
-    TXI_STRIP_KEEP = 24,     /* candidates of a patch after pruning                               */
-    TXI_STRIP_CLEAN = 24,    /* columns of a stroke that show all of it, from which on others are not used */
-    TXI_STRIP_ONWARD = 12,   /* pixels that lines without an end are continued behind the hole      */
-    TXI_STRIP_PROFILE = 12,  /* known columns on each side that profiles are means of             */
+    TXI_STRIP_OTHERS = 3, /* most other lines a strip takes texture from                       */
+    TXI_STRIP_KEEP = 24,  /* candidates of a patch after pruning                               */
+    TXI_STRIP_CLEAN = 24, /* columns of a stroke that show all of it, from which on no others are
+                             used                                                            */
+    TXI_STRIP_ONWARD = 12,  /* pixels that lines without an end are continued behind the hole    */
+    TXI_STRIP_PROFILE = 12, /* known columns on each side that profiles are means of             */
     TXI_STRIP_FEATURES = (3 * TXI_STRIP_ROWS + 15) / 16 * 16
 };
 
@@ -57,25 +59,25 @@ typedef struct txi_strip {
     int curve, partner; /* indices of the curves; partner -1: a single line                       */
     int inside, rows;
     int first, last;    /* columns with hole pixels                                              */
-    int tail;           /* columns behind the hole are no known part of the line, or are missing   */
+    int tail;           /* columns behind the hole are no known part of the line, or are missing  */
     int is_open;        /* the line ends in the hole                                             */
-    int is_bare;        /* a stroke that crosses others: see cover.h                               */
-    uint8_t *typical;   /* its usual colours, 3 per row; NULL: not known                           */
-    float tolerance;    /* levels; colours farther from the usual ones are not those of the stroke   */
+    int is_bare;        /* a stroke that crosses others: see cover.h                              */
+    uint8_t *typical;   /* its usual colours, 3 per row; NULL: not known                          */
+    float tolerance;   /* levels; colours farther from the usual ones are not those of the stroke */
     txi_ribbon line;
     uint8_t *color;     /* 3 per column and row                                                  */
     uint8_t *known;     /* 1 per column and row: the colour is known                             */
     txi_column *sources;
     int source_count, room; /* room: most of them                                                */
     uint8_t *source_color; /* 3 per source column and row                                         */
-    int16_t *source_feature; /* features per source column: colours, weighted                      */
-    int features;        /* 3 * rows, rounded up to a multiple of 16                               */
+    int16_t *source_feature; /* features per source column: colours, weighted                     */
+    int features;        /* 3 * rows, rounded up to a multiple of 16                              */
     int reach, hop;
     int *labels;         /* source columns that are centres of whole patches                      */
     int label_count;
-    int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                 */
-    float *profile;      /* 2 * 3 * rows: mean colours in front of the hole and behind it; NULL: none */
-    int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop       */
+    int32_t *overlap;    /* source_count^2: see txi_strip_overlaps                                */
+    float *profile;  /* 2 * 3 * rows: mean colours in front of the hole and behind it; NULL: none */
+    int node, node_count; /* its patches in the graph; patch k is centred at first + k * hop      */
     int *chosen;         /* per patch: the source column chosen                                   */
 } txi_strip;
 
@@ -83,8 +85,8 @@ static txm_vec2 txi_normal_of(txm_vec2 along) {
     return txm_v2(-along.y, along.x);
 }
 
-/* RGB at a place, bilinear, from 16 bits of fraction. Returns 0 if a pixel needed is not known, 1 if
-   all are, 2 if all may be copied from; rgb is black for 0. */
+/* RGB at a place, bilinear, at a place rounded to 1/256 of a pixel. Returns 0 if a pixel needed is
+   not known, 1 if all are, 2 if all may be copied from; rgb is black for 0. */
 static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) {
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!(x >= 0 && y >= 0 && x <= w->width - 1 && y <= w->height - 1)) return 0;
@@ -108,8 +110,8 @@ static int txi_strip_pixel(const txi_window *w, double x, double y, int rgb[3]) 
     return best;
 }
 
-/* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width, along
-   the normal. */
+/* Where a row, perhaps between two, lies: distance from the middle of a stroke of this half width,
+   along the normal. */
 static double txi_row_offset(double row, int inside, double half) {
     const double k = row - (double)TXI_STRIP_MARGIN;
     if (k <= 0) return k - half;
@@ -156,17 +158,19 @@ static txm_status txi_ribbon_make(const txm_vec2 *points, int count, txm_arena *
     return TXM_OK;
 }
 
-/* The points of a curve. One that goes through the hole, but meets no line on the other side of it, is
-   continued straight on there, so that its strip fits what is known; is_open receives 0 for it, 1 for one
-   that ends in the hole. points: room for TXI_STRIP_ONWARD more than the curve has. Returns how many. */
-static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *points, int *is_open) {
+/* The points of a curve. One that goes through the hole, but meets no line on the other side of it,
+   is continued straight on there, so that its strip fits what is known; is_open receives 0 for it,
+   1 for one that ends in the hole. points: room for TXI_STRIP_ONWARD more than the curve has.
+   Returns how many. */
+static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *points,
+                            int *is_open) {
     const int n = c->count;
     memcpy(points, c->points, (size_t)n * sizeof *points);
     *is_open = c->ends[1] < 0;
     if (c->ends[1] >= 0 || n < 4) return n;
     const txm_vec2 p = points[n - 1], t = txi_curve_along(c, n - 2);
-    const ptrdiff_t beyond =
-        txi_pixel(w->width, w->height, (double)p.x + 3 * (double)t.x, (double)p.y + 3 * (double)t.y);
+    const ptrdiff_t beyond = txi_pixel(w->width, w->height, (double)p.x + 3 * (double)t.x,
+                                       (double)p.y + 3 * (double)t.y);
     if (beyond < 0 || (w->state[beyond] != TXI_KNOWN && w->state[beyond] != TXI_FOREIGN)) return n;
     *is_open = 0;
     for (int i = 0; i < TXI_STRIP_ONWARD; i++)
@@ -176,7 +180,7 @@ static int txi_curve_onward(const txi_window *w, const txi_curve *c, txm_vec2 *p
 }
 
 enum {
-    TXI_REGISTER_SIDE = 12,  /* samples on each side of a line, half a pixel apart                 */
+    TXI_REGISTER_SIDE = 12,  /* samples on each side of a line, half a pixel apart                */
     TXI_REGISTER_TAPS = 2 * TXI_REGISTER_SIDE + 1,
     TXI_REGISTER_SHIFT = 3   /* most samples that a line is moved                                 */
 };
@@ -237,7 +241,8 @@ static void txi_register_fill(float *shift, const uint8_t *known, int count) {
 }
 
 /* Move the columns of a single line across it, so that its known part looks alike everywhere: each
-   column is registered against the mean profile. Missing columns are moved as those at their ends. */
+   column is registered against the mean profile. Missing columns are moved as those at their
+   ends. */
 static txm_status txi_ribbon_register(const txi_window *w, txi_ribbon *r, txm_arena *scratch,
                                       txm_env *env) {
     enum { SIZE = 3 * TXI_REGISTER_TAPS };
@@ -291,8 +296,9 @@ static void txi_ribbon_crop(txi_ribbon *r, int lo, int hi) {
     r->count = hi - lo;
 }
 
-/* Make a stroke of columns lo..hi - 1 of a line, its other side `width` to the right, or all to the left;
-   the other columns are cropped. 0: it would be narrower than a pixel or wider than TXI_STRIP_INSIDE. */
+/* Make a stroke of columns lo..hi - 1 of a line, its other side `width` to the right, or all to the
+   left; the other columns are cropped. 0: it would be narrower than a pixel or wider than
+   TXI_STRIP_INSIDE. */
 static int txi_ribbon_widen_by(txi_ribbon *r, int lo, int hi, const float *width) {
     const double sign = width[lo] > 0 ? 1 : -1;
     for (int i = lo; i < hi; i++) {
@@ -310,8 +316,9 @@ static int txi_ribbon_widen_by(txi_ribbon *r, int lo, int hi, const float *width
     return 1;
 }
 
-/* Widen a line to the stroke between it and its partner, where both run along each other. 0: they do
-   not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then unchanged.
+/* Widen a line to the stroke between it and its partner, where both run along each other. 0: they
+   do not, within TXI_STRIP_INSIDE pixels, from column `first` to `last`; the line is then
+   unchanged.
    width  room for a float per column                                                            */
 static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first, int last,
                             float *width) {
@@ -338,7 +345,8 @@ static int txi_ribbon_widen(txi_ribbon *r, const txi_ribbon *partner, int first,
 }
 
 /* The same for a partner that is the line itself, moved sideways: the points of both are paired. */
-static int txi_ribbon_widen_even(txi_ribbon *r, const txm_vec2 *points, const txm_vec2 *moved, float *width) {
+static int txi_ribbon_widen_even(txi_ribbon *r, const txm_vec2 *points, const txm_vec2 *moved,
+                                 float *width) {
     for (int i = 0; i < r->count; i++) {
         const txm_vec2 t = r->along[i];
         const double x = (double)moved[i].x - points[i].x, y = (double)moved[i].y - points[i].y;
@@ -399,8 +407,8 @@ static txm_vec2 txi_column_place(const txi_column *a, double t) {
                   txm_float((double)a->place.y + u * (double)a->along.x));
 }
 
-/* Add columns from..to of a line to a strip's sources: forwards, or backwards (turned by half a turn),
-   or mirrored (backwards, but with the rows as they are). */
+/* Add columns from..to of a line to a strip's sources: forwards, or backwards (turned by half a
+   turn), or mirrored (backwards, but with the rows as they are). */
 static void txi_columns_add(txi_strip *s, const txi_ribbon *r, int from, int to, int backwards,
                            int mirrored) {
     const int room = s->room - s->source_count;
@@ -429,8 +437,8 @@ static int txi_columns_own(txi_strip *s, int mirrored) {
     return s->source_count - before;
 }
 
-/* The weight of a row's colours in costs, in quarters: rows far from the lines count less, those beside a
-   bare stroke hardly or not. */
+/* The weight of a row's colours in costs, in quarters: rows far from the lines count less, those
+   beside a bare stroke hardly or not. */
 static int txi_row_weight(const txi_strip *s, int j) {
     const int k = j - TXI_STRIP_MARGIN, out = k < 0 ? -k : k > s->inside ? k - s->inside : 0;
     if (s->is_bare) return out == 0 ? 4 : out == 1;
@@ -447,8 +455,8 @@ static double txi_typical_distance(const txi_strip *s, int j, const uint8_t *col
     return sqrt(sum / 3.0);
 }
 
-/* How many rows of a column, from the edge or `beside` rows beside it, do not show the bare stroke, but
-   something that covers it or lies beside it. */
+/* How many rows of a column, from the edge or `beside` rows beside it, do not show the bare stroke,
+   but something that covers it or lies beside it. */
 static int txi_column_other(const txi_strip *s, const uint8_t *color, int beside) {
     int other = 0;
     for (int j = TXI_STRIP_MARGIN - beside; j <= TXI_STRIP_MARGIN + s->inside + beside; j++)
@@ -456,8 +464,8 @@ static int txi_column_other(const txi_strip *s, const uint8_t *color, int beside
     return other;
 }
 
-/* Of the usable source columns of a bare stroke only those stay that show it: edges and all, if there are
-   enough of them. */
+/* Of the usable source columns of a bare stroke only those stay that show it: edges and all, if
+   there are enough of them. */
 static void txi_columns_bare(txi_strip *s) {
     int clean = 0;
     for (int i = 0; i < s->source_count; i++)
@@ -476,12 +484,13 @@ static void txi_strip_feature(const txi_strip *s, const uint8_t *color, int16_t 
             feature[3 * j + c] = (int16_t)(color[3 * j + c] * txi_row_weight(s, j) / 4);
 }
 
-/* Colours and features of the sources. Where a row is not known the nearest known one towards the line
-   counts. A column whose middle is not known, or less than two thirds, breaks its run. */
+/* Colours and features of the sources. Where a row is not known the nearest known one towards the
+   line counts. A column whose middle is not known, or less than two thirds, breaks its run. */
 static txm_status txi_columns_sample(const txi_window *w, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
     const size_t rows = (size_t)s->rows, count = (size_t)s->source_count;
-    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside, beside = s->is_bare ? 1 : 2;
+    const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside,
+              beside = s->is_bare ? 1 : 2;
     s->features = (3 * s->rows + 15) / 16 * 16;
     s->source_color = (uint8_t *)txm_arena_alloc(arena, count * rows, 3);
     s->source_feature =
@@ -534,7 +543,8 @@ static int32_t txi_feature_ssd(const int16_t *a, const int16_t *b, const int16_t
    centred at source column a and the next one, at b, overlap in 2 reach - hop + 1 columns:
 
        E(a, b) = sum of C(a + k, b - hop + k), k = hop - reach .. reach
-               = S(a + hop - reach, b - reach),  S(p, q) = sum of C(p + m, q + m), m = 0 .. 2 reach - hop
+               = S(a + hop - reach, b - reach),
+       S(p, q) = sum of C(p + m, q + m), m = 0 .. 2 reach - hop
 
    overlap receives S, by running sums along diagonals.
    values  room for source_count int32                                                           */
@@ -598,8 +608,8 @@ static void txi_strip_unary(const txi_strip *s, int patch, int16_t *feature, int
             const int64_t sum =
                 (int64_t)unary[i] +
                 txi_feature_ssd(feature,
-                                s->source_feature + (size_t)(s->labels[i] + k) * (size_t)width, mask,
-                                width);
+                                s->source_feature + (size_t)(s->labels[i] + k) * (size_t)width,
+                                mask, width);
             unary[i] = (int32_t)(sum < TXI_COST_MOST ? sum : (int64_t)TXI_COST_MOST);
         }
     }
@@ -607,8 +617,8 @@ static void txi_strip_unary(const txi_strip *s, int patch, int16_t *feature, int
 
 /* ---- other lines as sources ---- */
 
-/* Mean squared difference between the mean of a strip's known columns and the profile of an end of a
-   line, read from left to right (turned 0) or from right to left. */
+/* Mean squared difference between the mean of a strip's known columns and the profile of an end of
+   a line, read from left to right (turned 0) or from right to left. */
 static double txi_strip_unlike(const double *mean, const txi_end *e, int turned) {
     double sum = 0;
     for (int t = -5; t <= 5; t++) {
@@ -659,8 +669,8 @@ static int txi_strip_others(const txi_strip *s, const txi_lines *lines, const in
     return n;
 }
 
-/* All sources of a strip: its own known columns; where these are few, columns of similar other lines,
-   and its own mirrored. */
+/* All sources of a strip: its own known columns; where these are few, columns of similar other
+   lines, and its own mirrored. */
 static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
                                     const txi_curve *curve, txi_strip *s, txm_arena *arena,
                                     txm_env *env) {
@@ -688,10 +698,13 @@ static txm_status txi_strip_sources(const txi_window *w, const txi_lines *lines,
 
 /* ---- profiles ---- */
 
-/* The mean colours of the known columns next to the hole, row by row, on one side of it. Rows of which
-   nothing is known are like the next one towards the lines. 0: the rows of the lines are not known. */
+/* The mean colours of the known columns next to the hole, row by row, on one side of it. Rows of
+   which nothing is known are like the next one towards the lines. 0: the rows of the lines are not
+   known. */
 static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
-    const int from = end ? s->last + 1 : s->first > TXI_STRIP_PROFILE ? s->first - TXI_STRIP_PROFILE : 0;
+    const int from = end                            ? s->last + 1
+                     : s->first > TXI_STRIP_PROFILE ? s->first - TXI_STRIP_PROFILE
+                                                    : 0;
     const int behind = end ? from + TXI_STRIP_PROFILE : s->first;
     const int to = behind < s->line.count ? behind : s->line.count;
     const int low = TXI_STRIP_MARGIN, high = TXI_STRIP_MARGIN + s->inside;
@@ -704,7 +717,8 @@ static int txi_strip_profile_side(const txi_strip *s, int end, float *profile) {
             for (int c = 0; c < 3 && s->known[at]; c++) sum[c] += s->color[3 * at + (size_t)c];
             known[j] += s->known[at];
         }
-        for (int c = 0; c < 3 && known[j]; c++) profile[3 * j + c] = (float)sum[c] / (float)known[j];
+        for (int c = 0; c < 3 && known[j]; c++)
+            profile[3 * j + c] = (float)sum[c] / (float)known[j];
         if (!known[j] && j >= low && j <= high) return 0;
     }
     for (int j = low - 1; j >= 0; j--)

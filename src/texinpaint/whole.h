@@ -5,34 +5,39 @@
 #include "strip.h"
 
 /* ---- whole strokes ------------------------------------------------------------------------------
-   Where bars cross near the border of the hole, one of them hides an edge of the other, and that edge
-   has no end to join. The other edge is enough: it is joined from border to border, and on both sides
-   of the hole the bar has the same width and the same colour. So the hidden edge is the joined one,
-   moved by the width. Curves that were found for its ends without that knowledge are taken away.   */
+   Where bars cross near the border of the hole, one of them hides an edge of the other, and that
+   edge has no end to join. The other edge is enough: it is joined from border to border, and on
+   both sides of the hole the bar has the same width and the same colour. So the hidden edge is the
+   joined one, moved by the width. Curves that were found for its ends without that knowledge are
+   taken away. */
 
 enum {
-    TXI_FLANK_KNOWN = 64,  /* pixels of the known part of a curve that a width is measured on; ours   */
-    TXI_FLANK_SKIP = 1,    /* pixels next to the hole that are left out                             */
-    TXI_FLANK_COLOR = 7,   /* of these so many for the colour                                      */
-    TXI_FLANK_LEAST = 7,   /* so many of them must agree about the width; ours                       */
-    TXI_CROSS_STEP = 3,    /* points of a curve from one to the next that is tested for crossings      */
+    TXI_FLANK_KNOWN =
+        64,              /* pixels of the known part of a curve that a width is measured on; ours */
+    TXI_FLANK_SKIP = 1,  /* pixels next to the hole that are left out                           */
+    TXI_FLANK_COLOR = 7, /* of these so many for the colour                                     */
+    TXI_FLANK_LEAST = 7, /* so many of them must agree about the width; ours                    */
+    TXI_CROSS_STEP = 3,  /* points of a curve from one to the next that is tested for crossings */
     TXI_FLANK_STEPS = 2 * (TXI_STROKE_WIDEST + 2)
 };
-#define TXI_FLANK_FROM 2.0    /* pixels from the curve at which the colour beside it is taken         */
-#define TXI_FLANK_TONE 32.0   /* levels; colours that differ more are never the same one; ours         */
-#define TXI_FLANK_CATCH 3.0   /* pixels; ends as near as that to the other edge belong to it; ours     */
-#define TXI_FLANK_DIFFER 0.25 /* share by which the widths on both sides of the hole may differ; ours */
+#define TXI_FLANK_FROM 2.0    /* pixels from the curve at which the colour beside it is taken     */
+#define TXI_FLANK_TONE 32.0   /* levels; colours that differ more are never the same one; ours    */
+#define TXI_FLANK_CATCH 3.0  /* pixels; ends as near as that to the other edge belong to it; ours */
+#define TXI_FLANK_DIFFER \
+    0.25 /* share by which the widths on both sides of the hole may differ; ours */
 
 /* What lies beside a curve in its known part on one side of the hole. */
 typedef struct txi_flank {
-    double width;    /* pixels to the opposite edge; 0: not known                                   */
-    double color[3]; /* up to there, RGB                                                           */
+    double width;    /* pixels to the opposite edge; 0: not known                                 */
+    double color[3]; /* up to there, RGB                                                          */
 } txi_flank;
 
 /* RGB at a distance to the right of point i of a curve; 0: not known. */
-static int txi_flank_pixel(const txi_window *w, const txi_curve *c, int i, double away, int rgb[3]) {
+static int txi_flank_pixel(const txi_window *w, const txi_curve *c, int i, double away,
+                           int rgb[3]) {
     const txm_vec2 t = txi_curve_along(c, i), p = c->points[i];
-    return txi_strip_pixel(w, (double)p.x - away * (double)t.y, (double)p.y + away * (double)t.x, rgb);
+    return txi_strip_pixel(w, (double)p.x - away * (double)t.y, (double)p.y + away * (double)t.x,
+                           rgb);
 }
 
 static double txi_flank_distance(const double color[3], const int rgb[3]) {
@@ -46,9 +51,10 @@ static int txi_flank_point(const txi_curve *c, int end, int i) {
     return k >= 0 && k < c->count ? k : -1;
 }
 
-/* The median of each channel beside the curve near the hole; side 1 right, -1 left. 0: too little is
-   known. */
-static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int side, double color[3]) {
+/* The median of each channel beside the curve near the hole; side 1 right, -1 left. 0: too little
+   is known. */
+static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int side,
+                           double color[3]) {
     int n = 0, values[3][TXI_FLANK_COLOR];
     for (int i = TXI_FLANK_SKIP; n < TXI_FLANK_COLOR; i++) {
         const int point = txi_flank_point(c, end, i);
@@ -67,10 +73,10 @@ static int txi_flank_color(const txi_window *w, const txi_curve *c, int end, int
     return n >= 4;
 }
 
-/* How far the colour beside point i reaches: to where half of the step to the next colour is done. 0: to
-   something that is not known; -1: it is another colour. */
-static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, int side, const double color[3],
-                              double differs) {
+/* How far the colour beside point i reaches: to where half of the step to the next colour is done.
+   0: to something that is not known; -1: it is another colour. */
+static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, int side,
+                              const double color[3], double differs) {
     int rgb[3];
     for (int k = 0; k < TXI_FLANK_STEPS; k++) {
         const double away = TXI_FLANK_FROM + 0.5 * k;
@@ -88,10 +94,11 @@ static double txi_flank_width(const txi_window *w, const txi_curve *c, int i, in
     return 0;
 }
 
-/* Measure what lies on one side of a curve (1 right, -1 left) at one end of the hole: its colour, and how
-   far that reaches by most of the points, as far as the curve has it at its side. 0: not even the
-   colour is known. */
-static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int side, txi_flank *f) {
+/* Measure what lies on one side of a curve (1 right, -1 left) at one end of the hole: its colour,
+   and how far that reaches by most of the points, as far as the curve has it at its side. 0: not
+   even the colour is known. */
+static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int side,
+                          txi_flank *f) {
     double widths[TXI_FLANK_KNOWN], across[3];
     int n = 0, most = 0, others = 0;
     f->width = 0;
@@ -119,14 +126,15 @@ static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int 
         most = agree;
         f->width = sum / agree;
     }
-    if (most < TXI_FLANK_LEAST || 5 * most < 3 * n || f->width > (double)TXI_STROKE_WIDEST) f->width = 0;
+    if (most < TXI_FLANK_LEAST || 5 * most < 3 * n || f->width > (double)TXI_STROKE_WIDEST)
+        f->width = 0;
     return 1;
 }
 
-/* The other edge of a stroke of which c is one: its points moved by the width, which changes evenly from
-   one side of the hole to the other. */
-static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const txi_flank f[2], int side,
-                                 txm_arena *arena, txm_env *env, txi_curve *other) {
+/* The other edge of a stroke of which c is one: its points moved by the width, which changes evenly
+   from one side of the hole to the other. */
+static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const txi_flank f[2],
+                                 int side, txm_arena *arena, txm_env *env, txi_curve *other) {
     *other = *c;
     other->points = (txm_vec2 *)txm_arena_alloc(arena, (size_t)c->count, sizeof *other->points);
     if (!other->points) return txi_no_memory(env);
@@ -136,7 +144,8 @@ static txm_status txi_other_edge(const txi_window *w, const txi_curve *c, const 
         const double t = part < 0 ? 0 : part > 1 ? 1 : part;
         const double away = side * (f[0].width + t * (f[1].width - f[0].width));
         const txm_vec2 along = txi_curve_along(c, i), p = c->points[i];
-        const double x = (double)p.x - away * (double)along.y, y = (double)p.y + away * (double)along.x;
+        const double x = (double)p.x - away * (double)along.y,
+                     y = (double)p.y + away * (double)along.x;
         const ptrdiff_t at = txi_pixel(w->width, w->height, x, y);
         other->points[i] = txm_v2(txm_float(x), txm_float(y));
         if (at < 0 || w->state[at] != TXI_HOLE) continue;
@@ -151,7 +160,8 @@ static int txi_end_on_curve(const txi_end *e, const txi_curve *c) {
     double best = TXI_FLANK_CATCH * TXI_FLANK_CATCH;
     int found = 0;
     for (int i = 0; i < c->count; i++) {
-        const double x = (double)e->place.x - c->points[i].x, y = (double)e->place.y - c->points[i].y;
+        const double x = (double)e->place.x - c->points[i].x,
+                     y = (double)e->place.y - c->points[i].y;
         const txm_vec2 t = txi_curve_along(c, i);
         const double dot = (double)t.x * e->heading.x + (double)t.y * e->heading.y;
         if (x * x + y * y > best || (dot < 0.85 && dot > -0.85)) continue;
@@ -161,15 +171,17 @@ static int txi_end_on_curve(const txi_end *e, const txi_curve *c) {
     return found;
 }
 
-/* Which curves give way to a new edge: those of its ends. Marks them in gone; 0: one of them is surer
-   than the new one, or none of them was seen to go on behind the hole without an end there. */
+/* Which curves give way to a new edge: those of its ends. Marks them in gone; 0: one of them is
+   surer than the new one, or none of them was seen to go on behind the hole without an end
+   there. */
 static int txi_edge_replaces(const txi_lines *l, const txi_curve *curves, int count, int from,
                              const int *partners, txi_curve *edge, uint8_t *gone) {
     int found[2] = {-1, -1}, hidden = 0;
     for (int i = 0; i < l->end_count; i++) {
         const int on = txi_end_on_curve(&l->ends[i], edge);
         if (!on || i == curves[from].ends[0] || i == curves[from].ends[1]) continue;
-        if (found[on - 1] < 0 || l->ends[i].length > l->ends[found[on - 1]].length) found[on - 1] = i;
+        if (found[on - 1] < 0 || l->ends[i].length > l->ends[found[on - 1]].length)
+            found[on - 1] = i;
     }
     if (found[0] < 0 && found[1] < 0) return 0;
     for (int k = 0; k < count; k++) {
@@ -189,8 +201,8 @@ static int txi_edge_replaces(const txi_lines *l, const txi_curve *curves, int co
     return 1;
 }
 
-/* What lies on one side of a curve at both ends of the hole. 0: it is not the same, or its width is not
-   known. A width that is known at one end only counts for both. */
+/* What lies on one side of a curve at both ends of the hole. 0: it is not the same, or its width is
+   not known. A width that is known at one end only counts for both. */
 static int txi_stroke_flanks(const txi_window *w, const txi_curve *c, int side, txi_flank f[2]) {
     if (!txi_flank_make(w, c, 0, side, &f[0]) || !txi_flank_make(w, c, 1, side, &f[1])) return 0;
     if (f[0].width <= 0) f[0].width = f[1].width;
@@ -201,21 +213,24 @@ static int txi_stroke_flanks(const txi_window *w, const txi_curve *c, int side, 
     return txi_end_color_distance(f[0].color, f[1].color) <= 0.25 * (double)c->strength + 4;
 }
 
-/* Make a whole stroke of curve i, if it is one edge of it; *edge receives the other one. 0: it is not. */
-static int txi_whole_stroke(const txi_window *w, const txi_lines *l, const txi_curve *curves, int count,
-                            int i, const int *partners, txm_arena *arena, txm_env *env, uint8_t *gone,
-                            txi_curve *edge, txm_status *status) {
+/* Make a whole stroke of curve i, if it is one edge of it; *edge receives the other one. 0: it is
+   not. */
+static int txi_whole_stroke(const txi_window *w, const txi_lines *l, const txi_curve *curves,
+                            int count, int i, const int *partners, txm_arena *arena, txm_env *env,
+                            uint8_t *gone, txi_curve *edge, txm_status *status) {
     const txi_curve *c = &curves[i];
     txi_flank f[2][2]; /* left and right, both ends */
     int usable[2];
     for (int k = 0; k < 2; k++) usable[k] = txi_stroke_flanks(w, c, k ? 1 : -1, f[k]);
-    const int first = usable[1] && (!usable[0] || f[1][0].width < f[0][0].width); /* the narrower one */
+    const int first =
+        usable[1] && (!usable[0] || f[1][0].width < f[0][0].width); /* the narrower one */
     for (int n = 0; n < 2; n++) {
         const int k = n ? !first : first;
         if (!usable[k]) continue;
         *status = txi_other_edge(w, c, f[k], k ? 1 : -1, arena, env, edge);
         if (*status != TXM_OK) return 0;
-        if (edge->first >= 0 && txi_edge_replaces(l, curves, count, i, partners, edge, gone)) return 1;
+        if (edge->first >= 0 && txi_edge_replaces(l, curves, count, i, partners, edge, gone))
+            return 1;
     }
     return 0;
 }
@@ -239,11 +254,12 @@ static int txi_curve_crosses(const txi_curve *curves, int count, int i) {
 
 /* Complete strokes of which only one edge was joined.
 
-   curves  *count curves in the arena, replaced by an array with the new edges, which are partners of the
+   curves  *count curves in the arena, replaced by an array with the new edges, which are partners
+   of the
            joined ones; curves that were found for their ends are gone
    cost    O(curves * ends * points)                                                            */
-static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm_arena *arena, txm_env *env,
-                                    txi_curve **curves, int *count) {
+static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm_arena *arena,
+                                    txm_env *env, txi_curve **curves, int *count) {
     const int most = 2 * *count;
     int n = *count, kept = 0;
     txm_arena scratch;
@@ -264,7 +280,8 @@ static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm
         uint8_t *gone = done + most;
         int i = -1;
         for (int k = 0; k < *count; k++) {
-            if (done[k] || partners[k] >= 0 || c[k].ends[1] < 0 || c[k].last <= c[k].first) continue;
+            if (done[k] || partners[k] >= 0 || c[k].ends[1] < 0 || c[k].last <= c[k].first)
+                continue;
             if (i < 0 || c[k].cost < c[i].cost) i = k;
         }
         if (i < 0) break;
