@@ -137,7 +137,7 @@ static txm_status txi_plan_hypothesis(const txi_choice *c, txi_hypothesis *h, tx
     if (h->is_mean || (TXI_LEFT_OUT & TXI_STRIPS) != 0)
         return txi_cartoon(c->w, &c->lines, h->curves, h->curve_count, &h->memory, env, &h->plan);
     return txi_plan_make(c->w, &c->lines, h->curves, h->curve_count, c->seed, &h->memory, env,
-                         &h->plan, &h->plan.poses, &h->plan.pose_count);
+                         &h->plan);
 }
 
 /* Complete one hypothesis to half resolution. */
@@ -215,6 +215,7 @@ static txm_status txi_try_one(txi_choice *c, int i, txm_env *env) {
     else best = h;
     txm_arena_free(&best->memory);
     best->curves = NULL;
+    if (h->is_mean) h->curves = NULL; /* they were those of the other one */
     return TXM_OK;
 }
 

@@ -16,7 +16,7 @@ enum {
     TXI_GUIDE_STEPS = 16     /* of its table per pixel                                            */
 };
 #define TXI_GUIDE_SIGMA 1.5 /* pixels                                                             */
-#define TXI_LAY_BARE 1.0    /* the same for strokes that cross others                             */
+#define TXI_LAY_BARE 1.0    /* the same for strokes that cross others: pixels from their edge     */
 #define TXI_LAY_EDGE 1.5    /* pixels inside of such a stroke that its edge reaches               */
 #define TXI_LAY_CLAIM 0.5   /* pixels from a line that belong to its strip in any case            */
 
@@ -141,10 +141,10 @@ static txm_status txi_strips_finish(txi_strips *all, txm_arena *arena, txm_env *
 /* RGB at a place, Catmull-Rom, or bilinear where not all of its 16 pixels may be copied from; 0 if
    not even that is possible. */
 static int txi_lay_pixel(const txi_window *w, double x, double y, double rgb[3]) {
-    const int bx = (int)floor(x), by = (int)floor(y);
     int coarse[3];
     double wx[4], wy[4];
     if (txi_strip_pixel(w, x, y, coarse) != 2) return 0;
+    const int bx = (int)floor(x), by = (int)floor(y);
     for (int c = 0; c < 3; c++) rgb[c] = coarse[c];
     if (bx < 1 || by < 1 || bx + 2 >= w->width || by + 2 >= w->height) return 1;
     const size_t corner = (size_t)(by - 1) * (size_t)w->width + (size_t)(bx - 1);
@@ -274,6 +274,27 @@ static uint8_t txi_lay_round(double value) {
     return (uint8_t)(value < 0 ? 0 : value > 254.5 ? 255 : (int)(value + 0.5));
 }
 
+/* What a pixel of a bare stroke would be if another stroke lay under it: if it is on the edge, the
+   nearest place inside.
+   from    the source column that the pixel is copied from
+   offset  what is added to its colours                                                        */
+static void txi_lay_edge_at(txi_lay *lay, const txi_strip *s, const txi_strip_spot *o,
+                            const txi_column *from, const float *offset, size_t at) {
+    txi_lay_edge *edge = &lay->edges[at];
+    double rgb[3];
+    edge->is_used = 0;
+    if (!s->is_bare || o->away <= -TXI_LAY_EDGE || o->half <= 2 * TXI_LAY_EDGE) return;
+    const double across = o->half - TXI_LAY_EDGE;
+    const double inner = txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
+    const txm_vec2 p =
+        txi_column_place(from, txi_row_offset(inner, s->inside, (double)from->half));
+    if (!txi_lay_pixel(lay->all->w, (double)p.x, (double)p.y, rgb)) return;
+    edge->is_used = 1;
+    for (int c = 0; c < 3; c++) edge->color[c] = txi_lay_round(rgb[c] + (double)offset[c]);
+    edge->x = p.x;
+    edge->y = p.y;
+}
+
 /* The colour of a pixel by the patch that has it, and where that is copied from. 0: the source is
    not known there. */
 static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_spot *o, size_t at) {
@@ -299,21 +320,7 @@ static int txi_lay_patch_at(txi_lay *lay, const txi_strip *s, const txi_strip_sp
                      there = (double)offset[c + next * 3 * TXI_STRIP_ROWS];
         lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c] + here + (there - here) * mix);
     }
-    if (lay->edges) {
-        txi_lay_edge *edge = &lay->edges[at];
-        edge->is_used = 0;
-        if (s->is_bare && o->away > -TXI_LAY_EDGE && o->half > 2 * TXI_LAY_EDGE) {
-            const double across = o->half - TXI_LAY_EDGE;
-            const double inner =
-                txi_offset_row(o->across < 0 ? -across : across, s->inside, o->half);
-            const txm_vec2 q =
-                txi_column_place(&from, txi_row_offset(inner, s->inside, (double)from.half));
-            edge->is_used = (uint8_t)txi_lay_pixel(lay->all->w, (double)q.x, (double)q.y, rgb);
-            for (int c = 0; c < 3; c++) edge->color[c] = txi_lay_round(rgb[c] + (double)offset[c]);
-            edge->x = q.x;
-            edge->y = q.y;
-        }
-    }
+    if (lay->edges) txi_lay_edge_at(lay, s, o, &from, offset, at);
     lay->plan->copies[at].x = p.x;
     lay->plan->copies[at].y = p.y;
     lay->plan->copies[at].piece = lay->plan->copies[at].pose = s->node + k;
@@ -350,6 +357,7 @@ static void txi_lay_at(txi_lay *lay, const txi_strip *s, int x, int y) {
         txi_strip_profile_at(s, o.column, o.row, rgb);
         for (int c = 0; c < 3; c++) lay->plan->color[4 * at + (size_t)c] = txi_lay_round(rgb[c]);
         lay->plan->copies[at].piece = -1;
+        lay->plan->copies[at].layer = 0;
     }
     lay->claims[at] = o.claim;
     lay->plan->pull[at] = (uint8_t)pull;
@@ -414,7 +422,7 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
     for (int i = 0; i <= TXI_GUIDE_RADIUS * TXI_GUIDE_STEPS; i++) {
         const double d = (double)i / ((double)TXI_GUIDE_STEPS * (double)TXI_GUIDE_SIGMA);
         table[i] =
-            (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.72134752044448170368 * d * d) + 0.5);
+            (uint8_t)((double)TXI_GUIDE_TOP * txm_exp2(-0.5 * TXI_LOG2_E * d * d) + 0.5);
     }
     for (int i = 0; lines && i < lines->thin_count; i++)
         txi_guide_at(w, plan, table, (double)lines->thin[i].place.x, (double)lines->thin[i].place.y,
@@ -435,94 +443,85 @@ static void txi_guide(const txi_strips *all, const txi_lines *lines, txi_plan *p
 
 /* ---- the plan ---- */
 
-static txm_status txi_plan_run(txi_strips *all, int profiles, const txi_lines *lines,
-                               const txi_curve *curves, int count, uint64_t seed, txm_arena *arena,
-                               txm_arena *scratch, txm_env *env, txi_plan *plan, txi_pose **poses) {
-    const txi_window *w = all->w;
-    const size_t pixels = (size_t)w->width * (size_t)w->height;
-    txi_lay lay;
-    txm_status status = txi_strips_make(w, curves, count, all, scratch, env);
-    if (status == TXM_OK) status = txi_strips_order(all, curves, scratch, env);
-    if (status == TXM_OK) status = txi_strips_graph(all, profiles, lines, curves, scratch, env);
-    if (status == TXM_OK) status = txi_strips_choose(all, seed, scratch, env);
-    if (status == TXM_OK) status = txi_strips_finish(all, scratch, env);
-    if (status != TXM_OK) return status;
-
-    lay.all = all;
-    lay.plan = plan;
-    lay.squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.squares);
-    lay.columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay.columns);
-    lay.claims = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay.claims);
-    lay.edges = NULL;
-    for (int i = 0; i < all->count; i++) {
-        if (all->strips[i].is_bare && !lay.edges && !scratch->failed)
-            lay.edges = (txi_lay_edge *)txm_arena_zero(scratch, pixels, sizeof *lay.edges);
-    }
-    lay.poses = *poses =
-        (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof **poses);
+/* Arrays of the plan, and what is needed to lay it. 0: no memory. */
+static int txi_lay_make(txi_lay *lay, txi_strips *all, txi_plan *plan, txm_arena *arena,
+                        txm_arena *scratch) {
+    const size_t pixels = (size_t)all->w->width * (size_t)all->w->height;
+    int bare = 0;
+    for (int i = 0; i < all->count; i++) bare |= all->strips[i].is_bare;
+    memset(lay, 0, sizeof *lay);
+    lay->all = all;
+    lay->plan = plan;
+    lay->squares = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay->squares);
+    lay->columns = (int32_t *)txm_arena_alloc(scratch, pixels, sizeof *lay->columns);
+    lay->claims = (float *)txm_arena_alloc(scratch, pixels, sizeof *lay->claims);
+    if (bare) lay->edges = (txi_lay_edge *)txm_arena_zero(scratch, pixels, sizeof *lay->edges);
+    lay->poses =
+        (txi_pose *)txm_arena_alloc(arena, (size_t)all->node_count + 1, sizeof *lay->poses);
     plan->color = (uint8_t *)txm_arena_zero(arena, pixels, 4);
     plan->pull = (uint8_t *)txm_arena_zero(arena, pixels, 1);
-    plan->copies = (txi_copy *)txm_arena_alloc(arena, pixels, sizeof *plan->copies);
-    if (arena->failed || scratch->failed) return txi_no_memory(env);
+    plan->copies = (txi_copy *)txm_arena_zero(arena, pixels, sizeof *plan->copies);
+    if (arena->failed || scratch->failed) return 0;
     for (size_t i = 0; i < pixels; i++) {
-        lay.claims[i] = TXI_STRIP_MARGIN;
-        plan->copies[i].x = plan->copies[i].y = 0;
+        lay->claims[i] = TXI_STRIP_MARGIN;
         plan->copies[i].piece = -1;
-        plan->copies[i].pose = plan->copies[i].layer = 0;
     }
-    txi_lay_all(&lay);
-    txi_guide(all, lines, plan);
-    return txm_progress(env, 0, "strips") ? txi_stopped(env) : TXM_OK;
+    plan->poses = lay->poses;
+    plan->pose_count = all->node_count;
+    return 1;
+}
+
+/* How the strips of a plan get their colours. */
+enum { TXI_LAY_TEXTURE, TXI_LAY_PROFILES };
+
+static txm_status txi_plan_strips(const txi_window *w, int way, const txi_lines *lines,
+                                  const txi_curve *curves, int count, uint64_t seed,
+                                  txm_arena *arena, txm_env *env, txi_plan *plan) {
+    txi_strips all;
+    txi_lay lay;
+    txm_arena scratch;
+    memset(&all, 0, sizeof all);
+    memset(plan, 0, sizeof *plan);
+    txm_arena_init(&scratch, env);
+    txm_status status = txi_strips_make(w, curves, count, &all, &scratch, env);
+    if (status == TXM_OK) status = txi_strips_order(&all, curves, &scratch, env);
+    if (status == TXM_OK)
+        status = txi_strips_graph(&all, way == TXI_LAY_PROFILES, lines, curves, &scratch, env);
+    if (status == TXM_OK) status = txi_strips_choose(&all, seed, &scratch, env);
+    if (status == TXM_OK) status = txi_strips_finish(&all, &scratch, env);
+    if (status == TXM_OK && !txi_lay_make(&lay, &all, plan, arena, &scratch))
+        status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        txi_lay_all(&lay);
+        txi_guide(&all, lines, plan);
+        if (txm_progress(env, 0, "strips")) status = txi_stopped(env);
+    }
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
+    return status;
 }
 
 /* Lay strips of texture along the completed lines of a window [1, III.A].
 
    lines   of the window: other lines to take texture from, and the known lines of the guide
-   channel;
-           NULL: none
+           channel; NULL: none
    curves  the completed lines, count of them; may be none
-   arena   holds plan and poses
-   plan    receives the strips: color and pull in the hole, the guide channel near all lines. Copies
-           have one piece and one pose per patch
-   poses   receives pose_count poses
-   return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED; after a failure *plan and *poses are NULL
-   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61      */
+   arena   holds the plan
+   plan    receives the strips: color and pull in the hole, the guide channel near all lines.
+           Copies have one piece and one pose per patch
+   return  TXM_OK; TXM_OUT_OF_MEMORY; TXM_CANCELLED; after a failure the plan is all zero
+   cost    per curve of n columns and m source columns O(m^2 + n m) times the rows, 32 to 61 */
 static txm_status txi_plan_make(const txi_window *w, const txi_lines *lines,
                                 const txi_curve *curves, int count, uint64_t seed, txm_arena *arena,
-                                txm_env *env, txi_plan *plan, const txi_pose **poses,
-                                int *pose_count) {
-    txi_strips all;
-    txi_pose *made = NULL;
-    txm_arena scratch;
-    memset(&all, 0, sizeof all);
-    memset(plan, 0, sizeof *plan);
-    all.w = w;
-    txm_arena_init(&scratch, env);
-    const txm_status status =
-        txi_plan_run(&all, 0, lines, curves, count, seed, arena, &scratch, env, plan, &made);
-    txm_arena_free(&scratch);
-    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
-    *poses = status == TXM_OK ? made : NULL;
-    *pose_count = status == TXM_OK ? all.node_count : 0;
-    return status;
+                                txm_env *env, txi_plan *plan) {
+    return txi_plan_strips(w, TXI_LAY_TEXTURE, lines, curves, count, seed, arena, env, plan);
 }
 
 /* The same without texture: the colours across each line are the mean ones of its known ends,
    blended along it. plan->copies has no pieces. */
 static txm_status txi_cartoon(const txi_window *w, const txi_lines *lines, const txi_curve *curves,
                               int count, txm_arena *arena, txm_env *env, txi_plan *plan) {
-    txi_strips all;
-    txi_pose *none = NULL;
-    txm_arena scratch;
-    memset(&all, 0, sizeof all);
-    memset(plan, 0, sizeof *plan);
-    all.w = w;
-    txm_arena_init(&scratch, env);
-    const txm_status status =
-        txi_plan_run(&all, 1, lines, curves, count, 0, arena, &scratch, env, plan, &none);
-    txm_arena_free(&scratch);
-    if (status != TXM_OK) memset(plan, 0, sizeof *plan);
-    return status;
+    return txi_plan_strips(w, TXI_LAY_PROFILES, lines, curves, count, 0, arena, env, plan);
 }
 
 /* Draw a plan over the colours of the window: strips, paler where they count less. rgb: 3 per

@@ -93,15 +93,12 @@ static txi_curve *add_arc(scene *s, double x, double y, double radius, double fr
 typedef struct laid {
     txm_arena arena;
     txi_plan plan;
-    const txi_pose *poses;
-    int pose_count;
 } laid;
 
 static laid lay(const scene *s, txm_env *env) {
     laid l;
     txm_arena_init(&l.arena, env);
-    assert_int_equal(txi_plan_make(&s->w, NULL, s->curves, s->count, 1, &l.arena, env, &l.plan,
-                                   &l.poses, &l.pose_count),
+    assert_int_equal(txi_plan_make(&s->w, NULL, s->curves, s->count, 1, &l.arena, env, &l.plan),
                      TXM_OK);
     return l;
 }
@@ -127,12 +124,12 @@ static void check_plan(const scene *s, const laid *l) {
         assert_true(l->plan.color[4 * i + 3] <= TXI_GUIDE_TOP);
         if (copy->piece < 0) continue;
         assert_true(l->plan.pull[i] > 0);
-        assert_in_range(copy->pose, 0, l->pose_count - 1);
+        assert_in_range(copy->pose, 0, l->plan.pose_count - 1);
         const ptrdiff_t from = txi_pixel(SIDE, SIDE, (double)copy->x, (double)copy->y);
         assert_true(from >= 0 && s->state[from] == TXI_KNOWN);
     }
-    for (int i = 0; i < l->pose_count; i++) { /* rotations, perhaps mirrored */
-        const txi_pose *p = &l->poses[i];
+    for (int i = 0; i < l->plan.pose_count; i++) { /* rotations, perhaps mirrored */
+        const txi_pose *p = &l->plan.poses[i];
         assert_true(fabs((double)(p->a * p->a + p->b * p->b) - 1) < 1e-5);
         assert_true(fabs((double)(p->c * p->c + p->d * p->d) - 1) < 1e-5);
         assert_true(fabs((double)(p->a * p->c + p->b * p->d)) < 1e-5);
@@ -390,7 +387,7 @@ static void test_short_lines_have_profiles(void **state) {
     assert_in_range(c->first, 1, 6);
     laid l = lay(s, NULL);
     check_plan(s, &l);
-    assert_int_equal(l.pose_count, 0);
+    assert_int_equal(l.plan.pose_count, 0);
     assert_true(error_of(s, &l.plan, 200, &pixels) < 12);
     assert_true(pixels > 7 * 50);
     txm_arena_free(&l.arena);
@@ -405,7 +402,7 @@ static void test_nothing_to_lay(void **state) {
         if (with == 1) add_line(s, 5, 5, 1, 0, 100, 1); /* beside the hole */
         if (with == 2) add_line(s, 79, 79, 1, 0, 1, 0);  /* a point in the hole */
         laid l = lay(s, NULL);
-        assert_int_equal(l.pose_count, 0);
+        assert_int_equal(l.plan.pose_count, 0);
         for (int i = 0; i < SIDE * SIDE; i++)
             assert_true(l.plan.pull[i] == 0 && l.plan.copies[i].piece == -1);
         txm_arena_free(&l.arena);
@@ -420,7 +417,7 @@ static uint64_t hash_of(const scene *s, txm_env *env) {
     uint64_t h = tk_hash(0, l.plan.color, 4 * SIDE * SIDE);
     h = tk_hash(h, l.plan.pull, SIDE * SIDE);
     h = tk_hash(h, l.plan.copies, SIDE * SIDE * sizeof *l.plan.copies);
-    h = tk_hash(h, l.poses, (size_t)l.pose_count * sizeof *l.poses);
+    h = tk_hash(h, l.plan.poses, (size_t)l.plan.pose_count * sizeof *l.plan.poses);
     txm_arena_free(&l.arena);
     return h;
 }
@@ -446,12 +443,13 @@ static txm_status run_plan(void *context, txm_env *env) {
     const scene *s = (const scene *)context;
     txm_arena arena;
     txi_plan plan;
-    const txi_pose *poses;
-    int count;
     txm_arena_init(&arena, env);
     const txm_status status =
-        txi_plan_make(&s->w, NULL, s->curves, s->count, 1, &arena, env, &plan, &poses, &count);
-    if (status != TXM_OK) assert_true(!plan.color && !plan.pull && !plan.copies && !poses && !count);
+        txi_plan_make(&s->w, NULL, s->curves, s->count, 1, &arena, env, &plan);
+    if (status != TXM_OK) {
+        assert_true(!plan.color && !plan.pull && !plan.copies);
+        assert_true(!plan.poses && !plan.pose_count);
+    }
     txm_arena_free(&arena);
     return status;
 }
