@@ -402,12 +402,15 @@ typedef struct txi_curve {
                           one                                                                    */
 } txi_curve;
 
+enum { TXI_PULL_KEPT = 128 };
+
 /* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
 typedef struct txi_plan {
     uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and
                         in the fourth byte the guide channel: 255 on a line (known or completed),
                         falling with the distance                                                */
-    uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
+    uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips; from
+                        TXI_PULL_KEPT on the strip itself is kept                              */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
     const txi_pose *poses; /* that copies[].pose counts                                           */
     int pose_count;
@@ -14042,7 +14045,7 @@ static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, 
     if (!plan || !plan->copies || !plan->pull || !plan->color) return NULL;
     const int x = p % l->width - TXI_EDGE, y = p / l->width - TXI_EDGE;
     const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
-    return plan->copies[at].piece >= 0 && plan->pull[at] >= 128 ? &plan->copies[at] : NULL;
+    return plan->copies[at].piece >= 0 && plan->pull[at] >= TXI_PULL_KEPT ? &plan->copies[at] : NULL;
 }
 
 /* The filler's poses and those of the plan after them. */
@@ -14216,7 +14219,7 @@ static void txi_look_pixel(const txi_look *v, int x, int y) {
     const int p = ((y >> scale) + TXI_EDGE) * l->width + (x >> scale) + TXI_EDGE;
     uint8_t list[TXI_LOOK_MOST][4], *out = v->color + 4 * at;
     int count = 0, best = INT_MAX, mean[3] = {0, 0, 0};
-    if (v->plan && v->plan->pull && v->plan->pull[at] >= 128) { /* the strip itself             */
+    if (v->plan && v->plan->pull && v->plan->pull[at] >= TXI_PULL_KEPT) { /* the strip itself             */
         memcpy(out, v->plan->color + 4 * at, 3);
         return;
     }
@@ -14835,21 +14838,19 @@ static txm_status txi_try_all(txi_choice *c, txm_env *env) {
     return status;
 }
 
-/* Complete a window to half its resolution; c->w, domain, prior and seed are set, the rest is 0.
-   txi_choice_free frees what is not the arena's. */
+/* Complete a window to half its resolution.
+   c      w, domain, prior, seed and the lines with their memory are set, the rest is 0;
+          txi_choice_free frees what is not the arena's                                        */
 static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
     txi_stage stage;
-    txm_arena_init(&c->of_lines, env);
     for (int i = 0; i < TXI_HYPOTHESES; i++) txm_arena_init(&c->tried[i].memory, env);
-    txm_status status = txi_trace(c->w, &c->of_lines, env, &c->lines);
-    if (status != TXM_OK) return status;
     c->foreseen = txi_foreseen(&c->lines);
     const double grain = txi_grain(c->w, env);
     if (grain < 0) return txi_no_memory(env);
     txi_choose_style(c, grain);
     txi_stage_begin(&stage, env, 0, 0.1f);
-    status = txi_stage_end(&stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env,
-                                                   &c->filler));
+    txm_status status = txi_stage_end(
+        &stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env, &c->filler));
     if (status == TXM_OK) status = txi_try_all(c, env);
     txm_arena_free(&c->of_lines);
     return status;
@@ -14880,59 +14881,58 @@ static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *c
     return TXM_OK;
 }
 
-/* Keep only the targets that lie on the lines of a plan. */
-static void txi_keep_targets(txi_window *w, const txi_plan *plan) {
-    size_t kept = 0;
-    for (size_t i = 0; i < w->target_count; i++) {
-        const txi_target *t = &w->targets[i];
-        const int x = txm_clampi((int)floor((double)t->x + 0.5), 0, w->width - 1);
-        const int y = txm_clampi((int)floor((double)t->y + 0.5), 0, w->height - 1);
-        if (plan->pull[(size_t)y * (size_t)w->width + (size_t)x] >= 128) w->targets[kept++] = *t;
-    }
-    w->target_count = kept;
+/* Does a target lie on the lines of a plan? */
+static int txi_is_on_line(const txi_window *w, const txi_plan *plan, const txi_target *t) {
+    const int x = txm_clampi((int)floor((double)t->x + 0.5), 0, w->width - 1);
+    const int y = txm_clampi((int)floor((double)t->y + 0.5), 0, w->height - 1);
+    return plan->pull[(size_t)y * (size_t)w->width + (size_t)x] >= TXI_PULL_KEPT;
 }
 
-/* The lines through a window's hole, painted; its targets are then those on lines. */
-static txm_status txi_paint_lines(txi_domain *d, txi_window *w, txm_arena *arena, txm_env *env) {
-    txi_lines lines;
+/* The lines through a window's hole, painted.
+   on_lines  receives the window with those targets only that lie on the lines                 */
+static txm_status txi_paint_lines(txi_domain *d, const txi_window *w, const txi_lines *lines,
+                                  txm_arena *arena, txm_env *env, txi_window *on_lines) {
     txi_curve *curves = NULL;
     txi_plan plan;
     int count = 0;
-    txm_status status = txi_trace(w, arena, env, &lines);
-    if (status == TXM_OK)
-        status = txi_join(w, &lines, NULL, TEXINPAINT_PICTURE, d->desc->alpha, d->desc->beta,
-                          d->desc->seed, arena, env, &curves, &count);
-    if (status != TXM_OK || count == 0) {
-        w->target_count = 0;
-        return status;
-    }
-    status = txi_cartoon(w, &lines, curves, count, arena, env, &plan);
+    *on_lines = *w;
+    on_lines->target_count = 0;
+    txm_status status = txi_join(w, lines, NULL, TEXINPAINT_PICTURE, d->desc->alpha, d->desc->beta,
+                                 d->desc->seed, arena, env, &curves, &count);
+    if (status != TXM_OK || count == 0) return status;
+    status = txi_cartoon(w, lines, curves, count, arena, env, &plan);
     if (status != TXM_OK) return status;
-    txi_keep_targets(w, &plan);
-    return txi_paint(d, w, plan.color, env);
+    on_lines->targets =
+        (txi_target *)txm_arena_alloc(arena, w->target_count, sizeof *on_lines->targets);
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < w->target_count; i++) {
+        if (txi_is_on_line(w, &plan, &w->targets[i]))
+            on_lines->targets[on_lines->target_count++] = w->targets[i];
+    }
+    return txi_paint(d, on_lines, plan.color, env);
 }
 
-/* Fill all holes smoothly, around the lines of the first if lines are wanted. */
-static txm_status txi_preview(txi_domain *d, txm_env *env) {
-    txi_window w;
+/* Fill all holes smoothly, around the lines of one window, which keep their colours.
+   w      the window, whose texels are missing, and its lines; NULL: no lines                  */
+static txm_status txi_preview(txi_domain *d, const txi_window *w, const txi_lines *lines,
+                              txm_env *env) {
+    txi_window painted;
     txm_arena arena;
     txi_stage stage;
-    int found = 0;
     txm_status status = TXM_OK;
     txm_arena_init(&arena, env);
-    memset(&w, 0, sizeof w);
-    if (d->desc->structure != TEXINPAINT_TEXTURE) {
+    memset(&painted, 0, sizeof painted);
+    if (w) {
         txi_stage_begin(&stage, env, 0, 0.5f);
-        status = txi_windows_next(d, &arena, &stage.env, &w, &found);
-        if (status == TXM_OK && found) status = txi_paint_lines(d, &w, &arena, &stage.env);
-        status = txi_stage_end(&stage, status);
+        status =
+            txi_stage_end(&stage, txi_paint_lines(d, w, lines, &arena, &stage.env, &painted));
     }
-    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 0;
+    for (size_t i = 0; i < painted.target_count; i++) d->missing[painted.targets[i].texel] = 0;
     if (status == TXM_OK) {
         txi_stage_begin(&stage, env, 0.5f, 1);
         status = txi_stage_end(&stage, txi_harmonic_fill(d, &stage.env));
     }
-    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 1;
+    for (size_t i = 0; i < painted.target_count; i++) d->missing[painted.targets[i].texel] = 1;
     txm_arena_free(&arena);
     return status;
 }
@@ -14995,6 +14995,7 @@ struct texinpaint_job {
     txm_arena memory;    /* holds the job                                                        */
     txm_arena of_window; /* what is known about the current window                              */
     txi_window window;
+    int is_open;         /* the window is laid out and its lines are traced, but not used yet    */
     txi_prior prior;
     txi_choice choice;
 };
@@ -15067,21 +15068,46 @@ static void txi_count_window(texinpaint_job *job) {
     job->left -= count < job->left ? count : job->left;
 }
 
-/* Lay out the next window and complete it to half its resolution. */
+/* Lay out the next window and trace the lines at its hole, unless that has been done; *found: there
+   is one. */
+static txm_status txi_open_window(texinpaint_job *job, txm_env *env, int *found) {
+    txi_choice *choice = &job->choice;
+    *found = job->is_open;
+    if (job->is_open) return TXM_OK;
+    txi_choice_free(choice);
+    txm_arena_free(&job->of_window);
+    memset(choice, 0, sizeof *choice);
+    txm_arena_init(&choice->of_lines, env);
+    txm_status status =
+        txi_windows_next(&job->domain, &job->of_window, env, &job->window, found);
+    if (status != TXM_OK || !*found) return status;
+    status = txi_trace(&job->window, &choice->of_lines, env, &choice->lines);
+    job->is_open = status == TXM_OK;
+    return status;
+}
+
+/* Smooth colours in all holes, and the lines through the first one. */
+static txm_status txi_step_preview(texinpaint_job *job, txm_env *env) {
+    int found = 0;
+    txm_status status = TXM_OK;
+    if (job->desc.structure != TEXINPAINT_TEXTURE) status = txi_open_window(job, env, &found);
+    if (status != TXM_OK) return status;
+    return txi_preview(&job->domain, found ? &job->window : NULL, &job->choice.lines, env);
+}
+
+/* Complete the next window to half its resolution. */
 static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     txi_domain *domain = &job->domain;
     txi_window *w = &job->window;
     txi_choice *choice = &job->choice;
-    int found = 0;
-    txi_choice_free(choice);
-    txm_arena_free(&job->of_window);
-    txm_status status = txi_windows_next(domain, &job->of_window, env, w, &found);
+    int found;
+    txm_status status = txi_open_window(job, env, &found);
     if (status != TXM_OK) return status;
     if (!found) {
         job->phase = TXI_GUTTER;
         return TXM_OK;
     }
-    memset(choice, 0, sizeof *choice);
+    job->is_open = 0; /* another try begins anew */
     choice->w = w;
     choice->domain = domain;
     choice->seed = txm_hash(job->desc.seed + (uint64_t)job->info.windows);
@@ -15169,7 +15195,7 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
     txi_stage_begin(&stage, env, from, from);
     switch (job->phase) {
     case TXI_PREVIEW:
-        status = txi_preview(&job->domain, &stage.env);
+        status = txi_step_preview(job, &stage.env);
         if (status == TXM_OK) job->phase = TXI_COARSE;
         break;
     case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;

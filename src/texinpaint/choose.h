@@ -241,21 +241,19 @@ static txm_status txi_try_all(txi_choice *c, txm_env *env) {
     return status;
 }
 
-/* Complete a window to half its resolution; c->w, domain, prior and seed are set, the rest is 0.
-   txi_choice_free frees what is not the arena's. */
+/* Complete a window to half its resolution.
+   c      w, domain, prior, seed and the lines with their memory are set, the rest is 0;
+          txi_choice_free frees what is not the arena's                                        */
 static txm_status txi_choose(txi_choice *c, txm_arena *arena, txm_env *env) {
     txi_stage stage;
-    txm_arena_init(&c->of_lines, env);
     for (int i = 0; i < TXI_HYPOTHESES; i++) txm_arena_init(&c->tried[i].memory, env);
-    txm_status status = txi_trace(c->w, &c->of_lines, env, &c->lines);
-    if (status != TXM_OK) return status;
     c->foreseen = txi_foreseen(&c->lines);
     const double grain = txi_grain(c->w, env);
     if (grain < 0) return txi_no_memory(env);
     txi_choose_style(c, grain);
     txi_stage_begin(&stage, env, 0, 0.1f);
-    status = txi_stage_end(&stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env,
-                                                   &c->filler));
+    txm_status status = txi_stage_end(
+        &stage, txi_filler_make(c->w, &c->style, c->seed, arena, &stage.env, &c->filler));
     if (status == TXM_OK) status = txi_try_all(c, env);
     txm_arena_free(&c->of_lines);
     return status;

@@ -76,12 +76,15 @@ typedef struct txi_curve {
                           one                                                                    */
 } txi_curve;
 
+enum { TXI_PULL_KEPT = 128 };
+
 /* What the lines say about a window, for txi_fill. NULL pointers: nothing. */
 typedef struct txi_plan {
     uint8_t *color;  /* 4 per pixel: RGB of the strips of texture along the completed lines, and
                         in the fourth byte the guide channel: 255 on a line (known or completed),
                         falling with the distance                                                */
-    uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips                */
+    uint8_t *pull;   /* how much color counts here, 0..255; 0 away from strips; from
+                        TXI_PULL_KEPT on the strip itself is kept                              */
     txi_copy *copies; /* where the strips' pixels are copied from; piece -1 elsewhere          */
     const txi_pose *poses; /* that copies[].pose counts                                           */
     int pose_count;

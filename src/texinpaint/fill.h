@@ -472,7 +472,7 @@ static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, 
     if (!plan || !plan->copies || !plan->pull || !plan->color) return NULL;
     const int x = p % l->width - TXI_EDGE, y = p / l->width - TXI_EDGE;
     const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
-    return plan->copies[at].piece >= 0 && plan->pull[at] >= 128 ? &plan->copies[at] : NULL;
+    return plan->copies[at].piece >= 0 && plan->pull[at] >= TXI_PULL_KEPT ? &plan->copies[at] : NULL;
 }
 
 /* The filler's poses and those of the plan after them. */

@@ -3,6 +3,7 @@
 
 #include "check.h"
 #include "choose.h"
+#include "layout.h"
 #include "preview.h"
 
 /* ---- jobs ------------------------------------------------------------------------------------ */
@@ -20,6 +21,7 @@ struct texinpaint_job {
     txm_arena memory;    /* holds the job                                                        */
     txm_arena of_window; /* what is known about the current window                              */
     txi_window window;
+    int is_open;         /* the window is laid out and its lines are traced, but not used yet    */
     txi_prior prior;
     txi_choice choice;
 };
@@ -92,21 +94,46 @@ static void txi_count_window(texinpaint_job *job) {
     job->left -= count < job->left ? count : job->left;
 }
 
-/* Lay out the next window and complete it to half its resolution. */
+/* Lay out the next window and trace the lines at its hole, unless that has been done; *found: there
+   is one. */
+static txm_status txi_open_window(texinpaint_job *job, txm_env *env, int *found) {
+    txi_choice *choice = &job->choice;
+    *found = job->is_open;
+    if (job->is_open) return TXM_OK;
+    txi_choice_free(choice);
+    txm_arena_free(&job->of_window);
+    memset(choice, 0, sizeof *choice);
+    txm_arena_init(&choice->of_lines, env);
+    txm_status status =
+        txi_windows_next(&job->domain, &job->of_window, env, &job->window, found);
+    if (status != TXM_OK || !*found) return status;
+    status = txi_trace(&job->window, &choice->of_lines, env, &choice->lines);
+    job->is_open = status == TXM_OK;
+    return status;
+}
+
+/* Smooth colours in all holes, and the lines through the first one. */
+static txm_status txi_step_preview(texinpaint_job *job, txm_env *env) {
+    int found = 0;
+    txm_status status = TXM_OK;
+    if (job->desc.structure != TEXINPAINT_TEXTURE) status = txi_open_window(job, env, &found);
+    if (status != TXM_OK) return status;
+    return txi_preview(&job->domain, found ? &job->window : NULL, &job->choice.lines, env);
+}
+
+/* Complete the next window to half its resolution. */
 static txm_status txi_step_coarse(texinpaint_job *job, txm_env *env) {
     txi_domain *domain = &job->domain;
     txi_window *w = &job->window;
     txi_choice *choice = &job->choice;
-    int found = 0;
-    txi_choice_free(choice);
-    txm_arena_free(&job->of_window);
-    txm_status status = txi_windows_next(domain, &job->of_window, env, w, &found);
+    int found;
+    txm_status status = txi_open_window(job, env, &found);
     if (status != TXM_OK) return status;
     if (!found) {
         job->phase = TXI_GUTTER;
         return TXM_OK;
     }
-    memset(choice, 0, sizeof *choice);
+    job->is_open = 0; /* another try begins anew */
     choice->w = w;
     choice->domain = domain;
     choice->seed = txm_hash(job->desc.seed + (uint64_t)job->info.windows);
@@ -194,7 +221,7 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
     txi_stage_begin(&stage, env, from, from);
     switch (job->phase) {
     case TXI_PREVIEW:
-        status = txi_preview(&job->domain, &stage.env);
+        status = txi_step_preview(job, &stage.env);
         if (status == TXM_OK) job->phase = TXI_COARSE;
         break;
     case TXI_COARSE: status = txi_step_coarse(job, &stage.env); break;

@@ -4,7 +4,6 @@
 #include "harmonic.h"
 #include "join.h"
 #include "lay.h"
-#include "layout.h"
 
 /* ---- preview ------------------------------------------------------------------------------------
    What a user sees first: smooth colours in the holes, and through the first hole its lines,
@@ -31,59 +30,58 @@ static txm_status txi_paint(txi_domain *d, const txi_window *w, const uint8_t *c
     return TXM_OK;
 }
 
-/* Keep only the targets that lie on the lines of a plan. */
-static void txi_keep_targets(txi_window *w, const txi_plan *plan) {
-    size_t kept = 0;
-    for (size_t i = 0; i < w->target_count; i++) {
-        const txi_target *t = &w->targets[i];
-        const int x = txm_clampi((int)floor((double)t->x + 0.5), 0, w->width - 1);
-        const int y = txm_clampi((int)floor((double)t->y + 0.5), 0, w->height - 1);
-        if (plan->pull[(size_t)y * (size_t)w->width + (size_t)x] >= 128) w->targets[kept++] = *t;
-    }
-    w->target_count = kept;
+/* Does a target lie on the lines of a plan? */
+static int txi_is_on_line(const txi_window *w, const txi_plan *plan, const txi_target *t) {
+    const int x = txm_clampi((int)floor((double)t->x + 0.5), 0, w->width - 1);
+    const int y = txm_clampi((int)floor((double)t->y + 0.5), 0, w->height - 1);
+    return plan->pull[(size_t)y * (size_t)w->width + (size_t)x] >= TXI_PULL_KEPT;
 }
 
-/* The lines through a window's hole, painted; its targets are then those on lines. */
-static txm_status txi_paint_lines(txi_domain *d, txi_window *w, txm_arena *arena, txm_env *env) {
-    txi_lines lines;
+/* The lines through a window's hole, painted.
+   on_lines  receives the window with those targets only that lie on the lines                 */
+static txm_status txi_paint_lines(txi_domain *d, const txi_window *w, const txi_lines *lines,
+                                  txm_arena *arena, txm_env *env, txi_window *on_lines) {
     txi_curve *curves = NULL;
     txi_plan plan;
     int count = 0;
-    txm_status status = txi_trace(w, arena, env, &lines);
-    if (status == TXM_OK)
-        status = txi_join(w, &lines, NULL, TEXINPAINT_PICTURE, d->desc->alpha, d->desc->beta,
-                          d->desc->seed, arena, env, &curves, &count);
-    if (status != TXM_OK || count == 0) {
-        w->target_count = 0;
-        return status;
-    }
-    status = txi_cartoon(w, &lines, curves, count, arena, env, &plan);
+    *on_lines = *w;
+    on_lines->target_count = 0;
+    txm_status status = txi_join(w, lines, NULL, TEXINPAINT_PICTURE, d->desc->alpha, d->desc->beta,
+                                 d->desc->seed, arena, env, &curves, &count);
+    if (status != TXM_OK || count == 0) return status;
+    status = txi_cartoon(w, lines, curves, count, arena, env, &plan);
     if (status != TXM_OK) return status;
-    txi_keep_targets(w, &plan);
-    return txi_paint(d, w, plan.color, env);
+    on_lines->targets =
+        (txi_target *)txm_arena_alloc(arena, w->target_count, sizeof *on_lines->targets);
+    if (arena->failed) return txi_no_memory(env);
+    for (size_t i = 0; i < w->target_count; i++) {
+        if (txi_is_on_line(w, &plan, &w->targets[i]))
+            on_lines->targets[on_lines->target_count++] = w->targets[i];
+    }
+    return txi_paint(d, on_lines, plan.color, env);
 }
 
-/* Fill all holes smoothly, around the lines of the first if lines are wanted. */
-static txm_status txi_preview(txi_domain *d, txm_env *env) {
-    txi_window w;
+/* Fill all holes smoothly, around the lines of one window, which keep their colours.
+   w      the window, whose texels are missing, and its lines; NULL: no lines                  */
+static txm_status txi_preview(txi_domain *d, const txi_window *w, const txi_lines *lines,
+                              txm_env *env) {
+    txi_window painted;
     txm_arena arena;
     txi_stage stage;
-    int found = 0;
     txm_status status = TXM_OK;
     txm_arena_init(&arena, env);
-    memset(&w, 0, sizeof w);
-    if (d->desc->structure != TEXINPAINT_TEXTURE) {
+    memset(&painted, 0, sizeof painted);
+    if (w) {
         txi_stage_begin(&stage, env, 0, 0.5f);
-        status = txi_windows_next(d, &arena, &stage.env, &w, &found);
-        if (status == TXM_OK && found) status = txi_paint_lines(d, &w, &arena, &stage.env);
-        status = txi_stage_end(&stage, status);
+        status =
+            txi_stage_end(&stage, txi_paint_lines(d, w, lines, &arena, &stage.env, &painted));
     }
-    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 0;
+    for (size_t i = 0; i < painted.target_count; i++) d->missing[painted.targets[i].texel] = 0;
     if (status == TXM_OK) {
         txi_stage_begin(&stage, env, 0.5f, 1);
         status = txi_stage_end(&stage, txi_harmonic_fill(d, &stage.env));
     }
-    for (size_t i = 0; i < w.target_count; i++) d->missing[w.targets[i].texel] = 1;
+    for (size_t i = 0; i < painted.target_count; i++) d->missing[painted.targets[i].texel] = 1;
     txm_arena_free(&arena);
     return status;
 }
