@@ -10680,6 +10680,7 @@ static txm_status txi_whole_strokes(const txi_window *w, const txi_lines *l, txm
 enum {
     TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours    */
     TXI_COVER_TONE = 32,  /* levels; colours that differ more are never those of one stroke; ours */
+    TXI_COVER_BEYOND = 3,   /* pixels that a stroke reaches beyond its last column                */
     TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours              */
 };
 
@@ -10741,8 +10742,31 @@ static double txi_cover_across(const txi_strip *s, double x, double y) {
     const txm_vec2 t = s->line.along[column], p = s->line.place[column];
     const double dx = x - p.x, dy = y - p.y, half = s->line.half[column];
     const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
-    if (ahead > 3 || ahead < -3 || half <= 0) return 1e9;
+    if (fabs(ahead) > (double)TXI_COVER_BEYOND || half <= 0) return 1e9;
     return (across < 0 ? -across : across) / half;
+}
+
+/* The box of a strip's columns and the width of its stroke: x0, y0, x1, y1, window pixels. */
+static void txi_cover_box(const txi_strip *s, double box[4]) {
+    box[0] = box[1] = 1e30;
+    box[2] = box[3] = -1e30;
+    for (int i = 0; i < s->line.count; i++) {
+        const double x = s->line.place[i].x, y = s->line.place[i].y, half = s->line.half[i];
+        box[0] = fmin(box[0], x - half);
+        box[1] = fmin(box[1], y - half);
+        box[2] = fmax(box[2], x + half);
+        box[3] = fmax(box[3], y + half);
+    }
+}
+
+/* Can two strokes cross: are their boxes no farther apart than a stroke reaches beyond its ends? */
+static int txi_cover_near(const txi_strip *a, const txi_strip *b) {
+    double p[4], q[4];
+    const double reach = TXI_COVER_BEYOND;
+    txi_cover_box(a, p);
+    txi_cover_box(b, q);
+    return p[0] <= q[2] + reach && q[0] <= p[2] + reach && p[1] <= q[3] + reach &&
+           q[1] <= p[3] + reach;
 }
 
 /* How many places in the known part, near the hole, where a and b cross show the colour of a, less
@@ -10810,6 +10834,7 @@ static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const t
         for (int j = i + 1; j < count; j++) {
             int inside;
             if (strips[i].partner < 0 || strips[j].partner < 0) continue;
+            if (!txi_cover_near(&strips[i], &strips[j])) continue;
             const int votes = txi_cover_votes(w, &strips[i], &strips[j], &inside);
             if (inside < 3) continue;
             strips[i].is_bare = strips[j].is_bare = 1;
@@ -13351,12 +13376,24 @@ enum {
     TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
     TXI_LABEL_NONE = -1,  /* not in the hole                                                   */
     TXI_LABEL_STRIP = -2, /* copied by the plan                                                */
-    TXI_LABEL_BIAS = 1 << 12
+    TXI_LABEL_BITS = 13,  /* of an offset: TXI_SIDE_MOST and the edges of a level fit          */
+    TXI_LABEL_BIAS = 1 << (TXI_LABEL_BITS - 1),
+    TXI_LABEL_MASK = (1 << TXI_LABEL_BITS) - 1
 };
 
 /* Labels as numbers: pose * 2^26 + (x offset + bias) * 2^13 + y offset + bias. */
 static inline int32_t txi_label(int pose, int dx, int dy) {
-    return pose << 26 | (dx + TXI_LABEL_BIAS) << 13 | (dy + TXI_LABEL_BIAS);
+    return pose << 2 * TXI_LABEL_BITS | (dx + TXI_LABEL_BIAS) << TXI_LABEL_BITS |
+           (dy + TXI_LABEL_BIAS);
+}
+static inline int txi_label_pose(int32_t label) {
+    return label >> 2 * TXI_LABEL_BITS;
+}
+static inline int txi_label_dx(int32_t label) {
+    return (label >> TXI_LABEL_BITS & TXI_LABEL_MASK) - TXI_LABEL_BIAS;
+}
+static inline int txi_label_dy(int32_t label) {
+    return (label & TXI_LABEL_MASK) - TXI_LABEL_BIAS;
 }
 
 typedef struct txi_assembly {
@@ -13375,9 +13412,8 @@ static inline const uint8_t *txi_label_color(const txi_level *l, int32_t label, 
         const size_t p = (size_t)y * (size_t)l->width + (size_t)x;
         return label == TXI_LABEL_STRIP && l->pull && l->pull[p] ? l->strip + 4 * p : NULL;
     }
-    const txi_source *s = &l->source[label >> 26];
-    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS;
-    const int j = y + (label & 8191) - TXI_LABEL_BIAS;
+    const txi_source *s = &l->source[txi_label_pose(label)];
+    const int i = x + txi_label_dx(label), j = y + txi_label_dy(label);
     if (i < 0 || j < 0 || i >= s->width || j >= s->height) return NULL;
     const size_t q = (size_t)j * (size_t)s->width + (size_t)i;
     return s->usable[q] ? s->color + 4 * q : NULL;
@@ -13599,6 +13635,7 @@ enum {
     TXI_ASSEMBLY_LABELS = 1000,
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
+    TXI_ASSEMBLY_REPORT = 64, /* moves from one report of progress to the next                 */
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
@@ -13661,9 +13698,10 @@ static double txi_grain(const txi_window *w, txm_env *env) {
 }
 
 /* Prepare the completion of a window's hole.
-   w      the hole is not empty; w outlives *out
+   w      outlives *out
    arena  receives all memory
-   return TXM_OK; TXM_TOO_SMALL: no patch of 8x8 pixels may be copied; TXM_OUT_OF_MEMORY        */
+   return TXM_OK; TXM_TOO_SMALL: no patch of 8x8 pixels may be copied, or no pixel is missing, as
+          all missing texels lie between pixels; TXM_OUT_OF_MEMORY                              */
 static txm_status txi_filler_make(const txi_window *w, const txi_style *style, uint64_t seed,
                                   txm_arena *arena, txm_env *env, txi_filler **out) {
     txi_filler *f = (txi_filler *)txm_arena_zero(arena, 1, sizeof *f);
@@ -13700,7 +13738,7 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
             return txi_no_memory(env);
         for (int pose = 0; pose < f->pose_count; pose++)
             patches += l->source[pose].color ? txi_source_patches(&l->source[pose]) : 0;
-        if (k == 0 && patches == 0)
+        if (k == 0 && (patches == 0 || l->hole_count == 0))
             return txm_fail(env, TXM_TOO_SMALL,
                             "too little known texture around a hole: no 8x8 texels to copy");
         if (k && patches < TXI_LEAST_PATCHES) break;
@@ -14045,7 +14083,8 @@ static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, 
     if (!plan || !plan->copies || !plan->pull || !plan->color) return NULL;
     const int x = p % l->width - TXI_EDGE, y = p / l->width - TXI_EDGE;
     const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
-    return plan->copies[at].piece >= 0 && plan->pull[at] >= TXI_PULL_KEPT ? &plan->copies[at] : NULL;
+    const int is_kept = plan->copies[at].piece >= 0 && plan->pull[at] >= TXI_PULL_KEPT;
+    return is_kept ? &plan->copies[at] : NULL;
 }
 
 /* The filler's poses and those of the plan after them. */
@@ -14061,44 +14100,44 @@ static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
     return 1;
 }
 
-/* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
-   strips pull by more than half they are kept. */
-static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
-                                    const txi_plan *plan, txi_copy *copies, txm_env *env) {
+/* The labels of the vote's choices; TXI_LABEL_STRIP where the plan's strips are kept. */
+static void txi_finish_labels(const txi_filler *f, const txi_canvas *t, const txi_plan *plan,
+                              int32_t *label) {
     const int32_t *chosen = t->chosen;
     const txi_level *l = &f->level[0];
-    const size_t n = (size_t)l->width * (size_t)l->height;
-    const txi_window *w = f->window;
-    txm_arena scratch;
-    txi_assembly assembly;
-    txm_arena_init(&scratch, env);
-    const size_t holes = (size_t)l->hole_count;
-    int32_t *piece = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
-    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, holes, sizeof(int32_t));
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, holes, 2 * sizeof(txm_pair));
-    if (!txi_assembly_make(&assembly, l, &scratch)) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
-    int32_t *label = assembly.label;
-    assembly.color = t->color;
-    assembly.window = w;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
-        if (txi_plan_copy(plan, w, l, p)) label[p] = TXI_LABEL_STRIP;
+        if (txi_plan_copy(plan, f->window, l, p)) label[p] = TXI_LABEL_STRIP;
         if (chosen[i] < 0 || label[p] == TXI_LABEL_STRIP) continue;
         const txi_match *m = &t->match[chosen[i]];
         const int corner = l->anchor[chosen[i]];
         label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
     }
-    const int kinds = txi_labels_used(&assembly, queue, TXI_ASSEMBLY_LABELS, pairs);
+}
+
+/* Improve the labels by expansion moves.
+   labels, pairs  room for one per hole pixel, and for two
+   cost           O(labels in use * hole pixels)                                               */
+static txm_status txi_finish_expand(txi_assembly *t, int32_t *labels, txm_pair *pairs,
+                                    txm_env *env) {
+    const int kinds = txi_labels_used(t, labels, TXI_ASSEMBLY_LABELS, pairs);
     const int passes = TXI_LEFT_OUT & TXI_PIECES ? 0 : TXI_ASSEMBLY_PASSES;
     for (int pass = 0, changed = 1; pass < passes && changed; pass++) {
         changed = 0;
-        for (int k = 0; k < kinds; k++)
-            changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
+        for (int k = 0; k < kinds; k++) {
+            if (k % TXI_ASSEMBLY_REPORT == 0 && txm_progress(env, 0, "joining"))
+                return txi_stopped(env);
+            changed += txi_expand(t, labels[k], TXI_ASSEMBLY_REACH);
+        }
     }
-    const int pieces = txi_assembly_pieces(&assembly, piece, queue);
+    return TXM_OK;
+}
+
+/* Where each pixel of the window is copied from, by the labels and their pieces. */
+static void txi_finish_copies(const txi_filler *f, const txi_plan *plan, const int32_t *label,
+                              const int32_t *piece, int pieces, txi_copy *copies) {
+    const txi_level *l = &f->level[0];
+    const txi_window *w = f->window;
     for (size_t k = 0; k < (size_t)w->width * (size_t)w->height; k++) {
         memset(&copies[k], 0, sizeof copies[k]);
         copies[k].piece = -1;
@@ -14113,17 +14152,42 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
             copy->piece += pieces;
         }
         if (label[p] < 0) continue;
-        const txi_source *s = &l->source[label[p] >> 26];
         int32_t px, py;
-        txi_source_place(s, x + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
-                         y + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
+        txi_source_place(&l->source[txi_label_pose(label[p])], x + txi_label_dx(label[p]),
+                         y + txi_label_dy(label[p]), &px, &py);
         copy->x = (float)px / (float)TXI_UNIT - (float)TXI_EDGE;
         copy->y = (float)py / (float)TXI_UNIT - (float)TXI_EDGE;
-        copy->pose = label[p] >> 26;
+        copy->pose = txi_label_pose(label[p]);
         copy->piece = piece[p];
     }
+}
+
+/* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
+   strips pull by more than half they are kept. */
+static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const txi_plan *plan,
+                                    txi_copy *copies, txm_env *env) {
+    const txi_level *l = &f->level[0];
+    const size_t n = (size_t)l->width * (size_t)l->height, holes = (size_t)l->hole_count;
+    txm_arena scratch;
+    txi_assembly assembly;
+    txm_arena_init(&scratch, env);
+    int32_t *piece = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
+    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, holes, sizeof(int32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, holes, 2 * sizeof(txm_pair));
+    txm_status status = TXM_OK;
+    if (!txi_assembly_make(&assembly, l, &scratch)) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        assembly.color = t->color;
+        assembly.window = f->window;
+        txi_finish_labels(f, t, plan, assembly.label);
+        status = txi_finish_expand(&assembly, queue, pairs, env);
+    }
+    if (status == TXM_OK) {
+        const int pieces = txi_assembly_pieces(&assembly, piece, queue);
+        txi_finish_copies(f, plan, assembly.label, piece, pieces, copies);
+    }
     txm_arena_free(&scratch);
-    return TXM_OK;
+    return status;
 }
 
 /* Complete the finest level, and say where each hole pixel is copied from.
@@ -14219,7 +14283,7 @@ static void txi_look_pixel(const txi_look *v, int x, int y) {
     const int p = ((y >> scale) + TXI_EDGE) * l->width + (x >> scale) + TXI_EDGE;
     uint8_t list[TXI_LOOK_MOST][4], *out = v->color + 4 * at;
     int count = 0, best = INT_MAX, mean[3] = {0, 0, 0};
-    if (v->plan && v->plan->pull && v->plan->pull[at] >= TXI_PULL_KEPT) { /* the strip itself             */
+    if (v->plan && v->plan->pull && v->plan->pull[at] >= TXI_PULL_KEPT) { /* the strip itself */
         memcpy(out, v->plan->color + 4 * at, 3);
         return;
     }

@@ -26,12 +26,24 @@ enum {
     TXI_NEVER = 20000000, /* what a pixel costs that a label cannot copy; ours                 */
     TXI_LABEL_NONE = -1,  /* not in the hole                                                   */
     TXI_LABEL_STRIP = -2, /* copied by the plan                                                */
-    TXI_LABEL_BIAS = 1 << 12
+    TXI_LABEL_BITS = 13,  /* of an offset: TXI_SIDE_MOST and the edges of a level fit          */
+    TXI_LABEL_BIAS = 1 << (TXI_LABEL_BITS - 1),
+    TXI_LABEL_MASK = (1 << TXI_LABEL_BITS) - 1
 };
 
 /* Labels as numbers: pose * 2^26 + (x offset + bias) * 2^13 + y offset + bias. */
 static inline int32_t txi_label(int pose, int dx, int dy) {
-    return pose << 26 | (dx + TXI_LABEL_BIAS) << 13 | (dy + TXI_LABEL_BIAS);
+    return pose << 2 * TXI_LABEL_BITS | (dx + TXI_LABEL_BIAS) << TXI_LABEL_BITS |
+           (dy + TXI_LABEL_BIAS);
+}
+static inline int txi_label_pose(int32_t label) {
+    return label >> 2 * TXI_LABEL_BITS;
+}
+static inline int txi_label_dx(int32_t label) {
+    return (label >> TXI_LABEL_BITS & TXI_LABEL_MASK) - TXI_LABEL_BIAS;
+}
+static inline int txi_label_dy(int32_t label) {
+    return (label & TXI_LABEL_MASK) - TXI_LABEL_BIAS;
 }
 
 typedef struct txi_assembly {
@@ -50,9 +62,8 @@ static inline const uint8_t *txi_label_color(const txi_level *l, int32_t label, 
         const size_t p = (size_t)y * (size_t)l->width + (size_t)x;
         return label == TXI_LABEL_STRIP && l->pull && l->pull[p] ? l->strip + 4 * p : NULL;
     }
-    const txi_source *s = &l->source[label >> 26];
-    const int i = x + (label >> 13 & 8191) - TXI_LABEL_BIAS;
-    const int j = y + (label & 8191) - TXI_LABEL_BIAS;
+    const txi_source *s = &l->source[txi_label_pose(label)];
+    const int i = x + txi_label_dx(label), j = y + txi_label_dy(label);
     if (i < 0 || j < 0 || i >= s->width || j >= s->height) return NULL;
     const size_t q = (size_t)j * (size_t)s->width + (size_t)i;
     return s->usable[q] ? s->color + 4 * q : NULL;

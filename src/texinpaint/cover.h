@@ -13,6 +13,7 @@
 enum {
     TXI_COVER_COLUMNS = 28, /* known columns on each side of the hole that are looked at; ours    */
     TXI_COVER_TONE = 32,  /* levels; colours that differ more are never those of one stroke; ours */
+    TXI_COVER_BEYOND = 3,   /* pixels that a stroke reaches beyond its last column                */
     TXI_COVER_VOTES = 6     /* places of a known crossing that decide about it; ours              */
 };
 
@@ -74,8 +75,31 @@ static double txi_cover_across(const txi_strip *s, double x, double y) {
     const txm_vec2 t = s->line.along[column], p = s->line.place[column];
     const double dx = x - p.x, dy = y - p.y, half = s->line.half[column];
     const double ahead = dx * t.x + dy * t.y, across = dy * t.x - dx * t.y;
-    if (ahead > 3 || ahead < -3 || half <= 0) return 1e9;
+    if (fabs(ahead) > (double)TXI_COVER_BEYOND || half <= 0) return 1e9;
     return (across < 0 ? -across : across) / half;
+}
+
+/* The box of a strip's columns and the width of its stroke: x0, y0, x1, y1, window pixels. */
+static void txi_cover_box(const txi_strip *s, double box[4]) {
+    box[0] = box[1] = 1e30;
+    box[2] = box[3] = -1e30;
+    for (int i = 0; i < s->line.count; i++) {
+        const double x = s->line.place[i].x, y = s->line.place[i].y, half = s->line.half[i];
+        box[0] = fmin(box[0], x - half);
+        box[1] = fmin(box[1], y - half);
+        box[2] = fmax(box[2], x + half);
+        box[3] = fmax(box[3], y + half);
+    }
+}
+
+/* Can two strokes cross: are their boxes no farther apart than a stroke reaches beyond its ends? */
+static int txi_cover_near(const txi_strip *a, const txi_strip *b) {
+    double p[4], q[4];
+    const double reach = TXI_COVER_BEYOND;
+    txi_cover_box(a, p);
+    txi_cover_box(b, q);
+    return p[0] <= q[2] + reach && q[0] <= p[2] + reach && p[1] <= q[3] + reach &&
+           q[1] <= p[3] + reach;
 }
 
 /* How many places in the known part, near the hole, where a and b cross show the colour of a, less
@@ -143,6 +167,7 @@ static txm_status txi_cover_find(const txi_window *w, txi_strip *strips, const t
         for (int j = i + 1; j < count; j++) {
             int inside;
             if (strips[i].partner < 0 || strips[j].partner < 0) continue;
+            if (!txi_cover_near(&strips[i], &strips[j])) continue;
             const int votes = txi_cover_votes(w, &strips[i], &strips[j], &inside);
             if (inside < 3) continue;
             strips[i].is_bare = strips[j].is_bare = 1;

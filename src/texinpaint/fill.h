@@ -26,6 +26,7 @@ enum {
     TXI_ASSEMBLY_LABELS = 1000,
     TXI_ASSEMBLY_REACH = 10, /* pixels that a piece may grow by in one move                    */
     TXI_ASSEMBLY_PASSES = 2,
+    TXI_ASSEMBLY_REPORT = 64, /* moves from one report of progress to the next                 */
     TXI_FIRST_STARTS = 2, /* at the coarsest level: the onion's result, and annealed ones       */
     TXI_JUDGE_WIDTH = 10, /* pixels: least width of the hole where a field is judged           */
     TXI_JUDGE_SWEEPS = 8,
@@ -88,9 +89,10 @@ static double txi_grain(const txi_window *w, txm_env *env) {
 }
 
 /* Prepare the completion of a window's hole.
-   w      the hole is not empty; w outlives *out
+   w      outlives *out
    arena  receives all memory
-   return TXM_OK; TXM_TOO_SMALL: no patch of 8x8 pixels may be copied; TXM_OUT_OF_MEMORY        */
+   return TXM_OK; TXM_TOO_SMALL: no patch of 8x8 pixels may be copied, or no pixel is missing, as
+          all missing texels lie between pixels; TXM_OUT_OF_MEMORY                              */
 static txm_status txi_filler_make(const txi_window *w, const txi_style *style, uint64_t seed,
                                   txm_arena *arena, txm_env *env, txi_filler **out) {
     txi_filler *f = (txi_filler *)txm_arena_zero(arena, 1, sizeof *f);
@@ -127,7 +129,7 @@ static txm_status txi_filler_make(const txi_window *w, const txi_style *style, u
             return txi_no_memory(env);
         for (int pose = 0; pose < f->pose_count; pose++)
             patches += l->source[pose].color ? txi_source_patches(&l->source[pose]) : 0;
-        if (k == 0 && patches == 0)
+        if (k == 0 && (patches == 0 || l->hole_count == 0))
             return txm_fail(env, TXM_TOO_SMALL,
                             "too little known texture around a hole: no 8x8 texels to copy");
         if (k && patches < TXI_LEAST_PATCHES) break;
@@ -472,7 +474,8 @@ static const txi_copy *txi_plan_copy(const txi_plan *plan, const txi_window *w, 
     if (!plan || !plan->copies || !plan->pull || !plan->color) return NULL;
     const int x = p % l->width - TXI_EDGE, y = p / l->width - TXI_EDGE;
     const size_t at = (size_t)y * (size_t)w->width + (size_t)x;
-    return plan->copies[at].piece >= 0 && plan->pull[at] >= TXI_PULL_KEPT ? &plan->copies[at] : NULL;
+    const int is_kept = plan->copies[at].piece >= 0 && plan->pull[at] >= TXI_PULL_KEPT;
+    return is_kept ? &plan->copies[at] : NULL;
 }
 
 /* The filler's poses and those of the plan after them. */
@@ -488,44 +491,44 @@ static int txi_finish_poses(txi_filler *f, const txi_plan *plan) {
     return 1;
 }
 
-/* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
-   strips pull by more than half they are kept. */
-static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
-                                    const txi_plan *plan, txi_copy *copies, txm_env *env) {
+/* The labels of the vote's choices; TXI_LABEL_STRIP where the plan's strips are kept. */
+static void txi_finish_labels(const txi_filler *f, const txi_canvas *t, const txi_plan *plan,
+                              int32_t *label) {
     const int32_t *chosen = t->chosen;
     const txi_level *l = &f->level[0];
-    const size_t n = (size_t)l->width * (size_t)l->height;
-    const txi_window *w = f->window;
-    txm_arena scratch;
-    txi_assembly assembly;
-    txm_arena_init(&scratch, env);
-    const size_t holes = (size_t)l->hole_count;
-    int32_t *piece = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
-    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, holes, sizeof(int32_t));
-    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, holes, 2 * sizeof(txm_pair));
-    if (!txi_assembly_make(&assembly, l, &scratch)) {
-        txm_arena_free(&scratch);
-        return txi_no_memory(env);
-    }
-    int32_t *label = assembly.label;
-    assembly.color = t->color;
-    assembly.window = w;
     for (int i = 0; i < l->hole_count; i++) {
         const int p = l->hole[i];
-        if (txi_plan_copy(plan, w, l, p)) label[p] = TXI_LABEL_STRIP;
+        if (txi_plan_copy(plan, f->window, l, p)) label[p] = TXI_LABEL_STRIP;
         if (chosen[i] < 0 || label[p] == TXI_LABEL_STRIP) continue;
         const txi_match *m = &t->match[chosen[i]];
         const int corner = l->anchor[chosen[i]];
         label[p] = txi_label(m->pose, m->x - corner % l->width, m->y - corner / l->width);
     }
-    const int kinds = txi_labels_used(&assembly, queue, TXI_ASSEMBLY_LABELS, pairs);
+}
+
+/* Improve the labels by expansion moves.
+   labels, pairs  room for one per hole pixel, and for two
+   cost           O(labels in use * hole pixels)                                               */
+static txm_status txi_finish_expand(txi_assembly *t, int32_t *labels, txm_pair *pairs,
+                                    txm_env *env) {
+    const int kinds = txi_labels_used(t, labels, TXI_ASSEMBLY_LABELS, pairs);
     const int passes = TXI_LEFT_OUT & TXI_PIECES ? 0 : TXI_ASSEMBLY_PASSES;
     for (int pass = 0, changed = 1; pass < passes && changed; pass++) {
         changed = 0;
-        for (int k = 0; k < kinds; k++)
-            changed += txi_expand(&assembly, queue[k], TXI_ASSEMBLY_REACH);
+        for (int k = 0; k < kinds; k++) {
+            if (k % TXI_ASSEMBLY_REPORT == 0 && txm_progress(env, 0, "joining"))
+                return txi_stopped(env);
+            changed += txi_expand(t, labels[k], TXI_ASSEMBLY_REACH);
+        }
     }
-    const int pieces = txi_assembly_pieces(&assembly, piece, queue);
+    return TXM_OK;
+}
+
+/* Where each pixel of the window is copied from, by the labels and their pieces. */
+static void txi_finish_copies(const txi_filler *f, const txi_plan *plan, const int32_t *label,
+                              const int32_t *piece, int pieces, txi_copy *copies) {
+    const txi_level *l = &f->level[0];
+    const txi_window *w = f->window;
     for (size_t k = 0; k < (size_t)w->width * (size_t)w->height; k++) {
         memset(&copies[k], 0, sizeof copies[k]);
         copies[k].piece = -1;
@@ -540,17 +543,42 @@ static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t,
             copy->piece += pieces;
         }
         if (label[p] < 0) continue;
-        const txi_source *s = &l->source[label[p] >> 26];
         int32_t px, py;
-        txi_source_place(s, x + (label[p] >> 13 & 8191) - TXI_LABEL_BIAS,
-                         y + (label[p] & 8191) - TXI_LABEL_BIAS, &px, &py);
+        txi_source_place(&l->source[txi_label_pose(label[p])], x + txi_label_dx(label[p]),
+                         y + txi_label_dy(label[p]), &px, &py);
         copy->x = (float)px / (float)TXI_UNIT - (float)TXI_EDGE;
         copy->y = (float)py / (float)TXI_UNIT - (float)TXI_EDGE;
-        copy->pose = label[p] >> 26;
+        copy->pose = txi_label_pose(label[p]);
         copy->piece = piece[p];
     }
+}
+
+/* Labels from the vote's choices, improved; then where each pixel is copied from. Where the plan's
+   strips pull by more than half they are kept. */
+static txm_status txi_finish_pieces(const txi_filler *f, const txi_canvas *t, const txi_plan *plan,
+                                    txi_copy *copies, txm_env *env) {
+    const txi_level *l = &f->level[0];
+    const size_t n = (size_t)l->width * (size_t)l->height, holes = (size_t)l->hole_count;
+    txm_arena scratch;
+    txi_assembly assembly;
+    txm_arena_init(&scratch, env);
+    int32_t *piece = (int32_t *)txm_arena_alloc(&scratch, n, sizeof(int32_t));
+    int32_t *queue = (int32_t *)txm_arena_alloc(&scratch, holes, sizeof(int32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, holes, 2 * sizeof(txm_pair));
+    txm_status status = TXM_OK;
+    if (!txi_assembly_make(&assembly, l, &scratch)) status = txi_no_memory(env);
+    if (status == TXM_OK) {
+        assembly.color = t->color;
+        assembly.window = f->window;
+        txi_finish_labels(f, t, plan, assembly.label);
+        status = txi_finish_expand(&assembly, queue, pairs, env);
+    }
+    if (status == TXM_OK) {
+        const int pieces = txi_assembly_pieces(&assembly, piece, queue);
+        txi_finish_copies(f, plan, assembly.label, piece, pieces, copies);
+    }
     txm_arena_free(&scratch);
-    return TXM_OK;
+    return status;
 }
 
 /* Complete the finest level, and say where each hole pixel is copied from.

@@ -67,7 +67,7 @@ static void txi_look_pixel(const txi_look *v, int x, int y) {
     const int p = ((y >> scale) + TXI_EDGE) * l->width + (x >> scale) + TXI_EDGE;
     uint8_t list[TXI_LOOK_MOST][4], *out = v->color + 4 * at;
     int count = 0, best = INT_MAX, mean[3] = {0, 0, 0};
-    if (v->plan && v->plan->pull && v->plan->pull[at] >= TXI_PULL_KEPT) { /* the strip itself             */
+    if (v->plan && v->plan->pull && v->plan->pull[at] >= TXI_PULL_KEPT) { /* the strip itself */
         memcpy(out, v->plan->color + 4 * at, 3);
         return;
     }
