@@ -237,12 +237,66 @@ static void test_faults(void **state) {
     assert_true(tk_sweep(blend, NULL, TK_ONWARD) >= 8);
 }
 
+/* ---- before the values are blended ---------------------------------------------------------------- */
+
+/* Missing texels may lie between the pixels of a window: nothing is to be filled in it then. */
+static void test_window_without_hole(void **state) {
+    static uint8_t color[4 * PIXELS];
+    txi_window w = window_of();
+    txi_style style;
+    txi_filler *filler = NULL;
+    txm_arena arena;
+    (void)state;
+    memset(states, TXI_KNOWN, sizeof states);
+    memset(&style, 0, sizeof style);
+    style.start = 14;
+    w.color = color;
+    txm_arena_init(&arena, NULL);
+    assert_int_equal(txi_filler_make(&w, &style, 1, &arena, NULL, &filler), TXM_TOO_SMALL);
+    txm_arena_free(&arena);
+}
+
+/* stops what is under way once pieces are joined */
+static int stop_at_joining(void *user, float fraction, const char *stage) {
+    (void)user;
+    (void)fraction;
+    return strcmp(stage, "joining") == 0;
+}
+
+static void test_joining_can_be_cancelled(void **state) {
+    enum { WIDE = 48 };
+    static uint8_t picture[WIDE * WIDE], mask[WIDE * WIDE], out[WIDE * WIDE];
+    texinpaint_desc desc;
+    txm_env env;
+    (void)state;
+    memset(&desc, 0, sizeof desc);
+    memset(&env, 0, sizeof env);
+    for (int i = 0; i < WIDE * WIDE; i++) {
+        const int x = i % WIDE - WIDE / 2, y = i / WIDE - WIDE / 2;
+        picture[i] = (uint8_t)(txm_hash((uint64_t)i) & 255);
+        mask[i] = (uint8_t)(x * x + y * y < 64 ? 255 : 0);
+    }
+    desc.image.pixels = picture;
+    desc.image.width = desc.image.height = WIDE;
+    desc.image.channels = 1;
+    desc.mask = desc.image;
+    desc.mask.pixels = mask;
+    desc.structure = TEXINPAINT_TEXTURE;
+    txm_image made = desc.image;
+    made.pixels = out;
+    assert_int_equal(texinpaint_complete(&desc, &env, &made), TXM_OK);
+    env.progress = stop_at_joining;
+    assert_int_equal(texinpaint_complete(&desc, &env, &made), TXM_CANCELLED);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_against_direct_solution),
         cmocka_unit_test(test_normals_turn),
         cmocka_unit_test(test_labels),
         cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_window_without_hole),
+        cmocka_unit_test(test_joining_can_be_cancelled),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
