@@ -103,7 +103,9 @@
      [3] G. Gimel'farb. Image textures and Gibbs random fields. Kluwer 1999 (controllable
          simulated annealing, of which the control here is a faster relative).
      [4] S. Geman, D. Geman. Stochastic relaxation, Gibbs distributions, and the Bayesian
-         restoration of images. IEEE PAMI 6(6), 1984.                                        */
+         restoration of images. IEEE PAMI 6(6), 1984.
+     [5] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
+         SIGGRAPH 2001.                                                                      */
 #ifndef TEXSYN_H
 #define TEXSYN_H
 
@@ -275,6 +277,115 @@ typedef struct texsyn_fill_desc {
           TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
+
+/* ---- light ------------------------------------------------------------------------------ */
+
+typedef struct texsyn_relight_desc {
+    txm_image image;     /* 1 to 4 channels; not modified                                        */
+    txm_image mask;      /* same size: what of it is compared with the other picture, where gray
+                            times alpha is at least half; pixels NULL = everything. Transparent
+                            pixels are never compared                                            */
+    txm_image like;      /* a picture in the light that is wanted, of any size                   */
+    txm_image like_mask; /* the same for that one                                                */
+    float strength;      /* how much of the change is made, up to 1; 0 = 1                       */
+} texsyn_relight_desc;
+
+/* A change of light: a plain value, for texsyn_light_apply. */
+enum { TEXSYN_LIGHT_KNOTS = 20 };
+typedef struct texsyn_light {
+    int knots;                       /* of the curve of brightness, 2 to TEXSYN_LIGHT_KNOTS      */
+    float from[TEXSYN_LIGHT_KNOTS];  /* brightness before, 0..1, rising                          */
+    float to[TEXSYN_LIGHT_KNOTS];    /* and after                                                */
+    float slope[TEXSYN_LIGHT_KNOTS]; /* of the curve at the knots                                */
+    float gain[2];                   /* chroma is multiplied by this complex number              */
+    float cast[2];                   /* and this is added, but not to grays                      */
+    float fade;                      /* the saturation from which on all of it is                */
+} texsyn_light;
+
+/* Give a picture the light of another one: the photometric correction of [1], section 3 and Fig. 6.
+
+   A monotone curve of brightness, the same for all channels, and a gain, a rotation and an offset of
+   chroma are chosen so that distributions agree; materials that occur in unequal shares are matched
+   first. Grays stay exactly gray. 8-bit samples are dithered.
+
+   out    the caller's, with the size and channels of the image, 8 or 16 bits or float; may be the
+          image itself; untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, a picture that does not fit,
+          samples that are not finite or beyond a million; TXM_TOO_SMALL for fewer than 16 pixels to
+          compare, named; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   some 0.1 s and 2 MB to learn, 0.2 s per megapixel to apply                           */
+TEXSYN_API txm_status texsyn_relight(const texsyn_relight_desc *desc, txm_env *env, txm_image out);
+
+/* The change alone, for other pictures in the same light; strength is not used. *out is untouched
+   after an error. Statuses as above. */
+TEXSYN_API txm_status texsyn_light_learn(const texsyn_relight_desc *desc, txm_env *env,
+                                         texsyn_light *out);
+
+/* Apply a change; strength 0..1: at 0 the picture is copied. out and statuses as above. */
+TEXSYN_API txm_status texsyn_light_apply(const texsyn_light *light, float strength,
+                                         const txm_image *image, txm_env *env, txm_image out);
+
+/* ---- erosion ---------------------------------------------------------------------------- */
+
+/* Cracks and pits like those of a weathered exemplar, in the order in which they appear. */
+typedef struct texsyn_erosion texsyn_erosion;
+
+typedef struct texsyn_erosion_desc {
+    txm_image weathered; /* at least 32 x 32; its cracks are darker than their surroundings. Not
+                            modified, need not outlive the call                                  */
+    txm_image mask;      /* same size: only where gray times alpha is at least half; pixels NULL =
+                            everywhere. Transparent pixels of the exemplar are never used        */
+    float share;         /* of the pixels that are eroded at level 1, up to 0.5; 0 = 0.1         */
+    int width, height;   /* of the pictures to be eroded, 1 or more each                         */
+    uint64_t seed;       /* another seed, other cracks                                           */
+} texsyn_erosion_desc;
+
+/* Find the cracks of an exemplar and lay cracks like them over any size ([1], section 4 and Fig. 11).
+
+   The cracks of the exemplar are laid in pieces, joined along minimum-error cuts [5], because thin
+   long lines are beyond clique statistics. Every pixel gets a rank; at level l those of the first
+   l * share * pixels, rounded, are eroded. So each level's pixels are part of the next one's.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives the erosion, or NULL on any error; release it with texsyn_erosion_free
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
+          beyond a million; TXM_TOO_SMALL for an exemplar under 32 x 32 or of fewer than 1024
+          pixels that count; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   about 0.5 s per megapixel of exemplar and erosion; 7 bytes per pixel, 60 while it is
+          made, and 75 per pixel of the exemplar                                               */
+TEXSYN_API txm_status texsyn_erosion_make(const texsyn_erosion_desc *desc, txm_env *env,
+                                          texsyn_erosion **out);
+
+/* Release an erosion with the allocator it was made with; NULL is allowed. */
+TEXSYN_API void texsyn_erosion_free(texsyn_erosion *erosion);
+
+/* The share of the pixels that is eroded at level 1. */
+TEXSYN_API float texsyn_erosion_share(const texsyn_erosion *erosion);
+
+/* Erode a picture: colours in cracks are multiplied by what the exemplar's are of their
+   surroundings, channel by channel; the pixels around them a little.
+
+   level    0..1; at 0 the picture is copied
+   levels   NULL, or a gray picture of the erosion's size, with or without alpha: level is multiplied
+            by its gray times alpha, pixel by pixel. The brighter, the more eroded
+   picture  of the erosion's size, 1 to 4 channels; alpha is kept
+   out      the caller's, of the same size and channels, also the picture itself; untouched after an
+            error
+   return   TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY (for three rows)          */
+TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float level,
+                                          const txm_image *levels, const txm_image *picture,
+                                          txm_env *env, txm_image out);
+
+/* What is eroded, as a mask: 1 channel, white where it is. Otherwise as texsyn_erosion_draw. */
+TEXSYN_API txm_status texsyn_erosion_mask(const texsyn_erosion *erosion, float level,
+                                          const txm_image *levels, txm_env *env, txm_image out);
+
+/* The other way round: white where the exemplar is intact, two pixels away from all cracks, black
+   elsewhere. With this as the mask, texsyn_learn learns the polished stone. Width, height and seed
+   of desc are not used; out has the size of the exemplar and 1 channel. Statuses as above. */
+TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm_env *env,
+                                            txm_image out);
 
 #ifdef __cplusplus
 }
@@ -4866,6 +4977,1743 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
     }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- pictures and masks ----------------------------------------------------------------- */
+
+static size_t txs_pixels_of(int width, int height) {
+    return (size_t)width * (size_t)height;
+}
+
+/* gray times alpha is at least half: the rule for masks */
+static int txs_is_white(const txm_image *mask, int x, int y) {
+    const txm_image m = txm_image_resolve(*mask);
+    double v = (double)txm_image_get(&m, x, y, 0);
+    if (m.channels >= 3)
+        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
+    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
+    return v >= 0.5;
+}
+
+/* all samples finite and at most a million */
+static int txs_is_plain(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        for (int x = 0; x < im.width; x++) {
+            for (int c = 0; c < im.channels; c++)
+                if (!(fabs((double)txm_image_get(&im, x, y, c)) <= 1e6)) return 0;
+        }
+    }
+    return 1;
+}
+
+static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
+                                 txm_env *env) {
+    if (!mask->pixels) return TXM_OK;
+    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (mask->width != image->width || mask->height != image->height)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
+                                   "must be # x # like its picture", (uint64_t)image->width,
+                                   (uint64_t)image->height);
+    if (!txm_image_is_finite(mask))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
+    return TXM_OK;
+}
+
+/* ---- a change of light ------------------------------------------------------------------
+
+   One curve for the brightness V, the largest of R, G and B, which is applied to all three, and a
+   linear map of the chroma. The chroma of a colour is a vector that is 0 for grays and has the
+   direction of the hue,
+
+       c = (R - (G + B) / 2, sqrt(3)/2 (G - B)),   s = c / V,   s' = z s + cast * fade(|s|)
+
+   with a complex z, that is, a gain and a rotation. The cast, what another colour of the light adds,
+   fades to 0 for grays, so that R = G = B stays so exactly. */
+
+enum { TXS_BINS_OF_LIGHT = 15 }; /* quantiles of brightness that are matched, without the extremes */
+#define TXS_FLATTEST 0.25        /* slopes of the curve between two of them                     */
+#define TXS_STEEPEST_CURVE 4.0
+#define TXS_NEXT_KNOT 0.004      /* quantiles closer than a gray level of 255 become one        */
+#define TXS_DIM 0.02             /* V that s is at least divided by                             */
+#define TXS_FADE 0.02f           /* |s| from which on the whole cast is added                   */
+
+typedef struct txs_chroma {
+    double x, y;
+} txs_chroma;
+
+/* The curve at v: a cubic between two knots, straight beyond the ends. */
+static double txs_curve_at(const texsyn_light *l, double v) {
+    const int n = l->knots;
+    if (v <= (double)l->from[0]) return (double)l->to[0] + (double)l->slope[0] * (v - (double)l->from[0]);
+    if (v >= (double)l->from[n - 1])
+        return (double)l->to[n - 1] + (double)l->slope[n - 1] * (v - (double)l->from[n - 1]);
+    int k = 0;
+    while (v >= (double)l->from[k + 1]) k++;
+    const double h = (double)l->from[k + 1] - (double)l->from[k], t = (v - (double)l->from[k]) / h;
+    const double rise = (double)l->to[k + 1] - (double)l->to[k];
+    const double a = (double)l->slope[k] * h, b = (double)l->slope[k + 1] * h;
+    return (double)l->to[k] + t * (a + t * (3 * rise - 2 * a - b + t * (a + b - 2 * rise)));
+}
+
+static double txs_brightest(const double rgb[3]) {
+    const double v = rgb[0] > rgb[1] ? rgb[0] : rgb[1];
+    return v > rgb[2] ? v : rgb[2];
+}
+
+/* s of a colour, and its V */
+static txs_chroma txs_chroma_of(const double rgb[3], double *v) {
+    txs_chroma c;
+    *v = txs_brightest(rgb);
+    const double divisor = *v > TXS_DIM ? *v : TXS_DIM;
+    c.x = (rgb[0] - 0.5 * (rgb[1] + rgb[2])) / divisor;
+    c.y = 0.86602540378443865 * (rgb[1] - rgb[2]) / divisor;
+    return c;
+}
+
+/* The colour of brightness v and chroma s; too large a chroma is reduced until no channel is below 0. */
+static void txs_colour_of(double v, txs_chroma s, double rgb[3]) {
+    const double third = 1.0 / 3, root = 0.57735026918962576; /* 1 / sqrt(3) */
+    const double size = v > TXS_DIM ? v : TXS_DIM;
+    const double d[3] = {2 * third * s.x * size, (root * s.y - third * s.x) * size,
+                         (-root * s.y - third * s.x) * size};
+    const double high = txs_brightest(d);
+    double low = d[0] < d[1] ? d[0] : d[1];
+    low = low < d[2] ? low : d[2];
+    const double scale = v <= 0 ? 0 : high - low > v ? v / (high - low) : 1;
+    for (int c = 0; c < 3; c++) rgb[c] = v + scale * (d[c] - high);
+}
+
+/* What the light makes of a colour. */
+static void txs_light_at(const texsyn_light *l, const double from[3], double to[3]) {
+    double curved[3], v;
+    for (int c = 0; c < 3; c++) {
+        curved[c] = txs_curve_at(l, from[c]);
+        if (curved[c] < 0) curved[c] = 0;
+    }
+    const txs_chroma s = txs_chroma_of(curved, &v);
+    const double size = sqrt(s.x * s.x + s.y * s.y) / (double)l->fade;
+    const double t = size < 1 ? size * size * (3 - 2 * size) : 1;
+    txs_chroma lit;
+    lit.x = (double)l->gain[0] * s.x - (double)l->gain[1] * s.y + t * (double)l->cast[0];
+    lit.y = (double)l->gain[1] * s.x + (double)l->gain[0] * s.y + t * (double)l->cast[1];
+    txs_colour_of(v, lit, to);
+}
+
+/* No change at all. */
+static texsyn_light txs_no_light(void) {
+    texsyn_light l;
+    memset(&l, 0, sizeof l);
+    l.knots = 2;
+    l.from[1] = l.to[1] = 1;
+    l.slope[0] = l.slope[1] = 1;
+    l.gain[0] = 1;
+    l.fade = TXS_FADE;
+    return l;
+}
+
+/* ---- samples ---------------------------------------------------------------------------- */
+
+enum {
+    TXS_SWATCHES = 8192,    /* pixels of a picture that are looked at                        */
+    TXS_LEAST_SWATCHES = 16 /* pixels: fewer say nothing of the light                        */
+};
+
+typedef struct txs_swatches {
+    int count;
+    double (*rgb)[3]; /* count each                                                       */
+    double *weight;   /* of materials; see below                                          */
+    double *value;    /* room for a quantity ...                                          */
+    txm_pair *order;  /* ... and for its order, twice                                     */
+} txs_swatches;
+
+/* The weighted quantile p of value, whose order is known; sum: of all weights. */
+static double txs_quantile(const txs_swatches *s, double sum, double p) {
+    double seen = 0, before = 0, last = s->value[s->order[0].value];
+    for (int i = 0; i < s->count; i++) {
+        const uint32_t k = s->order[i].value;
+        if (!(s->weight[k] > 0)) continue;
+        const double at = (seen + 0.5 * s->weight[k]) / sum, v = s->value[k];
+        if (at >= p) return before <= 0 || at <= before ? v : last + (v - last) * (p - before) / (at - before);
+        before = at;
+        last = v;
+        seen += s->weight[k];
+    }
+    return last;
+}
+
+/* All quantiles of the brightness that the curve matches. */
+static void txs_find_quantiles(txs_swatches *s, double quantile[TXS_BINS_OF_LIGHT + 2]) {
+    double sum = 0;
+    for (int i = 0; i < s->count; i++) {
+        s->value[i] = txs_brightest(s->rgb[i]);
+        s->order[i].key = txm_sort_key(txm_float(s->value[i]));
+        s->order[i].value = (uint32_t)i;
+        sum += s->weight[i];
+    }
+    txm_sort_pairs(s->order, s->order + s->count, (size_t)s->count);
+    quantile[0] = txs_quantile(s, sum, 0.005);
+    for (int k = 0; k < TXS_BINS_OF_LIGHT; k++)
+        quantile[k + 1] = txs_quantile(s, sum, (k + 0.5) / (double)TXS_BINS_OF_LIGHT);
+    quantile[TXS_BINS_OF_LIGHT + 1] = txs_quantile(s, sum, 0.995);
+}
+
+/* ---- fitting ---------------------------------------------------------------------------- */
+
+static double txs_limit(double x, double low, double high) {
+    return x < low ? low : x > high ? high : x;
+}
+
+static void txs_add_knot(texsyn_light *l, double from, double to) {
+    l->from[l->knots] = txm_float(from);
+    l->to[l->knots++] = txm_float(to);
+}
+
+/* Slopes that keep the curve monotone: harmonic means of those on either side. */
+static void txs_find_slopes(texsyn_light *l) {
+    double steep[TEXSYN_LIGHT_KNOTS] = {0};
+    const int n = l->knots;
+    for (int k = 0; k + 1 < n; k++)
+        steep[k] = ((double)l->to[k + 1] - (double)l->to[k]) /
+                   ((double)l->from[k + 1] - (double)l->from[k]);
+    l->slope[0] = txm_float(steep[0]);
+    l->slope[n - 1] = txm_float(steep[n - 2]);
+    for (int k = 1; k + 1 < n; k++)
+        l->slope[k] = txm_float(2 * steep[k - 1] * steep[k] / (steep[k - 1] + steep[k]));
+}
+
+/* The curve: quantiles of the one become those of the other, within the limits of its slope. Below
+   them it goes on as before or, where light is not `raised`, towards black: more exposure leaves
+   black as it is, haze raises it. Above them it goes on as before. */
+static void txs_fit_curve(txs_swatches *a, txs_swatches *b, int raised, texsyn_light *l) {
+    double x[TXS_BINS_OF_LIGHT + 2], y[TXS_BINS_OF_LIGHT + 2], to;
+    txs_find_quantiles(a, x);
+    txs_find_quantiles(b, y);
+    l->knots = 0;
+    if (x[0] > TXS_NEXT_KNOT) {
+        const double rise = raised && x[3] - x[0] > TXS_NEXT_KNOT ? (y[3] - y[0]) / (x[3] - x[0])
+                                                                  : y[0] / x[0];
+        const double slope = txs_limit(rise, TXS_FLATTEST, TXS_STEEPEST_CURVE);
+        txs_add_knot(l, 0, y[0] > slope * x[0] ? y[0] - slope * x[0] : 0);
+    }
+    if (!l->knots || (double)l->to[0] + TXS_FLATTEST * x[0] < y[0]) txs_add_knot(l, x[0], y[0]);
+    else txs_add_knot(l, x[0], (double)l->to[0] + TXS_FLATTEST * x[0]);
+    to = (double)l->to[l->knots - 1];
+    for (int k = 1; k < TXS_BINS_OF_LIGHT + 2; k++) {
+        const double step = x[k] - (double)l->from[l->knots - 1];
+        if (step <= TXS_NEXT_KNOT) continue;
+        to = txs_limit(y[k], to + TXS_FLATTEST * step, to + TXS_STEEPEST_CURVE * step);
+        txs_add_knot(l, x[k], to);
+    }
+    const int n = l->knots, back = n > 4 ? 4 : n;
+    const double last = (double)l->from[n - 1], rise = to - (double)l->to[n - back];
+    const double run = last - (double)l->from[n - back];
+    const double slope = run > 0 ? txs_limit(rise / run, TXS_FLATTEST, TXS_STEEPEST_CURVE) : 1;
+    if (n < 2 || last < 1 - TXS_NEXT_KNOT) {
+        const double step = last < 1 - TXS_NEXT_KNOT ? 1 - last : 1;
+        txs_add_knot(l, last + step, to + slope * step);
+    }
+    txs_find_slopes(l);
+}
+
+/* Mean of s, and its variance as a complex number and as a real one. */
+typedef struct txs_moments {
+    txs_chroma mean, square;
+    double variance;
+} txs_moments;
+
+static txs_moments txs_find_moments(const txs_swatches *s, const texsyn_light *curve) {
+    txs_moments m;
+    double sum = 0, v;
+    memset(&m, 0, sizeof m);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < s->count; i++) {
+            double rgb[3];
+            for (int c = 0; c < 3; c++) {
+                rgb[c] = curve ? txs_curve_at(curve, s->rgb[i][c]) : s->rgb[i][c];
+                if (rgb[c] < 0) rgb[c] = 0;
+            }
+            const txs_chroma t = txs_chroma_of(rgb, &v);
+            const double w = s->weight[i], x = t.x - m.mean.x, y = t.y - m.mean.y;
+            if (pass) {
+                m.square.x += w * (x * x - y * y) / sum;
+                m.square.y += w * 2 * x * y / sum;
+                m.variance += w * (x * x + y * y) / sum;
+            } else {
+                m.square.x += w * t.x; /* the sums of the first pass, for now */
+                m.square.y += w * t.y;
+                m.variance += w;
+            }
+        }
+        if (pass) break;
+        sum = m.variance;
+        m.mean.x = m.square.x / sum;
+        m.mean.y = m.square.y / sum;
+        m.square.x = m.square.y = m.variance = 0;
+    }
+    return m;
+}
+
+/* The rotation between the longer axes of two distributions of chroma, as a unit vector: half the
+   angle between the complex variances, at most TXS_MOST_TURN, less where an axis is indistinct. */
+static txs_chroma txs_find_turn(const txs_moments *a, const txs_moments *b, double noise) {
+    const double most_cosine = 0.8253356149; /* of 0.6 rad */
+    txs_chroma q, turn;
+    q.x = a->square.x * b->square.x + a->square.y * b->square.y;
+    q.y = a->square.x * b->square.y - a->square.y * b->square.x;
+    const double size = sqrt(q.x * q.x + q.y * q.y);
+    const double distinct = size / ((a->variance + noise) * (b->variance + noise));
+    turn.x = 1;
+    turn.y = 0;
+    if (!(size > 0)) return turn;
+    double cosine = sqrt((1 + txs_limit(q.x / size, -1, 1)) / 2);
+    if (cosine < most_cosine) cosine = most_cosine;
+    const double sine = sqrt(1 - cosine * cosine);
+    const double x = 1 - distinct + distinct * cosine, y = distinct * (q.y < 0 ? -sine : sine);
+    turn.x = x / sqrt(x * x + y * y);
+    turn.y = y / sqrt(x * x + y * y);
+    return turn;
+}
+
+/* The light that turns the distribution of a into that of b. */
+static texsyn_light txs_fit_light(txs_swatches *a, txs_swatches *b, int raised) {
+    const double noise = 0.01; /* of s, in either picture */
+    texsyn_light l = txs_no_light();
+    txs_fit_curve(a, b, raised, &l);
+    const txs_moments p = txs_find_moments(a, &l), q = txs_find_moments(b, NULL);
+    const double gain = txs_limit((sqrt(q.variance) + noise) / (sqrt(p.variance) + noise), 0.3, 3);
+    const txs_chroma turn = txs_find_turn(&p, &q, noise * noise);
+    l.gain[0] = txm_float(gain * turn.x);
+    l.gain[1] = txm_float(gain * turn.y);
+    l.cast[0] = txm_float(q.mean.x - gain * (turn.x * p.mean.x - turn.y * p.mean.y));
+    l.cast[1] = txm_float(q.mean.y - gain * (turn.y * p.mean.x + turn.x * p.mean.y));
+    return l;
+}
+
+/* ---- materials --------------------------------------------------------------------------
+
+   Two pictures may show the same materials in unequal shares; matching their distributions would
+   then turn one material into another. So clusters of colours are matched too, pixels are weighed
+   until matched clusters have equal shares, and the light is fitted again. Clusters are matched
+   after a first guess of the light, once that of the whole distributions and once no change. Of
+   all these lights the one is kept under which most colours have a counterpart in the other
+   picture, whatever their number. */
+
+enum {
+    TXS_MATERIALS = 3,      /* clusters a picture                                              */
+    TXS_MEANS_ROUNDS = 10,  /* of k-means                                                      */
+    TXS_MATCH_ROUNDS = 3,   /* matching, weighing, fitting                                     */
+    TXS_COMPARED = 512      /* colours that are compared one by one                            */
+};
+#define TXS_CHROMA_WEIGHT 1.5 /* of s against V in distances of colours                        */
+#define TXS_FEW 0.01          /* share of a cluster that is left out                           */
+#define TXS_TOO_FAR 0.2       /* colours farther apart than this have no counterpart           */
+#define TXS_WHOLE_BONUS 0.85  /* the light of the whole distributions is kept unless another is
+                                 better by more than this factor                               */
+
+typedef struct txs_point {
+    double at[3];
+} txs_point;
+
+typedef struct txs_cloud { /* the colours of one picture, under some light */
+    int count;
+    txs_point *points;
+    uint8_t *cluster;
+    txs_point centre[TXS_MATERIALS];
+    double share[TXS_MATERIALS];
+} txs_cloud;
+
+static double txs_apart(const txs_point *a, const txs_point *b) {
+    double sum = 0;
+    for (int k = 0; k < 3; k++) sum += (a->at[k] - b->at[k]) * (a->at[k] - b->at[k]);
+    return sum;
+}
+
+static void txs_place_points(txs_cloud *cloud, const txs_swatches *s, const texsyn_light *light) {
+    cloud->count = s->count;
+    for (int i = 0; i < s->count; i++) {
+        double rgb[3] = {s->rgb[i][0], s->rgb[i][1], s->rgb[i][2]}, v;
+        if (light) txs_light_at(light, s->rgb[i], rgb);
+        const txs_chroma c = txs_chroma_of(rgb, &v);
+        cloud->points[i].at[0] = v;
+        cloud->points[i].at[1] = TXS_CHROMA_WEIGHT * c.x;
+        cloud->points[i].at[2] = TXS_CHROMA_WEIGHT * c.y;
+    }
+}
+
+static void txs_assign_points(txs_cloud *c) {
+    for (int i = 0; i < c->count; i++) {
+        int best = 0;
+        for (int k = 1; k < TXS_MATERIALS; k++)
+            if (txs_apart(&c->points[i], &c->centre[k]) < txs_apart(&c->points[i], &c->centre[best]))
+                best = k;
+        c->cluster[i] = (uint8_t)best;
+    }
+}
+
+/* k-means, from centres that are evenly spaced in the order of brightness. */
+static void txs_find_clusters(txs_cloud *c, txm_pair *order) {
+    for (int i = 0; i < c->count; i++) {
+        order[i].key = txm_sort_key(txm_float(c->points[i].at[0]));
+        order[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(order, order + c->count, (size_t)c->count);
+    for (int k = 0; k < TXS_MATERIALS; k++)
+        c->centre[k] = c->points[order[(2 * k + 1) * c->count / (2 * TXS_MATERIALS)].value];
+    for (int round = 0; round < TXS_MEANS_ROUNDS; round++) {
+        txs_point sum[TXS_MATERIALS];
+        memset(sum, 0, sizeof sum);
+        memset(c->share, 0, sizeof c->share);
+        txs_assign_points(c);
+        for (int i = 0; i < c->count; i++) {
+            for (int k = 0; k < 3; k++) sum[c->cluster[i]].at[k] += c->points[i].at[k];
+            c->share[c->cluster[i]]++;
+        }
+        for (int k = 0; k < TXS_MATERIALS; k++) {
+            for (int d = 0; d < 3 && c->share[k] > 0; d++)
+                c->centre[k].at[d] = sum[k].at[d] / c->share[k];
+            c->share[k] /= c->count;
+        }
+    }
+}
+
+/* Go through all ways to match the clusters from `from` on; the best is kept. */
+static void txs_match_from(const txs_cloud *a, const txs_cloud *b, int from, double sum,
+                           int match[TXS_MATERIALS], double *least, int best[TXS_MATERIALS]) {
+    if (sum >= *least) return;
+    if (from == TXS_MATERIALS) {
+        *least = sum;
+        for (int k = 0; k < TXS_MATERIALS; k++) best[k] = match[k];
+        return;
+    }
+    for (int k = from; k < TXS_MATERIALS; k++) {
+        const int other = match[k];
+        match[k] = match[from];
+        match[from] = other;
+        txs_match_from(a, b, from + 1, sum + txs_apart(&a->centre[from], &b->centre[other]), match,
+                       least, best);
+        match[from] = match[k];
+        match[k] = other;
+    }
+}
+
+/* Weigh the samples of both pictures so that matched clusters have equal shares. 0: nothing is left. */
+static int txs_weigh_materials(const txs_cloud *a, const txs_cloud *b, txs_swatches *of_a,
+                               txs_swatches *of_b) {
+    int match[TXS_MATERIALS], best[TXS_MATERIALS];
+    double least = 1e300, total = 0, to_a[TXS_MATERIALS], to_b[TXS_MATERIALS];
+    for (int k = 0; k < TXS_MATERIALS; k++) match[k] = best[k] = k;
+    txs_match_from(a, b, 0, 0, match, &least, best);
+    for (int k = 0; k < TXS_MATERIALS; k++) {
+        const double p = a->share[k], q = b->share[best[k]];
+        const double share = p < TXS_FEW || q < TXS_FEW ? 0 : sqrt(p * q);
+        to_a[k] = share > 0 ? share / p : 0;
+        to_b[best[k]] = share > 0 ? share / q : 0;
+        total += share;
+    }
+    for (int i = 0; i < of_a->count; i++) of_a->weight[i] = to_a[a->cluster[i]];
+    for (int i = 0; i < of_b->count; i++) of_b->weight[i] = to_b[b->cluster[i]];
+    return total > 0;
+}
+
+/* Mean distance from colours of a to the nearest of b. */
+static double txs_one_way(const txs_cloud *a, const txs_cloud *b) {
+    const int n = a->count < TXS_COMPARED ? a->count : TXS_COMPARED;
+    const int m = b->count < TXS_COMPARED ? b->count : TXS_COMPARED;
+    double sum = 0;
+    for (int i = 0; i < n; i++) {
+        const txs_point *p = &a->points[(int)((int64_t)i * a->count / n)];
+        double least = TXS_TOO_FAR * TXS_TOO_FAR;
+        for (int k = 0; k < m; k++) {
+            const double d = txs_apart(p, &b->points[(int)((int64_t)k * b->count / m)]);
+            if (d < least) least = d;
+        }
+        sum += sqrt(least);
+    }
+    return sum / n;
+}
+
+/* ---- learning a light ------------------------------------------------------------------- */
+
+typedef struct txs_lighting {
+    txs_swatches a, b;
+    txs_cloud of_a, of_b;
+} txs_lighting;
+
+static double txs_light_cost(txs_lighting *w, const texsyn_light *light) {
+    txs_place_points(&w->of_a, &w->a, light);
+    return txs_one_way(&w->of_a, &w->of_b) + txs_one_way(&w->of_b, &w->of_a);
+}
+
+/* The light of matched materials, from a first guess. */
+static texsyn_light txs_match_materials(txs_lighting *w, texsyn_light light, int raised) {
+    for (int round = 0; round < TXS_MATCH_ROUNDS; round++) {
+        txs_place_points(&w->of_a, &w->a, &light);
+        txs_find_clusters(&w->of_a, w->a.order);
+        if (!txs_weigh_materials(&w->of_a, &w->of_b, &w->a, &w->b)) break;
+        light = txs_fit_light(&w->a, &w->b, raised);
+    }
+    return light;
+}
+
+static txm_status txs_choose_light(txs_lighting *w, txm_env *env, texsyn_light *out) {
+    for (int i = 0; i < w->a.count; i++) w->a.weight[i] = 1;
+    for (int i = 0; i < w->b.count; i++) w->b.weight[i] = 1;
+    const texsyn_light whole[2] = {txs_fit_light(&w->a, &w->b, 0), txs_fit_light(&w->a, &w->b, 1)};
+    txs_place_points(&w->of_b, &w->b, NULL);
+    txs_find_clusters(&w->of_b, w->b.order);
+    texsyn_light best = whole[0];
+    double least = TXS_WHOLE_BONUS * txs_light_cost(w, &whole[0]);
+    for (int k = 1; k < 6; k++) { /* even: black stays; then whole, matched, matched from no change */
+        const int raised = k % 2;
+        if (txm_progress(env, 0.15f * (float)k, "materials"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        const texsyn_light light =
+            k < 2 ? whole[1] : txs_match_materials(w, k < 4 ? whole[raised] : txs_no_light(), raised);
+        const double cost = txs_light_cost(w, &light) * (k < 2 ? TXS_WHOLE_BONUS : 1);
+        if (cost < least) {
+            least = cost;
+            best = light;
+        }
+    }
+    *out = best;
+    return TXM_OK;
+}
+
+static int txs_counts(const txm_image *im, const txm_image *mask, int x, int y) {
+    if (mask->pixels && !txs_is_white(mask, x, y)) return 0;
+    return im->channels % 2 == 1 || txm_image_get(im, x, y, im->channels - 1) >= 0.5f;
+}
+
+/* Samples of the pixels that count, evenly spread over them but at random within each stretch. */
+static txm_status txs_take_swatches(const txm_image *image, const txm_image *mask, const char *name,
+                                    txm_arena *arena, txs_swatches *s, txs_cloud *cloud,
+                                    txm_env *env) {
+    const txm_image im = txm_image_resolve(*image);
+    int64_t total = 0, seen = 0;
+    for (int y = 0; y < im.height; y++)
+        for (int x = 0; x < im.width; x++) total += txs_counts(&im, mask, x, y);
+    if (total < TXS_LEAST_SWATCHES)
+        return txm_fail_numbers_at(env, TXM_TOO_SMALL, name,
+                                   "fewer than # opaque pixels in the mask", TXS_LEAST_SWATCHES, 0);
+    s->count = 0;
+    const int most = total < TXS_SWATCHES ? (int)total : TXS_SWATCHES;
+    s->rgb = (double(*)[3])txm_arena_alloc(arena, (size_t)most, sizeof *s->rgb);
+    s->weight = (double *)txm_arena_alloc(arena, (size_t)most, sizeof(double));
+    s->value = (double *)txm_arena_alloc(arena, (size_t)most, sizeof(double));
+    s->order = (txm_pair *)txm_arena_alloc(arena, (size_t)most, 2 * sizeof(txm_pair));
+    cloud->points = (txs_point *)txm_arena_alloc(arena, (size_t)most, sizeof(txs_point));
+    cloud->cluster = (uint8_t *)txm_arena_alloc(arena, (size_t)most, 1);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for samples");
+    txm_rng rng = txm_rng_make(0, 5);
+    int64_t next = -1;
+    for (int y = 0; y < im.height && s->count < most; y++) {
+        for (int x = 0; x < im.width && s->count < most; x++) {
+            if (!txs_counts(&im, mask, x, y)) continue;
+            if (next < 0) {
+                const int64_t from = s->count * total / most, to = (s->count + 1) * total / most;
+                next = from + txm_rng_range(&rng, 0, (int)(to - from) - 1);
+            }
+            if (seen++ != next) continue;
+            for (int c = 0; c < 3; c++)
+                s->rgb[s->count][c] = (double)txm_image_get(&im, x, y, im.channels < 3 ? 0 : c);
+            s->count++;
+            next = -1;
+        }
+    }
+    return TXM_OK;
+}
+
+static txm_status txs_check_relight(const texsyn_relight_desc *d, txm_env *env) {
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    const txm_image *images[2] = {&d->image, &d->like}, *masks[2] = {&d->mask, &d->like_mask};
+    static const char *const names[2] = {"image", "like"};
+    static const char *const mask_names[2] = {"mask", "like_mask"};
+    for (int k = 0; k < 2; k++) {
+        txm_status status = txm_image_check(images[k], names[k], TEXSYN_MAX_PIXELS, env);
+        if (status == TXM_OK) status = txs_check_mask(masks[k], images[k], mask_names[k], env);
+        if (status != TXM_OK) return status;
+        if (!txs_is_plain(images[k]))
+            return txm_fail_at(env, TXM_BAD_ARGUMENT, names[k],
+                               "has samples that are not finite or beyond a million");
+    }
+    if (!(d->strength >= 0 && d->strength <= 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "strength must be 0 (default) to 1");
+    return TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_light_learn(const texsyn_relight_desc *desc, txm_env *env,
+                                         texsyn_light *out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    txm_status status = txs_check_relight(desc, env);
+    if (status != TXM_OK) return status;
+    txs_lighting w;
+    txm_arena arena;
+    texsyn_light light = txs_no_light();
+    txm_arena_init(&arena, env);
+    if (txm_progress(env, 0, "colours")) status = txm_fail(env, TXM_CANCELLED, "cancelled");
+    if (status == TXM_OK)
+        status = txs_take_swatches(&desc->image, &desc->mask, "image", &arena, &w.a, &w.of_a, env);
+    if (status == TXM_OK)
+        status = txs_take_swatches(&desc->like, &desc->like_mask, "like", &arena, &w.b, &w.of_b, env);
+    if (status == TXM_OK) status = txs_choose_light(&w, env, &light);
+    txm_arena_free(&arena);
+    if (status == TXM_OK) *out = light;
+    return status;
+}
+
+/* ---- applying a light ------------------------------------------------------------------- */
+
+enum { TXS_LIT_SHARES = 64 }; /* into which a picture is divided for threads */
+
+typedef struct txs_lit {
+    const texsyn_light *light;
+    txm_image from, to;
+    double strength;
+} txs_lit;
+
+/* Between -1/2 and 1/2, evenly distributed: noise of one step of 8 bits, so that no bands appear
+   where a step becomes several, or several values one. */
+static double txs_dither(int x, int y) {
+    const uint64_t place = (uint64_t)(uint32_t)y << 32 | (uint32_t)x;
+    return ((double)(txm_hash(place + 0x9e3779b97f4a7c15u) >> 40) + 0.5) / 16777216.0 - 0.5;
+}
+
+static void txs_light_pixel(const txs_lit *w, int x, int y) {
+    const int channels = w->from.channels, colours = channels < 3 ? 1 : 3;
+    const double noise = txs_dither(x, y) / 255;
+    double from[3], to[3];
+    for (int c = 0; c < 3; c++) {
+        from[c] = (double)txm_image_get(&w->from, x, y, colours == 1 ? 0 : c);
+        if (w->from.sample == TXM_U8) from[c] += noise;
+    }
+    txs_light_at(w->light, from, to);
+    for (int c = 0; c < channels; c++) {
+        if (c >= colours) { /* alpha */
+            txm_image_set(&w->to, x, y, c, txm_image_get(&w->from, x, y, c));
+            continue;
+        }
+        double v = from[c] + w->strength * (to[c] - from[c]);
+        if (w->from.sample != TXM_U8 && w->to.sample == TXM_U8) v += noise;
+        txm_image_set(&w->to, x, y, c, txm_float(v));
+    }
+}
+
+static void txs_light_share(void *context, int share) {
+    const txs_lit *w = (const txs_lit *)context;
+    const int rows = (w->from.height - 1) / TXS_LIT_SHARES + 1;
+    for (int y = share * rows; y < (share + 1) * rows && y < w->from.height; y++) {
+        for (int x = 0; x < w->from.width; x++) txs_light_pixel(w, x, y);
+    }
+}
+
+/* Is this a light that texsyn_light_learn can have made? */
+static int txs_is_light(const texsyn_light *l) {
+    if (l->knots < 2 || l->knots > TEXSYN_LIGHT_KNOTS || !(l->fade > 0 && l->fade <= 1e6f)) return 0;
+    for (int k = 0; k < l->knots; k++) {
+        if (!(fabsf(l->from[k]) <= 1e8f && fabsf(l->to[k]) <= 1e8f)) return 0;
+        if (!(l->slope[k] >= 0 && l->slope[k] <= 1e6f)) return 0;
+        if (k && !(l->from[k] > l->from[k - 1] && l->to[k] >= l->to[k - 1])) return 0;
+    }
+    for (int k = 0; k < 2; k++) {
+        if (!(fabsf(l->gain[k]) <= 1e6f && fabsf(l->cast[k]) <= 1e6f)) return 0;
+    }
+    return 1;
+}
+
+static txm_status txs_check_lit(const txm_image *image, const txm_image *out, txm_env *env) {
+    txm_status status = txm_image_check(image, "image", TEXSYN_MAX_PIXELS, env);
+    if (status == TXM_OK) status = txm_image_check(out, "out", TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    const txm_image from = txm_image_resolve(*image), to = txm_image_resolve(*out);
+    if (to.width != from.width || to.height != from.height || to.channels != from.channels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
+                           "must have the size and the channels of the image");
+    if (!txs_is_plain(&from))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image",
+                           "has samples that are not finite or beyond a million");
+    return TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_light_apply(const texsyn_light *light, float strength,
+                                         const txm_image *image, txm_env *env, txm_image out) {
+    if (!light) return txm_fail(env, TXM_BAD_ARGUMENT, "light is NULL");
+    if (!txs_is_light(light))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "light was not made by texsyn_light_learn");
+    if (!(strength >= 0 && strength <= 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "strength must be 0 to 1");
+    const txm_status status = txs_check_lit(image, &out, env);
+    if (status != TXM_OK) return status;
+    txs_lit w;
+    w.light = light;
+    w.from = txm_image_resolve(*image);
+    w.to = txm_image_resolve(out);
+    w.strength = (double)strength;
+    txm_parallel_for(env, TXS_LIT_SHARES, txs_light_share, &w);
+    return TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_relight(const texsyn_relight_desc *desc, txm_env *env, txm_image out) {
+    texsyn_light light;
+    txm_status status = txs_check_relight(desc, env);
+    if (status == TXM_OK) status = txs_check_lit(&desc->image, &out, env); /* before the work */
+    if (status == TXM_OK) status = texsyn_light_learn(desc, env, &light);
+    if (status == TXM_OK && txm_progress(env, 0.9f, "apply"))
+        status = txm_fail(env, TXM_CANCELLED, "cancelled");
+    if (status != TXM_OK) return status;
+    return texsyn_light_apply(&light, desc->strength > 0 ? desc->strength : 1.0f, &desc->image, env,
+                              out);
+}
+
+/* ---- darkness ---------------------------------------------------------------------------
+
+   What erosion sees in its exemplar. Cracks and pits are darker than their surroundings, and
+   cracks are also long. So each pixel has a darkness, its difference from the local mean in units
+   of the local deviation, and a strength, the darkness averaged along the best of a dozen
+   directions. Averaging along a crack bridges its interruptions and removes single dark pixels,
+   but does not widen it. */
+
+enum {
+    TXS_NEARBY = 11,         /* pixels: radius of the local mean, three box filters of it        */
+    TXS_AROUND = 24,         /* of the local deviation                                           */
+    TXS_STEADY = 4,          /* gray levels of 255 added to the deviation: even areas stay even  */
+    TXS_DIRECTIONS = 12,     /* of line segments                                                 */
+    TXS_HALF_LINE = 8,       /* pixels on either side of a segment's middle                      */
+    TXS_LINE = 2 * TXS_HALF_LINE + 1,
+    TXS_RATIO_ONE = 160      /* stored ratio of a pixel as light as its surroundings             */
+};
+#define TXS_LEAST_DARK (-1.0f) /* darkness is limited to this range before it is averaged: one */
+#define TXS_MOST_DARK 3.0f     /* black pixel makes no line                                    */
+#define TXS_ALONG 0.75         /* weight of the line in the strength; the rest is the pixel's  */
+#define TXS_INTACT 0.5f        /* less dark pixels count as intact surroundings                */
+
+typedef struct txs_stone {
+    int width, height;
+    float *dark;     /* limited to TXS_LEAST_DARK..TXS_MOST_DARK; 0 where unknown             */
+    float *strength; /* the same along lines                                                 */
+    uint8_t *ratio;  /* 3 per pixel: colour over that of the intact surroundings             */
+    uint8_t *known;  /* non-zero: opaque and inside the mask                                 */
+} txs_stone;
+
+/* One box filter along a line of count values that are step apart; zero beyond its ends. */
+static void txs_box(float *p, size_t count, size_t step, size_t radius, float *line) {
+    double sum = 0;
+    for (size_t i = 0; i < count; i++) line[i] = p[i * step];
+    for (size_t i = 0; i < radius && i < count; i++) sum += (double)line[i];
+    for (size_t i = 0; i < count; i++) {
+        if (i + radius < count) sum += (double)line[i + radius];
+        p[i * step] = txm_float(sum / (double)(2 * radius + 1));
+        if (i >= radius) sum -= (double)line[i - radius];
+    }
+}
+
+/* Three box filters each way, nearly a Gaussian of sigma sqrt(radius (radius + 1)); line has room
+   for the longer side. */
+static void txs_blur(float *plane, int width, int height, int radius, float *line) {
+    for (int pass = 0; pass < 3; pass++) {
+        for (size_t y = 0; y < (size_t)height; y++)
+            txs_box(plane + y * (size_t)width, (size_t)width, 1, (size_t)radius, line);
+        for (size_t x = 0; x < (size_t)width; x++)
+            txs_box(plane + x, (size_t)height, (size_t)width, (size_t)radius, line);
+    }
+}
+
+/* sum / weight where there is weight */
+static double txs_mean_at(const float *sum, const float *weight, size_t i) {
+    return weight[i] > 1e-4f ? (double)sum[i] / (double)weight[i] : 0;
+}
+
+/* What pixel i of an image looks like, in gray levels of 255. */
+static double txs_colour_at(const txm_image *im, size_t i, int c) {
+    const int x = (int)(i % (size_t)im->width), y = (int)(i / (size_t)im->width);
+    return 255 * (double)txm_image_get(im, x, y, im->channels < 3 ? 0 : c);
+}
+static double txs_luma_at(const txm_image *im, size_t i) {
+    return 0.299 * txs_colour_at(im, i, 0) + 0.587 * txs_colour_at(im, i, 1) +
+           0.114 * txs_colour_at(im, i, 2);
+}
+
+/* Four planes for the filters, and a line. */
+typedef struct txs_filter_room {
+    float *weight, *mean, *wide, *square, *line;
+} txs_filter_room;
+
+/* Darkness: (local mean - luma) / (local deviation + TXS_STEADY). */
+static void txs_find_dark(txs_stone *s, const txm_image *im, const txs_filter_room *r) {
+    const size_t n = txs_pixels_of(s->width, s->height);
+    for (size_t i = 0; i < n; i++) {
+        r->weight[i] = r->wide[i] = s->known[i] ? 1.0f : 0.0f;
+        r->mean[i] = s->known[i] ? txm_float(txs_luma_at(im, i)) : 0.0f;
+    }
+    txs_blur(r->weight, s->width, s->height, TXS_NEARBY, r->line);
+    txs_blur(r->mean, s->width, s->height, TXS_NEARBY, r->line);
+    for (size_t i = 0; i < n; i++) {
+        const double off = txs_mean_at(r->mean, r->weight, i) - txs_luma_at(im, i);
+        s->dark[i] = s->known[i] ? txm_float(off) : 0.0f;
+        r->square[i] = s->known[i] ? txm_float(off * off) : 0.0f;
+    }
+    txs_blur(r->wide, s->width, s->height, TXS_AROUND, r->line);
+    txs_blur(r->square, s->width, s->height, TXS_AROUND, r->line);
+    for (size_t i = 0; i < n; i++) {
+        const double deviation = sqrt(txs_mean_at(r->square, r->wide, i));
+        s->dark[i] = txm_clampf(txm_float((double)s->dark[i] / (deviation + (double)TXS_STEADY)),
+                                TXS_LEAST_DARK, TXS_MOST_DARK);
+    }
+}
+
+/* The colour of each pixel over the mean colour of the intact pixels around it. */
+static void txs_find_ratios(txs_stone *s, const txm_image *im, const txs_filter_room *r) {
+    const size_t n = txs_pixels_of(s->width, s->height);
+    for (size_t i = 0; i < n; i++)
+        r->weight[i] = s->known[i] && s->dark[i] < TXS_INTACT ? 1.0f : 0.0f;
+    for (int c = 0; c < 3; c++) {
+        for (size_t i = 0; i < n; i++)
+            r->mean[i] = r->weight[i] > 0.5f ? txm_float(txs_colour_at(im, i, c)) : 0.0f;
+        for (size_t i = 0; i < n && c == 0; i++) r->wide[i] = r->weight[i];
+        if (c == 0) txs_blur(r->wide, s->width, s->height, TXS_NEARBY, r->line);
+        txs_blur(r->mean, s->width, s->height, TXS_NEARBY, r->line);
+        for (size_t i = 0; i < n; i++) {
+            const double around = txs_mean_at(r->mean, r->wide, i);
+            const double ratio = s->known[i] && around > 0.5 ? txs_colour_at(im, i, c) / around : 1;
+            const double stored = floor(ratio * (double)TXS_RATIO_ONE + 0.5);
+            s->ratio[3 * i + (size_t)c] = (uint8_t)(stored > 255 ? 255 : stored < 0 ? 0 : stored);
+        }
+    }
+}
+
+/* ---- strength along lines -------------------------------------------------------------- */
+
+typedef struct txs_line_filter {
+    const float *dark;
+    float *strength;
+    int width, height;
+    int first, rows; /* where this part of the work begins, and rows of one share of it */
+    int dx[TXS_DIRECTIONS][TXS_LINE], dy[TXS_DIRECTIONS][TXS_LINE];
+} txs_line_filter;
+
+static void txs_make_lines(txs_line_filter *f) {
+    for (int d = 0; d < TXS_DIRECTIONS; d++) {
+        double sine, cosine;
+        txm_sincos(TXM_PI * d / (double)TXS_DIRECTIONS, &sine, &cosine);
+        for (int k = 0; k < TXS_LINE; k++) {
+            f->dx[d][k] = (int)floor((k - TXS_HALF_LINE) * cosine + 0.5);
+            f->dy[d][k] = (int)floor((k - TXS_HALF_LINE) * sine + 0.5);
+        }
+    }
+}
+
+/* The largest of the sums along the lines through a pixel; beyond the border the nearest pixel
+   stands for what is not there. */
+static float txs_best_line(const txs_line_filter *f, int x, int y) {
+    const int inside = x >= TXS_HALF_LINE && x < f->width - TXS_HALF_LINE && y >= TXS_HALF_LINE &&
+                       y < f->height - TXS_HALF_LINE;
+    float best = (float)TXS_LINE * TXS_LEAST_DARK;
+    for (int d = 0; d < TXS_DIRECTIONS; d++) {
+        double sum = 0;
+        for (int k = 0; k < TXS_LINE; k++) {
+            int u = x + f->dx[d][k], v = y + f->dy[d][k];
+            if (!inside) {
+                u = txm_clampi(u, 0, f->width - 1);
+                v = txm_clampi(v, 0, f->height - 1);
+            }
+            sum += (double)f->dark[(size_t)v * (size_t)f->width + (size_t)u];
+        }
+        best = txm_maxf(best, txm_float(sum));
+    }
+    return best;
+}
+
+static void txs_filter_rows(void *context, int share) {
+    const txs_line_filter *f = (const txs_line_filter *)context;
+    const int from = f->first + share * f->rows;
+    for (int y = from; y < from + f->rows && y < f->height; y++) {
+        for (int x = 0; x < f->width; x++) {
+            const size_t i = (size_t)y * (size_t)f->width + (size_t)x;
+            f->strength[i] = txm_float(TXS_ALONG * (double)txs_best_line(f, x, y) / (double)TXS_LINE +
+                                       (1 - TXS_ALONG) * (double)f->dark[i]);
+        }
+    }
+}
+
+/* strength of a plane of darkness, on the threads of env; reports from..to */
+static txm_status txs_find_strength(const float *dark, float *strength, int width, int height,
+                                    txm_env *env, float from, float to) {
+    enum { SHARES = 16, PARTS = 8 }; /* a report after each part */
+    txs_line_filter f;
+    f.width = width;
+    f.height = height;
+    f.rows = 1 + (height - 1) / (SHARES * PARTS);
+    f.dark = dark;
+    f.strength = strength;
+    txs_make_lines(&f);
+    for (f.first = 0; f.first < height; f.first += SHARES * f.rows) {
+        const float done = (float)f.first / (float)height;
+        if (txm_progress(env, txm_lerpf(from, to, done), "find cracks"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        txm_parallel_for(env, SHARES, txs_filter_rows, &f);
+    }
+    return TXM_OK;
+}
+
+/* ---- the order of erosion ---------------------------------------------------------------
+
+   Pixels erode one after the other, the strongest first, so that what is eroded at one level is
+   part of what is at the next, and any number of pixels is a level. Erosion finds it easier to go
+   on than to begin: a pixel beside an eroded one counts as stronger than it is, so cracks grow
+   along their whole length before others begin. And a pixel waits until the cracked region it
+   belongs to is long enough, which keeps single dark grains out. As regions only grow, waiting
+   changes the order and nothing else; in terms of morphology, this is an attribute opening by the
+   larger side of the bounding box, with a larger demand on the first regions than on later ones. */
+
+enum {
+    TXS_LONG_FIRST = 80, /* pixels: length of a region at the beginning ...                  */
+    TXS_LONG_LAST = 12,  /* ... and from the full share on                                   */
+    TXS_LONG_STEPS = 10, /* times at which the demand falls                                  */
+    TXS_LONG_PART = 4,   /* and it is at most this part of the shorter side of the picture   */
+    TXS_STRENGTHS = 4096 /* steps into which the range of strengths is divided               */
+};
+#define TXS_GO_ON 1.0f /* by how much a pixel beside an eroded one counts as stronger          */
+
+/* A queue of pixels by strength: a list for each step. A pixel enters twice: with its own
+   strength, and when it gets its first eroded neighbour. */
+typedef struct txs_queue {
+    int width, height;
+    const float *strength;
+    uint32_t *next;  /* 2 per pixel: the next entry in its list; entry / 2 is the pixel      */
+    uint8_t *state;  /* of each pixel: TXS_BESIDE, TXS_ERODED                                 */
+    uint32_t *first; /* of each list                                                         */
+    int step;        /* no list above this one holds anything                                */
+} txs_queue;
+
+#define TXS_NO_PIXEL UINT32_MAX
+enum { TXS_BESIDE = 1, TXS_ERODED = 2 };
+
+static void txs_enter(txs_queue *q, uint32_t pixel, int is_beside) {
+    const float range = TXS_MOST_DARK + TXS_GO_ON - TXS_LEAST_DARK;
+    const float strength = q->strength[pixel] + (is_beside ? TXS_GO_ON : 0.0f);
+    const float share = (strength - TXS_LEAST_DARK) / range;
+    const int step = txm_clampi((int)((double)share * (double)TXS_STRENGTHS), 0, TXS_STRENGTHS - 1);
+    const uint32_t entry = 2 * pixel + (uint32_t)is_beside;
+    q->next[entry] = q->first[step];
+    q->first[step] = entry;
+    if (step > q->step) q->step = step;
+}
+
+/* the strongest pixel that is not taken yet; there must be one */
+static uint32_t txs_take(txs_queue *q) {
+    for (;;) {
+        while (q->first[q->step] == TXS_NO_PIXEL) q->step--;
+        const uint32_t entry = q->first[q->step], pixel = entry / 2;
+        q->first[q->step] = q->next[entry];
+        if (q->state[pixel] & TXS_ERODED) continue;
+        q->state[pixel] |= TXS_ERODED;
+        return pixel;
+    }
+}
+
+/* Take all pixels; the values of order are these. */
+static void txs_grow_cracks(txs_queue *q, uint32_t count, txm_pair *order) {
+    memset(q->state, 0, count);
+    memset(q->first, 0xff, TXS_STRENGTHS * sizeof *q->first);
+    q->step = 0;
+    for (uint32_t i = count; i-- > 0;) txs_enter(q, i, 0); /* of equal ones the first comes first */
+    for (uint32_t k = 0; k < count; k++) {
+        const uint32_t p = txs_take(q);
+        const int x = (int)(p % (uint32_t)q->width), y = (int)(p / (uint32_t)q->width);
+        order[k].value = p;
+        for (int v = y > 0 ? y - 1 : y; v <= y + 1 && v < q->height; v++) {
+            for (int u = x > 0 ? x - 1 : x; u <= x + 1 && u < q->width; u++) {
+                const uint32_t beside = (uint32_t)v * (uint32_t)q->width + (uint32_t)u;
+                if (q->state[beside]) continue;
+                q->state[beside] = TXS_BESIDE;
+                txs_enter(q, beside, 1);
+            }
+        }
+    }
+}
+
+/* Regions of pixels that have been reached, as trees with their root as the name. Pixels of a
+   region that waits are linked in a ring. */
+typedef struct txs_regions {
+    int width, height;
+    uint32_t *parent;   /* of each pixel; itself at a root; none: not reached yet             */
+    uint32_t *ring;     /* the next pixel of the same waiting region                         */
+    int32_t *box;       /* 4 per pixel, valid at roots: least x, y, largest x, y; least x is
+                           TXS_RELEASED once a region no longer waits                        */
+    txm_pair *order;    /* key: when a pixel was released                                    */
+    uint32_t *place;    /* of each pixel in order                                            */
+} txs_regions;
+
+enum { TXS_RELEASED = -1 };
+
+static uint32_t txs_root_of(txs_regions *r, uint32_t p) {
+    while (r->parent[p] != p) {
+        r->parent[p] = r->parent[r->parent[p]];
+        p = r->parent[p];
+    }
+    return p;
+}
+
+static int txs_region_waits(const txs_regions *r, uint32_t root) {
+    return r->box[4 * (size_t)root] != TXS_RELEASED;
+}
+
+/* All pixels of a waiting region are released at a time. */
+static void txs_release(txs_regions *r, uint32_t root, uint32_t time) {
+    uint32_t p = root;
+    do {
+        r->order[r->place[p]].key = time;
+        p = r->ring[p];
+    } while (p != root);
+    r->box[4 * (size_t)root] = TXS_RELEASED;
+}
+
+static int txs_region_length(const txs_regions *r, uint32_t root) {
+    const int32_t *b = r->box + 4 * (size_t)root;
+    return 1 + (b[2] - b[0] > b[3] - b[1] ? b[2] - b[0] : b[3] - b[1]);
+}
+
+/* Join two regions. If only one of them waits, its wait is over. */
+static void txs_join_regions(txs_regions *r, uint32_t a, uint32_t b, uint32_t time) {
+    a = txs_root_of(r, a);
+    b = txs_root_of(r, b);
+    if (a == b) return;
+    const int a_waits = txs_region_waits(r, a), b_waits = txs_region_waits(r, b);
+    if (a_waits && !b_waits) txs_release(r, a, time);
+    if (b_waits && !a_waits) txs_release(r, b, time);
+    if (a_waits && b_waits) {
+        int32_t *to = r->box + 4 * (size_t)a;
+        const int32_t *from = r->box + 4 * (size_t)b;
+        for (int k = 0; k < 2; k++) {
+            if (from[k] < to[k]) to[k] = from[k];
+            if (from[2 + k] > to[2 + k]) to[2 + k] = from[2 + k];
+        }
+        const uint32_t next = r->ring[a];
+        r->ring[a] = r->ring[b];
+        r->ring[b] = next;
+    }
+    r->parent[b] = a;
+}
+
+/* Reach one more pixel. */
+static void txs_reach_pixel(txs_regions *r, uint32_t p, uint32_t time) {
+    const int x = (int)(p % (uint32_t)r->width), y = (int)(p / (uint32_t)r->width);
+    int32_t *box = r->box + 4 * (size_t)p;
+    r->parent[p] = r->ring[p] = p;
+    box[0] = box[2] = x;
+    box[1] = box[3] = y;
+    for (int v = y > 0 ? y - 1 : y; v <= y + 1 && v < r->height; v++) {
+        for (int u = x > 0 ? x - 1 : x; u <= x + 1 && u < r->width; u++) {
+            const uint32_t q = (uint32_t)v * (uint32_t)r->width + (uint32_t)u;
+            if (q != p && r->parent[q] != TXS_NO_PIXEL) txs_join_regions(r, q, p, time);
+        }
+    }
+}
+
+/* the length demanded of a region when `step` of TXS_LONG_STEPS are over */
+static int txs_demand(const txs_regions *r, int step) {
+    const int side = r->width < r->height ? r->width : r->height;
+    const int length = TXS_LONG_FIRST -
+                       (TXS_LONG_FIRST - TXS_LONG_LAST) * step / TXS_LONG_STEPS;
+    return length < side / TXS_LONG_PART ? length : side / TXS_LONG_PART;
+}
+
+/* Reach all pixels in order and note when each is released. */
+static void txs_reach_all(txs_regions *r, uint32_t count, double share) {
+    const double span = share * (double)count / (double)TXS_LONG_STEPS;
+    int step = 0, demand = txs_demand(r, 0);
+    memset(r->parent, 0xff, (size_t)count * sizeof *r->parent);
+    for (uint32_t k = 0; k < count; k++) r->place[r->order[k].value] = k;
+    for (uint32_t k = 0; k < count; k++) {
+        if (step < TXS_LONG_STEPS && (double)k >= span * (step + 1)) { /* the demand falls */
+            demand = txs_demand(r, ++step);
+            for (uint32_t i = 0; i < k; i++) {
+                const uint32_t p = r->order[i].value;
+                if (r->parent[p] == p && txs_region_waits(r, p) &&
+                    txs_region_length(r, p) >= demand)
+                    txs_release(r, p, k);
+            }
+        }
+        const uint32_t p = r->order[k].value;
+        r->order[k].key = count; /* for those that are never released */
+        txs_reach_pixel(r, p, k);
+        const uint32_t root = txs_root_of(r, p);
+        if (txs_region_waits(r, root) && txs_region_length(r, root) >= demand)
+            txs_release(r, root, k);
+    }
+}
+
+/* rank receives for each pixel how many erode before it; memory for the work is taken from arena. */
+static txm_status txs_find_ranks(const float *strength, int width, int height, double share,
+                                 txm_arena *arena, uint32_t *rank, txm_env *env, float at) {
+    const size_t n = txs_pixels_of(width, height);
+    txs_regions r;
+    txs_queue q;
+    q.next = (uint32_t *)txm_arena_alloc(arena, n, 2 * sizeof(uint32_t));
+    q.state = (uint8_t *)txm_arena_alloc(arena, n, 1);
+    q.first = (uint32_t *)txm_arena_alloc(arena, TXS_STRENGTHS, sizeof(uint32_t));
+    r.width = width;
+    r.height = height;
+    r.order = (txm_pair *)txm_arena_alloc(arena, n, 2 * sizeof(txm_pair));
+    r.parent = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
+    r.ring = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
+    r.place = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
+    r.box = (int32_t *)txm_arena_alloc(arena, n, 4 * sizeof(int32_t));
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the order of erosion");
+    if (txm_progress(env, at, "order")) return txm_fail(env, TXM_CANCELLED, "cancelled");
+    q.width = width;
+    q.height = height;
+    q.strength = strength;
+    txs_grow_cracks(&q, (uint32_t)n, r.order);
+    txs_reach_all(&r, (uint32_t)n, share);
+    txm_sort_pairs(r.order, r.order + n, n); /* stable: pixels of a region stay in order */
+    for (size_t k = 0; k < n; k++) rank[r.order[k].value] = (uint32_t)k;
+    return TXM_OK;
+}
+
+/* ---- laying pieces ----------------------------------------------------------------------
+
+   The cracks of a picture of another size: square pieces of the exemplar's are laid in rows, each
+   over the borders of its neighbours to the left and above, and joined to them along minimum-error
+   cuts [5]. What is compared is the strength along lines, so that cracks meet. Clique statistics do
+   not keep thin long lines; pieces do. They are mirrored and turned as far as the exemplar
+   has no direction that this would change, and a part of the exemplar that has been used often
+   costs more, so that none becomes conspicuous. */
+
+enum {
+    TXS_PIECE = 192,       /* pixels: side of a piece                                           */
+    TXS_PIECE_PARTS = 5,   /* and at most two fifths of the exemplar's shorter side             */
+    TXS_OVERLAP_PART = 5,  /* of a piece lies over the one before                               */
+    TXS_TRIES = 768,       /* random places that are compared for each piece                    */
+    TXS_TRY_STEP = 3,      /* pixels between those of their overlaps that are compared          */
+    TXS_FINALISTS = 8,     /* places that are moved a little and compared closely               */
+    TXS_MOVES = 3,         /* pixels each way                                                   */
+    TXS_MOVED = (2 * TXS_MOVES + 1) * (2 * TXS_MOVES + 1),
+    TXS_TRY_SHARES = 16,   /* into which the comparisons are divided for threads                */
+    TXS_CELL = 16,         /* pixels: side of a cell of the exemplar whose uses are counted     */
+    TXS_TURNS = 8          /* ways to lay a square: bit 0 mirrors x, 1 mirrors y, 2 swaps them  */
+};
+#define TXS_SAME_DIRECTION 0.2  /* the structure of an exemplar without direction is below this */
+#define TXS_USED_WEIGHT 1.0     /* of the square of uses over the average, in the cost          */
+#define TXS_CRACK_WEIGHT 3.0    /* of a crack of strength 1 in the error, compared with 1        */
+
+typedef struct txs_place_of { /* a piece of the exemplar */
+    int x, y, turn;
+} txs_place_of;
+
+typedef struct txs_laying {
+    const txs_stone *stone;
+    int width, height;              /* of the picture                                           */
+    int side, overlap;
+    int32_t *source;                /* for each pixel of the picture one of the exemplar; -1    */
+    uint32_t *used;                 /* per cell of the exemplar                                 */
+    int cells_x, cells_y;
+    double pieces;                  /* laid so far                                              */
+    int turns[TXS_TURNS], turn_count;
+    int left, top;                  /* of the piece that is being laid, in the picture          */
+    int piece_width, piece_height;  /* the part of it inside the picture                        */
+    txs_place_of tries[TXS_TRIES];
+    double costs[TXS_TRIES];
+    int try_count, try_step;        /* of those that are being compared                         */
+    float *error;                   /* of an overlap                                            */
+    double *scratch;
+    int *path[2];                   /* where the new piece begins: along the left, along the top */
+} txs_laying;
+
+/* The exemplar's pixel under pixel (u, v) of a piece. */
+static size_t txs_under(const txs_laying *l, const txs_place_of *p, int u, int v) {
+    int x = p->turn & 4 ? v : u, y = p->turn & 4 ? u : v;
+    if (p->turn & 1) x = l->side - 1 - x;
+    if (p->turn & 2) y = l->side - 1 - y;
+    return (size_t)(p->y + y) * (size_t)l->stone->width + (size_t)(p->x + x);
+}
+
+/* Which turns keep the directions of the exemplar, by its structure tensor: the mirrored one differs
+   in the sign of the mixed term, the one turned by a quarter in that of the difference. */
+static void txs_find_turns(txs_laying *l) {
+    const txs_stone *s = l->stone;
+    double xx = 0, xy = 0, yy = 0;
+    for (int y = 1; y < s->height; y++) {
+        for (int x = 1; x < s->width; x++) {
+            const float *p = s->strength + (size_t)y * (size_t)s->width + (size_t)x;
+            const double gx = (double)p[0] - (double)p[-1];
+            const double gy = (double)p[0] - (double)p[-s->width];
+            xx += gx * gx;
+            xy += gx * gy;
+            yy += gy * gy;
+        }
+    }
+    const double sum = xx + yy;
+    const int mirror = 2 * fabs(xy) <= TXS_SAME_DIRECTION * sum;
+    const int quarter = fabs(xx - yy) <= TXS_SAME_DIRECTION * sum;
+    l->turn_count = 0;
+    for (int t = 0; t < TXS_TURNS; t++) {
+        const int mirrors = (t & 1) + (t >> 1 & 1), swaps = t >> 2 & 1;
+        /* an odd number of reflections negates the mixed term; a swap, the difference */
+        const int keeps_mixed = mirror || (mirrors % 2 == 0);
+        const int keeps_difference = quarter || !swaps;
+        if (keeps_mixed && keeps_difference) l->turns[l->turn_count++] = t;
+    }
+}
+
+/* mean uses of the cells under a piece, over that of all cells */
+static double txs_uses_of(const txs_laying *l, const txs_place_of *p) {
+    double sum = 0, cells = 0;
+    for (int y = p->y / TXS_CELL; y <= (p->y + l->side - 1) / TXS_CELL; y++) {
+        for (int x = p->x / TXS_CELL; x <= (p->x + l->side - 1) / TXS_CELL; x++) {
+            sum += (double)l->used[(size_t)y * (size_t)l->cells_x + (size_t)x];
+            cells++;
+        }
+    }
+    const double per_piece = (double)(l->side + TXS_CELL) * (double)(l->side + TXS_CELL) /
+                             ((double)l->stone->width * (double)l->stone->height);
+    return sum / cells / (1 + l->pieces * per_piece);
+}
+
+static void txs_count_use(txs_laying *l, const txs_place_of *p) {
+    for (int y = p->y / TXS_CELL; y <= (p->y + l->side - 1) / TXS_CELL; y++) {
+        for (int x = p->x / TXS_CELL; x <= (p->x + l->side - 1) / TXS_CELL; x++)
+            l->used[(size_t)y * (size_t)l->cells_x + (size_t)x]++;
+    }
+    l->pieces++;
+}
+
+/* Squared difference of strengths where a piece lies on what is there; cracks count more than what is
+   between them. */
+static double txs_error_at(const txs_laying *l, const txs_place_of *p, int u, int v) {
+    const size_t at = (size_t)(l->top + v) * (size_t)l->width + (size_t)(l->left + u);
+    const double a = (double)l->stone->strength[txs_under(l, p, u, v)];
+    const double b = (double)l->stone->strength[l->source[at]];
+    const double crack = a > b ? a : b;
+    return (a - b) * (a - b) * (crack > 0 ? 1 + TXS_CRACK_WEIGHT * crack : 1);
+}
+
+/* Mean error over every try_step-th row and column of the overlap; unknown pixels of the exemplar count as
+   the largest error. */
+static double txs_try_cost(const txs_laying *l, const txs_place_of *p) {
+    double sum = 0, count = 1e-6, unknown = 0, seen = 0;
+    for (int v = 0; v < l->piece_height; v += l->try_step) {
+        for (int u = 0; u < l->piece_width; u += l->try_step) {
+            seen++;
+            unknown += !l->stone->known[txs_under(l, p, u, v)];
+            if (!((l->left && u < l->overlap) || (l->top && v < l->overlap))) continue;
+            sum += txs_error_at(l, p, u, v);
+            count++;
+        }
+    }
+    const double steep = (double)(TXS_MOST_DARK - TXS_LEAST_DARK);
+    const double base = 0.02; /* so that uses count among places of equal error */
+    const double uses = txs_uses_of(l, p);
+    return (base + sum / count) * (1 + TXS_USED_WEIGHT * uses * uses) +
+           steep * steep * unknown / seen;
+}
+
+static void txs_try_share(void *context, int share) {
+    txs_laying *l = (txs_laying *)context;
+    for (int i = share; i < l->try_count; i += TXS_TRY_SHARES)
+        l->costs[i] = txs_try_cost(l, &l->tries[i]);
+}
+
+/* Compare the tries, every step-th pixel each way. Returns the best one. */
+static int txs_compare_tries(txs_laying *l, int count, int step, txm_env *env) {
+    int best = 0;
+    l->try_count = count;
+    l->try_step = step;
+    txm_parallel_for(env, TXS_TRY_SHARES, txs_try_share, l);
+    for (int i = 1; i < count; i++)
+        if (l->costs[i] < l->costs[best]) best = i;
+    return best;
+}
+
+/* Replace the tries by the best of them, each moved by up to TXS_MOVES pixels. Returns how many. */
+static int txs_move_tries(txs_laying *l) {
+    txs_place_of finalists[TXS_FINALISTS];
+    int count = 0;
+    for (int k = 0; k < TXS_FINALISTS; k++) {
+        int best = 0;
+        for (int i = 1; i < l->try_count; i++)
+            if (l->costs[i] < l->costs[best]) best = i;
+        finalists[k] = l->tries[best];
+        l->costs[best] = 1e300;
+    }
+    for (int k = 0; k < TXS_FINALISTS; k++) {
+        for (int i = 0; i < TXS_MOVED; i++) {
+            txs_place_of *p = &l->tries[count++];
+            const int side = 2 * TXS_MOVES + 1;
+            *p = finalists[k];
+            p->x = txm_clampi(p->x + i % side - TXS_MOVES, 0, l->stone->width - l->side);
+            p->y = txm_clampi(p->y + i / side - TXS_MOVES, 0, l->stone->height - l->side);
+        }
+    }
+    return count;
+}
+
+/* The best place for the piece at (left, top): of many random ones, then near the best of these. */
+static const txs_place_of *txs_choose_place(txs_laying *l, txm_rng *rng, txm_env *env) {
+    for (int i = 0; i < TXS_TRIES; i++) {
+        txs_place_of *p = &l->tries[i];
+        p->x = txm_rng_range(rng, 0, l->stone->width - l->side);
+        p->y = txm_rng_range(rng, 0, l->stone->height - l->side);
+        p->turn = l->turns[txm_rng_below(rng, (uint32_t)l->turn_count)];
+    }
+    txs_compare_tries(l, TXS_TRIES, TXS_TRY_STEP, env);
+    return &l->tries[txs_compare_tries(l, txs_move_tries(l), 2, env)];
+}
+
+/* Where the piece begins in each row of its left overlap (top = 0) or column of its upper one. */
+static void txs_cut_overlap(txs_laying *l, const txs_place_of *p, int top) {
+    const int length = top ? l->piece_width : l->piece_height;
+    const int across = top ? l->piece_height : l->piece_width;
+    const int width = l->overlap < across ? l->overlap : across;
+    for (int i = 0; i < length; i++) {
+        for (int j = 0; j < width; j++)
+            l->error[i * width + j] =
+                txm_float(1e-3 + (top ? txs_error_at(l, p, i, j) : txs_error_at(l, p, j, i)));
+    }
+    txm_cut(l->error, length, width, width, 1, l->path[top], l->scratch);
+}
+
+static void txs_lay_piece(txs_laying *l, const txs_place_of *p) {
+    if (l->left) txs_cut_overlap(l, p, 0);
+    if (l->top) txs_cut_overlap(l, p, 1);
+    for (int v = 0; v < l->piece_height; v++) {
+        for (int u = 0; u < l->piece_width; u++) {
+            if ((l->left && u < l->path[0][v]) || (l->top && v < l->path[1][u])) continue;
+            l->source[(size_t)(l->top + v) * (size_t)l->width + (size_t)(l->left + u)] =
+                (int32_t)txs_under(l, p, u, v);
+        }
+    }
+}
+
+/* Fill source; memory for the work is taken from arena. Reports from..to. */
+static txm_status txs_lay_all(const txs_stone *stone, int width, int height, uint64_t seed,
+                              txm_arena *arena, int32_t *source, txm_env *env, float from,
+                              float to) {
+    const int shorter = stone->width < stone->height ? stone->width : stone->height;
+    txs_laying *l = (txs_laying *)txm_arena_zero(arena, 1, sizeof *l);
+    if (!l) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the cracks");
+    l->stone = stone;
+    l->width = width;
+    l->height = height;
+    l->source = source;
+    l->side = 2 * shorter / TXS_PIECE_PARTS;
+    if (l->side > TXS_PIECE) l->side = TXS_PIECE;
+    l->overlap = l->side / TXS_OVERLAP_PART;
+    l->cells_x = (stone->width - 1) / TXS_CELL + 1;
+    l->cells_y = (stone->height - 1) / TXS_CELL + 1;
+    l->used = (uint32_t *)txm_arena_zero(arena, txs_pixels_of(l->cells_x, l->cells_y),
+                                         sizeof(uint32_t));
+    const size_t strip = (size_t)l->side * (size_t)l->overlap;
+    l->error = (float *)txm_arena_alloc(arena, strip, sizeof(float));
+    l->scratch = (double *)txm_arena_alloc(arena, strip, sizeof(double));
+    l->path[0] = (int *)txm_arena_alloc(arena, (size_t)l->side, sizeof(int));
+    l->path[1] = (int *)txm_arena_alloc(arena, (size_t)l->side, sizeof(int));
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the cracks");
+    txs_find_turns(l);
+    txm_rng rng = txm_rng_make(seed, 1);
+    const int step = l->side - l->overlap;
+    for (l->top = 0; l->top == 0 || l->top + l->overlap < height; l->top += step) {
+        if (txm_progress(env, txm_lerpf(from, to, (float)l->top / (float)height), "lay cracks"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        l->piece_height = l->side < height - l->top ? l->side : height - l->top;
+        for (l->left = 0; l->left == 0 || l->left + l->overlap < width; l->left += step) {
+            l->piece_width = l->side < width - l->left ? l->side : width - l->left;
+            const txs_place_of *p = txs_choose_place(l, &rng, env);
+            txs_lay_piece(l, p);
+            txs_count_use(l, p);
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- erosion: the exemplar -------------------------------------------------------------- */
+
+enum {
+    TXS_LEAST_STONE = 32, /* pixels: shorter exemplars have no cracks to speak of                */
+    TXS_DEPTHS = 8,       /* parts of the order in which ratios are limited                      */
+    TXS_INTACT_BORDER = 2 /* pixels around cracks that do not count as intact                    */
+};
+#define TXS_SHARE 0.1f       /* of the picture that is eroded at level 1                      */
+#define TXS_MOST_SHARE 0.5f
+#define TXS_LIGHTEST 0.75    /* the lightest quarter of each depth is limited to the rest        */
+
+struct texsyn_erosion {
+    txm_arena arena; /* holds all, this struct too                                        */
+    int width, height;
+    float share;
+    uint32_t *rank; /* of each pixel: how many erode before it                           */
+    uint8_t *ratio; /* 3 per pixel: what its colour is multiplied by, of TXS_RATIO_ONE   */
+};
+
+static txm_status txs_check_erosion(const texsyn_erosion_desc *d, txm_env *env) {
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    txm_status status = txm_image_check(&d->weathered, "weathered", TEXSYN_MAX_PIXELS, env);
+    if (status == TXM_OK) status = txs_check_mask(&d->mask, &d->weathered, "mask", env);
+    if (status != TXM_OK) return status;
+    if (!(d->share >= 0 && d->share <= TXS_MOST_SHARE))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "share must be 0 (default) to 0.5");
+    if (!txs_is_plain(&d->weathered))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "weathered",
+                           "has samples that are not finite or beyond a million");
+    if (d->weathered.width < TXS_LEAST_STONE || d->weathered.height < TXS_LEAST_STONE)
+        return txm_fail_numbers_at(env, TXM_TOO_SMALL, "weathered", "must be at least # x #",
+                                   TXS_LEAST_STONE, TXS_LEAST_STONE);
+    return TXM_OK;
+}
+
+/* How many pixels are known: opaque and in the mask. */
+static size_t txs_find_known(txs_stone *s, const txm_image *im, const txm_image *mask) {
+    size_t count = 0;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            int ok = !mask->pixels || txs_is_white(mask, x, y);
+            if (im->channels % 2 == 0)
+                ok = ok && txm_image_get(im, x, y, im->channels - 1) >= 0.5f;
+            s->known[(size_t)y * (size_t)s->width + (size_t)x] = (uint8_t)ok;
+            count += (size_t)ok;
+        }
+    }
+    return count;
+}
+
+/* The planes of an exemplar, in arena; the room for the filters too. */
+static txm_status txs_make_stone(const texsyn_erosion_desc *d, txm_arena *arena, txs_stone *s,
+                                 txm_env *env, float from, float to) {
+    const txm_image im = txm_image_resolve(d->weathered);
+    const size_t n = txs_pixels_of(im.width, im.height);
+    const size_t longer = (size_t)(im.width > im.height ? im.width : im.height);
+    txs_filter_room room;
+    s->width = im.width;
+    s->height = im.height;
+    s->dark = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    s->strength = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    s->ratio = (uint8_t *)txm_arena_alloc(arena, n, 3);
+    s->known = (uint8_t *)txm_arena_alloc(arena, n, 1);
+    room.weight = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    room.mean = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    room.wide = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    room.square = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    room.line = (float *)txm_arena_alloc(arena, longer, sizeof(float));
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the exemplar");
+    if (txm_progress(env, from, "darkness")) return txm_fail(env, TXM_CANCELLED, "cancelled");
+    if (txs_find_known(s, &im, &d->mask) < (size_t)TXS_LEAST_STONE * TXS_LEAST_STONE)
+        return txm_fail_numbers_at(env, TXM_TOO_SMALL, "weathered",
+                                   "fewer than # opaque pixels in the mask",
+                                   (uint64_t)TXS_LEAST_STONE * TXS_LEAST_STONE, 0);
+    txs_find_dark(s, &im, &room);
+    txs_find_ratios(s, &im, &room);
+    return txs_find_strength(s->dark, s->strength, s->width, s->height, env,
+                             txm_lerpf(from, to, 0.3f), to);
+}
+
+/* The ratio of the luma, of TXS_RATIO_ONE. */
+static int txs_gray_ratio(const uint8_t ratio[3]) {
+    return (77 * ratio[0] + 150 * ratio[1] + 29 * ratio[2] + 128) >> 8;
+}
+
+/* which depth a rank is, TXS_DEPTHS for those beyond the share */
+static int txs_depth_of(uint32_t rank, double most) {
+    const double depth = (double)rank / most * (double)TXS_DEPTHS;
+    return depth < (double)TXS_DEPTHS ? (int)depth : TXS_DEPTHS;
+}
+
+/* The largest gray ratio of each depth of the exemplar, but for the lightest quarter: bridges between
+   the parts of a crack are as dark as the crack. */
+static void txs_find_limits(const txs_stone *s, const uint32_t *rank, double most,
+                            int limit[TXS_DEPTHS]) {
+    uint32_t histogram[TXS_DEPTHS][256];
+    const size_t n = txs_pixels_of(s->width, s->height);
+    memset(histogram, 0, sizeof histogram);
+    for (size_t i = 0; i < n; i++) {
+        const int depth = txs_depth_of(rank[i], most);
+        if (depth < TXS_DEPTHS && s->known[i])
+            histogram[depth][txs_gray_ratio(s->ratio + 3 * i)]++;
+    }
+    for (int d = 0; d < TXS_DEPTHS; d++) {
+        uint64_t count = 0, seen = 0;
+        for (int v = 0; v < 256; v++) count += histogram[d][v];
+        limit[d] = TXS_RATIO_ONE;
+        for (int v = 0; v < TXS_RATIO_ONE && count; v++) {
+            seen += histogram[d][v];
+            if ((double)seen < TXS_LIGHTEST * (double)count) continue;
+            limit[d] = v;
+            break;
+        }
+    }
+}
+
+/* What the stone becomes at each pixel: the exemplar's ratios, limited by depth. */
+static void txs_take_ratios(texsyn_erosion *e, const txs_stone *s, const int32_t *source,
+                            const int limit[TXS_DEPTHS]) {
+    const size_t n = txs_pixels_of(e->width, e->height);
+    const double most = (double)e->share * (double)n;
+    for (size_t i = 0; i < n; i++) {
+        const uint8_t *from = s->ratio + 3 * (size_t)source[i];
+        const int depth = txs_depth_of(e->rank[i], most), gray = txs_gray_ratio(from);
+        const int most_gray = limit[depth < TXS_DEPTHS ? depth : TXS_DEPTHS - 1];
+        for (size_t c = 0; c < 3; c++)
+            e->ratio[3 * i + c] =
+                gray <= most_gray ? from[c] : (uint8_t)((from[c] * most_gray + gray / 2) / gray);
+    }
+}
+
+/* ---- erosion: making -------------------------------------------------------------------- */
+
+/* Everything between the check and the object; planes that are no longer needed are in work. */
+static txm_status txs_erode_exemplar(const texsyn_erosion_desc *d, texsyn_erosion *e,
+                                     txm_arena *work, txm_env *env) {
+    txs_stone stone;
+    int limit[TXS_DEPTHS];
+    const size_t n = txs_pixels_of(e->width, e->height);
+    txm_status status = txs_make_stone(d, work, &stone, env, 0, 0.2f);
+    if (status != TXM_OK) return status;
+    const size_t size = txs_pixels_of(stone.width, stone.height);
+    uint32_t *rank = (uint32_t *)txm_arena_alloc(work, size, sizeof(uint32_t));
+    int32_t *source = (int32_t *)txm_arena_alloc(work, n, sizeof(int32_t));
+    float *dark = (float *)txm_arena_alloc(work, n, sizeof(float));
+    float *strength = (float *)txm_arena_alloc(work, n, sizeof(float));
+    if (work->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the cracks");
+    status = txs_find_ranks(stone.strength, stone.width, stone.height, (double)e->share, work, rank,
+                            env, 0.2f);
+    if (status == TXM_OK)
+        status = txs_lay_all(&stone, e->width, e->height, d->seed, work, source, env, 0.25f, 0.6f);
+    if (status != TXM_OK) return status;
+    for (size_t i = 0; i < n; i++) dark[i] = stone.dark[source[i]];
+    status = txs_find_strength(dark, strength, e->width, e->height, env, 0.6f, 0.85f);
+    if (status == TXM_OK)
+        status = txs_find_ranks(strength, e->width, e->height, (double)e->share, work, e->rank, env,
+                                0.85f);
+    if (status != TXM_OK) return status;
+    txs_find_limits(&stone, rank, (double)e->share * (double)size, limit);
+    txs_take_ratios(e, &stone, source, limit);
+    return TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_erosion_make(const texsyn_erosion_desc *desc, txm_env *env,
+                                          texsyn_erosion **out) {
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    txm_status status = txs_check_erosion(desc, env);
+    if (status != TXM_OK) return status;
+    if (desc->width < 1 || desc->height < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
+    if (desc->height > TEXSYN_MAX_PIXELS / desc->width)
+        return txm_fail(env, TXM_TOO_LARGE, "more than TEXSYN_MAX_PIXELS pixels");
+
+    txm_arena own, work;
+    txm_arena_init(&own, env);
+    txm_arena_init(&work, env);
+    const size_t n = txs_pixels_of(desc->width, desc->height);
+    texsyn_erosion *e = (texsyn_erosion *)txm_arena_alloc(&own, 1, sizeof *e);
+    uint32_t *rank = (uint32_t *)txm_arena_alloc(&own, n, sizeof(uint32_t));
+    uint8_t *ratio = (uint8_t *)txm_arena_alloc(&own, n, 3);
+    if (own.failed) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the erosion");
+    } else {
+        e->width = desc->width;
+        e->height = desc->height;
+        e->share = desc->share > 0 ? desc->share : TXS_SHARE;
+        e->rank = rank;
+        e->ratio = ratio;
+        status = txs_erode_exemplar(desc, e, &work, env);
+    }
+    txm_arena_free(&work);
+    if (status == TXM_OK && txm_progress(env, 1, "done"))
+        status = txm_fail(env, TXM_CANCELLED, "cancelled");
+    if (status != TXM_OK) {
+        txm_arena_free(&own);
+        return status;
+    }
+    e->arena = own;
+    *out = e;
+    return TXM_OK;
+}
+
+TEXSYN_API void texsyn_erosion_free(texsyn_erosion *erosion) {
+    if (!erosion) return;
+    txm_arena arena = erosion->arena;
+    txm_arena_free(&arena);
+}
+
+TEXSYN_API float texsyn_erosion_share(const texsyn_erosion *erosion) {
+    return erosion ? erosion->share : 0;
+}
+
+/* ---- erosion: drawing ------------------------------------------------------------------- */
+
+enum { TXS_COVERED = 16 }; /* weight of a pixel all of whose neighbours are eroded as well */
+
+typedef struct txs_level_of { /* how far a pixel is eroded */
+    const texsyn_erosion *erosion;
+    float level;
+    const txm_image *levels;
+    double most;
+} txs_level_of;
+
+static int txs_is_eroded(const txs_level_of *l, int x, int y) {
+    double level = (double)l->level;
+    if (l->levels) {
+        const int channels = l->levels->channels;
+        level *= (double)txm_clampf(txm_image_get(l->levels, x, y, 0), 0, 1);
+        if (channels == 2) level *= (double)txm_clampf(txm_image_get(l->levels, x, y, 1), 0, 1);
+    }
+    const size_t i = (size_t)y * (size_t)l->erosion->width + (size_t)x;
+    return (double)l->erosion->rank[i] < floor(level * l->most + 0.5);
+}
+
+static txm_status txs_check_levels(const texsyn_erosion *e, float level, const txm_image *levels,
+                                   txm_env *env) {
+    if (!e) return txm_fail(env, TXM_BAD_ARGUMENT, "erosion is NULL");
+    if (!(level >= 0 && level <= 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "level must be 0 to 1");
+    if (!levels) return TXM_OK;
+    const txm_status status = txm_image_check(levels, "levels", TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (levels->channels > 2)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels", "must be gray, with or without alpha");
+    if (levels->width != e->width || levels->height != e->height)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, "levels", "must be # x # like the erosion",
+                                   (uint64_t)e->width, (uint64_t)e->height);
+    if (!txm_image_is_finite(levels))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "levels", "has samples that are not finite");
+    return TXM_OK;
+}
+
+static txs_level_of txs_level_make(const texsyn_erosion *e, float level, const txm_image *levels) {
+    txs_level_of l;
+    l.erosion = e;
+    l.level = level;
+    l.levels = levels;
+    l.most = (double)e->share * (double)txs_pixels_of(e->width, e->height);
+    return l;
+}
+
+TEXSYN_API txm_status texsyn_erosion_mask(const texsyn_erosion *erosion, float level,
+                                          const txm_image *levels, txm_env *env, txm_image out) {
+    txm_status status = txs_check_levels(erosion, level, levels, env);
+    if (status == TXM_OK) status = txm_image_check(&out, "out", TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (out.width != erosion->width || out.height != erosion->height || out.channels > 1)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, "out", "must be # x #, with one channel",
+                                   (uint64_t)erosion->width, (uint64_t)erosion->height);
+    const txs_level_of l = txs_level_make(erosion, level, levels);
+    for (int y = 0; y < out.height; y++) {
+        for (int x = 0; x < out.width; x++)
+            txm_image_set(&out, x, y, 0, txs_is_eroded(&l, x, y) ? 1.0f : 0.0f);
+    }
+    return TXM_OK;
+}
+
+/* How much of a pixel is covered, 0..TXS_COVERED: a tent over its neighbours; an eroded pixel at least
+   three quarters, another at most half, so that lines of one pixel are dark and rims are soft. */
+static int txs_cover(const uint8_t *const rows[3], int x, int width) {
+    static const int weight[3][3] = {{1, 2, 1}, {2, 4, 2}, {1, 2, 1}};
+    int sum = 0;
+    for (int v = 0; v < 3; v++) {
+        for (int u = 0; u < 3; u++)
+            sum += weight[v][u] * rows[v][txm_clampi(x + u - 1, 0, width - 1)];
+    }
+    const int least = TXS_COVERED * 3 / 4;
+    if (rows[1][x]) return sum > least ? sum : least;
+    return sum / 2;
+}
+
+/* One pixel of the picture; one that nothing covers is copied as it is. */
+static void txs_erode_pixel(const texsyn_erosion *e, const txm_image *from, const txm_image *to, int x,
+                            int y, int cover) {
+    const uint8_t *ratio = e->ratio + 3 * ((size_t)y * (size_t)e->width + (size_t)x);
+    const int colours = from->channels < 3 ? 1 : 3;
+    for (int c = 0; c < from->channels; c++) {
+        const float v = txm_image_get(from, x, y, c);
+        const int r = colours == 1 ? txs_gray_ratio(ratio) : c < 3 ? ratio[c] : TXS_RATIO_ONE;
+        const int whole = (int)TXS_COVERED * (int)TXS_RATIO_ONE;
+        const double factor = (whole - cover * (TXS_RATIO_ONE - r)) / (double)whole;
+        txm_image_set(to, x, y, c, c < colours && cover ? txm_float((double)v * factor) : v);
+    }
+}
+
+TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float level,
+                                          const txm_image *levels, const txm_image *picture,
+                                          txm_env *env, txm_image out) {
+    txm_status status = txs_check_levels(erosion, level, levels, env);
+    if (status == TXM_OK) status = txm_image_check(picture, "picture", TEXSYN_MAX_PIXELS, env);
+    if (status == TXM_OK) status = txm_image_check(&out, "out", TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    const txm_image from = txm_image_resolve(*picture), to = txm_image_resolve(out);
+    if (from.width != erosion->width || from.height != erosion->height)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, "picture", "must be # x # like the erosion",
+                                   (uint64_t)erosion->width, (uint64_t)erosion->height);
+    if (to.width != from.width || to.height != from.height || to.channels != from.channels)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
+                           "must have the size and the channels of the picture");
+    if (!txm_image_is_finite(&from))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "picture", "has samples that are not finite");
+
+    /* three rows of the mask, those above and below the one that is drawn */
+    const size_t width = (size_t)from.width;
+    uint8_t *mask = (uint8_t *)txm_alloc(env, 3 * width);
+    if (!mask) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for three rows");
+    const txs_level_of l = txs_level_make(erosion, level, levels);
+    for (int y = 0; y <= from.height; y++) {
+        uint8_t *next = mask + width * (size_t)(y % 3);
+        for (int x = 0; x < from.width && y < from.height; x++)
+            next[x] = (uint8_t)txs_is_eroded(&l, x, y);
+        if (y == 0) continue;
+        const uint8_t *const rows[3] = {mask + width * (size_t)((y > 1 ? y - 2 : 0) % 3),
+                                        mask + width * (size_t)((y - 1) % 3),
+                                        y < from.height ? next : mask + width * (size_t)((y - 1) % 3)};
+        for (int x = 0; x < from.width; x++)
+            txs_erode_pixel(erosion, &from, &to, x, y - 1, txs_cover(rows, x, from.width));
+    }
+    txm_free(env, mask);
+    return TXM_OK;
+}
+
+/* ---- the intact stone ------------------------------------------------------------------- */
+
+/* Is there a crack within TXS_INTACT_BORDER pixels? */
+static int txs_near_crack(const txs_stone *s, const uint32_t *rank, double most, int x, int y) {
+    for (int v = y - TXS_INTACT_BORDER; v <= y + TXS_INTACT_BORDER; v++) {
+        for (int u = x - TXS_INTACT_BORDER; u <= x + TXS_INTACT_BORDER; u++) {
+            if (u < 0 || v < 0 || u >= s->width || v >= s->height) continue;
+            if ((double)rank[(size_t)v * (size_t)s->width + (size_t)u] < most) return 1;
+        }
+    }
+    return 0;
+}
+
+TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm_env *env,
+                                            txm_image out) {
+    txm_status status = txs_check_erosion(desc, env);
+    if (status == TXM_OK) status = txm_image_check(&out, "out", TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (out.width != desc->weathered.width || out.height != desc->weathered.height ||
+        out.channels > 1)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, "out", "must be # x #, with one channel",
+                                   (uint64_t)desc->weathered.width,
+                                   (uint64_t)desc->weathered.height);
+    txm_arena work;
+    txs_stone stone;
+    const size_t n = txs_pixels_of(out.width, out.height);
+    const double share = (double)(desc->share > 0 ? desc->share : TXS_SHARE);
+    txm_arena_init(&work, env);
+    status = txs_make_stone(desc, &work, &stone, env, 0, 0.7f);
+    uint32_t *rank = status == TXM_OK ? (uint32_t *)txm_arena_alloc(&work, n, sizeof(uint32_t)) : NULL;
+    if (status == TXM_OK && !rank) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the order");
+    if (status == TXM_OK)
+        status = txs_find_ranks(stone.strength, out.width, out.height, share, &work, rank, env, 0.7f);
+    if (status == TXM_OK && txm_progress(env, 1, "done"))
+        status = txm_fail(env, TXM_CANCELLED, "cancelled");
+    for (int y = 0; y < out.height && status == TXM_OK; y++) {
+        for (int x = 0; x < out.width; x++) {
+            const int intact = stone.known[(size_t)y * (size_t)out.width + (size_t)x] &&
+                               !txs_near_crack(&stone, rank, floor(share * (double)n + 0.5), x, y);
+            txm_image_set(&out, x, y, 0, intact ? 1.0f : 0.0f);
+        }
+    }
+    txm_arena_free(&work);
     return status;
 }
 

@@ -103,7 +103,9 @@
      [3] G. Gimel'farb. Image textures and Gibbs random fields. Kluwer 1999 (controllable
          simulated annealing, of which the control here is a faster relative).
      [4] S. Geman, D. Geman. Stochastic relaxation, Gibbs distributions, and the Bayesian
-         restoration of images. IEEE PAMI 6(6), 1984.                                        */
+         restoration of images. IEEE PAMI 6(6), 1984.
+     [5] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
+         SIGGRAPH 2001.                                                                      */
 #ifndef TEXSYN_H
 #define TEXSYN_H
 
@@ -276,6 +278,115 @@ typedef struct texsyn_fill_desc {
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
 
+/* ---- light ------------------------------------------------------------------------------ */
+
+typedef struct texsyn_relight_desc {
+    txm_image image;     /* 1 to 4 channels; not modified                                        */
+    txm_image mask;      /* same size: what of it is compared with the other picture, where gray
+                            times alpha is at least half; pixels NULL = everything. Transparent
+                            pixels are never compared                                            */
+    txm_image like;      /* a picture in the light that is wanted, of any size                   */
+    txm_image like_mask; /* the same for that one                                                */
+    float strength;      /* how much of the change is made, up to 1; 0 = 1                       */
+} texsyn_relight_desc;
+
+/* A change of light: a plain value, for texsyn_light_apply. */
+enum { TEXSYN_LIGHT_KNOTS = 20 };
+typedef struct texsyn_light {
+    int knots;                       /* of the curve of brightness, 2 to TEXSYN_LIGHT_KNOTS      */
+    float from[TEXSYN_LIGHT_KNOTS];  /* brightness before, 0..1, rising                          */
+    float to[TEXSYN_LIGHT_KNOTS];    /* and after                                                */
+    float slope[TEXSYN_LIGHT_KNOTS]; /* of the curve at the knots                                */
+    float gain[2];                   /* chroma is multiplied by this complex number              */
+    float cast[2];                   /* and this is added, but not to grays                      */
+    float fade;                      /* the saturation from which on all of it is                */
+} texsyn_light;
+
+/* Give a picture the light of another one: the photometric correction of [1], section 3 and Fig. 6.
+
+   A monotone curve of brightness, the same for all channels, and a gain, a rotation and an offset of
+   chroma are chosen so that distributions agree; materials that occur in unequal shares are matched
+   first. Grays stay exactly gray. 8-bit samples are dithered.
+
+   out    the caller's, with the size and channels of the image, 8 or 16 bits or float; may be the
+          image itself; untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, a picture that does not fit,
+          samples that are not finite or beyond a million; TXM_TOO_SMALL for fewer than 16 pixels to
+          compare, named; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   some 0.1 s and 2 MB to learn, 0.2 s per megapixel to apply                           */
+TEXSYN_API txm_status texsyn_relight(const texsyn_relight_desc *desc, txm_env *env, txm_image out);
+
+/* The change alone, for other pictures in the same light; strength is not used. *out is untouched
+   after an error. Statuses as above. */
+TEXSYN_API txm_status texsyn_light_learn(const texsyn_relight_desc *desc, txm_env *env,
+                                         texsyn_light *out);
+
+/* Apply a change; strength 0..1: at 0 the picture is copied. out and statuses as above. */
+TEXSYN_API txm_status texsyn_light_apply(const texsyn_light *light, float strength,
+                                         const txm_image *image, txm_env *env, txm_image out);
+
+/* ---- erosion ---------------------------------------------------------------------------- */
+
+/* Cracks and pits like those of a weathered exemplar, in the order in which they appear. */
+typedef struct texsyn_erosion texsyn_erosion;
+
+typedef struct texsyn_erosion_desc {
+    txm_image weathered; /* at least 32 x 32; its cracks are darker than their surroundings. Not
+                            modified, need not outlive the call                                  */
+    txm_image mask;      /* same size: only where gray times alpha is at least half; pixels NULL =
+                            everywhere. Transparent pixels of the exemplar are never used        */
+    float share;         /* of the pixels that are eroded at level 1, up to 0.5; 0 = 0.1         */
+    int width, height;   /* of the pictures to be eroded, 1 or more each                         */
+    uint64_t seed;       /* another seed, other cracks                                           */
+} texsyn_erosion_desc;
+
+/* Find the cracks of an exemplar and lay cracks like them over any size ([1], section 4 and Fig. 11).
+
+   The cracks of the exemplar are laid in pieces, joined along minimum-error cuts [5], because thin
+   long lines are beyond clique statistics. Every pixel gets a rank; at level l those of the first
+   l * share * pixels, rounded, are eroded. So each level's pixels are part of the next one's.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives the erosion, or NULL on any error; release it with texsyn_erosion_free
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
+          beyond a million; TXM_TOO_SMALL for an exemplar under 32 x 32 or of fewer than 1024
+          pixels that count; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY;
+          TXM_CANCELLED
+   cost   about 0.5 s per megapixel of exemplar and erosion; 7 bytes per pixel, 60 while it is
+          made, and 75 per pixel of the exemplar                                               */
+TEXSYN_API txm_status texsyn_erosion_make(const texsyn_erosion_desc *desc, txm_env *env,
+                                          texsyn_erosion **out);
+
+/* Release an erosion with the allocator it was made with; NULL is allowed. */
+TEXSYN_API void texsyn_erosion_free(texsyn_erosion *erosion);
+
+/* The share of the pixels that is eroded at level 1. */
+TEXSYN_API float texsyn_erosion_share(const texsyn_erosion *erosion);
+
+/* Erode a picture: colours in cracks are multiplied by what the exemplar's are of their
+   surroundings, channel by channel; the pixels around them a little.
+
+   level    0..1; at 0 the picture is copied
+   levels   NULL, or a gray picture of the erosion's size, with or without alpha: level is multiplied
+            by its gray times alpha, pixel by pixel. The brighter, the more eroded
+   picture  of the erosion's size, 1 to 4 channels; alpha is kept
+   out      the caller's, of the same size and channels, also the picture itself; untouched after an
+            error
+   return   TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY (for three rows)          */
+TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float level,
+                                          const txm_image *levels, const txm_image *picture,
+                                          txm_env *env, txm_image out);
+
+/* What is eroded, as a mask: 1 channel, white where it is. Otherwise as texsyn_erosion_draw. */
+TEXSYN_API txm_status texsyn_erosion_mask(const texsyn_erosion *erosion, float level,
+                                          const txm_image *levels, txm_env *env, txm_image out);
+
+/* The other way round: white where the exemplar is intact, two pixels away from all cracks, black
+   elsewhere. With this as the mask, texsyn_learn learns the polished stone. Width, height and seed
+   of desc are not used; out has the size of the exemplar and 1 channel. Statuses as above. */
+TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm_env *env,
+                                            txm_image out);
+
 #ifdef __cplusplus
 }
 #endif
@@ -300,6 +411,13 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
 #include "texsyn/mosaic_learner.h"
 #include "texsyn/tone.h"
 #include "texsyn/fill.h"
+#include "texsyn/mask.h"
+#include "texsyn/light.h"
+#include "texsyn/relight.h"
+#include "texsyn/darkness.h"
+#include "texsyn/order.h"
+#include "texsyn/laying.h"
+#include "texsyn/erode.h"
 #endif /* TEXSYN_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------

@@ -112,10 +112,55 @@ static uint64_t file(txm_env *env) {
     return hash;
 }
 
+/* a light learned and applied, in three depths */
+static uint64_t relit(txm_env *env) {
+    static uint8_t like[SIDE * SIDE * 3];
+    uint64_t hash = 0;
+    golden_blobs(exemplar, SIDE, SIDE, 3);
+    golden_noise(like, SIDE, SIDE, 3);
+    for (int s = 0; s < 3; s++) {
+        static const txm_sample samples[3] = {TXM_U8, TXM_U16, TXM_F32};
+        texsyn_relight_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.image = golden_image(exemplar, SIDE, SIDE, 3, TXM_U8);
+        desc.like = golden_image(like, SIDE, SIDE, 3, TXM_U8);
+        const txm_image out = golden_image(picture, SIDE, SIDE, 3, samples[s]);
+        golden_need(texsyn_relight(&desc, env, out), "relight", env);
+        hash = tk_hash(hash, picture, (size_t)SIDE * SIDE * 3 * txm_sample_bytes(samples[s]));
+    }
+    return hash;
+}
+
+/* cracks, drawn at three levels over another picture */
+static uint64_t eroded(txm_env *env) {
+    texsyn_erosion *erosion = NULL;
+    texsyn_erosion_desc desc;
+    uint64_t hash = 0;
+    static uint8_t stone[WIDTH * HEIGHT * 3];
+    golden_bricks(exemplar, SIDE, SIDE, 3);
+    golden_noise(stone, WIDTH, HEIGHT, 3);
+    memset(&desc, 0, sizeof desc);
+    desc.weathered = golden_image(exemplar, SIDE, SIDE, 3, TXM_U8);
+    desc.width = WIDTH;
+    desc.height = HEIGHT;
+    desc.seed = 5;
+    golden_need(texsyn_erosion_make(&desc, env, &erosion), "erosion", env);
+    const txm_image from = golden_image(stone, WIDTH, HEIGHT, 3, TXM_U8);
+    for (int k = 1; k <= 3; k++) {
+        const txm_image out = golden_image(picture, WIDTH, HEIGHT, 3, TXM_U8);
+        golden_need(texsyn_erosion_draw(erosion, (float)k / 4, NULL, &from, env, out), "draw", env);
+        hash = tk_hash(hash, picture, (size_t)WIDTH * HEIGHT * 3);
+    }
+    texsyn_erosion_free(erosion);
+    return hash;
+}
+
 static const golden_case cases[] = {{"gray", gray},
                                     {"rgb-tileable", rgb_tileable},
                                     {"rgba-16-bits", rgba_deep},
                                     {"blobs-fine-float", blobs_fine},
                                     {"masked", masked},
-                                    {"file", file}};
+                                    {"file", file},
+                                    {"relit", relit},
+                                    {"eroded", eroded}};
 GOLDEN_MAIN("texsyn")
