@@ -278,6 +278,81 @@ typedef struct texsyn_fill_desc {
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
 
+/* ---- composite textures ----------------------------------------------------------------- */
+
+/* A learned composite texture: a label map, itself a texture, and a texture for each label ([1],
+   section 4). It holds all it needs and never changes once it is made. */
+typedef struct texsyn_composite texsyn_composite;
+
+/* Does the layout have an order? Its labels may keep to their height (sky above ground), to their
+   place from left to right, or to none. */
+typedef enum texsyn_field {
+    TEXSYN_FIELD_AUTO = 0, /* found from the example */
+    TEXSYN_FIELD_NONE,
+    TEXSYN_FIELD_ROWS,
+    TEXSYN_FIELD_COLUMNS
+} texsyn_field;
+
+typedef struct texsyn_composite_learn_desc {
+    txm_image example;  /* 1, 3 or 4 channels, both sides at least 32 px; not modified            */
+    txm_image labels;   /* same size, 1 channel of 8 bits: 0..15, each on 256 pixels or more, and
+                           255 where nothing is to be learned; texsyn_segment finds them          */
+    texsyn_field field; /* of the layout                                                          */
+    int max_types;      /* clique types per label and level beyond the preselected, 1..64; 0 = 14 */
+    uint64_t seed;      /* for the random numbers; any value                                      */
+} texsyn_composite_learn_desc;
+
+/* Learn a composite.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives the composite, or NULL on any error; release it with texsyn_composite_free
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, labels that do not fit or are over
+          15, samples that are not finite; TXM_TOO_SMALL for an example under 32 x 32 or a label with
+          fewer than 256 pixels, which the message names; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(pixels) for the statistics, and about 3 s for 512 x 512 with three labels             */
+TEXSYN_API txm_status texsyn_composite_learn(const texsyn_composite_learn_desc *desc, txm_env *env,
+                                             texsyn_composite **out);
+
+/* Release a composite with the allocator it was made with; NULL is allowed. */
+TEXSYN_API void texsyn_composite_free(texsyn_composite *composite);
+
+TEXSYN_API int texsyn_composite_label_count(const texsyn_composite *composite); /* 1..16 */
+
+/* The texture of a label, to look into; NULL for a bad label. The composite owns it. */
+TEXSYN_API const texsyn_model *texsyn_composite_model(const texsyn_composite *composite, int label);
+
+/* Write the composite as bytes, read it back: as texsyn_save and texsyn_load. */
+TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, txm_env *env,
+                                            void *buffer, size_t capacity, size_t *size);
+TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_env *env,
+                                            texsyn_composite **out);
+
+typedef struct texsyn_composite_desc {
+    const texsyn_composite *composite;
+    int width, height; /* of the output in pixels, 1 or more each                                 */
+    txm_image layout;  /* width x height, 1 channel of 8 bits: a drawn label map, every value a
+                          label of the composite; pixels NULL = a map is synthesised              */
+    int quality;       /* -2 fast .. +2 best; 0 = default                                         */
+    uint64_t seed;     /* another seed, another picture                                           */
+} texsyn_composite_desc;
+
+/* Synthesise a composite: the label map if none is drawn, then all textures and what happens where
+   they meet in one run.
+
+   out    width x height, the channels of the example (or 3 where it has 1, or 4 = opaque), any sample
+          type; untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, a label that the composite does not
+          have, or a picture that does not fit; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(width * height): about 8 s for 1024 x 1024 on one core, 40 bytes per pixel            */
+TEXSYN_API txm_status texsyn_composite_synthesize(const texsyn_composite_desc *desc, txm_env *env,
+                                                  txm_image out);
+
+/* The label map alone, as texsyn_composite_synthesize with the same description makes it.
+   out    width x height, 1 channel of 8 bits */
+TEXSYN_API txm_status texsyn_composite_layout(const texsyn_composite_desc *desc, txm_env *env,
+                                              txm_image out);
+
 /* ---- light ------------------------------------------------------------------------------ */
 
 typedef struct texsyn_relight_desc {
@@ -4978,6 +5053,1849 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
     return status;
+}
+
+/* ---- label maps as textures ---------------------------------------------------------------
+
+   A label map is a texture whose values have no order, so its clique types are joint histograms of
+   labels, not histograms of differences [1, section 4]:
+
+     FIELD    band of the picture x label: what lies above stays above. One band = the shares alone.
+     PAIR     label at p + d x label at p. Head and tail differ, so order is kept (Fig. 13).
+     PARENT   label of the coarser level x label at p; d = (1, 0) is the coarse pixel beside p's own
+              on the side that p is nearer to.
+     RING     how many of the 8 pixels at a distance carry the label of p, x label: pairs fix how
+              long borders are, rings how they bend, and whether there are specks.
+
+   A histogram has a row for each value of the first and a column for each label of p.            */
+enum {
+    TXS_OUTSIDE = TXS_MAX_LABELS, /* label of what is unknown or outside     */
+    TXS_BANDS_OF_FIELD = 16,      /* along the side of the picture           */
+    TXS_LAY_AROUND = 8,           /* pixels of a ring                        */
+    TXS_LAY_BINS =
+        TXS_MAX_LABELS * TXS_MAX_LABELS,    /* of a histogram; rows of TXS_MAX_LABELS bins */
+    TXS_LAY_ROWS = (int)TXS_MAX_LABELS + 1, /* of a table: TXS_OUTSIDE has no energy   */
+    TXS_LAY_TYPES = 48,                     /* clique types of one level               */
+    TXS_LAY_LEVELS = 6,
+    TXS_LAY_TOP = 48,                        /* pixels: short side of the coarsest level */
+    TXS_LAY_REACH = 20,                      /* pixels: longest pair on the coarsest level */
+    TXS_LAY_NEAR = 5,                        /* the same on the others                  */
+    TXS_LAY_MARGIN = 2 * (int)TXS_LAY_REACH, /* of a plane                              */
+    TXS_LAY_RINGS = 3                        /* of distances 1, 2, 4                    */
+};
+
+enum { TXS_LAY_FIELD, TXS_LAY_PAIR, TXS_LAY_PARENT, TXS_LAY_RING };
+
+typedef struct txs_lay_type {
+    int kind, dx, dy; /* of a ring, dx is the distance */
+    int32_t share[TXS_LAY_BINS];
+} txs_lay_type;
+
+typedef struct txs_lay_level {
+    txs_lay_type *types; /* the first is the field */
+    int type_count;
+} txs_lay_level;
+
+typedef struct txs_layout {
+    int labels, levels;
+    int field;                           /* 0 none, 1 bands are rows, 2 columns           */
+    int width, height;                   /* of the example                                */
+    txs_lay_level level[TXS_LAY_LEVELS]; /* 0 = full resolution                           */
+} txs_layout;
+
+/* A plane of labels with a margin: opposite sides repeated where an axis wraps, else outside. */
+typedef struct txs_lay_plane {
+    int width, height, wrap_x, wrap_y;
+    ptrdiff_t stride;
+    uint8_t *pixels; /* the margin's first corner */
+} txs_lay_plane;
+
+static uint8_t *txs_lay_at(const txs_lay_plane *p, int x, int y) {
+    return p->pixels + (y + TXS_LAY_MARGIN) * p->stride + (x + TXS_LAY_MARGIN);
+}
+
+static size_t txs_lay_bytes(const txs_lay_plane *p) {
+    return (size_t)p->stride * ((size_t)p->height + 2 * TXS_LAY_MARGIN);
+}
+
+/* All outside. 0 without memory. */
+static int txs_lay_plane_make(txs_lay_plane *p, const txm_env *env, int width, int height,
+                              int wrap_x, int wrap_y) {
+    const size_t stride = (size_t)width + 2 * TXS_LAY_MARGIN;
+    size_t bytes;
+    p->width = width;
+    p->height = height;
+    p->wrap_x = wrap_x;
+    p->wrap_y = wrap_y;
+    p->stride = (ptrdiff_t)stride;
+    p->pixels = NULL;
+    if (!txm_mul(stride, (size_t)height + 2 * TXS_LAY_MARGIN, 1, &bytes)) return 0;
+    p->pixels = (uint8_t *)txm_alloc(env, bytes);
+    if (p->pixels) memset(p->pixels, TXS_OUTSIDE, bytes);
+    return p->pixels != NULL;
+}
+
+static void txs_lay_plane_free(txs_lay_plane *p, const txm_env *env) {
+    txm_free(env, p->pixels);
+    p->pixels = NULL;
+}
+
+/* Set a pixel and its copies in the margin. */
+static void txs_lay_set(const txs_lay_plane *p, int x, int y, uint8_t label) {
+    const int m = TXS_LAY_MARGIN;
+    *txs_lay_at(p, x, y) = label;
+    if (x >= m && x < p->width - m && y >= m && y < p->height - m) return;
+    const int left = p->wrap_x ? x - (x + m) / p->width * p->width : x;
+    const int top = p->wrap_y ? y - (y + m) / p->height * p->height : y;
+    const int right = p->wrap_x ? p->width + m : x + 1, bottom = p->wrap_y ? p->height + m : y + 1;
+    for (int yy = top; yy < bottom; yy += p->height)
+        for (int xx = left; xx < right; xx += p->width) *txs_lay_at(p, xx, yy) = label;
+}
+
+static const int txs_lay_around[TXS_LAY_AROUND][2] = {{1, 0},  {1, 1},   {0, 1},  {-1, 1},
+                                                      {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+
+/* How many pixels of the ring carry the label of the middle; -1 if not all are known. */
+static int txs_lay_alike(const txs_lay_plane *p, int x, int y, int distance) {
+    const uint8_t *at = txs_lay_at(p, x, y);
+    int alike = 0;
+    for (int i = 0; i < TXS_LAY_AROUND; i++) {
+        const uint8_t label =
+            at[distance * (txs_lay_around[i][1] * p->stride + txs_lay_around[i][0])];
+        if (label == TXS_OUTSIDE) return -1;
+        alike += label == *at;
+    }
+    return alike;
+}
+
+/* ---- statistics of a label map ------------------------------------------------------------- */
+
+/* A map, the one of the coarser level at this resolution, and which band a pixel lies in. */
+typedef struct txs_lay_view {
+    const txs_lay_plane *map, *parent; /* parent NULL on the coarsest level */
+    int field;
+} txs_lay_view;
+
+static int txs_lay_band(const txs_lay_view *v, int x, int y) {
+    if (v->field == 0) return 0;
+    return v->field == 1 ? (int)((int64_t)y * TXS_BANDS_OF_FIELD / v->map->height)
+                         : (int)((int64_t)x * TXS_BANDS_OF_FIELD / v->map->width);
+}
+
+/* the coarse pixel that a PARENT type looks at, at this resolution */
+static ptrdiff_t txs_lay_parent(const txs_lay_type *t, const txs_lay_plane *parent, int x, int y) {
+    const int sx = x & 1 ? 2 : -2, sy = y & 1 ? 2 : -2;
+    return sy * t->dy * parent->stride + sx * t->dx;
+}
+
+/* The row that a type's histogram has for the pixel; TXS_OUTSIDE if it has none. */
+static int txs_lay_row(const txs_lay_view *v, const txs_lay_type *t, int x, int y) {
+    int alike;
+    switch (t->kind) {
+    case TXS_LAY_FIELD: return txs_lay_band(v, x, y);
+    case TXS_LAY_PAIR: return txs_lay_at(v->map, x, y)[t->dy * v->map->stride + t->dx];
+    case TXS_LAY_PARENT: return txs_lay_at(v->parent, x, y)[txs_lay_parent(t, v->parent, x, y)];
+    default:
+        alike = txs_lay_alike(v->map, x, y, t->dx);
+        return alike < 0 ? (int)TXS_OUTSIDE : alike;
+    }
+}
+
+/* Count the cliques of a type; returns how many there are. */
+static int64_t txs_lay_count(const txs_lay_view *v, const txs_lay_type *t,
+                             int32_t count[TXS_LAY_BINS]) {
+    int64_t total = 0;
+    memset(count, 0, TXS_LAY_BINS * sizeof *count);
+    for (int y = 0; y < v->map->height; y++) {
+        for (int x = 0; x < v->map->width; x++) {
+            const int label = *txs_lay_at(v->map, x, y), row = txs_lay_row(v, t, x, y);
+            if (label == TXS_OUTSIDE || row == TXS_OUTSIDE) continue;
+            count[row * TXS_MAX_LABELS + label]++;
+            total++;
+        }
+    }
+    return total;
+}
+
+/* Normalise to a sum of about TXS_ONE. The bands of a field are normalised one by one and share
+   that sum, so that a band of which little is known counts like the others. */
+static void txs_lay_normalise(const txs_lay_view *v, const txs_lay_type *t, const int32_t *count,
+                              int32_t *share) {
+    const int parts = t->kind == TXS_LAY_FIELD && v->field ? (int)TXS_BANDS_OF_FIELD : 1;
+    const int bins = TXS_LAY_BINS / parts;
+    for (int part = 0; part < parts; part++) {
+        int64_t total = 0;
+        for (int i = 0; i < bins; i++) total += count[part * bins + i];
+        for (int i = 0; i < bins; i++)
+            share[part * bins + i] =
+                total ? (int32_t)((int64_t)count[part * bins + i] * (TXS_ONE / parts) / total) : 0;
+    }
+}
+
+/* How often two labels would lie d bands apart if the field alone decided, given the share of each
+   label in each band: added to pairs, which has a row for the label at p + d, times `by`. */
+static void txs_lay_field_pairs(const int32_t *field, int labels, double d, double by,
+                                double pairs[TXS_LAY_BINS]) {
+    const int last = TXS_BANDS_OF_FIELD - 1, steps = 8; /* of a band */
+    double sum[TXS_LAY_BINS] = {0}, total = 0;
+    for (int i = 0; i <= last * steps; i++) {
+        const double t = (double)i / steps, u = t + d;
+        if (u < 0 || u > last) continue;
+        const int32_t *f = field + (int)t * TXS_MAX_LABELS, *g = field + (int)u * TXS_MAX_LABELS;
+        const double wt = t - (int)t, wu = u - (int)u;
+        const int nt = t < last ? (int)TXS_MAX_LABELS : 0, nu = u < last ? (int)TXS_MAX_LABELS : 0;
+        for (int a = 0; a < labels; a++) {
+            const double tail = f[a] * (1 - wt) + f[a + nt] * wt;
+            for (int b = 0; b < labels; b++)
+                sum[b * TXS_MAX_LABELS + a] += tail * (g[b] * (1 - wu) + g[b + nu] * wu);
+        }
+    }
+    for (int i = 0; i < TXS_LAY_BINS; i++) total += sum[i];
+    for (int i = 0; i < TXS_LAY_BINS && total > 0; i++) pairs[i] += by * sum[i] / total;
+}
+
+/* A pair's histogram for a picture of another size along the field. The field spreads with the
+   picture, the pairs do not: there is one horizon, however high the picture is. So what the field
+   explains is exchanged, and only what goes beyond it is kept; pairs
+   that the example does not have stay away. bands_then, bands_now: how many
+   bands of the field the displacement spans in the example and in the picture. */
+static void txs_lay_fit_pair(txs_lay_type *t, const int32_t *field, int labels, double bands_then,
+                             double bands_now) {
+    double pairs[TXS_LAY_BINS], total = 0;
+    for (int i = 0; i < TXS_LAY_BINS; i++) pairs[i] = t->share[i];
+    txs_lay_field_pairs(field, labels, bands_then, -(double)TXS_ONE, pairs);
+    txs_lay_field_pairs(field, labels, bands_now, (double)TXS_ONE, pairs);
+    for (int i = 0; i < TXS_LAY_BINS; i++) {
+        if (!(pairs[i] > 0.5) || t->share[i] == 0) pairs[i] = 0;
+        total += pairs[i];
+    }
+    for (int i = 0; i < TXS_LAY_BINS && total > 0; i++)
+        t->share[i] = (int32_t)floor(pairs[i] / total * (double)TXS_ONE + 0.5);
+}
+
+/* ---- Gibbs sampling of labels ---------------------------------------------------------------
+
+   As in the sampler of values the potentials are controlled (see potential.h), here with histograms
+   that are exact: a pixel that changes its label takes its cliques out and puts them in again. */
+enum {
+    TXS_LAY_GRID = 8,           /* sub-lattices a side                                     */
+    TXS_LAY_GROUP = 4,          /* of them are visited before potentials are set anew      */
+    TXS_LAY_PROPORTIONAL = 100, /* gains, nats per unit of histogram error             */
+    TXS_LAY_INTEGRAL = 20,
+    TXS_LAY_STEEPEST = 8,             /* nats: the largest potential of a clique                 */
+    TXS_LAY_NAT = TXS_NAT * TXS_FINE, /* steps of a potential per nat, as in the noise */
+    TXS_LAY_UNSEEN = 3,               /* nats: where a pair has no clique in the example          */
+    TXS_LAY_HOT = 16,                 /* noise of a draw from the Gibbs distribution            */
+    TXS_LAY_FINE = 256,               /* steps of an integral per step of a potential            */
+    TXS_LAY_NEVER = 40,               /* nats: where it has none although there would be many     */
+    TXS_LAY_MUCH = TXS_ONE / 50,      /* share that is many                                  */
+    TXS_LAY_TABLE = (int)TXS_LAY_ROWS * (int)TXS_MAX_LABELS
+};
+
+typedef struct txs_lay_sampler {
+    const txs_lay_level *level;
+    txs_lay_view view;
+    int labels;
+    const int16_t *noise;
+    uint64_t seed;
+    txs_lay_plane alike[TXS_LAY_RINGS]; /* of each ring: how many pixels are like their middle, or
+                                           TXS_OUTSIDE                                   */
+    uint8_t *plain;                     /* see txs_lay_find_plain; NULL on the coarsest level */
+    int heat;                           /* of the noise, 0..TXS_LAY_HOT */
+    int32_t (*count)[TXS_LAY_BINS];    /* of each type, now                                       */
+    int32_t (*integral)[TXS_LAY_BINS]; /* steps / TXS_LAY_FINE                                    */
+    int16_t (*table)[2][TXS_LAY_TABLE]; /* potentials by row: of the tail, of a pair's head       */
+} txs_lay_sampler;
+
+/* Set a type's potentials from its error; integrate as well if it is time. */
+static void txs_lay_control(txs_lay_sampler *s, int k, int integrate) {
+    const txs_lay_type *t = &s->level->types[k];
+    const int32_t limit = TXS_LAY_STEEPEST * TXS_LAY_NAT * TXS_LAY_FINE;
+    int32_t share[TXS_LAY_BINS];
+    txs_lay_normalise(&s->view, t, s->count[k], share);
+    for (int row = 0; row < TXS_MAX_LABELS; row++) {
+        for (int label = 0; label < s->labels; label++) {
+            const int i = row * TXS_MAX_LABELS + label;
+            const int64_t pull =
+                (int64_t)(share[i] - t->share[i]) * (TXS_LAY_NAT * TXS_LAY_FINE) / TXS_ONE;
+            int32_t *sum = &s->integral[k][i];
+            if (integrate && *sum <= limit)
+                *sum = txm_clampi(*sum + (int32_t)(TXS_LAY_INTEGRAL * pull), -limit, limit);
+            const int16_t v =
+                (int16_t)((*sum > limit ? *sum
+                                        : txm_clampi(*sum + (int32_t)(TXS_LAY_PROPORTIONAL * pull),
+                                                     -limit, limit)) /
+                          TXS_LAY_FINE);
+            s->table[k][0][i] = v;
+            if (row < s->labels) s->table[k][1][label * TXS_MAX_LABELS + row] = v;
+        }
+    }
+}
+
+static void txs_lay_add_row(int32_t *energy, const int16_t *row, int labels) {
+    enum { HALF = TXS_MAX_LABELS / 2 }; /* loops of fixed length become a few vector instructions */
+    for (int v = 0; v < HALF; v++) energy[v] += row[v];
+    if (labels <= HALF) return;
+    for (int v = HALF; v < TXS_MAX_LABELS; v++) energy[v] += row[v];
+}
+
+static const txs_lay_plane *txs_lay_ring(const txs_lay_sampler *s, const txs_lay_type *t) {
+    return &s->alike[t->dx >> 1]; /* distances 1, 2, 4 */
+}
+
+/* What a ring says: p's own, and those of the 8 pixels that have p in theirs. */
+static void txs_lay_add_ring(const txs_lay_sampler *s, int k, int x, int y, int32_t *energy) {
+    const txs_lay_plane *map = s->view.map, *ring = txs_lay_ring(s, &s->level->types[k]);
+    const uint8_t *at = txs_lay_at(map, x, y), *alike = txs_lay_at(ring, x, y);
+    const int16_t *table = s->table[k][0];
+    const int distance = s->level->types[k].dx, now = *at;
+    int same[TXS_MAX_LABELS + 1] = {0};
+    for (int i = 0; i < TXS_LAY_AROUND; i++) {
+        const ptrdiff_t d = distance * (txs_lay_around[i][1] * map->stride + txs_lay_around[i][0]);
+        const int label = at[d];
+        same[label]++;
+        if (alike[d] == TXS_OUTSIDE) continue;
+        const int others = alike[d] - (label == now); /* without p */
+        energy[label] +=
+            table[(others + 1) * TXS_MAX_LABELS + label] - table[others * TXS_MAX_LABELS + label];
+    }
+    for (int v = 0; v < s->labels && *alike != TXS_OUTSIDE; v++)
+        energy[v] += table[same[v] * TXS_MAX_LABELS + v];
+}
+
+/* Give a pixel another label, and the rings it lies in their counts. */
+static void txs_lay_change(txs_lay_sampler *s, int x, int y, uint8_t label) {
+    const txs_lay_plane *map = s->view.map;
+    const int before = *txs_lay_at(map, x, y);
+    txs_lay_set(map, x, y, label);
+    for (int r = 0; r < TXS_LAY_RINGS; r++) {
+        const txs_lay_plane *ring = &s->alike[r];
+        const int distance = 1 << r;
+        int same = 0;
+        for (int i = 0; i < TXS_LAY_AROUND; i++) {
+            int qx = x + distance * txs_lay_around[i][0], qy = y + distance * txs_lay_around[i][1];
+            const int there = *txs_lay_at(map, qx, qy);
+            same += there == label;
+            if (there != before && there != label) continue;
+            if (map->wrap_x) qx = txs_mod(qx, map->width);
+            if (map->wrap_y) qy = txs_mod(qy, map->height);
+            const int count = *txs_lay_at(ring, qx, qy);
+            if (count != TXS_OUTSIDE)
+                txs_lay_set(ring, qx, qy, (uint8_t)(count + (there == label ? 1 : -1)));
+        }
+        if (*txs_lay_at(ring, x, y) != TXS_OUTSIDE) txs_lay_set(ring, x, y, (uint8_t)same);
+    }
+}
+
+static int txs_lay_sampler_row(const txs_lay_sampler *s, const txs_lay_type *t, int x, int y) {
+    return t->kind == TXS_LAY_RING ? *txs_lay_at(txs_lay_ring(s, t), x, y)
+                                   : txs_lay_row(&s->view, t, x, y);
+}
+
+/* Take the cliques of a pixel out of the histograms (by -1) or put them in (by 1). */
+static void txs_lay_tally(txs_lay_sampler *s, int x, int y, int by) {
+    const txs_lay_plane *map = s->view.map;
+    const uint8_t *at = txs_lay_at(map, x, y);
+    const int label = *at;
+    for (int k = 0; k < s->level->type_count; k++) {
+        const txs_lay_type *t = &s->level->types[k];
+        const ptrdiff_t d = t->dy * map->stride + t->dx;
+        const int row = txs_lay_sampler_row(s, t, x, y);
+        if (row != TXS_OUTSIDE) s->count[k][row * TXS_MAX_LABELS + label] += by;
+        if (t->kind == TXS_LAY_PAIR && at[-d] != TXS_OUTSIDE)
+            s->count[k][label * TXS_MAX_LABELS + at[-d]] += by;
+        for (int i = 0; i < TXS_LAY_AROUND && t->kind == TXS_LAY_RING; i++) {
+            const txs_lay_plane *ring = txs_lay_ring(s, t);
+            const ptrdiff_t q = t->dx * (txs_lay_around[i][1] * map->stride + txs_lay_around[i][0]);
+            const int alike = txs_lay_at(ring, x, y)[q];
+            if (alike != TXS_OUTSIDE) s->count[k][alike * TXS_MAX_LABELS + at[q]] += by;
+        }
+    }
+}
+
+/* Is the map of one label about the pixel, here and a level above? Then no other label is drawn: a
+   border may move, but what has no border on either level stays as it is. */
+static int txs_lay_is_plain(const txs_lay_sampler *s, int x, int y) {
+    return s->plain && *txs_lay_at(&s->alike[0], x, y) == TXS_LAY_AROUND &&
+           s->plain[(ptrdiff_t)y * s->view.map->width + x] == *txs_lay_at(s->view.map, x, y);
+}
+
+/* Labels of the pixels about which the parent has but one label, else TXS_OUTSIDE. */
+static void txs_lay_find_plain(const txs_lay_plane *parent, uint8_t *plain) {
+    for (int y = 0; y < parent->height; y++) {
+        for (int x = 0; x < parent->width; x++) {
+            const uint8_t label = *txs_lay_at(parent, x, y);
+            const int alone = txs_lay_alike(parent, x, y, 2) == TXS_LAY_AROUND;
+            *plain++ = (uint8_t)(alone ? label : (int)TXS_OUTSIDE);
+        }
+    }
+}
+
+/* Draw a new label for a pixel. */
+static void txs_lay_visit(txs_lay_sampler *s, int x, int y, txm_rng *rng) {
+    const txs_lay_plane *map = s->view.map;
+    const uint8_t *at = txs_lay_at(map, x, y);
+    const int16_t *noise = s->noise + (txm_rng_next(rng) & (TXS_NOISE - 1));
+    int32_t energy[TXS_MAX_LABELS];
+    if (txs_lay_is_plain(s, x, y)) return;
+    for (int v = 0; v < TXS_MAX_LABELS; v++) energy[v] = noise[v] * s->heat / TXS_LAY_HOT;
+    for (int k = 0; k < s->level->type_count; k++) {
+        const txs_lay_type *t = &s->level->types[k];
+        if (t->kind == TXS_LAY_RING) {
+            txs_lay_add_ring(s, k, x, y, energy);
+            continue;
+        }
+        txs_lay_add_row(energy, s->table[k][0] + txs_lay_row(&s->view, t, x, y) * TXS_MAX_LABELS,
+                        s->labels);
+        if (t->kind == TXS_LAY_PAIR)
+            txs_lay_add_row(energy,
+                            s->table[k][1] + at[-(t->dy * map->stride + t->dx)] * TXS_MAX_LABELS,
+                            s->labels);
+    }
+    int best = 0;
+    for (int v = 1; v < s->labels; v++)
+        if (energy[v] < energy[best]) best = v;
+    if (best == *at) return;
+    txs_lay_tally(s, x, y, -1);
+    txs_lay_change(s, x, y, (uint8_t)best);
+    txs_lay_tally(s, x, y, 1);
+}
+
+/* Visit every pixel once. */
+static void txs_lay_sweep(txs_lay_sampler *s, int sweep) {
+    enum { ALL = TXS_LAY_GRID * TXS_LAY_GRID };
+    int order[ALL];
+    txm_rng rng = txm_rng_make(s->seed, (uint64_t)sweep);
+    for (int i = 0; i < ALL; i++) order[i] = i;
+    txm_shuffle(&rng, order, ALL);
+    for (int i = 0; i < ALL; i += TXS_LAY_GROUP) {
+        for (int top = 0; top < s->view.map->height; top += TXS_LAY_GRID) {
+            for (int j = i; j < i + TXS_LAY_GROUP; j++) {
+                const int y = top + order[j] / TXS_LAY_GRID;
+                if (y >= s->view.map->height) continue;
+                for (int x = order[j] % TXS_LAY_GRID; x < s->view.map->width; x += TXS_LAY_GRID)
+                    txs_lay_visit(s, x, y, &rng);
+            }
+        }
+        for (int k = 0; k < s->level->type_count; k++)
+            txs_lay_control(s, k, i + TXS_LAY_GROUP == ALL);
+    }
+}
+
+/* Count the map as it is; to be called whenever the level has got types. */
+static void txs_lay_sampler_start(txs_lay_sampler *s) {
+    for (int r = 0; r < TXS_LAY_RINGS; r++) {
+        for (int y = 0; y < s->view.map->height; y++) {
+            for (int x = 0; x < s->view.map->width; x++) {
+                const int alike = txs_lay_alike(s->view.map, x, y, 1 << r);
+                txs_lay_set(&s->alike[r], x, y, (uint8_t)(alike < 0 ? (int)TXS_OUTSIDE : alike));
+            }
+        }
+    }
+    for (int k = 0; k < s->level->type_count; k++) {
+        txs_lay_count(&s->view, &s->level->types[k], s->count[k]);
+        txs_lay_control(s, k, 0);
+    }
+}
+
+/* Where the potentials of a type start. What the example does not have although there would be
+   much of it by chance has a high potential that stays: a label in a band of the field in which it
+   has no neighbour, two labels that never touch, or only one way round. So a sky stays above the
+   ground. Shares alone would allow it a little, for the sake of other shares. */
+static void txs_lay_forbid(const txs_lay_type *t, int labels, int field, int32_t *integral) {
+    const int32_t nat = TXS_LAY_NAT * TXS_LAY_FINE;
+    const int bands = field ? (int)TXS_BANDS_OF_FIELD : 1;
+    const int touching = abs(t->dx) + abs(t->dy) == 1;
+    int64_t in_row[TXS_MAX_LABELS] = {0}, in_column[TXS_MAX_LABELS] = {0};
+    for (int i = 0; i < TXS_LAY_BINS; i++) {
+        in_row[i / TXS_MAX_LABELS] += t->share[i];
+        in_column[i % TXS_MAX_LABELS] += t->share[i];
+    }
+    for (int row = 0; row < TXS_MAX_LABELS; row++) {
+        for (int label = 0; label < labels; label++) {
+            const int i = row * TXS_MAX_LABELS + label;
+            const int64_t by_chance = in_row[row] * in_column[label] / TXS_ONE;
+            int32_t about = t->share[i];
+            if (t->kind == TXS_LAY_PAIR && row < labels && about == 0)
+                integral[i] = (touching && by_chance > TXS_LAY_MUCH ? (int)TXS_LAY_NEVER
+                                                                    : (int)TXS_LAY_UNSEEN) *
+                              nat;
+            if (t->kind != TXS_LAY_FIELD || row >= bands) continue;
+            if (row > 0) about += t->share[i - TXS_MAX_LABELS];
+            if (row + 1 < bands) about += t->share[i + TXS_MAX_LABELS];
+            if (about == 0) integral[i] = TXS_LAY_NEVER * nat;
+        }
+    }
+}
+
+static txs_lay_sampler *txs_lay_sampler_make(txm_arena *arena, const txs_lay_level *level,
+                                             const txs_lay_view *view, int labels, int max_types,
+                                             const int16_t *noise, uint64_t seed) {
+    const size_t n = (size_t)max_types;
+    txs_lay_sampler *s = (txs_lay_sampler *)txm_arena_zero(arena, 1, sizeof *s);
+    if (!s) return NULL;
+    s->level = level;
+    s->view = *view;
+    s->labels = labels;
+    s->noise = noise;
+    s->seed = seed;
+    s->heat = TXS_LAY_HOT;
+    s->count = (int32_t(*)[TXS_LAY_BINS])txm_arena_zero(arena, n, sizeof *s->count);
+    s->integral = (int32_t(*)[TXS_LAY_BINS])txm_arena_zero(arena, n, sizeof *s->integral);
+    s->table = (int16_t(*)[2][TXS_LAY_TABLE])txm_arena_zero(arena, n, sizeof *s->table);
+    for (int k = 0; k < level->type_count && s->integral; k++)
+        txs_lay_forbid(&level->types[k], labels, view->field, s->integral[k]);
+    for (int r = 0; r < TXS_LAY_RINGS; r++) {
+        txs_lay_plane *p = &s->alike[r];
+        *p = *view->map;
+        p->pixels = (uint8_t *)txm_arena_alloc(arena, txs_lay_bytes(p), 1);
+        if (p->pixels) memset(p->pixels, TXS_OUTSIDE, txs_lay_bytes(p));
+    }
+    if (view->parent) {
+        s->plain =
+            (uint8_t *)txm_arena_alloc(arena, (size_t)view->map->width, (size_t)view->map->height);
+        if (s->plain) txs_lay_find_plain(view->parent, s->plain);
+    }
+    return arena->failed ? NULL : s;
+}
+
+/* ---- learning and synthesising label maps ---------------------------------------------------
+
+   As with values [1, section 3]: on every level of a pyramid a map is synthesised with the clique
+   types so far, the types whose histograms differ most are added, and so on. */
+enum {
+    TXS_LAY_ADDED = 20,      /* types that are chosen on the coarsest level */
+    TXS_LAY_ADDED_BELOW = 6, /* and on the others                           */
+    TXS_LAY_BATCH = 4,       /* of them at once                             */
+    TXS_LAY_SETTLE = 6,      /* sweeps before types are compared            */
+    TXS_LAY_COOL = 5         /* heat of the last sweep */
+};
+
+/* Weights of labels that make the shares of a coarse map those of the whole: where each block
+   takes its most frequent label alone, what is thin or scattered would be lost. */
+typedef struct txs_lay_blocks {
+    int width, height, labels;
+    const float *share; /* of each label in each block */
+    double bias[TXS_MAX_LABELS];
+} txs_lay_blocks;
+
+static int txs_lay_strongest(const txs_lay_blocks *b, size_t block) {
+    const float *share = b->share + block * (size_t)b->labels;
+    int best = 0;
+    double most = -1e300;
+    double known = 0;
+    for (int v = 0; v < b->labels; v++) {
+        const double weight = (double)share[v] + b->bias[v];
+        known += (double)share[v];
+        if (share[v] > 0 && weight > most) {
+            most = weight;
+            best = v;
+        }
+    }
+    return known > 0 ? best : (int)TXS_OUTSIDE;
+}
+
+static void txs_lay_balance(txs_lay_blocks *b, const double *wanted) {
+    enum { ROUNDS = 24 };
+    const size_t blocks = (size_t)b->width * (size_t)b->height;
+    double gain = 0.5;
+    memset(b->bias, 0, sizeof b->bias);
+    for (int round = 0; round < ROUNDS; round++, gain *= 0.85) {
+        double count[TXS_MAX_LABELS] = {0}, known = 0;
+        for (size_t i = 0; i < blocks; i++) {
+            const int label = txs_lay_strongest(b, i);
+            if (label == TXS_OUTSIDE) continue;
+            count[label]++;
+            known++;
+        }
+        for (int v = 0; v < b->labels && known > 0; v++) {
+            /* a label with a small share reacts to a small error */
+            const double off = wanted[v] - count[v] / known;
+            b->bias[v] += gain * off / (wanted[v] + 0.1);
+        }
+    }
+}
+
+/* The map at 1 / 2^level of its size. */
+static txm_status txs_lay_shrink(const txs_lay_plane *full, int labels, const double *wanted,
+                                 int level, txs_lay_plane *out, txm_env *env) {
+    const int side = 1 << level;
+    txs_lay_blocks b;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    memset(&b, 0, sizeof b);
+    b.width = (full->width + side - 1) / side;
+    b.height = (full->height + side - 1) / side;
+    b.labels = labels;
+    const size_t blocks = (size_t)b.width * (size_t)b.height;
+    float *share = (float *)txm_arena_zero(&arena, blocks, (size_t)labels * sizeof *share);
+    if (!share || !txs_lay_plane_make(out, env, b.width, b.height, full->wrap_x, full->wrap_y)) {
+        txm_arena_free(&arena);
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the label map");
+    }
+    for (int y = 0; y < full->height; y++) {
+        for (int x = 0; x < full->width; x++) {
+            const int label = *txs_lay_at(full, x, y);
+            const size_t block = (size_t)(y / side) * (size_t)b.width + (size_t)(x / side);
+            if (label != TXS_OUTSIDE)
+                share[block * (size_t)labels + (size_t)label] += 1.0f / (float)(side * side);
+        }
+    }
+    b.share = share;
+    if (level > 0) txs_lay_balance(&b, wanted);
+    for (int y = 0; y < b.height; y++)
+        for (int x = 0; x < b.width; x++)
+            txs_lay_set(out, x, y,
+                        (uint8_t)txs_lay_strongest(&b, (size_t)y * (size_t)b.width + (size_t)x));
+    txm_arena_free(&arena);
+    return TXM_OK;
+}
+
+/* A coarse map at twice its size. */
+static int txs_lay_double(const txs_lay_plane *coarse, int width, int height, txs_lay_plane *out,
+                          const txm_env *env) {
+    if (!txs_lay_plane_make(out, env, width, height, coarse->wrap_x, coarse->wrap_y)) return 0;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) txs_lay_set(out, x, y, *txs_lay_at(coarse, x >> 1, y >> 1));
+    return 1;
+}
+
+static txs_lay_type *txs_lay_add(txs_lay_level *l, int kind, int dx, int dy) {
+    txs_lay_type *t = &l->types[l->type_count++];
+    memset(t, 0, sizeof *t);
+    t->kind = kind;
+    t->dx = dx;
+    t->dy = dy;
+    return t;
+}
+
+/* The types that every level has. */
+static void txs_lay_preselect(txs_lay_level *l, const txs_lay_view *source) {
+    int32_t count[TXS_LAY_BINS];
+    l->type_count = 0;
+    txs_lay_add(l, TXS_LAY_FIELD, 0, 0);
+    txs_lay_add(l, TXS_LAY_PAIR, 1, 0);
+    txs_lay_add(l, TXS_LAY_PAIR, 0, 1);
+    txs_lay_add(l, TXS_LAY_PAIR, 1, 1);
+    txs_lay_add(l, TXS_LAY_PAIR, -1, 1);
+    for (int i = 0; i < TXS_LAY_RINGS; i++) txs_lay_add(l, TXS_LAY_RING, 1 << i, 0);
+    for (int i = 0; i < 4 && source->parent; i++) txs_lay_add(l, TXS_LAY_PARENT, i & 1, i >> 1);
+    int kept = 0;
+    for (int k = 0; k < l->type_count; k++) {
+        const int64_t n = txs_lay_count(source, &l->types[k], count);
+        txs_lay_normalise(source, &l->types[k], count, l->types[k].share);
+        if (n > 0) l->types[kept++] = l->types[k]; /* a small map may have no such clique */
+    }
+    l->type_count = kept;
+}
+
+/* Add the pairs whose histograms differ most from the source's; returns how many. */
+static int txs_lay_add_worst(txs_lay_level *l, const txs_lay_view *source, const txs_lay_view *map,
+                             txs_lay_type *candidates, float *distance, int count, int most) {
+    int32_t counts[TXS_LAY_BINS], share[TXS_LAY_BINS];
+    int added = 0;
+    for (int i = 0; i < count; i++) {
+        txs_lay_type *c = &candidates[i];
+        if (txs_lay_count(source, c, counts) == 0) {
+            distance[i] = 0;
+            continue;
+        }
+        txs_lay_normalise(source, c, counts, c->share);
+        txs_lay_count(map, c, counts);
+        txs_lay_normalise(map, c, counts, share);
+        double sum = 0;
+        for (int k = 0; k < TXS_LAY_BINS; k++) {
+            const double off = (double)(share[k] - c->share[k]) / (double)TXS_ONE;
+            sum += off * off;
+        }
+        distance[i] = txm_float(sqrt(sum));
+    }
+    for (; added < most && l->type_count < TXS_LAY_TYPES; added++) {
+        int worst = 0;
+        for (int i = 1; i < count; i++)
+            if (distance[i] > distance[worst]) worst = i;
+        if (count == 0 || !(distance[worst] > TXS_THRESHOLD)) break;
+        const txs_lay_type chosen = candidates[worst];
+        l->types[l->type_count++] = chosen;
+        for (int i = 0; i < count; i++) /* its neighbours say the same */
+            if (abs(candidates[i].dx - chosen.dx) <= 1 && abs(candidates[i].dy - chosen.dy) <= 1)
+                distance[i] = 0;
+    }
+    return added;
+}
+
+/* Start a level's map: from the coarser one, or at random by the field. */
+static void txs_lay_start(const txs_lay_view *v, const txs_lay_level *l, int labels,
+                          uint64_t seed) {
+    txm_rng rng = txm_rng_make(seed, 5);
+    for (int y = 0; y < v->map->height; y++) {
+        for (int x = 0; x < v->map->width; x++) {
+            if (v->parent) {
+                txs_lay_set(v->map, x, y, *txs_lay_at(v->parent, x, y));
+                continue;
+            }
+            const int32_t *share = l->types[0].share + txs_lay_band(v, x, y) * TXS_MAX_LABELS;
+            int32_t total = 0;
+            int label = 0;
+            for (int k = 0; k < labels; k++) total += share[k];
+            int32_t left = total > 0 ? (int32_t)txm_rng_below(&rng, (uint32_t)total) : 0;
+            while (label < labels - 1 && left >= share[label]) left -= share[label++];
+            txs_lay_set(v->map, x, y, (uint8_t)label);
+        }
+    }
+}
+
+/* Learn one level: source is the example's map, with the true coarser map as its parent. at: the
+   fraction of the whole that is done. */
+static txm_status txs_lay_learn_level(txs_lay_level *l, int labels, const txs_lay_view *source,
+                                      const int16_t *noise, uint64_t seed, txm_env *env, float at) {
+    const int side =
+        source->map->width < source->map->height ? source->map->width : source->map->height;
+    const int reach = source->parent ? (int)TXS_LAY_NEAR : txm_clampi(side / 3, 2, TXS_LAY_REACH);
+    const int most = source->parent ? (int)TXS_LAY_ADDED_BELOW : (int)TXS_LAY_ADDED;
+    const size_t capacity = (size_t)(2 * reach + 1) * (size_t)(reach + 1);
+    txs_lay_plane map;
+    txs_lay_view view = *source;
+    txm_status status = TXM_OK;
+    txm_arena arena;
+    int candidate_count = 0, sweep = 0;
+    txm_arena_init(&arena, env);
+    txs_lay_type *candidates = (txs_lay_type *)txm_arena_zero(&arena, capacity, sizeof *candidates);
+    float *distance = (float *)txm_arena_zero(&arena, capacity, sizeof *distance);
+    const int room = txs_lay_plane_make(&map, env, source->map->width, source->map->height, 0, 0);
+    view.map = &map;
+    txs_lay_sampler *s = txs_lay_sampler_make(&arena, l, &view, labels, TXS_LAY_TYPES, noise, seed);
+    if (!room || !s || arena.failed) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the label map");
+        goto done;
+    }
+    txs_lay_preselect(l, source);
+    for (int y = 0; y <= reach; y++) {
+        for (int x = -reach; x <= reach; x++) {
+            if ((y == 0 && x <= 0) || x * x + y * y > reach * reach || abs(x) + y <= 1) continue;
+            candidates[candidate_count].kind = TXS_LAY_PAIR;
+            candidates[candidate_count].dx = x;
+            candidates[candidate_count++].dy = y;
+        }
+    }
+    txs_lay_start(&view, l, labels, seed);
+    for (int left = most; left > 0;) {
+        txs_lay_sampler_start(s);
+        for (int i = 0; i < TXS_LAY_SETTLE; i++) {
+            if (txm_progress(env, at, "layout")) {
+                status = txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
+                goto done;
+            }
+            txs_lay_sweep(s, sweep++);
+        }
+        const int added = txs_lay_add_worst(l, source, &view, candidates, distance, candidate_count,
+                                            left < TXS_LAY_BATCH ? left : (int)TXS_LAY_BATCH);
+        if (added == 0) break;
+        left -= added;
+    }
+done:
+    txs_lay_plane_free(&map, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* How much the band tells about the label: mutual information over the labels' entropy. */
+static double txs_lay_order(const txs_lay_plane *map, int field, int labels) {
+    int32_t count[TXS_LAY_BINS];
+    const txs_lay_view view = {map, NULL, field};
+    const txs_lay_type type = {TXS_LAY_FIELD, 0, 0, {0}};
+    const double total = (double)txs_lay_count(&view, &type, count);
+    double mutual = 0, entropy = 0, share[TXS_MAX_LABELS] = {0};
+    for (int i = 0; i < TXS_LAY_BINS; i++) share[i % TXS_MAX_LABELS] += count[i] / total;
+    for (int v = 0; v < labels; v++)
+        if (share[v] > 0) entropy -= share[v] * log(share[v]);
+    for (int row = 0; row < TXS_MAX_LABELS; row++) {
+        double band = 0;
+        for (int v = 0; v < labels; v++) band += count[row * TXS_MAX_LABELS + v] / total;
+        for (int v = 0; v < labels; v++) {
+            const double joint = count[row * TXS_MAX_LABELS + v] / total;
+            if (joint > 0) mutual += joint * log(joint / (band * share[v]));
+        }
+    }
+    return entropy > 0 ? mutual / entropy : 0;
+}
+
+/* ---- synthesis of a label map ---------------------------------------------------------------- */
+
+static int txs_lay_sweeps(int level, int quality) {
+    static const int sweeps[5][3] = {
+        {4, 6, 16}, {6, 8, 24}, {9, 12, 40}, {12, 18, 60}, {18, 24, 90}};
+    return sweeps[quality + 2][level > 2 ? 2 : level];
+}
+
+/* The types of a level for a picture of this size. 0 without memory. */
+static int txs_lay_fit(const txs_layout *layout, int index, int width, int height, txm_arena *arena,
+                       txs_lay_level *fitted) {
+    const txs_lay_level *l = &layout->level[index];
+    const int side = layout->field == 1 ? height : width;
+    const int side_then = (layout->field == 1 ? layout->height : layout->width) >> index;
+    *fitted = *l;
+    fitted->types = (txs_lay_type *)txm_arena_alloc(arena, (size_t)l->type_count, sizeof *l->types);
+    if (!fitted->types) return 0;
+    memcpy(fitted->types, l->types, sizeof *l->types * (size_t)l->type_count);
+    if (!layout->field || side == side_then) return 1;
+    for (int k = 0; k < l->type_count; k++) {
+        txs_lay_type *t = &fitted->types[k];
+        const int d = layout->field == 1 ? t->dy : t->dx;
+        if (t->kind == TXS_LAY_PAIR && d != 0)
+            txs_lay_fit_pair(t, l->types[0].share, layout->labels,
+                             (double)(d * (int)TXS_BANDS_OF_FIELD) / side_then,
+                             (double)(d * (int)TXS_BANDS_OF_FIELD) / side);
+    }
+    return 1;
+}
+
+/* Synthesise a map of any size into out, which the caller frees. Fraction from..to of the whole. */
+static txm_status txs_layout_make(const txs_layout *layout, int width, int height, int wrap_x,
+                                  int wrap_y, int quality, const int16_t *noise, uint64_t seed,
+                                  txs_lay_plane *out, txm_env *env, float from, float to) {
+    float work = 0, done = 0;
+    for (int i = 0; i < layout->levels; i++) work += 1.0f / (float)(1 << 2 * i);
+    txs_lay_plane coarse, parent;
+    memset(&coarse, 0, sizeof coarse);
+    memset(out, 0, sizeof *out);
+    for (int i = layout->levels - 1; i >= 0; i--) {
+        txs_lay_level fitted;
+        const int w = (width + (1 << i) - 1) >> i, h = (height + (1 << i) - 1) >> i;
+        const int top = i + 1 == layout->levels;
+        txm_arena arena;
+        txm_status status = TXM_OK;
+        memset(&parent, 0, sizeof parent);
+        txm_arena_init(&arena, env);
+        int room = txs_lay_plane_make(out, env, w, h, wrap_x, wrap_y);
+        if (room && !top) room = txs_lay_double(&coarse, w, h, &parent, env);
+        const txs_lay_view view = {out, top ? NULL : &parent, layout->field};
+        if (room) room = txs_lay_fit(layout, i, w, h, &arena, &fitted);
+        txs_lay_sampler *s =
+            room ? txs_lay_sampler_make(&arena, &fitted, &view, layout->labels, fitted.type_count,
+                                        noise, txm_hash(seed + (uint64_t)i))
+                 : NULL;
+        if (!s) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the label map");
+        else {
+            txs_lay_start(&view, &fitted, layout->labels, seed);
+            txs_lay_sampler_start(s);
+        }
+        const int sweeps = txs_lay_sweeps(top ? 2 : i > 0, quality);
+        for (int k = 0; k < sweeps && status == TXM_OK; k++) {
+            const float part = (done + (float)k / (float)sweeps / (float)(1 << 2 * i)) / work;
+            if (txm_progress(env, from + (to - from) * part, "layout"))
+                status = txm_fail(env, TXM_CANCELLED, "stopped by the progress callback");
+            else {
+                if (k + 1 == sweeps) s->heat = TXS_LAY_COOL;
+                txs_lay_sweep(s, k);
+            }
+        }
+        txm_arena_free(&arena);
+        txs_lay_plane_free(&parent, env);
+        txs_lay_plane_free(&coarse, env);
+        if (status != TXM_OK) {
+            txs_lay_plane_free(out, env);
+            return status;
+        }
+        coarse = *out;
+        done += 1.0f / (float)(1 << 2 * i);
+    }
+    return TXM_OK;
+}
+
+/* Learn a label map; the layout's types lie in the arena. field: 0 to 2 as in the layout, or -1 to
+   find it out. Fraction from..to of the whole. */
+static txm_status txs_layout_learn(const txs_lay_plane *full, int labels, int field,
+                                   const int16_t *noise, uint64_t seed, txm_arena *arena,
+                                   txs_layout *layout, txm_env *env, float from, float to) {
+    const double ordered = 0.25; /* of a label's entropy that its band explains */
+    const int side = full->width < full->height ? full->width : full->height;
+    txs_lay_plane map[TXS_LAY_LEVELS], parent;
+    txm_status status = TXM_OK;
+    double known = 0, share[TXS_MAX_LABELS] = {0};
+    memset(layout, 0, sizeof *layout);
+    memset(map, 0, sizeof map);
+    memset(&parent, 0, sizeof parent);
+    layout->labels = labels;
+    layout->width = full->width;
+    layout->height = full->height;
+    layout->levels = 1;
+    while (layout->levels < TXS_LAY_LEVELS && side >> layout->levels >= TXS_LAY_TOP)
+        layout->levels++;
+    for (int y = 0; y < full->height; y++) {
+        for (int x = 0; x < full->width; x++) {
+            const int label = *txs_lay_at(full, x, y);
+            if (label == TXS_OUTSIDE) continue;
+            share[label]++;
+            known++;
+        }
+    }
+    for (int v = 0; v < labels; v++) share[v] /= known;
+    if (field < 0) {
+        const double rows = txs_lay_order(full, 1, labels),
+                     columns = txs_lay_order(full, 2, labels);
+        layout->field = rows >= columns && rows > ordered ? 1 : columns > ordered ? 2 : 0;
+    } else layout->field = field;
+
+    for (int i = 0; i < layout->levels && status == TXM_OK; i++)
+        status = txs_lay_shrink(full, labels, share, i, &map[i], env);
+    for (int i = layout->levels - 1; i >= 0 && status == TXM_OK; i--) {
+        const int top = i + 1 == layout->levels;
+        const txs_lay_view source = {&map[i], top ? NULL : &parent, layout->field};
+        layout->level[i].types =
+            (txs_lay_type *)txm_arena_zero(arena, TXS_LAY_TYPES, sizeof(txs_lay_type));
+        if (!layout->level[i].types ||
+            (!top && !txs_lay_double(&map[i + 1], map[i].width, map[i].height, &parent, env)))
+            status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the label map");
+        else
+            status = txs_lay_learn_level(&layout->level[i], labels, &source, noise,
+                                         txm_hash(seed + (uint64_t)i), env,
+                                         from + (to - from) / (float)(1 << 2 * i));
+        txs_lay_plane_free(&parent, env);
+    }
+    for (int i = 0; i < TXS_LAY_LEVELS; i++) txs_lay_plane_free(&map[i], env);
+    return status;
+}
+
+/* ---- composite textures ----------------------------------------------------------------------
+
+   A composite texture is a label map, itself a texture, and a texture for each label [1, section
+   4]. All its textures are learned and synthesised in one run, as a mosaic, with crossing types for
+   what happens where two of them meet. */
+enum {
+    TXS_COMPOSITE_TOP = 64,     /* pixels: short side of the coarsest level, about */
+    TXS_COMPOSITE_FEW = 256,    /* pixels: a label with fewer cannot be learned    */
+    TXS_COMPOSITE_SPARSE = 64,  /* pixels: with fewer a coarse level is left out   */
+    TXS_COMPOSITE_CANVAS = 320, /* pixels: a side of what is synthesised to learn  */
+    TXS_COMPOSITE_TYPES = 14,   /* clique types per label and level                */
+    TXS_COMPOSITE_REFRESH = 4,  /* sub-lattices                                    */
+    TXS_COMPOSITE_SOFT = 400,   /* pixels, see txs_soften                          */
+    TXS_CROSS_SCALE = 20,       /* steps of the root of a share of a crossing type */
+    TXS_CROSS_DOUBT = 2,        /* square steps, added to shares before they are compared */
+    TXS_COMPOSITE_COOL = 30     /* percent: temperature of the last sweep          */
+};
+
+struct texsyn_composite {
+    txm_arena arena; /* holds all of it */
+    int channels, labels, levels;
+    txs_layout layout;
+    texsyn_model *model[TXS_MAX_LABELS];
+    txs_crossing *crossing[TXS_MAX_LEVELS]; /* TXS_MAX_CROSSINGS at most */
+    int crossings[TXS_MAX_LEVELS];
+};
+
+/* What learning works with. */
+typedef struct txs_composer {
+    const texsyn_composite_learn_desc *desc;
+    texsyn_composite *composite;
+    txm_image example;
+    txs_ground source[TXS_MAX_LEVELS], canvas[TXS_MAX_LEVELS];
+    txs_mosaic from, from_above, to, to_above; /* of the source, of the canvas */
+    txs_raise_map *maps;
+    int16_t *noise, *cool;
+} txs_composer;
+
+/* Room for a composite whose models have all their types. */
+static texsyn_composite *txs_composite_make(txm_env *env, int channels, int labels) {
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    texsyn_composite *c = (texsyn_composite *)txm_arena_zero(&arena, 1, sizeof *c);
+    if (!c) return NULL;
+    c->channels = channels;
+    c->labels = labels;
+    for (int k = 0; k < labels; k++) c->model[k] = txs_fill_model_make(&arena, channels);
+    for (int i = 0; i < TXS_MAX_LEVELS; i++)
+        c->crossing[i] =
+            (txs_crossing *)txm_arena_zero(&arena, TXS_MAX_CROSSINGS, sizeof(txs_crossing));
+    if (arena.failed) {
+        txm_arena_free(&arena);
+        return NULL;
+    }
+    c->arena = arena;
+    return c;
+}
+
+/* ---- learning a composite: the example ------------------------------------------------------- */
+
+/* The bands of a label: principal components of its visible pixels. mask: a byte a pixel. */
+static void txs_composite_bands(const txs_composer *w, int label, uint8_t *mask) {
+    const txs_ground *g = &w->source[0];
+    texsyn_model *m = w->composite->model[label];
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    txs_source s;
+    size_t visible = 0, hidden = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        mask[i] = g->label[i] == label;
+        if (!mask[i] || m->channels < 4) continue;
+        mask[i] = txm_image_get(&w->example, (int)(i % (size_t)g->width),
+                                (int)(i / (size_t)g->width), 3) > 0;
+        visible += mask[i];
+        hidden += !mask[i];
+    }
+    if (m->channels == 4 && !visible) /* all is transparent: any colour will do */
+        for (size_t i = 0; i < pixels; i++) mask[i] = g->label[i] == label;
+    memset(&s, 0, sizeof s);
+    s.width = g->width;
+    s.height = g->height;
+    s.mask = mask;
+    txs_find_bands(m, &w->example, &s);
+    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+}
+
+/* The example's pixels in the bands of their labels; a transparent pixel has the mean colour. */
+static void txs_composite_split(const txs_composer *w) {
+    const txs_ground *g = &w->source[0];
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            double c[4] = {0, 0, 0, 0};
+            if (g->label[i] == TXS_NO_LABEL) continue;
+            const texsyn_model *m = w->composite->model[g->label[i]];
+            for (int k = 0; k < m->channels; k++)
+                c[k] = 255.0 * (double)txm_image_get(&w->example, x, y, k) - (double)m->mean[k];
+            if (m->channels == 4 && !(txm_image_get(&w->example, x, y, 3) > 0))
+                c[0] = c[1] = c[2] = 0;
+            for (int b = 0; b < m->bands; b++) {
+                double v = 0;
+                for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
+                g->value[(size_t)b * pixels + i] = txm_float(v);
+            }
+        }
+    }
+}
+
+/* A level on which a label has too few pixels: it is of one colour there, the mean. */
+static void txs_composite_blank(texsyn_model *m, int index) {
+    txs_level *l = &m->level[index];
+    l->type_count = 0;
+    for (int b = 0; b < m->bands; b++) {
+        txs_type *t = txs_add_type(l, TEXSYN_SINGLE, b, b, 0, 0);
+        l->values[b] = 1;
+        l->low[b] = 0;
+        l->step[b] = 1;
+        t->share[0] = TXS_ONE;
+        txs_make_classes(l, b);
+    }
+}
+
+static size_t txs_composite_count(const txs_ground *g, int label) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    size_t count = 0;
+    for (size_t i = 0; i < pixels; i++) count += g->label[i] == label;
+    return count;
+}
+
+/* The pyramid of the example, and how its bands are quantised. */
+static txm_status txs_composite_prepare(txs_composer *w, txm_arena *arena, txm_env *env) {
+    texsyn_composite *c = w->composite;
+    txs_ground *g = w->source;
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    const int side = g->width < g->height ? g->width : g->height;
+    uint8_t *bytes = (uint8_t *)txm_arena_alloc(arena, pixels, (size_t)c->channels);
+    float *values = (float *)txm_arena_alloc(arena, pixels, (size_t)c->channels * sizeof *values);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+    for (int k = 0; k < c->labels; k++) txs_composite_bands(w, k, bytes);
+    txs_composite_split(w);
+    c->levels = 1;
+    while (c->levels < TXS_MAX_LEVELS && side >> c->levels >= TXS_COMPOSITE_TOP) {
+        const txs_ground *fine = &g[c->levels - 1];
+        if (!txs_ground_make(&g[c->levels], arena, (fine->width + 1) / 2, (fine->height + 1) / 2,
+                             c->channels, 1))
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+        txs_ground_halve(fine, &g[c->levels++]);
+    }
+    for (int k = 0; k < c->labels; k++) {
+        texsyn_model *m = c->model[k];
+        m->levels = c->levels;
+        for (int i = 0; i < c->levels; i++) {
+            if (txs_composite_count(&g[i], k) < TXS_COMPOSITE_SPARSE) txs_composite_blank(m, i);
+            else
+                txs_ground_quantise(&g[i], k, m->bands, &m->level[i], values, bytes,
+                                    i ? NULL : m->dither);
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- learning a composite: the levels -------------------------------------------------------- */
+
+/* Labels of a ground from a map; all is to be synthesised. */
+static int txs_composite_ground(txs_ground *g, txm_arena *arena, const txs_lay_plane *map,
+                                int bands) {
+    if (!txs_ground_make(g, arena, map->width, map->height, bands, 0)) return 0;
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const int label = *txs_lay_at(map, x, y);
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            g->label[i] = (uint8_t)(label == TXS_OUTSIDE ? (int)TXS_NO_LABEL : label);
+            g->state[i] = TXS_FREE;
+        }
+    }
+    return 1;
+}
+
+static int txs_composite_pyramid(txs_ground *g, txm_arena *arena, int levels) {
+    for (int i = 1; i < levels; i++) {
+        if (!txs_ground_make(&g[i], arena, (g[i - 1].width + 1) / 2, (g[i - 1].height + 1) / 2,
+                             g[i - 1].bands, 0))
+            return 0;
+        txs_ground_halve(&g[i - 1], &g[i]);
+    }
+    return 1;
+}
+
+/* The textures of all labels on a level. */
+static void txs_composite_textures(const texsyn_composite *c, int index, txs_texture *texture) {
+    for (int k = 0; k < c->labels; k++) {
+        texture[k].model = c->model[k];
+        texture[k].level = &c->model[k]->level[index];
+    }
+}
+
+/* The canvas of a level, started from the one above, which is freed. */
+static txm_status txs_composite_enter(const texsyn_composite *c, int index, const txs_ground *g,
+                                      txs_mosaic *m, txs_mosaic *above, txs_raise_map *maps,
+                                      uint64_t seed, txm_env *env) {
+    txs_texture texture[TXS_MAX_LABELS], coarser[TXS_MAX_LABELS];
+    const int has_parents = above->canvas.pixels != NULL;
+    int reach = TXS_NEAR;
+    txs_composite_textures(c, index, texture);
+    for (int k = 0; k < c->labels; k++)
+        for (int i = 0; i < texture[k].level->type_count; i++)
+            if (txs_reach(&texture[k].level->types[i]) > reach)
+                reach = txs_reach(&texture[k].level->types[i]);
+    if (!txs_mosaic_make(m, env, &g[index], c->labels, reach, has_parents))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+    txs_mosaic_lay(m, &g[index], texture, seed);
+    if (has_parents) {
+        txs_composite_textures(c, index + 1, coarser);
+        txs_mosaic_raise(m, above, coarser, texture, maps);
+        txs_mosaic_free(above, env);
+    }
+    return TXM_OK;
+}
+
+static txm_status txs_composite_level(txs_composer *w, int index, txm_env *env, float from,
+                                      float to) {
+    texsyn_composite *c = w->composite;
+    const uint64_t seed = txm_hash(w->desc->seed + (uint64_t)index);
+    const int types = w->desc->max_types ? w->desc->max_types : (int)TXS_COMPOSITE_TYPES;
+    const txs_study_plan plan = {6,
+                                 3,
+                                 10,
+                                 types,
+                                 6,
+                                 TXS_NEAR,
+                                 TXS_COMPOSITE_REFRESH,
+                                 TXS_COMPOSITE_SOFT,
+                                 c->labels > 1,
+                                 seed,
+                                 w->noise,
+                                 NULL};
+    txm_status status =
+        txs_composite_enter(c, index, w->source, &w->from, &w->from_above, w->maps, seed, env);
+    if (status == TXM_OK)
+        status = txs_composite_enter(c, index, w->canvas, &w->to, &w->to_above, w->maps, seed, env);
+    if (status == TXM_OK)
+        status = txs_mosaic_learn(&plan, index, c->model, &w->from, &w->to, c->crossing[index],
+                                  &c->crossings[index], env, from, to);
+    w->from_above = w->from;
+    w->to_above = w->to;
+    memset(&w->from, 0, sizeof w->from);
+    memset(&w->to, 0, sizeof w->to);
+    return status;
+}
+
+/* What is kept of a crossing type: the roots of its shares, coarsely; no potentials, which the
+   control finds again in a few sweeps. */
+static void txs_cross_round(txs_type *t) {
+    for (int i = 0; i < TXS_BINS; i++)
+        t->root[i] = (int16_t)floor(
+            sqrt((double)t->share[i] / (double)TXS_ONE) * (double)TXS_CROSS_SCALE + 0.5);
+}
+
+/* The inverse, and potentials to start from: half of what the log of a share over that by chance
+   says, the rest being said by other types. 0 for an empty histogram. */
+static int txs_cross_unround(txs_type *t) {
+    const double doubt = TXS_CROSS_DOUBT;
+    int32_t total = 0, tail[TXS_CLASSES] = {0}, head[TXS_CLASSES] = {0};
+    for (int i = 0; i < TXS_BINS; i++) {
+        const int32_t square = t->root[i] * t->root[i];
+        total += square;
+        tail[i / TXS_CLASSES] += square;
+        head[i % TXS_CLASSES] += square;
+    }
+    for (int i = 0; i < TXS_BINS && total; i++) {
+        const double square = t->root[i] * t->root[i];
+        const double chance = (double)tail[i / TXS_CLASSES] * head[i % TXS_CLASSES] / total;
+        t->share[i] = (int32_t)((int64_t)t->root[i] * t->root[i] * TXS_ONE / total);
+        t->potential[i] =
+            (int16_t)floor(-log((square + doubt) / (chance + doubt)) * (double)TXS_NAT / 2 + 0.5);
+    }
+    return total > 0;
+}
+
+/* Round what was measured to what a file keeps, so that saving loses nothing. */
+static void txs_composite_round(texsyn_composite *c) {
+    for (int i = 0; i < c->levels; i++) {
+        for (int k = 0; k < c->labels; k++) {
+            txs_level *l = &c->model[k]->level[i];
+            for (int j = 0; j < l->type_count; j++) {
+                txs_round_statistics(&l->types[j], i);
+                txs_unround_statistics(&l->types[j]);
+            }
+        }
+        for (int j = 0; j < c->crossings[i]; j++) {
+            txs_cross_round(&c->crossing[i][j].type);
+            txs_cross_unround(&c->crossing[i][j].type);
+        }
+    }
+}
+
+/* The labels of the example: as given, or found. */
+static txm_status txs_composite_labels(const texsyn_composite_learn_desc *d, txs_lay_plane *map,
+                                       int *labels, txm_env *env) {
+    const txm_image given = txm_image_resolve(d->labels);
+    int64_t count[TXS_MAX_LABELS] = {0};
+    if (!txs_lay_plane_make(map, env, d->example.width, d->example.height, 0, 0))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the label map");
+    *labels = 0;
+    for (int y = 0; y < map->height; y++) {
+        const uint8_t *row = (const uint8_t *)txm_image_row_const(&given, y);
+        for (int x = 0; x < map->width; x++) {
+            if (row[x] == TXS_NO_LABEL) continue;
+            if (row[x] >= TXS_MAX_LABELS)
+                return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                        "labels: # occurs; they must be 0 to 15, or 255 for none",
+                                        row[x], 0);
+            txs_lay_set(map, x, y, row[x]);
+            count[row[x]]++;
+            if (row[x] >= *labels) *labels = row[x] + 1;
+        }
+    }
+    if (*labels == 0)
+        return txm_fail(env, TXM_TOO_SMALL, "labels: 255 everywhere; nothing can be learned");
+    for (int k = 0; k < *labels; k++)
+        if (count[k] < TXS_COMPOSITE_FEW)
+            return txm_fail_numbers(
+                env, TXM_TOO_SMALL,
+                "label #: has # pixels; at least 256 (16 x 16) are needed to learn from",
+                (uint64_t)k, (uint64_t)count[k]);
+    return TXM_OK;
+}
+
+static txm_status txs_composite_check(const texsyn_composite_learn_desc *d, txm_env *env) {
+    txm_status status;
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "composite: desc is NULL");
+    if ((status = txm_image_check(&d->example, "example", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+        return status;
+    if (d->example.channels == 2)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "example: 2 channels; give 1, 3 or 4");
+    if (d->example.width < 32 || d->example.height < 32)
+        return txm_fail(env, TXM_TOO_SMALL, "example: smaller than 32 x 32");
+    if ((status = txm_image_check(&d->labels, "labels", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+        return status;
+    if (d->labels.width != d->example.width || d->labels.height != d->example.height ||
+        d->labels.channels > 1 || d->labels.sample != TXM_U8)
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "labels: must have 1 channel of 8 bits and the size of the example");
+    if (d->max_types < 0 || d->max_types > (int)TXS_MAX_TYPES - (int)TXS_PRESELECTED)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "max_types must be 0 to 64");
+    if (d->field < TEXSYN_FIELD_AUTO || d->field > TEXSYN_FIELD_COLUMNS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "field is not one of texsyn_field");
+    if (d->example.sample == TXM_F32 && !txm_image_is_finite(&d->example))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "example: a sample is not finite");
+    return TXM_OK;
+}
+
+/* Learn everything once the label map is known. */
+static txm_status txs_composite_run(txs_composer *w, const txs_lay_plane *map, txm_arena *arena,
+                                    txm_env *env) {
+    texsyn_composite *c = w->composite;
+    const size_t entries = (size_t)TXS_NOISE + TXS_VALUES;
+    const int width = txm_clampi(map->width, 1, TXS_COMPOSITE_CANVAS);
+    const int height = txm_clampi(map->height, 1, TXS_COMPOSITE_CANVAS);
+    txs_lay_plane drawn;
+    float total = 0, from = 0.2f;
+    w->noise = (int16_t *)txm_arena_alloc(arena, entries, sizeof *w->noise);
+    w->maps = (txs_raise_map *)txm_arena_alloc(arena, (size_t)c->labels, sizeof *w->maps);
+    if (arena->failed || !txs_composite_ground(&w->source[0], arena, map, c->channels))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+    w->source[0].value = (float *)txm_arena_zero(arena, (size_t)map->width * (size_t)map->height,
+                                                 sizeof(float) * (size_t)c->channels);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+    memset(w->source[0].state, TXS_SOURCE, (size_t)map->width * (size_t)map->height);
+    txs_noise_table(w->noise);
+    txm_status status = txs_composite_prepare(w, arena, env);
+    if (status == TXM_OK)
+        status = txs_layout_learn(map, c->labels, (int)w->desc->field - TEXSYN_FIELD_NONE, w->noise,
+                                  w->desc->seed, &c->arena, &c->layout, env, 0, 0.15f);
+    if (status == TXM_OK)
+        status = txs_layout_make(&c->layout, width, height, 0, 0, 0, w->noise, w->desc->seed,
+                                 &drawn, env, 0.15f, 0.2f);
+    if (status != TXM_OK) return status;
+    const int room = txs_composite_ground(&w->canvas[0], arena, &drawn, c->channels) &&
+                     txs_composite_pyramid(w->canvas, arena, c->levels);
+    txs_lay_plane_free(&drawn, env);
+    if (!room) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
+    for (int i = 0; i < c->levels; i++) total += 1.0f / (float)(1 << 2 * i);
+    for (int i = c->levels - 1; i >= 0 && status == TXM_OK; i--) {
+        const float next = from + 0.8f / (float)(1 << 2 * i) / total;
+        status = txs_composite_level(w, i, env, from, i ? next : 1);
+        from = next;
+    }
+    txs_composite_round(c);
+    return status;
+}
+
+TEXSYN_API txm_status texsyn_composite_learn(const texsyn_composite_learn_desc *desc, txm_env *env,
+                                             texsyn_composite **out) {
+    if (out) *out = NULL;
+    else return txm_fail(env, TXM_BAD_ARGUMENT, "composite: out is NULL");
+    txs_lay_plane map;
+    txs_composer w;
+    txm_arena arena;
+    int labels;
+    txm_status status = txs_composite_check(desc, env);
+    if (status != TXM_OK) return status;
+    memset(&w, 0, sizeof w);
+    txm_arena_init(&arena, env);
+    w.desc = desc;
+    w.example = txm_image_resolve(desc->example);
+    status = txs_composite_labels(desc, &map, &labels, env);
+    if (status == TXM_OK) {
+        w.composite = txs_composite_make(env, w.example.channels, labels);
+        if (!w.composite) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the composite");
+    }
+    if (status == TXM_OK) status = txs_composite_run(&w, &map, &arena, env);
+    txs_mosaic_free(&w.from, env);
+    txs_mosaic_free(&w.from_above, env);
+    txs_mosaic_free(&w.to, env);
+    txs_mosaic_free(&w.to_above, env);
+    txs_lay_plane_free(&map, env);
+    txm_arena_free(&arena);
+    if (status == TXM_OK) *out = w.composite;
+    else texsyn_composite_free(w.composite);
+    return status;
+}
+
+TEXSYN_API void texsyn_composite_free(texsyn_composite *composite) {
+    if (composite) txm_arena_free(&composite->arena);
+}
+
+TEXSYN_API int texsyn_composite_label_count(const texsyn_composite *composite) {
+    return composite ? composite->labels : 0;
+}
+
+TEXSYN_API const texsyn_model *texsyn_composite_model(const texsyn_composite *composite,
+                                                      int label) {
+    return composite && label >= 0 && label < composite->labels ? composite->model[label] : NULL;
+}
+
+/* ---- synthesising a composite ---------------------------------------------------------------- */
+
+static int txs_composite_sweeps(int level, int quality) {
+    static const int sweeps[5][3] = {{2, 4, 10}, {3, 6, 14}, {5, 8, 20}, {8, 12, 28}, {12, 20, 40}};
+    return sweeps[quality + 2][level > 2 ? 2 : level];
+}
+
+static txm_status txs_composite_check_desc(const texsyn_composite_desc *d, int channels,
+                                           const txm_image *out, txm_env *env) {
+    txm_status status;
+    if (!d || !d->composite)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "composite: desc or composite is NULL");
+    if (d->width < 1 || d->height < 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "width and height must be 1 or more");
+    if (d->height > TEXSYN_MAX_PIXELS / d->width)
+        return txm_fail(env, TXM_TOO_LARGE, "more than TEXSYN_MAX_PIXELS pixels; make tiles");
+    if (d->quality < -2 || d->quality > 2)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "quality must be -2 to 2");
+    if ((status = txm_image_check(out, "out", 0, env)) != TXM_OK) return status;
+    const int has = out->channels ? out->channels : 1;
+    if (out->width != d->width || out->height != d->height)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: must have the size of the synthesis");
+    if (channels == 0 && (has != 1 || out->sample != TXM_U8))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: must have 1 channel of 8 bits");
+    if (has == 2 || has < channels)
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "out: must have the channels of the composite, or 3 or 4");
+    if (!d->layout.pixels) return TXM_OK;
+    if ((status = txm_image_check(&d->layout, "layout", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+        return status;
+    if (d->layout.width != d->width || d->layout.height != d->height || d->layout.channels > 1 ||
+        d->layout.sample != TXM_U8)
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "layout: must have 1 channel of 8 bits and the size of the synthesis");
+    const txm_image layout = txm_image_resolve(d->layout);
+    for (int y = 0; y < d->height; y++) {
+        const uint8_t *row = (const uint8_t *)txm_image_row_const(&layout, y);
+        for (int x = 0; x < d->width; x++)
+            if (row[x] >= d->composite->labels)
+                return txm_fail_numbers(env, TXM_BAD_ARGUMENT,
+                                        "layout: label # occurs; the composite has # of them",
+                                        row[x], (uint64_t)d->composite->labels);
+    }
+    return TXM_OK;
+}
+
+/* The label map of a synthesis: as drawn, or synthesised. Fraction 0..to of the whole. */
+static txm_status txs_composite_map(const texsyn_composite_desc *d, const int16_t *noise,
+                                    txs_lay_plane *map, txm_env *env, float to) {
+    if (!d->layout.pixels)
+        return txs_layout_make(&d->composite->layout, d->width, d->height, 0, 0, d->quality, noise,
+                               txm_hash(d->seed), map, env, 0, to);
+    const txm_image layout = txm_image_resolve(d->layout);
+    if (!txs_lay_plane_make(map, env, d->width, d->height, 0, 0))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the label map");
+    for (int y = 0; y < d->height; y++)
+        for (int x = 0; x < d->width; x++)
+            txs_lay_set(map, x, y, ((const uint8_t *)txm_image_row_const(&layout, y))[x]);
+    return TXM_OK;
+}
+
+/* The value of a pixel in steps: within its step it is placed by its neighbours where these are
+   smooth, at random where they are not, as in synthesis.h. Neighbours of other labels are left out:
+   their steps are others. noise: 16 random bits. */
+static float txs_composite_value(const txs_mosaic *m, const uint8_t *p, int band, float spread,
+                                 unsigned noise) {
+    static const int weight[3][3] = {{1, 2, 1}, {2, 4, 2}, {1, 2, 1}};
+    const ptrdiff_t plane = band * m->canvas.plane;
+    const int label = p[m->label], value = p[plane];
+    int smooth = 1, sum = 0, total = 0;
+    for (int i = 0; i < 9; i++) {
+        const uint8_t *q = p + (i / 3 - 1) * m->canvas.stride + i % 3 - 1;
+        if (q[m->label] != label) continue;
+        smooth &= abs(q[plane] - value) <= 1;
+        sum += weight[i / 3][i % 3] * (q[plane] - value);
+        total += weight[i / 3][i % 3];
+    }
+    const double off = smooth ? sum / (double)total : noise / 65536.0 - 0.5;
+    return txm_float(value + txm_clampf(txm_float(off), -0.5f, 0.5f) * (double)spread);
+}
+
+typedef struct txs_composite_painter {
+    const texsyn_composite_desc *desc;
+    const txs_mosaic *mosaic;
+    const txm_image *out;
+} txs_composite_painter;
+
+/* From the canvas to the picture: some rows of it. */
+static void txs_composite_paint(void *context, int share) {
+    const txs_composite_painter *w = (const txs_composite_painter *)context;
+    const texsyn_composite *c = w->desc->composite;
+    const int end = txm_clampi((share + 1) * TXS_PAINT_ROWS, 0, w->out->height);
+    for (int y = share * TXS_PAINT_ROWS; y < end; y++) {
+        for (int x = 0; x < w->out->width; x++) {
+            const uint8_t *p = txs_pixel(w->mosaic, x, y);
+            const texsyn_model *t = c->model[p[w->mosaic->label]];
+            const txs_level *l = &t->level[0];
+            uint64_t noise =
+                txm_hash(((uint64_t)(unsigned)y << 32 | (unsigned)x) ^ txm_hash(w->desc->seed));
+            double v[4] = {(double)t->mean[0], (double)t->mean[1], (double)t->mean[2],
+                           (double)t->mean[3]};
+            for (int b = 0; b < t->bands; b++, noise >>= 16) {
+                const float at =
+                    txs_composite_value(w->mosaic, p, b, t->dither[b], (unsigned)(noise & 0xffff));
+                /* a product of two floats is exact in double, contracted or not */
+                const float value = txm_float(txs_value(l, b, (double)at));
+                for (int k = 0; k < t->channels; k++)
+                    v[k] += (double)value * (double)t->basis[b][k];
+            }
+            for (int k = 0; k < w->out->channels; k++) {
+                const double sample = k == 3 && t->channels < 4 ? 255 : v[t->channels == 1 ? 0 : k];
+                txm_image_set(w->out, x, y, k, txm_float(sample / 255));
+            }
+        }
+    }
+}
+
+/* All levels, coarse first; the finest stays in *m. */
+static txm_status txs_composite_sweep(const texsyn_composite_desc *d, txs_ground *ground,
+                                      txs_mosaic *m, const int16_t *noise, const int16_t *cool,
+                                      txs_raise_map *maps, txm_env *env) {
+    const texsyn_composite *c = d->composite;
+    txs_texture texture[TXS_MAX_LABELS];
+    txs_mosaic above;
+    txm_status status = TXM_OK;
+    double work = 0, done = 0;
+    memset(&above, 0, sizeof above);
+    for (int i = 0; i < c->levels; i++)
+        work += (double)txs_composite_sweeps(i, d->quality) / (double)(1 << 2 * i);
+    for (int i = c->levels - 1; i >= 0 && status == TXM_OK; i--) {
+        const int sweeps = txs_composite_sweeps(i, d->quality);
+        const double next = done + (double)sweeps / (double)(1 << 2 * i);
+        const txs_brush_plan plan = {TXS_MAX_TYPES, TXS_MAX_CROSSINGS, TXS_COMPOSITE_REFRESH,
+                                     TXS_COMPOSITE_SOFT, txm_hash(d->seed + (uint64_t)i)};
+        status = txs_composite_enter(c, i, ground, m, &above, maps, txm_hash(d->seed) + (uint64_t)i,
+                                     env);
+        txs_composite_textures(c, i, texture);
+        if (status == TXM_OK)
+            status = txs_mosaic_run(m, texture, &plan, c->crossing[i], c->crossings[i], sweeps,
+                                    noise, i ? NULL : cool, env, (float)(0.2 + 0.8 * done / work),
+                                    (float)(0.2 + 0.8 * next / work));
+        done = next;
+        if (i == 0 || status != TXM_OK) continue;
+        above = *m;
+        memset(m, 0, sizeof *m);
+    }
+    txs_mosaic_free(&above, env);
+    return status;
+}
+
+TEXSYN_API txm_status texsyn_composite_synthesize(const texsyn_composite_desc *desc, txm_env *env,
+                                                  txm_image out) {
+    txm_status status = txs_composite_check_desc(
+        desc, desc && desc->composite ? desc->composite->channels : 1, &out, env);
+    if (status != TXM_OK) return status;
+    const texsyn_composite *c = desc->composite;
+    const size_t entries = (size_t)TXS_NOISE + TXS_VALUES;
+    txs_ground ground[TXS_MAX_LEVELS];
+    txs_lay_plane map;
+    txs_mosaic m;
+    txm_arena arena;
+    memset(&map, 0, sizeof map);
+    memset(&m, 0, sizeof m);
+    out = txm_image_resolve(out);
+    txm_arena_init(&arena, env);
+    int16_t *noise = (int16_t *)txm_arena_alloc(&arena, entries, sizeof *noise);
+    int16_t *cool = (int16_t *)txm_arena_alloc(&arena, entries, sizeof *cool);
+    txs_raise_map *maps = (txs_raise_map *)txm_arena_alloc(&arena, (size_t)c->labels, sizeof *maps);
+    if (arena.failed) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to synthesise");
+    if (status == TXM_OK) {
+        txs_noise_table(noise);
+        txs_cool_noise(noise, TXS_COMPOSITE_COOL, cool);
+        status = txs_composite_map(desc, noise, &map, env, 0.2f);
+    }
+    if (status == TXM_OK && (!txs_composite_ground(&ground[0], &arena, &map, c->channels) ||
+                             !txs_composite_pyramid(ground, &arena, c->levels)))
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to synthesise");
+    txs_lay_plane_free(&map, env);
+    if (status == TXM_OK) status = txs_composite_sweep(desc, ground, &m, noise, cool, maps, env);
+    if (status == TXM_OK) {
+        txs_composite_painter painter = {desc, &m, &out};
+        txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS,
+                         txs_composite_paint, &painter);
+    }
+    txs_mosaic_free(&m, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+TEXSYN_API txm_status texsyn_composite_layout(const texsyn_composite_desc *desc, txm_env *env,
+                                              txm_image out) {
+    txs_lay_plane map;
+    txm_arena arena;
+    txm_status status = txs_composite_check_desc(desc, 0, &out, env);
+    if (status != TXM_OK) return status;
+    memset(&map, 0, sizeof map);
+    out = txm_image_resolve(out);
+    txm_arena_init(&arena, env);
+    int16_t *noise = (int16_t *)txm_arena_alloc(&arena, TXS_NOISE + TXS_VALUES, sizeof *noise);
+    if (!noise) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the label map");
+    else {
+        txs_noise_table(noise);
+        status = txs_composite_map(desc, noise, &map, env, 1);
+    }
+    for (int y = 0; y < out.height && status == TXM_OK; y++)
+        memcpy(txm_image_row(&out, y), txs_lay_at(&map, 0, y), (size_t)out.width);
+    txs_lay_plane_free(&map, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- the composite as bytes ------------------------------------------------------------------
+
+   The same code as that of a model (see file.h), over the layout, the models of the labels one
+   after the other, and the crossing types. docs/model-format.md describes the bytes.          */
+
+enum {
+    TXS_LAY_SCALE = 60, /* steps of the root of a share in a label map */
+    TXS_LAY_SIDE_BITS = 24
+};
+
+/* Contexts: of displacements and histograms of the layout by kind, of those of crossing types. */
+typedef struct txs_composite_codec {
+    txs_context place[2], share[4][8];
+    txs_context cross_place[2], cross_share[8];
+    int16_t root[TXS_LAY_BINS], like[TXS_LAY_BINS];
+    txs_codec model;
+} txs_composite_codec;
+
+/* Rows of a layout's histogram. */
+static int txs_lay_rows(const txs_layout *layout, int kind) {
+    if (kind == TXS_LAY_FIELD) return layout->field ? (int)TXS_BANDS_OF_FIELD : 1;
+    return kind == TXS_LAY_RING ? TXS_LAY_AROUND + 1 : layout->labels;
+}
+
+/* Round a share to what is kept: its root in steps, beside each other without the empty columns. */
+static void txs_lay_roots(const txs_layout *layout, const txs_lay_type *t, int16_t *root) {
+    const int rows = txs_lay_rows(layout, t->kind);
+    for (int i = 0; i < rows * layout->labels; i++) {
+        const int32_t share = t->share[i / layout->labels * TXS_MAX_LABELS + i % layout->labels];
+        root[i] =
+            (int16_t)floor(sqrt((double)share / (double)TXS_ONE) * (double)TXS_LAY_SCALE + 0.5);
+    }
+}
+
+/* The inverse, normalised as txs_lay_normalise has it; 0 for an empty histogram. */
+static int txs_lay_unroot(const txs_layout *layout, txs_lay_type *t, const int16_t *root) {
+    const txs_lay_view view = {NULL, NULL, layout->field};
+    const int rows = txs_lay_rows(layout, t->kind);
+    int32_t square[TXS_LAY_BINS] = {0}, total = 0;
+    for (int i = 0; i < rows * layout->labels; i++) {
+        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = root[i] * root[i];
+        total += root[i] * root[i];
+    }
+    txs_lay_normalise(&view, t, square, t->share);
+    return total > 0;
+}
+
+/* Type k of a level. The histogram of the last one of its kind predicts its own. */
+static void txs_code_lay_type(txs_coder *c, txs_composite_codec *z, const txs_layout *layout,
+                              int level, int k) {
+    const txs_lay_level *l = &layout->level[level];
+    txs_lay_type *t = &l->types[k];
+    int before = k - 1;
+    t->kind = txs_limited(c, 2, TXS_LAY_FIELD, TXS_LAY_RING, t->kind);
+    if ((t->kind == TXS_LAY_FIELD) != (k == 0)) c->bad = 1;
+    if (t->kind == TXS_LAY_PARENT && level + 1 == layout->levels) c->bad = 1;
+    if (t->kind != TXS_LAY_FIELD) {
+        t->dx = txs_number(c, &z->place[0], t->dx);
+        t->dy = txs_number(c, &z->place[1], t->dy);
+    }
+    if (t->kind == TXS_LAY_RING && ((t->dx != 1 && t->dx != 2 && t->dx != 4) || t->dy)) c->bad = 1;
+    if (t->kind == TXS_LAY_PARENT && (t->dx & ~1 || t->dy & ~1)) c->bad = 1;
+    if (t->kind == TXS_LAY_PAIR &&
+        ((!t->dx && !t->dy) || abs(t->dx) > TXS_LAY_REACH || abs(t->dy) > TXS_LAY_REACH))
+        c->bad = 1;
+    if (c->bad) return;
+    while (before >= 0 && l->types[before].kind != t->kind) before--;
+    txs_lay_roots(layout, t, z->root);
+    if (before >= 0) txs_lay_roots(layout, &l->types[before], z->like);
+    txs_sequence(c, z->share[t->kind], z->root, before >= 0 ? z->like : NULL,
+                 txs_lay_rows(layout, t->kind) * layout->labels, 0, TXS_LAY_SCALE, TXS_NONE);
+    if (!c->bad && !txs_lay_unroot(layout, t, z->root)) c->bad = 1;
+}
+
+/* Returns 0 if there is no memory. */
+static int txs_code_layout(txs_coder *c, txs_composite_codec *z, txs_layout *layout,
+                           txm_arena *arena) {
+    const int most = (1 << TXS_LAY_SIDE_BITS) - 1;
+    layout->field = txs_limited(c, 2, 0, 2, layout->field);
+    layout->width = txs_limited(c, TXS_LAY_SIDE_BITS, 1, most, layout->width);
+    layout->height = txs_limited(c, TXS_LAY_SIDE_BITS, 1, most, layout->height);
+    layout->levels = txs_limited(c, 3, 1, TXS_LAY_LEVELS, layout->levels);
+    for (int i = layout->levels - 1; i >= 0 && !c->bad; i--) {
+        txs_lay_level *l = &layout->level[i];
+        if (layout->width >> i == 0 || layout->height >> i == 0) c->bad = 1;
+        l->type_count = txs_limited(c, 6, 1, TXS_LAY_TYPES, l->type_count);
+        if (c->bad) break;
+        if (c->reading)
+            l->types =
+                (txs_lay_type *)txm_arena_zero(arena, (size_t)l->type_count, sizeof(txs_lay_type));
+        if (!l->types) return 0;
+        for (int k = 0; k < l->type_count && !c->bad; k++) txs_code_lay_type(c, z, layout, i, k);
+    }
+    return 1;
+}
+
+/* Crossing type k of a level; the last one of the same bands predicts its histogram. */
+static void txs_code_crossing(txs_coder *c, txs_composite_codec *z, const texsyn_composite *m,
+                              int level, int k) {
+    txs_crossing *x = &m->crossing[level][k];
+    txs_type *t = &x->type;
+    int before = k - 1;
+    x->tail = txs_limited(c, 4, 0, m->labels - 1, x->tail);
+    x->head = txs_limited(c, 4, 0, m->labels - 1, x->head);
+    if (c->bad || x->tail >= x->head) {
+        c->bad = 1;
+        return;
+    }
+    t->kind = TEXSYN_VALUES;
+    t->band = txs_limited(c, 2, 0, m->model[x->tail]->bands - 1, t->band);
+    t->other = txs_limited(c, 2, 0, m->model[x->head]->bands - 1, t->other);
+    t->dx = txs_number(c, &z->cross_place[0], t->dx);
+    t->dy = txs_number(c, &z->cross_place[1], t->dy);
+    if (c->bad || (!t->dx && !t->dy) || abs(t->dx) > TXS_CROSS_REACH ||
+        abs(t->dy) > TXS_CROSS_REACH) {
+        c->bad = 1;
+        return;
+    }
+    while (before >= 0) {
+        const txs_crossing *o = &m->crossing[level][before];
+        if (o->tail == x->tail && o->head == x->head && o->type.band == t->band &&
+            o->type.other == t->other)
+            break;
+        before--;
+    }
+    txs_sequence(c, z->cross_share, t->root,
+                 before >= 0 ? m->crossing[level][before].type.root : NULL, TXS_BINS, 0,
+                 TXS_CROSS_SCALE, TXS_NONE);
+    if (!c->bad && !txs_cross_unround(t)) c->bad = 1;
+}
+
+/* May the ends of a level's crossing types be added up at one pixel? */
+static int txs_crossings_fit(const texsyn_composite *m, int level) {
+    int ends[TXS_MAX_LABELS][TXS_MAX_BANDS] = {{0}};
+    for (int i = 0; i < m->crossings[level]; i++) {
+        const txs_crossing *x = &m->crossing[level][i];
+        if (++ends[x->tail][x->type.band] > TXS_CROSS_ENDS ||
+            ++ends[x->head][x->type.other] > TXS_CROSS_ENDS)
+            return 0;
+    }
+    return 1;
+}
+
+/* The whole composite, to or from the coder; what reading allocates goes to its arena. Returns 0 if
+   there is no memory. */
+static int txs_code_composite(txs_coder *c, texsyn_composite *m, txs_composite_codec *z) {
+    txs_contexts_init(z->place, 2);
+    txs_contexts_init(&z->share[0][0], 4 * 8);
+    txs_contexts_init(z->cross_place, 2);
+    txs_contexts_init(z->cross_share, 8);
+    m->labels = m->layout.labels = txs_limited(c, 5, 1, TXS_MAX_LABELS, m->labels);
+    if (c->bad) return 1;
+    if (!txs_code_layout(c, z, &m->layout, &m->arena)) return 0;
+    for (int k = 0; k < m->labels && !c->bad; k++) {
+        if (c->reading) {
+            m->model[k] = (texsyn_model *)txm_arena_zero(&m->arena, 1, sizeof *m->model[k]);
+            if (!m->model[k]) return 0;
+            m->model[k]->arena = m->arena;
+        }
+        const int room = txs_code_model(c, m->model[k], &z->model);
+        if (c->reading) m->arena = m->model[k]->arena;
+        if (!room) return 0;
+        if (m->model[k]->channels != m->model[0]->channels ||
+            m->model[k]->levels != m->model[0]->levels)
+            c->bad = 1;
+    }
+    if (c->bad) return 1;
+    m->channels = m->model[0]->channels;
+    m->levels = m->model[0]->levels;
+    for (int i = 0; i < m->levels && !c->bad; i++) {
+        m->crossings[i] = txs_limited(c, 9, 0, TXS_MAX_CROSSINGS, m->crossings[i]);
+        if (c->bad) break;
+        if (c->reading)
+            m->crossing[i] = (txs_crossing *)txm_arena_zero(
+                &m->arena, (size_t)(m->crossings[i] ? m->crossings[i] : 1), sizeof(txs_crossing));
+        if (!m->crossing[i]) return 0;
+        for (int k = 0; k < m->crossings[i] && !c->bad; k++) txs_code_crossing(c, z, m, i, k);
+        if (!c->bad && !txs_crossings_fit(m, i)) c->bad = 1;
+    }
+    return 1;
+}
+
+/* ---- public: composites ---------------------------------------------------------------------- */
+
+/* A copy that the coder may write to; NULL without memory. */
+static texsyn_composite *txs_composite_copy(const texsyn_composite *from, txm_env *env) {
+    texsyn_composite *c = txs_composite_make(env, from->channels, from->labels);
+    if (!c) return NULL;
+    c->levels = from->levels;
+    c->layout = from->layout;
+    for (int i = 0; i < from->layout.levels; i++) {
+        txs_lay_level *l = &c->layout.level[i];
+        const size_t count = (size_t)l->type_count;
+        l->types = (txs_lay_type *)txm_arena_alloc(&c->arena, count, sizeof *l->types);
+        if (!l->types) {
+            texsyn_composite_free(c);
+            return NULL;
+        }
+        memcpy(l->types, from->layout.level[i].types, count * sizeof *l->types);
+    }
+    for (int k = 0; k < from->labels; k++) {
+        texsyn_model *m = c->model[k];
+        const texsyn_model *old = from->model[k];
+        for (int i = 0; i < TXS_MAX_LEVELS; i++) {
+            txs_type *types = m->level[i].types;
+            const size_t count = i < old->levels ? (size_t)old->level[i].type_count : 0;
+            if (count) memcpy(types, old->level[i].types, count * sizeof *types);
+            m->level[i] = old->level[i];
+            m->level[i].types = types;
+        }
+        m->channels = old->channels;
+        m->bands = old->bands;
+        m->levels = old->levels;
+        memcpy(m->mean, old->mean, sizeof m->mean);
+        memcpy(m->basis, old->basis, sizeof m->basis);
+        memcpy(m->dither, old->dither, sizeof m->dither);
+    }
+    for (int i = 0; i < from->levels; i++) {
+        c->crossings[i] = from->crossings[i];
+        memcpy(c->crossing[i], from->crossing[i], sizeof(txs_crossing) * (size_t)c->crossings[i]);
+    }
+    return c;
+}
+
+TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, txm_env *env,
+                                            void *buffer, size_t capacity, size_t *size) {
+    if (!composite || !size)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "save: composite or size is NULL");
+    txm_status status = TXM_OK;
+    txs_composite_codec *z = (txs_composite_codec *)txm_alloc(env, sizeof *z);
+    texsyn_composite *copy = z ? txs_composite_copy(composite, env) : NULL;
+    if (!copy) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to save the composite");
+    for (int writing = 0; writing < (buffer ? 2 : 1) && status == TXM_OK; writing++) {
+        uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
+        txs_coder c;
+        memset(&c, 0, sizeof c);
+        c.out = bytes;
+        c.size = capacity;
+        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'C'), txs_put(&c, '1');
+        txs_coder_start(&c);
+        txs_code_composite(&c, copy, z);
+        txs_coder_finish(&c);
+        *size = c.at + TXS_CRC_BYTES;
+        if (buffer && capacity < *size)
+            status = txm_fail(env, TXM_TOO_SMALL, "save: the buffer is smaller than *size says");
+        if (!writing || status != TXM_OK) continue;
+        const uint32_t crc = txs_crc(bytes, c.at);
+        for (int i = 0; i < TXS_CRC_BYTES; i++) bytes[c.at + (size_t)i] = (uint8_t)(crc >> 8 * i);
+    }
+    texsyn_composite_free(copy);
+    txm_free(env, z);
+    return status;
+}
+
+TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_env *env,
+                                            texsyn_composite **out) {
+    const uint8_t *bytes = (const uint8_t *)data;
+    if (out) *out = NULL;
+    if (!data || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "load: data or out is NULL");
+    if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || memcmp(bytes, "TXC1", TXS_MAGIC_BYTES) != 0)
+        return txm_fail(env, TXM_BAD_DATA, "not a texsyn composite");
+    size -= TXS_CRC_BYTES;
+    uint32_t crc = 0;
+    for (int i = 0; i < TXS_CRC_BYTES; i++) crc |= (uint32_t)bytes[size + (size_t)i] << 8 * i;
+    if (size > TXS_MAX_FILE || crc != txs_crc(bytes, size))
+        return txm_fail(env, TXM_BAD_DATA, "the composite is damaged or cut short");
+
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    texsyn_composite *m = (texsyn_composite *)txm_arena_zero(&arena, 1, sizeof *m);
+    txs_composite_codec *z = (txs_composite_codec *)txm_alloc(env, sizeof *z);
+    txs_coder c;
+    int enough = m && z;
+    if (m) m->arena = arena;
+    memset(&c, 0, sizeof c);
+    c.reading = 1;
+    c.in = bytes;
+    c.at = TXS_MAGIC_BYTES;
+    c.size = size;
+    if (enough) {
+        txs_coder_start(&c);
+        enough = txs_code_composite(&c, m, z);
+        c.bad |= c.at != c.size; /* the coder reads just what was written */
+    }
+    txm_free(env, z);
+    if (enough && !c.bad) {
+        *out = m;
+        return TXM_OK;
+    }
+    texsyn_composite_free(m);
+    return enough ? txm_fail(env, TXM_BAD_DATA, "the composite's contents contradict each other")
+                  : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to load the composite");
 }
 
 /* ---- pictures and masks ----------------------------------------------------------------- */

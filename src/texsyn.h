@@ -278,6 +278,81 @@ typedef struct texsyn_fill_desc {
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
 
+/* ---- composite textures ----------------------------------------------------------------- */
+
+/* A learned composite texture: a label map, itself a texture, and a texture for each label ([1],
+   section 4). It holds all it needs and never changes once it is made. */
+typedef struct texsyn_composite texsyn_composite;
+
+/* Does the layout have an order? Its labels may keep to their height (sky above ground), to their
+   place from left to right, or to none. */
+typedef enum texsyn_field {
+    TEXSYN_FIELD_AUTO = 0, /* found from the example */
+    TEXSYN_FIELD_NONE,
+    TEXSYN_FIELD_ROWS,
+    TEXSYN_FIELD_COLUMNS
+} texsyn_field;
+
+typedef struct texsyn_composite_learn_desc {
+    txm_image example;  /* 1, 3 or 4 channels, both sides at least 32 px; not modified            */
+    txm_image labels;   /* same size, 1 channel of 8 bits: 0..15, each on 256 pixels or more, and
+                           255 where nothing is to be learned; texsyn_segment finds them          */
+    texsyn_field field; /* of the layout                                                          */
+    int max_types;      /* clique types per label and level beyond the preselected, 1..64; 0 = 14 */
+    uint64_t seed;      /* for the random numbers; any value                                      */
+} texsyn_composite_learn_desc;
+
+/* Learn a composite.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives the composite, or NULL on any error; release it with texsyn_composite_free
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, labels that do not fit or are over
+          15, samples that are not finite; TXM_TOO_SMALL for an example under 32 x 32 or a label with
+          fewer than 256 pixels, which the message names; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(pixels) for the statistics, and about 3 s for 512 x 512 with three labels             */
+TEXSYN_API txm_status texsyn_composite_learn(const texsyn_composite_learn_desc *desc, txm_env *env,
+                                             texsyn_composite **out);
+
+/* Release a composite with the allocator it was made with; NULL is allowed. */
+TEXSYN_API void texsyn_composite_free(texsyn_composite *composite);
+
+TEXSYN_API int texsyn_composite_label_count(const texsyn_composite *composite); /* 1..16 */
+
+/* The texture of a label, to look into; NULL for a bad label. The composite owns it. */
+TEXSYN_API const texsyn_model *texsyn_composite_model(const texsyn_composite *composite, int label);
+
+/* Write the composite as bytes, read it back: as texsyn_save and texsyn_load. */
+TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, txm_env *env,
+                                            void *buffer, size_t capacity, size_t *size);
+TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_env *env,
+                                            texsyn_composite **out);
+
+typedef struct texsyn_composite_desc {
+    const texsyn_composite *composite;
+    int width, height; /* of the output in pixels, 1 or more each                                 */
+    txm_image layout;  /* width x height, 1 channel of 8 bits: a drawn label map, every value a
+                          label of the composite; pixels NULL = a map is synthesised              */
+    int quality;       /* -2 fast .. +2 best; 0 = default                                         */
+    uint64_t seed;     /* another seed, another picture                                           */
+} texsyn_composite_desc;
+
+/* Synthesise a composite: the label map if none is drawn, then all textures and what happens where
+   they meet in one run.
+
+   out    width x height, the channels of the example (or 3 where it has 1, or 4 = opaque), any sample
+          type; untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, a label that the composite does not
+          have, or a picture that does not fit; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(width * height): about 8 s for 1024 x 1024 on one core, 40 bytes per pixel            */
+TEXSYN_API txm_status texsyn_composite_synthesize(const texsyn_composite_desc *desc, txm_env *env,
+                                                  txm_image out);
+
+/* The label map alone, as texsyn_composite_synthesize with the same description makes it.
+   out    width x height, 1 channel of 8 bits */
+TEXSYN_API txm_status texsyn_composite_layout(const texsyn_composite_desc *desc, txm_env *env,
+                                              txm_image out);
+
 /* ---- light ------------------------------------------------------------------------------ */
 
 typedef struct texsyn_relight_desc {
@@ -411,6 +486,11 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/mosaic_learner.h"
 #include "texsyn/tone.h"
 #include "texsyn/fill.h"
+#include "texsyn/layout.h"
+#include "texsyn/layout_sampler.h"
+#include "texsyn/layout_learn.h"
+#include "texsyn/composite.h"
+#include "texsyn/composite_file.h"
 #include "texsyn/mask.h"
 #include "texsyn/light.h"
 #include "texsyn/relight.h"
