@@ -56,9 +56,10 @@
      added, and so on [1]. Synthesis is Gibbs sampling [4] in which the potentials of the clique
      types are controlled so that the histograms of the canvas follow those of the example.
      In addition to the pairs of [1] there is a coarse joint histogram of two neighbouring values,
-     which distinguishes rare values from frequent ones; and there are cliques of three and four
-     pixels (corners, parallel differences, differences together with those of the coarser level),
-     for what pairs cannot express.
+     which distinguishes rare values from frequent ones; there are cliques of three and four pixels
+     (corners, parallel differences, differences together with those of the coarser level), for what
+     pairs cannot express; and for contours there are filters of 12 to 18 pixels and differences
+     beside a label of the coarser level, which says how that changes and curves.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
@@ -71,8 +72,9 @@
    MEMORY
      A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
      sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
-     takes 2 bytes per band and pixel for the current level and the next coarser one, without
-     margins: 8 to 9 bytes per RGB pixel in all, and 1 MB; a picture that does not tile is cut
+     takes 2 bytes per band and pixel for the current level and the next coarser one, 1 more for
+     labels and half a byte for each filter, without margins: 9 to 14 bytes per RGB pixel in all,
+     and 1 MB; a picture that does not tile is cut
      from a canvas of at least 64 x 64. After an error nothing stays allocated and *out is NULL.
 
    TIME   (one core of 2023; make bench measures yours)
@@ -174,7 +176,10 @@ typedef enum texsyn_kind {
     TEXSYN_VALUES,     /* two pixels, coarsely: class of I_b(p), class of I_c(p + d)             */
     TEXSYN_CORNER,     /* three: classes of I_b(p + d) - I_b(p) and I_b(p + e) - I_b(p)          */
     TEXSYN_SCALE,      /* classes of I_b(p + d) - I_b(p) and J_b(p + e) - J_b(p + d - e)         */
-    TEXSYN_PARALLEL    /* classes of I_b(p + d) - I_b(p) and I_c(p + e + d) - I_c(p + e)         */
+    TEXSYN_PARALLEL,   /* classes of I_b(p + d) - I_b(p) and I_c(p + e + d) - I_c(p + e)         */
+    TEXSYN_FILTER,     /* class of the response of a filter of 12 to 18 pixels, weights 1 and -1 */
+    TEXSYN_CONTEXT     /* label of J(p + e), class of I_b(p + d) - I_b(p), of J_b(p) - I_b(p) for
+                          d = 0; the label says how J changes and curves there                   */
 } texsyn_kind;
 
 /* One clique type of a model's neighbourhood system. */
@@ -478,6 +483,9 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #if defined(__GNUC__)
 #include <immintrin.h>
 #define TXS_AVX2 1 /* compiled for AVX2 function by function, chosen when running */
+#ifdef __x86_64__
+#define TXS_LANES 1 /* an address is as long as a lane */
+#endif
 #endif
 #endif
 
@@ -498,11 +506,22 @@ enum {
     TXS_BINS = TXS_CLASSES * TXS_CLASSES, /* of the largest histogram                         */
     TXS_ONE = 65536,    /* sum of a normalised histogram                                    */
     TXS_MAX_TYPES = 96, /* clique types of one level                                        */
-    TXS_MAX_ENDS = 112, /* ends of cliques at one pixel of one band: keeps energies 16 bit  */
+    TXS_MAX_ENDS = 160, /* ends of cliques at one pixel of one band                         */
+    TXS_MAX_MEMBERS = 18, /* pixels of a clique                                             */
+    TXS_LABELS = 9,     /* of a pixel by what its surroundings look like on the level above */
+    TXS_LABEL_REACH = 2,   /* pixels: of what a label looks at                              */
+    TXS_MAX_GRADIENT = 30752, /* the largest squared gradient: 2 (4 times 31)^2             */
+    TXS_RESPONSES = 27, /* classes of a filter's response                                   */
+    TXS_MAX_RESPONSE = 279, /* 9 pixels against 9                                           */
+    TXS_MAX_FILTERS = 12, /* clique types that are filters, of one level                    */
     TXS_MAX_REACH = 60, /* pixels                                                           */
     TXS_NEAR = 10,      /* pixels: reach of all levels but the coarsest                     */
-    TXS_ROW = 64,       /* bytes of a table row for a difference                            */
+    TXS_ROW_BITS = 6,   /* their binary logarithm                                           */
+    TXS_ROW = 1 << TXS_ROW_BITS, /* bytes of a table row for a difference                   */
+    TXS_VALUE_BITS = 5, /* the logarithm of TXS_VALUES                                      */
     TXS_TABLE = (2 * TXS_CLASSES + TXS_DIFFERENCES) * TXS_ROW, /* bytes of one type's tables  */
+    TXS_RESPONSE_ROW = 2 * (TXS_MAX_RESPONSE + TXS_VALUES) - 1, /* bytes of a filter's table,
+                            of which there is one for each weight                           */
     TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
     TXS_NAT = 16,        /* steps of a row's byte per nat of energy                          */
     TXS_FINE = 4,        /* steps of the summed energy per step of a byte                    */
@@ -532,6 +551,7 @@ enum {
 #define TXS_NOISE_SHARE 0.75f  /* the same in units of the expected sampling noise               */
 #define TXS_CORNER_WEIGHT 2.0f /* of distances, pairs having 1                                   */
 #define TXS_EDGE_WEIGHT 2.5f
+#define TXS_CONTOUR_WEIGHT 2.5f /* filters and labels */
 
 /* classes of a difference -31..31: fine where differences are frequent */
 static const uint8_t txs_difference_class[TXS_DIFFERENCES + 1] = {
@@ -545,6 +565,7 @@ typedef struct txs_type {
     int kind, band, other;
     int dx, dy, ex, ey;
     int phase; /* tails counted: 0 all, 1 at even, 2 at odd coordinates; see txs_is_tail */
+    int shape, scale; /* of a filter: index in txs_shapes, response with the last class */
     int32_t share[TXS_BINS];     /* the example's histogram, sum about TXS_ONE                  */
     int16_t potential[TXS_BINS]; /* where the synthesis starts, 1/TXS_NAT nat                   */
     int16_t root[TXS_BINS];      /* the two as a model file keeps them: square roots of the     */
@@ -556,6 +577,7 @@ typedef struct txs_level {
     int values[TXS_MAX_BANDS];
     float low[TXS_MAX_BANDS], step[TXS_MAX_BANDS];
     uint8_t classes[TXS_MAX_BANDS][TXS_VALUES]; /* of values, by quantiles of the single pixels */
+    int gradient_cut[2], curve_cut[2];          /* between the labels, see txs_fill_labels      */
     txs_type *types;                            /* the first ones are the singles of each band  */
     int type_count;
 } txs_level;
@@ -569,9 +591,12 @@ static float txs_short_float(float x) {
     return x;
 }
 
+enum { TXS_VERSION = 2, TXS_KINDS = TEXSYN_CONTEXT + 1 };
+
 struct texsyn_model {
     txm_arena arena; /* holds the model itself and its types                                  */
     int channels, bands, levels;
+    int version; /* of its file                                                               */
     float mean[TXS_MAX_BANDS];                 /* of the channels, 0..255                       */
     float basis[TXS_MAX_BANDS][TXS_MAX_BANDS]; /* band b = sum_c basis[b][c] (x[c] - mean[c])   */
     float dither[TXS_MAX_BANDS];               /* share of a step that the example's values fill */
@@ -579,7 +604,8 @@ struct texsyn_model {
 };
 
 /* Quantised planes with a margin that repeats the opposite border: first the bands, then the
-   bands of the coarser level at this resolution ("parent"), which do not change. */
+   bands of the coarser level at this resolution ("parent"), which do not change, then the labels,
+   which do not either. */
 typedef struct txs_canvas {
     int width, height, margin;
     int slip_x, slip_y;      /* from here on odd and even swap, see txs_place; or the size */
@@ -612,6 +638,7 @@ static int txs_canvas_make(txs_canvas *c, const txm_env *env, int width, int hei
         return 0;
     c->stride = (ptrdiff_t)stride;
     c->plane = (ptrdiff_t)plane;
+    bytes += TXS_GRID; /* lanes reach so far beyond the last pixel */
     c->pixels = (uint8_t *)txm_alloc(env, bytes);
     if (c->pixels) memset(c->pixels, 0, bytes);
     return c->pixels != NULL;
@@ -650,7 +677,50 @@ static void txs_set(const txs_canvas *c, int plane, int x, int y, uint8_t value)
 
 /* ---- clique types ----------------------------------------------------------------------- */
 
-/* Where the members of a clique lie, seen from its tail; returns how many. */
+/* Filters: the pixels p + i e + j d, i < length, weighed by the profile's j-th entry. */
+typedef struct txs_shape {
+    int dx, dy, ex, ey, length, profile;
+} txs_shape;
+
+static const struct {
+    int width, weight[6];
+} txs_profiles[] = {{2, {-1, 1}}, {4, {-1, 1, 1, -1}}, {6, {-1, -1, -1, 1, 1, 1}}};
+
+enum { TXS_SHAPES = 8 };
+
+/* seven pixels against their parallels, bars, squares against their neighbours */
+static const txs_shape txs_shapes[TXS_SHAPES] = {
+    {0, 1, 1, 0, 7, 0}, {1, 0, 0, 1, 7, 0}, {1, -1, 1, 1, 7, 0}, {1, 1, -1, 1, 7, 0},
+    {0, 1, 1, 0, 3, 1}, {1, 0, 0, 1, 3, 1}, {0, 1, 1, 0, 3, 2},  {1, 0, 0, 1, 3, 2}};
+
+/* Where the pixels of a shape lie, and their weights, 1 or -1; returns how many. */
+static int txs_shape_pixels(int shape, int at[TXS_MAX_MEMBERS][2], int weight[TXS_MAX_MEMBERS]) {
+    const txs_shape *s = &txs_shapes[shape];
+    int n = 0;
+    for (int i = 0; i < s->length; i++) {
+        for (int j = 0; j < txs_profiles[s->profile].width; j++, n++) {
+            at[n][0] = i * s->ex + j * s->dx;
+            at[n][1] = i * s->ey + j * s->dy;
+            weight[n] = txs_profiles[s->profile].weight[j];
+        }
+    }
+    return n;
+}
+
+/* Classes of all responses -TXS_MAX_RESPONSE..: 13 + sign(r) floor(13 (|r| / scale)^0.7 + 1/2), 0
+   and 26 beyond the scale. The limits are |r| / scale in 1/4096. */
+static void txs_response_classes(int scale, uint8_t class_of[2 * TXS_MAX_RESPONSE + 1]) {
+    static const int limit[TXS_RESPONSES / 2] = {39,   187,  389,  628,  900,  1199, 1522,
+                                                 1867, 2232, 2617, 3019, 3438, 3873};
+    for (int r = 0, k = 0; r <= TXS_MAX_RESPONSE; r++) {
+        while (k < TXS_RESPONSES / 2 && r * 4096 >= limit[k] * scale) k++;
+        class_of[TXS_MAX_RESPONSE + r] = (uint8_t)(TXS_RESPONSES / 2 + k);
+        class_of[TXS_MAX_RESPONSE - r] = (uint8_t)(TXS_RESPONSES / 2 - k);
+    }
+}
+
+/* Where the members of a clique of the kinds up to TEXSYN_PARALLEL lie, seen from its tail; returns
+   how many. */
 static int txs_members(const txs_type *t, int at[4][2]) {
     const int s = t->kind == TEXSYN_PARALLEL ? 1 : -1;
     const int x[4] = {0, t->dx, t->ex, t->dx + s * t->ex};
@@ -663,6 +733,23 @@ static int txs_members(const txs_type *t, int at[4][2]) {
     return counts[t->kind];
 }
 
+/* The same of all kinds. A label is known where all pixels are that it looks at. */
+static int txs_footprint(const txs_type *t, int at[TXS_MAX_MEMBERS][2]) {
+    int weight[TXS_MAX_MEMBERS], n = 2;
+    if (t->kind == TEXSYN_FILTER) return txs_shape_pixels(t->shape, at, weight);
+    if (t->kind != TEXSYN_CONTEXT) return txs_members(t, at);
+    at[0][0] = at[0][1] = 0;
+    at[1][0] = t->dx;
+    at[1][1] = t->dy;
+    for (int y = -TXS_LABEL_REACH; y <= TXS_LABEL_REACH; y += TXS_LABEL_REACH) {
+        for (int x = -TXS_LABEL_REACH; x <= TXS_LABEL_REACH; x += TXS_LABEL_REACH, n++) {
+            at[n][0] = t->ex + x;
+            at[n][1] = t->ey + y;
+        }
+    }
+    return n;
+}
+
 /* May a pixel with these parities (x & 1, y & 1) be the tail? The neighbours (1, 0) and (0, 1) are
    two clique types each below the coarsest level: within a pixel of the coarser level, and across
    its border. In a photograph they have the same histogram; were they one type, a synthesised
@@ -673,7 +760,7 @@ static int txs_is_tail(const txs_type *t, int px, int py) {
 
 /* the largest distance along an axis between two members */
 static int txs_reach(const txs_type *t) {
-    int at[4][2], n = txs_members(t, at), reach = 0;
+    int at[TXS_MAX_MEMBERS][2], n = txs_footprint(t, at), reach = 0;
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < i; j++) {
             for (int k = 0; k < 2; k++) {
@@ -688,6 +775,7 @@ static int txs_reach(const txs_type *t) {
 static int txs_bin_count(int kind) {
     return kind == TEXSYN_SINGLE                          ? TXS_VALUES
            : kind == TEXSYN_PAIR || kind == TEXSYN_PARENT ? TXS_DIFFERENCES
+           : kind == TEXSYN_FILTER                        ? TXS_RESPONSES
                                                           : TXS_BINS;
 }
 
@@ -695,9 +783,11 @@ static int txs_bin_count(int kind) {
      value       p[a]
      difference  p[a] - p[b] + 31
      values      ca[p[a]] * 9 + cb[p[b]]
-     two         class(p[a] - p[b]) * 9 + class(p[c] - p[d])                                */
+     two         class(p[a] - p[b]) * 9 + class(p[c] - p[d])
+     labelled    p[c] * 9 + class(p[a] - p[b])
+   Filters are counted otherwise.                                                           */
 typedef struct txs_tally {
-    int form; /* 0 value, 1 difference, 2 values, 3 two */
+    int form; /* 0 value, 1 difference, 2 values, 3 two, 4 labelled; -1 none */
     int type; /* index in the level */
     ptrdiff_t a, b, c, d;
     const uint8_t *ca, *cb;
@@ -737,6 +827,12 @@ static txs_tally txs_tally_make(const txs_type *t, const txs_level *level, const
         y.c = parent + e;
         y.d = parent + d - e;
         break;
+    case TEXSYN_CONTEXT:
+        y.form = 4;
+        if (t->dx == 0 && t->dy == 0) y.a = parent;
+        y.c = 2 * bands * c->plane + e;
+        break;
+    case TEXSYN_FILTER: y.form = -1; break;
     default: /* TEXSYN_PARALLEL */ y.c = head + d + e; y.d = head + e;
     }
     return y;
@@ -751,6 +847,7 @@ static int txs_bin(const txs_tally *y, const uint8_t *p) {
     case 0: return p[y->a];
     case 1: return p[y->a] - p[y->b] + 31;
     case 2: return y->ca[p[y->a]] * TXS_CLASSES + y->cb[p[y->b]];
+    case 4: return p[y->c] * TXS_CLASSES + txs_class(p[y->a] - p[y->b]);
     default: return txs_class(p[y->a] - p[y->b]) * TXS_CLASSES + txs_class(p[y->c] - p[y->d]);
     }
 }
@@ -778,13 +875,17 @@ static void txs_make_classes(txs_level *level, int band) {
      form 0   row = table - p[o1]                                     one difference
      form 1   row = table + class(p[o2] - p[o3]) * 64 - p[o1]         two, the other one known
      form 2   row = table + (p[o2] - p[o1]) * 64 - p[o1]              two, v in both
-     form 3   row = table + classes[p[o1]] * 32                       a value beside a known one */
+     form 3   row = table + classes[p[o1]] * 32                       a value beside a known one
+     form 4   row = table + p[o2] * 64 - p[o1]                        one difference, at a label
+
+   For a filter with the response r, a pixel of weight w and value p has the row
+   table + w r - p.                                                                         */
 typedef struct txs_end {
     ptrdiff_t o1, o2, o3;
     const uint8_t *table, *classes;
 } txs_end;
 
-enum { TXS_FORMS = 4 };
+enum { TXS_FORMS = 5 };
 
 static const uint8_t txs_no_energy[TXS_VALUES] = {
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO,
@@ -792,29 +893,53 @@ static const uint8_t txs_no_energy[TXS_VALUES] = {
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO,
     TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO, TXS_ZERO};
 
+/* Write the rows of count ends of one form, for TXS_TOGETHER pixels p, p + TXS_GRID, ...: that of
+   end k for pixel i goes to rows[k * TXS_TOGETHER + i]. Only the first `pixels` are wanted. */
+typedef void txs_aim(const txs_end *ends, int count, int form, const uint8_t *p, int pixels,
+                       const uint8_t **rows);
+
 /* The value with the lowest energy
 
        e(v) = TXS_FINE * (sum of rows at v - TXS_ZERO count) + single(v) + noise
 
    With noise of Gumbel's distribution that is a draw from exp(-e) / sum exp(-e), the Gibbs
    sampler's step [4]. Values are kept even ones first, single[] and noise[] in that order, since
-   adding bytes as the halves of 16-bit words yields them so. count is even, rows hold 1..127. */
-typedef int txs_pick(const uint8_t *const *rows, int count, const int16_t *single,
+   adding bytes as the halves of 16-bit words yields them so. The rows are those at rows[0],
+   rows[apart], ...; their count is even, they hold 1..127. Energies saturate at 16 bits. */
+typedef int txs_pick(const uint8_t *const *rows, int apart, int count, const int16_t *single,
                      const int16_t *noise);
 
 static int txs_slot_value(int slot) {
     return (slot & 15) * 2 + (slot >> 4);
 }
 
+static void txs_aim_plain(const txs_end *ends, int count, int form, const uint8_t *p, int pixels,
+                            const uint8_t **rows) {
+    for (int k = 0; k < count; k++, rows += TXS_TOGETHER) {
+        const txs_end *e = &ends[k];
+        const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *p3 = p + e->o3, *table = e->table;
+        for (int i = 0, x = 0; i < pixels; i++, x += TXS_GRID) {
+            switch (form) {
+            case 0: rows[i] = table - p1[x]; break;
+            case 1: rows[i] = table + txs_class(p2[x] - p3[x]) * TXS_ROW - p1[x]; break;
+            case 2: rows[i] = table + (p2[x] - p1[x]) * TXS_ROW - p1[x]; break;
+            case 3: rows[i] = table + e->classes[p1[x]] * TXS_VALUES; break;
+            default: rows[i] = table + p2[x] * TXS_ROW - p1[x];
+            }
+        }
+    }
+}
+
 #ifndef TXS_SSE2
-static int txs_pick_plain(const uint8_t *const *rows, int count, const int16_t *single,
+static int txs_pick_plain(const uint8_t *const *rows, int apart, int count, const int16_t *single,
                           const int16_t *noise) {
     int sum[TXS_VALUES] = {0}, best = 0;
     for (int i = 0; i < count; i++)
-        for (int v = 0; v < TXS_VALUES; v++) sum[v] += rows[i][v];
+        for (int v = 0; v < TXS_VALUES; v++) sum[v] += rows[i * apart][v];
     for (int slot = 0, least = INT_MAX; slot < TXS_VALUES; slot++) {
-        int e =
-            TXS_FINE * (sum[txs_slot_value(slot)] - TXS_ZERO * count) + single[slot] + noise[slot];
+        int e = TXS_FINE * (sum[txs_slot_value(slot)] - TXS_ZERO * count);
+        e = txm_clampi(e, INT16_MIN, INT16_MAX) + single[slot] + noise[slot];
+        e = txm_clampi(e, INT16_MIN, INT16_MAX);
         if (e < least) {
             least = e;
             best = slot;
@@ -835,25 +960,34 @@ static __m128i txs_least(__m128i m) {
     return _mm_min_epi16(m, _mm_shufflehi_epi16(_mm_shufflelo_epi16(m, 0xb1), 0xb1));
 }
 
-static int txs_pick_sse2(const uint8_t *const *rows, int count, const int16_t *single,
+/* TXS_FINE times the summed rows, and the rest */
+static __m128i txs_finish(__m128i e, const int16_t *single, const int16_t *noise) {
+    e = _mm_adds_epi16(e, e);
+    return _mm_adds_epi16(_mm_adds_epi16(e, e), _mm_add_epi16(txs_load(single), txs_load(noise)));
+}
+
+/* Sums of words: `all` of the words that two bytes make, `high` of their upper bytes; the sum of the
+   lower ones follows. */
+static int txs_pick_sse2(const uint8_t *const *rows, int apart, int count, const int16_t *single,
                          const int16_t *noise) {
-    const __m128i low = _mm_set1_epi16(255);
-    __m128i e0 = _mm_set1_epi16((short)(-TXS_ZERO * count)), e1 = e0, e2 = e0, e3 = e0;
-    for (int i = 0; i < count; i += 2) {
-        __m128i a = _mm_add_epi8(txs_load(rows[i]), txs_load(rows[i + 1]));
-        __m128i b = _mm_add_epi8(txs_load(rows[i] + 16), txs_load(rows[i + 1] + 16));
-        e0 = _mm_add_epi16(e0, _mm_and_si128(a, low));
-        e1 = _mm_add_epi16(e1, _mm_and_si128(b, low));
-        e2 = _mm_add_epi16(e2, _mm_srli_epi16(a, 8));
-        e3 = _mm_add_epi16(e3, _mm_srli_epi16(b, 8));
+    __m128i all0 = _mm_setzero_si128(), all1 = all0, high0 = all0, high1 = all0;
+    for (int i = 0; i < count; i += 2, rows += 2 * apart) {
+        const uint8_t *r = rows[0], *q = rows[apart];
+        __m128i a = _mm_add_epi8(txs_load(r), txs_load(q));
+        __m128i b = _mm_add_epi8(txs_load(r + 16), txs_load(q + 16));
+        all0 = _mm_add_epi16(all0, a);
+        all1 = _mm_add_epi16(all1, b);
+        high0 = _mm_add_epi16(high0, _mm_srli_epi16(a, 8));
+        high1 = _mm_add_epi16(high1, _mm_srli_epi16(b, 8));
     }
-#define TXS_FINISH(e, k) \
-    _mm_add_epi16(_mm_slli_epi16(e, 2), _mm_add_epi16(txs_load(single + (k)), txs_load(noise + (k))))
-    e0 = TXS_FINISH(e0, 0);
-    e1 = TXS_FINISH(e1, 8);
-    e2 = TXS_FINISH(e2, 16);
-    e3 = TXS_FINISH(e3, 24);
-#undef TXS_FINISH
+    const __m128i zero = _mm_set1_epi16((short)(TXS_ZERO * count));
+    __m128i e0 = _mm_sub_epi16(_mm_sub_epi16(all0, _mm_slli_epi16(high0, 8)), zero);
+    __m128i e1 = _mm_sub_epi16(_mm_sub_epi16(all1, _mm_slli_epi16(high1, 8)), zero);
+    __m128i e2 = _mm_sub_epi16(high0, zero), e3 = _mm_sub_epi16(high1, zero);
+    e0 = txs_finish(e0, single, noise);
+    e1 = txs_finish(e1, single + 8, noise + 8);
+    e2 = txs_finish(e2, single + 16, noise + 16);
+    e3 = txs_finish(e3, single + 24, noise + 24);
     __m128i m = txs_least(_mm_min_epi16(_mm_min_epi16(e0, e1), _mm_min_epi16(e2, e3)));
     int first = _mm_movemask_epi8(_mm_packs_epi16(_mm_cmpeq_epi16(e0, m), _mm_cmpeq_epi16(e1, m)));
     int last = _mm_movemask_epi8(_mm_packs_epi16(_mm_cmpeq_epi16(e2, m), _mm_cmpeq_epi16(e3, m)));
@@ -862,22 +996,28 @@ static int txs_pick_sse2(const uint8_t *const *rows, int count, const int16_t *s
 #endif
 
 #ifdef TXS_AVX2
-__attribute__((target("avx2"))) static int
-txs_pick_avx2(const uint8_t *const *rows, int count, const int16_t *single, const int16_t *noise) {
-    const __m256i low = _mm256_set1_epi16(255);
-    __m256i e0 = _mm256_set1_epi16((short)(-TXS_ZERO * count)), e1 = e0;
-    for (int i = 0; i < count; i += 2) {
-        __m256i a = _mm256_add_epi8(_mm256_loadu_si256((const __m256i *)(const void *)rows[i]),
-                                    _mm256_loadu_si256((const __m256i *)(const void *)rows[i + 1]));
-        e0 = _mm256_add_epi16(e0, _mm256_and_si256(a, low));
-        e1 = _mm256_add_epi16(e1, _mm256_srli_epi16(a, 8));
+#define TXS_FOR_AVX2 __attribute__((target("avx2"))) static
+
+TXS_FOR_AVX2 int txs_pick_avx2(const uint8_t *const *rows, int apart, int count,
+                               const int16_t *single, const int16_t *noise) {
+    __m256i all = _mm256_setzero_si256(), high = all;
+    for (int i = 0; i < count; i += 2, rows += 2 * apart) {
+        __m256i a = _mm256_add_epi8(_mm256_loadu_si256((const __m256i *)(const void *)rows[0]),
+                                    _mm256_loadu_si256((const __m256i *)(const void *)rows[apart]));
+        all = _mm256_add_epi16(all, a);
+        high = _mm256_add_epi16(high, _mm256_srli_epi16(a, 8));
     }
+    const __m256i zero = _mm256_set1_epi16((short)(TXS_ZERO * count));
     const __m256i *s = (const __m256i *)(const void *)single,
                   *n = (const __m256i *)(const void *)noise;
-    e0 = _mm256_add_epi16(_mm256_slli_epi16(e0, 2),
-                          _mm256_add_epi16(_mm256_loadu_si256(s), _mm256_loadu_si256(n)));
-    e1 = _mm256_add_epi16(_mm256_slli_epi16(e1, 2),
-                          _mm256_add_epi16(_mm256_loadu_si256(s + 1), _mm256_loadu_si256(n + 1)));
+    __m256i e0 = _mm256_sub_epi16(_mm256_sub_epi16(all, _mm256_slli_epi16(high, 8)), zero);
+    __m256i e1 = _mm256_sub_epi16(high, zero);
+    e0 = _mm256_adds_epi16(e0, e0); /* times TXS_FINE */
+    e1 = _mm256_adds_epi16(e1, e1);
+    e0 = _mm256_adds_epi16(_mm256_adds_epi16(e0, e0),
+                           _mm256_add_epi16(_mm256_loadu_si256(s), _mm256_loadu_si256(n)));
+    e1 = _mm256_adds_epi16(_mm256_adds_epi16(e1, e1),
+                           _mm256_add_epi16(_mm256_loadu_si256(s + 1), _mm256_loadu_si256(n + 1)));
     __m256i w = _mm256_min_epi16(e0, e1);
     __m128i m = _mm_min_epi16(_mm256_castsi256_si128(w), _mm256_extracti128_si256(w, 1));
     m = _mm_min_epi16(m, _mm_shuffle_epi32(m, 0x4e));
@@ -889,6 +1029,67 @@ txs_pick_avx2(const uint8_t *const *rows, int count, const int16_t *single, cons
     return txs_slot_value(__builtin_ctz((unsigned)_mm256_movemask_epi8(w)));
 }
 #endif
+
+#ifdef TXS_LANES
+/* TXS_GRID pixels are as many bytes as a 64-bit lane has, so that a lane's lowest byte is the pixel
+   of its row, and four rows' addresses are computed at once. */
+#define TXS_LOAD4(p) _mm256_loadu_si256((const __m256i *)(const void *)(p))
+
+TXS_FOR_AVX2 void txs_aim_avx2(const txs_end *ends, int count, int form, const uint8_t *p,
+                                 int pixels, const uint8_t **rows) {
+    const __m256i low = _mm256_set1_epi64x(255);
+    /* classes 4 to 8 of differences 0 to 15 without the 4 */
+    const __m256i class_of =
+        _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4));
+    const __m256i most = _mm256_set1_epi8(15), middle = _mm256_set1_epi8(TXS_CLASSES / 2);
+    if (pixels < TXS_TOGETHER) { /* the others may lie beyond the canvas */
+        txs_aim_plain(ends, count, form, p, pixels, rows);
+        return;
+    }
+    for (int k = 0; k < count; k++, ends++) {
+        const __m256i table = _mm256_set1_epi64x((long long)(intptr_t)ends->table);
+        for (int half = 0; half < 2; half++, rows += TXS_TOGETHER / 2) {
+            const uint8_t *q = p + half * (TXS_TOGETHER / 2 * TXS_GRID);
+            const __m256i p1 = _mm256_and_si256(TXS_LOAD4(q + ends->o1), low);
+            __m256i row = _mm256_sub_epi64(table, p1);
+            if (form == 1) {
+                const __m256i d = _mm256_sub_epi8(TXS_LOAD4(q + ends->o2), TXS_LOAD4(q + ends->o3));
+                __m256i known =
+                    _mm256_shuffle_epi8(class_of, _mm256_min_epu8(_mm256_abs_epi8(d), most));
+                known = _mm256_add_epi8(_mm256_sign_epi8(known, d), middle);
+                known = _mm256_and_si256(known, low);
+                row = _mm256_add_epi64(row, _mm256_slli_epi64(known, TXS_ROW_BITS));
+            } else if (form == 2) {
+                const __m256i p2 = _mm256_and_si256(TXS_LOAD4(q + ends->o2), low);
+                row = _mm256_add_epi64(row,
+                                       _mm256_slli_epi64(_mm256_sub_epi64(p2, p1), TXS_ROW_BITS));
+            } else if (form == 3) {
+                const __m256i *c = (const __m256i *)(const void *)ends->classes;
+                const __m256i both = _mm256_loadu_si256(c);
+                const __m256i first = _mm256_permute2x128_si256(both, both, 0x00);
+                const __m256i last = _mm256_permute2x128_si256(both, both, 0x11);
+                /* an index with its highest bit set gives 0 */
+                const __m256i class_ = _mm256_or_si256(
+                    _mm256_shuffle_epi8(first, _mm256_add_epi8(p1, _mm256_set1_epi64x(0x70))),
+                    _mm256_shuffle_epi8(last, _mm256_sub_epi8(p1, _mm256_set1_epi64x(16))));
+                row = _mm256_add_epi64(
+                    table, _mm256_slli_epi64(_mm256_and_si256(class_, low), TXS_VALUE_BITS));
+            } else if (form == 4) {
+                const __m256i label = _mm256_and_si256(TXS_LOAD4(q + ends->o2), low);
+                row = _mm256_add_epi64(row, _mm256_slli_epi64(label, TXS_ROW_BITS));
+            }
+            _mm256_storeu_si256((__m256i *)(void *)rows, row);
+        }
+    }
+}
+#endif
+
+static txs_aim *txs_best_aim(void) {
+#ifdef TXS_LANES
+    if (__builtin_cpu_supports("avx2")) return txs_aim_avx2;
+#endif
+    return txs_aim_plain;
+}
 
 static txs_pick *txs_best_pick(void) {
 #ifdef TXS_AVX2
@@ -931,6 +1132,7 @@ static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_
     const ptrdiff_t tail = t->band * c->plane, head = t->other * c->plane;
     const ptrdiff_t parent = (bands + t->other) * c->plane;
     const ptrdiff_t d = t->dy * c->stride + t->dx, e = t->ey * c->stride + t->ex;
+    const ptrdiff_t label = 2 * bands * c->plane + e;
     const uint8_t *table = tables + 31;
     const ptrdiff_t block = TXS_CLASSES * TXS_ROW;
     for (int i = 0; i < 4; i++) {
@@ -981,6 +1183,18 @@ static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_
         ends[1].o2 = parent + e;
         ends[1].o3 = parent + d - e;
         return 2;
+    case TEXSYN_FILTER: return 0;
+    case TEXSYN_CONTEXT: /* the head, the tail; or the tail below its parent */
+        form[0] = form[1] = 4;
+        ends[0].o1 = parent;
+        ends[0].o2 = label;
+        ends[0].table = table + block;
+        if (t->dx == 0 && t->dy == 0) return 1;
+        ends[0].o1 = tail + d;
+        ends[1].o1 = tail - d;
+        ends[1].o2 = label - d;
+        ends[1].table = table;
+        return 2;
     default: /* TEXSYN_PARALLEL: head and tail of the one difference, of the other */
         ends[0].o1 = tail - d;
         ends[0].o2 = head + e;
@@ -999,13 +1213,24 @@ static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_
     }
 }
 
+/* Ends of a filter at one pixel, at most, if its tails have one parity. */
+static int txs_shape_ends(int shape) {
+    int at[TXS_MAX_MEMBERS][2], weight[TXS_MAX_MEMBERS], count[4] = {0}, most = 0;
+    const int n = txs_shape_pixels(shape, at, weight);
+    for (int i = 0; i < n; i++) {
+        const int parity = (at[i][0] & 1) + 2 * (at[i][1] & 1);
+        if (++count[parity] > most) most = count[parity];
+    }
+    return most;
+}
+
 /* Ends that a level's types put into one band, at most; a model must stay within TXS_MAX_ENDS. */
 static int txs_most_ends(const txs_level *level, int bands) {
     int count[TXS_MAX_BANDS] = {0}, most = 0;
     for (int k = 0; k < level->type_count; k++) {
         const txs_type *t = &level->types[k];
-        static const int tail[] = {0, 1, 1, 1, 3, 2, 2}, head[] = {0, 1, 0, 1, 0, 0, 2};
-        count[t->band] += tail[t->kind];
+        static const int tail[] = {0, 1, 1, 1, 3, 2, 2, 0, 2}, head[] = {0, 1, 0, 1, 0, 0, 2, 0, 0};
+        count[t->band] += t->kind == TEXSYN_FILTER ? txs_shape_ends(t->shape) : tail[t->kind];
         count[t->other] += head[t->kind];
     }
     for (int b = 0; b < bands; b++)
@@ -1048,6 +1273,24 @@ static void txs_expand(const txs_level *level, const txs_type *t, const uint8_t 
                 row[i] = v[class_of[62 - i] * N + class_of[txm_clampi(62 - i + delta, 0, 62)]];
         }
         break;
+    case TEXSYN_CONTEXT:
+        for (int q = 0; q < TXS_LABELS; q++) {
+            for (int i = 0; i < TXS_DIFFERENCES; i++) {
+                table[q * ROW + i] = v[q * N + class_of[i]];
+                table[BLOCK + q * ROW + i] = v[q * N + class_of[62 - i]];
+            }
+        }
+        break;
+    case TEXSYN_FILTER: {
+        uint8_t classes[2 * TXS_MAX_RESPONSE + 1];
+        txs_response_classes(t->scale, classes);
+        for (int i = 0; i < TXS_RESPONSE_ROW; i++) {
+            const int r = txm_clampi(i - (TXS_VALUES - 1), 0, 2 * TXS_MAX_RESPONSE);
+            table[i] = v[classes[r]];
+            table[TXS_RESPONSE_ROW + i] = v[classes[2 * TXS_MAX_RESPONSE - r]];
+        }
+        break;
+    }
     default: /* TEXSYN_SCALE and, with the ends of the other difference, TEXSYN_PARALLEL */
         for (int q = 0; q < N; q++) {
             for (int i = 0; i < TXS_DIFFERENCES; i++) {
@@ -1100,6 +1343,304 @@ static void txs_publish(const txs_level *level, const txs_type *t, const int32_t
     if (t->kind != TEXSYN_SINGLE) txs_expand(level, t, row, table);
 }
 
+/* ---- filters ------------------------------------------------------------------------------
+
+   A filter's response at its tail is a sum over many pixels, so it is kept. A pixel that changes
+   changes the responses at the tails of all filters that contain it.
+
+   Neighbouring tails say nearly the same, so at a time only those of one parity (x & 1, y & 1) are
+   considered, a quarter of all, and another quarter in the next sweep. Their responses form a plane
+   of words with half the canvas's rows and columns, so TXS_GRID pixels are 64 bits there as well.
+
+   The canvas's margin has responses too. Parities go on counting there, so on a torus of odd size a
+   pixel and its copies have different tails, and all are kept up to date.                   */
+
+typedef struct txs_filter {
+    int type;           /* index in the level */
+    uint16_t *response; /* plus TXS_MAX_RESPONSE */
+    uint8_t class_of[2 * TXS_MAX_RESPONSE + 1];
+} txs_filter;
+
+/* A pixel of a filter that has its tail at (x - dx, y - dy). */
+typedef struct txs_tap {
+    int dx, dy, weight;
+    ptrdiff_t tail; /* from (x, y) to the tail in the plane of responses */
+    uint16_t *response;
+    const uint8_t *table; /* row of the response -TXS_MAX_RESPONSE if the pixel is 0 */
+} txs_tap;
+
+enum {
+    TXS_EDGE = 8, /* pixels around the canvas that have responses: even, as far as shapes reach */
+    TXS_RESPONSE_GRID = TXS_GRID / 2,
+    TXS_MAX_TAPS = 8 * TXS_MAX_FILTERS, /* at one pixel */
+    TXS_RESPONSE_ROWS = 16              /* rows of responses computed by one task */
+};
+
+/* Rows for TXS_TOGETHER pixels at `now`, TXS_GRID apart, `tails` being their responses without the
+   taps' own offsets: as txs_aim does it. */
+typedef void txs_aim_taps(const txs_tap *taps, int count, const uint8_t *now, ptrdiff_t tails,
+                            int pixels, const uint8_t **rows);
+
+/* Add the changes of these pixels to the responses. */
+typedef void txs_add_taps(const txs_tap *taps, int count, ptrdiff_t tails, int pixels,
+                          const int *delta);
+
+typedef struct txs_filters {
+    const txs_canvas *canvas;
+    const txs_level *level;
+    int count, parity;
+    int reach; /* of the filters along an axis; as much of the margin has copies that count */
+    ptrdiff_t stride; /* responses in a row */
+    int rows;
+    txs_aim_taps *aim;
+    txs_add_taps *add;
+    txs_filter filter[TXS_MAX_FILTERS];
+    txs_tap tap[TXS_MAX_BANDS][4][TXS_MAX_TAPS]; /* for pixels of each parity */
+    int tap_count[TXS_MAX_BANDS][4];
+} txs_filters;
+
+static int txs_parity(int x, int y) {
+    return (x & 1) + 2 * (y & 1);
+}
+
+/* Pixel (x, y) in the plane of responses, which begins at (-TXS_EDGE, -TXS_EDGE). */
+static ptrdiff_t txs_response_index(const txs_filters *f, int x, int y) {
+    return ((y + TXS_EDGE) >> 1) * f->stride + ((x + TXS_EDGE) >> 1);
+}
+
+/* The smallest rectangle around the pixels of a shape, the tail included: x0, y0, x1, y1. */
+static void txs_shape_box(int at[TXS_MAX_MEMBERS][2], int count, int box[4]) {
+    memset(box, 0, 4 * sizeof *box);
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 2; k++) {
+            if (at[i][k] < box[k]) box[k] = at[i][k];
+            if (at[i][k] > box[k + 2]) box[k + 2] = at[i][k];
+        }
+    }
+}
+
+/* One row of the responses of filter k, of all tails whose pixels lie on the canvas. */
+static void txs_filters_row(const txs_filters *f, int k, int y) {
+    const txs_canvas *c = f->canvas;
+    const txs_type *t = &f->level->types[f->filter[k].type];
+    int at[TXS_MAX_MEMBERS][2], weight[TXS_MAX_MEMBERS], box[4];
+    const int n = txs_shape_pixels(t->shape, at, weight), m = c->margin;
+    txs_shape_box(at, n, box);
+    if (y + box[1] < -m || y + box[3] >= c->height + m) return;
+    int x0 = -(m + box[0] < TXS_EDGE ? m + box[0] : (int)TXS_EDGE);
+    const int x1 = c->width + (m - box[2] < TXS_EDGE ? m - box[2] : (int)TXS_EDGE);
+    x0 += (x0 ^ f->parity) & 1;
+    if (x1 <= x0) return;
+    const int count = (x1 - x0 + 1) / 2;
+    uint16_t *row = f->filter[k].response + txs_response_index(f, x0, y);
+    for (int i = 0; i < count; i++) row[i] = TXS_MAX_RESPONSE;
+    for (int j = 0; j < n; j++) {
+        const uint8_t *p = txs_at(c, t->band, x0 + at[j][0], y + at[j][1]);
+        if (weight[j] > 0)
+            for (int i = 0; i < count; i++) row[i] = (uint16_t)(row[i] + p[2 * i]);
+        else
+            for (int i = 0; i < count; i++) row[i] = (uint16_t)(row[i] - p[2 * i]);
+    }
+}
+
+static void txs_filters_rows(void *context, int share) {
+    const txs_filters *f = (const txs_filters *)context;
+    for (int i = share * TXS_RESPONSE_ROWS; i < (share + 1) * TXS_RESPONSE_ROWS && i < f->rows; i++)
+        for (int k = 0; k < f->count; k++)
+            txs_filters_row(f, k, 2 * i - TXS_EDGE + (f->parity >> 1));
+}
+
+/* Consider the tails of another parity. */
+static void txs_filters_turn(txs_filters *f, txm_env *env, int parity, const uint8_t *tables) {
+    f->parity = parity;
+    memset(f->tap_count, 0, sizeof f->tap_count);
+    for (int k = 0; k < f->count; k++) {
+        const txs_type *t = &f->level->types[f->filter[k].type];
+        int at[TXS_MAX_MEMBERS][2], weight[TXS_MAX_MEMBERS];
+        const int n = txs_shape_pixels(t->shape, at, weight);
+        const uint8_t *table = tables + (size_t)f->filter[k].type * TXS_TABLE + TXS_VALUES - 1;
+        for (int i = 0; i < n; i++) {
+            const int own = txs_parity(at[i][0], at[i][1]) ^ parity;
+            int *count = &f->tap_count[t->band][own];
+            if (*count == TXS_MAX_TAPS) continue; /* cannot be: see txs_shape_ends */
+            txs_tap *tap = &f->tap[t->band][own][(*count)++];
+            tap->dx = at[i][0];
+            tap->dy = at[i][1];
+            tap->weight = weight[i];
+            tap->response = f->filter[k].response;
+            tap->table = table + (weight[i] < 0 ? TXS_RESPONSE_ROW + 2 * TXS_MAX_RESPONSE : 0);
+            /* a halved coordinate loses its parity, so these are even */
+            tap->tail = ((own >> 1) - (parity >> 1) - at[i][1]) / 2 * f->stride +
+                        ((own & 1) - (parity & 1) - at[i][0]) / 2;
+        }
+    }
+    if (f->count)
+        txm_parallel_for(env, (f->rows + TXS_RESPONSE_ROWS - 1) / TXS_RESPONSE_ROWS,
+                         txs_filters_rows, f);
+}
+
+static void txs_aim_taps_plain(const txs_tap *taps, int count, const uint8_t *now,
+                                 ptrdiff_t tails, int pixels, const uint8_t **rows) {
+    for (int k = 0; k < count; k++, rows += TXS_TOGETHER) {
+        const uint16_t *r = taps[k].response + taps[k].tail + tails;
+        for (int i = 0; i < pixels; i++)
+            rows[i] = taps[k].table + taps[k].weight * r[i * TXS_RESPONSE_GRID] - now[i * TXS_GRID];
+    }
+}
+
+static void txs_add_taps_plain(const txs_tap *taps, int count, ptrdiff_t tails, int pixels,
+                               const int *delta) {
+    for (int k = 0; k < count; k++) {
+        uint16_t *r = taps[k].response + taps[k].tail + tails;
+        for (int i = 0; i < pixels; i++, r += TXS_RESPONSE_GRID)
+            *r = (uint16_t)(*r + taps[k].weight * delta[i]);
+    }
+}
+
+#ifdef TXS_LANES
+enum { /* from the first pixel of a batch to the second half of it */
+    TXS_HALF_PIXELS = TXS_TOGETHER / 2 * TXS_GRID,
+    TXS_HALF_RESPONSES = TXS_HALF_PIXELS / 2
+};
+
+TXS_FOR_AVX2 void txs_aim_taps_avx2(const txs_tap *taps, int count, const uint8_t *now,
+                                      ptrdiff_t tails, int pixels, const uint8_t **rows) {
+    const __m256i byte = _mm256_set1_epi64x(255), word = _mm256_set1_epi64x(65535);
+    if (pixels < TXS_TOGETHER) {
+        txs_aim_taps_plain(taps, count, now, tails, pixels, rows);
+        return;
+    }
+    const __m256i first = _mm256_and_si256(TXS_LOAD4(now), byte);
+    const __m256i last = _mm256_and_si256(TXS_LOAD4(now + TXS_HALF_PIXELS), byte);
+    for (int k = 0; k < count; k++, rows += TXS_TOGETHER) {
+        const uint16_t *r = taps[k].response + taps[k].tail + tails;
+        const __m256i table = _mm256_set1_epi64x((long long)(intptr_t)taps[k].table);
+        const __m256i a = _mm256_and_si256(TXS_LOAD4(r), word);
+        const __m256i b = _mm256_and_si256(TXS_LOAD4(r + TXS_HALF_RESPONSES), word);
+        __m256i u = _mm256_sub_epi64(table, first), v = _mm256_sub_epi64(table, last);
+        if (taps[k].weight > 0) {
+            u = _mm256_add_epi64(u, a);
+            v = _mm256_add_epi64(v, b);
+        } else {
+            u = _mm256_sub_epi64(u, a);
+            v = _mm256_sub_epi64(v, b);
+        }
+        _mm256_storeu_si256((__m256i *)(void *)rows, u);
+        _mm256_storeu_si256((__m256i *)(void *)(rows + TXS_TOGETHER / 2), v);
+    }
+}
+
+/* The other words of a lane are responses that stay as they are: another pixel's change is added to
+   them by the same thread, before or after. */
+TXS_FOR_AVX2 void txs_add_taps_avx2(const txs_tap *taps, int count, ptrdiff_t tails, int pixels,
+                                    const int *delta) {
+    if (pixels < TXS_TOGETHER) {
+        txs_add_taps_plain(taps, count, tails, pixels, delta);
+        return;
+    }
+    const __m256i word = _mm256_set1_epi64x(65535);
+    const __m256i d = _mm256_loadu_si256((const __m256i *)(const void *)delta);
+    const __m256i a = _mm256_and_si256(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(d)), word);
+    const __m256i b = _mm256_and_si256(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(d, 1)), word);
+    for (int k = 0; k < count; k++) {
+        uint16_t *r = taps[k].response + taps[k].tail + tails;
+        uint16_t *q = r + TXS_HALF_RESPONSES;
+        const __m256i u = TXS_LOAD4(r), v = TXS_LOAD4(q);
+        const int plus = taps[k].weight > 0;
+        _mm256_storeu_si256((__m256i *)(void *)r,
+                            plus ? _mm256_add_epi16(u, a) : _mm256_sub_epi16(u, a));
+        _mm256_storeu_si256((__m256i *)(void *)q,
+                            plus ? _mm256_add_epi16(v, b) : _mm256_sub_epi16(v, b));
+    }
+}
+#endif
+
+/* Rows of the filters' ends at pixels (x, y), (x + TXS_GRID, y), ... of a band; returns how many. */
+static int txs_filters_aim(const txs_filters *f, int band, int x, int y, int pixels,
+                             const uint8_t **rows) {
+    const int own = txs_parity(x, y), count = f->tap_count[band][own];
+    if (count)
+        f->aim(f->tap[band][own], count, txs_at(f->canvas, band, x, y),
+                 txs_response_index(f, x, y), pixels, rows);
+    return count;
+}
+
+/* Pixel (x, y) of a band and its copies in the margin have changed by delta. */
+static void txs_filters_change_one(const txs_filters *f, int band, int x, int y, int delta) {
+    const int w = f->canvas->width, h = f->canvas->height, reach = f->reach;
+    for (int yy = y - (y + reach) / h * h; yy < h + reach; yy += h) {
+        for (int xx = x - (x + reach) / w * w; xx < w + reach; xx += w) {
+            const int own = txs_parity(xx, yy);
+            const txs_tap *t = f->tap[band][own], *stop = t + f->tap_count[band][own];
+            for (; t < stop; t++) {
+                const int tx = xx - t->dx, ty = yy - t->dy;
+                if (tx >= -TXS_EDGE && tx < w + TXS_EDGE && ty >= -TXS_EDGE && ty < h + TXS_EDGE)
+                    txs_add_taps_plain(t, 1, txs_response_index(f, xx, yy), 1, &delta);
+            }
+        }
+    }
+}
+
+/* Pixels (x, y), (x + TXS_GRID, y), ... of a band have changed by delta[]. */
+static void txs_filters_change(const txs_filters *f, int band, int x, int y, int pixels,
+                               const int *delta) {
+    const int own = txs_parity(x, y), reach = f->reach;
+    if (f->count == 0) return;
+    if (y >= reach && y < f->canvas->height - reach && x >= reach &&
+        x + (pixels - 1) * TXS_GRID < f->canvas->width - reach) /* no copies */
+        f->add(f->tap[band][own], f->tap_count[band][own], txs_response_index(f, x, y), pixels,
+               delta);
+    else
+        for (int i = 0; i < pixels; i++)
+            if (delta[i]) txs_filters_change_one(f, band, x + i * TXS_GRID, y, delta[i]);
+}
+
+/* Count the filters whose tail is (x, y). */
+static void txs_filters_count(const txs_filters *f, int x, int y, int32_t (*counts)[TXS_BINS]) {
+    if (txs_parity(x, y) != f->parity) return;
+    const ptrdiff_t at = txs_response_index(f, x, y);
+    for (int k = 0; k < f->count; k++) {
+        const txs_filter *filter = &f->filter[k];
+        counts[filter->type][filter->class_of[filter->response[at]]]++;
+    }
+}
+
+/* Take the filters among the level's types; there must be as many planes. */
+static void txs_filters_find(txs_filters *f) {
+    f->count = f->reach = 0;
+    for (int k = 0; k < f->level->type_count; k++) {
+        const txs_type *t = &f->level->types[k];
+        if (t->kind != TEXSYN_FILTER || f->count == TXS_MAX_FILTERS) continue;
+        txs_filter *filter = &f->filter[f->count++];
+        filter->type = k;
+        txs_response_classes(t->scale, filter->class_of);
+        if (txs_reach(t) > f->reach) f->reach = txs_reach(t);
+    }
+}
+
+/* Planes for so many filters; sets arena->failed if there is no memory. */
+static void txs_filters_make(txs_filters *f, txm_arena *arena, const txs_level *level,
+                             const txs_canvas *canvas, int count) {
+    enum { ROUND = 2, LANE = TXS_RESPONSE_GRID }; /* lanes reach so far beyond the last response */
+    const size_t stride = ((size_t)canvas->width + 2 * TXS_EDGE + 1) / ROUND;
+    const size_t rows = ((size_t)canvas->height + 2 * TXS_EDGE + 1) / ROUND;
+    f->canvas = canvas;
+    f->level = level;
+    f->stride = (ptrdiff_t)stride;
+    f->rows = (int)rows;
+    f->aim = txs_aim_taps_plain;
+    f->add = txs_add_taps_plain;
+#ifdef TXS_LANES
+    if (__builtin_cpu_supports("avx2")) {
+        f->aim = txs_aim_taps_avx2;
+        f->add = txs_add_taps_avx2;
+    }
+#endif
+    for (int k = 0; k < count && k < TXS_MAX_FILTERS; k++)
+        f->filter[k].response =
+            (uint16_t *)txm_arena_zero(arena, stride * rows + LANE, sizeof(uint16_t));
+}
+
 /* ---- the sampler --------------------------------------------------------------------------
 
    Gibbs sampling of a canvas, which is a torus, with controlled potentials.
@@ -1122,6 +1663,7 @@ typedef struct txs_sampler {
     const txs_canvas *canvas;
     int bands;
     uint64_t seed;
+    txs_aim *aim;
     txs_pick *pick;
     txs_list list[4]; /* for pixels of each parity, (x & 1) + 2 (y & 1)   */
     int16_t single[TXS_MAX_BANDS][TXS_VALUES];
@@ -1130,6 +1672,7 @@ typedef struct txs_sampler {
     int32_t (*integral)[TXS_BINS];  /* 1/(TXS_NAT TXS_PRECISE) nat          */
     int32_t (*counts)[TXS_BINS];    /* TXS_TASKS times all types            */
     const int16_t *noise;
+    txs_filters filters;
     int strips, tasks, skip;          /* layout; one pixel in skip is counted */
     int sublattice[TXS_GROUP], phase; /* of the pass                          */
     uint64_t pass, sweep;
@@ -1156,6 +1699,8 @@ static void txs_count(const txs_list *list, const uint8_t *p, int32_t (*counts)[
     for (stop += list->tally_count[3]; t < stop; t++)
         counts[t->type]
               [txs_class(p[t->a] - p[t->b]) * TXS_CLASSES + txs_class(p[t->c] - p[t->d])]++;
+    for (stop += list->tally_count[4]; t < stop; t++)
+        counts[t->type][p[t->c] * TXS_CLASSES + txs_class(p[t->a] - p[t->b])]++;
 }
 
 static const txs_list *txs_list_at(const txs_sampler *s, int x, int y) {
@@ -1172,42 +1717,31 @@ static int txs_is_counted(const txs_sampler *s, int x, int y) {
    is the same as drawing one after another; drawing them together keeps the data of an end in
    registers. */
 static void txs_visit(const txs_sampler *s, int x, int y, int count, txm_rng *rng) {
-    const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
+    const uint8_t *rows[(TXS_MAX_ENDS + 2) * TXS_TOGETHER];
     const uint8_t *p = txs_at(s->canvas, 0, x, y);
     const txs_list *list = txs_list_at(s, x, y);
     for (int b = 0; b < s->bands; b++) {
-        const txs_end *e = list->ends[b], *stop = e + list->end_count[b][0];
+        const txs_end *e = list->ends[b];
+        const uint8_t *now = p + b * s->canvas->plane;
         int n = 0;
-        for (; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *table = e->table;
-            for (int i = 0; i < count; i++) rows[i][n] = table - p1[i * TXS_GRID];
+        for (int form = 0; form < TXS_FORMS; form++) {
+            const int ends = list->end_count[b][form];
+            s->aim(e, ends, form, p, count, rows + n * TXS_TOGETHER);
+            e += ends;
+            n += ends;
         }
-        for (stop += list->end_count[b][1]; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *p3 = p + e->o3, *table = e->table;
-            for (int i = 0; i < count; i++) {
-                int known = txs_class(p2[i * TXS_GRID] - p3[i * TXS_GRID]);
-                rows[i][n] = table + known * TXS_ROW - p1[i * TXS_GRID];
-            }
-        }
-        for (stop += list->end_count[b][2]; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *table = e->table;
-            for (int i = 0; i < count; i++) {
-                int arm = p1[i * TXS_GRID];
-                rows[i][n] = table + (p2[i * TXS_GRID] - arm) * TXS_ROW - arm;
-            }
-        }
-        for (stop += list->end_count[b][3]; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *classes = e->classes, *table = e->table;
-            for (int i = 0; i < count; i++)
-                rows[i][n] = table + classes[p1[i * TXS_GRID]] * TXS_VALUES;
-        }
+        n += txs_filters_aim(&s->filters, b, x, y, count, rows + n * TXS_TOGETHER);
+        int delta[TXS_TOGETHER] = {0}, any = 0;
         for (int i = 0; i < count; i++) {
-            rows[i][n] = txs_no_energy;
-            int v = s->pick(rows[i], (n + 1) & ~1, s->single[b],
+            rows[n * TXS_TOGETHER + i] = txs_no_energy;
+            int v = s->pick(rows + i, TXS_TOGETHER, (n + 1) & ~1, s->single[b],
                             s->noise + (txm_rng_next(rng) & (TXS_NOISE - 1)));
             if (v >= s->level->values[b]) v = s->level->values[b] - 1;
+            delta[i] = v - now[i * TXS_GRID];
+            any |= delta[i];
             txs_set(s->canvas, b, x + i * TXS_GRID, y, (uint8_t)v);
         }
+        if (any) txs_filters_change(&s->filters, b, x, y, count, delta);
     }
 }
 
@@ -1232,9 +1766,11 @@ static void txs_work(void *context, int task) {
                     if (n > TXS_TOGETHER) n = TXS_TOGETHER;
                     txs_visit(s, x, y, n, &rng);
                 }
-                for (int x = sx; x < width; x += TXS_GRID)
-                    if (txs_is_counted(s, x, y))
-                        txs_count(txs_list_at(s, x, y), txs_at(s->canvas, 0, x, y), counts);
+                for (int x = sx; x < width; x += TXS_GRID) {
+                    if (!txs_is_counted(s, x, y)) continue;
+                    txs_count(txs_list_at(s, x, y), txs_at(s->canvas, 0, x, y), counts);
+                    txs_filters_count(&s->filters, x, y, counts);
+                }
             }
         }
     }
@@ -1254,11 +1790,14 @@ static void txs_gather(txs_sampler *s, int passes) {
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
 }
 
+static const int txs_turns[4] = {0, 3, 1, 2}; /* parities of filters' tails, sweep by sweep */
+
 /* Visit every pixel once. Progress from..to of the whole work. */
 static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, float from, float to) {
     enum { ALL = TXS_GRID * TXS_GRID };
     const int phases = s->strips > 1 ? 2 : 1, groups = (int)ALL / TXS_GROUP;
     int order[ALL];
+    txs_filters_turn(&s->filters, env, txs_turns[s->sweep % 4], s->tables);
     txm_rng rng = txm_rng_make(s->seed, ~s->sweep++);
     for (int i = 0; i < ALL; i++) order[i] = i;
     txm_shuffle(&rng, order, ALL);
@@ -1292,7 +1831,7 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
                 /* of a pair, end 0 is the head; only pairs have a phase */
                 if (forms[i] != form || !txs_is_tail(t, px - (i ? 0 : t->dx), py - (i ? 0 : t->dy)))
                     continue;
-                list->ends[band[i]][count[0] + count[1] + count[2] + count[3]] = ends[i];
+                list->ends[band[i]][count[0] + count[1] + count[2] + count[3] + count[4]] = ends[i];
                 count[form]++;
             }
             if (tally.form != form || !txs_is_tail(t, px, py)) continue;
@@ -1304,7 +1843,7 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
 }
 
 /* Lay out the work for the level's types as they are now, and count the canvas as it is. */
-static void txs_sampler_start(txs_sampler *s) {
+static void txs_sampler_start(txs_sampler *s, txm_env *env) {
     const txs_canvas *c = s->canvas;
     const int types = s->level->type_count;
     int reach = 16; /* a strip is at least this high: less is too little work for a thread */
@@ -1320,21 +1859,27 @@ static void txs_sampler_start(txs_sampler *s) {
     s->skip = pixels > TXS_SAMPLES ? (int)(pixels / TXS_SAMPLES) : 1;
     if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find almost none */
 
+    txs_filters_find(&s->filters);
+    txs_filters_turn(&s->filters, env, txs_turns[s->sweep % 4], s->tables);
     memset(s->histogram, 0, sizeof *s->histogram * (size_t)types);
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
-    for (int y = 0; y < c->height; y++)
-        for (int x = 0; x < c->width; x++)
-            if (txs_is_counted(s, x, y))
-                txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
+    for (int y = 0; y < c->height; y++) {
+        for (int x = 0; x < c->width; x++) {
+            if (!txs_is_counted(s, x, y)) continue;
+            txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
+            txs_filters_count(&s->filters, x, y, s->histogram);
+        }
+    }
     for (int k = 0; k < types; k++)
         for (int i = 0; i < TXS_BINS; i++) s->histogram[k][i] *= TXS_WINDOW;
     txs_control(s, 0);
 }
 
-/* A sampler in the arena's memory; NULL if there is none. Call txs_sampler_start before use. */
+/* A sampler in the arena's memory for so many types and filters among them; NULL if there is none.
+   Call txs_sampler_start before use. */
 static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, int max_types,
-                                     const txs_canvas *canvas, int bands, const int16_t *noise,
-                                     uint64_t seed) {
+                                     int max_filters, const txs_canvas *canvas, int bands,
+                                     const int16_t *noise, uint64_t seed) {
     const size_t n = (size_t)max_types;
     txs_sampler *s = (txs_sampler *)txm_arena_zero(arena, 1, sizeof *s);
     if (!s) return NULL;
@@ -1342,12 +1887,14 @@ static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, i
     s->canvas = canvas;
     s->bands = bands;
     s->seed = txm_hash(seed);
+    s->aim = txs_best_aim();
     s->pick = txs_best_pick();
     s->noise = noise;
     s->tables = (uint8_t *)txm_arena_zero(arena, n, TXS_TABLE);
     s->histogram = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->histogram);
     s->integral = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->integral);
     s->counts = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n * TXS_TASKS, sizeof *s->counts);
+    txs_filters_make(&s->filters, arena, level, canvas, max_filters);
     if (arena->failed) return NULL;
     for (int k = 0; k < level->type_count; k++)
         for (int i = 0; i < TXS_BINS; i++)
@@ -1537,6 +2084,75 @@ static void txs_fill_parent(const txs_level *above, const txs_canvas *coarse,
     }
 }
 
+/* How the first band of the level above changes and curves at p: the squared gradient by Sobel's
+   filter, the Laplacian, both of pixels that are `step` apart in x and `row` in y. */
+static void txs_look(const uint8_t *p, const ptrdiff_t x[2], const ptrdiff_t y[2], int *gradient,
+                     int *curve) {
+    const int gx = p[y[0] + x[1]] + 2 * p[x[1]] + p[y[1] + x[1]] - p[y[0] + x[0]] - 2 * p[x[0]] -
+                   p[y[1] + x[0]];
+    const int gy = p[y[1] + x[0]] + 2 * p[y[1]] + p[y[1] + x[1]] - p[y[0] + x[0]] - 2 * p[y[0]] -
+                   p[y[0] + x[1]];
+    *gradient = gx * gx + gy * gy;
+    *curve = p[x[0]] + p[x[1]] + p[y[0]] + p[y[1]] - 4 * p[0];
+}
+
+/* Visit the labels' arguments; at a border without margin the last pixel is repeated. */
+static void txs_look_at(const txs_canvas *c, int bands, int x, int y, int *gradient, int *curve) {
+    enum { R = TXS_LABEL_REACH };
+    const int wrap = c->margin >= R;
+    const ptrdiff_t dx[2] = {wrap || x >= R ? -R : -x,
+                             wrap || x + R < c->width ? R : c->width - 1 - x};
+    const ptrdiff_t dy[2] = {c->stride * (wrap || y >= R ? -R : -y),
+                             c->stride * (wrap || y + R < c->height ? R : c->height - 1 - y)};
+    txs_look(txs_at(c, bands, x, y), dx, dy, gradient, curve);
+}
+
+/* Fill the plane of labels from the parent plane of the first band: by thirds of the gradient, 0 to
+   2, plus 3 times thirds of the curvature. */
+static void txs_fill_labels(const txs_level *level, txs_canvas *canvas, int bands) {
+    for (int y = 0; y < canvas->height; y++) {
+        uint8_t *label = txs_at(canvas, 2 * bands, 0, y);
+        for (int x = 0; x < canvas->width; x++) {
+            int gradient, curve;
+            txs_look_at(canvas, bands, x, y, &gradient, &curve);
+            label[x] =
+                (uint8_t)((gradient > level->gradient_cut[0]) +
+                          (gradient > level->gradient_cut[1]) +
+                          3 * ((curve > level->curve_cut[0]) + (curve > level->curve_cut[1])));
+        }
+    }
+    txs_wrap(canvas, 2 * bands);
+}
+
+/* Choose the limits of the labels: thirds of the example. Returns 0 if there is no memory. */
+static int txs_cut_labels(txs_level *level, const txs_source *s, int bands, txm_arena *arena) {
+    enum { CURVES = 8 * TXS_VALUES + 1 };
+    uint32_t *gradients =
+        (uint32_t *)txm_arena_zero(arena, TXS_MAX_GRADIENT + 1, sizeof *gradients);
+    uint32_t curves[CURVES] = {0}, count = 0;
+    if (!gradients) return 0;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            int gradient, curve;
+            if (s->mask && !s->mask[(size_t)y * (size_t)s->width + (size_t)x]) continue;
+            txs_look_at(&s->canvas, bands, x, y, &gradient, &curve);
+            gradients[gradient]++;
+            curves[curve + CURVES / 2]++;
+            count++;
+        }
+    }
+    for (uint32_t i = 0; i < 2; i++) {
+        const uint32_t part = (i + 1) * (count / 3);
+        uint32_t seen = 0;
+        int g = 0, k = 0;
+        while (g < TXS_MAX_GRADIENT && (seen += gradients[g]) < part) g++;
+        for (seen = 0; k < CURVES - 1 && (seen += curves[k]) < part;) k++;
+        level->gradient_cut[i] = g;
+        level->curve_cut[i] = k - CURVES / 2;
+    }
+    return 1;
+}
+
 /* Start the synthesis of a level: from what is above, or from even noise (step 2 of [1]). */
 static void txs_start_canvas(const txs_level *level, const txs_canvas *canvas, int bands,
                              int has_parent, uint64_t seed) {
@@ -1554,30 +2170,80 @@ static void txs_start_canvas(const txs_level *level, const txs_canvas *canvas, i
 
 /* ---- statistics of an image ------------------------------------------------------------- */
 
+enum { TXS_RESPONSES_TOGETHER = 256 };
+
+/* The responses of a filter at count tails from (x, y) on. */
+static void txs_responses(const txs_canvas *c, const txs_type *t, int x, int y, int count,
+                          int16_t *response) {
+    int at[TXS_MAX_MEMBERS][2], weight[TXS_MAX_MEMBERS];
+    const int n = txs_shape_pixels(t->shape, at, weight);
+    memset(response, 0, (size_t)count * sizeof *response);
+    for (int k = 0; k < n; k++) {
+        const uint8_t *p = txs_at(c, t->band, x + at[k][0], y + at[k][1]);
+        const int w = weight[k];
+        for (int i = 0; i < count; i++) response[i] = (int16_t)(response[i] + w * p[i]);
+    }
+}
+
+/* The tails whose members lie inside an image: x, y of the first, and after the last. */
+static void txs_find_tails(int at[TXS_MAX_MEMBERS][2], int members, int width, int height,
+                           int inside[4]) {
+    const int size[2] = {width, height};
+    for (int k = 0; k < 2; k++) {
+        inside[k] = 0;
+        inside[k + 2] = size[k];
+        for (int i = 0; i < members; i++) {
+            if (-at[i][k] > inside[k]) inside[k] = -at[i][k];
+            if (size[k] - at[i][k] < inside[k + 2]) inside[k + 2] = size[k] - at[i][k];
+        }
+    }
+}
+
+/* Do all members of the clique at (x, y) belong to the texture? */
+static int txs_is_masked(const uint8_t *mask, int width, int at[TXS_MAX_MEMBERS][2], int members,
+                         int x, int y) {
+    int all = 1;
+    for (int i = 0; i < members; i++)
+        all &= mask[(ptrdiff_t)(y + at[i][1]) * width + x + at[i][0]] != 0;
+    return all;
+}
+
 /* Histogram of a clique type over a canvas: of the example, cliques that lie inside image and
    mask; of a synthesised canvas (wrap) all of them. Every step-th row. Returns the number of
    cliques; share[] sums to about TXS_ONE. */
 static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, int step, int bands,
                            const txs_level *level, const txs_type *t, int32_t share[TXS_BINS]) {
-    int at[4][2], members = txs_members(t, at), x0 = 0, y0 = 0, x1 = c->width, y1 = c->height;
+    int at[TXS_MAX_MEMBERS][2], inside[4] = {0, 0, c->width, c->height};
+    const int members = txs_footprint(t, at);
     uint32_t h[2][TXS_BINS + 15];
     const txs_tally y = txs_tally_make(t, level, c, bands);
     int64_t total = 0;
     memset(h, 0, sizeof h);
-    for (int i = 0; i < members && !wrap; i++) {
-        if (-at[i][0] > x0) x0 = -at[i][0];
-        if (c->width - at[i][0] < x1) x1 = c->width - at[i][0];
-        if (-at[i][1] > y0) y0 = -at[i][1];
-        if (c->height - at[i][1] < y1) y1 = c->height - at[i][1];
-    }
+    if (!wrap) txs_find_tails(at, members, c->width, c->height, inside);
+    const int x0 = inside[0], y0 = inside[1], x1 = inside[2], y1 = inside[3];
+    uint8_t class_of[2 * TXS_MAX_RESPONSE + 1];
+    if (t->kind == TEXSYN_FILTER) txs_response_classes(t->scale, class_of);
     for (int row = y0; row < y1; row += step) {
         const uint8_t *p = txs_at(c, 0, 0, row);
         if (mask || t->phase) {
             for (int x = x0; x < x1; x++) {
-                int inside = txs_is_tail(t, x, row);
-                for (int i = 0; i < members && mask; i++)
-                    inside &= mask[(ptrdiff_t)(row + at[i][1]) * c->width + x + at[i][0]] != 0;
-                if (inside) h[0][txs_bin(&y, p + x)]++;
+                if (!txs_is_tail(t, x, row) ||
+                    (mask && !txs_is_masked(mask, c->width, at, members, x, row)))
+                    continue;
+                if (t->kind == TEXSYN_FILTER) {
+                    int16_t r;
+                    txs_responses(c, t, x, row, 1, &r);
+                    h[0][class_of[r + TXS_MAX_RESPONSE]]++;
+                } else {
+                    h[0][txs_bin(&y, p + x)]++;
+                }
+            }
+        } else if (t->kind == TEXSYN_FILTER) {
+            int16_t r[TXS_RESPONSES_TOGETHER];
+            for (int x = x0, n; x < x1; x += n) {
+                n = x1 - x < TXS_RESPONSES_TOGETHER ? x1 - x : (int)TXS_RESPONSES_TOGETHER;
+                txs_responses(c, t, x, row, n, r);
+                for (int i = 0; i < n; i++) h[i & 1][class_of[r[i] + TXS_MAX_RESPONSE]]++;
             }
         } else if (y.form == 1) {
             const uint8_t *a = p + y.a, *b = p + y.b;
@@ -1622,7 +2288,8 @@ typedef struct txs_learner {
     const txs_canvas *canvas;
     txs_candidate *candidates;
     int candidate_count, capacity;
-    int step; /* the canvas is measured on every step-th row */
+    int step;   /* the canvas is measured on every step-th row */
+    int shapes; /* filters and labels may be chosen too        */
 } txs_learner;
 
 static txs_type *txs_add_type(txs_level *l, int kind, int band, int other, int dx, int dy) {
@@ -1656,6 +2323,56 @@ static void txs_add_candidate(txs_learner *a, int kind, int band, int other, con
     c->type.ex = ex;
     c->type.ey = ey;
     c->weight = weight;
+}
+
+/* What a filter's last classes begin at: the example's 99.5th percentile. */
+static int txs_find_scale(const txs_learner *a, const txs_type *t) {
+    const txs_source *s = a->source;
+    int at[TXS_MAX_MEMBERS][2], inside[4];
+    const int members = txs_footprint(t, at);
+    uint32_t h[TXS_MAX_RESPONSE + 1] = {0}, count = 0, seen = 0;
+    int16_t r[TXS_RESPONSES_TOGETHER];
+    txs_find_tails(at, members, s->width, s->height, inside);
+    for (int y = inside[1]; y < inside[3]; y += s->step) {
+        for (int x = inside[0], n; x < inside[2]; x += n) {
+            n = inside[2] - x < TXS_RESPONSES_TOGETHER ? inside[2] - x
+                                                       : (int)TXS_RESPONSES_TOGETHER;
+            txs_responses(&s->canvas, t, x, y, n, r);
+            for (int i = 0; i < n; i++) {
+                if (s->mask && !txs_is_masked(s->mask, s->width, at, members, x + i, y)) continue;
+                h[abs(r[i])]++;
+                count++;
+            }
+        }
+    }
+    int scale = TXS_MAX_RESPONSE;
+    while (scale > 1 && (seen += h[scale]) <= count / 200) scale--;
+    return scale;
+}
+
+/* Filters, and differences beside the labels of the level above. */
+static void txs_list_shapes(txs_learner *a, const float *seen) {
+    static const int contexts[][4] = {{0, 0, 0, 0},   {1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 0, 0},
+                                      {-1, 1, 0, 0},  {2, 0, 1, 0}, {0, 2, 0, 1}, {2, 2, 1, 1},
+                                      {-2, 2, -1, 1}, {3, 0, 1, 0}, {0, 3, 0, 1}, {3, 3, 1, 1},
+                                      {-3, 3, -1, 1}, {4, 0, 2, 0}, {0, 4, 0, 2}};
+    if (a->index + 1 < a->model->levels)
+        for (size_t i = 0; i < sizeof contexts / sizeof *contexts; i++)
+            txs_add_candidate(a, TEXSYN_CONTEXT, 0, 0, contexts[i], TXS_CONTOUR_WEIGHT * seen[0]);
+    for (int i = 0; i < TXS_SHAPES; i++) {
+        const int d[4] = {txs_shapes[i].dx, txs_shapes[i].dy, txs_shapes[i].ex, txs_shapes[i].ey};
+        if (a->candidate_count == a->capacity) return;
+        txs_candidate *c = &a->candidates[a->candidate_count++];
+        memset(c, 0, sizeof *c);
+        c->type.kind = TEXSYN_FILTER;
+        c->type.dx = d[0];
+        c->type.dy = d[1];
+        c->type.ex = d[2];
+        c->type.ey = d[3];
+        c->type.shape = i;
+        c->type.scale = txs_find_scale(a, &c->type);
+        c->weight = TXS_CONTOUR_WEIGHT * seen[0];
+    }
 }
 
 /* Pairs within the reach, and the kinds that take three or four pixels, of few shapes. */
@@ -1863,8 +2580,8 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
         (txs_candidate *)txm_arena_alloc(&arena, (size_t)a->capacity, sizeof *a->candidates);
     int64_t(*sum)[TXS_BINS] =
         (int64_t(*)[TXS_BINS])txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof *sum);
-    txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, a->canvas, bands, noise,
-                                      txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
+    txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, TXS_SHAPES, a->canvas, bands,
+                                      noise, txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
     if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
@@ -1873,13 +2590,14 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
     txs_preselect(a);
     for (int b = 0; b < bands; b++) seen[b] = txs_visibility(a->level, b);
     txs_list_candidates(a, reach, seen);
+    if (a->shapes) txs_list_shapes(a, seen);
     txm_parallel_for(env, a->candidate_count, txs_measure_example, a);
     txs_start_canvas(a->level, a->canvas, bands, !top,
                      txm_hash(a->desc->seed) + (uint64_t)a->index);
 
     /* steps 3 to 6 of [1]; what was synthesised so far, and its potentials, are kept */
     for (;;) {
-        txs_sampler_start(s);
+        txs_sampler_start(s, env);
         for (int i = 0; i < sweeps; i++, from += sweep)
             if ((status = txs_sweep(s, env, "learn", from, from + sweep)) != TXM_OK) goto done;
         if (left == 0) break;
@@ -1913,6 +2631,7 @@ enum { TXS_MAGIC_BYTES = 4, TXS_CRC_BYTES = 4, TXS_MAX_FILE = 1 << 20, TXS_UNARY
 
 typedef struct txs_coder {
     int reading, bad; /* bad: ran out of bytes, or an impossible value    */
+    int version;      /* of the format                                    */
     uint8_t *out;     /* writing; NULL = only count                       */
     const uint8_t *in;
     size_t at, size;      /* bytes so far, bytes there are                    */
@@ -2058,7 +2777,7 @@ static void txs_sequence(txs_coder *c, txs_context *x, int16_t *v, const int16_t
 
 /* All contexts: of displacements, histograms and potentials by the kind of the clique type. */
 typedef struct txs_codec {
-    txs_context place[4][7], share[7][8], potential[7][8];
+    txs_context place[4][TXS_KINDS], share[TXS_KINDS][8], potential[TXS_KINDS][8];
     int16_t used[TXS_BINS]; /* the potential, where it is kept */
 } txs_codec;
 
@@ -2101,7 +2820,9 @@ static void txs_code_statistics(txs_coder *c, txs_codec *z, txs_level *l, int le
     int used = 0;
     txs_mirror mirror = TXS_NONE; /* differences are about as often v as -v */
     if (same && t->kind == TEXSYN_VALUES) mirror = TXS_DIAGONAL;
-    else if (same && t->kind != TEXSYN_SINGLE && t->kind != TEXSYN_CORNER) mirror = TXS_REVERSED;
+    else if (same && t->kind != TEXSYN_SINGLE && t->kind != TEXSYN_CORNER &&
+             t->kind != TEXSYN_CONTEXT)
+        mirror = TXS_REVERSED;
     txs_sequence(c, z->share[t->kind], t->root, like < 0 ? NULL : l->types[like].root, bins, 0,
                  txs_root_scale(t->kind, level), mirror);
 
@@ -2116,13 +2837,33 @@ static void txs_code_statistics(txs_coder *c, txs_codec *z, txs_level *l, int le
     if (!c->bad && !txs_unround_statistics(t)) c->bad = 1;
 }
 
+/* A filter within its band. */
+static void txs_code_filter(txs_coder *c, txs_type *t) {
+    t->other = t->band;
+    t->shape = txs_limited(c, 4, 0, TXS_SHAPES - 1, t->shape);
+    t->scale = txs_limited(c, 9, 1, TXS_MAX_RESPONSE, t->scale);
+    t->dx = txs_shapes[t->shape].dx;
+    t->dy = txs_shapes[t->shape].dy;
+    t->ex = txs_shapes[t->shape].ex;
+    t->ey = txs_shapes[t->shape].ey;
+}
+
 static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_model *m,
                           int level) {
-    t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_PARALLEL, t->kind);
+    if (c->version == 1) t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_PARALLEL, t->kind);
+    else t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_CONTEXT, t->kind);
     t->band = txs_limited(c, 2, 0, m->bands - 1, t->band);
     t->phase = t->kind == TEXSYN_PAIR ? txs_limited(c, 2, 0, 2, t->phase) : 0;
-    t->other = t->kind == TEXSYN_CORNER ? t->band : txs_limited(c, 2, 0, m->bands - 1, t->other);
-    if ((t->kind == TEXSYN_PARENT || t->kind == TEXSYN_SCALE) && level + 1 == m->levels) c->bad = 1;
+    if (t->kind == TEXSYN_FILTER) {
+        txs_code_filter(c, t);
+        return;
+    }
+    t->other = t->kind == TEXSYN_CORNER || t->kind == TEXSYN_CONTEXT
+                   ? t->band
+                   : txs_limited(c, 2, 0, m->bands - 1, t->other);
+    if ((t->kind == TEXSYN_PARENT || t->kind == TEXSYN_SCALE || t->kind == TEXSYN_CONTEXT) &&
+        level + 1 == m->levels)
+        c->bad = 1;
     if (t->kind != TEXSYN_PARENT) {
         t->dx = txs_number(c, &z->place[0][t->kind], t->dx);
         t->dy = txs_number(c, &z->place[1][t->kind], t->dy);
@@ -2135,14 +2876,15 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     const int same_d = t->dx == 0 && t->dy == 0, same_e = t->ex == 0 && t->ey == 0;
     const int equal = t->ex == t->dx && t->ey == t->dy,
               opposite = t->ex == -t->dx && t->ey == -t->dy;
-    if (t->kind != TEXSYN_PARENT && same_d && (t->band == t->other || t->kind >= TEXSYN_CORNER))
+    if (t->kind != TEXSYN_PARENT && same_d && t->kind != TEXSYN_CONTEXT &&
+        (t->band == t->other || t->kind >= TEXSYN_CORNER))
         c->bad = 1;
     if (t->kind == TEXSYN_CORNER && (same_e || equal)) c->bad = 1;
     if (t->kind == TEXSYN_PARALLEL && t->band == t->other && (same_e || equal || opposite))
         c->bad = 1;
     /* and so would members that are drawn at the same time, see txs_visit */
-    int at[4][2], drawn = t->kind == TEXSYN_SCALE ? 2 : txs_members(t, at);
-    txs_members(t, at);
+    int at[TXS_MAX_MEMBERS][2], drawn = txs_footprint(t, at);
+    if (t->kind == TEXSYN_SCALE || t->kind == TEXSYN_CONTEXT) drawn = 2;
     for (int i = 0; i < drawn; i++) {
         for (int j = 0; j < i; j++) {
             const int apart = at[i][0] - at[j][0];
@@ -2152,6 +2894,14 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     if (abs(t->dx) > TXS_MAX_REACH || abs(t->dy) > TXS_MAX_REACH || abs(t->ex) > TXS_MAX_REACH ||
         abs(t->ey) > TXS_MAX_REACH || txs_reach(t) > TXS_MAX_REACH)
         c->bad = 1;
+}
+
+/* The limits between the labels. */
+static void txs_code_labels(txs_coder *c, txs_level *l) {
+    for (int i = 0; i < 2; i++) {
+        l->gradient_cut[i] = txs_limited(c, 15, 0, TXS_MAX_GRADIENT, l->gradient_cut[i]);
+        l->curve_cut[i] = txs_limited(c, 9, -4 * TXS_VALUES, 4 * TXS_VALUES, l->curve_cut[i]);
+    }
 }
 
 /* The whole model, to or from the coder. What reading allocates goes to the model's arena.
@@ -2170,9 +2920,9 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
         m->dither[b] = (float)txs_limited(c, 8, 0, 255, (int)(m->dither[b] * 255 + 0.5f)) / 255;
     }
     memset(z, 0, sizeof *z);
-    txs_contexts_init(&z->place[0][0], 4 * 7);
-    txs_contexts_init(&z->share[0][0], 7 * 8);
-    txs_contexts_init(&z->potential[0][0], 7 * 8);
+    txs_contexts_init(&z->place[0][0], 4 * TXS_KINDS);
+    txs_contexts_init(&z->share[0][0], TXS_KINDS * 8);
+    txs_contexts_init(&z->potential[0][0], TXS_KINDS * 8);
     for (int i = m->levels - 1; i >= 0 && !c->bad; i--) {
         txs_level *l = &m->level[i];
         for (int b = 0; b < m->bands; b++) {
@@ -2181,6 +2931,7 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             l->step[b] = txs_real(c, l->step[b]);
             if (!(l->step[b] > 1e-6f)) c->bad = 1;
         }
+        if (c->version > 1 && i + 1 < m->levels) txs_code_labels(c, l);
         l->type_count = txs_limited(c, 7, m->bands, TXS_MAX_TYPES, l->type_count);
         if (c->bad) break;
         if (c->reading) {
@@ -2195,6 +2946,10 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             if (!c->bad) txs_code_statistics(c, z, l, i, k);
             if (k < m->bands && !c->bad) txs_make_classes(l, k);
         }
+        int filters = 0;
+        for (int k = 0; k < l->type_count && !c->bad; k++)
+            filters += l->types[k].kind == TEXSYN_FILTER;
+        if (filters > TXS_MAX_FILTERS) c->bad = 1;
         if (!c->bad && txs_most_ends(l, m->bands) > TXS_MAX_ENDS) c->bad = 1;
     }
     return 1;
@@ -2249,8 +3004,10 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         txs_coder c;
         memset(&c, 0, sizeof c);
         c.out = bytes;
+        c.version = copy->version;
         c.size = capacity;
-        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'S'), txs_put(&c, '1');
+        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'S'),
+            txs_put(&c, (uint8_t)('0' + copy->version));
         txs_coder_start(&c);
         txs_code_model(&c, copy, z);
         txs_coder_finish(&c);
@@ -2270,7 +3027,8 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
     const uint8_t *bytes = (const uint8_t *)data;
     if (out) *out = NULL;
     if (!data || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "load: data or out is NULL");
-    if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || memcmp(bytes, "TXS1", TXS_MAGIC_BYTES) != 0)
+    if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || (memcmp(bytes, "TXS1", TXS_MAGIC_BYTES) != 0 &&
+                                                   memcmp(bytes, "TXS2", TXS_MAGIC_BYTES) != 0))
         return txm_fail(env, TXM_BAD_DATA, "not a texsyn model");
     size -= TXS_CRC_BYTES;
     uint32_t crc = 0;
@@ -2288,6 +3046,7 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
     c.at = TXS_MAGIC_BYTES;
     c.size = size;
     if (enough) {
+        m->version = c.version = bytes[TXS_MAGIC_BYTES - 1] - '0';
         txs_coder_start(&c);
         enough = txs_code_model(&c, m, z);
         c.bad |= c.at != c.size; /* the coder reads just what was written */
@@ -2412,7 +3171,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.height = s->height;
         s->canvas.stride = s->width;
         s->canvas.plane = (ptrdiff_t)pixels;
-        s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels);
+        s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels + 1);
         if (arena->failed)
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
@@ -2440,9 +3199,13 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
             if (i == 0) m->dither[b] = fill;
         }
     }
-    for (int i = m->levels - 2; i >= 0; i--)
+    for (int i = m->levels - 2; i >= 0; i--) {
         txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
                        m->bands);
+        if (!txs_cut_labels(&m->level[i], &source[i], m->bands, arena))
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+        txs_fill_labels(&m->level[i], &source[i].canvas, m->bands);
+    }
     return TXM_OK;
 }
 
@@ -2472,6 +3235,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
         goto done;
     }
     txs_noise_table(noise);
+    m->version = TXS_VERSION;
     if ((status = txs_prepare(desc, m, source, &arena, env)) != TXM_OK) goto done;
 
     for (int i = 0; i < m->levels; i++) total += 1.0f / (float)(1 << 2 * i);
@@ -2484,15 +3248,19 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
         a.level = &m->level[i];
         a.source = &source[i];
         a.canvas = &canvas;
+        a.shapes = 1;
         a.level->types = (txs_type *)txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof(txs_type));
         const int margin = i + 1 == m->levels ? TXS_MAX_REACH : TXS_NEAR;
         if (!a.level->types ||
             !txs_canvas_make(&canvas, env, txm_clampi(source[i].width, 128, 256),
-                             txm_clampi(source[i].height, 128, 256), margin, 2 * m->bands)) {
+                             txm_clampi(source[i].height, 128, 256), margin, 2 * m->bands + 1)) {
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
             goto done;
         }
-        if (above.pixels) txs_fill_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+        if (above.pixels) {
+            txs_fill_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+            txs_fill_labels(a.level, &canvas, m->bands);
+        }
         txs_canvas_free(&above, env);
         const float to = from + 1.0f / (float)(1 << 2 * i) / total;
         if ((status = txs_learn_level(&a, noise, env, from, to)) != TXM_OK) goto done;
@@ -2554,31 +3322,36 @@ static txm_status txs_enter_level(texsyn_job *job, txm_env *env) {
     const texsyn_model *m = job->desc.model;
     const int i = job->level;
     const txs_level *l = &m->level[i];
-    int width, height, margin = 1;
+    int width, height, margin = TXS_LABEL_REACH, filters = 0;
     txs_canvas coarse = job->canvas;
     txs_canvas_size(&job->desc, i, &width, &height);
     for (int k = 0; k < l->type_count; k++) {
         int reach = txs_reach(&l->types[k]);
         if (reach > margin) margin = reach;
+        filters += l->types[k].kind == TEXSYN_FILTER;
     }
     txm_arena_free(&job->level_arena);
     job->sampler = NULL;
-    if (!txs_canvas_make(&job->canvas, &job->memory, width, height, margin, 2 * m->bands)) {
+    if (!txs_canvas_make(&job->canvas, &job->memory, width, height, margin, 2 * m->bands + 1)) {
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
     }
-    job->sampler = txs_sampler_make(&job->level_arena, l, l->type_count, &job->canvas, m->bands,
-                                    job->noise, txm_hash(job->desc.seed) + 128 + (uint64_t)i);
+    job->sampler =
+        txs_sampler_make(&job->level_arena, l, l->type_count, filters, &job->canvas, m->bands,
+                         job->noise, txm_hash(job->desc.seed) + 128 + (uint64_t)i);
     if (!job->sampler) {
         txs_canvas_free(&job->canvas, &job->memory);
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the sampler");
     }
-    if (coarse.pixels) txs_fill_parent(l + 1, &coarse, l, &job->canvas, m->bands);
+    if (coarse.pixels) {
+        txs_fill_parent(l + 1, &coarse, l, &job->canvas, m->bands);
+        txs_fill_labels(l, &job->canvas, m->bands);
+    }
     txs_start_canvas(l, &job->canvas, m->bands, coarse.pixels != NULL,
                      txm_hash(job->desc.seed) + (uint64_t)i);
     txs_canvas_free(&coarse, &job->memory);
-    txs_sampler_start(job->sampler);
+    txs_sampler_start(job->sampler, env);
     return TXM_OK;
 }
 
@@ -3313,7 +4086,7 @@ static void txs_draw_value(const txs_brush *s, int label, int band, const uint8_
                            uint8_t *p, txm_rng *rng) {
     const int values = s->texture[label].level->values[band];
     rows[n] = txs_no_energy;
-    int v = s->pick(rows, (n + 1) & ~1, s->single[label * TXS_MAX_BANDS + band],
+    int v = s->pick(rows, 1, (n + 1) & ~1, s->single[label * TXS_MAX_BANDS + band],
                     s->noise + (txm_rng_next(rng) & (TXS_NOISE - 1)));
     if (v >= values) v = values - 1;
     p[band * s->mosaic->canvas.plane] = (uint8_t)v;
@@ -6840,6 +7613,7 @@ TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, t
         uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
         txs_coder c;
         memset(&c, 0, sizeof c);
+        c.version = 1; /* of the labels' models: pictures of several textures have no filters */
         c.out = bytes;
         c.size = capacity;
         txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'C'), txs_put(&c, '1');
@@ -6879,6 +7653,7 @@ TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_e
     int enough = m && z;
     if (m) m->arena = arena;
     memset(&c, 0, sizeof c);
+    c.version = 1;
     c.reading = 1;
     c.in = bytes;
     c.at = TXS_MAGIC_BYTES;

@@ -7,9 +7,12 @@ import struct
 import sys
 import zlib
 
-KINDS = ["single", "pair", "parent", "values", "corner", "scale", "parallel"]
-SINGLE, PAIR, PARENT, VALUES, CORNER, SCALE, PARALLEL = range(7)
+KINDS = ["single", "pair", "parent", "values", "corner", "scale", "parallel",
+         "filter", "context"]
+SINGLE, PAIR, PARENT, VALUES, CORNER, SCALE, PARALLEL, FILTER, CONTEXT = range(9)
 NONE, REVERSED, DIAGONAL = range(3)
+SHAPES = [(0, 1, 1, 0), (1, 0, 0, 1), (1, -1, 1, 1), (1, 1, -1, 1),
+          (0, 1, 1, 0), (1, 0, 0, 1), (0, 1, 1, 0), (1, 0, 0, 1)]  # d and e of the filters
 ROOT_SCALES = [48, 36, 26]  # on levels 0, 1, and 2 or more; of all kinds but SINGLE
 ROOT_SCALE_SINGLE = 160
 RARE = 3  # the smallest root that has a potential
@@ -116,6 +119,7 @@ class Type:
     def __init__(self, kind, band, other):
         self.kind, self.band, self.other = kind, band, other
         self.dx = self.dy = self.ex = self.ey = self.phase = 0
+        self.shape = self.scale = 0
 
     def members(self):
         d, e = (self.dx, self.dy), (self.ex, self.ey)
@@ -128,22 +132,28 @@ class Type:
             at.append((d[0] - e[0], d[1] - e[1]))
         if self.kind == PARALLEL:
             at.append((d[0] + e[0], d[1] + e[1]))
+        if self.kind == CONTEXT:
+            at += [(e[0] + x, e[1] + y) for x in (-2, 2) for y in (-2, 2)]
         return at
 
 
-def read_description(coder, place, bands, is_coarsest):
-    kind = coder.limited(3, PAIR, PARALLEL)
+def read_description(coder, place, bands, is_coarsest, version):
+    kind = coder.limited(3, PAIR, PARALLEL if version == 1 else CONTEXT)
     t = Type(kind, coder.limited(2, 0, bands - 1), 0)
     if kind == PAIR:
         t.phase = coder.limited(2, 0, 2)
-    t.other = t.band if kind == CORNER else coder.limited(2, 0, bands - 1)
+    if kind == FILTER:
+        t.other, t.shape, t.scale = t.band, coder.limited(4, 0, 7), coder.limited(9, 1, 279)
+        t.dx, t.dy, t.ex, t.ey = SHAPES[t.shape]
+        return t
+    t.other = t.band if kind in (CORNER, CONTEXT) else coder.limited(2, 0, bands - 1)
     if kind != PARENT:
         t.dx, t.dy = coder.number(place[0][kind]), coder.number(place[1][kind])
     if kind >= CORNER:
         t.ex, t.ey = coder.number(place[2][kind]), coder.number(place[3][kind])
-    require(not (is_coarsest and kind in (PARENT, SCALE)), "nothing is coarser")
+    require(not (is_coarsest and kind in (PARENT, SCALE, CONTEXT)), "nothing is coarser")
     d, e, same = (t.dx, t.dy), (t.ex, t.ey), t.band == t.other
-    if kind >= CORNER or (kind in (PAIR, VALUES) and same):
+    if kind in (CORNER, SCALE, PARALLEL) or (kind in (PAIR, VALUES) and same):
         require(d != (0, 0), "members coincide")
     if kind == CORNER or (kind == PARALLEL and same):
         require(e != (0, 0) and e != d, "members coincide")
@@ -169,12 +179,13 @@ def most_alike(t, earlier):
 def read_statistics(coder, contexts_of, t, earlier, level, values):
     share, potential = contexts_of
     bins = values if t.kind == SINGLE else 63 if t.kind in (PAIR, PARENT) else 81
+    bins = 27 if t.kind == FILTER else bins
     scale = ROOT_SCALE_SINGLE if t.kind == SINGLE else ROOT_SCALES[min(level, 2)]
     like, same = most_alike(t, earlier), t.band == t.other
     mirror = NONE
     if same and t.kind == VALUES:
         mirror = DIAGONAL
-    elif same and t.kind not in (SINGLE, CORNER):
+    elif same and t.kind not in (SINGLE, CORNER, CONTEXT):
         mirror = REVERSED
     root = coder.sequence(share[t.kind], like and like.root, bins, 0, scale, mirror)
     used = sum(r >= RARE for r in root)
@@ -190,7 +201,8 @@ def read_statistics(coder, contexts_of, t, earlier, level, values):
 
 class Model:
     def __init__(self, data):
-        require(data[:4] == b"TXS1", "not a texsyn model")
+        require(data[:4] in (b"TXS1", b"TXS2"), "not a texsyn model")
+        version = data[3] - ord("0")
         require(8 <= len(data) <= (1 << 20) + 4, "of a wrong size")
         require(zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0], "damaged or too short")
         coder = Coder(data[4:-4])
@@ -205,19 +217,24 @@ class Model:
         place = [[Context() for _ in KINDS] for _ in range(4)]
         contexts = [[[Context() for _ in range(8)] for _ in KINDS] for _ in range(2)]
         self.types = [None] * self.levels
+        self.labels = [None] * self.levels  # limits of gradient and curve, two of each
         self.values = [None] * self.levels  # (number, low, step) of each band
         for level in reversed(range(self.levels)):
             values = self.values[level] = []
             for _ in range(self.bands):
                 values.append((coder.limited(5, 1, 32), coder.real(), coder.real()))
                 require(values[-1][2] > 0, "a step of no size")
+            if version > 1 and level + 1 < self.levels:
+                self.labels[level] = [(coder.limited(15, 0, 30752), coder.limited(9, -128, 128))
+                                      for _ in range(2)]
             count = coder.limited(7, self.bands, 96)
             types = self.types[level] = []
             for k in range(count):
                 if k < self.bands:
                     t = Type(SINGLE, k, k)
                 else:
-                    t = read_description(coder, place, self.bands, level + 1 == self.levels)
+                    t = read_description(coder, place, self.bands, level + 1 == self.levels,
+                                         version)
                 read_statistics(coder, contexts, t, types, level, values[t.band][0])
                 types.append(t)
         require(coder.at == len(coder.body), "bytes left over")

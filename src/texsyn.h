@@ -56,9 +56,10 @@
      added, and so on [1]. Synthesis is Gibbs sampling [4] in which the potentials of the clique
      types are controlled so that the histograms of the canvas follow those of the example.
      In addition to the pairs of [1] there is a coarse joint histogram of two neighbouring values,
-     which distinguishes rare values from frequent ones; and there are cliques of three and four
-     pixels (corners, parallel differences, differences together with those of the coarser level),
-     for what pairs cannot express.
+     which distinguishes rare values from frequent ones; there are cliques of three and four pixels
+     (corners, parallel differences, differences together with those of the coarser level), for what
+     pairs cannot express; and for contours there are filters of 12 to 18 pixels and differences
+     beside a label of the coarser level, which says how that changes and curves.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)
@@ -71,8 +72,9 @@
    MEMORY
      A model is a few blocks, some 100 kB in memory for 3 kB in a file. Learning takes 12 bytes per
      sample of the example and 3 to 5 MB; up to 40 MB with one level and max_distance 60. Synthesis
-     takes 2 bytes per band and pixel for the current level and the next coarser one, without
-     margins: 8 to 9 bytes per RGB pixel in all, and 1 MB; a picture that does not tile is cut
+     takes 2 bytes per band and pixel for the current level and the next coarser one, 1 more for
+     labels and half a byte for each filter, without margins: 9 to 14 bytes per RGB pixel in all,
+     and 1 MB; a picture that does not tile is cut
      from a canvas of at least 64 x 64. After an error nothing stays allocated and *out is NULL.
 
    TIME   (one core of 2023; make bench measures yours)
@@ -174,7 +176,10 @@ typedef enum texsyn_kind {
     TEXSYN_VALUES,     /* two pixels, coarsely: class of I_b(p), class of I_c(p + d)             */
     TEXSYN_CORNER,     /* three: classes of I_b(p + d) - I_b(p) and I_b(p + e) - I_b(p)          */
     TEXSYN_SCALE,      /* classes of I_b(p + d) - I_b(p) and J_b(p + e) - J_b(p + d - e)         */
-    TEXSYN_PARALLEL    /* classes of I_b(p + d) - I_b(p) and I_c(p + e + d) - I_c(p + e)         */
+    TEXSYN_PARALLEL,   /* classes of I_b(p + d) - I_b(p) and I_c(p + e + d) - I_c(p + e)         */
+    TEXSYN_FILTER,     /* class of the response of a filter of 12 to 18 pixels, weights 1 and -1 */
+    TEXSYN_CONTEXT     /* label of J(p + e), class of I_b(p + d) - I_b(p), of J_b(p) - I_b(p) for
+                          d = 0; the label says how J changes and curves there                   */
 } texsyn_kind;
 
 /* One clique type of a model's neighbourhood system. */
@@ -474,6 +479,7 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/model.h"
 #include "texsyn/energy.h"
 #include "texsyn/potential.h"
+#include "texsyn/filter.h"
 #include "texsyn/sampler.h"
 #include "texsyn/example.h"
 #include "texsyn/neighbourhood.h"

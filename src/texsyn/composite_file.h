@@ -239,6 +239,7 @@ TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, t
         uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
         txs_coder c;
         memset(&c, 0, sizeof c);
+        c.version = 1; /* of the labels' models: pictures of several textures have no filters */
         c.out = bytes;
         c.size = capacity;
         txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'C'), txs_put(&c, '1');
@@ -278,6 +279,7 @@ TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_e
     int enough = m && z;
     if (m) m->arena = arena;
     memset(&c, 0, sizeof c);
+    c.version = 1;
     c.reading = 1;
     c.in = bytes;
     c.at = TXS_MAGIC_BYTES;

@@ -11,6 +11,9 @@
 #if defined(__GNUC__)
 #include <immintrin.h>
 #define TXS_AVX2 1 /* compiled for AVX2 function by function, chosen when running */
+#ifdef __x86_64__
+#define TXS_LANES 1 /* an address is as long as a lane */
+#endif
 #endif
 #endif
 
@@ -31,11 +34,22 @@ enum {
     TXS_BINS = TXS_CLASSES * TXS_CLASSES, /* of the largest histogram                         */
     TXS_ONE = 65536,    /* sum of a normalised histogram                                    */
     TXS_MAX_TYPES = 96, /* clique types of one level                                        */
-    TXS_MAX_ENDS = 112, /* ends of cliques at one pixel of one band: keeps energies 16 bit  */
+    TXS_MAX_ENDS = 160, /* ends of cliques at one pixel of one band                         */
+    TXS_MAX_MEMBERS = 18, /* pixels of a clique                                             */
+    TXS_LABELS = 9,     /* of a pixel by what its surroundings look like on the level above */
+    TXS_LABEL_REACH = 2,   /* pixels: of what a label looks at                              */
+    TXS_MAX_GRADIENT = 30752, /* the largest squared gradient: 2 (4 times 31)^2             */
+    TXS_RESPONSES = 27, /* classes of a filter's response                                   */
+    TXS_MAX_RESPONSE = 279, /* 9 pixels against 9                                           */
+    TXS_MAX_FILTERS = 12, /* clique types that are filters, of one level                    */
     TXS_MAX_REACH = 60, /* pixels                                                           */
     TXS_NEAR = 10,      /* pixels: reach of all levels but the coarsest                     */
-    TXS_ROW = 64,       /* bytes of a table row for a difference                            */
+    TXS_ROW_BITS = 6,   /* their binary logarithm                                           */
+    TXS_ROW = 1 << TXS_ROW_BITS, /* bytes of a table row for a difference                   */
+    TXS_VALUE_BITS = 5, /* the logarithm of TXS_VALUES                                      */
     TXS_TABLE = (2 * TXS_CLASSES + TXS_DIFFERENCES) * TXS_ROW, /* bytes of one type's tables  */
+    TXS_RESPONSE_ROW = 2 * (TXS_MAX_RESPONSE + TXS_VALUES) - 1, /* bytes of a filter's table,
+                            of which there is one for each weight                           */
     TXS_ZERO = 64,       /* the byte in a row that stands for no energy                      */
     TXS_NAT = 16,        /* steps of a row's byte per nat of energy                          */
     TXS_FINE = 4,        /* steps of the summed energy per step of a byte                    */
@@ -65,6 +79,7 @@ enum {
 #define TXS_NOISE_SHARE 0.75f  /* the same in units of the expected sampling noise               */
 #define TXS_CORNER_WEIGHT 2.0f /* of distances, pairs having 1                                   */
 #define TXS_EDGE_WEIGHT 2.5f
+#define TXS_CONTOUR_WEIGHT 2.5f /* filters and labels */
 
 /* classes of a difference -31..31: fine where differences are frequent */
 static const uint8_t txs_difference_class[TXS_DIFFERENCES + 1] = {

@@ -185,6 +185,75 @@ static void txs_fill_parent(const txs_level *above, const txs_canvas *coarse,
     }
 }
 
+/* How the first band of the level above changes and curves at p: the squared gradient by Sobel's
+   filter, the Laplacian, both of pixels that are `step` apart in x and `row` in y. */
+static void txs_look(const uint8_t *p, const ptrdiff_t x[2], const ptrdiff_t y[2], int *gradient,
+                     int *curve) {
+    const int gx = p[y[0] + x[1]] + 2 * p[x[1]] + p[y[1] + x[1]] - p[y[0] + x[0]] - 2 * p[x[0]] -
+                   p[y[1] + x[0]];
+    const int gy = p[y[1] + x[0]] + 2 * p[y[1]] + p[y[1] + x[1]] - p[y[0] + x[0]] - 2 * p[y[0]] -
+                   p[y[0] + x[1]];
+    *gradient = gx * gx + gy * gy;
+    *curve = p[x[0]] + p[x[1]] + p[y[0]] + p[y[1]] - 4 * p[0];
+}
+
+/* Visit the labels' arguments; at a border without margin the last pixel is repeated. */
+static void txs_look_at(const txs_canvas *c, int bands, int x, int y, int *gradient, int *curve) {
+    enum { R = TXS_LABEL_REACH };
+    const int wrap = c->margin >= R;
+    const ptrdiff_t dx[2] = {wrap || x >= R ? -R : -x,
+                             wrap || x + R < c->width ? R : c->width - 1 - x};
+    const ptrdiff_t dy[2] = {c->stride * (wrap || y >= R ? -R : -y),
+                             c->stride * (wrap || y + R < c->height ? R : c->height - 1 - y)};
+    txs_look(txs_at(c, bands, x, y), dx, dy, gradient, curve);
+}
+
+/* Fill the plane of labels from the parent plane of the first band: by thirds of the gradient, 0 to
+   2, plus 3 times thirds of the curvature. */
+static void txs_fill_labels(const txs_level *level, txs_canvas *canvas, int bands) {
+    for (int y = 0; y < canvas->height; y++) {
+        uint8_t *label = txs_at(canvas, 2 * bands, 0, y);
+        for (int x = 0; x < canvas->width; x++) {
+            int gradient, curve;
+            txs_look_at(canvas, bands, x, y, &gradient, &curve);
+            label[x] =
+                (uint8_t)((gradient > level->gradient_cut[0]) +
+                          (gradient > level->gradient_cut[1]) +
+                          3 * ((curve > level->curve_cut[0]) + (curve > level->curve_cut[1])));
+        }
+    }
+    txs_wrap(canvas, 2 * bands);
+}
+
+/* Choose the limits of the labels: thirds of the example. Returns 0 if there is no memory. */
+static int txs_cut_labels(txs_level *level, const txs_source *s, int bands, txm_arena *arena) {
+    enum { CURVES = 8 * TXS_VALUES + 1 };
+    uint32_t *gradients =
+        (uint32_t *)txm_arena_zero(arena, TXS_MAX_GRADIENT + 1, sizeof *gradients);
+    uint32_t curves[CURVES] = {0}, count = 0;
+    if (!gradients) return 0;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            int gradient, curve;
+            if (s->mask && !s->mask[(size_t)y * (size_t)s->width + (size_t)x]) continue;
+            txs_look_at(&s->canvas, bands, x, y, &gradient, &curve);
+            gradients[gradient]++;
+            curves[curve + CURVES / 2]++;
+            count++;
+        }
+    }
+    for (uint32_t i = 0; i < 2; i++) {
+        const uint32_t part = (i + 1) * (count / 3);
+        uint32_t seen = 0;
+        int g = 0, k = 0;
+        while (g < TXS_MAX_GRADIENT && (seen += gradients[g]) < part) g++;
+        for (seen = 0; k < CURVES - 1 && (seen += curves[k]) < part;) k++;
+        level->gradient_cut[i] = g;
+        level->curve_cut[i] = k - CURVES / 2;
+    }
+    return 1;
+}
+
 /* Start the synthesis of a level: from what is above, or from even noise (step 2 of [1]). */
 static void txs_start_canvas(const txs_level *level, const txs_canvas *canvas, int bands,
                              int has_parent, uint64_t seed) {

@@ -13,6 +13,7 @@ enum { TXS_MAGIC_BYTES = 4, TXS_CRC_BYTES = 4, TXS_MAX_FILE = 1 << 20, TXS_UNARY
 
 typedef struct txs_coder {
     int reading, bad; /* bad: ran out of bytes, or an impossible value    */
+    int version;      /* of the format                                    */
     uint8_t *out;     /* writing; NULL = only count                       */
     const uint8_t *in;
     size_t at, size;      /* bytes so far, bytes there are                    */
@@ -158,7 +159,7 @@ static void txs_sequence(txs_coder *c, txs_context *x, int16_t *v, const int16_t
 
 /* All contexts: of displacements, histograms and potentials by the kind of the clique type. */
 typedef struct txs_codec {
-    txs_context place[4][7], share[7][8], potential[7][8];
+    txs_context place[4][TXS_KINDS], share[TXS_KINDS][8], potential[TXS_KINDS][8];
     int16_t used[TXS_BINS]; /* the potential, where it is kept */
 } txs_codec;
 
@@ -201,7 +202,9 @@ static void txs_code_statistics(txs_coder *c, txs_codec *z, txs_level *l, int le
     int used = 0;
     txs_mirror mirror = TXS_NONE; /* differences are about as often v as -v */
     if (same && t->kind == TEXSYN_VALUES) mirror = TXS_DIAGONAL;
-    else if (same && t->kind != TEXSYN_SINGLE && t->kind != TEXSYN_CORNER) mirror = TXS_REVERSED;
+    else if (same && t->kind != TEXSYN_SINGLE && t->kind != TEXSYN_CORNER &&
+             t->kind != TEXSYN_CONTEXT)
+        mirror = TXS_REVERSED;
     txs_sequence(c, z->share[t->kind], t->root, like < 0 ? NULL : l->types[like].root, bins, 0,
                  txs_root_scale(t->kind, level), mirror);
 
@@ -216,13 +219,33 @@ static void txs_code_statistics(txs_coder *c, txs_codec *z, txs_level *l, int le
     if (!c->bad && !txs_unround_statistics(t)) c->bad = 1;
 }
 
+/* A filter within its band. */
+static void txs_code_filter(txs_coder *c, txs_type *t) {
+    t->other = t->band;
+    t->shape = txs_limited(c, 4, 0, TXS_SHAPES - 1, t->shape);
+    t->scale = txs_limited(c, 9, 1, TXS_MAX_RESPONSE, t->scale);
+    t->dx = txs_shapes[t->shape].dx;
+    t->dy = txs_shapes[t->shape].dy;
+    t->ex = txs_shapes[t->shape].ex;
+    t->ey = txs_shapes[t->shape].ey;
+}
+
 static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_model *m,
                           int level) {
-    t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_PARALLEL, t->kind);
+    if (c->version == 1) t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_PARALLEL, t->kind);
+    else t->kind = txs_limited(c, 3, TEXSYN_PAIR, TEXSYN_CONTEXT, t->kind);
     t->band = txs_limited(c, 2, 0, m->bands - 1, t->band);
     t->phase = t->kind == TEXSYN_PAIR ? txs_limited(c, 2, 0, 2, t->phase) : 0;
-    t->other = t->kind == TEXSYN_CORNER ? t->band : txs_limited(c, 2, 0, m->bands - 1, t->other);
-    if ((t->kind == TEXSYN_PARENT || t->kind == TEXSYN_SCALE) && level + 1 == m->levels) c->bad = 1;
+    if (t->kind == TEXSYN_FILTER) {
+        txs_code_filter(c, t);
+        return;
+    }
+    t->other = t->kind == TEXSYN_CORNER || t->kind == TEXSYN_CONTEXT
+                   ? t->band
+                   : txs_limited(c, 2, 0, m->bands - 1, t->other);
+    if ((t->kind == TEXSYN_PARENT || t->kind == TEXSYN_SCALE || t->kind == TEXSYN_CONTEXT) &&
+        level + 1 == m->levels)
+        c->bad = 1;
     if (t->kind != TEXSYN_PARENT) {
         t->dx = txs_number(c, &z->place[0][t->kind], t->dx);
         t->dy = txs_number(c, &z->place[1][t->kind], t->dy);
@@ -235,14 +258,15 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     const int same_d = t->dx == 0 && t->dy == 0, same_e = t->ex == 0 && t->ey == 0;
     const int equal = t->ex == t->dx && t->ey == t->dy,
               opposite = t->ex == -t->dx && t->ey == -t->dy;
-    if (t->kind != TEXSYN_PARENT && same_d && (t->band == t->other || t->kind >= TEXSYN_CORNER))
+    if (t->kind != TEXSYN_PARENT && same_d && t->kind != TEXSYN_CONTEXT &&
+        (t->band == t->other || t->kind >= TEXSYN_CORNER))
         c->bad = 1;
     if (t->kind == TEXSYN_CORNER && (same_e || equal)) c->bad = 1;
     if (t->kind == TEXSYN_PARALLEL && t->band == t->other && (same_e || equal || opposite))
         c->bad = 1;
     /* and so would members that are drawn at the same time, see txs_visit */
-    int at[4][2], drawn = t->kind == TEXSYN_SCALE ? 2 : txs_members(t, at);
-    txs_members(t, at);
+    int at[TXS_MAX_MEMBERS][2], drawn = txs_footprint(t, at);
+    if (t->kind == TEXSYN_SCALE || t->kind == TEXSYN_CONTEXT) drawn = 2;
     for (int i = 0; i < drawn; i++) {
         for (int j = 0; j < i; j++) {
             const int apart = at[i][0] - at[j][0];
@@ -252,6 +276,14 @@ static void txs_code_type(txs_coder *c, txs_codec *z, txs_type *t, const texsyn_
     if (abs(t->dx) > TXS_MAX_REACH || abs(t->dy) > TXS_MAX_REACH || abs(t->ex) > TXS_MAX_REACH ||
         abs(t->ey) > TXS_MAX_REACH || txs_reach(t) > TXS_MAX_REACH)
         c->bad = 1;
+}
+
+/* The limits between the labels. */
+static void txs_code_labels(txs_coder *c, txs_level *l) {
+    for (int i = 0; i < 2; i++) {
+        l->gradient_cut[i] = txs_limited(c, 15, 0, TXS_MAX_GRADIENT, l->gradient_cut[i]);
+        l->curve_cut[i] = txs_limited(c, 9, -4 * TXS_VALUES, 4 * TXS_VALUES, l->curve_cut[i]);
+    }
 }
 
 /* The whole model, to or from the coder. What reading allocates goes to the model's arena.
@@ -270,9 +302,9 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
         m->dither[b] = (float)txs_limited(c, 8, 0, 255, (int)(m->dither[b] * 255 + 0.5f)) / 255;
     }
     memset(z, 0, sizeof *z);
-    txs_contexts_init(&z->place[0][0], 4 * 7);
-    txs_contexts_init(&z->share[0][0], 7 * 8);
-    txs_contexts_init(&z->potential[0][0], 7 * 8);
+    txs_contexts_init(&z->place[0][0], 4 * TXS_KINDS);
+    txs_contexts_init(&z->share[0][0], TXS_KINDS * 8);
+    txs_contexts_init(&z->potential[0][0], TXS_KINDS * 8);
     for (int i = m->levels - 1; i >= 0 && !c->bad; i--) {
         txs_level *l = &m->level[i];
         for (int b = 0; b < m->bands; b++) {
@@ -281,6 +313,7 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             l->step[b] = txs_real(c, l->step[b]);
             if (!(l->step[b] > 1e-6f)) c->bad = 1;
         }
+        if (c->version > 1 && i + 1 < m->levels) txs_code_labels(c, l);
         l->type_count = txs_limited(c, 7, m->bands, TXS_MAX_TYPES, l->type_count);
         if (c->bad) break;
         if (c->reading) {
@@ -295,6 +328,10 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             if (!c->bad) txs_code_statistics(c, z, l, i, k);
             if (k < m->bands && !c->bad) txs_make_classes(l, k);
         }
+        int filters = 0;
+        for (int k = 0; k < l->type_count && !c->bad; k++)
+            filters += l->types[k].kind == TEXSYN_FILTER;
+        if (filters > TXS_MAX_FILTERS) c->bad = 1;
         if (!c->bad && txs_most_ends(l, m->bands) > TXS_MAX_ENDS) c->bad = 1;
     }
     return 1;
@@ -349,8 +386,10 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         txs_coder c;
         memset(&c, 0, sizeof c);
         c.out = bytes;
+        c.version = copy->version;
         c.size = capacity;
-        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'S'), txs_put(&c, '1');
+        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'S'),
+            txs_put(&c, (uint8_t)('0' + copy->version));
         txs_coder_start(&c);
         txs_code_model(&c, copy, z);
         txs_coder_finish(&c);
@@ -370,7 +409,8 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
     const uint8_t *bytes = (const uint8_t *)data;
     if (out) *out = NULL;
     if (!data || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "load: data or out is NULL");
-    if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || memcmp(bytes, "TXS1", TXS_MAGIC_BYTES) != 0)
+    if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || (memcmp(bytes, "TXS1", TXS_MAGIC_BYTES) != 0 &&
+                                                   memcmp(bytes, "TXS2", TXS_MAGIC_BYTES) != 0))
         return txm_fail(env, TXM_BAD_DATA, "not a texsyn model");
     size -= TXS_CRC_BYTES;
     uint32_t crc = 0;
@@ -388,6 +428,7 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
     c.at = TXS_MAGIC_BYTES;
     c.size = size;
     if (enough) {
+        m->version = c.version = bytes[TXS_MAGIC_BYTES - 1] - '0';
         txs_coder_start(&c);
         enough = txs_code_model(&c, m, z);
         c.bad |= c.at != c.size; /* the coder reads just what was written */

@@ -68,7 +68,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.height = s->height;
         s->canvas.stride = s->width;
         s->canvas.plane = (ptrdiff_t)pixels;
-        s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels);
+        s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels + 1);
         if (arena->failed)
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
@@ -96,9 +96,13 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
             if (i == 0) m->dither[b] = fill;
         }
     }
-    for (int i = m->levels - 2; i >= 0; i--)
+    for (int i = m->levels - 2; i >= 0; i--) {
         txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
                        m->bands);
+        if (!txs_cut_labels(&m->level[i], &source[i], m->bands, arena))
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+        txs_fill_labels(&m->level[i], &source[i].canvas, m->bands);
+    }
     return TXM_OK;
 }
 
@@ -128,6 +132,7 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
         goto done;
     }
     txs_noise_table(noise);
+    m->version = TXS_VERSION;
     if ((status = txs_prepare(desc, m, source, &arena, env)) != TXM_OK) goto done;
 
     for (int i = 0; i < m->levels; i++) total += 1.0f / (float)(1 << 2 * i);
@@ -140,15 +145,19 @@ TEXSYN_API txm_status texsyn_learn(const texsyn_learn_desc *desc, txm_env *env,
         a.level = &m->level[i];
         a.source = &source[i];
         a.canvas = &canvas;
+        a.shapes = 1;
         a.level->types = (txs_type *)txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof(txs_type));
         const int margin = i + 1 == m->levels ? TXS_MAX_REACH : TXS_NEAR;
         if (!a.level->types ||
             !txs_canvas_make(&canvas, env, txm_clampi(source[i].width, 128, 256),
-                             txm_clampi(source[i].height, 128, 256), margin, 2 * m->bands)) {
+                             txm_clampi(source[i].height, 128, 256), margin, 2 * m->bands + 1)) {
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
             goto done;
         }
-        if (above.pixels) txs_fill_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+        if (above.pixels) {
+            txs_fill_parent(a.level + 1, &above, a.level, &canvas, m->bands);
+            txs_fill_labels(a.level, &canvas, m->bands);
+        }
         txs_canvas_free(&above, env);
         const float to = from + 1.0f / (float)(1 << 2 * i) / total;
         if ((status = txs_learn_level(&a, noise, env, from, to)) != TXM_OK) goto done;

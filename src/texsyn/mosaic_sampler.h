@@ -170,7 +170,7 @@ static void txs_draw_value(const txs_brush *s, int label, int band, const uint8_
                            uint8_t *p, txm_rng *rng) {
     const int values = s->texture[label].level->values[band];
     rows[n] = txs_no_energy;
-    int v = s->pick(rows, (n + 1) & ~1, s->single[label * TXS_MAX_BANDS + band],
+    int v = s->pick(rows, 1, (n + 1) & ~1, s->single[label * TXS_MAX_BANDS + band],
                     s->noise + (txm_rng_next(rng) & (TXS_NOISE - 1)));
     if (v >= values) v = values - 1;
     p[band * s->mosaic->canvas.plane] = (uint8_t)v;

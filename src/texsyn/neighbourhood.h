@@ -6,30 +6,80 @@
 
 /* ---- statistics of an image ------------------------------------------------------------- */
 
+enum { TXS_RESPONSES_TOGETHER = 256 };
+
+/* The responses of a filter at count tails from (x, y) on. */
+static void txs_responses(const txs_canvas *c, const txs_type *t, int x, int y, int count,
+                          int16_t *response) {
+    int at[TXS_MAX_MEMBERS][2], weight[TXS_MAX_MEMBERS];
+    const int n = txs_shape_pixels(t->shape, at, weight);
+    memset(response, 0, (size_t)count * sizeof *response);
+    for (int k = 0; k < n; k++) {
+        const uint8_t *p = txs_at(c, t->band, x + at[k][0], y + at[k][1]);
+        const int w = weight[k];
+        for (int i = 0; i < count; i++) response[i] = (int16_t)(response[i] + w * p[i]);
+    }
+}
+
+/* The tails whose members lie inside an image: x, y of the first, and after the last. */
+static void txs_find_tails(int at[TXS_MAX_MEMBERS][2], int members, int width, int height,
+                           int inside[4]) {
+    const int size[2] = {width, height};
+    for (int k = 0; k < 2; k++) {
+        inside[k] = 0;
+        inside[k + 2] = size[k];
+        for (int i = 0; i < members; i++) {
+            if (-at[i][k] > inside[k]) inside[k] = -at[i][k];
+            if (size[k] - at[i][k] < inside[k + 2]) inside[k + 2] = size[k] - at[i][k];
+        }
+    }
+}
+
+/* Do all members of the clique at (x, y) belong to the texture? */
+static int txs_is_masked(const uint8_t *mask, int width, int at[TXS_MAX_MEMBERS][2], int members,
+                         int x, int y) {
+    int all = 1;
+    for (int i = 0; i < members; i++)
+        all &= mask[(ptrdiff_t)(y + at[i][1]) * width + x + at[i][0]] != 0;
+    return all;
+}
+
 /* Histogram of a clique type over a canvas: of the example, cliques that lie inside image and
    mask; of a synthesised canvas (wrap) all of them. Every step-th row. Returns the number of
    cliques; share[] sums to about TXS_ONE. */
 static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, int step, int bands,
                            const txs_level *level, const txs_type *t, int32_t share[TXS_BINS]) {
-    int at[4][2], members = txs_members(t, at), x0 = 0, y0 = 0, x1 = c->width, y1 = c->height;
+    int at[TXS_MAX_MEMBERS][2], inside[4] = {0, 0, c->width, c->height};
+    const int members = txs_footprint(t, at);
     uint32_t h[2][TXS_BINS + 15];
     const txs_tally y = txs_tally_make(t, level, c, bands);
     int64_t total = 0;
     memset(h, 0, sizeof h);
-    for (int i = 0; i < members && !wrap; i++) {
-        if (-at[i][0] > x0) x0 = -at[i][0];
-        if (c->width - at[i][0] < x1) x1 = c->width - at[i][0];
-        if (-at[i][1] > y0) y0 = -at[i][1];
-        if (c->height - at[i][1] < y1) y1 = c->height - at[i][1];
-    }
+    if (!wrap) txs_find_tails(at, members, c->width, c->height, inside);
+    const int x0 = inside[0], y0 = inside[1], x1 = inside[2], y1 = inside[3];
+    uint8_t class_of[2 * TXS_MAX_RESPONSE + 1];
+    if (t->kind == TEXSYN_FILTER) txs_response_classes(t->scale, class_of);
     for (int row = y0; row < y1; row += step) {
         const uint8_t *p = txs_at(c, 0, 0, row);
         if (mask || t->phase) {
             for (int x = x0; x < x1; x++) {
-                int inside = txs_is_tail(t, x, row);
-                for (int i = 0; i < members && mask; i++)
-                    inside &= mask[(ptrdiff_t)(row + at[i][1]) * c->width + x + at[i][0]] != 0;
-                if (inside) h[0][txs_bin(&y, p + x)]++;
+                if (!txs_is_tail(t, x, row) ||
+                    (mask && !txs_is_masked(mask, c->width, at, members, x, row)))
+                    continue;
+                if (t->kind == TEXSYN_FILTER) {
+                    int16_t r;
+                    txs_responses(c, t, x, row, 1, &r);
+                    h[0][class_of[r + TXS_MAX_RESPONSE]]++;
+                } else {
+                    h[0][txs_bin(&y, p + x)]++;
+                }
+            }
+        } else if (t->kind == TEXSYN_FILTER) {
+            int16_t r[TXS_RESPONSES_TOGETHER];
+            for (int x = x0, n; x < x1; x += n) {
+                n = x1 - x < TXS_RESPONSES_TOGETHER ? x1 - x : (int)TXS_RESPONSES_TOGETHER;
+                txs_responses(c, t, x, row, n, r);
+                for (int i = 0; i < n; i++) h[i & 1][class_of[r[i] + TXS_MAX_RESPONSE]]++;
             }
         } else if (y.form == 1) {
             const uint8_t *a = p + y.a, *b = p + y.b;
@@ -74,7 +124,8 @@ typedef struct txs_learner {
     const txs_canvas *canvas;
     txs_candidate *candidates;
     int candidate_count, capacity;
-    int step; /* the canvas is measured on every step-th row */
+    int step;   /* the canvas is measured on every step-th row */
+    int shapes; /* filters and labels may be chosen too        */
 } txs_learner;
 
 static txs_type *txs_add_type(txs_level *l, int kind, int band, int other, int dx, int dy) {
@@ -108,6 +159,56 @@ static void txs_add_candidate(txs_learner *a, int kind, int band, int other, con
     c->type.ex = ex;
     c->type.ey = ey;
     c->weight = weight;
+}
+
+/* What a filter's last classes begin at: the example's 99.5th percentile. */
+static int txs_find_scale(const txs_learner *a, const txs_type *t) {
+    const txs_source *s = a->source;
+    int at[TXS_MAX_MEMBERS][2], inside[4];
+    const int members = txs_footprint(t, at);
+    uint32_t h[TXS_MAX_RESPONSE + 1] = {0}, count = 0, seen = 0;
+    int16_t r[TXS_RESPONSES_TOGETHER];
+    txs_find_tails(at, members, s->width, s->height, inside);
+    for (int y = inside[1]; y < inside[3]; y += s->step) {
+        for (int x = inside[0], n; x < inside[2]; x += n) {
+            n = inside[2] - x < TXS_RESPONSES_TOGETHER ? inside[2] - x
+                                                       : (int)TXS_RESPONSES_TOGETHER;
+            txs_responses(&s->canvas, t, x, y, n, r);
+            for (int i = 0; i < n; i++) {
+                if (s->mask && !txs_is_masked(s->mask, s->width, at, members, x + i, y)) continue;
+                h[abs(r[i])]++;
+                count++;
+            }
+        }
+    }
+    int scale = TXS_MAX_RESPONSE;
+    while (scale > 1 && (seen += h[scale]) <= count / 200) scale--;
+    return scale;
+}
+
+/* Filters, and differences beside the labels of the level above. */
+static void txs_list_shapes(txs_learner *a, const float *seen) {
+    static const int contexts[][4] = {{0, 0, 0, 0},   {1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 0, 0},
+                                      {-1, 1, 0, 0},  {2, 0, 1, 0}, {0, 2, 0, 1}, {2, 2, 1, 1},
+                                      {-2, 2, -1, 1}, {3, 0, 1, 0}, {0, 3, 0, 1}, {3, 3, 1, 1},
+                                      {-3, 3, -1, 1}, {4, 0, 2, 0}, {0, 4, 0, 2}};
+    if (a->index + 1 < a->model->levels)
+        for (size_t i = 0; i < sizeof contexts / sizeof *contexts; i++)
+            txs_add_candidate(a, TEXSYN_CONTEXT, 0, 0, contexts[i], TXS_CONTOUR_WEIGHT * seen[0]);
+    for (int i = 0; i < TXS_SHAPES; i++) {
+        const int d[4] = {txs_shapes[i].dx, txs_shapes[i].dy, txs_shapes[i].ex, txs_shapes[i].ey};
+        if (a->candidate_count == a->capacity) return;
+        txs_candidate *c = &a->candidates[a->candidate_count++];
+        memset(c, 0, sizeof *c);
+        c->type.kind = TEXSYN_FILTER;
+        c->type.dx = d[0];
+        c->type.dy = d[1];
+        c->type.ex = d[2];
+        c->type.ey = d[3];
+        c->type.shape = i;
+        c->type.scale = txs_find_scale(a, &c->type);
+        c->weight = TXS_CONTOUR_WEIGHT * seen[0];
+    }
 }
 
 /* Pairs within the reach, and the kinds that take three or four pixels, of few shapes. */
@@ -315,8 +416,8 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
         (txs_candidate *)txm_arena_alloc(&arena, (size_t)a->capacity, sizeof *a->candidates);
     int64_t(*sum)[TXS_BINS] =
         (int64_t(*)[TXS_BINS])txm_arena_zero(&arena, TXS_MAX_TYPES, sizeof *sum);
-    txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, a->canvas, bands, noise,
-                                      txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
+    txs_sampler *s = txs_sampler_make(&arena, a->level, TXS_MAX_TYPES, TXS_SHAPES, a->canvas, bands,
+                                      noise, txm_hash(a->desc->seed) + 64 + (uint64_t)a->index);
     if (arena.failed) {
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn the model");
         goto done;
@@ -325,13 +426,14 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
     txs_preselect(a);
     for (int b = 0; b < bands; b++) seen[b] = txs_visibility(a->level, b);
     txs_list_candidates(a, reach, seen);
+    if (a->shapes) txs_list_shapes(a, seen);
     txm_parallel_for(env, a->candidate_count, txs_measure_example, a);
     txs_start_canvas(a->level, a->canvas, bands, !top,
                      txm_hash(a->desc->seed) + (uint64_t)a->index);
 
     /* steps 3 to 6 of [1]; what was synthesised so far, and its potentials, are kept */
     for (;;) {
-        txs_sampler_start(s);
+        txs_sampler_start(s, env);
         for (int i = 0; i < sweeps; i++, from += sweep)
             if ((status = txs_sweep(s, env, "learn", from, from + sweep)) != TXM_OK) goto done;
         if (left == 0) break;

@@ -34,6 +34,7 @@ static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_
     const ptrdiff_t tail = t->band * c->plane, head = t->other * c->plane;
     const ptrdiff_t parent = (bands + t->other) * c->plane;
     const ptrdiff_t d = t->dy * c->stride + t->dx, e = t->ey * c->stride + t->ex;
+    const ptrdiff_t label = 2 * bands * c->plane + e;
     const uint8_t *table = tables + 31;
     const ptrdiff_t block = TXS_CLASSES * TXS_ROW;
     for (int i = 0; i < 4; i++) {
@@ -84,6 +85,18 @@ static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_
         ends[1].o2 = parent + e;
         ends[1].o3 = parent + d - e;
         return 2;
+    case TEXSYN_FILTER: return 0;
+    case TEXSYN_CONTEXT: /* the head, the tail; or the tail below its parent */
+        form[0] = form[1] = 4;
+        ends[0].o1 = parent;
+        ends[0].o2 = label;
+        ends[0].table = table + block;
+        if (t->dx == 0 && t->dy == 0) return 1;
+        ends[0].o1 = tail + d;
+        ends[1].o1 = tail - d;
+        ends[1].o2 = label - d;
+        ends[1].table = table;
+        return 2;
     default: /* TEXSYN_PARALLEL: head and tail of the one difference, of the other */
         ends[0].o1 = tail - d;
         ends[0].o2 = head + e;
@@ -102,13 +115,24 @@ static int txs_type_ends(const txs_level *level, const txs_type *t, const uint8_
     }
 }
 
+/* Ends of a filter at one pixel, at most, if its tails have one parity. */
+static int txs_shape_ends(int shape) {
+    int at[TXS_MAX_MEMBERS][2], weight[TXS_MAX_MEMBERS], count[4] = {0}, most = 0;
+    const int n = txs_shape_pixels(shape, at, weight);
+    for (int i = 0; i < n; i++) {
+        const int parity = (at[i][0] & 1) + 2 * (at[i][1] & 1);
+        if (++count[parity] > most) most = count[parity];
+    }
+    return most;
+}
+
 /* Ends that a level's types put into one band, at most; a model must stay within TXS_MAX_ENDS. */
 static int txs_most_ends(const txs_level *level, int bands) {
     int count[TXS_MAX_BANDS] = {0}, most = 0;
     for (int k = 0; k < level->type_count; k++) {
         const txs_type *t = &level->types[k];
-        static const int tail[] = {0, 1, 1, 1, 3, 2, 2}, head[] = {0, 1, 0, 1, 0, 0, 2};
-        count[t->band] += tail[t->kind];
+        static const int tail[] = {0, 1, 1, 1, 3, 2, 2, 0, 2}, head[] = {0, 1, 0, 1, 0, 0, 2, 0, 0};
+        count[t->band] += t->kind == TEXSYN_FILTER ? txs_shape_ends(t->shape) : tail[t->kind];
         count[t->other] += head[t->kind];
     }
     for (int b = 0; b < bands; b++)
@@ -151,6 +175,24 @@ static void txs_expand(const txs_level *level, const txs_type *t, const uint8_t 
                 row[i] = v[class_of[62 - i] * N + class_of[txm_clampi(62 - i + delta, 0, 62)]];
         }
         break;
+    case TEXSYN_CONTEXT:
+        for (int q = 0; q < TXS_LABELS; q++) {
+            for (int i = 0; i < TXS_DIFFERENCES; i++) {
+                table[q * ROW + i] = v[q * N + class_of[i]];
+                table[BLOCK + q * ROW + i] = v[q * N + class_of[62 - i]];
+            }
+        }
+        break;
+    case TEXSYN_FILTER: {
+        uint8_t classes[2 * TXS_MAX_RESPONSE + 1];
+        txs_response_classes(t->scale, classes);
+        for (int i = 0; i < TXS_RESPONSE_ROW; i++) {
+            const int r = txm_clampi(i - (TXS_VALUES - 1), 0, 2 * TXS_MAX_RESPONSE);
+            table[i] = v[classes[r]];
+            table[TXS_RESPONSE_ROW + i] = v[classes[2 * TXS_MAX_RESPONSE - r]];
+        }
+        break;
+    }
     default: /* TEXSYN_SCALE and, with the ends of the other difference, TEXSYN_PARALLEL */
         for (int q = 0; q < N; q++) {
             for (int i = 0; i < TXS_DIFFERENCES; i++) {

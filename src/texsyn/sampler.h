@@ -1,7 +1,7 @@
 #ifndef TEXSYN_SAMPLER_H
 #define TEXSYN_SAMPLER_H
 
-#include "potential.h"
+#include "filter.h"
 
 /* ---- the sampler --------------------------------------------------------------------------
 
@@ -25,6 +25,7 @@ typedef struct txs_sampler {
     const txs_canvas *canvas;
     int bands;
     uint64_t seed;
+    txs_aim *aim;
     txs_pick *pick;
     txs_list list[4]; /* for pixels of each parity, (x & 1) + 2 (y & 1)   */
     int16_t single[TXS_MAX_BANDS][TXS_VALUES];
@@ -33,6 +34,7 @@ typedef struct txs_sampler {
     int32_t (*integral)[TXS_BINS];  /* 1/(TXS_NAT TXS_PRECISE) nat          */
     int32_t (*counts)[TXS_BINS];    /* TXS_TASKS times all types            */
     const int16_t *noise;
+    txs_filters filters;
     int strips, tasks, skip;          /* layout; one pixel in skip is counted */
     int sublattice[TXS_GROUP], phase; /* of the pass                          */
     uint64_t pass, sweep;
@@ -59,6 +61,8 @@ static void txs_count(const txs_list *list, const uint8_t *p, int32_t (*counts)[
     for (stop += list->tally_count[3]; t < stop; t++)
         counts[t->type]
               [txs_class(p[t->a] - p[t->b]) * TXS_CLASSES + txs_class(p[t->c] - p[t->d])]++;
+    for (stop += list->tally_count[4]; t < stop; t++)
+        counts[t->type][p[t->c] * TXS_CLASSES + txs_class(p[t->a] - p[t->b])]++;
 }
 
 static const txs_list *txs_list_at(const txs_sampler *s, int x, int y) {
@@ -75,42 +79,31 @@ static int txs_is_counted(const txs_sampler *s, int x, int y) {
    is the same as drawing one after another; drawing them together keeps the data of an end in
    registers. */
 static void txs_visit(const txs_sampler *s, int x, int y, int count, txm_rng *rng) {
-    const uint8_t *rows[TXS_TOGETHER][TXS_MAX_ENDS + 2];
+    const uint8_t *rows[(TXS_MAX_ENDS + 2) * TXS_TOGETHER];
     const uint8_t *p = txs_at(s->canvas, 0, x, y);
     const txs_list *list = txs_list_at(s, x, y);
     for (int b = 0; b < s->bands; b++) {
-        const txs_end *e = list->ends[b], *stop = e + list->end_count[b][0];
+        const txs_end *e = list->ends[b];
+        const uint8_t *now = p + b * s->canvas->plane;
         int n = 0;
-        for (; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *table = e->table;
-            for (int i = 0; i < count; i++) rows[i][n] = table - p1[i * TXS_GRID];
+        for (int form = 0; form < TXS_FORMS; form++) {
+            const int ends = list->end_count[b][form];
+            s->aim(e, ends, form, p, count, rows + n * TXS_TOGETHER);
+            e += ends;
+            n += ends;
         }
-        for (stop += list->end_count[b][1]; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *p3 = p + e->o3, *table = e->table;
-            for (int i = 0; i < count; i++) {
-                int known = txs_class(p2[i * TXS_GRID] - p3[i * TXS_GRID]);
-                rows[i][n] = table + known * TXS_ROW - p1[i * TXS_GRID];
-            }
-        }
-        for (stop += list->end_count[b][2]; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *table = e->table;
-            for (int i = 0; i < count; i++) {
-                int arm = p1[i * TXS_GRID];
-                rows[i][n] = table + (p2[i * TXS_GRID] - arm) * TXS_ROW - arm;
-            }
-        }
-        for (stop += list->end_count[b][3]; e < stop; e++, n++) {
-            const uint8_t *p1 = p + e->o1, *classes = e->classes, *table = e->table;
-            for (int i = 0; i < count; i++)
-                rows[i][n] = table + classes[p1[i * TXS_GRID]] * TXS_VALUES;
-        }
+        n += txs_filters_aim(&s->filters, b, x, y, count, rows + n * TXS_TOGETHER);
+        int delta[TXS_TOGETHER] = {0}, any = 0;
         for (int i = 0; i < count; i++) {
-            rows[i][n] = txs_no_energy;
-            int v = s->pick(rows[i], (n + 1) & ~1, s->single[b],
+            rows[n * TXS_TOGETHER + i] = txs_no_energy;
+            int v = s->pick(rows + i, TXS_TOGETHER, (n + 1) & ~1, s->single[b],
                             s->noise + (txm_rng_next(rng) & (TXS_NOISE - 1)));
             if (v >= s->level->values[b]) v = s->level->values[b] - 1;
+            delta[i] = v - now[i * TXS_GRID];
+            any |= delta[i];
             txs_set(s->canvas, b, x + i * TXS_GRID, y, (uint8_t)v);
         }
+        if (any) txs_filters_change(&s->filters, b, x, y, count, delta);
     }
 }
 
@@ -135,9 +128,11 @@ static void txs_work(void *context, int task) {
                     if (n > TXS_TOGETHER) n = TXS_TOGETHER;
                     txs_visit(s, x, y, n, &rng);
                 }
-                for (int x = sx; x < width; x += TXS_GRID)
-                    if (txs_is_counted(s, x, y))
-                        txs_count(txs_list_at(s, x, y), txs_at(s->canvas, 0, x, y), counts);
+                for (int x = sx; x < width; x += TXS_GRID) {
+                    if (!txs_is_counted(s, x, y)) continue;
+                    txs_count(txs_list_at(s, x, y), txs_at(s->canvas, 0, x, y), counts);
+                    txs_filters_count(&s->filters, x, y, counts);
+                }
             }
         }
     }
@@ -157,11 +152,14 @@ static void txs_gather(txs_sampler *s, int passes) {
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
 }
 
+static const int txs_turns[4] = {0, 3, 1, 2}; /* parities of filters' tails, sweep by sweep */
+
 /* Visit every pixel once. Progress from..to of the whole work. */
 static txm_status txs_sweep(txs_sampler *s, txm_env *env, const char *stage, float from, float to) {
     enum { ALL = TXS_GRID * TXS_GRID };
     const int phases = s->strips > 1 ? 2 : 1, groups = (int)ALL / TXS_GROUP;
     int order[ALL];
+    txs_filters_turn(&s->filters, env, txs_turns[s->sweep % 4], s->tables);
     txm_rng rng = txm_rng_make(s->seed, ~s->sweep++);
     for (int i = 0; i < ALL; i++) order[i] = i;
     txm_shuffle(&rng, order, ALL);
@@ -195,7 +193,7 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
                 /* of a pair, end 0 is the head; only pairs have a phase */
                 if (forms[i] != form || !txs_is_tail(t, px - (i ? 0 : t->dx), py - (i ? 0 : t->dy)))
                     continue;
-                list->ends[band[i]][count[0] + count[1] + count[2] + count[3]] = ends[i];
+                list->ends[band[i]][count[0] + count[1] + count[2] + count[3] + count[4]] = ends[i];
                 count[form]++;
             }
             if (tally.form != form || !txs_is_tail(t, px, py)) continue;
@@ -207,7 +205,7 @@ static void txs_list_fill(txs_sampler *s, int px, int py) {
 }
 
 /* Lay out the work for the level's types as they are now, and count the canvas as it is. */
-static void txs_sampler_start(txs_sampler *s) {
+static void txs_sampler_start(txs_sampler *s, txm_env *env) {
     const txs_canvas *c = s->canvas;
     const int types = s->level->type_count;
     int reach = 16; /* a strip is at least this high: less is too little work for a thread */
@@ -223,21 +221,27 @@ static void txs_sampler_start(txs_sampler *s) {
     s->skip = pixels > TXS_SAMPLES ? (int)(pixels / TXS_SAMPLES) : 1;
     if (s->skip > 2048) s->skip = 2048; /* else txs_is_counted would find almost none */
 
+    txs_filters_find(&s->filters);
+    txs_filters_turn(&s->filters, env, txs_turns[s->sweep % 4], s->tables);
     memset(s->histogram, 0, sizeof *s->histogram * (size_t)types);
     memset(s->counts, 0, sizeof *s->counts * (size_t)(types * s->tasks));
-    for (int y = 0; y < c->height; y++)
-        for (int x = 0; x < c->width; x++)
-            if (txs_is_counted(s, x, y))
-                txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
+    for (int y = 0; y < c->height; y++) {
+        for (int x = 0; x < c->width; x++) {
+            if (!txs_is_counted(s, x, y)) continue;
+            txs_count(txs_list_at(s, x, y), txs_at(c, 0, x, y), s->histogram);
+            txs_filters_count(&s->filters, x, y, s->histogram);
+        }
+    }
     for (int k = 0; k < types; k++)
         for (int i = 0; i < TXS_BINS; i++) s->histogram[k][i] *= TXS_WINDOW;
     txs_control(s, 0);
 }
 
-/* A sampler in the arena's memory; NULL if there is none. Call txs_sampler_start before use. */
+/* A sampler in the arena's memory for so many types and filters among them; NULL if there is none.
+   Call txs_sampler_start before use. */
 static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, int max_types,
-                                     const txs_canvas *canvas, int bands, const int16_t *noise,
-                                     uint64_t seed) {
+                                     int max_filters, const txs_canvas *canvas, int bands,
+                                     const int16_t *noise, uint64_t seed) {
     const size_t n = (size_t)max_types;
     txs_sampler *s = (txs_sampler *)txm_arena_zero(arena, 1, sizeof *s);
     if (!s) return NULL;
@@ -245,12 +249,14 @@ static txs_sampler *txs_sampler_make(txm_arena *arena, const txs_level *level, i
     s->canvas = canvas;
     s->bands = bands;
     s->seed = txm_hash(seed);
+    s->aim = txs_best_aim();
     s->pick = txs_best_pick();
     s->noise = noise;
     s->tables = (uint8_t *)txm_arena_zero(arena, n, TXS_TABLE);
     s->histogram = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->histogram);
     s->integral = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n, sizeof *s->integral);
     s->counts = (int32_t(*)[TXS_BINS])txm_arena_zero(arena, n * TXS_TASKS, sizeof *s->counts);
+    txs_filters_make(&s->filters, arena, level, canvas, max_filters);
     if (arena->failed) return NULL;
     for (int k = 0; k < level->type_count; k++)
         for (int i = 0; i < TXS_BINS; i++)

@@ -44,31 +44,36 @@ static txm_status txs_enter_level(texsyn_job *job, txm_env *env) {
     const texsyn_model *m = job->desc.model;
     const int i = job->level;
     const txs_level *l = &m->level[i];
-    int width, height, margin = 1;
+    int width, height, margin = TXS_LABEL_REACH, filters = 0;
     txs_canvas coarse = job->canvas;
     txs_canvas_size(&job->desc, i, &width, &height);
     for (int k = 0; k < l->type_count; k++) {
         int reach = txs_reach(&l->types[k]);
         if (reach > margin) margin = reach;
+        filters += l->types[k].kind == TEXSYN_FILTER;
     }
     txm_arena_free(&job->level_arena);
     job->sampler = NULL;
-    if (!txs_canvas_make(&job->canvas, &job->memory, width, height, margin, 2 * m->bands)) {
+    if (!txs_canvas_make(&job->canvas, &job->memory, width, height, margin, 2 * m->bands + 1)) {
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
     }
-    job->sampler = txs_sampler_make(&job->level_arena, l, l->type_count, &job->canvas, m->bands,
-                                    job->noise, txm_hash(job->desc.seed) + 128 + (uint64_t)i);
+    job->sampler =
+        txs_sampler_make(&job->level_arena, l, l->type_count, filters, &job->canvas, m->bands,
+                         job->noise, txm_hash(job->desc.seed) + 128 + (uint64_t)i);
     if (!job->sampler) {
         txs_canvas_free(&job->canvas, &job->memory);
         job->canvas = coarse;
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the sampler");
     }
-    if (coarse.pixels) txs_fill_parent(l + 1, &coarse, l, &job->canvas, m->bands);
+    if (coarse.pixels) {
+        txs_fill_parent(l + 1, &coarse, l, &job->canvas, m->bands);
+        txs_fill_labels(l, &job->canvas, m->bands);
+    }
     txs_start_canvas(l, &job->canvas, m->bands, coarse.pixels != NULL,
                      txm_hash(job->desc.seed) + (uint64_t)i);
     txs_canvas_free(&coarse, &job->memory);
-    txs_sampler_start(job->sampler);
+    txs_sampler_start(job->sampler, env);
     return TXM_OK;
 }
 

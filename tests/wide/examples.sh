@@ -35,7 +35,7 @@ size() { od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }
 
 synthesise() {
     (cd "$tmp" && ./synthesise clouds.png c.txs c.png) || return 1
-    [ "$(head -c 4 "$tmp/c.txs")" = TXS1 ] && [ "$(size "$tmp/c.png")" = "512 512" ]
+    [ "$(head -c 4 "$tmp/c.txs")" = TXS2 ] && [ "$(size "$tmp/c.png")" = "512 512" ]
 }
 example synthesise
 check "synthesise writes a model and a texture" synthesise
