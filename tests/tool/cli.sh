@@ -37,12 +37,12 @@ size="--size 40x30"
 check "--help" run 0 --help
 check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log && grep -q patch out.log &&
     grep -q edges out.log && grep -q tiles out.log && grep -q retile out.log &&
-    grep -q inpaint out.log &&
+    grep -q inpaint out.log && grep -q relight out.log && grep -q erode out.log &&
     grep -q tree out.log && grep -q forest out.log"
 check "--version" run 0 --version
 check "--version names the headers" \
     grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, texedges [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, trimesh_cover [0-9.]*, texinpaint [0-9.]*, treepieces [0-9.]*)$' out.log
-for command in learn synth patch edges tiles retile inpaint tree forest; do
+for command in learn synth relight erode patch edges tiles retile inpaint tree forest; do
     check "$command --help" run 0 $command --help
     check "$command --help has an example" grep -q "  texkit $command .*-o" out.log
     input=sand.png
@@ -133,6 +133,48 @@ check "learn --mask" run 0 learn sand.png --mask mask.png -o masked.txs
 refuses 1 "" learn sand.png --mask black.pgm -o n.txs
 refuses 1 "48 x 48" learn sand.png --mask short.pgm -o n.txs
 refuses 1 "cannot read" learn sand.png --mask missing.png -o n.txs
+
+# ---- relight and erode
+check "relight" run 0 relight sand.png --like rgba.png -o relit.png --stats relit.json
+check "relight keeps size and channels" png_is relit.png 48 48 2
+check "relight tells what it made" grep -q 'relit.png: 48 x 48 pixels' out.log
+check "relight --stats" sh -c "grep -q '\"gain\": ' relit.json && grep -q '\"cast\": ' relit.json"
+check "relight gray with alpha" run 0 relight gray-alpha.png --like sand.png -o relit-ga.png
+check "relight --strength 0 changes nothing" run 0 relight sand.png --like rgba.png -o same.bmp --strength 0
+check "the same pixels" sh -c "'$texkit' relight sand.png --like sand.png -o sand.bmp --strength 0 --quiet &&
+    cmp sand.bmp same.bmp"
+check "relight with masks" run 0 relight sand.png --like rgba.png -o relit.png --mask mask.png --like-mask mask.png
+refuses 1 "fewer than 16" relight sand.png --like rgba.png -o n.png --mask black.pgm
+refuses 1 "fewer than 16" relight sand.png --like rgba.png -o n.png --like-mask black.pgm
+refuses 1 "48 x 48" relight sand.png --like rgba.png -o n.png --like-mask short.pgm
+refuses 1 "cannot read" relight sand.png --like missing.png -o n.png
+refuses 2 "add --like" relight sand.png -o n.png
+refuses 2 "no picture" relight --like sand.png -o n.png
+refuses 2 "" relight sand.png --like rgba.png -o n.txs
+for bad in -1 1.1 x; do refuses 2 "--strength" relight sand.png --like rgba.png -o n.png --strength $bad; done
+
+check "erode" run 0 erode sand.png --weathered gray.png --level 0.5 -o worn.png --stats worn.json \
+    --cracks cracks.png --intact intact.png
+check "erode keeps size and channels" png_is worn.png 48 48 2
+check "--cracks is gray, of the picture's size" png_is cracks.png 48 48 0
+check "--intact is gray, of the exemplar's size" png_is intact.png 48 48 0
+check "erode --stats" sh -c "grep -q '\"share\": 0.1' worn.json && grep -q '\"level\": 0.5' worn.json"
+check "a model of the intact stone" run 0 learn gray.png --mask intact.png -o intact.txs
+check "erode to level 0 changes nothing" run 0 erode sand.png --weathered gray.png --level 0 -o worn.bmp
+check "the same pixels" cmp sand.bmp worn.bmp
+check "erode by a picture of levels" run 0 erode rgba.png --weathered sand.png --level 1 -o worn.png --levels gray.png
+check "erode, other cracks" run 0 erode sand.png --weathered gray.png --level 0.5 -o other.png --seed 2 --share 0.2 \
+    --mask mask.png
+refuses 1 "at least 32 x 32" erode sand.png --weathered tiny.png --level 1 -o n.png
+refuses 1 "fewer than 1024" erode sand.png --weathered sand.png --level 1 -o n.png --mask black.pgm
+refuses 1 "48 x 48" erode sand.png --weathered sand.png --level 1 -o n.png --levels short.pgm
+refuses 1 "48 x 48" erode sand.png --weathered sand.png --level 1 -o n.png --mask short.pgm
+refuses 1 "cannot read" erode sand.png --weathered missing.png --level 1 -o n.png
+refuses 2 "add --weathered" erode sand.png --level 1 -o n.png
+refuses 2 "add --level" erode sand.png --weathered gray.png -o n.png
+refuses 2 "written twice" erode sand.png --weathered gray.png --level 1 -o n.png --cracks n.png
+for bad in -1 1.1 x; do refuses 2 "--level" erode sand.png --weathered gray.png -o n.png --level $bad; done
+for bad in 0 0.6 x; do refuses 2 "--share" erode sand.png --weathered gray.png -o n.png --level 1 --share $bad; done
 
 # ---- statistics
 check "learn --stats" run 0 learn sand.png -o s.txs --stats learn.json
@@ -467,6 +509,8 @@ for way in ./a links/hard again/soft; do
     keeps $way.png a.png synth a.png -o $way.png $size
     keeps $way.png a.png patch a.png -o $way.png $size
     keeps $way.png a.png edges a.png -o $way.png
+    keeps $way.png a.png relight b.png --like a.png -o $way.png
+    keeps $way.png a.png erode b.png --weathered a.png --level 1 -o n.png --cracks $way.png
     keeps $way.png a.png learn a.png -o n.txs --stats $way.png
     keeps $way.png a.png tiles a.png -o n --kind wang --size 32 --stats $way.png
     keeps $way.png a.png tree -o n.obj --leaf a.png --stats $way.png

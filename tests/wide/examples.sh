@@ -114,6 +114,17 @@ check "remove needs a photograph" refuses "^remove: " "$tmp/remove" none.png "$t
 check "remove needs boxes" refuses "a box is" "$tmp/remove" "$tmp/clouds.png" "$tmp/n.png" 1,1,5
 check "remove leaves something" refuses "^remove: " "$tmp/remove" "$tmp/clouds.png" "$tmp/n.png" -99,-99,300,300
 
+pillar() {
+    (cd "$tmp" && ./pillar bricks.png p.png && ./pillar bricks.png p2.png clouds.png) || return 1
+    [ "$(size "$tmp/p.png")" = "520 1040" ] && [ "$(size "$tmp/p2.png")" = "520 1040" ] &&
+        ! cmp -s "$tmp/p.png" "$tmp/p2.png"
+}
+example pillar
+check "pillar writes pictures" pillar
+check "pillar needs a photograph" refuses "^pillar: " "$tmp/pillar" none.png "$tmp/n.png"
+check "pillar needs one that is large enough" sh -c "build/draw bricks '$tmp/small.png' 24 &&
+    ! '$tmp/pillar' '$tmp/small.png' '$tmp/n.png' 2>'$tmp/err.log' && grep -q 'at least 32 x 32' '$tmp/err.log'"
+
 # of more files than one: built by make
 repair() {
     build/examples/repair "$tmp/ball.obj" "$tmp/ball.png" "$tmp/ball-mask.png" "$tmp/b" || return 1

@@ -1,5 +1,6 @@
 #!/bin/sh
-# The model loader against hostile bytes: a few thousand mutations here, a million with --full.
+# The model loader against hostile bytes, and public calls against pictures of all kinds: a few thousand
+# here, many more with FULL=1.
 . tests/kit/tap.sh
 
 mkdir "$tmp/seeds"
@@ -14,6 +15,12 @@ runs=20000
 check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
     tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_standalone" -lm &&
     check "$runs mutated models" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*.txs
+
+runs=500
+[ "$FULL" = 1 ] && runs=5000
+check "relighting and erosion build by themselves" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off \
+    -I. tests/wide/fuzz/fuzz_texsyn_weather.c -o "$OUT/fuzz_weather" -lm &&
+    check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
 
 if [ "$FULL" = 1 ] && has clang; then
     check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \

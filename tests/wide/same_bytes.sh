@@ -59,6 +59,14 @@ build/draw cells "$tmp/cells.png" 64
 for threads in 1 2 8; do
     build/texkit learn "$tmp/cells.png" -o "$tmp/$threads.txs" --threads $threads --quiet
     build/texkit synth "$tmp/1.txs" -o "$tmp/$threads.png" --size 150x90 --threads $threads --quiet
+    build/texkit relight "$tmp/1.png" --like "$tmp/cells.png" -o "$tmp/relit-$threads.png" \
+        --threads $threads --quiet
+    build/texkit erode "$tmp/1.png" --weathered "$tmp/cells.png" --level 0.7 -o "$tmp/eroded-$threads.png" \
+        --threads $threads --quiet
+    check "texkit relight, the same picture with --threads $threads" \
+        cmp "$tmp/relit-1.png" "$tmp/relit-$threads.png"
+    check "texkit erode, the same picture with --threads $threads" \
+        cmp "$tmp/eroded-1.png" "$tmp/eroded-$threads.png"
     check "texkit learn, the same model with --threads $threads" \
         cmp "$tmp/1.txs" "$tmp/$threads.txs"
     check "texkit synth, the same picture with --threads $threads" \
