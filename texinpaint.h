@@ -13356,7 +13356,7 @@ static void txi_count_use(const txi_ballot *v) {
     for (int y = half; y < l->height; y++) {
         for (int x = half; x < w; x++) {
             const uint32_t use = sums[(y - half) * w + x - half] / TXI_PATCH_AREA;
-            t->use[y * w + x] = (uint16_t)(use < TXI_USE_MOST ? use : TXI_USE_MOST);
+            t->use[y * w + x] = (uint16_t)(use < (uint32_t)TXI_USE_MOST ? use : (uint32_t)TXI_USE_MOST);
         }
     }
 }

@@ -9320,9 +9320,9 @@ static void txs_erode_pixel(const texsyn_erosion *e, const txm_image *from, cons
     const int colours = from->channels < 3 ? 1 : 3;
     for (int c = 0; c < from->channels; c++) {
         const float v = txm_image_get(from, x, y, c);
-        const int r = colours == 1 ? txs_gray_ratio(ratio) : c < 3 ? ratio[c] : TXS_RATIO_ONE;
-        const int whole = (int)TXS_COVERED * (int)TXS_RATIO_ONE;
-        const double factor = (whole - cover * (TXS_RATIO_ONE - r)) / (double)whole;
+        const int one = TXS_RATIO_ONE, whole = one * (int)TXS_COVERED;
+        const int r = colours == 1 ? txs_gray_ratio(ratio) : c < 3 ? ratio[c] : one;
+        const double factor = (whole - cover * (one - r)) / (double)whole;
         txm_image_set(to, x, y, c, c < colours && cover ? txm_float((double)v * factor) : v);
     }
 }
