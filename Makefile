@@ -123,7 +123,7 @@ $(BUILD)/bench/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 # the same without SIMD, for comparison
 $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD \
+	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD -DTEXINPAINT_NO_SIMD \
 	    $< $(filter %.o,$^) -o $@ -lm
 
 $(BUILD)/bench/bench_inpaint $(BUILD)/bench/plain/bench_inpaint: $(MESHES)
@@ -146,21 +146,23 @@ test check:
 
 include tests/build.mk
 
-# parts by themselves, then what includes modules, without their implementations a second time.
-# clang-tidy 14 finds uninitialised va_lists that are none once it reads several files in one run
-LINTED = $(wildcard tools/*.c tools/*/*.c examples/*.c examples/*/*.c bench/*.c)
+# Implementations are checked once: by cppcheck in tools/modules, with and without SIMD, by clang-tidy
+# part by part. All else is checked without them, by cppcheck with threads and windows, by clang-tidy
+# without. clang-tidy 14 finds uninitialised va_lists that are none once it reads several files in one run
+IMPLEMENTED = $(wildcard tools/modules/*.c)
+LINTED = $(filter-out $(IMPLEMENTED),$(wildcard tools/*.c tools/*/*.c examples/*.c examples/*/*.c bench/*.c))
 PARTS  = $(wildcard src/*/*.h)
-BARE   = $(foreach m,$(basename $(HEADERS)),-D$(shell echo $(m) | tr a-z A-Z)_IMPLEMENTED)
+BARE  := $(foreach m,$(basename $(HEADERS)),-D$(shell echo $(m) | tr a-z A-Z)_IMPLEMENTED)
+CPPCHECK = cppcheck --quiet -j 2 --std=c99 --enable=warning,performance,portability --inline-suppr \
+    --error-exitcode=1 --suppress=missingIncludeSystem '--suppress=uninitvar:src/texmath/*' -Isrc -Itools
+TIDY   = xargs -P 2 -I FILE clang-tidy --quiet --warnings-as-errors='*' FILE -- -std=c99 -Isrc
 
 lint:
 	@tools/setup.sh lint
-	cppcheck --quiet -j 2 --std=c99 --enable=warning,performance,portability --inline-suppr \
-	    --error-exitcode=1 --suppress=missingIncludeSystem '--suppress=uninitvar:src/texmath/*' \
-	    -Isrc -Itools $(LINTED)
-	printf '%s\n' $(PARTS) | xargs -P 2 -I FILE clang-tidy --quiet --warnings-as-errors='*' \
-	    FILE -- -xc -std=c99 -Isrc -Wno-unused-function
-	printf '%s\n' $(LINTED) | xargs -P 2 -I FILE clang-tidy --quiet --warnings-as-errors='*' \
-	    FILE -- -std=c99 -Isrc -Itools $(BARE)
+	$(CPPCHECK) $(BARE) -D_OPENMP=201511 -DFOREST_WINDOW $(LINTED)
+	$(CPPCHECK) $(IMPLEMENTED)
+	printf '%s\n' $(LINTED) $(IMPLEMENTED) | $(TIDY) -Itools $(BARE)
+	printf '%s\n' $(PARTS) | $(TIDY) -xc -Wno-unused-function
 
 # ---- installing
 
