@@ -4,37 +4,60 @@
 # with the indices of each parallel loop taken backwards (0 below), with fused multiply-add allowed to
 # the compiler, and from plain C as with SIMD.
 . tests/kit/tap.sh
+. tests/kit/library.sh
 
 golden=tests/wide/golden
 modules=$(sed 's/ .*//' $golden/golden.txt | uniq)
-plain="-DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD"
+
+# build COMPILER "FLAGS" MODULE: links the golden program with the module compiled so
+build() {
+    library "$1" "$2" "$3" || { cat "$object.log"; return 1; }
+    # shellcheck disable=SC2086 # flags are words
+    $1 -std=gnu99 $2 -ffp-contract=off -D$(echo "$3" | tr '[:lower:]' '[:upper:]')_IMPLEMENTED -I. \
+        -Itests/kit -I$golden "$golden/golden_$3.c" "$object" -o "$tmp/golden_$3" -lpthread -lm
+}
+
+# run MODULE HOW PROGRAM THREADS...
+run() {
+    module=$1 how=$2 program=$3
+    shift 3
+    for threads in "$@"; do
+        check "the golden bytes of $module, $how, threads $threads" \
+            $golden/compare.sh "$program $threads"
+    done
+}
 
 # same COMPILER "FLAGS" THREADS...: all modules, built so, on so many threads
 same() {
     cc=$1 flags=$2
     shift 2
     for module in $modules; do
-        program=$tmp/golden_$module runs=
-        # shellcheck disable=SC2086 # flags are words
-        check "builds golden_$module, $cc $flags" $cc -std=gnu99 $flags -ffp-contract=off -Isrc -I. \
-            -Itests/kit -I$golden $golden/golden_$module.c -o "$program" -lpthread -lm || continue
-        for threads in "$@"; do
-            check "the golden bytes of $module, $cc $flags, threads $threads" \
-                $golden/compare.sh "$program $threads"
-        done
+        check "builds golden_$module, $cc $flags" build "$cc" "$flags" "$module" || continue
+        run "$module" "$cc $flags" "$tmp/golden_$module" "$@"
     done
 }
 
+# is_tool_compiler COMPILER: "cc (Debian 12.2.0)" and "gcc (Debian 12.2.0)" are one
+version() { "$1" --version | sed '1s/^[^ ]* //; 1q'; }
+is_tool_compiler() { [ "$(version "$1")" = "$(version "$CC")" ]; }
+
 if [ "$FULL" = 1 ]; then
+    # as the tool has them, at -O3
+    for module in $modules; do run "$module" "of the tool" build/golden/golden_$module 1 2 8 0; done
     for cc in $(compilers); do
         for level in -O0 -O1 -O2; do same "$cc" $level 2; done
-        same "$cc" -O3 1 2 8 0
+        is_tool_compiler "$cc" || same "$cc" -O3 1 2 8 0
         if grep -q '^flags.*\<fma\>' /proc/cpuinfo 2>/dev/null; then
             same "$cc" "-O3 -mfma -mavx2" 2
         fi
     done
     set -- $(compilers)
-    same "$1" "-O2 $plain" 2
+    for name in $(grep -lE '^ +[A-Z]*_NO_SIMD' ./*.h); do
+        module=$(basename "$name" .h)
+        plain=-O2\ -D$(echo "$module" | tr '[:lower:]' '[:upper:]')_NO_SIMD
+        check "builds golden_$module, $1 $plain" build "$1" "$plain" "$module" &&
+            run "$module" "$1 $plain" "$tmp/golden_$module" 2
+    done
 else
     set -- $(compilers)
     same "$1" -O2 1 3
@@ -42,7 +65,7 @@ fi
 
 # the message tells module and case; lines that are missing or foreign are noticed
 set -- $modules
-"$tmp/golden_$1" 1 >"$tmp/lines"
+build/golden/golden_"$1" 1 >"$tmp/lines"
 name=$(sed -n '2s/ [^ ]*$//p' "$tmp/lines")
 differs() {
     sed "$1" "$tmp/lines" >"$tmp/changed"
