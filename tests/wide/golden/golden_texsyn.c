@@ -155,6 +155,72 @@ static uint64_t eroded(txm_env *env) {
     return hash;
 }
 
+/* a hole in color, filled from all that is known, and one in gray from a corner of the picture */
+static uint64_t filled(txm_env *env) {
+    static uint8_t source[SIDE * SIDE];
+    uint64_t hash = 0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const int x = i % SIDE, y = i / SIDE;
+        mask[i] = (x - 40) * (x - 40) + (y - 36) * (y - 36) < 14 * 14 ? 255 : 0;
+        source[i] = x < SIDE / 2 ? 255 : 0;
+    }
+    for (int channels = 3; channels > 0; channels -= 2) {
+        texsyn_fill_desc desc;
+        memset(&desc, 0, sizeof desc);
+        golden_blobs(exemplar, SIDE, SIDE, channels);
+        desc.image = golden_image(exemplar, SIDE, SIDE, channels, TXM_U8);
+        desc.mask = golden_image(mask, SIDE, SIDE, 1, TXM_U8);
+        if (channels == 1) desc.source = golden_image(source, SIDE, SIDE, 1, TXM_U8);
+        desc.quality = -2;
+        desc.seed = 4;
+        const txm_image out = golden_image(picture, SIDE, SIDE, channels, TXM_U8);
+        golden_need(texsyn_fill(&desc, env, out), "fill", env);
+        hash = tk_hash(hash, picture, (size_t)SIDE * SIDE * (size_t)channels);
+    }
+    return hash;
+}
+
+/* a composite of two textures: its file, a layout made for it, and pictures of that and of a drawn
+   layout */
+static uint64_t composite(txm_env *env) {
+    static uint8_t labels[WIDTH * HEIGHT], bricks[SIDE * SIDE * 3];
+    texsyn_composite *made = NULL;
+    texsyn_composite_learn_desc learn;
+    texsyn_composite_desc synth;
+    size_t size = 0;
+    golden_noise(exemplar, SIDE, SIDE, 3);
+    golden_bricks(bricks, SIDE, SIDE, 3);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        labels[i] = (uint8_t)(i / SIDE + i % SIDE / 4 > 40);
+        if (labels[i]) memcpy(exemplar + 3 * i, bricks + 3 * i, 3);
+    }
+    memset(&learn, 0, sizeof learn);
+    learn.example = golden_image(exemplar, SIDE, SIDE, 3, TXM_U8);
+    learn.labels = golden_image(labels, SIDE, SIDE, 1, TXM_U8);
+    learn.max_types = 6;
+    golden_need(texsyn_composite_learn(&learn, env, &made), "learn", env);
+    golden_need(texsyn_composite_save(made, env, bytes, sizeof bytes, &size), "save", env);
+    uint64_t hash = tk_hash(0, bytes, size);
+    memset(&synth, 0, sizeof synth);
+    synth.composite = made;
+    synth.width = WIDTH;
+    synth.height = HEIGHT;
+    synth.quality = -2;
+    synth.seed = 6;
+    for (int drawn = 0; drawn < 2; drawn++) {
+        const txm_image map = golden_image(labels, WIDTH, HEIGHT, 1, TXM_U8);
+        for (int i = 0; drawn && i < WIDTH * HEIGHT; i++) labels[i] = (uint8_t)(i % WIDTH > 30);
+        if (drawn) synth.layout = map;
+        else golden_need(texsyn_composite_layout(&synth, env, map), "layout", env);
+        const txm_image out = golden_image(picture, WIDTH, HEIGHT, 3, TXM_U8);
+        golden_need(texsyn_composite_synthesize(&synth, env, out), "synthesize", env);
+        hash = tk_hash(hash, labels, sizeof labels);
+        hash = tk_hash(hash, picture, (size_t)WIDTH * HEIGHT * 3);
+    }
+    texsyn_composite_free(made);
+    return hash;
+}
+
 static const golden_case cases[] = {{"gray", gray},
                                     {"rgb-tileable", rgb_tileable},
                                     {"rgba-16-bits", rgba_deep},
@@ -162,5 +228,7 @@ static const golden_case cases[] = {{"gray", gray},
                                     {"masked", masked},
                                     {"file", file},
                                     {"relit", relit},
-                                    {"eroded", eroded}};
+                                    {"eroded", eroded},
+                                    {"filled", filled},
+                                    {"composite", composite}};
 GOLDEN_MAIN("texsyn")
