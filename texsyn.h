@@ -303,7 +303,7 @@ typedef struct texsyn_composite_learn_desc {
     txm_image labels;   /* same size, 1 channel of 8 bits: 0..15, each on 256 pixels or more, and
                            255 where nothing is to be learned; texsyn_segment finds them          */
     texsyn_field field; /* of the layout                                                          */
-    int max_types;      /* clique types per label and level beyond the preselected, 1..64; 0 = 14 */
+    int max_types;      /* clique types per label and level beyond the preselected, 1..64; 0 = 10 */
     uint64_t seed;      /* for the random numbers; any value                                      */
 } texsyn_composite_learn_desc;
 
@@ -3938,7 +3938,7 @@ typedef struct txs_crossing {
 enum {
     TXS_MAX_CROSSINGS = 256, /* of one level */
     TXS_CROSS_ENDS = 96,     /* of one label and band */
-    TXS_SOFT_CROSSING = 400  /* see txs_soften; ours, by trial */
+    TXS_SOFT_CROSSING = 40  /* see txs_soften; ours, by trial */
 };
 
 /* What the pixels of one label and parity take part in. */
@@ -4530,7 +4530,7 @@ enum {
     TXS_TAILS = 12000,    /* cliques counted of each type: as many as matter */
     TXS_PRESELECTED = 32, /* types of a label at most, see txs_study_preselect */
     TXS_CROSS_REACH = 5,  /* pixels, between the first bands; ours, by trial */
-    TXS_CROSS_BATCH = 3   /* crossing types added for each pair of labels at once */
+    TXS_CROSS_BATCH = 4   /* crossing types added for each pair of labels at once */
 };
 
 /* ---- measuring ------------------------------------------------------------------------ */
@@ -6740,7 +6740,7 @@ enum {
     TXS_COMPOSITE_FEW = 256,    /* pixels: a label with fewer cannot be learned    */
     TXS_COMPOSITE_SPARSE = 64,  /* pixels: with fewer a coarse level is left out   */
     TXS_COMPOSITE_CANVAS = 320, /* pixels: a side of what is synthesised to learn  */
-    TXS_COMPOSITE_TYPES = 14,   /* clique types per label and level                */
+    TXS_COMPOSITE_TYPES = 10,   /* clique types per label and level                */
     TXS_COMPOSITE_REFRESH = 4,  /* sub-lattices                                    */
     TXS_COMPOSITE_SOFT = 400,   /* pixels, see txs_soften                          */
     TXS_CROSS_SCALE = 20,       /* steps of the root of a share of a crossing type */
@@ -6962,7 +6962,7 @@ static txm_status txs_composite_level(txs_composer *w, int index, txm_env *env, 
                                  TXS_NEAR,
                                  TXS_COMPOSITE_REFRESH,
                                  TXS_COMPOSITE_SOFT,
-                                 c->labels > 1,
+                                 c->labels > 1 && index < 2,
                                  seed,
                                  w->noise,
                                  NULL};
@@ -7169,7 +7169,8 @@ TEXSYN_API const texsyn_model *texsyn_composite_model(const texsyn_composite *co
 /* ---- synthesising a composite ---------------------------------------------------------------- */
 
 static int txs_composite_sweeps(int level, int quality) {
-    static const int sweeps[5][3] = {{2, 4, 10}, {3, 6, 14}, {5, 8, 20}, {8, 12, 28}, {12, 20, 40}};
+    static const int sweeps[5][3] = {
+        {3, 4, 10}, {5, 7, 16}, {9, 12, 24}, {13, 18, 32}, {20, 28, 44}};
     return sweeps[quality + 2][level > 2 ? 2 : level];
 }
 

@@ -303,7 +303,7 @@ typedef struct texsyn_composite_learn_desc {
     txm_image labels;   /* same size, 1 channel of 8 bits: 0..15, each on 256 pixels or more, and
                            255 where nothing is to be learned; texsyn_segment finds them          */
     texsyn_field field; /* of the layout                                                          */
-    int max_types;      /* clique types per label and level beyond the preselected, 1..64; 0 = 14 */
+    int max_types;      /* clique types per label and level beyond the preselected, 1..64; 0 = 10 */
     uint64_t seed;      /* for the random numbers; any value                                      */
 } texsyn_composite_learn_desc;
 

@@ -15,7 +15,7 @@ enum {
     TXS_COMPOSITE_FEW = 256,    /* pixels: a label with fewer cannot be learned    */
     TXS_COMPOSITE_SPARSE = 64,  /* pixels: with fewer a coarse level is left out   */
     TXS_COMPOSITE_CANVAS = 320, /* pixels: a side of what is synthesised to learn  */
-    TXS_COMPOSITE_TYPES = 14,   /* clique types per label and level                */
+    TXS_COMPOSITE_TYPES = 10,   /* clique types per label and level                */
     TXS_COMPOSITE_REFRESH = 4,  /* sub-lattices                                    */
     TXS_COMPOSITE_SOFT = 400,   /* pixels, see txs_soften                          */
     TXS_CROSS_SCALE = 20,       /* steps of the root of a share of a crossing type */
@@ -237,7 +237,7 @@ static txm_status txs_composite_level(txs_composer *w, int index, txm_env *env, 
                                  TXS_NEAR,
                                  TXS_COMPOSITE_REFRESH,
                                  TXS_COMPOSITE_SOFT,
-                                 c->labels > 1,
+                                 c->labels > 1 && index < 2,
                                  seed,
                                  w->noise,
                                  NULL};
@@ -444,7 +444,8 @@ TEXSYN_API const texsyn_model *texsyn_composite_model(const texsyn_composite *co
 /* ---- synthesising a composite ---------------------------------------------------------------- */
 
 static int txs_composite_sweeps(int level, int quality) {
-    static const int sweeps[5][3] = {{2, 4, 10}, {3, 6, 14}, {5, 8, 20}, {8, 12, 28}, {12, 20, 40}};
+    static const int sweeps[5][3] = {
+        {3, 4, 10}, {5, 7, 16}, {9, 12, 24}, {13, 18, 32}, {20, 28, 44}};
     return sweeps[quality + 2][level > 2 ? 2 : level];
 }
 

@@ -46,7 +46,7 @@ enum {
     TXS_TAILS = 12000,    /* cliques counted of each type: as many as matter */
     TXS_PRESELECTED = 32, /* types of a label at most, see txs_study_preselect */
     TXS_CROSS_REACH = 5,  /* pixels, between the first bands; ours, by trial */
-    TXS_CROSS_BATCH = 3   /* crossing types added for each pair of labels at once */
+    TXS_CROSS_BATCH = 4   /* crossing types added for each pair of labels at once */
 };
 
 /* ---- measuring ------------------------------------------------------------------------ */

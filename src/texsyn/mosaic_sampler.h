@@ -22,7 +22,7 @@ typedef struct txs_crossing {
 enum {
     TXS_MAX_CROSSINGS = 256, /* of one level */
     TXS_CROSS_ENDS = 96,     /* of one label and band */
-    TXS_SOFT_CROSSING = 400  /* see txs_soften; ours, by trial */
+    TXS_SOFT_CROSSING = 40  /* see txs_soften; ours, by trial */
 };
 
 /* What the pixels of one label and parity take part in. */
