@@ -49,6 +49,13 @@
      mask leaves out what does not belong. About 256 x 256 pixels that show the largest element a
      few dozen times are enough; 64 x 64 are too few for good statistics.
 
+   SEGMENTATION
+     texsyn_segment divides a photograph that shows several textures: a label for each pixel. The
+     labels say where each texture is to be learned from (the mask of texsyn_learn_desc). It looks
+     at colours and at contrast of three sizes; textures that differ in neither count as one. If
+     only one is found it looks again for smaller differences: moss on rock is a texture of its own
+     in a picture of rocks, but not beside bricks.
+
    HOW IT WORKS
      The example is split into decorrelated colour bands of at most 32 values and into pyramid
      levels. On each level, coarse first, a canvas is synthesised with the clique types so far, the
@@ -107,7 +114,10 @@
      [4] S. Geman, D. Geman. Stochastic relaxation, Gibbs distributions, and the Bayesian
          restoration of images. IEEE PAMI 6(6), 1984.
      [5] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
-         SIGGRAPH 2001.                                                                      */
+         SIGGRAPH 2001.
+     [6] T. Leung, J. Malik. Recognizing surfaces using three-dimensional textons. ICCV 1999.
+     [7] V. Ferrari, T. Tuytelaars, L. Van Gool. Real-time affine region tracking and coplanar
+         grouping. CVPR 2001 (clique partitioning).                                          */
 #ifndef TEXSYN_H
 #define TEXSYN_H
 
@@ -282,6 +292,45 @@ typedef struct texsyn_fill_desc {
           TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
+
+/* ---- segmentation ----------------------------------------------------------------------- */
+
+enum {
+    TEXSYN_MAX_SEGMENTS = 16, /* textures of a segmentation */
+    TEXSYN_TRANSITION = 254,  /* label of what is too small or thin to be one, if asked for */
+    TEXSYN_NO_LABEL = 255     /* label of pixels that do not take part */
+};
+
+typedef struct texsyn_segment_desc {
+    txm_image image; /* 1, 3 or 4 channels, both sides at least 16 px; where alpha is under one half
+                        pixels do not take part                                                   */
+    txm_image mask;  /* same size: pixels take part where gray times alpha is at least half;
+                        pixels NULL = all                                                         */
+    int segments;    /* how many textures, 1..16; 0 = as many as are found, 1 or more             */
+    int transition;  /* non-zero: parts thinner than about 13 pixels and specks get
+                        TEXSYN_TRANSITION; else they join what is around them. Pixels are those of
+                        the resolution that is worked at                                          */
+    uint64_t seed;   /* for the choice of the first textons; any value                            */
+} texsyn_segment_desc;
+
+/* Find the textures of a picture without being told what they look like [6, 7].
+
+   A picture of more than 2^19 pixels is reduced by a whole number until it has no more; boundaries
+   are then as exact as a pixel of that size, and smooth.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives a label for each pixel: 0..*count-1, 0 for the texture with the largest area, and
+          the special ones above. 1 channel, 8 bits, as large as the image, which it must not
+          overlap. Untouched after an error
+   count  receives the number of textures; each has at least one pixel. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
+          beyond a million; TXM_TOO_SMALL for an image under 16 x 16, if fewer than 256 pixels take
+          part, or if it has no so many segments; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(width * height) time, 0.3 s for 512 x 512. 45 MB and 3 bytes per label and pixel, at
+          most 75 MB, whatever the size                                                           */
+TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *env, txm_image out,
+                                     int *count);
 
 /* ---- composite textures ----------------------------------------------------------------- */
 
@@ -5825,6 +5874,1539 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
     }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- textons ------------------------------------------------------------------------------
+
+   What a pixel looks like, as two small numbers: a colour texton, the nearest of at most 32 typical
+   colours, and a texture texton, the nearest of 64 typical answers of nine filters. These tell how
+   much the lightness changes across, down and as spots (gradient and Laplacian, without signs,
+   smoothed) at three scales. A texture is then a histogram of textons [6]. Everything is computed
+   in integers, or in floats that hold whole numbers below 2^24: the same everywhere. */
+
+enum {
+    TXS_WORK = 1 << 19,      /* pixels: a larger picture is reduced to a half, a third, ...     */
+    TXS_COLOURS = 32,        /* colour textons                                                  */
+    TXS_GRAINS = 64,         /* texture textons                                                 */
+    TXS_SCALES = 3,          /* Gaussians of sigma 1, 2.2, 4.6                                  */
+    TXS_FILTERS = 3 * TXS_SCALES,
+    TXS_CODES = 255 * 16,    /* a sample, 0..1, in steps of a sixteenth of an 8-bit one         */
+    TXS_LAB = 64,            /* steps per unit of L*, a*, b*                                    */
+    TXS_CUBE_ROOTS = 1 << 14, /* entries of the table, from 0 to 1                              */
+    TXS_ROOT_UNIT = 8192,    /* its entries' unit                                               */
+    TXS_LOUD = 8,            /* filter answers are told apart up to so many times their RMS     */
+    TXS_ANSWER = 127,        /* the largest answer of a filter                                  */
+    TXS_TRAINING = 8192,     /* pixels that the textons are made from                           */
+    TXS_ROUNDS = 8,          /* of k-means                                                      */
+    TXS_APART = 20           /* first centres of colours: so many quarters of a unit of Lab     */
+};
+
+/* The picture at the resolution that is worked at, and its textons. */
+typedef struct txs_scene {
+    int width, height, factor;  /* a pixel is a square of factor x factor pixels of the picture   */
+    size_t pixels;
+    uint8_t *counted;           /* non-zero: at least half of the square takes part               */
+    int16_t *lab[3];            /* L*, a*, b* in steps of 1 / TXS_LAB                             */
+    uint8_t *colour, *shape;    /* the textons of each pixel                                      */
+} txs_scene;
+
+/* ---- colour ------------------------------------------------------------------------------- */
+
+/* The root of a, 0..1, by Newton's method from above: the same everywhere, unlike pow. */
+static double txs_newton_root(double a, int degree) {
+    double t = 1;
+    for (int k = 0; k < 60 && a > 0; k++) {
+        double power = 1;
+        for (int i = 1; i < degree; i++) power *= t;
+        const double next = t - (t * power - a) / (degree * power);
+        if (!(next < t)) break;
+        t = next;
+    }
+    return a > 0 ? t : 0;
+}
+
+typedef struct txs_colours {
+    uint16_t linear[TXS_CODES + 1];    /* of an sRGB code, 0..65535         */
+    int16_t root[TXS_CUBE_ROOTS + 1];  /* CIE's f of a linear value         */
+} txs_colours;
+
+static void txs_colour_tables(txs_colours *t) {
+    for (int i = 0; i <= TXS_CODES; i++) {
+        const double s = (double)i / (double)TXS_CODES, v = (s + 0.055) / 1.055;
+        const double linear = s <= 0.04045 ? s / 12.92 : v * v * txs_newton_root(v * v, 5);
+        t->linear[i] = (uint16_t)(linear * 65535 + 0.5);
+    }
+    for (int i = 0; i <= TXS_CUBE_ROOTS; i++) {
+        const double v = (double)i / (double)TXS_CUBE_ROOTS;
+        const double f = v > 0.008856 ? txs_newton_root(v, 3) : 7.787 * v + 16.0 / 116;
+        t->root[i] = (int16_t)(f * (double)TXS_ROOT_UNIT + 0.5);
+    }
+}
+
+/* sRGB codes to L*a*b* under D65 */
+static void txs_code_to_lab(const txs_colours *t, const int code[3], int lab[3]) {
+    static const uint32_t weights[3][3] = { /* of R, G, B in X, Y, Z over white, of 32768 */
+        {14218, 12327, 6223}, {6966, 23436, 2366}, {580, 3588, 28600}};
+    int f[3];
+    for (int k = 0; k < 3; k++) {
+        uint32_t sum = 0;
+        for (int c = 0; c < 3; c++) sum += weights[k][c] * t->linear[code[c]];
+        f[k] = t->root[(sum >> 15) * TXS_CUBE_ROOTS / 65535];
+    }
+    lab[0] = 116 * f[1] * TXS_LAB / TXS_ROOT_UNIT - 16 * TXS_LAB;
+    lab[1] = 500 * (f[0] - f[1]) / (TXS_ROOT_UNIT / TXS_LAB);
+    lab[2] = 200 * (f[1] - f[2]) / (TXS_ROOT_UNIT / TXS_LAB);
+}
+
+static int txs_sample_code(const txm_image *im, int x, int y, int c) {
+    const void *row = txm_image_row_const(im, y);
+    const size_t i = (size_t)x * (size_t)im->channels + (size_t)c;
+    if (im->sample == TXM_U8) return 16 * ((const uint8_t *)row)[i];
+    if (im->sample == TXM_U16)
+        return (int)(((uint32_t)((const uint16_t *)row)[i] * TXS_CODES + 32767) / 65535);
+    return (int)((double)txm_clampf(((const float *)row)[i], 0, 1) * (double)TXS_CODES + 0.5);
+}
+
+/* ---- the picture at working resolution ------------------------------------------------------ */
+
+/* Does the pixel take part? By the mask, where there is one, and by its own alpha. */
+static int txs_takes_part(const txm_image *im, const txm_image *mask, int x, int y) {
+    const int alpha = im->channels == 2 || im->channels == 4;
+    if (alpha && txs_sample_code(im, x, y, im->channels - 1) < TXS_CODES / 2) return 0;
+    if (!mask->pixels) return 1;
+    int gray = 0;
+    const int colours = mask->channels < 3 ? 1 : 3;
+    for (int c = 0; c < colours; c++) gray += txs_sample_code(mask, x, y, c);
+    gray /= colours;
+    if (mask->channels == 2 || mask->channels == 4)
+        gray = gray * txs_sample_code(mask, x, y, mask->channels - 1) / TXS_CODES;
+    return gray >= TXS_CODES / 2;
+}
+
+/* One pixel of the scene: the mean of those of its square that take part. */
+static void txs_reduce(txs_scene *s, const txm_image *im, const txm_image *mask,
+                       const txs_colours *tables, int x, int y) {
+    const int f = s->factor, colours = im->channels < 3 ? 1 : 3;
+    const int right = txm_clampi((x + 1) * f, 0, im->width);
+    const int bottom = txm_clampi((y + 1) * f, 0, im->height);
+    const size_t at = (size_t)y * (size_t)s->width + (size_t)x;
+    int64_t sum[3] = {0, 0, 0}, parts = 0, all = 0;
+    for (int v = y * f; v < bottom; v++) {
+        for (int u = x * f; u < right; u++, all++) {
+            if (!txs_takes_part(im, mask, u, v)) continue;
+            for (int c = 0; c < colours; c++) sum[c] += txs_sample_code(im, u, v, c);
+            parts++;
+        }
+    }
+    s->counted[at] = (uint8_t)(parts > 0 && 2 * parts >= all);
+    if (!parts) parts = 1;
+    int code[3], lab[3];
+    for (int c = 0; c < 3; c++) code[c] = (int)(sum[colours == 1 ? 0 : c] / parts);
+    txs_code_to_lab(tables, code, lab);
+    for (int c = 0; c < 3; c++) s->lab[c][at] = (int16_t)lab[c];
+}
+
+/* ---- filters ------------------------------------------------------------------------------ */
+
+/* Five taps of a Gaussian, `step` apart, along a row or a column of count values that lie `by`
+   apart; the border is repeated. line: room for count + 4 * step values. */
+static void txs_blur_line(int16_t *values, int count, ptrdiff_t by, int step, int16_t *line) {
+    const int pad = 2 * step;
+    for (int i = 0; i < count; i++) line[pad + i] = values[i * by];
+    for (int i = 0; i < pad; i++) {
+        line[i] = line[pad];
+        line[pad + count + i] = line[pad + count - 1];
+    }
+    for (int i = 0; i < count; i++) {
+        const int16_t *p = line + i;
+        const int sum = p[0] + 4 * p[step] + 6 * p[2 * step] + 4 * p[3 * step] + p[4 * step];
+        values[i * by] = (int16_t)((sum + 8 + (1 << 20)) / 16 - (1 << 16));
+    }
+}
+
+typedef struct txs_blurring {
+    int16_t *plane, *lines;
+    int width, height, step, room; /* room: values a line has in lines */
+} txs_blurring;
+
+static void txs_blur_rows(void *context, int share) {
+    const txs_blurring *b = (const txs_blurring *)context;
+    const int from = (int)((int64_t)b->height * share / TXS_TASKS);
+    const int to = (int)((int64_t)b->height * (share + 1) / TXS_TASKS);
+    for (int y = from; y < to; y++)
+        txs_blur_line(b->plane + (ptrdiff_t)y * b->width, b->width, 1, b->step,
+                      b->lines + (ptrdiff_t)share * b->room);
+}
+
+static void txs_blur_columns(void *context, int share) {
+    const txs_blurring *b = (const txs_blurring *)context;
+    const int from = (int)((int64_t)b->width * share / TXS_TASKS);
+    const int to = (int)((int64_t)b->width * (share + 1) / TXS_TASKS);
+    for (int x = from; x < to; x++)
+        txs_blur_line(b->plane + x, b->height, b->width, b->step,
+                      b->lines + (ptrdiff_t)share * b->room);
+}
+
+static void txs_blur_plane(const txs_scene *s, int16_t *plane, int step, int16_t *lines, int room,
+                     txm_env *env) {
+    txs_blurring b = {plane, lines, s->width, s->height, step, room};
+    TEXSYN_ASSERT(room >= s->width + 4 * step && room >= s->height + 4 * step);
+    txm_parallel_for(env, TXS_TASKS, txs_blur_rows, &b);
+    txm_parallel_for(env, TXS_TASKS, txs_blur_columns, &b);
+}
+
+/* Filter 0, 1: gradients, 2: Laplacian, by differences of pixels `step` apart. */
+static int txs_answer(const txs_scene *s, const int16_t *plane, int filter, int step, int x,
+                      int y) {
+    const ptrdiff_t w = s->width;
+    const int left = x < step ? 0 : x - step, right = x + step < s->width ? x + step : s->width - 1;
+    const int up = y < step ? 0 : y - step, down = y + step < s->height ? y + step : s->height - 1;
+    const int dx = plane[y * w + right] - plane[y * w + left];
+    if (filter == 0) return dx;
+    if (filter == 1) return plane[down * w + x] - plane[up * w + x];
+    return plane[y * w + right] + plane[y * w + left] + plane[down * w + x] + plane[up * w + x] -
+           4 * plane[y * w + x];
+}
+
+/* One filter over the scene: the magnitudes of its answers, smoothed, relative to their root mean
+   square r: 127 a / sqrt(r^2 + a^2), which lets no contour drown the rest. */
+static void txs_run_filter(const txs_scene *s, const int16_t *plane, int filter, int step,
+                           int16_t *raw, int8_t *out, int16_t *lines, int room, txm_env *env) {
+    enum { LEVELS = 256 }; /* of |a|, up to TXS_LOUD times r */
+    int8_t level[LEVELS + 1];
+    uint64_t square = 0, count = 0;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            const size_t i = (size_t)y * (size_t)s->width + (size_t)x;
+            const int a = txs_answer(s, plane, filter, step, x, y);
+            raw[i] = (int16_t)txm_clampi(abs(a), 0, INT16_MAX);
+        }
+    }
+    txs_blur_plane(s, raw, step, lines, room, env);
+    for (size_t i = 0; i < s->pixels; i++) {
+        if (!s->counted[i]) continue;
+        square += (uint64_t)((int64_t)raw[i] * raw[i]);
+        count++;
+    }
+    const double least = TXS_LAB / 4; /* weaker answers are noise of the 8-bit samples */
+    double rms = sqrt((double)square / (double)(count ? count : 1));
+    if (rms < least) rms = least;
+    for (int i = 0; i <= LEVELS; i++) {
+        const double v = (double)(i * TXS_LOUD) / (double)LEVELS;
+        level[i] = (int8_t)((double)TXS_ANSWER * v / sqrt(1 + v * v) + 0.5);
+    }
+    const int scale = (int)((double)(LEVELS << 12) / ((double)TXS_LOUD * rms) + 0.5);
+    for (size_t i = 0; i < s->pixels; i++) {
+        const int64_t at = ((int64_t)raw[i] * scale + (1 << 11)) >> 12;
+        out[i] = level[at < (int64_t)LEVELS ? at : (int64_t)LEVELS];
+    }
+}
+
+/* ---- k-means ------------------------------------------------------------------------------ */
+
+enum { TXS_MOST_CENTRES = 64, TXS_MOST_AXES = TXS_FILTERS };
+
+/* Centres, axis by axis, whole numbers. The distance of x from centre c, up to |x|^2, is
+   |c|^2 - 2 x.c: products and sums stay below 2^24, so float holds them exactly. */
+typedef struct txs_clusters {
+    int count, axes;
+    float centre[TXS_MOST_AXES][TXS_MOST_CENTRES], square[TXS_MOST_CENTRES];
+} txs_clusters;
+
+static void txs_set_centre(txs_clusters *k, int c, const int *x) {
+    float square = 0;
+    for (int a = 0; a < k->axes; a++) {
+        k->centre[a][c] = (float)x[a];
+        square += (float)(x[a] * x[a]);
+    }
+    k->square[c] = square;
+}
+
+/* the nearest centre, the first of several */
+static int txs_nearest(const txs_clusters *k, const int *x) {
+    float d[TXS_MOST_CENTRES];
+    int best = 0;
+    for (int c = 0; c < TXS_MOST_CENTRES; c++) d[c] = k->square[c];
+    for (int a = 0; a < k->axes; a++) {
+        const float v = (float)(-2 * x[a]);
+        const float *centre = k->centre[a];
+        for (int c = 0; c < TXS_MOST_CENTRES; c++) d[c] += v * centre[c];
+    }
+    for (int c = 1; c < k->count; c++)
+        if (d[c] < d[best]) best = c;
+    return best;
+}
+
+static int64_t txs_distance2(const int *x, const int *y, int axes) {
+    int64_t sum = 0;
+    for (int a = 0; a < axes; a++) sum += (int64_t)(x[a] - y[a]) * (x[a] - y[a]);
+    return sum;
+}
+
+/* First centres: each sample with a chance in proportion to its squared distance from the centres
+   so far (k-means++), less `apart`: samples that are nearer to a centre are as good as it. */
+static void txs_seed_centres(txs_clusters *k, const int *samples, int n, int64_t apart,
+                             int64_t *far_, uint64_t seed) {
+    txm_rng rng = txm_rng_make(seed, 7);
+    const int axes = k->axes;
+    int chosen = (int)txm_rng_below(&rng, (uint32_t)n);
+    for (int i = 0; i < n; i++) far_[i] = INT64_MAX;
+    for (int c = 0; c < k->count; c++) {
+        int64_t sum = 0;
+        txs_set_centre(k, c, samples + (ptrdiff_t)chosen * axes);
+        for (int i = 0; i < n; i++) {
+            const int64_t d = txs_distance2(samples + (ptrdiff_t)i * axes,
+                                            samples + (ptrdiff_t)chosen * axes, axes);
+            if (d - apart < far_[i]) far_[i] = d > apart ? d - apart : 0;
+            sum += far_[i];
+        }
+        if (sum == 0) { /* no sample differs enough from all centres */
+            k->count = c + 1;
+            return;
+        }
+        uint64_t at = ((uint64_t)txm_rng_next(&rng) << 20) % (uint64_t)sum;
+        for (chosen = 0; chosen + 1 < n && at >= (uint64_t)far_[chosen]; chosen++)
+            at -= (uint64_t)far_[chosen];
+    }
+}
+
+/* k-means over n samples of `axes` numbers each. */
+static void txs_find_centres(txs_clusters *k, const int *samples, int n, int64_t apart,
+                              int64_t *far_, uint64_t seed) {
+    txs_seed_centres(k, samples, n, apart, far_, seed);
+    for (int c = k->count; c < TXS_MOST_CENTRES; c++) k->square[c] = 0; /* computed, never chosen */
+    for (int round = 0; round < TXS_ROUNDS; round++) {
+        int64_t sum[TXS_MOST_CENTRES][TXS_MOST_AXES] = {{0}}, members[TXS_MOST_CENTRES] = {0};
+        for (int i = 0; i < n; i++) {
+            const int *x = samples + (ptrdiff_t)i * k->axes;
+            const int c = txs_nearest(k, x);
+            for (int a = 0; a < k->axes; a++) sum[c][a] += x[a];
+            members[c]++;
+        }
+        for (int c = 0; c < k->count; c++) {
+            int mean[TXS_MOST_AXES];
+            if (!members[c]) continue;
+            for (int a = 0; a < k->axes; a++) {
+                const int64_t half = sum[c][a] < 0 ? -members[c] / 2 : members[c] / 2;
+                mean[a] = (int)((sum[c][a] + half) / members[c]);
+            }
+            txs_set_centre(k, c, mean);
+        }
+    }
+}
+
+/* ---- the textons of a scene ---------------------------------------------------------------- */
+
+typedef struct txs_features {
+    const txs_scene *scene;
+    int16_t *smooth[3];            /* lab, blurred once */
+    int8_t *answers[TXS_FILTERS];
+    txs_clusters colours, shapes;
+} txs_features;
+
+/* (L, 1.5 a, 1.5 b) in steps of a quarter */
+static void txs_colour_features(const txs_features *f, size_t i, int *x) {
+    x[0] = f->smooth[0][i] / (TXS_LAB / 4);
+    for (int c = 1; c < 3; c++) x[c] = f->smooth[c][i] * 3 / (TXS_LAB / 2);
+}
+
+static void txs_shape_features(const txs_features *f, size_t i, int *x) {
+    for (int a = 0; a < TXS_FILTERS; a++) x[a] = f->answers[a][i];
+}
+
+static void txs_name_textons(void *context, int share) {
+    const txs_features *f = (const txs_features *)context;
+    const txs_scene *s = f->scene;
+    const size_t from = s->pixels * (size_t)share / TXS_TASKS;
+    const size_t to = s->pixels * ((size_t)share + 1) / TXS_TASKS;
+    for (size_t i = from; i < to; i++) {
+        int x[TXS_MOST_AXES];
+        if (!s->counted[i]) continue;
+        txs_colour_features(f, i, x);
+        s->colour[i] = (uint8_t)txs_nearest(&f->colours, x);
+        txs_shape_features(f, i, x);
+        s->shape[i] = (uint8_t)txs_nearest(&f->shapes, x);
+    }
+}
+
+/* Make both vocabularies from a sample of the counted pixels, evenly spread over them. */
+static void txs_find_textons(txs_features *f, int *samples, int64_t *far_, uint64_t seed) {
+    const txs_scene *s = f->scene;
+    size_t counted = 0;
+    for (size_t i = 0; i < s->pixels; i++) counted += s->counted[i];
+    const size_t step = counted / TXS_TRAINING + 1;
+    for (int pass = 0; pass < 2; pass++) {
+        txs_clusters *k = pass ? &f->shapes : &f->colours;
+        k->count = pass ? TXS_GRAINS : TXS_COLOURS;
+        k->axes = pass ? TXS_FILTERS : 3;
+        size_t seen = 0, next = step / 2;
+        int n = 0;
+        for (size_t i = 0; i < s->pixels; i++) {
+            if (!s->counted[i] || seen++ != next) continue;
+            TEXSYN_ASSERT(n < TXS_TRAINING);
+            if (pass) txs_shape_features(f, i, samples + n * k->axes);
+            else txs_colour_features(f, i, samples + n * k->axes);
+            n++;
+            next = (size_t)n * step + (size_t)(txm_hash((uint64_t)n) % step);
+        }
+        TEXSYN_ASSERT(n > 0);
+        const int64_t apart = pass ? 0 : TXS_APART * TXS_APART;
+        txs_find_centres(k, samples, n, apart, far_, seed + (uint64_t)pass);
+    }
+}
+
+/* ---- regions ------------------------------------------------------------------------------
+
+   The scene is divided into blocks; each is described by the histograms of the textons around it.
+   Neighbouring blocks are joined, the most similar first, until a few dozen regions are left; these
+   are then partitioned into cliques of mutually similar ones, wherever they lie [7]. A
+   clique is a texture. */
+
+enum {
+    TXS_BINS_OF_BLOCK = TXS_COLOURS + TXS_GRAINS,
+    TXS_BLOCK_TOTAL = 4096,    /* sum of either half of a normalised histogram                  */
+    TXS_FAR = 1 << 16,         /* distance of histograms that have nothing in common            */
+    TXS_BLOCK = 8,             /* pixels a side                                                 */
+    TXS_SMALLEST_BLOCK = 2,    /* of small pictures, that have at least                         */
+    TXS_BLOCKS_ACROSS = 16,    /* on their shorter side                                         */
+    TXS_MOST_BLOCKS = 9216,    /* memory grows with their square                                */
+    TXS_PIECES = 24,   /* regions that are partitioned                                  */
+    TXS_LOG_UNIT = 256         /* of the table of n log2 n                                      */
+};
+
+typedef struct txs_blocks {
+    int size, width, height, count; /* size: pixels a side                                       */
+    uint16_t (*sums)[TXS_BINS_OF_BLOCK];   /* textons counted in each block                      */
+    uint16_t (*wide)[TXS_BINS_OF_BLOCK];   /* of a block and what is around it, normalised       */
+    uint16_t (*clear)[TXS_BINS_OF_BLOCK];  /* the same without mixtures at boundaries            */
+    int *weight;                           /* counted pixels of each block                       */
+    int32_t *log_table;                    /* n log2 n for n up to 2 TXS_BLOCK_TOTAL             */
+} txs_blocks;
+
+#define TXS_LN2 0.69314718055994530942
+
+/* log2 of x >= 1 to about 1e-12, by its exponent and a series: the same everywhere */
+static double txs_log2(double x) {
+    int whole = 0;
+    for (; x >= 2; x /= 2) whole++;
+    if (x > 1.41421356237309505) x /= 2, whole++;
+    const double t = (x - 1) / (x + 1), tt = t * t;
+    double sum = 0;
+    for (int k = 17; k > 0; k -= 2) sum = sum * tt + 1.0 / k;
+    return whole + 2 * t * sum / TXS_LN2;
+}
+
+static void txs_log_table(int32_t *table) {
+    table[0] = 0;
+    for (int n = 1; n <= 2 * TXS_BLOCK_TOTAL; n++)
+        table[n] = (int32_t)((double)(n * TXS_LOG_UNIT) * txs_log2((double)n) + 0.5);
+}
+
+/* The Jensen-Shannon divergence of bins from..to, 0..TXS_FAR. */
+static int txs_divergence(const int32_t *table, const uint16_t *p, const uint16_t *q, int from,
+                          int to) {
+    int32_t sum = 0;
+    for (int i = from; i < to; i++) sum += table[p[i]] + table[q[i]] - table[p[i] + q[i]];
+    const int64_t whole = 2 * (int64_t)TXS_BLOCK_TOTAL * TXS_LOG_UNIT;
+    const int64_t d = (whole + sum) * TXS_FAR / whole;
+    return (int)(d < 0 ? 0 : d);
+}
+
+/* the mean of those of colour and of texture */
+static int txs_unlike(const int32_t *table, const uint16_t *p, const uint16_t *q) {
+    return (txs_divergence(table, p, q, 0, TXS_COLOURS) +
+            txs_divergence(table, p, q, TXS_COLOURS, TXS_BINS_OF_BLOCK)) /
+           2;
+}
+
+/* counts, each half to the sum TXS_BLOCK_TOTAL (but for rounding) */
+static void txs_normalise_bins(const uint64_t *counts, uint16_t *out) {
+    for (int half = 0; half < 2; half++) {
+        const int from = half ? (int)TXS_COLOURS : 0;
+        const int to = half ? (int)TXS_BINS_OF_BLOCK : (int)TXS_COLOURS;
+        uint64_t total = 0;
+        for (int i = from; i < to; i++) total += counts[i];
+        if (!total) total = 1;
+        for (int i = from; i < to; i++)
+            out[i] = (uint16_t)((counts[i] * TXS_BLOCK_TOTAL + total / 2) / total);
+    }
+}
+
+/* ---- blocks ------------------------------------------------------------------------------- */
+
+static void txs_count_blocks(const txs_scene *s, txs_blocks *b) {
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            const size_t i = (size_t)y * (size_t)s->width + (size_t)x;
+            const int k = y / b->size * b->width + x / b->size;
+            if (!s->counted[i]) continue;
+            TEXSYN_ASSERT(k < b->count);
+            b->sums[k][s->colour[i]]++;
+            b->sums[k][TXS_COLOURS + s->shape[i]]++;
+            b->weight[k]++;
+        }
+    }
+}
+
+/* The histogram of a block with its neighbours, which weigh the less the farther they are. */
+static void txs_widen(txs_blocks *b, int x, int y) {
+    static const int taps[5] = {2, 4, 5, 4, 2};
+    uint64_t sum[TXS_BINS_OF_BLOCK] = {0};
+    for (int v = -2; v <= 2; v++) {
+        for (int u = -2; u <= 2; u++) {
+            if (x + u < 0 || x + u >= b->width || y + v < 0 || y + v >= b->height) continue;
+            const uint16_t *from = b->sums[(y + v) * b->width + x + u];
+            const uint32_t weight = (uint32_t)(taps[u + 2] * taps[v + 2]);
+            for (int i = 0; i < TXS_BINS_OF_BLOCK; i++) sum[i] += weight * from[i];
+        }
+    }
+    txs_normalise_bins(sum, b->wide[y * b->width + x]);
+}
+
+/* How much a block differs from those two blocks away. */
+static int txs_local_spread(const txs_blocks *b, int x, int y) {
+    static const int way[4][2] = {{-2, 0}, {2, 0}, {0, -2}, {0, 2}};
+    int64_t sum = 0, n = 0;
+    for (int k = 0; k < 4; k++) {
+        const int u = x + way[k][0], v = y + way[k][1];
+        if (u < 0 || u >= b->width || v < 0 || v >= b->height || !b->weight[v * b->width + u])
+            continue;
+        sum += txs_unlike(b->log_table, b->wide[y * b->width + x], b->wide[v * b->width + u]);
+        n++;
+    }
+    return n ? (int)(sum / n) : 0;
+}
+
+/* At a boundary a block mixes two textures. So each takes the histogram of the least mixed one near
+   it (Kuwahara's filter). spread: room for a number a block. */
+static void txs_clear_mixtures(txs_blocks *b, int *spread) {
+    for (int y = 0; y < b->height; y++)
+        for (int x = 0; x < b->width; x++)
+            spread[y * b->width + x] = txs_local_spread(b, x, y);
+    for (int y = 0; y < b->height; y++) {
+        for (int x = 0; x < b->width; x++) {
+            int best = y * b->width + x;
+            if (!b->weight[best]) continue;
+            for (int v = txm_clampi(y - 2, 0, y); v <= y + 2 && v < b->height; v++) {
+                for (int u = txm_clampi(x - 2, 0, x); u <= x + 2 && u < b->width; u++) {
+                    const int k = v * b->width + u;
+                    if (b->weight[k] && spread[k] < spread[best]) best = k;
+                }
+            }
+            memcpy(b->clear[y * b->width + x], b->wide[best], sizeof b->wide[best]);
+        }
+    }
+}
+
+/* ---- joining neighbours ---------------------------------------------------------------------- */
+
+typedef struct txs_region_set {
+    const txs_blocks *blocks;
+    int *of;             /* the region of each block, named by one of its blocks; -1: not counted */
+    uint64_t (*sum)[TXS_BINS_OF_BLOCK];    /* of the histograms of its blocks, by area */
+    uint16_t (*mean)[TXS_BINS_OF_BLOCK];   /* the same, normalised */
+    int64_t *area;       /* counted pixels; 0: no region of this name */
+    uint64_t *touches;   /* a row of bits for each region: its neighbours */
+    int words;           /* of such a row */
+    int *partner;        /* the neighbour that is joined most cheaply; -1: none */
+    int64_t *cost;       /* of that */
+    int count;
+} txs_region_set;
+
+static void txs_set_touch(txs_region_set *r, int a, int b, int value) {
+    uint64_t *word = &r->touches[(size_t)a * (size_t)r->words + (size_t)(b >> 6)];
+    const uint64_t bit = (uint64_t)1 << (b & 63);
+    *word = value ? *word | bit : *word & ~bit;
+}
+
+/* Ward's: what joining two regions adds to the unlikeness within regions. */
+static int64_t txs_join_cost(const txs_region_set *r, int a, int b) {
+    const int64_t d = txs_unlike(r->blocks->log_table, r->mean[a], r->mean[b]);
+    return d * (r->area[a] * r->area[b] / (r->area[a] + r->area[b]));
+}
+
+/* the next neighbour of a region after `after`, or -1 */
+static int txs_next_touch(const txs_region_set *r, int a, int after) {
+    const uint64_t *row = r->touches + (size_t)a * (size_t)r->words;
+    for (int b = after + 1; b < r->blocks->count; b++) {
+        if (!row[b >> 6]) b |= 63;
+        else if (row[b >> 6] >> (b & 63) & 1) return b;
+    }
+    return -1;
+}
+
+static void txs_find_partner(txs_region_set *r, int a) {
+    r->partner[a] = -1;
+    for (int b = txs_next_touch(r, a, -1); b >= 0; b = txs_next_touch(r, a, b)) {
+        const int64_t cost = txs_join_cost(r, a, b);
+        if (r->partner[a] >= 0 && cost >= r->cost[a]) continue;
+        r->partner[a] = b;
+        r->cost[a] = cost;
+    }
+}
+
+static void txs_join_two(txs_region_set *r, int a, int b) {
+    r->area[a] += r->area[b];
+    r->area[b] = 0;
+    for (int i = 0; i < TXS_BINS_OF_BLOCK; i++) r->sum[a][i] += r->sum[b][i];
+    txs_normalise_bins(r->sum[a], r->mean[a]);
+    for (int c = txs_next_touch(r, b, -1); c >= 0; c = txs_next_touch(r, b, c)) {
+        txs_set_touch(r, c, b, 0);
+        if (c == a) continue;
+        txs_set_touch(r, c, a, 1);
+        txs_set_touch(r, a, c, 1);
+    }
+    r->partner[b] = -1;
+    for (int k = 0; k < r->blocks->count; k++)
+        if (r->of[k] == b) r->of[k] = a;
+    r->count--;
+    txs_find_partner(r, a);
+    for (int c = txs_next_touch(r, a, -1); c >= 0; c = txs_next_touch(r, a, c)) {
+        if (r->partner[c] == a || r->partner[c] == b) {
+            txs_find_partner(r, c);
+            continue;
+        }
+        const int64_t cost = txs_join_cost(r, c, a);
+        if (cost < r->cost[c]) {
+            r->partner[c] = a;
+            r->cost[c] = cost;
+        }
+    }
+}
+
+/* Every counted block a region of its own. It touches the counted block before it in its row and
+   in its column, also across what is not counted. */
+static void txs_first_regions(txs_region_set *r) {
+    const txs_blocks *b = r->blocks;
+    r->count = 0;
+    for (int k = 0; k < b->count; k++) {
+        const int x = k % b->width;
+        r->of[k] = b->weight[k] ? k : -1;
+        r->area[k] = b->weight[k];
+        if (!b->weight[k]) continue;
+        r->count++;
+        memcpy(r->mean[k], b->clear[k], sizeof r->mean[k]);
+        for (int i = 0; i < TXS_BINS_OF_BLOCK; i++)
+            r->sum[k][i] = (uint64_t)b->clear[k][i] * (uint64_t)b->weight[k];
+        int left = k - 1, up = k - b->width;
+        while (left >= k - x && !b->weight[left]) left--;
+        while (up >= 0 && !b->weight[up]) up -= b->width;
+        const int before[2] = {left >= k - x ? left : -1, up};
+        for (int i = 0; i < 2; i++) {
+            if (before[i] < 0) continue;
+            txs_set_touch(r, k, before[i], 1);
+            txs_set_touch(r, before[i], k, 1);
+        }
+    }
+    for (int k = 0; k < b->count; k++) txs_find_partner(r, k);
+}
+
+/* Join the most similar neighbours until `most` regions are left, or none touch. */
+static void txs_join_neighbours(txs_region_set *r, int most) {
+    while (r->count > most) {
+        int best = -1;
+        for (int k = 0; k < r->blocks->count; k++)
+            if (r->partner[k] >= 0 && (best < 0 || r->cost[k] < r->cost[best])) best = k;
+        if (best < 0) return;
+        const int other = r->partner[best];
+        txs_join_two(r, best < other ? best : other, best < other ? other : best);
+    }
+}
+
+/* ---- partition into cliques --------------------------------------------------------------- */
+
+/* How unlike textures must be, for thick groups and for thin ones. */
+typedef struct txs_standard {
+    double thick, least_thick; /* the cut for groups of that thickness or more, in blocks */
+    double thin, most_thin;    /* and for those of at most that                           */
+} txs_standard;
+
+/* Ours, see docs/choices.md: the strict one, and a finer one for what looks like one texture. */
+static const txs_standard txs_strict = {0.39, 5, 0.5, 1.8};
+static const txs_standard txs_fine = {0.31, 3, 0.5, 1.8};
+
+typedef struct txs_partition {
+    int count;         /* groups; 0..count-1, each of one region or more                      */
+    int regions;       /* the matrices have as many rows and columns                          */
+    int *unlike;       /* mean distance of two groups, by area                                */
+    int *border;       /* length of their common boundary in sides of blocks                  */
+    int64_t *area;     /* pixels                                                              */
+    int *group;        /* of each region                                                      */
+    int block;         /* pixels of a block                                                   */
+} txs_partition;
+
+static int *txs_unlike_at(const txs_partition *p, int a, int b) {
+    return &p->unlike[(size_t)a * (size_t)p->regions + (size_t)b];
+}
+
+static int *txs_border_at(const txs_partition *p, int a, int b) {
+    return &p->border[(size_t)a * (size_t)p->regions + (size_t)b];
+}
+
+/* Row and column `from` of both matrices to `to`. */
+static void txs_move_group(txs_partition *p, int to, int from) {
+    p->area[to] = p->area[from];
+    for (int k = 0; k < p->regions; k++)
+        if (p->group[k] == from) p->group[k] = to;
+    for (int c = 0; c < p->regions; c++) {
+        *txs_unlike_at(p, to, c) = *txs_unlike_at(p, from, c);
+        *txs_border_at(p, to, c) = *txs_border_at(p, from, c);
+    }
+    for (int c = 0; c < p->regions; c++) {
+        *txs_unlike_at(p, c, to) = *txs_unlike_at(p, c, from);
+        *txs_border_at(p, c, to) = *txs_border_at(p, c, from);
+    }
+}
+
+/* Group b becomes part of group a; the last group takes the number of b. */
+static void txs_unite_groups(txs_partition *p, int a, int b) {
+    const int64_t whole = p->area[a] + p->area[b];
+    for (int c = 0; c < p->count; c++) {
+        const int64_t sum =
+            p->area[a] * *txs_unlike_at(p, a, c) + p->area[b] * *txs_unlike_at(p, b, c);
+        const int border = *txs_border_at(p, a, c) + *txs_border_at(p, b, c);
+        *txs_unlike_at(p, a, c) = *txs_unlike_at(p, c, a) = (int)(sum / whole);
+        *txs_border_at(p, a, c) = *txs_border_at(p, c, a) = border;
+    }
+    *txs_border_at(p, a, a) = 0;
+    p->area[a] = whole;
+    for (int k = 0; k < p->regions; k++)
+        if (p->group[k] == b) p->group[k] = a;
+    if (b != --p->count) txs_move_group(p, b, p->count);
+}
+
+/* Area per boundary, in blocks: half the width of a strip, a quarter of a square's side. */
+static double txs_thickness(const txs_partition *p, int a) {
+    int64_t border = 0;
+    for (int c = 0; c < p->count; c++) border += c == a ? 0 : *txs_border_at(p, a, c);
+    return (double)p->area[a] / (double)(p->block * p->block) / (double)(border ? border : 1);
+}
+
+/* How unlike two groups must be to count as two textures. Thin ones are more often parts of one
+   texture, such as bricks and mortar. */
+static int txs_group_cut(const txs_partition *p, const txs_standard *z, int a, int b) {
+    const double s = txs_thickness(p, a), t = txs_thickness(p, b), thinner = s < t ? s : t;
+    double share = (z->least_thick - thinner) / (z->least_thick - z->most_thin);
+    share = share < 0 ? 0 : share > 1 ? 1 : share;
+    return (int)((z->thick + (z->thin - z->thick) * share) * (double)TXS_FAR);
+}
+
+/* The pair of groups a < b that is most likely one texture; returns by how much their distance
+   exceeds what it may be, INT_MAX if there is but one group. */
+static int txs_most_similar(const txs_partition *p, const txs_standard *z, int pair[2]) {
+    int best = INT_MAX;
+    for (int a = 0; a < p->count; a++) {
+        for (int b = a + 1; b < p->count; b++) {
+            const int excess = *txs_unlike_at(p, a, b) - txs_group_cut(p, z, a, b);
+            if (excess >= best) continue;
+            best = excess;
+            pair[0] = a;
+            pair[1] = b;
+        }
+    }
+    return best;
+}
+
+/* Unite the most similar groups while they may be one texture or more than `most` are left, but
+   never to fewer than `least`. */
+static void txs_find_cliques(txs_partition *p, const txs_standard *z, int least, int most) {
+    int pair[2] = {0, 0};
+    while (p->count > least) {
+        const int excess = txs_most_similar(p, z, pair);
+        if (excess >= 0 && p->count <= most) return;
+        txs_unite_groups(p, pair[0], pair[1]);
+    }
+}
+
+/* Groups smaller than `small` join the most similar other one, the smallest first. */
+static void txs_join_small(txs_partition *p, int64_t small, int least) {
+    while (p->count > least) {
+        int a = 0, best = -1;
+        for (int c = 1; c < p->count; c++)
+            if (p->area[c] < p->area[a]) a = c;
+        if (p->area[a] >= small) return;
+        for (int c = 0; c < p->count; c++) {
+            if (c == a) continue;
+            if (best < 0 || *txs_unlike_at(p, a, c) < *txs_unlike_at(p, a, best)) best = c;
+        }
+        txs_unite_groups(p, a < best ? a : best, a < best ? best : a);
+    }
+}
+
+/* ---- labels -------------------------------------------------------------------------------
+
+   Boundaries to the pixel: each pixel takes the label under which the textons around it are
+   likely and which its neighbours have. */
+
+enum {
+    TXS_MOST_LABELS = TEXSYN_MAX_SEGMENTS,
+    TXS_REFINEMENTS = 3,
+    TXS_SWEEPS = 4,          /* in each refinement                                       */
+    TXS_REACH = 6,          /* pixels: reach of the window in which neighbours count    */
+    TXS_PATIENCE = 96,       /* costs as much as if no pixel of it had the label         */
+    TXS_FINER = 16,          /* steps per step of a cost when both are added             */
+    TXS_COST_UNIT = 64,      /* steps of a cost per nat                                  */
+    TXS_SPECK = 2048,        /* a smaller part of the picture is a speck                 */
+    TXS_UNSEEN_SHARE = 2000  /* of a label's pixels: as if more had each texton          */
+};
+
+typedef struct txs_refiner {
+    const txs_scene *scene;
+    uint8_t *label;             /* of each pixel                                          */
+    int count, reach;
+    int32_t *colour_cost, *shape_cost; /* of each texton under each label                 */
+    int16_t *cost;              /* planes, one a label: mean around each pixel            */
+    uint8_t *share;             /* the same: pixels of the label around each pixel        */
+    int32_t *work;              /* a line of sums for each label                          */
+    uint16_t *counted_around;   /* counted pixels within reach                            */
+} txs_refiner;
+
+/* Sums over a window of 2 reach + 1 pixels a side, clipped at the border. */
+typedef struct txs_window_sums {
+    int width, height, reach;
+    int32_t *columns; /* width sums over the rows of the window */
+} txs_window_sums;
+
+static void txs_window_row(const txs_window_sums *b, int32_t *out) {
+    int32_t sum = 0;
+    for (int x = 0; x < b->reach && x < b->width; x++) sum += b->columns[x];
+    for (int x = 0; x < b->width; x++) {
+        if (x + b->reach < b->width) sum += b->columns[x + b->reach];
+        out[x] = sum;
+        if (x >= b->reach) sum -= b->columns[x - b->reach];
+    }
+}
+
+/* -log p of the textons of each label, in TXS_COST_UNIT */
+static void txs_texton_costs(txs_refiner *r) {
+    const txs_scene *s = r->scene;
+    memset(r->colour_cost, 0, sizeof(int32_t) * (size_t)r->count * TXS_COLOURS);
+    memset(r->shape_cost, 0, sizeof(int32_t) * (size_t)r->count * TXS_GRAINS);
+    for (size_t i = 0; i < s->pixels; i++) {
+        if (!s->counted[i]) continue;
+        r->colour_cost[r->label[i] * TXS_COLOURS + s->colour[i]]++;
+        r->shape_cost[r->label[i] * TXS_GRAINS + s->shape[i]]++;
+    }
+    for (int k = 0; k < 2 * r->count; k++) {
+        const int bins = k & 1 ? TXS_GRAINS : TXS_COLOURS;
+        int32_t *bin = k & 1 ? r->shape_cost + (k >> 1) * bins : r->colour_cost + (k >> 1) * bins;
+        double total = 0;
+        for (int i = 0; i < bins; i++) total += bin[i];
+        /* as if each texton had been seen a little more often than it was */
+        const double more = total / (double)TXS_UNSEEN_SHARE + 1;
+        for (int i = 0; i < bins; i++) {
+            const double p = (total + more * bins) / ((double)bin[i] + more);
+            bin[i] = (int32_t)(txs_log2(p) * TXS_LN2 * (double)TXS_COST_UNIT + 0.5);
+        }
+    }
+}
+
+static void txs_add_costs(const txs_refiner *r, int label, int y, int sign, int32_t *columns) {
+    const txs_scene *s = r->scene;
+    const size_t at = (size_t)y * (size_t)s->width;
+    const int32_t *colour = r->colour_cost + label * TXS_COLOURS;
+    const int32_t *shape = r->shape_cost + label * TXS_GRAINS;
+    for (int x = 0; x < s->width; x++) {
+        const size_t i = at + (size_t)x;
+        if (s->counted[i]) columns[x] += sign * (colour[s->colour[i]] + shape[s->shape[i]]);
+    }
+}
+
+/* The mean cost of a label around each pixel. */
+static void txs_average_costs(void *context, int label) {
+    const txs_refiner *r = (const txs_refiner *)context;
+    const txs_scene *s = r->scene;
+    const size_t line = 2 * (size_t)s->width;
+    int32_t *columns = r->work + (size_t)label * line, *out = columns + s->width;
+    const txs_window_sums box = {s->width, s->height, r->reach, columns};
+    memset(columns, 0, sizeof *columns * (size_t)s->width);
+    for (int y = 0; y < r->reach && y < s->height; y++) txs_add_costs(r, label, y, 1, columns);
+    for (int y = 0; y < s->height; y++) {
+        if (y + r->reach < s->height) txs_add_costs(r, label, y + r->reach, 1, columns);
+        txs_window_row(&box, out);
+        if (y >= r->reach) txs_add_costs(r, label, y - r->reach, -1, columns);
+        int16_t *to = r->cost + (size_t)label * s->pixels + (size_t)y * (size_t)s->width;
+        const uint16_t *n = r->counted_around + (size_t)y * (size_t)s->width;
+        for (int x = 0; x < s->width; x++) to[x] = (int16_t)(n[x] ? out[x] / n[x] : 0);
+    }
+}
+
+static void txs_count_around(const txs_refiner *r) {
+    const txs_scene *s = r->scene;
+    int32_t *columns = r->work, *out = columns + s->width;
+    const txs_window_sums box = {s->width, s->height, r->reach, columns};
+    memset(columns, 0, sizeof *columns * (size_t)s->width);
+    for (int y = -r->reach; y < s->height; y++) {
+        if (y + r->reach < s->height)
+            for (int x = 0; x < s->width; x++)
+                columns[x] += s->counted[(size_t)(y + r->reach) * (size_t)s->width + (size_t)x];
+        if (y < 0) continue;
+        txs_window_row(&box, out);
+        for (int x = 0; x < s->width; x++) {
+            r->counted_around[(size_t)y * (size_t)s->width + (size_t)x] = (uint16_t)out[x];
+            if (y >= r->reach)
+                columns[x] -= s->counted[(size_t)(y - r->reach) * (size_t)s->width + (size_t)x];
+        }
+    }
+}
+
+static void txs_add_label(const txs_refiner *r, int label, int y, int sign, int32_t *columns) {
+    const txs_scene *s = r->scene;
+    const uint8_t *row = r->label + (size_t)y * (size_t)s->width;
+    const uint8_t *counted = s->counted + (size_t)y * (size_t)s->width;
+    for (int x = 0; x < s->width; x++) columns[x] += sign * ((row[x] == label) & counted[x]);
+}
+
+/* How many pixels around each have the label. */
+static void txs_share_label(void *context, int label) {
+    const txs_refiner *r = (const txs_refiner *)context;
+    const txs_scene *s = r->scene;
+    const size_t line = 2 * (size_t)s->width;
+    int32_t *columns = r->work + (size_t)label * line, *out = columns + s->width;
+    const txs_window_sums box = {s->width, s->height, TXS_REACH, columns};
+    memset(columns, 0, sizeof *columns * (size_t)s->width);
+    for (int y = 0; y < TXS_REACH && y < s->height; y++) txs_add_label(r, label, y, 1, columns);
+    for (int y = 0; y < s->height; y++) {
+        if (y + TXS_REACH < s->height) txs_add_label(r, label, y + TXS_REACH, 1, columns);
+        txs_window_row(&box, out);
+        if (y >= TXS_REACH) txs_add_label(r, label, y - TXS_REACH, -1, columns);
+        uint8_t *to = r->share + (size_t)label * s->pixels + (size_t)y * (size_t)s->width;
+        for (int x = 0; x < s->width; x++) to[x] = (uint8_t)out[x];
+    }
+}
+
+static void txs_choose_labels(void *context, int share) {
+    const txs_refiner *r = (const txs_refiner *)context;
+    const txs_scene *s = r->scene;
+    const int window = (2 * TXS_REACH + 1) * (2 * TXS_REACH + 1);
+    const int gain = (TXS_PATIENCE * TXS_FINER + window / 2) / window;
+    const size_t from = s->pixels * (size_t)share / TXS_TASKS;
+    const size_t to = s->pixels * ((size_t)share + 1) / TXS_TASKS;
+    for (size_t i = from; i < to; i++) {
+        int best = 0, least = INT_MAX;
+        for (int k = 0; k < r->count; k++) {
+            const size_t at = (size_t)k * s->pixels + i;
+            const int cost = TXS_FINER * r->cost[at] - gain * r->share[at];
+            if (cost >= least) continue;
+            least = cost;
+            best = k;
+        }
+        r->label[i] = (uint8_t)best;
+    }
+}
+
+static const int txs_reaches[TXS_REFINEMENTS] = {12, 8, 5};
+
+static txm_status txs_refine_labels(txs_refiner *r, txm_env *env, float from, float to) {
+    for (int i = 0; i < TXS_REFINEMENTS; i++) {
+        r->reach = txs_reaches[i];
+        txs_texton_costs(r);
+        txs_count_around(r);
+        txm_parallel_for(env, r->count, txs_average_costs, r);
+        for (int k = 0; k < TXS_SWEEPS; k++) {
+            txm_parallel_for(env, r->count, txs_share_label, r);
+            txm_parallel_for(env, TXS_TASKS, txs_choose_labels, r);
+        }
+        const float done = (float)(i + 1) / (float)TXS_REFINEMENTS;
+        if (txm_progress(env, from + (to - from) * done, "refine"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+    }
+    return TXM_OK;
+}
+
+/* ---- specks and thin parts ----------------------------------------------------------------- */
+
+typedef struct txs_cleaner {
+    int width, height;
+    uint8_t *label;
+    uint8_t *seen;
+    uint32_t *part;    /* pixels of the connected part that is looked at */
+} txs_cleaner;
+
+/* The connected part at pixel i; its size. */
+static size_t txs_find_part(const txs_cleaner *c, size_t i) {
+    const size_t w = (size_t)c->width, pixels = w * (size_t)c->height;
+    size_t count = 0;
+    c->part[count++] = (uint32_t)i;
+    c->seen[i] = 1;
+    for (size_t k = 0; k < count; k++) {
+        const size_t at = c->part[k], x = at % w;
+        const size_t beside[4] = {x ? at - 1 : at, x + 1 < w ? at + 1 : at, at >= w ? at - w : at,
+                                  at + w < pixels ? at + w : at};
+        for (int n = 0; n < 4; n++) {
+            if (c->seen[beside[n]] || c->label[beside[n]] != c->label[i]) continue;
+            TEXSYN_ASSERT(count < pixels);
+            c->seen[beside[n]] = 1;
+            c->part[count++] = (uint32_t)beside[n];
+        }
+    }
+    return count;
+}
+
+/* The label that most pixels beside the part have; its own if there are none. */
+static int txs_label_around(const txs_cleaner *c, size_t count) {
+    const size_t w = (size_t)c->width, pixels = w * (size_t)c->height;
+    const int own = c->label[c->part[0]];
+    size_t votes[256] = {0};
+    int best = own;
+    for (size_t k = 0; k < count; k++) {
+        const size_t at = c->part[k], x = at % w;
+        votes[c->label[x ? at - 1 : at]]++;
+        votes[c->label[x + 1 < w ? at + 1 : at]]++;
+        votes[c->label[at >= w ? at - w : at]]++;
+        votes[c->label[at + w < pixels ? at + w : at]]++;
+    }
+    votes[own] = 0;
+    for (int l = 0; l < 256; l++)
+        if (votes[l] > votes[best]) best = l;
+    return best;
+}
+
+/* Parts of fewer than `least` pixels take the label around them, or `transition` if that is not
+   negative; but the largest part of each label stays. */
+static void txs_clean_labels(const txs_cleaner *c, size_t least, int transition) {
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    size_t largest[256] = {0}, keep[256] = {0};
+    memset(c->seen, 0, pixels);
+    for (size_t i = 0; i < pixels; i++) {
+        if (c->seen[i]) continue;
+        const size_t count = txs_find_part(c, i);
+        if (count <= largest[c->label[i]]) continue;
+        largest[c->label[i]] = count;
+        keep[c->label[i]] = i;
+    }
+    memset(c->seen, 0, pixels);
+    for (size_t i = 0; i < pixels; i++) {
+        if (c->seen[i]) continue;
+        const size_t count = txs_find_part(c, i);
+        if (count >= least || keep[c->label[i]] == i) continue;
+        const int label = transition >= 0 ? transition : txs_label_around(c, count);
+        for (size_t k = 0; k < count; k++) c->label[c->part[k]] = (uint8_t)label;
+    }
+}
+
+/* With a transition class: what no square of 2 TXS_REACH + 1 pixels of its label covers becomes a
+   transition, unless nothing would be left of the label. share: a plane. */
+static void txs_mark_thin(txs_refiner *r, int label, uint8_t transition) {
+    const txs_scene *s = r->scene;
+    size_t left = 0;
+    r->reach = TXS_REACH;
+    txs_share_label(r, label);
+    uint8_t *share = r->share + (size_t)label * s->pixels;
+    for (size_t i = 0; i < s->pixels; i++)
+        share[i] = (uint8_t)(s->counted[i] && share[i] == r->counted_around[i]);
+    /* the squares' centres, widened to the squares: in columns, then in rows */
+    for (int pass = 0; pass < 2; pass++) {
+        const int lines = pass ? s->height : s->width, length = pass ? s->width : s->height;
+        const size_t by = pass ? 1 : (size_t)s->width, next = pass ? (size_t)s->width : 1;
+        for (int k = 0; k < lines; k++) {
+            uint8_t *line = share + (size_t)k * next;
+            int last = -1;
+            for (int i = 0; i < length; i++) {
+                if (line[(size_t)i * by] & 1) last = i;
+                if (last >= 0 && i - last <= TXS_REACH) line[(size_t)i * by] |= 2;
+            }
+            last = -1;
+            for (int i = length - 1; i >= 0; i--) {
+                if (line[(size_t)i * by] & 1) last = i;
+                if (last >= 0 && last - i <= TXS_REACH) line[(size_t)i * by] |= 2;
+            }
+            for (int i = 0; i < length; i++) line[(size_t)i * by] >>= 1;
+        }
+    }
+    for (size_t i = 0; i < s->pixels; i++) left += r->label[i] == label && share[i];
+    for (size_t i = 0; i < s->pixels && left; i++)
+        if (r->label[i] == label && !share[i]) r->label[i] = transition;
+}
+
+/* ---- labels of the picture ------------------------------------------------------------------ */
+
+/* The label at a pixel of the picture: a vote of the nine pixels of the scene around it, with the
+   weights of a quadratic spline, which makes smooth boundaries of steps. */
+static uint8_t txs_vote(const txs_scene *s, const uint8_t *label, int x, int y) {
+    const int f = s->factor, at[2] = {x / f, y / f};
+    const int off[2] = {2 * (x % f) + 1 - f, 2 * (y % f) + 1 - f}; /* of 2 f */
+    uint8_t found[9];
+    int64_t weight[9];
+    int best = 0, same = 1;
+    for (int k = 0; k < 9; k++) {
+        const int u = txm_clampi(at[0] + k % 3 - 1, 0, s->width - 1);
+        const int v = txm_clampi(at[1] + k / 3 - 1, 0, s->height - 1);
+        int64_t w = 1;
+        for (int c = 0; c < 2; c++) {
+            const int64_t side = (c ? k / 3 : k % 3) - 1, a = off[c];
+            w *= side ? (f + side * a) * (f + side * a) : 6 * (int64_t)f * f - 2 * a * a;
+        }
+        found[k] = label[(size_t)v * (size_t)s->width + (size_t)u];
+        weight[k] = w;
+        same &= found[k] == found[0];
+    }
+    if (same) return found[0];
+    for (int k = 0; k < 9; k++) {
+        for (int j = 0; j < k; j++) {
+            if (found[j] != found[k]) continue;
+            weight[j] += weight[k]; /* the first of a label counts for all */
+            weight[k] = 0;
+            break;
+        }
+    }
+    for (int k = 1; k < 9; k++)
+        if (weight[k] > weight[best] || (weight[k] == weight[best] && found[k] < found[best]))
+            best = k;
+    return found[best];
+}
+
+/* ---- segmentation -------------------------------------------------------------------------
+
+   See the picture, name its textons, find regions, decide which of them are one texture, draw the
+   boundaries. */
+
+enum {
+    TXS_SMALL = 50,         /* a texture covers at least such a part of the picture    */
+    TXS_LEAST_COUNTED = 256 /* pixels that must take part                              */
+};
+
+/* progress at the end of each stage, by the time it takes */
+#define TXS_AT_TEXTONS 0.1f
+#define TXS_AT_REGIONS 0.5f
+#define TXS_AT_LABELS 0.65f
+#define TXS_AT_END 0.95f
+
+typedef struct txs_segmenter {
+    const texsyn_segment_desc *desc;
+    txm_env *env;
+    txm_arena arena;
+    txs_scene scene;
+    txs_blocks blocks;
+    txs_region_set regions;
+    txs_partition partition;
+    txs_refiner refiner;
+    uint32_t *nearest; /* of each pixel of the scene the counted one nearest to it */
+} txs_segmenter;
+
+/* Steps to the nearest counted pixel, by two passes; its index for each pixel. */
+static void txs_find_nearest(const txs_scene *s, uint32_t *nearest, uint16_t *steps) {
+    static const int before[4][2] = {{-1, 0}, {0, -1}, {-1, -1}, {1, -1}};
+    const ptrdiff_t w = s->width;
+    for (size_t i = 0; i < s->pixels; i++) {
+        nearest[i] = (uint32_t)i;
+        steps[i] = s->counted[i] ? 0 : UINT16_MAX;
+    }
+    for (int pass = 0; pass < 4; pass++) { /* the second pair for what lies in a shadow */
+        const int sign = pass & 1 ? -1 : 1;
+        for (size_t n = 0; n < s->pixels; n++) {
+            const size_t i = pass & 1 ? s->pixels - 1 - n : n;
+            const int x = (int)(i % (size_t)w), y = (int)(i / (size_t)w);
+            for (int k = 0; k < 4; k++) {
+                const int u = x + sign * before[k][0], v = y + sign * before[k][1];
+                if (u < 0 || u >= s->width || v < 0 || v >= s->height) continue;
+                const size_t j = (size_t)(v * w + u);
+                if (steps[j] + 1 >= steps[i]) continue;
+                steps[i] = (uint16_t)(steps[j] + 1);
+                nearest[i] = nearest[j];
+            }
+        }
+    }
+}
+
+static txm_status txs_no_memory_to_segment(txm_env *env) {
+    return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the segmentation");
+}
+
+typedef struct txs_reducer {
+    txs_scene *scene;
+    txm_image image, mask;
+    const txs_colours *tables;
+} txs_reducer;
+
+static void txs_reduce_rows(void *context, int share) {
+    const txs_reducer *r = (const txs_reducer *)context;
+    txs_scene *s = r->scene;
+    const int from = (int)((int64_t)s->height * share / TXS_TASKS);
+    const int to = (int)((int64_t)s->height * (share + 1) / TXS_TASKS);
+    for (int y = from; y < to; y++)
+        for (int x = 0; x < s->width; x++) txs_reduce(s, &r->image, &r->mask, r->tables, x, y);
+}
+
+/* Do enough pixels take part? */
+static txm_status txs_check_counted(const txs_segmenter *g, txm_image image, txm_image mask) {
+    const txs_scene *s = &g->scene;
+    size_t whole = 0, counted = 0;
+    for (size_t i = 0; i < s->pixels; i++) whole += s->counted[i];
+    for (int y = 0; y < image.height && counted < TXS_LEAST_COUNTED; y++)
+        for (int x = 0; x < image.width; x++)
+            counted += (size_t)txs_takes_part(&image, &mask, x, y);
+    if (counted >= TXS_LEAST_COUNTED && whole > 0) return TXM_OK;
+    return txm_fail(g->env, TXM_TOO_SMALL,
+                    "fewer than 256 pixels (16 x 16) take part, by mask and alpha");
+}
+
+static txm_status txs_see_scene(txs_segmenter *g) {
+    txs_scene *s = &g->scene;
+    const txm_image *im = &g->desc->image;
+    txm_arena arena;
+    txm_status status = TXM_OK;
+    s->factor = 1;
+    while (((int64_t)im->width + s->factor - 1) / s->factor *
+               (((int64_t)im->height + s->factor - 1) / s->factor) > TXS_WORK)
+        s->factor++;
+    s->width = (im->width + s->factor - 1) / s->factor;
+    s->height = (im->height + s->factor - 1) / s->factor;
+    s->pixels = (size_t)s->width * (size_t)s->height;
+    s->counted = (uint8_t *)txm_arena_alloc(&g->arena, s->pixels, 3);
+    s->lab[0] = (int16_t *)txm_arena_alloc(&g->arena, s->pixels, 3 * sizeof(int16_t));
+    g->nearest = (uint32_t *)txm_arena_alloc(&g->arena, s->pixels, sizeof(uint32_t));
+    if (g->arena.failed) return txs_no_memory_to_segment(g->env);
+    s->colour = s->counted + s->pixels;
+    s->shape = s->colour + s->pixels;
+    memset(s->colour, 0, 2 * s->pixels);
+    s->lab[1] = s->lab[0] + s->pixels;
+    s->lab[2] = s->lab[1] + s->pixels;
+
+    txm_arena_init(&arena, g->env);
+    txs_colours *tables = (txs_colours *)txm_arena_alloc(&arena, 1, sizeof *tables);
+    uint16_t *steps = (uint16_t *)txm_arena_alloc(&arena, s->pixels, sizeof *steps);
+    if (arena.failed) {
+        status = txs_no_memory_to_segment(g->env);
+    } else {
+        txs_colour_tables(tables);
+        txs_reducer r = {s, txm_image_resolve(*im), g->desc->mask, tables};
+        if (r.mask.pixels) r.mask = txm_image_resolve(r.mask);
+        txm_parallel_for(g->env, TXS_TASKS, txs_reduce_rows, &r);
+        status = txs_check_counted(g, r.image, r.mask);
+    }
+    if (status == TXM_OK) {
+        txs_find_nearest(s, g->nearest, steps);
+        for (size_t i = 0; i < s->pixels; i++)
+            for (int c = 0; c < 3; c++) s->lab[c][i] = s->lab[c][g->nearest[i]];
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+static txm_status txs_make_textons(txs_segmenter *g) {
+    txs_scene *s = &g->scene;
+    txm_arena arena;
+    txs_features f;
+    memset(&f, 0, sizeof f);
+    f.scene = s;
+    txm_arena_init(&arena, g->env);
+    const int longest = s->width > s->height ? s->width : s->height;
+    const int room = longest + 64 * (1 << (TXS_SCALES - 1));
+    int16_t *lines = (int16_t *)txm_arena_alloc(&arena, (size_t)room, TXS_TASKS * sizeof *lines);
+    int16_t *planes = (int16_t *)txm_arena_alloc(&arena, s->pixels, 5 * sizeof *planes);
+    int8_t *answers = (int8_t *)txm_arena_alloc(&arena, s->pixels, TXS_FILTERS);
+    int *samples = (int *)txm_arena_alloc(&arena, TXS_TRAINING, TXS_MOST_AXES * sizeof *samples);
+    int64_t *far_ = (int64_t *)txm_arena_alloc(&arena, TXS_TRAINING, sizeof *far_);
+    if (arena.failed) {
+        txm_arena_free(&arena);
+        return txs_no_memory_to_segment(g->env);
+    }
+    for (int c = 0; c < 3; c++) {
+        f.smooth[c] = planes + (size_t)c * s->pixels;
+        memcpy(f.smooth[c], s->lab[c], s->pixels * sizeof(int16_t));
+        txs_blur_plane(s, f.smooth[c], 1, lines, room, g->env);
+    }
+    int16_t *light = planes + 3 * s->pixels, *raw = planes + 4 * s->pixels;
+    memcpy(light, f.smooth[0], s->pixels * sizeof(int16_t));
+    for (int k = 0; k < TXS_FILTERS; k++) {
+        f.answers[k] = answers + (size_t)k * s->pixels;
+        if (k && k % 3 == 0) txs_blur_plane(s, light, 1 << k / 3, lines, room, g->env);
+        txs_run_filter(s, light, k % 3, 1 << k / 3, raw, f.answers[k], lines, room, g->env);
+    }
+    txs_find_textons(&f, samples, far_, g->desc->seed);
+    txm_parallel_for(g->env, TXS_TASKS, txs_name_textons, &f);
+    txm_arena_free(&arena);
+    return TXM_OK;
+}
+
+static txm_status txs_make_regions(txs_segmenter *g) {
+    const txs_scene *s = &g->scene;
+    txs_blocks *b = &g->blocks;
+    txs_region_set *r = &g->regions;
+    const int side = s->width < s->height ? s->width : s->height;
+    b->size = txm_clampi(side / TXS_BLOCKS_ACROSS, TXS_SMALLEST_BLOCK, TXS_BLOCK);
+    for (;; b->size++) { /* a long strip has more of them */
+        b->width = (s->width + b->size - 1) / b->size;
+        b->height = (s->height + b->size - 1) / b->size;
+        b->count = b->width * b->height;
+        if (b->count <= TXS_MOST_BLOCKS) break;
+    }
+    const size_t n = (size_t)b->count;
+    r->words = (b->count + 63) / 64;
+    const size_t row = sizeof(uint16_t) * TXS_BINS_OF_BLOCK;
+    b->sums = (uint16_t(*)[TXS_BINS_OF_BLOCK])txm_arena_zero(&g->arena, n, row);
+    b->wide = (uint16_t(*)[TXS_BINS_OF_BLOCK])txm_arena_zero(&g->arena, n, row);
+    b->clear = (uint16_t(*)[TXS_BINS_OF_BLOCK])txm_arena_zero(&g->arena, n, row);
+    b->weight = (int *)txm_arena_zero(&g->arena, n, sizeof(int));
+    b->log_table = (int32_t *)txm_arena_alloc(&g->arena, 2 * TXS_BLOCK_TOTAL + 1, sizeof(int32_t));
+    r->of = (int *)txm_arena_alloc(&g->arena, n, sizeof(int));
+    r->sum = (uint64_t(*)[TXS_BINS_OF_BLOCK])txm_arena_alloc(&g->arena, n, 4 * row);
+    r->mean = (uint16_t(*)[TXS_BINS_OF_BLOCK])txm_arena_alloc(&g->arena, n, row);
+    r->area = (int64_t *)txm_arena_alloc(&g->arena, n, sizeof(int64_t));
+    r->touches = (uint64_t *)txm_arena_zero(&g->arena, n, sizeof(uint64_t) * (size_t)r->words);
+    r->partner = (int *)txm_arena_alloc(&g->arena, n, sizeof(int));
+    r->cost = (int64_t *)txm_arena_alloc(&g->arena, n, sizeof(int64_t));
+    if (g->arena.failed) return txs_no_memory_to_segment(g->env);
+    r->blocks = b;
+    txs_log_table(b->log_table);
+    txs_count_blocks(s, b);
+    for (int y = 0; y < b->height; y++)
+        for (int x = 0; x < b->width; x++) txs_widen(b, x, y);
+    txs_clear_mixtures(b, r->partner);
+    txs_first_regions(r);
+    txs_join_neighbours(r, TXS_PIECES);
+    return TXM_OK;
+}
+
+/* Every region a group of its own: raw histograms, distances, boundaries. */
+static void txs_first_groups(txs_segmenter *g, uint64_t (*sum)[TXS_BINS_OF_BLOCK],
+                             uint16_t (*mean)[TXS_BINS_OF_BLOCK]) {
+    const txs_blocks *b = &g->blocks;
+    const txs_region_set *r = &g->regions;
+    txs_partition *p = &g->partition;
+    const size_t square = (size_t)p->regions * (size_t)p->regions;
+    p->count = p->regions;
+    memset(p->border, 0, square * sizeof *p->border);
+    memset(p->area, 0, (size_t)p->regions * sizeof *p->area);
+    memset(sum, 0, (size_t)p->regions * sizeof *sum);
+    for (int k = 0; k < b->count; k++) {
+        const int a = r->of[k], beside[2] = {k % b->width ? k - 1 : -1, k - b->width};
+        if (a < 0) continue;
+        for (int i = 0; i < TXS_BINS_OF_BLOCK; i++) sum[a][i] += b->sums[k][i];
+        p->area[a] += b->weight[k];
+        for (int i = 0; i < 2; i++) {
+            const int c = beside[i] < 0 ? -1 : r->of[beside[i]];
+            if (c < 0 || c == a) continue;
+            ++*txs_border_at(p, a, c);
+            ++*txs_border_at(p, c, a);
+        }
+    }
+    for (int a = 0; a < p->regions; a++) {
+        txs_normalise_bins(sum[a], mean[a]);
+        p->group[a] = a;
+    }
+    for (int a = 0; a < p->regions; a++)
+        for (int c = 0; c < p->regions; c++)
+            *txs_unlike_at(p, a, c) = txs_unlike(b->log_table, mean[a], mean[c]);
+}
+
+/* Regions are numbered in the order of their names. */
+static void txs_number_regions(txs_region_set *r) {
+    const int blocks = r->blocks->count;
+    int *number = r->partner, next = 0; /* partners are not needed any more */
+    for (int k = 0; k < blocks; k++)
+        if (r->of[k] == k) number[k] = next++;
+    TEXSYN_ASSERT(next == r->count);
+    for (int k = 0; k < blocks; k++)
+        if (r->of[k] >= 0) r->of[k] = number[r->of[k]];
+}
+
+/* Which regions are one texture? */
+static txm_status txs_group_regions(txs_segmenter *g) {
+    txs_partition *p = &g->partition;
+    const size_t n = (size_t)g->regions.count;
+    const int forced = g->desc->segments;
+    p->regions = g->regions.count;
+    p->block = g->blocks.size;
+    p->unlike = (int *)txm_arena_alloc(&g->arena, n * n, 2 * sizeof(int));
+    p->area = (int64_t *)txm_arena_alloc(&g->arena, n, sizeof(int64_t));
+    p->group = (int *)txm_arena_alloc(&g->arena, n, sizeof(int));
+    uint64_t(*sum)[TXS_BINS_OF_BLOCK] =
+        (uint64_t(*)[TXS_BINS_OF_BLOCK])txm_arena_alloc(&g->arena, n, sizeof *sum);
+    uint16_t(*mean)[TXS_BINS_OF_BLOCK] =
+        (uint16_t(*)[TXS_BINS_OF_BLOCK])txm_arena_alloc(&g->arena, n, sizeof *mean);
+    if (g->arena.failed) return txs_no_memory_to_segment(g->env);
+    p->border = p->unlike + n * n;
+    txs_number_regions(&g->regions);
+    txs_first_groups(g, sum, mean);
+    if (forced) {
+        if (forced > p->count)
+            return txm_fail_numbers(g->env, TXM_TOO_SMALL,
+                                    "segments: the picture has only # regions; ask for fewer",
+                                    (uint64_t)p->count, 0);
+        txs_find_cliques(p, &txs_strict, forced, forced);
+        return TXM_OK;
+    }
+    int64_t all = 0;
+    for (int a = 0; a < p->regions; a++) all += p->area[a];
+    txs_find_cliques(p, &txs_strict, 1, TXS_MOST_LABELS);
+    txs_join_small(p, all / TXS_SMALL, 1);
+    if (p->count > 1) return TXM_OK;
+    txs_first_groups(g, sum, mean); /* one texture; or several that are not very unlike? */
+    txs_find_cliques(p, &txs_fine, 1, TXS_MOST_LABELS);
+    txs_join_small(p, all / TXS_SMALL, 1);
+    return TXM_OK;
+}
+
+/* Each block's label to its pixels. */
+static void txs_spread_labels(const txs_segmenter *g, uint8_t *label) {
+    const txs_scene *s = &g->scene;
+    const txs_blocks *b = &g->blocks;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            const int region = g->regions.of[y / b->size * b->width + x / b->size];
+            label[(size_t)y * (size_t)s->width + (size_t)x] =
+                (uint8_t)(region < 0 ? 0 : g->partition.group[region]);
+        }
+    }
+}
+
+/* Has each label a pixel that takes part? */
+static int txs_all_labels_live(const txs_refiner *r) {
+    const txs_scene *s = r->scene;
+    size_t area[TXS_MOST_LABELS] = {0};
+    for (size_t i = 0; i < s->pixels; i++) area[r->label[i]] += s->counted[i];
+    for (int k = 0; k < r->count; k++)
+        if (!area[k]) return 0;
+    return 1;
+}
+
+static txm_status txs_find_labels(txs_segmenter *g) {
+    const txs_scene *s = &g->scene;
+    txs_refiner *r = &g->refiner;
+    r->scene = s;
+    r->count = g->partition.count;
+    TEXSYN_ASSERT(r->count >= 1 && r->count <= TXS_MOST_LABELS);
+    const size_t n = (size_t)r->count;
+    r->label = (uint8_t *)txm_arena_alloc(&g->arena, s->pixels, 1);
+    r->colour_cost = (int32_t *)txm_arena_alloc(&g->arena, n, TXS_COLOURS * sizeof(int32_t));
+    r->shape_cost = (int32_t *)txm_arena_alloc(&g->arena, n, TXS_GRAINS * sizeof(int32_t));
+    r->cost = (int16_t *)txm_arena_alloc(&g->arena, s->pixels, n * sizeof(int16_t));
+    r->share = (uint8_t *)txm_arena_alloc(&g->arena, s->pixels, n);
+    r->work = (int32_t *)txm_arena_alloc(&g->arena, (size_t)s->width, 2 * n * sizeof(int32_t));
+    r->counted_around = (uint16_t *)txm_arena_alloc(&g->arena, s->pixels, sizeof(uint16_t));
+    if (g->arena.failed) return txs_no_memory_to_segment(g->env);
+    txs_spread_labels(g, r->label);
+    if (r->count < 2) return TXM_OK;
+    const txm_status status = txs_refine_labels(r, g->env, TXS_AT_LABELS, TXS_AT_END);
+    if (status == TXM_OK && g->desc->segments && !txs_all_labels_live(r))
+        txs_spread_labels(g, r->label); /* rather coarse boundaries than a label less */
+    return status;
+}
+
+/* Specks and, if wanted, transitions; then labels also where nothing counts. */
+static txm_status txs_tidy_labels(txs_segmenter *g) {
+    const txs_scene *s = &g->scene;
+    txs_refiner *r = &g->refiner;
+    const int wants = g->desc->transition;
+    const int transition = wants ? (int)TEXSYN_TRANSITION : -1;
+    const txs_cleaner cleaner = {s->width, s->height, r->label, r->share,
+                                 (uint32_t *)txm_arena_alloc(&g->arena, s->pixels, 4)};
+    if (g->arena.failed) return txs_no_memory_to_segment(g->env);
+    if (wants && r->count > 1) {
+        r->reach = TXS_REACH;
+        txs_count_around(r);
+        for (int k = 0; k < r->count; k++) txs_mark_thin(r, k, TEXSYN_TRANSITION);
+    }
+    for (size_t i = 0; i < s->pixels; i++) r->label[i] = r->label[g->nearest[i]];
+    txs_clean_labels(&cleaner, s->pixels / TXS_SPECK, transition);
+    return TXM_OK;
+}
+
+/* Labels by area, the largest 0; without those that no pixel has. */
+static int txs_order_labels(txs_segmenter *g) {
+    const txs_scene *s = &g->scene;
+    txs_refiner *r = &g->refiner;
+    size_t area[256] = {0};
+    uint8_t name[256] = {0};
+    int count = 0;
+    for (size_t i = 0; i < s->pixels; i++) area[r->label[i]] += s->counted[i];
+    for (;; count++) {
+        int best = -1;
+        for (int c = 0; c < r->count; c++)
+            if (area[c] && (best < 0 || area[c] > area[best])) best = c;
+        if (best < 0) break;
+        name[best] = (uint8_t)count;
+        area[best] = 0;
+    }
+    name[TEXSYN_TRANSITION] = TEXSYN_TRANSITION;
+    for (size_t i = 0; i < s->pixels; i++) r->label[i] = name[r->label[i]];
+    return count;
+}
+
+typedef struct txs_writer {
+    const txs_segmenter *job;
+    const txm_image *out;
+} txs_writer;
+
+static void txs_write_labels(void *context, int share) {
+    const txs_writer *w = (const txs_writer *)context;
+    const txs_scene *s = &w->job->scene;
+    const txm_image im = txm_image_resolve(w->job->desc->image), *out = w->out;
+    txm_image mask = w->job->desc->mask;
+    if (mask.pixels) mask = txm_image_resolve(mask);
+    const int from = (int)((int64_t)out->height * share / TXS_TASKS);
+    const int to = (int)((int64_t)out->height * (share + 1) / TXS_TASKS);
+    for (int y = from; y < to; y++) {
+        uint8_t *row = (uint8_t *)txm_image_row(out, y);
+        for (int x = 0; x < out->width; x++)
+            row[x] = txs_takes_part(&im, &mask, x, y) ? txs_vote(s, w->job->refiner.label, x, y)
+                                                      : (uint8_t)TEXSYN_NO_LABEL;
+    }
+}
+
+/* ---- public: segmentation ------------------------------------------------------------------ */
+
+static txm_status txs_segment_check(const texsyn_segment_desc *d, const txm_image *out,
+                                    const int *count, txm_env *env) {
+    txm_status status;
+    if (!d || !count) return txm_fail(env, TXM_BAD_ARGUMENT, "segment: desc or count is NULL");
+    if ((status = txm_image_check(&d->image, "image", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+        return status;
+    if (d->image.channels == 2)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "image: 2 channels; give 1, 3 or 4");
+    if (d->image.width < 16 || d->image.height < 16)
+        return txm_fail(env, TXM_TOO_SMALL, "image: both sides must be at least 16 pixels");
+    if (!txs_image_is_moderate(&d->image))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "image: a sample is NaN or beyond a million");
+    if (d->mask.pixels) {
+        if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
+            return status;
+        if (d->mask.width != d->image.width || d->mask.height != d->image.height)
+            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must be as large as the image");
+    }
+    if (d->segments < 0 || d->segments > TEXSYN_MAX_SEGMENTS)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "segments must be 1 to 16, or 0");
+    if ((status = txm_image_check(out, "out", 0, env)) != TXM_OK) return status;
+    if (out->width != d->image.width || out->height != d->image.height)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: must be as large as the image");
+    if (out->channels > 1 || out->sample != TXM_U8)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: must have one 8-bit channel");
+    return TXM_OK;
+}
+
+static txm_status txs_report_stage(const txs_segmenter *g, float fraction, const char *stage) {
+    return txm_progress(g->env, fraction, stage) ? txm_fail(g->env, TXM_CANCELLED, "cancelled")
+                                                 : TXM_OK;
+}
+
+TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *env, txm_image out,
+                                     int *count) {
+    txm_status status = txs_segment_check(desc, &out, count, env);
+    if (status != TXM_OK) return status;
+    txs_segmenter g;
+    memset(&g, 0, sizeof g);
+    g.desc = desc;
+    g.env = env;
+    txm_arena_init(&g.arena, env);
+    status = txs_see_scene(&g);
+    if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_TEXTONS, "textons");
+    if (status == TXM_OK) status = txs_make_textons(&g);
+    if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_REGIONS, "regions");
+    if (status == TXM_OK) status = txs_make_regions(&g);
+    if (status == TXM_OK) status = txs_group_regions(&g);
+    if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_LABELS, "labels");
+    if (status == TXM_OK) status = txs_find_labels(&g);
+    if (status == TXM_OK) status = txs_tidy_labels(&g);
+    if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_END, "labels");
+    if (status == TXM_OK) {
+        const txs_writer writer = {&g, &out};
+        *count = txs_order_labels(&g);
+        txm_parallel_for(env, TXS_TASKS, txs_write_labels, (void *)&writer);
+    }
+    txm_arena_free(&g.arena);
     return status;
 }
 

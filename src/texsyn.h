@@ -49,6 +49,13 @@
      mask leaves out what does not belong. About 256 x 256 pixels that show the largest element a
      few dozen times are enough; 64 x 64 are too few for good statistics.
 
+   SEGMENTATION
+     texsyn_segment divides a photograph that shows several textures: a label for each pixel. The
+     labels say where each texture is to be learned from (the mask of texsyn_learn_desc). It looks
+     at colours and at contrast of three sizes; textures that differ in neither count as one. If
+     only one is found it looks again for smaller differences: moss on rock is a texture of its own
+     in a picture of rocks, but not beside bricks.
+
    HOW IT WORKS
      The example is split into decorrelated colour bands of at most 32 values and into pyramid
      levels. On each level, coarse first, a canvas is synthesised with the clique types so far, the
@@ -107,7 +114,10 @@
      [4] S. Geman, D. Geman. Stochastic relaxation, Gibbs distributions, and the Bayesian
          restoration of images. IEEE PAMI 6(6), 1984.
      [5] A. A. Efros, W. T. Freeman. Image quilting for texture synthesis and transfer.
-         SIGGRAPH 2001.                                                                      */
+         SIGGRAPH 2001.
+     [6] T. Leung, J. Malik. Recognizing surfaces using three-dimensional textons. ICCV 1999.
+     [7] V. Ferrari, T. Tuytelaars, L. Van Gool. Real-time affine region tracking and coplanar
+         grouping. CVPR 2001 (clique partitioning).                                          */
 #ifndef TEXSYN_H
 #define TEXSYN_H
 
@@ -282,6 +292,45 @@ typedef struct texsyn_fill_desc {
           TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
+
+/* ---- segmentation ----------------------------------------------------------------------- */
+
+enum {
+    TEXSYN_MAX_SEGMENTS = 16, /* textures of a segmentation */
+    TEXSYN_TRANSITION = 254,  /* label of what is too small or thin to be one, if asked for */
+    TEXSYN_NO_LABEL = 255     /* label of pixels that do not take part */
+};
+
+typedef struct texsyn_segment_desc {
+    txm_image image; /* 1, 3 or 4 channels, both sides at least 16 px; where alpha is under one half
+                        pixels do not take part                                                   */
+    txm_image mask;  /* same size: pixels take part where gray times alpha is at least half;
+                        pixels NULL = all                                                         */
+    int segments;    /* how many textures, 1..16; 0 = as many as are found, 1 or more             */
+    int transition;  /* non-zero: parts thinner than about 13 pixels and specks get
+                        TEXSYN_TRANSITION; else they join what is around them. Pixels are those of
+                        the resolution that is worked at                                          */
+    uint64_t seed;   /* for the choice of the first textons; any value                            */
+} texsyn_segment_desc;
+
+/* Find the textures of a picture without being told what they look like [6, 7].
+
+   A picture of more than 2^19 pixels is reduced by a whole number until it has no more; boundaries
+   are then as exact as a pixel of that size, and smooth.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    receives a label for each pixel: 0..*count-1, 0 for the texture with the largest area, and
+          the special ones above. 1 channel, 8 bits, as large as the image, which it must not
+          overlap. Untouched after an error
+   count  receives the number of textures; each has at least one pixel. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, samples that are not finite or
+          beyond a million; TXM_TOO_SMALL for an image under 16 x 16, if fewer than 256 pixels take
+          part, or if it has no so many segments; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   O(width * height) time, 0.3 s for 512 x 512. 45 MB and 3 bytes per label and pixel, at
+          most 75 MB, whatever the size                                                           */
+TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *env, txm_image out,
+                                     int *count);
 
 /* ---- composite textures ----------------------------------------------------------------- */
 
@@ -492,6 +541,10 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/mosaic_learner.h"
 #include "texsyn/tone.h"
 #include "texsyn/fill.h"
+#include "texsyn/textons.h"
+#include "texsyn/regions.h"
+#include "texsyn/labels.h"
+#include "texsyn/segment.h"
 #include "texsyn/layout.h"
 #include "texsyn/layout_sampler.h"
 #include "texsyn/layout_learn.h"

@@ -37,12 +37,12 @@ size="--size 40x30"
 check "--help" run 0 --help
 check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log && grep -q patch out.log &&
     grep -q edges out.log && grep -q tiles out.log && grep -q retile out.log &&
-    grep -q inpaint out.log && grep -q relight out.log && grep -q erode out.log &&
+    grep -q inpaint out.log && grep -q relight out.log && grep -q erode out.log && grep -q segment out.log &&
     grep -q tree out.log && grep -q forest out.log"
 check "--version" run 0 --version
 check "--version names the headers" \
     grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, texedges [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, trimesh_cover [0-9.]*, texinpaint [0-9.]*, treepieces [0-9.]*)$' out.log
-for command in learn synth relight erode patch edges tiles retile inpaint tree forest; do
+for command in learn synth segment relight erode patch edges tiles retile inpaint tree forest; do
     check "$command --help" run 0 $command --help
     check "$command --help has an example" grep -q "  texkit $command .*-o" out.log
     input=sand.png
@@ -175,6 +175,27 @@ refuses 2 "add --level" erode sand.png --weathered gray.png -o n.png
 refuses 2 "written twice" erode sand.png --weathered gray.png --level 1 -o n.png --cracks n.png
 for bad in -1 1.1 x; do refuses 2 "--level" erode sand.png --weathered gray.png -o n.png --level $bad; done
 for bad in 0 0.6 x; do refuses 2 "--share" erode sand.png --weathered gray.png -o n.png --level 1 --share $bad; done
+
+# ---- segment
+"$draw" bricks bricks.png 96
+check "segment" run 0 segment bricks.png -o labels.png --stats segment.json
+check "segment tells what it found" grep -q 'labels.png: [0-9]* texture' out.log
+for key in segments areas seconds width transition not_counted; do
+    check "segment --stats has $key" grep -q "\"$key\": " segment.json
+done
+check "labels are an indexed PNG" sh -c "test \"\$(od -An -tu1 -j25 -N1 labels.png | tr -d ' ')\" = 3"
+check "segment --segments" run 0 segment bricks.png -o four.png --segments 4 --stats four.json
+check "exactly so many" grep -q '"segments": 4' four.json
+check "segment --gray" run 0 segment bricks.png -o gray-labels.png --gray --segments 3 --transition
+check "gray labels are a gray PNG" sh -c "test \"\$(od -An -tu1 -j25 -N1 gray-labels.png | tr -d ' ')\" = 0"
+check "segment to TGA and BMP" sh -c "'$texkit' segment bricks.png -o l.tga --quiet &&
+    '$texkit' segment bricks.png -o l.bmp --quiet"
+check "segment of one thread" sh -c "'$texkit' segment bricks.png -o one.png --segments 4 --threads 1 --quiet &&
+    cmp one.png four.png"
+refuses 2 "JPEG" segment bricks.png -o n.jpg
+refuses 2 "--segments" segment bricks.png -o n.png --segments 17
+refuses 1 "16 pixels" segment tiny.png -o n.png
+refuses 1 "96 x 96" segment bricks.png --mask sand.png -o n.png
 
 # ---- statistics
 check "learn --stats" run 0 learn sand.png -o s.txs --stats learn.json

@@ -353,6 +353,46 @@ int image_encode(const char *extension, const txm_image *image, unsigned char **
     return 1;
 }
 
+int image_encode_indexed(const txm_image *labels, const unsigned char palette[256][3],
+                         unsigned char **bytes, size_t *size, const char **why) {
+    unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    unsigned char header[13] = {0}, colours[3 * 256], *data = NULL, *packed = NULL;
+    const size_t width = (size_t)labels->width, height = (size_t)labels->height;
+    sink s = {NULL, 0, 0, 0};
+    int n = 0;
+    *bytes = NULL;
+    if (height > MAX_PNG16 / (width + 1)) return *why = "more than 2^29 bytes; make it smaller", 0;
+    data = (unsigned char *)malloc((width + 1) * height);
+    for (size_t y = 0; y < height && data; y++) { /* no filter: neighbouring indices are equal */
+        data[y * (width + 1)] = 0;
+        memcpy(data + y * (width + 1) + 1, txm_image_row_const(labels, (int)y), width);
+    }
+    if (data)
+        packed = stbi_zlib_compress(data, (int)((width + 1) * height), &n,
+                                    stbi_write_png_compression_level);
+    free(data);
+    if (packed) {
+        put_number(header, (uint32_t)width);
+        put_number(header + 4, (uint32_t)height);
+        header[8] = 8;
+        header[9] = 3; /* indexed */
+        memcpy(colours, palette, sizeof colours);
+        sink_write(&s, signature, 8);
+        put_chunk(&s, "IHDR", header, 13);
+        put_chunk(&s, "PLTE", colours, (int)sizeof colours);
+        put_chunk(&s, "IDAT", packed, n);
+        put_chunk(&s, "IEND", NULL, 0);
+        free(packed);
+    }
+    if (!s.bytes || s.failed) {
+        free(s.bytes);
+        return *why = "no memory to encode the picture; make it smaller", 0;
+    }
+    *bytes = s.bytes;
+    *size = s.size;
+    return 1;
+}
+
 int image_write(const char *path, const txm_image *image, const char **why) {
     char extension[8];
     unsigned char *bytes;

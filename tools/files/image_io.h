@@ -48,7 +48,11 @@ int image_can_write(const char *extension, int width, int height, int channels, 
 int image_encode(const char *extension, const txm_image *image, unsigned char **bytes, size_t *size,
                  const char **why);
 
-/* The same, written to the path, whose extension says how. */
+/* A PNG of labels: one 8-bit channel whose values are indices into a palette of 256 RGB colours. */
+int image_encode_indexed(const txm_image *labels, const unsigned char palette[256][3],
+                         unsigned char **bytes, size_t *size, const char **why);
+
+/* The same as image_encode, written to the path, whose extension says how. */
 int image_write(const char *path, const txm_image *image, const char **why);
 
 #endif /* IMAGE_IO_H */

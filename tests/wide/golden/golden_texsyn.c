@@ -221,6 +221,31 @@ static uint64_t composite(txm_env *env) {
     return hash;
 }
 
+/* textures side by side, found and forced */
+static uint64_t segments(txm_env *env) {
+    enum { SEGMENT_SIDE = 160 };
+    static uint8_t pixels[SEGMENT_SIDE * SEGMENT_SIDE * 3], labels[SEGMENT_SIDE * SEGMENT_SIDE];
+    static uint8_t bricks[SEGMENT_SIDE * SEGMENT_SIDE * 3];
+    texsyn_segment_desc desc;
+    int count = 0;
+    memset(&desc, 0, sizeof desc);
+    golden_noise(pixels, SEGMENT_SIDE, SEGMENT_SIDE, 3);
+    golden_bricks(bricks, SEGMENT_SIDE, SEGMENT_SIDE, 3);
+    for (int i = 0; i < SEGMENT_SIDE * SEGMENT_SIDE; i++)
+        if (i % SEGMENT_SIDE > i / SEGMENT_SIDE) memcpy(pixels + 3 * i, bricks + 3 * i, 3);
+    desc.image = golden_image(pixels, SEGMENT_SIDE, SEGMENT_SIDE, 3, TXM_U8);
+    uint64_t hash = 0;
+    for (int forced = 0; forced <= 4; forced += 4) {
+        desc.segments = forced;
+        desc.transition = forced > 0;
+        golden_need(texsyn_segment(&desc, env, golden_image(labels, SEGMENT_SIDE, SEGMENT_SIDE, 1,
+                                                            TXM_U8), &count), "segment", env);
+        hash = tk_hash(hash, &count, sizeof count);
+        hash = tk_hash(hash, labels, sizeof labels);
+    }
+    return hash;
+}
+
 static const golden_case cases[] = {{"gray", gray},
                                     {"rgb-tileable", rgb_tileable},
                                     {"rgba-16-bits", rgba_deep},
@@ -230,5 +255,6 @@ static const golden_case cases[] = {{"gray", gray},
                                     {"relit", relit},
                                     {"eroded", eroded},
                                     {"filled", filled},
-                                    {"composite", composite}};
+                                    {"composite", composite},
+                                    {"segments", segments}};
 GOLDEN_MAIN("texsyn")
