@@ -5,7 +5,8 @@
      Reads one photograph of a texture and records, for a few dozen relative positions of two to
      four pixels ("clique types"), how often each difference of their values occurs: two to four
      thousand bytes. From these alone it makes new texture of any size, optionally tileable. No
-     pixel of the photograph is kept, so none can be copied.
+     pixel of the photograph is kept, so none can be copied. It also replaces a region of a picture
+     by texture that continues its surroundings without a seam.
 
    QUICK START                                 (tests build and run this very block)
      // Learn a texture and make a larger one. cc -std=c99 quick.c -lm
@@ -67,6 +68,8 @@
      (corners, parallel differences, differences together with those of the coarser level), for what
      pairs cannot express; and for contours there are filters of 12 to 18 pixels and differences
      beside a label of the coarser level, which says how that changes and curves.
+     texsyn_fill does the same in a hole, with the surroundings fixed: it learns from the known pixels
+     near the hole on the canvas of the hole itself.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
      TEXSYN_STATIC       every function static to the including file (set it everywhere)

@@ -18,6 +18,7 @@ enum {
     TXS_FILL_CELLS = 8,     /* a side of what a window fills, at most */
     TXS_FILL_MARGIN = 48,   /* known pixels round it, if it is wide */
     TXS_FILL_THIN = 24,     /* pixels: width of a hole that counts as thin; its margin, too */
+    TXS_FILL_WIDER = 8,     /* pixels by which it is widened to learn in it */
     TXS_FILL_FEW = 256,     /* source pixels: with fewer nothing can be learned */
     TXS_FILL_LEAST = 1024,  /* source pixels: with fewer another window's model serves */
     TXS_FILL_ENOUGH = 4096, /* source pixels: a window grows until it has so many */
@@ -26,7 +27,7 @@ enum {
     TXS_TAKEN = TXS_SOURCE + 1, /* a state while holes are looked for */
     TXS_FILL_REFRESH = 8,       /* sub-lattices */
     TXS_FILL_SOFT = 4000,       /* pixels, see txs_soften: of a hole that is wide, of a thin one */
-    TXS_FILL_SOFT_THIN = 60000,
+    TXS_FILL_SOFT_THIN = 100000,
     TXS_FILL_COOL = 60 /* percent: temperature of the last sweep */
 };
 
@@ -272,6 +273,7 @@ typedef struct txs_pane {
     txs_hole hole;
     txs_ground ground[TXS_FILL_LEVELS];
     int levels, thin, margin;
+    int is_trial;   /* only to learn in: a thin hole that is widened */
     txm_image view; /* of the picture */
     texsyn_model *model;
     float spread[TXS_MAX_BANDS];
@@ -337,6 +339,21 @@ static int64_t txs_count_source(const txs_ground *g) {
     for (size_t i = 0; i < (size_t)g->width * (size_t)g->height; i++)
         count += g->state[i] == TXS_SOURCE && g->label[i] != TXS_NO_LABEL;
     return count;
+}
+
+/* In a thin hole nearly all cliques have known members, which says little of the potentials: they are
+   learned in a wider one, if enough is left to learn from. distance: a number for each pixel. */
+static void txs_pane_widen(txs_pane *p, int32_t *distance) {
+    txs_ground *g = &p->ground[0];
+    const int pixels = g->width * g->height;
+    int64_t left = 0;
+    txs_distances(g, 1, distance);
+    for (int i = 0; i < pixels; i++)
+        left += g->state[i] == TXS_SOURCE && distance[i] > TXS_FILL_WIDER;
+    if (left < TXS_FILL_LEAST) return;
+    for (int i = 0; i < pixels; i++)
+        if (g->label[i] != TXS_NO_LABEL && distance[i] <= TXS_FILL_WIDER) g->state[i] = TXS_FREE;
+    p->is_trial = 1;
 }
 
 /* Learn only from what is near the hole, if that is enough: a long scratch crosses much that
@@ -462,8 +479,10 @@ static txm_status txs_pane_prepare(const txs_filler *f, txs_pane *p, const texsy
     if (arena->failed || !txs_ground_make(&g[0], arena, h->width, h->height, channels, 1))
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     txs_pane_mark(f, p);
-    const int width = txs_hole_width(&g[0], scratch);
+    int width = txs_hole_width(&g[0], scratch);
     p->thin = width <= TXS_FILL_THIN;
+    if (p->thin && !known) txs_pane_widen(p, scratch);
+    if (p->is_trial) width = txs_hole_width(&g[0], scratch);
     p->margin = p->thin ? (int)TXS_FILL_THIN : (int)TXS_FILL_MARGIN;
     txs_pane_narrow(p, scratch);
     int levels = txs_hole_levels(width);
@@ -502,7 +521,7 @@ static txm_status txs_pane_level(const txs_filler *f, txs_pane *p, int index, in
     const int quality = f->desc->quality;
     const uint64_t seed = txm_hash(f->desc->seed + 977u * (uint64_t)p->index) + (uint64_t)index;
     const txs_texture texture = {p->model, &p->model->level[index]};
-    const int softness = p->thin ? TXS_FILL_SOFT_THIN : TXS_FILL_SOFT;
+    const int softness = p->thin && !p->is_trial ? TXS_FILL_SOFT_THIN : TXS_FILL_SOFT;
     const int16_t *last = index ? NULL : f->cool;
     txs_raise_map maps[1];
     int reach = TXS_FILL_REACH;
@@ -582,41 +601,66 @@ static void txs_pane_adopt(txs_pane *p, const texsyn_model *known) {
     memcpy(p->spread, known->dither, sizeof p->spread);
 }
 
-/* Fill one window with a model that is known, or learn one; *model receives it, in models' memory. */
-static txm_status txs_fill_window(txs_filler *f, int index, const texsyn_model *known,
-                                  txm_arena *models, texsyn_model **model, txm_env *env, float from,
-                                  float to) {
-    txm_status status;
-    txm_arena arena;
+/* All levels of a window. */
+static txm_status txs_pane_levels(const txs_filler *f, txs_pane *p, int is_known, txm_env *env,
+                                  float from, float to) {
+    txm_status status = TXM_OK;
     float total = 0;
-    txm_arena_init(&arena, env);
-    txs_pane *p = (txs_pane *)txm_arena_zero(&arena, 1, sizeof *p);
-    *model = txs_fill_model_make(models, f->image.channels);
-    if (!p || !*model) {
-        txm_arena_free(&arena);
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
-    }
-    p->hole = f->hole[index];
-    p->model = *model;
-    p->index = index;
-    if (known) txs_pane_adopt(p, known);
-    status = txs_pane_prepare(f, p, known, &arena, env);
-    if (status == TXM_OK && !known) status = txs_pane_quantise(p, &arena, env);
     for (int i = 0; i < p->levels; i++) total += 1.0f / (float)(1 << 2 * i);
+    const float part = (to - from) / total;
     for (int i = p->levels - 1; i >= 0 && status == TXM_OK; i--) {
-        const float next = from + (to - from) / (float)(1 << 2 * i) / total;
-        status = txs_pane_level(f, p, i, known != NULL, env, from, i ? next : to);
+        const float next = from + part / (float)(1 << 2 * i);
+        status = txs_pane_level(f, p, i, is_known, env, from, i ? next : to);
         from = next;
         if (i && status == TXM_OK) {
             p->above = p->canvas;
             p->canvas.canvas.pixels = NULL;
         }
     }
-    if (status == TXM_OK) status = txs_pane_close(f, p, &arena, env);
-    memcpy((*model)->dither, p->spread, sizeof p->spread);
+    return status;
+}
+
+/* Fill a window with a model that is known, or with one that is learned, which p->model receives.
+   *is_trial: it was only learned. */
+static txm_status txs_fill_once(txs_filler *f, int index, const texsyn_model *known,
+                                texsyn_model *model, int *is_trial, txm_env *env, float from,
+                                float to) {
+    txm_status status;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    txs_pane *p = (txs_pane *)txm_arena_zero(&arena, 1, sizeof *p);
+    if (!p) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    p->hole = f->hole[index];
+    p->model = model;
+    p->index = index;
+    if (known) txs_pane_adopt(p, known);
+    status = txs_pane_prepare(f, p, known, &arena, env);
+    if (status == TXM_OK && !known) status = txs_pane_quantise(p, &arena, env);
+    if (status == TXM_OK) status = txs_pane_levels(f, p, known != NULL, env, from, to);
+    if (status == TXM_OK && !p->is_trial) status = txs_pane_close(f, p, &arena, env);
+    memcpy(model->dither, p->spread, sizeof p->spread);
+    *is_trial = p->is_trial;
     txs_mosaic_free(&p->canvas, env);
     txs_mosaic_free(&p->above, env);
     txm_arena_free(&arena);
+    return status;
+}
+
+/* The same, and once more with the model if it was only learned. The models lie in the memory of
+   models. */
+static txm_status txs_fill_window(txs_filler *f, int index, const texsyn_model *known,
+                                  txm_arena *models, texsyn_model **model, txm_env *env, float from,
+                                  float to) {
+    const float learned = from + 0.8f * (to - from); /* of the time, if there is a trial */
+    int is_trial = 0;
+    txm_status status = TXM_OUT_OF_MEMORY;
+    *model = txs_fill_model_make(models, f->image.channels);
+    texsyn_model *copy = txs_fill_model_make(models, f->image.channels);
+    if (*model && copy)
+        status = txs_fill_once(f, index, known, *model, &is_trial, env, from, learned);
+    else txm_fail(env, status, "no memory for a model");
+    if (status == TXM_OK && is_trial)
+        status = txs_fill_once(f, index, *model, copy, &is_trial, env, learned, to);
     return status;
 }
 
