@@ -246,6 +246,47 @@ static uint64_t segments(txm_env *env) {
     return hash;
 }
 
+/* a hole and a corner of a picture filled; known: with a model */
+static uint64_t fill_as(int channels, txm_sample sample, int known, txm_env *env) {
+    static uint16_t deep[SIDE * SIDE * 4], out[SIDE * SIDE * 4];
+    texsyn_model *model = NULL;
+    texsyn_fill_desc desc;
+    memset(&desc, 0, sizeof desc);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const int x = i % SIDE, y = i / SIDE;
+        mask[i] = (x > 20 && x < 50 && y > 12 && y < 44) || x + y < 15 ? 255 : 0;
+    }
+    for (int i = 0; i < SIDE * SIDE * channels; i++) deep[i] = (uint16_t)(exemplar[i] * 257);
+    desc.image = golden_image(sample == TXM_U16 ? (void *)deep : (void *)exemplar, SIDE, SIDE,
+                              channels, sample);
+    desc.mask = golden_image(mask, SIDE, SIDE, 1, TXM_U8);
+    desc.quality = known ? 1 : 0;
+    if (known) {
+        const texsyn_learn_desc learn = learning(channels);
+        golden_need(texsyn_learn(&learn, env, &model), "learn", env);
+        desc.model = model;
+    }
+    golden_need(texsyn_fill(&desc, env, golden_image(out, SIDE, SIDE, channels, sample)), "fill",
+                env);
+    texsyn_model_free(model);
+    return tk_hash(0, out, (size_t)SIDE * SIDE * (size_t)channels * txm_sample_bytes(sample));
+}
+
+static uint64_t fill_rgb(txm_env *env) {
+    golden_blobs(exemplar, SIDE, SIDE, 3);
+    return fill_as(3, TXM_U8, 0, env);
+}
+
+static uint64_t fill_deep(txm_env *env) {
+    golden_noise(exemplar, SIDE, SIDE, 4);
+    return fill_as(4, TXM_U16, 0, env);
+}
+
+static uint64_t fill_known(txm_env *env) {
+    golden_blobs(exemplar, SIDE, SIDE, 1);
+    return fill_as(1, TXM_U8, 1, env);
+}
+
 static const golden_case cases[] = {{"gray", gray},
                                     {"rgb-tileable", rgb_tileable},
                                     {"rgba-16-bits", rgba_deep},
@@ -256,5 +297,8 @@ static const golden_case cases[] = {{"gray", gray},
                                     {"eroded", eroded},
                                     {"filled", filled},
                                     {"composite", composite},
-                                    {"segments", segments}};
+                                    {"segments", segments},
+                                    {"fill", fill_rgb},
+                                    {"fill-rgba-16-bits", fill_deep},
+                                    {"fill-model", fill_known}};
 GOLDEN_MAIN("texsyn")
