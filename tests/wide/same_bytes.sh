@@ -79,6 +79,7 @@ check "a foreign case is noticed" sh -c "sed '2s/ / other-/' '$tmp/lines' >'$tmp
 
 # the tool with OpenMP agrees with itself
 build/draw cells "$tmp/cells.png" 64
+/usr/bin/python3 tests/tool/check_inpaint.py mask disc 64 "$tmp/mask.png"
 for threads in 1 2 8; do
     build/texkit learn "$tmp/cells.png" -o "$tmp/$threads.txs" --threads $threads --quiet
     build/texkit synth "$tmp/1.txs" -o "$tmp/$threads.png" --size 150x90 --threads $threads --quiet
@@ -94,6 +95,10 @@ for threads in 1 2 8; do
         cmp "$tmp/1.txs" "$tmp/$threads.txs"
     check "texkit synth, the same picture with --threads $threads" \
         cmp "$tmp/1.png" "$tmp/$threads.png"
+    build/texkit fill "$tmp/cells.png" --mask "$tmp/mask.png" -o "$tmp/filled-$threads.png" \
+        --threads $threads --quiet
+    check "texkit fill, the same picture with --threads $threads" \
+        cmp "$tmp/filled-1.png" "$tmp/filled-$threads.png"
 done
 
 # no thread steps on another's data
