@@ -28,6 +28,11 @@ check "synth" run 0 synth sand.txs -o synth.png --size 40x30 --tileable
 check "has the size and channels" check_tool patch is synth.png 40 30 3 8
 refuses 2 "such as 512x512" synth sand.txs -o n.png --size 0x5
 
+"$root/build/scan" ball ball 192
+check "fill" run 0 fill ball.png --mask ball-mask.png -o filled.png
+check "changes nothing else" check_tool inpaint kept ball.png ball-mask.png filled.png 0.5
+refuses 2 "add --mask" fill ball.png -o n.png
+
 check "patch" run 0 patch bricks.png -o patch.png --size 64x64 --passes 1
 check "has the size and channels" check_tool patch is patch.png 64 64 3 8
 refuses 1 "No such file" patch missing.png -o n.png --size 64x64
@@ -45,7 +50,6 @@ check "retile" run 0 retile torus.obj -o torus.glb --vertices 200
 check "has so many places" check_tool glb torus.glb places=200
 refuses 1 "No such file" retile missing.obj -o n.obj --vertices 100
 
-"$root/build/scan" ball ball 192
 check "inpaint" run 0 inpaint --mesh ball.obj --texture ball.png --mask ball-mask.png -o whole.png
 check "changes nothing that is known, and the rest" check_tool inpaint kept ball.png ball-mask.png whole.png
 check "in a picture" run 0 inpaint ball.png --mask ball-mask.png -o flat.png
