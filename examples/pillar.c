@@ -16,7 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { WIDTH = 520, HEIGHT = 1040, ACROSS = 480, TALL = 1100, RAYS = 2, FLUTES = 20 };
+enum { WIDTH = 520, HEIGHT = 1040, ACROSS = 480, TALL = 1100, RAYS = 2, FLUTES = 20, STEPS = 80 };
 static const double tall = 7.6, margin = 0.35; /* lengths are in radii of the shaft at its foot */
 
 static txm_image image_of(void *pixels, int width, int height, int channels) {
@@ -82,11 +82,11 @@ static double outside(double x, double h, double z) {
 
 /* The first point of stone on the ray through (x, h), or 0. */
 static int hit(double x, double h, double *z) {
-    const double step = 0.02;
+    const double nearest = 1.6, step = nearest / STEPS;
     if (h < 0 || h > tall) return 0;
-    for (double near_ = 1.6; near_ > 0; near_ -= step) {
-        if (outside(x, h, near_ - step) > 0) continue;
-        double in = near_ - step, out = near_;
+    for (int k = 1; k <= STEPS; k++) {
+        double in = nearest - k * step, out = in + step;
+        if (outside(x, h, in) > 0) continue;
         for (int i = 0; i < 12; i++) {
             const double middle = (in + out) / 2;
             if (outside(x, h, middle) > 0) out = middle;
@@ -134,7 +134,8 @@ static void render(const txm_image *sheet, txm_image out) {
         for (int x = 0; x < out.width; x++) {
             double sum[3] = {0, 0, 0}, colour[3];
             for (int ray = 0; ray < RAYS * RAYS; ray++) {
-                const double u = x + (ray % RAYS + 0.5) / RAYS, v = y + ((double)(ray / RAYS) + 0.5) / RAYS;
+                const int column = ray % RAYS, row = ray / RAYS;
+                const double u = x + (column + 0.5) / RAYS, v = y + (row + 0.5) / RAYS;
                 cast(sheet, (u - 0.5 * out.width) * pixel, tall + margin - v * pixel, colour);
                 for (int c = 0; c < 3; c++) sum[c] += colour[c] / (RAYS * RAYS);
             }
