@@ -484,7 +484,7 @@ typedef struct texsyn_erosion_desc {
           beyond a million; TXM_TOO_SMALL for an exemplar under 32 x 32 or of fewer than 1024
           pixels that count; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS; TXM_OUT_OF_MEMORY;
           TXM_CANCELLED
-   cost   about 0.5 s per megapixel of exemplar and erosion; 7 bytes per pixel, 60 while it is
+   cost   about 3 s per megapixel of erosion and 2 s of exemplar; 7 bytes per pixel, 60 while it is
           made, and 75 per pixel of the exemplar                                               */
 TEXSYN_API txm_status texsyn_erosion_make(const texsyn_erosion_desc *desc, txm_env *env,
                                           texsyn_erosion **out);
