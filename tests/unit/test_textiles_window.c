@@ -2,8 +2,6 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_textiles_window && build/tests/unit/test_textiles_window */
-#define TEXTILES_MAX_PIXELS (1 << 22) /* so that sets that are too large are quickly made */
-#define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
 #include "atlaskit.h"
@@ -291,7 +289,7 @@ static void test_bad_layouts(void **state) {
     textiles_set_free(corner);
 }
 
-/* 256 tiles of 80 pixels are within the limit, with wide gutters no longer. */
+/* 256 tiles of 80 pixels are within the limit that tests/build.mk sets, with wide gutters no longer. */
 static void test_too_large(void **state) {
     (void)state;
     const kind_of many = {TEXTILES_WANG, 4, 1, 0, 256};

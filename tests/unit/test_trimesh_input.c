@@ -9,8 +9,7 @@
 
 #include <cmocka.h>
 
-#define TRIMESH_RELAX_IMPLEMENTATION
-#include "trimesh_relax.h"
+#include "trimesh_relax/mend_all.h"
 #include "surfaces.h"
 #include "testkit.h"
 
