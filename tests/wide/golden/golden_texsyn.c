@@ -155,31 +155,6 @@ static uint64_t eroded(txm_env *env) {
     return hash;
 }
 
-/* a hole in color, filled from all that is known, and one in gray from a corner of the picture */
-static uint64_t filled(txm_env *env) {
-    static uint8_t source[SIDE * SIDE];
-    uint64_t hash = 0;
-    for (int i = 0; i < SIDE * SIDE; i++) {
-        const int x = i % SIDE, y = i / SIDE;
-        mask[i] = (x - 40) * (x - 40) + (y - 36) * (y - 36) < 14 * 14 ? 255 : 0;
-        source[i] = x < SIDE / 2 ? 255 : 0;
-    }
-    for (int channels = 3; channels > 0; channels -= 2) {
-        texsyn_fill_desc desc;
-        memset(&desc, 0, sizeof desc);
-        golden_blobs(exemplar, SIDE, SIDE, channels);
-        desc.image = golden_image(exemplar, SIDE, SIDE, channels, TXM_U8);
-        desc.mask = golden_image(mask, SIDE, SIDE, 1, TXM_U8);
-        if (channels == 1) desc.source = golden_image(source, SIDE, SIDE, 1, TXM_U8);
-        desc.quality = -2;
-        desc.seed = 4;
-        const txm_image out = golden_image(picture, SIDE, SIDE, channels, TXM_U8);
-        golden_need(texsyn_fill(&desc, env, out), "fill", env);
-        hash = tk_hash(hash, picture, (size_t)SIDE * SIDE * (size_t)channels);
-    }
-    return hash;
-}
-
 /* a composite of two textures: its file, a layout made for it, and pictures of that and of a drawn
    layout */
 static uint64_t composite(txm_env *env) {
@@ -295,7 +270,6 @@ static const golden_case cases[] = {{"gray", gray},
                                     {"file", file},
                                     {"relit", relit},
                                     {"eroded", eroded},
-                                    {"filled", filled},
                                     {"composite", composite},
                                     {"segments", segments},
                                     {"fill", fill_rgb},
