@@ -240,6 +240,7 @@ static txm_status txs_composite_level(txs_composer *w, int index, txm_env *env, 
                                  c->labels > 1 && index < 2,
                                  seed,
                                  w->noise,
+                                 NULL,
                                  NULL};
     txm_status status =
         txs_composite_enter(c, index, w->source, &w->from, &w->from_above, w->maps, seed, env);

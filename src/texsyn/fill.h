@@ -554,7 +554,8 @@ static txm_status txs_pane_level(const txs_filler *f, txs_pane *p, int index, in
                                  0,
                                  seed,
                                  f->noise,
-                                 last};
+                                 last,
+                                 NULL};
     return txs_mosaic_learn(&plan, index, &p->model, &p->canvas, &p->canvas, NULL, NULL, env, from,
                             to);
 }

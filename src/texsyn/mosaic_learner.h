@@ -8,7 +8,8 @@
 
    Greedy selection of clique types on one level as in neighbourhood.h, for all labels at once and
    for the crossings of their borders. Targets are measured at the source pixels of one mosaic, what
-   was synthesised at the free pixels of another (or of the same).                           */
+   was synthesised at the free pixels of another (or of the same). Crossings may be measured in a
+   mosaic of their own.                                                                      */
 
 typedef struct txs_study_plan {
     int first, between, last; /* sweeps: at first, after each batch of types, at the end   */
@@ -18,6 +19,7 @@ typedef struct txs_study_plan {
     int crosses;              /* non-zero: crossing types as well                          */
     uint64_t seed;
     const int16_t *noise, *last_noise; /* the latter of the last sweep                     */
+    const txs_mosaic *border; /* where crossings are measured instead of in the source, or NULL */
 } txs_study_plan;
 
 /* A crossing type that could be added. */
@@ -36,6 +38,8 @@ typedef struct txs_study {
     txs_learner learner[TXS_MAX_LABELS];
     txs_pixels tails[TXS_MAX_LABELS];      /* of the source, TXS_TAILS at most  */
     txs_pixels free_tails[TXS_MAX_LABELS]; /* of the canvas                     */
+    const txs_mosaic *border;              /* where crossings are measured      */
+    txs_pixels border_tails[TXS_MAX_LABELS];
     txs_crossing *crossing;
     int crossings;
     txs_cross_candidate *cross;
@@ -301,8 +305,9 @@ static void txs_cross_source(void *context, int i) {
     txs_study *s = (txs_study *)context;
     txs_cross_candidate *c = &s->cross[i];
     const int64_t n =
-        txs_study_measure_crossing(s, s->source, s->source->sample, &s->tails[c->crossing.tail],
-                                   &c->crossing, c->crossing.type.share);
+        txs_study_measure_crossing(s, s->border, s->border->sample,
+                                   &s->border_tails[c->crossing.tail], &c->crossing,
+                                   c->crossing.type.share);
     enum { FEW = 30 }; /* cliques: less is no statistic */
     c->noise = n ? txm_float(sqrt(2.0 / (double)n)) : 0;
     if (n < FEW) c->weight = 0;
@@ -374,8 +379,11 @@ static txm_status txs_study_begin(txs_study *s, txm_arena *arena, txm_env *env) 
     if (crosses)
         s->cross = (txs_cross_candidate *)txm_arena_alloc(arena, (size_t)crosses, sizeof *s->cross);
     if (arena->failed || !txs_tails_make(arena, s->source, s->source->sample, reach, s->tails) ||
-        !txs_tails_make(arena, s->canvas, s->canvas->label, reach, s->free_tails))
+        !txs_tails_make(arena, s->canvas, s->canvas->label, reach, s->free_tails) ||
+        (s->plan->border &&
+         !txs_tails_make(arena, s->border, s->border->sample, reach, s->border_tails)))
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn from the picture");
+    for (int k = 0; k < labels && !s->plan->border; k++) s->border_tails[k] = s->tails[k];
     for (int k = 0; k < labels; k++) {
         s->now = k;
         txs_study_preselect(s, k);
@@ -477,6 +485,7 @@ static txm_status txs_mosaic_learn(const txs_study_plan *plan, int index, texsyn
         s->plan = plan;
         s->source = source;
         s->canvas = canvas;
+        s->border = plan->border ? plan->border : source;
         s->index = index;
         s->model = model;
         status = txs_study_begin(s, &arena, env);
