@@ -296,6 +296,55 @@ typedef struct texsyn_fill_desc {
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
 
+/* ---- knitting --------------------------------------------------------------------------- */
+
+/* Are the two pictures of the same texture? */
+typedef enum texsyn_likeness {
+    TEXSYN_LIKENESS_AUTO = 0, /* found from their histograms */
+    TEXSYN_LIKENESS_SAME,
+    TEXSYN_LIKENESS_DIFFERENT
+} texsyn_likeness;
+
+typedef struct texsyn_knit_desc {
+    txm_image a;        /* 1, 3 or 4 channels, any sample type, sides of 16 px or more; not modified */
+    txm_image b;        /* the same channels and sample type; of any size of 16 px or more: where it
+                           ends it goes on reflected                                              */
+    txm_image layout;   /* size of a, TXM_U8; b where 128 or more (with more channels: where gray
+                           times alpha is at least half of its range), a elsewhere. Any shape     */
+    int zone;           /* pixels on either side of the border that are synthesised, 1..64; 0 = 3
+                           for pictures of the same texture, 6 for different ones                 */
+    float roughness;    /* pixels by which the border is usually displaced, up to 32, and at most
+                           2.5 times that; 0 = as the materials are, 3.3 to 11; negative = the
+                           border as drawn                                                        */
+    texsyn_likeness likeness; /* AUTO with an example of a border: different                      */
+    txm_image border;         /* an example of a border between the two textures, in the same light:
+                                 channels of a, any size of 16 px or more; pixels NULL = none     */
+    txm_image border_layout;  /* its layout, in the form of layout                                */
+    int quality;              /* -2 fast .. +2 best: fewer or more clique types and sweeps        */
+    uint64_t seed;            /* another seed, another zone                                       */
+} texsyn_knit_desc;
+
+/* Join two pictures along a border of any shape so that no seam shows ([1], section 3 and Fig. 5).
+
+   Pictures of the same texture: the border moves to where they agree best, and its zone is filled as
+   texsyn_fill does. Different ones: the border is displaced by the materials themselves, bright
+   grains reaching over dark gaps, and by noise as coarse as they are. In either case spots smaller
+   than the displacement may vanish. Then the zone is synthesised, either side with statistics of its
+   own, and what meets across the border follows the example of a border, or the places where the two
+   pictures agree best. texsyn_relight beforehand gives both the same light.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    form of a, may be a or b itself: outside the zone of the (displaced) border it has the bytes
+          of a or b. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a layout
+          that is all black or all white, samples that are not finite or beyond a million;
+          TXM_TOO_SMALL for pictures under 16 x 16, fewer than 256 pixels outside the zone, or an
+          example whose border is shorter than 64 pixels; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   memory and time grow with the pixels, 4 bytes beside the copy for each; and with the length
+          of the border: 0.6 s for 256 px of it                                                  */
+TEXSYN_API txm_status texsyn_knit(const texsyn_knit_desc *desc, txm_env *env, txm_image out);
+
 /* ---- segmentation ----------------------------------------------------------------------- */
 
 enum {
@@ -544,6 +593,10 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/mosaic_learner.h"
 #include "texsyn/tone.h"
 #include "texsyn/fill.h"
+#include "texsyn/mask.h"
+#include "texsyn/border.h"
+#include "texsyn/seam.h"
+#include "texsyn/knit.h"
 #include "texsyn/textons.h"
 #include "texsyn/regions.h"
 #include "texsyn/labels.h"
@@ -553,7 +606,6 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/layout_learn.h"
 #include "texsyn/composite.h"
 #include "texsyn/composite_file.h"
-#include "texsyn/mask.h"
 #include "texsyn/light.h"
 #include "texsyn/relight.h"
 #include "texsyn/darkness.h"
