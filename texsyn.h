@@ -296,6 +296,55 @@ typedef struct texsyn_fill_desc {
    cost   about 0.2 s for a hole of 64 x 64, 1 s for 200 x 200                                  */
 TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, txm_image out);
 
+/* ---- knitting --------------------------------------------------------------------------- */
+
+/* Are the two pictures of the same texture? */
+typedef enum texsyn_likeness {
+    TEXSYN_LIKENESS_AUTO = 0, /* found from their histograms */
+    TEXSYN_LIKENESS_SAME,
+    TEXSYN_LIKENESS_DIFFERENT
+} texsyn_likeness;
+
+typedef struct texsyn_knit_desc {
+    txm_image a;        /* 1, 3 or 4 channels, any sample type, sides of 16 px or more; not modified */
+    txm_image b;        /* the same channels and sample type; of any size of 16 px or more: where it
+                           ends it goes on reflected                                              */
+    txm_image layout;   /* size of a, TXM_U8; b where 128 or more (with more channels: where gray
+                           times alpha is at least half of its range), a elsewhere. Any shape     */
+    int zone;           /* pixels on either side of the border that are synthesised, 1..64; 0 = 3
+                           for pictures of the same texture, 6 for different ones                 */
+    float roughness;    /* pixels by which the border is usually displaced, up to 32, and at most
+                           2.5 times that; 0 = as the materials are, 3.3 to 11; negative = the
+                           border as drawn                                                        */
+    texsyn_likeness likeness; /* AUTO with an example of a border: different                      */
+    txm_image border;         /* an example of a border between the two textures, in the same light:
+                                 channels of a, any size of 16 px or more; pixels NULL = none     */
+    txm_image border_layout;  /* its layout, in the form of layout                                */
+    int quality;              /* -2 fast .. +2 best: fewer or more clique types and sweeps        */
+    uint64_t seed;            /* another seed, another zone                                       */
+} texsyn_knit_desc;
+
+/* Join two pictures along a border of any shape so that no seam shows ([1], section 3 and Fig. 5).
+
+   Pictures of the same texture: the border moves to where they agree best, and its zone is filled as
+   texsyn_fill does. Different ones: the border is displaced by the materials themselves, bright
+   grains reaching over dark gaps, and by noise as coarse as they are. In either case spots smaller
+   than the displacement may vanish. Then the zone is synthesised, either side with statistics of its
+   own, and what meets across the border follows the example of a border, or the places where the two
+   pictures agree best. texsyn_relight beforehand gives both the same light.
+
+   env    NULL, or how to allocate, report and spread the work
+   out    form of a, may be a or b itself: outside the zone of the (displaced) border it has the bytes
+          of a or b. Untouched after an error
+   return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a layout
+          that is all black or all white, samples that are not finite or beyond a million;
+          TXM_TOO_SMALL for pictures under 16 x 16, fewer than 256 pixels outside the zone, or an
+          example whose border is shorter than 64 pixels; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
+          TXM_OUT_OF_MEMORY; TXM_CANCELLED
+   cost   memory and time grow with the pixels, 4 bytes beside the copy for each; and with the length
+          of the border: 0.6 s for 256 px of it                                                  */
+TEXSYN_API txm_status texsyn_knit(const texsyn_knit_desc *desc, txm_env *env, txm_image out);
+
 /* ---- segmentation ----------------------------------------------------------------------- */
 
 enum {
@@ -4544,7 +4593,8 @@ static void txs_cool_noise(const int16_t *noise, int percent, int16_t *cool) {
 
    Greedy selection of clique types on one level as in neighbourhood.h, for all labels at once and
    for the crossings of their borders. Targets are measured at the source pixels of one mosaic, what
-   was synthesised at the free pixels of another (or of the same).                           */
+   was synthesised at the free pixels of another (or of the same). Crossings may be measured in a
+   mosaic of their own.                                                                      */
 
 typedef struct txs_study_plan {
     int first, between, last; /* sweeps: at first, after each batch of types, at the end   */
@@ -4554,6 +4604,7 @@ typedef struct txs_study_plan {
     int crosses;              /* non-zero: crossing types as well                          */
     uint64_t seed;
     const int16_t *noise, *last_noise; /* the latter of the last sweep                     */
+    const txs_mosaic *border; /* where crossings are measured instead of in the source, or NULL */
 } txs_study_plan;
 
 /* A crossing type that could be added. */
@@ -4572,6 +4623,8 @@ typedef struct txs_study {
     txs_learner learner[TXS_MAX_LABELS];
     txs_pixels tails[TXS_MAX_LABELS];      /* of the source, TXS_TAILS at most  */
     txs_pixels free_tails[TXS_MAX_LABELS]; /* of the canvas                     */
+    const txs_mosaic *border;              /* where crossings are measured      */
+    txs_pixels border_tails[TXS_MAX_LABELS];
     txs_crossing *crossing;
     int crossings;
     txs_cross_candidate *cross;
@@ -4837,8 +4890,9 @@ static void txs_cross_source(void *context, int i) {
     txs_study *s = (txs_study *)context;
     txs_cross_candidate *c = &s->cross[i];
     const int64_t n =
-        txs_study_measure_crossing(s, s->source, s->source->sample, &s->tails[c->crossing.tail],
-                                   &c->crossing, c->crossing.type.share);
+        txs_study_measure_crossing(s, s->border, s->border->sample,
+                                   &s->border_tails[c->crossing.tail], &c->crossing,
+                                   c->crossing.type.share);
     enum { FEW = 30 }; /* cliques: less is no statistic */
     c->noise = n ? txm_float(sqrt(2.0 / (double)n)) : 0;
     if (n < FEW) c->weight = 0;
@@ -4910,8 +4964,11 @@ static txm_status txs_study_begin(txs_study *s, txm_arena *arena, txm_env *env) 
     if (crosses)
         s->cross = (txs_cross_candidate *)txm_arena_alloc(arena, (size_t)crosses, sizeof *s->cross);
     if (arena->failed || !txs_tails_make(arena, s->source, s->source->sample, reach, s->tails) ||
-        !txs_tails_make(arena, s->canvas, s->canvas->label, reach, s->free_tails))
+        !txs_tails_make(arena, s->canvas, s->canvas->label, reach, s->free_tails) ||
+        (s->plan->border &&
+         !txs_tails_make(arena, s->border, s->border->sample, reach, s->border_tails)))
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to learn from the picture");
+    for (int k = 0; k < labels && !s->plan->border; k++) s->border_tails[k] = s->tails[k];
     for (int k = 0; k < labels; k++) {
         s->now = k;
         txs_study_preselect(s, k);
@@ -5013,6 +5070,7 @@ static txm_status txs_mosaic_learn(const txs_study_plan *plan, int index, texsyn
         s->plan = plan;
         s->source = source;
         s->canvas = canvas;
+        s->border = plan->border ? plan->border : source;
         s->index = index;
         s->model = model;
         status = txs_study_begin(s, &arena, env);
@@ -5759,7 +5817,8 @@ static txm_status txs_pane_level(const txs_filler *f, txs_pane *p, int index, in
                                  0,
                                  seed,
                                  f->noise,
-                                 last};
+                                 last,
+                                 NULL};
     return txs_mosaic_learn(&plan, index, &p->model, &p->canvas, &p->canvas, NULL, NULL, env, from,
                             to);
 }
@@ -5920,6 +5979,1177 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
         status = txs_fill_windows(&filler, &arena, env);
     }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- pictures and masks ----------------------------------------------------------------- */
+
+static size_t txs_pixels_of(int width, int height) {
+    return (size_t)width * (size_t)height;
+}
+
+/* gray times alpha is at least half: the rule for masks */
+static int txs_is_white(const txm_image *mask, int x, int y) {
+    const txm_image m = txm_image_resolve(*mask);
+    double v = (double)txm_image_get(&m, x, y, 0);
+    if (m.channels >= 3)
+        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
+    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
+    return v >= 0.5;
+}
+
+/* all samples finite and at most a million */
+static int txs_is_plain(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        for (int x = 0; x < im.width; x++) {
+            for (int c = 0; c < im.channels; c++)
+                if (!(fabs((double)txm_image_get(&im, x, y, c)) <= 1e6)) return 0;
+        }
+    }
+    return 1;
+}
+
+static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
+                                 txm_env *env) {
+    if (!mask->pixels) return TXM_OK;
+    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (mask->width != image->width || mask->height != image->height)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
+                                   "must be # x # like its picture", (uint64_t)image->width,
+                                   (uint64_t)image->height);
+    if (!txm_image_is_finite(mask))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
+    return TXM_OK;
+}
+
+/* ---- the border of a knit ----------------------------------------------------------------
+
+   Two pictures, and for each pixel the label of the one that it is taken from: 0 or 1. The border
+   as drawn is displaced: where the first material is bright it reaches further into the second one
+   and the other way round, so that whole grains and stones stay together and stand out; noise as
+   coarse as the grain does the rest. How coarse that is is asked of the materials.          */
+
+enum {
+    TXS_NEXT = 5, /* distances are in fifths of a pixel: to the next pixel in a row, */
+    TXS_CORNERWISE = 7,
+    TXS_KNIGHT = 11,     /* diagonally, and 2 along and 1 across                     */
+    TXS_FARTHEST = 60000,     /* no other label seen yet                                  */
+    TXS_KNIT_CELL = 256,      /* pixels: a side of what is worked on at once              */
+    TXS_SURVEY = 100000, /* pixels of a picture that are looked at                   */
+    TXS_LAGS = 24,       /* pixels: the longest correlation that is looked for       */
+    TXS_TRAITS = 7,      /* histograms that tell textures apart                      */
+    TXS_TRAIT_BINS = 32,
+    TXS_COATS = 4 /* fields that displace the border: brightness of both, noise, fine noise */
+};
+
+#define TXS_FINEST_GRAIN 1.5  /* pixels: standard deviation of the blur of the fields */
+#define TXS_COARSEST_GRAIN 5.0
+#define TXS_ROUGH 2.2         /* displacement in units of the grain                   */
+#define TXS_ROUGHEST 2.5      /* the largest displacement in units of the usual one   */
+
+typedef struct txs_pair_of_pictures { /* all of one form; the second one is repeated by reflection */
+    txm_image picture[2];
+    int width, height; /* of the first */
+} txs_pair_of_pictures;
+
+/* A coordinate reflected into 0..size-1. */
+static int txs_reflect(int x, int size) {
+    const int turn = txs_mod(x, 2 * size);
+    return turn < size ? turn : 2 * size - 1 - turn;
+}
+
+static float txs_pair_get(const txs_pair_of_pictures *p, int label, int x, int y, int c) {
+    const txm_image *im = &p->picture[label];
+    return txm_image_get(im, txs_reflect(x, im->width), txs_reflect(y, im->height), c);
+}
+
+/* Brightness 0..1; what cannot be seen is neither bright nor dark. */
+static double txs_pair_luma(const txs_pair_of_pictures *p, int label, int x, int y) {
+    const int channels = p->picture[label].channels;
+    if (channels == 4 && !(txs_pair_get(p, label, x, y, 3) > 0)) return 0.5;
+    if (channels < 3) return (double)txs_pair_get(p, label, x, y, 0);
+    return (54 * (double)txs_pair_get(p, label, x, y, 0) +
+            183 * (double)txs_pair_get(p, label, x, y, 1) +
+            19 * (double)txs_pair_get(p, label, x, y, 2)) /
+           256;
+}
+
+/* ---- distances ------------------------------------------------------------------------ */
+
+/* The distance of a pixel from the nearest one of another label, by way of one neighbour. */
+static int txs_border_step(const uint8_t *label, const uint16_t *distance, int width, int height,
+                           int x, int y, int dx, int dy, int step) {
+    const int nx = x + dx, ny = y + dy;
+    if (nx < 0 || ny < 0 || nx >= width || ny >= height) return TXS_FARTHEST;
+    const size_t at = (size_t)y * (size_t)width + (size_t)x;
+    const size_t next = (size_t)ny * (size_t)width + (size_t)nx;
+    return label[next] != label[at] ? step : distance[next] + step;
+}
+
+/* Distances of all pixels from the other label, in fifths of a pixel, at most TXS_FARTHEST. */
+static void txs_border_distances(const uint8_t *label, int width, int height, uint16_t *distance) {
+    static const int8_t way[8][3] = {
+        {-1, 0, TXS_NEXT},      {0, -1, TXS_NEXT},      {-1, -1, TXS_CORNERWISE},
+        {1, -1, TXS_CORNERWISE},  {-2, -1, TXS_KNIGHT},   {-1, -2, TXS_KNIGHT},
+        {1, -2, TXS_KNIGHT},    {2, -1, TXS_KNIGHT}};
+    const size_t pixels = txs_pixels_of(width, height);
+    for (size_t i = 0; i < pixels; i++) distance[i] = TXS_FARTHEST;
+    for (int sign = 1; sign >= -1; sign -= 2) { /* from the first pixel on, then from the last */
+        for (size_t i = 0; i < pixels; i++) {
+            const size_t at = sign > 0 ? i : pixels - 1 - i;
+            const int x = (int)(at % (size_t)width), y = (int)(at / (size_t)width);
+            int least = distance[at];
+            for (int k = 0; k < 8; k++) {
+                const int d = txs_border_step(label, distance, width, height, x, y,
+                                              sign * way[k][0], sign * way[k][1], way[k][2]);
+                if (d < least) least = d;
+            }
+            distance[at] = (uint16_t)least;
+        }
+    }
+}
+
+/* ---- what the materials are like ------------------------------------------------------ */
+
+typedef struct txs_material {
+    double grain;                             /* pixels: half the length of correlation */
+    double trait[TXS_TRAITS][TXS_TRAIT_BINS]; /* normalised histograms                  */
+} txs_material;
+
+/* Every how many pixels, in both directions, a picture is looked at. */
+static int txs_survey_step(int width, int height) {
+    int step = 1;
+    while ((int64_t)width * height / step / step > TXS_SURVEY) step++;
+    return step;
+}
+
+static void txs_add_trait(txs_material *m, int trait, double value) {
+    m->trait[trait][txm_clampi((int)floor(value * (double)TXS_TRAIT_BINS), 0,
+                               (int)TXS_TRAIT_BINS - 1)] += 1;
+}
+
+/* Brightness, two differences of channels, and differences of neighbours near and far. */
+static void txs_survey_pixel(const txs_pair_of_pictures *p, int label, int x, int y,
+                             txs_material *m) {
+    enum { FAR_ = 4 }; /* pixels */
+    const double luma = txs_pair_luma(p, label, x, y);
+    txs_add_trait(m, 0, luma);
+    for (int k = 0; k < 4; k++) {
+        const int step = k < 2 ? 1 : FAR_;
+        const double other = txs_pair_luma(p, label, x + (k % 2 ? 0 : step), y + (k % 2 ? step : 0));
+        txs_add_trait(m, 1 + k, sqrt(fabs(other - luma))); /* small ones are resolved better */
+    }
+    if (p->picture[label].channels < 3) return;
+    const double green = (double)txs_pair_get(p, label, x, y, 1);
+    txs_add_trait(m, 5, 0.5 + 2 * ((double)txs_pair_get(p, label, x, y, 0) - green));
+    txs_add_trait(m, 6, 0.5 + 2 * ((double)txs_pair_get(p, label, x, y, 2) - green));
+}
+
+/* The length of correlation of the brightness: where it falls under 1/e. */
+static double txs_correlation(const txs_pair_of_pictures *p, const uint8_t *own, int label,
+                              int step) {
+    double count = 0, sum = 0, square = 0;
+    double differing[TXS_LAGS + 1] = {0}, pairs[TXS_LAGS + 1] = {0};
+    for (int y = 0; y < p->height; y += step) {
+        for (int x = 0; x < p->width; x += step) {
+            if (own[(size_t)y * (size_t)p->width + (size_t)x] != label) continue;
+            const double v = txs_pair_luma(p, label, x, y);
+            count++;
+            sum += v;
+            square += txm_float(v * v);
+            for (int lag = 1; lag <= TXS_LAGS; lag++) {
+                for (int k = 0; k < 2; k++) {
+                    const int nx = x + (k ? 0 : lag), ny = y + (k ? lag : 0);
+                    if (nx >= p->width || ny >= p->height ||
+                        own[(size_t)ny * (size_t)p->width + (size_t)nx] != label)
+                        continue;
+                    const double d = txs_pair_luma(p, label, nx, ny) - v;
+                    differing[lag] += txm_float(d * d);
+                    pairs[lag]++;
+                }
+            }
+        }
+    }
+    const double mean = count > 0 ? sum / count : 0;
+    const double variance = count > 0 ? square / count - txm_float(mean * mean) : 0;
+    for (int lag = 1; lag <= TXS_LAGS; lag++)
+        if (!(pairs[lag] > 0) ||
+            differing[lag] / pairs[lag] > 2 * variance * (1 - 0.36787944117144233))
+            return lag;
+    return TXS_LAGS;
+}
+
+/* Look at a picture where it is its own side. */
+static void txs_survey(const txs_pair_of_pictures *p, const uint8_t *own, int label,
+                       txs_material *m) {
+    const int step = txs_survey_step(p->width, p->height);
+    double count = 0;
+    memset(m, 0, sizeof *m);
+    for (int y = 0; y < p->height; y += step) {
+        for (int x = 0; x < p->width; x += step) {
+            if (own[(size_t)y * (size_t)p->width + (size_t)x] != label) continue;
+            txs_survey_pixel(p, label, x, y, m);
+            count++;
+        }
+    }
+    for (int k = 0; k < TXS_TRAITS; k++)
+        for (int i = 0; i < TXS_TRAIT_BINS && count > 0; i++) m->trait[k][i] /= count;
+    m->grain = txs_correlation(p, own, label, step) / 2;
+}
+
+/* How much two materials differ: 0..1, the largest of the distances of their histograms. */
+static double txs_material_distance(const txs_material *a, const txs_material *b) {
+    double most = 0;
+    for (int k = 0; k < TXS_TRAITS; k++) {
+        double sum = 0;
+        for (int i = 0; i < TXS_TRAIT_BINS; i++) sum += fabs(a->trait[k][i] - b->trait[k][i]);
+        if (sum / 2 > most) most = sum / 2;
+    }
+    return most;
+}
+
+/* ---- fields --------------------------------------------------------------------------- */
+
+enum {
+    TXS_PASSES = 3, /* of moving means: about a Gaussian                       */
+    TXS_WIDER = 4   /* times as wide a blur is what brightness is compared with */
+};
+
+/* What displaces the border, in a cell of the picture. */
+typedef struct txs_coats {
+    const txs_pair_of_pictures *pair;
+    uint64_t seed;
+    int radius;                /* of the blur                                   */
+    int left, top;             /* of the cell                                   */
+    int side;                  /* of the cell with the rim that blurring needs  */
+    double *plane, *wide;      /* side x side each                              */
+    double *line;              /* side                                          */
+    double *field[TXS_COATS];  /* TXS_KNIT_CELL x TXS_KNIT_CELL each                      */
+    double square[TXS_COATS];  /* sums over the pixels that are near the border */
+    double count;
+} txs_coats;
+
+/* One pass of a moving mean over count values that are step apart; at the ends the last value is
+   repeated. */
+static void txs_mean_line(double *v, ptrdiff_t step, int count, int radius, double *line) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) line[i] = v[i * step];
+    for (int i = -radius; i <= radius; i++) sum += line[txm_clampi(i, 0, count - 1)];
+    for (int i = 0; i < count; i++) {
+        v[i * step] = sum / (2 * radius + 1);
+        sum += line[txm_clampi(i + radius + 1, 0, count - 1)] -
+               line[txm_clampi(i - radius, 0, count - 1)];
+    }
+}
+
+static void txs_coats_blur(const txs_coats *c, double *plane, int side, int radius) {
+    for (int pass = 0; pass < TXS_PASSES; pass++) {
+        for (int y = 0; y < side; y++)
+            txs_mean_line(plane + (ptrdiff_t)y * side, 1, side, radius, c->line);
+        for (int x = 0; x < side; x++) txs_mean_line(plane + x, side, side, radius, c->line);
+    }
+}
+
+/* The radius of moving means whose passes blur with this standard deviation. */
+static int txs_blur_radius(double deviation) {
+    const double d = (double)txm_float(deviation); /* its square is exact */
+    return txm_clampi((int)floor(sqrt(d * d + 0.25)), 1, 1 << 10);
+}
+
+static int txs_coats_rim(int radius) {
+    return TXS_PASSES * (1 + TXS_WIDER) * radius;
+}
+
+/* Room for the fields of a cell; 0 if there is no memory. */
+static int txs_coats_make(txs_coats *c, txm_arena *arena, const txs_pair_of_pictures *pair,
+                          double grain, uint64_t seed) {
+    memset(c, 0, sizeof *c);
+    c->pair = pair;
+    c->seed = seed;
+    c->radius = txs_blur_radius(grain);
+    c->side = TXS_KNIT_CELL + 2 * txs_coats_rim(c->radius);
+    const size_t side = (size_t)c->side;
+    c->plane = (double *)txm_arena_alloc(arena, side * side, sizeof(double));
+    c->wide = (double *)txm_arena_alloc(arena, side * side, sizeof(double));
+    c->line = (double *)txm_arena_alloc(arena, side, sizeof(double));
+    for (int k = 0; k < TXS_COATS; k++)
+        c->field[k] =
+            (double *)txm_arena_alloc(arena, (size_t)TXS_KNIT_CELL * TXS_KNIT_CELL, sizeof(double));
+    return !arena->failed;
+}
+
+/* White noise that belongs to the place. */
+static double txs_coat_noise(uint64_t seed, int x, int y) {
+    const uint64_t place = (uint64_t)(uint32_t)y << 32 | (uint32_t)x;
+    return (double)(txm_hash(place ^ txm_hash(seed)) >> 40) / 16777216.0 - 0.5;
+}
+
+/* Brightness less that of the surroundings, of picture k. */
+static void txs_coat_brightness(txs_coats *c, int k) {
+    const int rim = txs_coats_rim(c->radius);
+    const size_t size = (size_t)c->side * (size_t)c->side;
+    for (int y = 0; y < c->side; y++)
+        for (int x = 0; x < c->side; x++)
+            c->plane[(size_t)y * (size_t)c->side + (size_t)x] =
+                txs_pair_luma(c->pair, k, c->left + x - rim, c->top + y - rim);
+    txs_coats_blur(c, c->plane, c->side, c->radius);
+    memcpy(c->wide, c->plane, size * sizeof *c->wide);
+    txs_coats_blur(c, c->wide, c->side, TXS_WIDER * c->radius);
+    for (int y = 0; y < TXS_KNIT_CELL; y++) {
+        for (int x = 0; x < TXS_KNIT_CELL; x++) {
+            const size_t at = (size_t)(y + rim) * (size_t)c->side + (size_t)(x + rim);
+            c->field[k][y * TXS_KNIT_CELL + x] = c->plane[at] - c->wide[at];
+        }
+    }
+}
+
+/* Noise, blurred, to field k. */
+static void txs_coat_clouds(txs_coats *c, int k, int radius) {
+    const int rim = TXS_PASSES * radius, side = TXS_KNIT_CELL + 2 * rim;
+    for (int y = 0; y < side; y++)
+        for (int x = 0; x < side; x++)
+            c->plane[(size_t)y * (size_t)side + (size_t)x] =
+                txs_coat_noise(c->seed + (uint64_t)k, c->left + x - rim, c->top + y - rim);
+    txs_coats_blur(c, c->plane, side, radius);
+    for (int y = 0; y < TXS_KNIT_CELL; y++)
+        for (int x = 0; x < TXS_KNIT_CELL; x++)
+            c->field[k][y * TXS_KNIT_CELL + x] =
+                c->plane[(size_t)(y + rim) * (size_t)side + (size_t)(x + rim)];
+}
+
+/* All fields in the cell whose first pixel is left, top. */
+static void txs_coats_lay(txs_coats *c, int left, int top) {
+    c->left = left;
+    c->top = top;
+    txs_coat_brightness(c, 0);
+    txs_coat_brightness(c, 1);
+    txs_coat_clouds(c, 2, c->radius);
+    txs_coat_clouds(c, 3, (c->radius + 1) / 2);
+}
+
+/* ---- displacing ----------------------------------------------------------------------- */
+
+typedef struct txs_frayed { /* a border to be displaced */
+    uint8_t *label;
+    const uint16_t *distance; /* of the border as drawn */
+    int width, height;
+    int limit;  /* of the displacement, in fifths of a pixel */
+    float rough; /* the usual displacement, pixels */
+} txs_frayed;
+
+/* The field that displaces the border, about of standard deviation 1: positive towards picture 0. */
+static double txs_coats_at(const txs_coats *c, int at) {
+    static const float weight[TXS_COATS] = {-0.5f, 0.5f, 0.65f, 0.3f};
+    double sum = 0;
+    for (int k = 0; k < TXS_COATS; k++) {
+        const double deviation = c->count > 0 ? sqrt(c->square[k] / c->count) : 0;
+        if (deviation > 1e-4) /* not of a picture that is flat */
+            sum += (double)txm_float((double)weight[k] * c->field[k][at] / deviation);
+    }
+    return sum;
+}
+
+/* Add up the squares of the fields in this cell, or (is_last) displace the border in it. */
+static void txs_fray_cell(const txs_frayed *f, txs_coats *c, int is_last) {
+    for (int y = 0; y < TXS_KNIT_CELL && c->top + y < f->height; y++) {
+        for (int x = 0; x < TXS_KNIT_CELL && c->left + x < f->width; x++) {
+            const size_t i = (size_t)(c->top + y) * (size_t)f->width + (size_t)(c->left + x);
+            const int at = y * TXS_KNIT_CELL + x, from = f->distance[i];
+            if (from > f->limit) continue;
+            if (is_last) {
+                const double edge = from / (double)TXS_NEXT - 0.5;
+                const double off = (double)txm_float(txs_coats_at(c, at) * (double)f->rough);
+                f->label[i] = (f->label[i] ? edge : -edge) + off > 0;
+                continue;
+            }
+            for (int k = 0; k < TXS_COATS; k++)
+                c->square[k] += (double)txm_float(c->field[k][at] * c->field[k][at]);
+            c->count++;
+        }
+    }
+}
+
+static int txs_fray_reaches(const txs_frayed *f, int left, int top) {
+    for (int y = top; y < top + TXS_KNIT_CELL && y < f->height; y++)
+        for (int x = left; x < left + TXS_KNIT_CELL && x < f->width; x++)
+            if (f->distance[(size_t)y * (size_t)f->width + (size_t)x] <= f->limit) return 1;
+    return 0;
+}
+
+/* Displace the border, cell by cell. Fraction 0..to of the whole. */
+static txm_status txs_fray(const txs_frayed *f, txs_coats *c, txm_env *env, float to) {
+    for (int pass = 0; pass < 2; pass++) {
+        for (int top = 0; top < f->height; top += TXS_KNIT_CELL) {
+            const float part = (float)(pass * f->height + top) / (2 * (float)f->height);
+            if (txm_progress(env, to * part, "border"))
+                return txm_fail(env, TXM_CANCELLED, "cancelled");
+            for (int left = 0; left < f->width; left += TXS_KNIT_CELL) {
+                if (!txs_fray_reaches(f, left, top)) continue;
+                txs_coats_lay(c, left, top);
+                txs_fray_cell(f, c, pass);
+            }
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- the border between pictures of one texture -------------------------------------------
+
+   It moves to where the two pictures agree: the minimum cut in a band along the border as drawn,
+   cell by cell. A cell looks a little beyond itself; what earlier cells have decided is fixed. */
+
+enum {
+    TXS_SEAM_RIM = 16,                                     /* pixels that a cell looks beyond itself */
+    TXS_SEAM_SIDE = TXS_KNIT_CELL + 2 * TXS_SEAM_RIM + 2,  /* nodes: with the margin of txm_flow */
+    TXS_SEAM_HARD = 1 << 20,                               /* more than all arcs of a pixel */
+    TXS_SEAM_ROUGHEST = 255                                /* the largest mismatch of a pixel */
+};
+
+typedef struct txs_seam {
+    const txs_pair_of_pictures *pair;
+    const txs_frayed *border;
+    txm_flow flow;
+    int left, top;     /* of the cell                                   */
+    uint8_t *mismatch; /* of each node; those outside the picture have 0 */
+} txs_seam;
+
+/* By how much the pictures differ at a pixel, 0..255; what is transparent in both does not. */
+static uint8_t txs_mismatch(const txs_pair_of_pictures *p, int x, int y) {
+    const int channels = p->picture[0].channels;
+    double sum = 0;
+    if (channels == 4 && !(txs_pair_get(p, 0, x, y, 3) > 0) && !(txs_pair_get(p, 1, x, y, 3) > 0))
+        return 0;
+    for (int c = 0; c < channels; c++)
+        sum += fabs((double)txs_pair_get(p, 0, x, y, c) - (double)txs_pair_get(p, 1, x, y, c));
+    const double share = sum / channels;
+    return (uint8_t)(share < 1 ? (int)floor(share * 255) : (int)TXS_SEAM_ROUGHEST);
+}
+
+/* The pixel of a node; 0 if it is in the margin or outside the picture. */
+static int txs_seam_pixel(const txs_seam *s, int node, int *x, int *y) {
+    const int u = node % TXS_SEAM_SIDE, v = node / TXS_SEAM_SIDE;
+    *x = s->left + u - TXS_SEAM_RIM - 1;
+    *y = s->top + v - TXS_SEAM_RIM - 1;
+    return u > 0 && v > 0 && u < TXS_SEAM_SIDE - 1 && v < TXS_SEAM_SIDE - 1 && *x >= 0 && *y >= 0 &&
+           *x < s->border->width && *y < s->border->height;
+}
+
+static size_t txs_seam_index(const txs_seam *s, int x, int y) {
+    return (size_t)y * (size_t)s->border->width + (size_t)x;
+}
+
+/* Arcs to the next pixels, and what is fixed: pixels beyond the band and those of earlier cells. */
+static void txs_seam_lay(txs_seam *s) {
+    const txs_frayed *f = s->border;
+    txm_flow *g = &s->flow;
+    int x, y;
+    for (int p = 0; p < g->count; p++) {
+        for (int d = 0; d < 4; d++) g->arc[d][p] = 0;
+        g->excess[p] = 0;
+        s->mismatch[p] =
+            (uint8_t)(txs_seam_pixel(s, p, &x, &y) ? txs_mismatch(s->pair, x, y) : 0);
+    }
+    for (int p = 0; p < g->count; p++) {
+        if (!txs_seam_pixel(s, p, &x, &y)) continue;
+        const size_t i = txs_seam_index(s, x, y);
+        const int is_earlier = y < s->top || (y < s->top + TXS_KNIT_CELL && x < s->left);
+        if (f->distance[i] > f->limit || is_earlier)
+            g->excess[p] = f->label[i] ? -TXS_SEAM_HARD : (int)TXS_SEAM_HARD;
+        for (int d = 0; d < 2; d++) {
+            const int q = p + g->step[d];
+            if (!txs_seam_pixel(s, q, &x, &y)) continue;
+            g->arc[d][p] = g->arc[d + 2][q] = 1 + s->mismatch[p] + s->mismatch[q];
+        }
+    }
+}
+
+/* Cut a cell. */
+static void txs_seam_cut(txs_seam *s, int left, int top) {
+    const txs_frayed *f = s->border;
+    s->left = left;
+    s->top = top;
+    txs_seam_lay(s);
+    txm_flow_solve(&s->flow);
+    for (int p = 0; p < s->flow.count; p++) {
+        int x, y;
+        if (!txs_seam_pixel(s, p, &x, &y) || x < left || y < top || x >= left + TXS_KNIT_CELL ||
+            y >= top + TXS_KNIT_CELL)
+            continue;
+        const size_t i = txs_seam_index(s, x, y);
+        if (f->distance[i] <= f->limit) f->label[i] = s->flow.tree[p] == TXM_FLOW_SINK;
+    }
+}
+
+/* Move the border, cell by cell. Fraction 0..to of the whole. */
+static txm_status txs_seam_find(const txs_pair_of_pictures *pair, const txs_frayed *border,
+                                txm_env *env, float to) {
+    const int nodes = TXS_SEAM_SIDE * TXS_SEAM_SIDE;
+    txm_status status = TXM_OK;
+    txm_arena arena;
+    txs_seam s;
+    memset(&s, 0, sizeof s);
+    s.pair = pair;
+    s.border = border;
+    txm_arena_init(&arena, env);
+    s.mismatch = (uint8_t *)txm_arena_alloc(&arena, (size_t)nodes, 1);
+    if (!txm_flow_make(&s.flow, &arena, 4, nodes) || arena.failed)
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to move the border");
+    s.flow.count = nodes;
+    s.flow.step[0] = 1;
+    s.flow.step[1] = TXS_SEAM_SIDE;
+    s.flow.step[2] = -1;
+    s.flow.step[3] = -TXS_SEAM_SIDE;
+    for (int top = 0; top < border->height && status == TXM_OK; top += TXS_KNIT_CELL) {
+        if (txm_progress(env, to * (float)top / (float)border->height, "border"))
+            status = txm_fail(env, TXM_CANCELLED, "cancelled");
+        for (int left = 0; left < border->width && status == TXM_OK; left += TXS_KNIT_CELL)
+            if (txs_fray_reaches(border, left, top)) txs_seam_cut(&s, left, top);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- knitting ----------------------------------------------------------------------------
+
+   Two pictures of the same texture: the border moves to where they agree best (seam.h), and its zone
+   is a hole, to be filled. Of different ones: the border is displaced (border.h), then the zone is
+   synthesised in windows, starting from the pixels of the two pictures. A window is a mosaic with two labels, each learned from its own
+   side. Crossing types say what meets across the border: as in the example of a border, or, where
+   there is none, as where the two pictures happen to agree best, which is where one would cut. */
+
+enum {
+    TXS_KNIT_ZONE = 6,        /* pixels on either side of the border      */
+    TXS_KNIT_ZONE_ALIKE = 3,  /* the same between pictures of one texture */
+    TXS_KNIT_MOST = 64,       /* a zone at most                           */
+    TXS_KNIT_LEAST = 16,      /* pixels: sides of pictures                */
+    TXS_KNIT_TWO = 2,         /* labels                                   */
+    TXS_KNIT_GAP = 2 * TXS_CROSS_REACH, /* pixels between pictures side by side */
+    TXS_KNIT_BLOCK = 8,  /* pixels: sides of the fields of a checkerboard */
+    TXS_KNIT_MATCH = 25, /* percent of the pixels count as agreeing       */
+    TXS_KNIT_FEW = 64    /* pixels of an example that lie at its border   */
+};
+
+#define TXS_KNIT_ALIKE 0.32 /* nearer histograms are of the same texture: ours, by trial */
+#define TXS_KNIT_ROUGHEST 32.0f
+
+typedef struct txs_knitter {
+    const texsyn_knit_desc *desc;
+    txs_pair_of_pictures pair, border;
+    txm_image image;    /* a copy, in which the zone is synthesised */
+    uint8_t *label;     /* of each pixel: 0 or 1                    */
+    uint8_t *state;     /* enum txs_state                           */
+    uint16_t *distance; /* from the other label                     */
+    int zone;
+    int64_t missing;
+    int16_t *noise, *cool;
+} txs_knitter;
+
+/* ---- checks --------------------------------------------------------------------------- */
+
+static txm_status txs_knit_check_picture(const txm_image *image, const char *name, txm_env *env) {
+    const txm_status status = txm_image_check(image, name, TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (image->channels == 2)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "2 channels; give 1, 3 or 4");
+    if (image->width < TXS_KNIT_LEAST || image->height < TXS_KNIT_LEAST)
+        return txm_fail_at(env, TXM_TOO_SMALL, name, "must be 16 x 16 or larger");
+    if (!txs_is_plain(image))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
+                           "has samples that are not finite or beyond a million");
+    return TXM_OK;
+}
+
+static int txs_channels_of(const txm_image *image) {
+    return image->channels ? image->channels : 1;
+}
+
+static txm_status txs_knit_check_border(const texsyn_knit_desc *d, txm_env *env) {
+    txm_status status = txs_knit_check_picture(&d->border, "border", env);
+    if (status != TXM_OK) return status;
+    if (txs_channels_of(&d->border) != txs_channels_of(&d->a))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "border: must have the channels of a");
+    return txs_fill_check_mask(&d->border_layout, "border_layout", &d->border, env);
+}
+
+static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out, txm_env *env) {
+    txm_status status;
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "knit: desc is NULL");
+    if ((status = txs_knit_check_picture(&d->a, "a", env)) != TXM_OK ||
+        (status = txs_knit_check_picture(&d->b, "b", env)) != TXM_OK)
+        return status;
+    if (txs_channels_of(&d->b) != txs_channels_of(&d->a) || d->b.sample != d->a.sample)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "b: must have the channels and samples of a");
+    if ((status = txs_fill_check_mask(&d->layout, "layout", &d->a, env)) != TXM_OK) return status;
+    if (d->border.pixels && (status = txs_knit_check_border(d, env)) != TXM_OK) return status;
+    if (d->zone < 0 || d->zone > TXS_KNIT_MOST)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "zone must be 1 to 64, or 0 for the default");
+    if (!(d->roughness <= TXS_KNIT_ROUGHEST))
+        return txm_fail(env, TXM_BAD_ARGUMENT,
+                        "roughness must be up to 32, 0 for the default, negative for none");
+    if ((int)d->likeness < TEXSYN_LIKENESS_AUTO || (int)d->likeness > TEXSYN_LIKENESS_DIFFERENT)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "likeness must be one of texsyn_likeness");
+    if (d->quality < -2 || d->quality > 2)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "quality must be -2 to 2");
+    if ((status = txm_image_check(out, "out", 0, env)) != TXM_OK) return status;
+    if (out->width != d->a.width || out->height != d->a.height ||
+        txs_channels_of(out) != txs_channels_of(&d->a) || out->sample != d->a.sample)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "out: must have the form of a");
+    return TXM_OK;
+}
+
+/* ---- the pictures --------------------------------------------------------------------- */
+
+/* Read a layout; returns how many pixels are white. */
+static size_t txs_knit_read(const txm_image *layout, uint8_t *label) {
+    size_t white = 0;
+    for (int y = 0; y < layout->height; y++) {
+        for (int x = 0; x < layout->width; x++) {
+            const int is_white = txs_mask_at(layout, x, y);
+            label[(size_t)y * (size_t)layout->width + (size_t)x] = (uint8_t)is_white;
+            white += (size_t)is_white;
+        }
+    }
+    return white;
+}
+
+static txm_status txs_knit_open(txs_knitter *k, txm_arena *arena, txm_env *env) {
+    const texsyn_knit_desc *d = k->desc;
+    const size_t entries = (size_t)TXS_NOISE + TXS_VALUES;
+    const size_t pixels = txs_pixels_of(d->a.width, d->a.height);
+    k->pair.picture[0] = txm_image_resolve(d->a);
+    k->pair.picture[1] = txm_image_resolve(d->b);
+    k->pair.width = d->a.width;
+    k->pair.height = d->a.height;
+    if (d->border.pixels) {
+        k->border.picture[0] = k->border.picture[1] = txm_image_resolve(d->border);
+        k->border.width = d->border.width;
+        k->border.height = d->border.height;
+    }
+    k->image = k->pair.picture[0];
+    k->image.stride = 0;
+    k->image.pixels = txm_arena_alloc(
+        arena, pixels, (size_t)k->image.channels * txm_sample_bytes(k->image.sample));
+    k->image = txm_image_resolve(k->image);
+    k->label = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    k->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    k->distance = (uint16_t *)txm_arena_alloc(arena, pixels, sizeof *k->distance);
+    k->noise = (int16_t *)txm_arena_alloc(arena, entries, sizeof *k->noise);
+    k->cool = (int16_t *)txm_arena_alloc(arena, entries, sizeof *k->cool);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the pictures");
+    txs_noise_table(k->noise);
+    txs_cool_noise(k->noise, TXS_FILL_COOL, k->cool);
+    const size_t white = txs_knit_read(&d->layout, k->label);
+    if (white == 0)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "layout: is all black; white is where b goes");
+    if (white == pixels)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "layout: is all white; black is where a goes");
+    return TXM_OK;
+}
+
+/* The bytes of a pixel of one of the two pictures to another one. */
+static void txs_knit_copy_pixel(const txs_pair_of_pictures *p, int label, int x, int y,
+                                const txm_image *to, int to_x, int to_y) {
+    const txm_image *from = &p->picture[label];
+    const size_t bytes = (size_t)from->channels * txm_sample_bytes(from->sample);
+    const int fx = txs_reflect(x, from->width), fy = txs_reflect(y, from->height);
+    memcpy((uint8_t *)txm_image_row(to, to_y) + (size_t)to_x * bytes,
+           (const uint8_t *)txm_image_row_const(from, fy) + (size_t)fx * bytes, bytes);
+}
+
+/* Put the two pictures together, and find the zone. */
+static void txs_knit_compose(txs_knitter *k) {
+    const int width = k->image.width, height = k->image.height;
+    txs_border_distances(k->label, width, height, k->distance);
+    k->missing = 0;
+    for (int y = 0; y < height; y++) {
+        for (int x = 0; x < width; x++) {
+            const size_t i = (size_t)y * (size_t)width + (size_t)x;
+            const int is_free = k->distance[i] <= TXS_NEXT * k->zone;
+            txs_knit_copy_pixel(&k->pair, k->label[i], x, y, &k->image, x, y);
+            k->state[i] = (uint8_t)(is_free ? TXS_FREE : TXS_SOURCE);
+            k->missing += is_free;
+        }
+    }
+}
+
+/* ---- moving the border ---------------------------------------------------------------- */
+
+/* How coarse the border is to be, as the materials are or as asked for: pixels. */
+static double txs_knit_grain(const txs_knitter *k, const txs_material *material) {
+    const double a = material[0].grain, b = material[1].grain, coarser = a > b ? a : b;
+    if (k->desc->roughness > 0) return (double)k->desc->roughness / TXS_ROUGH;
+    if (coarser < TXS_FINEST_GRAIN) return TXS_FINEST_GRAIN;
+    return coarser > TXS_COARSEST_GRAIN ? TXS_COARSEST_GRAIN : coarser;
+}
+
+/* Displace the border as the materials are, or to where they agree. Fraction 0..to of the whole. */
+static txm_status txs_knit_move(txs_knitter *k, const txs_material *material, int is_alike,
+                                txm_env *env, float to) {
+    const double grain = txs_knit_grain(k, material);
+    txs_coats coats;
+    txs_frayed f;
+    txm_arena arena;
+    txm_status status;
+    if (k->desc->roughness < 0) return TXM_OK;
+    txs_border_distances(k->label, k->image.width, k->image.height, k->distance);
+    memset(&f, 0, sizeof f);
+    f.label = k->label;
+    f.distance = k->distance;
+    f.width = k->image.width;
+    f.height = k->image.height;
+    f.rough = txm_float(grain * TXS_ROUGH);
+    f.limit = (int)((double)f.rough * TXS_ROUGHEST * (double)TXS_NEXT);
+    if (is_alike) return txs_seam_find(&k->pair, &f, env, to);
+    txm_arena_init(&arena, env);
+    status = txs_coats_make(&coats, &arena, &k->pair, grain, k->desc->seed)
+                 ? txs_fray(&f, &coats, env, to)
+                 : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to displace the border");
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* ---- one texture ---------------------------------------------------------------------- */
+
+static txm_status txs_knit_alike(txs_knitter *k, const txs_material *material, txm_env *env,
+                                 txm_image out) {
+    texsyn_fill_desc fill;
+    const txm_status status = txs_knit_move(k, material, 1, env, 0);
+    if (status != TXM_OK) return status;
+    const size_t pixels = txs_pixels_of(k->image.width, k->image.height);
+    k->zone = k->desc->zone ? k->desc->zone : (int)TXS_KNIT_ZONE_ALIKE;
+    txs_knit_compose(k);
+    if (!k->missing) { /* nothing but a spot, which has vanished */
+        txs_copy_picture(&k->image, &out);
+        return TXM_OK;
+    }
+    if ((int64_t)pixels - k->missing < TXS_FILL_FEW)
+        return txm_fail(env, TXM_TOO_SMALL, "fewer than 256 pixels lie outside the zone");
+    for (size_t i = 0; i < pixels; i++) k->state[i] = k->state[i] == TXS_FREE ? 255 : 0;
+    memset(&fill, 0, sizeof fill);
+    fill.image = k->image;
+    fill.mask = k->image;
+    fill.mask.pixels = k->state;
+    fill.mask.channels = 1;
+    fill.mask.sample = TXM_U8;
+    fill.mask.stride = 0;
+    fill.quality = k->desc->quality;
+    fill.seed = k->desc->seed;
+    return texsyn_fill(&fill, env, out);
+}
+
+/* ---- a window of two textures --------------------------------------------------------- */
+
+typedef struct txs_loom { /* what a window works with */
+    txs_knitter *knit;
+    txs_hole hole;
+    txs_ground canvas, source, border;
+    txs_mosaic on, from, along; /* of the same */
+    txs_texture texture[TXS_KNIT_TWO];
+    texsyn_model *model[TXS_KNIT_TWO];
+    float spread[TXS_KNIT_TWO][TXS_MAX_BANDS];
+} txs_loom;
+
+/* The values of a pixel in the bands of a label's model; a transparent one has the mean colour. */
+static void txs_loom_split(const txs_loom *w, const txs_pair_of_pictures *p, int label, int x, int y,
+                           txs_ground *g, size_t at) {
+    const texsyn_model *m = w->model[label];
+    const size_t pixels = txs_pixels_of(g->width, g->height);
+    double c[4] = {0, 0, 0, 0};
+    for (int i = 0; i < m->channels; i++)
+        c[i] = 255.0 * (double)txs_pair_get(p, label, x, y, i) - (double)m->mean[i];
+    if (m->channels == 4 && !(txs_pair_get(p, label, x, y, 3) > 0)) c[0] = c[1] = c[2] = 0;
+    for (int b = 0; b < m->bands; b++) {
+        double v = 0;
+        for (int i = 0; i < m->channels; i++) v += (double)m->basis[b][i] * c[i];
+        g->value[(size_t)b * pixels + at] = txm_float(v);
+    }
+}
+
+/* Where the textures are learned: the two pictures side by side, each on its own side if that is
+   enough. */
+static void txs_loom_mark_source(txs_loom *w) {
+    const txs_knitter *k = w->knit;
+    const txs_hole *h = &w->hole;
+    txs_ground *g = &w->source;
+    const size_t pixels = txs_pixels_of(g->width, g->height);
+    memset(g->label, TXS_NO_LABEL, pixels);
+    memset(g->state, TXS_KNOWN, pixels);
+    for (int label = 0; label < TXS_KNIT_TWO; label++) {
+        int own = 0;
+        for (int pass = 0; pass < 2; pass++) {
+            for (int i = 0; i < h->width * h->height; i++) {
+                const int x = i % h->width, y = i / h->width;
+                const size_t in = (size_t)(h->top + y) * (size_t)k->image.width +
+                                  (size_t)(h->left + x);
+                const size_t at = (size_t)y * (size_t)g->width +
+                                  (size_t)(x + label * (h->width + TXS_KNIT_GAP));
+                const int is_own = k->label[in] == label && k->state[in] == TXS_SOURCE;
+                if (!pass) own += is_own;
+                else if (is_own || own < TXS_FILL_ENOUGH) {
+                    g->label[at] = (uint8_t)label;
+                    g->state[at] = TXS_SOURCE;
+                }
+            }
+        }
+    }
+}
+
+/* A copy of a window of one of the pictures. */
+static txm_image txs_loom_cut(const txs_loom *w, int label, txm_arena *arena) {
+    const txs_hole *h = &w->hole;
+    txm_image view = w->knit->pair.picture[label];
+    view.width = h->width;
+    view.height = h->height;
+    view.stride = 0;
+    view.pixels =
+        txm_arena_alloc(arena, txs_pixels_of(h->width, h->height),
+                        (size_t)view.channels * txm_sample_bytes(view.sample));
+    view = txm_image_resolve(view);
+    for (int y = 0; y < h->height && view.pixels; y++)
+        for (int x = 0; x < h->width; x++)
+            txs_knit_copy_pixel(&w->knit->pair, label, h->left + x, h->top + y, &view, x, y);
+    return view;
+}
+
+/* The bands of a label: principal components of its visible colours; see txs_pane_find_bands. */
+static void txs_loom_find_bands(const txs_loom *w, int label, const txm_image *view,
+                                uint8_t *mask) {
+    const txs_ground *g = &w->source;
+    texsyn_model *m = w->model[label];
+    txs_source s;
+    int visible = 0, hidden = 0;
+    for (int pass = 0; pass < 2; pass++) { /* if nothing is visible, any colour will do */
+        for (int i = 0; i < view->width * view->height && (!pass || !visible); i++) {
+            const int x = i % view->width, y = i / view->width;
+            const size_t at = (size_t)y * (size_t)g->width +
+                              (size_t)(x + label * (view->width + TXS_KNIT_GAP));
+            const int is_seen =
+                pass || m->channels < 4 || txm_image_get(view, x, y, 3) > 0;
+            mask[i] = g->label[at] == label && is_seen;
+            visible += mask[i] && !pass;
+            hidden += g->label[at] == label && !is_seen;
+        }
+    }
+    memset(&s, 0, sizeof s);
+    s.width = view->width;
+    s.height = view->height;
+    s.mask = mask;
+    txs_find_bands(m, view, &s);
+    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+}
+
+/* The textures of the window: bands and how they are quantised. */
+static txm_status txs_loom_source(txs_loom *w, txm_arena *arena, txm_env *env) {
+    const txs_hole *h = &w->hole;
+    txs_ground *g = &w->source;
+    const int width = 2 * h->width + TXS_KNIT_GAP, channels = w->knit->image.channels;
+    const size_t room = txs_pixels_of(width, h->height) * (size_t)channels;
+    txs_ground_make(g, arena, width, h->height, channels, 1);
+    uint8_t *bytes = (uint8_t *)txm_arena_alloc(arena, room, 1);
+    float *values = (float *)txm_arena_alloc(arena, room, sizeof *values);
+    for (int label = 0; label < TXS_KNIT_TWO; label++) {
+        w->model[label] = txs_fill_model_make(arena, channels);
+        if (!w->model[label]) break;
+        w->model[label]->levels = 1;
+        w->texture[label].model = w->model[label];
+        w->texture[label].level = &w->model[label]->level[0];
+    }
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    txs_loom_mark_source(w);
+    for (int label = 0; label < TXS_KNIT_TWO; label++) {
+        const txm_image view = txs_loom_cut(w, label, arena);
+        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+        txs_loom_find_bands(w, label, &view, bytes);
+        for (int i = 0; i < h->width * h->height; i++) {
+            const int x = i % h->width, y = i / h->width;
+            txs_loom_split(w, &w->knit->pair, label, h->left + x, h->top + y, g,
+                           (size_t)y * (size_t)width +
+                               (size_t)(x + label * (h->width + TXS_KNIT_GAP)));
+        }
+        txs_ground_quantise(g, label, w->model[label]->bands, w->texture[label].level, values,
+                            bytes, w->spread[label]);
+    }
+    return TXM_OK;
+}
+
+/* What is synthesised: the window of the picture. The zone outside the hole, which other windows
+   have not synthesised yet, has no label. */
+static txm_status txs_loom_canvas(txs_loom *w, txm_arena *arena, txm_env *env) {
+    const txs_knitter *k = w->knit;
+    const txs_hole *h = &w->hole;
+    txs_ground *g = &w->canvas;
+    txs_pair_of_pictures done;
+    if (!txs_ground_make(g, arena, h->width, h->height, k->image.channels, 1))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    memset(&done, 0, sizeof done);
+    done.picture[0] = done.picture[1] = k->image;
+    for (int i = 0; i < h->width * h->height; i++) {
+        const int x = h->left + i % h->width, y = h->top + i / h->width;
+        const size_t in = (size_t)y * (size_t)k->image.width + (size_t)x;
+        const int is_inside = x >= h->x0 && x < h->x1 && y >= h->y0 && y < h->y1;
+        const int is_later = k->state[in] == TXS_FREE && !is_inside;
+        g->state[i] = k->state[in];
+        g->label[i] = is_later ? (uint8_t)TXS_NO_LABEL : k->label[in];
+        txs_loom_split(w, &done, k->label[in], x, y, g, (size_t)i);
+    }
+    return TXM_OK;
+}
+
+/* ---- what meets across a border ------------------------------------------------------- */
+
+/* An example of a border as a ground. */
+static txm_status txs_loom_example(txs_loom *w, txm_arena *arena, txm_env *env) {
+    const txs_knitter *k = w->knit;
+    txs_ground *g = &w->border;
+    if (!txs_ground_make(g, arena, k->border.width, k->border.height, k->image.channels, 1))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example of a border");
+    memset(g->state, TXS_SOURCE, txs_pixels_of(g->width, g->height));
+    txs_knit_read(&k->desc->border_layout, g->label);
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t at = (size_t)y * (size_t)g->width + (size_t)x;
+            txs_loom_split(w, &k->border, g->label[at], x, y, g, at);
+        }
+    }
+    return TXM_OK;
+}
+
+/* A border that might be, where no example of one is given: the two pictures on a checkerboard, less
+   the places where they do not agree. mismatch: a byte for each pixel. */
+static txm_status txs_loom_invent(txs_loom *w, txm_arena *arena, txm_env *env) {
+    const txs_knitter *k = w->knit;
+    const txs_hole *h = &w->hole;
+    txs_ground *g = &w->border;
+    int histogram[256] = {0}, agreeing = 0, most = 0;
+    const int pixels = h->width * h->height;
+    uint8_t *mismatch = (uint8_t *)txm_arena_alloc(arena, (size_t)pixels, 1);
+    if (arena->failed || !txs_ground_make(g, arena, h->width, h->height, k->image.channels, 1))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    for (int i = 0; i < pixels; i++) {
+        mismatch[i] = txs_mismatch(&k->pair, h->left + i % h->width, h->top + i / h->width);
+        histogram[mismatch[i]]++;
+    }
+    while (most < 255 && (int64_t)(agreeing += histogram[most]) * 100 <
+                             (int64_t)pixels * TXS_KNIT_MATCH)
+        most++;
+    for (int i = 0; i < pixels; i++) {
+        const int x = i % h->width, y = i / h->width;
+        const int label = (x / TXS_KNIT_BLOCK + y / TXS_KNIT_BLOCK) & 1;
+        g->state[i] = TXS_SOURCE;
+        g->label[i] = (uint8_t)(mismatch[i] <= most ? label : (int)TXS_NO_LABEL);
+        txs_loom_split(w, &k->pair, label, h->left + x, h->top + y, g, (size_t)i);
+    }
+    return TXM_OK;
+}
+
+/* ---- synthesising a window ------------------------------------------------------------ */
+
+/* The zone starts from the pixels of the pictures. */
+static void txs_loom_start(txs_loom *w) {
+    const txs_ground *g = &w->canvas;
+    const size_t pixels = txs_pixels_of(g->width, g->height);
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            if (!txs_is_free(&w->on, x, y)) continue;
+            const txs_texture *t = &w->texture[g->label[i]];
+            for (int b = 0; b < t->model->bands; b++)
+                txs_pixel(&w->on, x, y)[b * w->on.canvas.plane] = (uint8_t)txs_quantise(
+                    t->level, b, (double)g->value[(size_t)b * pixels + i]);
+        }
+    }
+}
+
+static txm_status txs_loom_run(txs_loom *w, uint64_t seed, txm_env *env, float from, float to) {
+    const txs_knitter *k = w->knit;
+    const int quality = k->desc->quality, reach = TXS_FILL_REACH;
+    const txs_study_plan plan = {2,
+                                 2,
+                                 txs_fill_sweeps(quality),
+                                 txs_fill_types(quality),
+                                 6,
+                                 TXS_FILL_REACH,
+                                 TXS_FILL_REFRESH,
+                                 TXS_FILL_SOFT,
+                                 1,
+                                 seed,
+                                 k->noise,
+                                 k->cool,
+                                 &w->along};
+    if (!txs_mosaic_make(&w->on, env, &w->canvas, TXS_KNIT_TWO, reach, 0) ||
+        !txs_mosaic_make(&w->from, env, &w->source, TXS_KNIT_TWO, reach, 0) ||
+        !txs_mosaic_make(&w->along, env, &w->border, TXS_KNIT_TWO, reach, 0))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    txs_mosaic_lay(&w->on, &w->canvas, w->texture, seed);
+    txs_mosaic_lay(&w->from, &w->source, w->texture, seed);
+    txs_mosaic_lay(&w->along, &w->border, w->texture, seed);
+    txs_loom_start(w);
+    return txs_mosaic_learn(&plan, 0, w->model, &w->from, &w->on, NULL, NULL, env, from, to);
+}
+
+/* The samples of a pixel of the picture from the bands of the canvas. */
+static void txs_loom_paint(const txs_loom *w, int x, int y) {
+    const txs_ground *g = &w->canvas;
+    const size_t pixels = txs_pixels_of(g->width, g->height);
+    const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+    const texsyn_model *m = w->model[g->label[i]];
+    for (int c = 0; c < m->channels; c++) {
+        double v = (double)m->mean[c];
+        for (int b = 0; b < m->bands; b++) /* a product of two floats is exact in double */
+            v += (double)m->basis[b][c] * (double)g->value[(size_t)b * pixels + i];
+        txm_image_set(&w->knit->image, w->hole.left + x, w->hole.top + y, c, txm_float(v / 255));
+    }
+}
+
+/* From the canvas to the picture. */
+static txm_status txs_loom_close(txs_loom *w, txm_arena *arena, txm_env *env) {
+    txs_knitter *k = w->knit;
+    txs_ground *g = &w->canvas;
+    const size_t pixels = txs_pixels_of(g->width, g->height);
+    float *at = (float *)txm_arena_alloc(arena, pixels, sizeof *at);
+    float *grain = (float *)txm_arena_alloc(arena, pixels, sizeof *grain);
+    if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    for (int label = 0; label < TXS_KNIT_TWO; label++)
+        for (int b = 0; b < w->model[label]->bands; b++)
+            txs_tone_apply(&w->on, g, w->texture, label, b, w->spread[label][b], k->desc->seed, at,
+                           grain);
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            if (g->state[i] != TXS_FREE || g->label[i] == TXS_NO_LABEL) continue;
+            txs_loom_paint(w, x, y);
+            k->state[(size_t)(w->hole.top + y) * (size_t)k->image.width +
+                     (size_t)(w->hole.left + x)] = TXS_KNOWN;
+        }
+    }
+    return TXM_OK;
+}
+
+static txm_status txs_knit_window(txs_knitter *k, const txs_hole *hole, int index, txm_env *env,
+                                  float from, float to) {
+    txm_arena arena;
+    txm_status status = TXM_OUT_OF_MEMORY;
+    txm_arena_init(&arena, env);
+    txs_loom *w = (txs_loom *)txm_arena_zero(&arena, 1, sizeof *w);
+    if (!w) return txm_fail(env, status, "no memory for a window");
+    w->knit = k;
+    w->hole = *hole;
+    status = txs_loom_source(w, &arena, env);
+    if (status == TXM_OK) status = txs_loom_canvas(w, &arena, env);
+    if (status == TXM_OK)
+        status = k->border.width ? txs_loom_example(w, &arena, env)
+                                 : txs_loom_invent(w, &arena, env);
+    if (status == TXM_OK)
+        status = txs_loom_run(w, txm_hash(k->desc->seed + 977u * (uint64_t)index), env, from, to);
+    if (status == TXM_OK) status = txs_loom_close(w, &arena, env);
+    txs_mosaic_free(&w->on, env);
+    txs_mosaic_free(&w->from, env);
+    txs_mosaic_free(&w->along, env);
+    txm_arena_free(&arena);
+    return status;
+}
+
+/* The zone in a cell, and the window round it; 0 if there is none. */
+static int txs_knit_hole(const txs_knitter *k, int left, int top, txs_hole *h) {
+    const int right = txm_clampi(left + TXS_KNIT_CELL, 0, k->image.width);
+    const int bottom = txm_clampi(top + TXS_KNIT_CELL, 0, k->image.height);
+    memset(h, 0, sizeof *h);
+    h->x0 = right;
+    h->y0 = bottom;
+    for (int y = top; y < bottom; y++) {
+        for (int x = left; x < right; x++) {
+            if (k->state[(size_t)y * (size_t)k->image.width + (size_t)x] != TXS_FREE) continue;
+            if (x < h->x0) h->x0 = x;
+            if (y < h->y0) h->y0 = y;
+            if (x >= h->x1) h->x1 = x + 1;
+            h->y1 = y + 1;
+            h->missing++;
+        }
+    }
+    if (!h->missing) return 0;
+    h->left = txm_clampi(h->x0 - TXS_FILL_MARGIN, 0, k->image.width);
+    h->top = txm_clampi(h->y0 - TXS_FILL_MARGIN, 0, k->image.height);
+    h->width = txm_clampi(h->x1 + TXS_FILL_MARGIN, 0, k->image.width) - h->left;
+    h->height = txm_clampi(h->y1 + TXS_FILL_MARGIN, 0, k->image.height) - h->top;
+    return 1;
+}
+
+/* ---- two textures --------------------------------------------------------------------- */
+
+/* Does the example of a border have one? */
+static txm_status txs_knit_check_example(const txs_knitter *k, txm_env *env) {
+    txm_arena arena;
+    const int width = k->border.width, height = k->border.height;
+    int64_t meetings = 0;
+    if (!width) return TXM_OK;
+    txm_arena_init(&arena, env);
+    uint8_t *label = (uint8_t *)txm_arena_alloc(&arena, txs_pixels_of(width, height), 1);
+    if (!label) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example of a border");
+    txs_knit_read(&k->desc->border_layout, label);
+    for (int y = 0; y < height; y++) {
+        for (int x = 0; x < width; x++) {
+            const uint8_t *p = label + (size_t)y * (size_t)width + (size_t)x;
+            meetings += (x && p[0] != p[-1]) + (y && p[0] != p[-(ptrdiff_t)width]);
+        }
+    }
+    txm_arena_free(&arena);
+    if (meetings < TXS_KNIT_FEW)
+        return txm_fail(env, TXM_TOO_SMALL,
+                        "border_layout: its border is shorter than 64 pixels; nothing to learn");
+    return TXM_OK;
+}
+
+static txm_status txs_knit_different(txs_knitter *k, const txs_material *material, txm_env *env) {
+    txm_status status = txs_knit_check_example(k, env);
+    int64_t done = 0;
+    int index = 0;
+    if (status == TXM_OK) status = txs_knit_move(k, material, 0, env, 0.1f);
+    if (status != TXM_OK) return status;
+    k->zone = k->desc->zone ? k->desc->zone : (int)TXS_KNIT_ZONE;
+    txs_knit_compose(k);
+    for (int top = 0; top < k->image.height; top += TXS_KNIT_CELL) {
+        for (int left = 0; left < k->image.width && status == TXM_OK; left += TXS_KNIT_CELL) {
+            txs_hole hole;
+            if (!txs_knit_hole(k, left, top, &hole)) continue;
+            const float from = 0.1f + 0.9f * (float)((double)done / (double)k->missing);
+            done += hole.missing;
+            status = txs_knit_window(k, &hole, index++, env, from,
+                                     0.1f + 0.9f * (float)((double)done / (double)k->missing));
+        }
+    }
+    return status;
+}
+
+/* ---- public: knitting ----------------------------------------------------------------- */
+
+TEXSYN_API txm_status texsyn_knit(const texsyn_knit_desc *desc, txm_env *env, txm_image out) {
+    txm_arena arena;
+    txs_knitter k;
+    txs_material material[TXS_KNIT_TWO];
+    txm_status status = txs_knit_check(desc, &out, env);
+    if (status != TXM_OK) return status;
+    memset(&k, 0, sizeof k);
+    k.desc = desc;
+    txm_arena_init(&arena, env);
+    status = txs_knit_open(&k, &arena, env);
+    if (status == TXM_OK && txm_progress(env, 0, "border"))
+        status = txm_fail(env, TXM_CANCELLED, "cancelled");
+    if (status == TXM_OK) {
+        for (int label = 0; label < TXS_KNIT_TWO; label++)
+            txs_survey(&k.pair, k.label, label, &material[label]);
+        const int is_alike = desc->likeness == TEXSYN_LIKENESS_AUTO
+                                 ? !desc->border.pixels &&
+                                       txs_material_distance(&material[0], &material[1]) < TXS_KNIT_ALIKE
+                                 : desc->likeness == TEXSYN_LIKENESS_SAME;
+        if (is_alike) status = txs_knit_alike(&k, material, env, out);
+        else {
+            status = txs_knit_different(&k, material, env);
+            if (status == TXM_OK) txs_copy_picture(&k.image, &out);
+        }
+    }
     txm_arena_free(&arena);
     return status;
 }
@@ -8594,6 +9824,7 @@ static txm_status txs_composite_level(txs_composer *w, int index, txm_env *env, 
                                  c->labels > 1 && index < 2,
                                  seed,
                                  w->noise,
+                                 NULL,
                                  NULL};
     txm_status status =
         txs_composite_enter(c, index, w->source, &w->from, &w->from_above, w->maps, seed, env);
@@ -9301,48 +10532,6 @@ TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_e
     texsyn_composite_free(m);
     return enough ? txm_fail(env, TXM_BAD_DATA, "the composite's contents contradict each other")
                   : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to load the composite");
-}
-
-/* ---- pictures and masks ----------------------------------------------------------------- */
-
-static size_t txs_pixels_of(int width, int height) {
-    return (size_t)width * (size_t)height;
-}
-
-/* gray times alpha is at least half: the rule for masks */
-static int txs_is_white(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    double v = (double)txm_image_get(&m, x, y, 0);
-    if (m.channels >= 3)
-        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
-    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
-    return v >= 0.5;
-}
-
-/* all samples finite and at most a million */
-static int txs_is_plain(const txm_image *image) {
-    const txm_image im = txm_image_resolve(*image);
-    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
-        for (int x = 0; x < im.width; x++) {
-            for (int c = 0; c < im.channels; c++)
-                if (!(fabs((double)txm_image_get(&im, x, y, c)) <= 1e6)) return 0;
-        }
-    }
-    return 1;
-}
-
-static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
-                                 txm_env *env) {
-    if (!mask->pixels) return TXM_OK;
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
-                                   "must be # x # like its picture", (uint64_t)image->width,
-                                   (uint64_t)image->height);
-    if (!txm_image_is_finite(mask))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
-    return TXM_OK;
 }
 
 /* ---- a change of light ------------------------------------------------------------------

@@ -28,7 +28,7 @@ const char cli_versions[] =
 /* ---- the table of commands ---------------------------------------------------------------- */
 
 static const command *const commands[] = {&learn_command, &synth_command, &fill_command,
-                                         &segment_command,
+                                         &knit_command, &segment_command,
                                          &relight_command, &erode_command, &patch_command,
                                          &edges_command, &tiles_command, &retile_command,
                                          &inpaint_command, &tree_command, &forest_command};
