@@ -54,6 +54,20 @@ example wall
 check "wall writes all maps of a material, the same again" wall
 check "wall needs maps of one size" refuses "^wall: " "$tmp/wall" "$tmp/bad" "$tmp/bricks.png" "$tmp/c.png"
 
+# a field smaller than the default
+terrain() {
+    for kind in sand clouds cells; do build/draw $kind "$tmp/$kind-256.png" 256 || return 1; done
+    (cd "$tmp" && ./terrain sand-256.png cells-256.png clouds-256.png t 128 &&
+        ./terrain sand-256.png cells-256.png clouds-256.png again 128) || return 1
+    [ "$(size "$tmp/t-map.png")" = "128 128" ] && [ "$(size "$tmp/t.png")" = "1200 600" ] &&
+        cmp "$tmp/t-map.png" "$tmp/again-map.png"
+}
+example terrain
+check "terrain writes a map and a picture, the same again" terrain
+check "terrain needs photographs" refuses "^terrain: " "$tmp/terrain" none.png none.png none.png "$tmp/n"
+check "terrain needs them large enough" refuses "under 256" "$tmp/terrain" "$tmp/clouds.png" "$tmp/clouds.png" \
+    "$tmp/clouds.png" "$tmp/n"
+
 strokes() {
     "$tmp/strokes" "$tmp/clouds.png" "$tmp/s.png" && [ "$(size "$tmp/s.png")" = "512 512" ]
 }
