@@ -56,14 +56,26 @@ static void txs_aim_plain(const txs_end *ends, int count, int form, const uint8_
     for (int k = 0; k < count; k++, rows += TXS_TOGETHER) {
         const txs_end *e = &ends[k];
         const uint8_t *p1 = p + e->o1, *p2 = p + e->o2, *p3 = p + e->o3, *table = e->table;
-        for (int i = 0, x = 0; i < pixels; i++, x += TXS_GRID) {
-            switch (form) {
-            case 0: rows[i] = table - p1[x]; break;
-            case 1: rows[i] = table + txs_class(p2[x] - p3[x]) * TXS_ROW - p1[x]; break;
-            case 2: rows[i] = table + (p2[x] - p1[x]) * TXS_ROW - p1[x]; break;
-            case 3: rows[i] = table + e->classes[p1[x]] * TXS_VALUES; break;
-            default: rows[i] = table + p2[x] * TXS_ROW - p1[x];
-            }
+        const int stop = pixels * TXS_GRID;
+        const uint8_t **row = rows;
+        switch (form) {
+        case 0:
+            for (int x = 0; x < stop; x += TXS_GRID) *row++ = table - p1[x];
+            break;
+        case 1:
+            for (int x = 0; x < stop; x += TXS_GRID)
+                *row++ = table + txs_class(p2[x] - p3[x]) * TXS_ROW - p1[x];
+            break;
+        case 2:
+            for (int x = 0; x < stop; x += TXS_GRID)
+                *row++ = table + (p2[x] - p1[x]) * TXS_ROW - p1[x];
+            break;
+        case 3:
+            for (int x = 0; x < stop; x += TXS_GRID)
+                *row++ = table + e->classes[p1[x]] * TXS_VALUES;
+            break;
+        default:
+            for (int x = 0; x < stop; x += TXS_GRID) *row++ = table + p2[x] * TXS_ROW - p1[x];
         }
     }
 }
