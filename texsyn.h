@@ -4733,7 +4733,7 @@ static void txs_tails_find(const txs_mosaic *m, ptrdiff_t labels, int label, con
     tails->count = tails->pure = 0;
     for (int pure = 1; pure >= 0; pure--) {
         int64_t found = 0, seen = 0;
-        for (int pass = 0; pass < 2; pass++) {
+        for (int pass = 0; pass < (found ? 2 : 1); pass++) {
             for (int y = 0; y < height; y++) {
                 for (int x = 0; x < width; x++) {
                     if (purity[(size_t)y * (size_t)width + (size_t)x] != pure ||
@@ -9873,7 +9873,8 @@ static int txs_cross_unround(txs_type *t) {
     }
     for (int i = 0; i < TXS_BINS && total; i++) {
         const double square = t->root[i] * t->root[i];
-        const double chance = (double)tail[i / TXS_CLASSES] * head[i % TXS_CLASSES] / total;
+        const int a = i / TXS_CLASSES, b = i % TXS_CLASSES;
+        const double chance = (double)tail[a] * head[b] / total;
         t->share[i] = (int32_t)((int64_t)t->root[i] * t->root[i] * TXS_ONE / total);
         t->potential[i] =
             (int16_t)floor(-log((square + doubt) / (chance + doubt)) * (double)TXS_NAT / 2 + 0.5);

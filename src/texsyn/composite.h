@@ -277,7 +277,8 @@ static int txs_cross_unround(txs_type *t) {
     }
     for (int i = 0; i < TXS_BINS && total; i++) {
         const double square = t->root[i] * t->root[i];
-        const double chance = (double)tail[i / TXS_CLASSES] * head[i % TXS_CLASSES] / total;
+        const int a = i / TXS_CLASSES, b = i % TXS_CLASSES;
+        const double chance = (double)tail[a] * head[b] / total;
         t->share[i] = (int32_t)((int64_t)t->root[i] * t->root[i] * TXS_ONE / total);
         t->potential[i] =
             (int16_t)floor(-log((square + doubt) / (chance + doubt)) * (double)TXS_NAT / 2 + 0.5);

@@ -136,7 +136,7 @@ static void txs_tails_find(const txs_mosaic *m, ptrdiff_t labels, int label, con
     tails->count = tails->pure = 0;
     for (int pure = 1; pure >= 0; pure--) {
         int64_t found = 0, seen = 0;
-        for (int pass = 0; pass < 2; pass++) {
+        for (int pass = 0; pass < (found ? 2 : 1); pass++) {
             for (int y = 0; y < height; y++) {
                 for (int x = 0; x < width; x++) {
                     if (purity[(size_t)y * (size_t)width + (size_t)x] != pure ||
