@@ -288,6 +288,7 @@ static int txs_cross_unround(txs_type *t) {
 
 /* Round what was measured to what a file keeps, so that saving loses nothing. */
 static void txs_composite_round(texsyn_composite *c) {
+    txs_layout_round(&c->layout);
     for (int i = 0; i < c->levels; i++) {
         for (int k = 0; k < c->labels; k++) {
             txs_level *l = &c->model[k]->level[i];

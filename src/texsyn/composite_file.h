@@ -8,10 +8,7 @@
    The same code as that of a model (see file.h), over the layout, the models of the labels one
    after the other, and the crossing types. docs/model-format.md describes the bytes.          */
 
-enum {
-    TXS_LAY_SCALE = 60, /* steps of the root of a share in a label map */
-    TXS_LAY_SIDE_BITS = 24
-};
+enum { TXS_LAY_SIDE_BITS = 24 };
 
 /* Contexts: of displacements and histograms of the layout by kind, of those of crossing types. */
 typedef struct txs_composite_codec {
@@ -20,35 +17,6 @@ typedef struct txs_composite_codec {
     int16_t root[TXS_LAY_BINS], like[TXS_LAY_BINS];
     txs_codec model;
 } txs_composite_codec;
-
-/* Rows of a layout's histogram. */
-static int txs_lay_rows(const txs_layout *layout, int kind) {
-    if (kind == TXS_LAY_FIELD) return layout->field ? (int)TXS_BANDS_OF_FIELD : 1;
-    return kind == TXS_LAY_RING ? TXS_LAY_AROUND + 1 : layout->labels;
-}
-
-/* Round a share to what is kept: its root in steps, beside each other without the empty columns. */
-static void txs_lay_roots(const txs_layout *layout, const txs_lay_type *t, int16_t *root) {
-    const int rows = txs_lay_rows(layout, t->kind);
-    for (int i = 0; i < rows * layout->labels; i++) {
-        const int32_t share = t->share[i / layout->labels * TXS_MAX_LABELS + i % layout->labels];
-        root[i] =
-            (int16_t)floor(sqrt((double)share / (double)TXS_ONE) * (double)TXS_LAY_SCALE + 0.5);
-    }
-}
-
-/* The inverse, normalised as txs_lay_normalise has it; 0 for an empty histogram. */
-static int txs_lay_unroot(const txs_layout *layout, txs_lay_type *t, const int16_t *root) {
-    const txs_lay_view view = {NULL, NULL, layout->field};
-    const int rows = txs_lay_rows(layout, t->kind);
-    int32_t square[TXS_LAY_BINS] = {0}, total = 0;
-    for (int i = 0; i < rows * layout->labels; i++) {
-        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = root[i] * root[i];
-        total += root[i] * root[i];
-    }
-    txs_lay_normalise(&view, t, square, t->share);
-    return total > 0;
-}
 
 /* Type k of a level. The histogram of the last one of its kind predicts its own. */
 static void txs_code_lay_type(txs_coder *c, txs_composite_codec *z, const txs_layout *layout,

@@ -222,4 +222,49 @@ static void txs_lay_fit_pair(txs_lay_type *t, const int32_t *field, int labels, 
         t->share[i] = (int32_t)floor(pairs[i] / total * (double)TXS_ONE + 0.5);
 }
 
+/* ---- what is kept of a label map's statistics ------------------------------------------------ */
+
+enum { TXS_LAY_SCALE = 60 }; /* steps of the root of a share */
+
+/* Rows of a layout's histogram. */
+static int txs_lay_rows(const txs_layout *layout, int kind) {
+    if (kind == TXS_LAY_FIELD) return layout->field ? (int)TXS_BANDS_OF_FIELD : 1;
+    return kind == TXS_LAY_RING ? TXS_LAY_AROUND + 1 : layout->labels;
+}
+
+/* Round a share to what is kept: its root in steps, beside each other without the empty columns. */
+static void txs_lay_roots(const txs_layout *layout, const txs_lay_type *t, int16_t *root) {
+    const int rows = txs_lay_rows(layout, t->kind);
+    for (int i = 0; i < rows * layout->labels; i++) {
+        const int32_t share = t->share[i / layout->labels * TXS_MAX_LABELS + i % layout->labels];
+        root[i] =
+            (int16_t)floor(sqrt((double)share / (double)TXS_ONE) * (double)TXS_LAY_SCALE + 0.5);
+    }
+}
+
+/* The inverse, normalised as txs_lay_normalise has it; 0 for an empty histogram. */
+static int txs_lay_unroot(const txs_layout *layout, txs_lay_type *t, const int16_t *root) {
+    const txs_lay_view view = {NULL, NULL, layout->field};
+    const int rows = txs_lay_rows(layout, t->kind);
+    int32_t square[TXS_LAY_BINS] = {0}, total = 0;
+    for (int i = 0; i < rows * layout->labels; i++) {
+        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = root[i] * root[i];
+        total += root[i] * root[i];
+    }
+    txs_lay_normalise(&view, t, square, t->share);
+    return total > 0;
+}
+
+/* Round all shares to what a file keeps, so that saving loses nothing. */
+static void txs_layout_round(txs_layout *layout) {
+    int16_t root[TXS_LAY_BINS];
+    for (int i = 0; i < layout->levels; i++) {
+        for (int k = 0; k < layout->level[i].type_count; k++) {
+            txs_lay_type *t = &layout->level[i].types[k];
+            txs_lay_roots(layout, t, root);
+            txs_lay_unroot(layout, t, root);
+        }
+    }
+}
+
 #endif /* TEXSYN_LAYOUT_H */
