@@ -17,6 +17,7 @@ extern const command learn_command, synth_command; /* clique.c */
 extern const command fill_command;                 /* fill.c    */
 extern const command segment_command;              /* segment.c */
 extern const command knit_command;                 /* knit.c  */
+extern const command composite_command;            /* composite.c */
 extern const command relight_command;              /* relight.c */
 extern const command erode_command;                /* erode.c   */
 extern const command patch_command;                /* patch.c  */

@@ -27,11 +27,10 @@ const char cli_versions[] =
 
 /* ---- the table of commands ---------------------------------------------------------------- */
 
-static const command *const commands[] = {&learn_command, &synth_command, &fill_command,
-                                         &knit_command, &segment_command,
-                                         &relight_command, &erode_command, &patch_command,
-                                         &edges_command, &tiles_command, &retile_command,
-                                         &inpaint_command, &tree_command, &forest_command};
+static const command *const commands[] = {
+    &learn_command,     &synth_command,   &fill_command,  &knit_command,    &segment_command,
+    &composite_command, &relight_command, &erode_command, &patch_command,   &edges_command,
+    &tiles_command,     &retile_command,  &inpaint_command, &tree_command,  &forest_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """check_patch.py WHAT FILES... - do pictures of texkit patch and texkit edges hold what they should?
 
-    draw FOLDER                        bricks.png and maps in register: -normal, -id, -height (16 bits)
+    draw FOLDER                        bricks.png and maps in register: -normal, -id, -height (16 bits);
+                                       parts.png of three materials, with its labels
     is FILE WIDTH HEIGHT CHANNELS BITS
     sources S.pfm OUT EXEMPLAR,...     each pixel of OUT is that of the exemplar at the place S says
     near S.pfm OUT EXEMPLAR,... MOST   the same but for MOST, 0..255, on average
@@ -130,6 +131,20 @@ def draw(folder):
     write_png(folder + "/bricks-normal.png", side, side, 3, 8, normal)
     write_png(folder + "/bricks-id.png", side, side, 1, 8, lambda x, y: 7 if is_mortar(x, y) else 200)
     write_png(folder + "/bricks-height.png", side, side, 1, 16, height)
+    # sand of two colours, in patches and below a sky; what says so, in colour and as numbers
+    def part(x, y):
+        wave = math.sin(x / 7) + math.sin(y / 9) + math.sin((x + 2 * y) / 11)
+        return 0 if y < 26 else 1 if wave > 0.2 else 2
+
+    def sand(x, y):
+        tone = noise(x // 2, y // 2, 3) // 6
+        return ((120, 160, 230), (200 + tone, 150 + tone, 60 + tone), (30 + tone, 70 + tone, 20))[part(x, y)]
+
+    shown = ((0, 0, 255), (255, 160, 0), (0, 120, 0))
+    write_png(folder + "/parts.png", side, side, 3, 8, sand)
+    write_png(folder + "/parts-labels.png", side, side, 3, 8, lambda x, y: shown[part(x, y)])
+    write_png(folder + "/parts-numbers.png", side, side, 1, 8, part)
+    write_png(folder + "/drawn.png", 80, 64, 3, 8, lambda x, y: shown[1 if x < 30 else 2 if y < 40 else 0])
     # darker to the right, and what says so; a target that asks for dark above
     write_png(folder + "/ramp.png", side, side, 3, 8,
               lambda x, y: tuple(c * (220 - 2 * x) // 255 for c in color(x, y)))

@@ -36,6 +36,7 @@ size="--size 40x30"
 # ---- help and version
 check "--help" run 0 --help
 check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth out.log && grep -q patch out.log &&
+    grep -q composite out.log &&
     grep -q edges out.log && grep -q tiles out.log && grep -q retile out.log &&
     grep -q inpaint out.log && grep -q ' fill ' out.log && grep -q ' knit ' out.log &&
     grep -q relight out.log && grep -q erode out.log && grep -q segment out.log &&
@@ -43,7 +44,7 @@ check "--help lists the commands" sh -c "grep -q learn out.log && grep -q synth 
 check "--version" run 0 --version
 check "--version names the headers" \
     grep -q '^texkit [0-9.]* (texmath [0-9.]*, texsyn [0-9.]*, texpatch [0-9.]*, texedges [0-9.]*, textiles [0-9.]*, trimesh_relax [0-9.]*, trimesh_cover [0-9.]*, texinpaint [0-9.]*, treepieces [0-9.]*)$' out.log
-for command in learn synth fill knit segment relight erode patch edges tiles retile inpaint tree forest; do
+for command in learn synth composite fill knit segment relight erode patch edges tiles retile inpaint tree forest; do
     check "$command --help" run 0 $command --help
     check "$command --help has an example" grep -q "  texkit $command .*-o" out.log
     input=sand.png

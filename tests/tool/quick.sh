@@ -32,6 +32,12 @@ refuses 2 "such as 512x512" synth sand.txs -o n.png --size 0x5
 check "fill" run 0 fill ball.png --mask ball-mask.png -o filled.png
 check "changes nothing else" check_tool inpaint kept ball.png ball-mask.png filled.png 0.5
 refuses 2 "add --mask" fill ball.png -o n.png
+check "composite" run 0 composite parts.png --labels parts-labels.png -o composite.png --size 60x50 \
+    --save parts.txc --map map.png
+check "has the size and channels" check_tool patch is composite.png 60 50 3 8
+check "from what it saved, drawn as it was" run 0 composite parts.txc -o again.png --layout map.png
+check "the same picture" cmp composite.png again.png
+refuses 1 "more than 16 colours" composite parts.png --labels parts.png -o n.png --size 60x50
 
 check "patch" run 0 patch bricks.png -o patch.png --size 64x64 --passes 1
 check "has the size and channels" check_tool patch is patch.png 64 64 3 8

@@ -1,6 +1,10 @@
 #!/bin/sh
+<<<<<<< HEAD
 # The model loader against hostile bytes, and public calls against pictures of all kinds: a few thousand
 # here, many more with FULL=1.
+=======
+# The loaders of models and composites against hostile bytes: a few thousand mutations here, a million with --full.
+>>>>>>> d7bcca5 (tests/wide/fuzz: hostile composites, as changed bytes and as forged fields)
 . tests/kit/tap.sh
 
 mkdir "$tmp/seeds"
@@ -9,12 +13,15 @@ for kind in sand:3 cells:1 blades:4; do
     build/draw "$name" "$tmp/$name.png" 48 "${kind#*:}"
     build/texkit learn "$tmp/$name.png" -o "$tmp/seeds/$name.txs" --types 3 --quiet
 done
+/usr/bin/python3 tests/tool/check_patch.py draw "$tmp"
+build/texkit composite "$tmp/parts.png" --labels "$tmp/parts-labels.png" -o "$tmp/c.png" --size 9x9 \
+    --types 3 --save "$tmp/seeds/parts.txc" --quiet
 
 runs=20000
 [ "$FULL" = 1 ] && runs=200000
 check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
     tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_standalone" -lm &&
-    check "$runs mutated models" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*.txs
+    check "$runs mutated models and composites" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*
 
 runs=500
 [ "$FULL" = 1 ] && runs=5000

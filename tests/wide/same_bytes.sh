@@ -101,6 +101,15 @@ for threads in 1 2 8; do
         cmp "$tmp/filled-1.png" "$tmp/filled-$threads.png"
 done
 
+/usr/bin/python3 tests/tool/check_patch.py draw "$tmp"
+for threads in 1 2 8; do
+    build/texkit composite "$tmp/parts.png" --labels "$tmp/parts-labels.png" --size 150x90 --types 4 \
+        -o "$tmp/$threads.png" --save "$tmp/$threads.txc" --threads $threads --quiet
+    check "texkit composite, the same picture with --threads $threads" cmp "$tmp/1.png" "$tmp/$threads.png"
+    check "texkit composite, the same composite with --threads $threads" \
+        cmp "$tmp/1.txc" "$tmp/$threads.txc"
+done
+
 # no thread steps on another's data
 if [ "$FULL" = 1 ] && has clang; then
     for module in $modules; do
