@@ -1,10 +1,6 @@
 #!/bin/sh
-<<<<<<< HEAD
-# The model loader against hostile bytes, and public calls against pictures of all kinds: a few thousand
-# here, many more with FULL=1.
-=======
-# The loaders of models and composites against hostile bytes: a few thousand mutations here, a million with --full.
->>>>>>> d7bcca5 (tests/wide/fuzz: hostile composites, as changed bytes and as forged fields)
+# Loaders of models and composites against hostile bytes, and public calls against pictures of all kinds: a
+# few thousand here, many more with FULL=1.
 . tests/kit/tap.sh
 
 mkdir "$tmp/seeds"
