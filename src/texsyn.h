@@ -278,6 +278,8 @@ typedef struct texsyn_fill_desc {
     txm_image source; /* same size and form as mask: where to learn from; pixels NULL = from all
                          that is known near the hole                                             */
     const texsyn_model *model; /* what to fill with, of as many channels; NULL = learn it        */
+    int relight;               /* non-zero: such a model gets the mean colour and the contrast of
+                                  what is known, if it was learned in other light                */
     int quality;               /* -2 fast .. +2 best: fewer or more clique types and sweeps      */
     uint64_t seed;             /* another seed, another filling                                  */
 } texsyn_fill_desc;

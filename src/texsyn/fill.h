@@ -31,6 +31,9 @@ enum {
     TXS_FILL_COOL = 60 /* percent: temperature of the last sweep */
 };
 
+#define TXS_FILL_DIMMEST 0.25 /* change of contrast in another light, at most; ours */
+#define TXS_FILL_BRIGHTEST 4.0
+
 /* A part of the hole to be filled at once, in pixels of the picture, and the window round it. */
 typedef struct txs_hole {
     int x0, y0, x1, y1;
@@ -448,6 +451,57 @@ static void txs_flatten(const texsyn_model *from, texsyn_model *to) {
     }
 }
 
+/* ---- a model in another light ---------------------------------------------------------------- */
+
+/* Standard deviation of a band's values. */
+static double txs_band_deviation(const txs_level *l, int band) {
+    double mean = 0, square = 0;
+    for (int v = 0; v < TXS_VALUES; v++) {
+        const double share = (double)l->types[band].share[v] / (double)TXS_ONE;
+        mean += share * v;
+        square += share * v * v;
+    }
+    return sqrt(square > mean * mean ? square - mean * mean : 0) * (double)l->step[band];
+}
+
+/* Give a model the mean colour of what is known and visible, and the contrast of its first band: a
+   texture from another photograph then has the light of this one. Alpha stays as it is. */
+static void txs_fill_relight(const txs_filler *f, texsyn_model *m) {
+    const int colours = m->channels < 3 ? 1 : 3;
+    const txm_image *im = &f->image;
+    double mean[3] = {0, 0, 0}, square = 0, along = 0, count = 0;
+    for (int y = 0; y < im->height; y++) {
+        for (int x = 0; x < im->width; x++) {
+            double band = 0;
+            if (f->state[(size_t)y * (size_t)im->width + (size_t)x] != TXS_SOURCE ||
+                (m->channels == 4 && !(txm_image_get(im, x, y, 3) > 0)))
+                continue;
+            for (int c = 0; c < colours; c++) {
+                const double v = 255.0 * (double)txm_image_get(im, x, y, c);
+                mean[c] += v;
+                band += (double)m->basis[0][c] * (v - (double)m->mean[c]);
+            }
+            along += band;
+            square += band * band;
+            count++;
+        }
+    }
+    if (!(count >= (double)TXS_FILL_FEW)) return;
+    const double variance = square / count - along / count * (along / count);
+    const double now = txs_band_deviation(&m->level[0], 0);
+    double gain = variance > 0 && now > 0 ? sqrt(variance) / now : 1;
+    gain = gain < TXS_FILL_DIMMEST ? TXS_FILL_DIMMEST : gain;
+    gain = gain > TXS_FILL_BRIGHTEST ? TXS_FILL_BRIGHTEST : gain;
+    for (int c = 0; c < colours; c++) m->mean[c] = txs_short_float(txm_float(mean[c] / count));
+    for (int i = 0; i < m->levels; i++) {
+        for (int b = 0; b < m->bands; b++) {
+            if (m->channels == 4 && m->basis[b][3] != 0) continue;
+            m->level[i].low[b] = txs_short_float(txm_float((double)m->level[i].low[b] * gain));
+            m->level[i].step[b] = txs_short_float(txm_float((double)m->level[i].step[b] * gain));
+        }
+    }
+}
+
 /* ---- filling a window ----------------------------------------------------------------- */
 
 /* Work for the given quality, -2..2; ours, by trial. */
@@ -713,6 +767,7 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
         txs_noise_table(filler.noise);
         txs_cool_noise(filler.noise, TXS_FILL_COOL, filler.cool);
         if (filler.given) txs_flatten(desc->model, filler.given);
+        if (filler.given && desc->relight) txs_fill_relight(&filler, filler.given);
         status = txs_fill_windows(&filler, &arena, env);
     }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);

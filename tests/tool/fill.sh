@@ -42,6 +42,8 @@ check "alpha" run 0 fill alpha.png --mask mask-disc.png -o c.png
 check "stays alpha" look kept alpha.png mask-disc.png c.png 0.5
 check "--model" run 0 fill sand.png --mask mask-disc.png -o m.png --model sand.txs
 check "only the region changes with a model" look kept sand.png mask-disc.png m.png 0.8
+check "--relight" run 0 fill sand.png --mask mask-disc.png -o l.png --model sand.txs --relight
+refuses 2 "without --model" fill sand.png --mask mask-disc.png -o n.png --relight
 check "--source" run 0 fill sand.png --mask mask-disc.png -o u.png --source mask-edge.png
 check "the source makes a difference" sh -c "! cmp -s a.png u.png"
 

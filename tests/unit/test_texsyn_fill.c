@@ -229,6 +229,38 @@ static void test_model(void **state) {
     }
 }
 
+/* A texture that was learned in the dark becomes as bright and as rich in contrast as its new
+   surroundings. */
+static void test_relight(void **state) {
+    (void)state;
+    enum { LEFT = SIDE / 2 * SIDE }; /* pixels of the hole */
+    static uint8_t bright[SIDE * SIDE], dark[SIDE * SIDE], mask[SIDE * SIDE], out[SIDE * SIDE];
+    double known[2] = {0, 0}, filled[2] = {0, 0};
+    draw_clouds(bright, SIDE, SIDE, 1);
+    for (int i = 0; i < SIDE * SIDE; i++) dark[i] = (uint8_t)(bright[i] / 3);
+    texsyn_learn_desc learn;
+    texsyn_model *model;
+    memset(&learn, 0, sizeof learn);
+    learn.example = view_bytes(dark, SIDE, SIDE, 1);
+    assert_int_equal(texsyn_learn(&learn, NULL, &model), TXM_OK);
+    draw_mask(mask, SIDE, SIDE, half);
+    texsyn_fill_desc d =
+        fill_desc(view_bytes(bright, SIDE, SIDE, 1), view_bytes(mask, SIDE, SIDE, 1));
+    d.model = model;
+    d.relight = 1;
+    fill(&d, view_bytes(out, SIDE, SIDE, 1));
+    texsyn_model_free(model);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double *sum = mask[i] ? filled : known;
+        sum[0] += out[i] / (double)LEFT;
+        sum[1] += (double)out[i] * out[i] / (double)LEFT;
+    }
+    const double deviation = sqrt(known[1] - known[0] * known[0]);
+    assert_true(fabs(filled[0] - known[0]) < 0.5 * deviation);
+    const double ratio = sqrt(filled[1] - filled[0] * filled[0]) / deviation;
+    assert_true(ratio > 0.6 && ratio < 1.5);
+}
+
 /* Colours under transparent pixels make no difference; alpha is continued. */
 static void test_alpha(void **state) {
     (void)state;
@@ -444,13 +476,13 @@ static void test_failing(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shapes),        cmocka_unit_test(test_no_seam),
-        cmocka_unit_test(test_constant),      cmocka_unit_test(test_large),
-        cmocka_unit_test(test_source),        cmocka_unit_test(test_model),
-        cmocka_unit_test(test_alpha),         cmocka_unit_test(test_formats),
-        cmocka_unit_test(test_masks),         cmocka_unit_test(test_same_bytes),
-        cmocka_unit_test(test_bad_arguments), cmocka_unit_test(test_bad_masks),
-        cmocka_unit_test(test_failing),
+        cmocka_unit_test(test_shapes),     cmocka_unit_test(test_no_seam),
+        cmocka_unit_test(test_constant),   cmocka_unit_test(test_large),
+        cmocka_unit_test(test_source),     cmocka_unit_test(test_model),
+        cmocka_unit_test(test_relight),    cmocka_unit_test(test_alpha),
+        cmocka_unit_test(test_formats),    cmocka_unit_test(test_masks),
+        cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_bad_arguments),
+        cmocka_unit_test(test_bad_masks),  cmocka_unit_test(test_failing),
     };
     return cmocka_run_group_tests_name("texsyn_fill", tests, NULL, NULL);
 }

@@ -18,7 +18,8 @@ static const cli_manual fill_manual = {
     "in\n"
     ".png, .tga, .bmp or .jpg and has the channels of IMAGE; .png keeps 16 bits.\n"
     "--source S learns only where S is white, of what lies near the region.\n"
-    "--model fills with a texture of 'texkit learn', whose exemplar had the channels of IMAGE.\n"
+    "--model fills with a texture of 'texkit learn', whose exemplar had the channels of IMAGE;\n"
+    "--relight gives it the mean colour and the contrast of the picture.\n"
     "Of --stats: 'filled' pixels.\n",
     "  texkit fill meadow.jpg --mask stone.png -o meadow-only.png\n"
     "  texkit fill bark.png --mask label.png --model bark.txs --seed 2 -o bark-clean.png\n",
@@ -96,11 +97,17 @@ static int run_job(fill_job *j, int argc, char **argv) {
         {CLI_INPUT, "--source", "S", "learn only where this picture is white", &j->source, 0, 0},
         {CLI_INPUT, "--model", "MODEL.txs", "fill with this texture instead of learning one",
          &j->model, 0, 0},
+        {CLI_FLAG, "--relight", NULL, "give the model of --model the light of the picture",
+         &j->desc.relight, 0, 0},
         {CLI_INT, "--quality", "N", "fewer or more statistics and sweeps, -2 to 2; default 0",
          &j->desc.quality, -2, 2},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (cli_begin(run, &fill_manual, options, argc, argv, &status)) return status;
+    if (j->desc.relight && !j->model)
+        return cli_fail(run, CLI_USAGE,
+                        "--relight without --model: what is learned here has the "
+                        "light of the picture");
     if (!j->mask)
         return cli_fail(run, CLI_USAGE, "no mask given; add --mask M, white where to fill");
     status = check_picture_path(run, run->output, 0, 0, 0);
