@@ -286,22 +286,24 @@ static int txs_cross_unround(txs_type *t) {
     return total > 0;
 }
 
-/* Round what was measured to what a file keeps, so that saving loses nothing. */
-static void txs_composite_round(texsyn_composite *c) {
-    txs_layout_round(&c->layout);
+/* Round what was measured to what a file keeps, and read that again, so that saving loses nothing. */
+static txm_status txs_composite_settle(const texsyn_composite *c, txm_env *env,
+                                       texsyn_composite **out) {
+    size_t size = 0;
     for (int i = 0; i < c->levels; i++) {
-        for (int k = 0; k < c->labels; k++) {
-            txs_level *l = &c->model[k]->level[i];
-            for (int j = 0; j < l->type_count; j++) {
-                txs_round_statistics(&l->types[j], i);
-                txs_unround_statistics(&l->types[j]);
-            }
-        }
-        for (int j = 0; j < c->crossings[i]; j++) {
-            txs_cross_round(&c->crossing[i][j].type);
-            txs_cross_unround(&c->crossing[i][j].type);
-        }
+        for (int k = 0; k < c->labels; k++)
+            for (int j = 0; j < c->model[k]->level[i].type_count; j++)
+                txs_round_statistics(&c->model[k]->level[i].types[j], i);
+        for (int j = 0; j < c->crossings[i]; j++) txs_cross_round(&c->crossing[i][j].type);
     }
+    txm_status status = texsyn_composite_save(c, env, NULL, 0, &size);
+    if (status != TXM_OK) return status;
+    uint8_t *bytes = (uint8_t *)txm_alloc(env, size);
+    if (!bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the composite");
+    status = texsyn_composite_save(c, env, bytes, size, &size);
+    if (status == TXM_OK) status = texsyn_composite_load(bytes, size, env, out);
+    txm_free(env, bytes);
+    return status;
 }
 
 /* The labels of the example: as given, or found. */
@@ -396,7 +398,6 @@ static txm_status txs_composite_run(txs_composer *w, const txs_lay_plane *map, t
         status = txs_composite_level(w, i, env, from, i ? next : 1);
         from = next;
     }
-    txs_composite_round(c);
     return status;
 }
 
@@ -426,8 +427,8 @@ TEXSYN_API txm_status texsyn_composite_learn(const texsyn_composite_learn_desc *
     txs_mosaic_free(&w.to_above, env);
     txs_lay_plane_free(&map, env);
     txm_arena_free(&arena);
-    if (status == TXM_OK) *out = w.composite;
-    else texsyn_composite_free(w.composite);
+    if (status == TXM_OK) status = txs_composite_settle(w.composite, env, out);
+    texsyn_composite_free(w.composite);
     return status;
 }
 

@@ -255,16 +255,4 @@ static int txs_lay_unroot(const txs_layout *layout, txs_lay_type *t, const int16
     return total > 0;
 }
 
-/* Round all shares to what a file keeps, so that saving loses nothing. */
-static void txs_layout_round(txs_layout *layout) {
-    int16_t root[TXS_LAY_BINS];
-    for (int i = 0; i < layout->levels; i++) {
-        for (int k = 0; k < layout->level[i].type_count; k++) {
-            txs_lay_type *t = &layout->level[i].types[k];
-            txs_lay_roots(layout, t, root);
-            txs_lay_unroot(layout, t, root);
-        }
-    }
-}
-
 #endif /* TEXSYN_LAYOUT_H */
