@@ -33,6 +33,11 @@ for extension in png tga bmp jpg; do
     check "writes .$extension" run 0 composite a.txc -o "e.$extension" $size
 done
 
+check "labels that are found" run 0 composite parts.png -o f.png $size --map f-map.png --save f.txc
+check "the map has their numbers" look is f-map.png 40 30 1 8
+check "so many as are asked for" run 0 composite parts.png -o f.png $size --segments 2 --stats stats.json
+check "there are two" grep -q '"labels": 2' stats.json
+
 # ---- what was saved, and drawn layouts
 check "from what was saved" run 0 composite a.txc -o b.png --size 60x50 --save b.txc
 check "the same picture" cmp a.png b.png
@@ -52,7 +57,8 @@ check "the same picture" cmp d.png d2.png
 
 # ---- refusals
 refuses 2 "add --size" composite parts.png $labels -o x.png
-refuses 2 "add --labels" composite parts.png -o x.png $size
+refuses 2 "leave one out" composite parts.png $labels -o x.png $size --segments 3
+for bad in 0 17 x; do refuses 2 "--segments" composite parts.png -o x.png $size --segments $bad; done
 refuses 2 "auto, none, rows, columns" composite parts.png $labels -o x.png $size --field sideways
 refuses 2 ".txc" composite parts.png $labels -o x.png $size --save x.txs
 refuses 2 "end the name in" composite parts.png $labels -o x.gif $size

@@ -13,8 +13,9 @@ static const cli_manual composite_manual = {
     "composite", "EXEMPLAR|MODEL.txc -o OUT --size WxH [options]",
     "make a picture of several textures, laid out as in an exemplar",
     "EXEMPLAR is a picture of two to 16 materials, at least 32 x 32 pixels; --labels tells which is\n"
-    "where. Learned are the layout, the texture of each label and what happens where two of them\n"
-    "meet. Or the input is what --save wrote before (the file's content decides, not its name).\n"
+    "where; without it that is found, as by 'texkit segment --transition'. Learned are the layout,\n"
+    "the texture of each label and what happens where two of them meet. Or the input is what --save\n"
+    "wrote before (the file's content decides, not its name).\n"
     "OUT ends in .png, .tga, .bmp or .jpg; it has the channels of EXEMPLAR, and .png keeps 16 bits.\n"
     "A picture of labels is gray, indexed or in colour and has one colour for each label, at most\n"
     "  16, each on 256 pixels or more. Gray values that are all below 16 are labels 0 to 15; other\n"
@@ -23,13 +24,14 @@ static const cli_manual composite_manual = {
     "--layout is a drawn picture of labels with the colours of --labels; without --size the result\n"
     "  has its size. For a saved composite without --labels it has to show every label.\n",
     "  texkit composite slope.jpg --labels parts.png -o slope2.png --size 1024x768 --save slope.txc\n"
+    "  texkit composite slope.jpg --segments 3 -o more.png --size 1024x768 --map more-labels.png\n"
     "  texkit composite slope.txc -o drawn.png --layout drawing.png\n",
     1, "exemplar or model", 0, "take a smaller size"};
 
 typedef struct composite_job {
     cli run;
     const char *labels_path, *layout_path, *field_name, *save_path, *map_path;
-    int extent[2], quality;
+    int extent[2], quality, segments;
     label_colours colours;
     texsyn_composite_learn_desc learn;
     texsyn_composite_desc desc;
@@ -51,6 +53,8 @@ static int check_options(composite_job *j) {
     if (j->extent[0] && j->extent[0] > TEXSYN_MAX_PIXELS / j->extent[1])
         return cli_fail(run, CLI_USAGE, "--size %dx%d: at most %d pixels in all", j->extent[0],
                         j->extent[1], TEXSYN_MAX_PIXELS);
+    if (j->segments && j->labels_path)
+        return cli_fail(run, CLI_USAGE, "--segments: --labels says how many there are; leave one out");
     if (j->field_name) {
         const int field = find_name(run, "--field", j->field_name, fields);
         if (field < 0) return CLI_USAGE;
@@ -80,16 +84,36 @@ static int save(composite_job *j) {
     return check_result(run, result, run->inputs[0]);
 }
 
+/* The labels of the exemplar, found. What is thin is not learned. */
+static int find_labels(composite_job *j) {
+    cli *run = &j->run;
+    txm_image *labels = &j->learn.labels;
+    texsyn_segment_desc desc = {0};
+    int count = 0;
+    desc.image = j->learn.example;
+    desc.segments = j->segments;
+    desc.transition = 1;
+    desc.seed = run->seed;
+    cli_stage(run, "segment");
+    int status = new_picture(run, desc.image.width, desc.image.height, 1, TXM_U8, labels);
+    if (!status)
+        status = check_result(run, texsyn_segment(&desc, &run->env, *labels, &count), run->inputs[0]);
+    uint8_t *p = (uint8_t *)labels->pixels;
+    const size_t pixels = (size_t)desc.image.width * (size_t)desc.image.height;
+    for (size_t i = 0; i < pixels && !status; i++)
+        if (p[i] >= count) p[i] = NO_LABEL;
+    if (!status) plain_labels(count, &j->colours);
+    return status;
+}
+
 static int learn(composite_job *j) {
     cli *run = &j->run;
     texsyn_composite_learn_desc *d = &j->learn;
     int status = check_picture_fits(run, run->output, j->extent[0], j->extent[1], &d->example);
     if (status) return status;
-    if (!j->labels_path)
-        return cli_fail(run, CLI_USAGE, "no labels given; add --labels L, a picture of '%s' with "
-                        "one colour for each material", run->inputs[0]);
-    status = read_labels(run, j->labels_path, &j->colours, &d->labels);
-    if (!status)
+    status = j->labels_path ? read_labels(run, j->labels_path, &j->colours, &d->labels)
+                            : find_labels(j);
+    if (!status && j->labels_path)
         status = check_extent(run, "the picture of labels", j->labels_path, &d->labels,
                               d->example.width, d->example.height, run->inputs[0]);
     if (status) return status;
@@ -232,8 +256,10 @@ static int run_composite(int argc, char **argv) {
     const cli_option options[] = {
         {CLI_EXTENT, "--size", "WxH", "width and height of the result in pixels", j.extent, 1,
          MAX_SIDE},
-        {CLI_INPUT, "--labels", "L", "a picture of labels of the exemplar's size", &j.labels_path, 0,
+        {CLI_INPUT, "--labels", "L", "a picture of labels of the exemplar's size; default: found", &j.labels_path, 0,
          0},
+        {CLI_INT, "--segments", "K", "without --labels: how many textures, 1 to 16; default: found",
+         &j.segments, 1, TEXSYN_MAX_SEGMENTS},
         {CLI_INPUT, "--layout", "DRAWN", "a picture of labels for the result; default: synthesised",
          &j.layout_path, 0, 0},
         {CLI_TEXT, "--field", "NAME", "do labels keep to rows (a sky above) or to columns? auto, none, "
