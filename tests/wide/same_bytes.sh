@@ -79,6 +79,7 @@ check "a foreign case is noticed" sh -c "sed '2s/ / other-/' '$tmp/lines' >'$tmp
 
 # the tool with OpenMP agrees with itself
 build/draw cells "$tmp/cells.png" 64
+build/draw sand "$tmp/sand.png" 64
 /usr/bin/python3 tests/tool/check_inpaint.py mask disc 64 "$tmp/mask.png"
 for threads in 1 2 8; do
     build/texkit learn "$tmp/cells.png" -o "$tmp/$threads.txs" --threads $threads --quiet
@@ -99,6 +100,10 @@ for threads in 1 2 8; do
         --threads $threads --quiet
     check "texkit fill, the same picture with --threads $threads" \
         cmp "$tmp/filled-1.png" "$tmp/filled-$threads.png"
+    build/texkit knit "$tmp/cells.png" "$tmp/sand.png" --layout "$tmp/mask.png" \
+        -o "$tmp/knitted-$threads.png" --threads $threads --quiet
+    check "texkit knit, the same picture with --threads $threads" \
+        cmp "$tmp/knitted-1.png" "$tmp/knitted-$threads.png"
 done
 
 /usr/bin/python3 tests/tool/check_patch.py draw "$tmp"

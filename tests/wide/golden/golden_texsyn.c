@@ -262,12 +262,42 @@ static uint64_t fill_known(txm_env *env) {
     return fill_as(1, TXM_U8, 1, env);
 }
 
+/* two pictures joined: of different textures, with and without an example of their border, and of one */
+static uint64_t knitted(txm_env *env) {
+    static uint8_t other[SIDE * SIDE * 3], layout[SIDE * SIDE], out[SIDE * SIDE * 3];
+    uint64_t hash = 0;
+    golden_blobs(exemplar, SIDE, SIDE, 3);
+    golden_noise(other, SIDE, SIDE, 3);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const int x = i % SIDE, y = i / SIDE;
+        layout[i] = x + y / 2 > 45 || (x < 20 && y < 20) ? 255 : 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        texsyn_knit_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.a = golden_image(exemplar, SIDE, SIDE, 3, TXM_U8);
+        desc.b = golden_image(other, SIDE, SIDE, 3, TXM_U8);
+        desc.layout = golden_image(layout, SIDE, SIDE, 1, TXM_U8);
+        desc.likeness = k == 2 ? TEXSYN_LIKENESS_SAME : TEXSYN_LIKENESS_DIFFERENT;
+        desc.quality = -1;
+        desc.seed = 4;
+        if (k == 1) {
+            desc.border = desc.a;
+            desc.border_layout = desc.layout;
+        }
+        golden_need(texsyn_knit(&desc, env, golden_image(out, SIDE, SIDE, 3, TXM_U8)), "knit", env);
+        hash = tk_hash(hash, out, sizeof out);
+    }
+    return hash;
+}
+
 static const golden_case cases[] = {{"gray", gray},
                                     {"rgb-tileable", rgb_tileable},
                                     {"rgba-16-bits", rgba_deep},
                                     {"blobs-fine-float", blobs_fine},
                                     {"masked", masked},
                                     {"file", file},
+                                    {"knitted", knitted},
                                     {"relit", relit},
                                     {"eroded", eroded},
                                     {"composite", composite},
