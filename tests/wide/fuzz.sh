@@ -27,6 +27,9 @@ check "relighting and erosion build by themselves" $CC -std=gnu99 $SANITIZE -DFU
 check "filling builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
     tests/wide/fuzz/fuzz_texsyn_fill.c -o "$OUT/fuzz_fill" -lm &&
     check "$runs random fillings" "$OUT/fuzz_fill" $runs
+check "knitting builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
+    tests/wide/fuzz/fuzz_texsyn_knit.c -o "$OUT/fuzz_knit" -lm &&
+    check "$runs random knits" "$OUT/fuzz_knit" $runs
 
 if [ "$FULL" = 1 ] && has clang; then
     check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \
