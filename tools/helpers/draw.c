@@ -2,7 +2,9 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    The pictures are the project's own, drawn with integers only, so they are the same everywhere.
-   Channels: 1, 3 (default) or 4, whose alpha is made of one of the others.                      */
+   Channels: 1, 3 (default) or 4, whose alpha is made of one of the others.
+
+   draw discs OUT.png SIDE X,Y,W,H... draws a mask: white in the ellipses of these boxes.        */
 #include "files/image_io.h"
 
 #include <stdio.h>
@@ -150,6 +152,24 @@ static int fail(const char *path, const char *why) {
     return 1;
 }
 
+/* A mask of one channel; texts: the boxes of its ellipses. Returns NULL, or what went wrong. */
+static const char *draw_discs(const txm_image *out, char **texts, int count) {
+    unsigned char *to = (unsigned char *)out->pixels;
+    memset(to, 0, (size_t)out->width * (size_t)out->height);
+    for (int k = 0; k < count; k++) {
+        int left, top, width, height;
+        if (sscanf(texts[k], "%d,%d,%d,%d", &left, &top, &width, &height) != 4 || width < 1 ||
+            width > MAX_SIDE || height < 1 || height > MAX_SIDE)
+            return "a box is X,Y,W,H";
+        for (int i = 0; i < out->width * out->height; i++) {
+            const int x = i % out->width - left, y = i / out->width - top;
+            const double u = 2 * (x + 0.5) / width - 1, v = 2 * (y + 0.5) / height - 1;
+            if (u * u + v * v <= 1) to[i] = 255;
+        }
+    }
+    return NULL;
+}
+
 int main(int argc, char **argv) {
     txm_image out = {0};
     const char *why = NULL;
@@ -159,9 +179,10 @@ int main(int argc, char **argv) {
         return 0;
     }
     if (argc < 3) return fail("", "usage: draw KIND OUT.png [SIDE [CHANNELS]]; draw list");
-    int side = argc > 3 ? atoi(argv[3]) : 256, channels = argc > 4 ? atoi(argv[4]) : 3;
+    const int discs = !strcmp(argv[1], "discs");
+    int side = argc > 3 ? atoi(argv[3]) : 256, channels = discs ? 1 : argc > 4 ? atoi(argv[4]) : 3;
     while (kind < count && strcmp(argv[1], kinds[kind].name) != 0) kind++;
-    if (kind == count) return fail(argv[1], "no such kind; see draw list");
+    if (kind == count && !discs) return fail(argv[1], "no such kind; see draw list");
     if (side < 1 || side > MAX_SIDE || channels < 1 || channels > 4)
         return fail(argv[2], "bad size");
 
@@ -170,7 +191,8 @@ int main(int argc, char **argv) {
     out.pixels = malloc((size_t)side * (size_t)side * 4);
     if (!out.pixels) return fail(argv[2], "out of memory");
     unsigned char *to = (unsigned char *)out.pixels;
-    for (int y = 0; y < side; y++) {
+    if (discs) why = draw_discs(&out, argv + 4, argc > 4 ? argc - 4 : 0);
+    for (int y = 0; y < side && !discs; y++) {
         for (int x = 0; x < side; x++) {
             int rgb[3];
             kinds[kind].draw(x + 64, y + 64, rgb); /* away from negative lattice points */
@@ -181,7 +203,7 @@ int main(int argc, char **argv) {
         }
     }
 
-    const int ok = image_write(argv[2], &out, &why);
+    const int ok = !why && image_write(argv[2], &out, &why);
     free(out.pixels);
     return ok ? 0 : fail(argv[2], why);
 }
