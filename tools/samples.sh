@@ -14,7 +14,7 @@ packages=$build/packages
 
 # role, name, title, package, path, licence, times to shrink before cutting the middle out. The role
 # "good": texsyn.h is made for it; "limit": it shows what texsyn.h cannot do; "layout": for texpatch.h;
-# "scene": for texinpaint.h, up to 512 pixels.
+# "scene": for texinpaint.h, up to 512 pixels; "more": for one section of the demo each.
 photographs="
 good  gravel  Gravel   python3-skimage      usr/lib/python3/dist-packages/skimage/data/gravel.png CC0-1.0 2
 good  pebbles Pebbles  extremetuxracer-data usr/share/games/etr/terrains/pebbles04.png            GPL-2+ 1
@@ -29,12 +29,17 @@ limit brick   Bricks   python3-skimage      usr/lib/python3/dist-packages/skimag
 layout wall   Slates   extremetuxracer-data usr/share/games/etr/terrains/pave01.png               GPL-2+ 1
 scene rocket  Rocket   python3-skimage      usr/lib/python3/dist-packages/skimage/data/rocket.jpg CC0-1.0 1
 scene camera  Camera   python3-skimage      usr/lib/python3/dist-packages/skimage/data/camera.png CC0-1.0 1
+more  autumn  Autumn   extremetuxracer-data usr/share/games/etr/terrains/grass01.png              GPL-2+ 1
+more  cracked Cracks   extremetuxracer-data usr/share/games/etr/terrains/rock06.png               GPL-2+ 1
+more  rock    Rock     extremetuxracer-data usr/share/games/etr/terrains/rock07.png               GPL-2+ 1
+more  snow    Snow     extremetuxracer-data usr/share/games/etr/terrains/snow01.png               GPL-2+ 1
+more  thaw    Thaw     extremetuxracer-data usr/share/games/etr/terrains/snowy_rock06.png         GPL-2+ 1
 "
 
 # nothing to do while the samples are there and this list of them is the same
 [ -s "$samples/list.txt" ] && [ -z "$(find "$0" -newer "$samples/list.txt")" ] && exit 0
 rm -rf "$samples"
-mkdir -p "$samples/limit" "$samples/layout" "$samples/scene" "$packages"
+mkdir -p "$samples/limit" "$samples/layout" "$samples/scene" "$samples/more" "$packages"
 log=$packages/log.txt
 tab=$(printf '\t')
 
