@@ -3,6 +3,9 @@
 
    terrain MEADOW ROCK SNOW OUT [SIZE]
 
+   With photographs of the demo:
+       make demo && build/examples/terrain out/lawn.png out/rock.png out/snow.png terrain
+
    A height field of SIZE x SIZE is generated (2048, or 64 to 4096); heights and slopes say where
    meadow, rock and snow lie. Of the photographs 256 x 256 pixels each are learned, side by side, as
    one composite texture of texsyn.h, with a label each; it then covers the field. Writes OUT-map.png,
