@@ -241,6 +241,31 @@ species() {
 SPECIES
 }
 
+# samples NAME...: samples for single sections, copied to the page; fails if one of them is not there
+samples() {
+    for sample; do
+        [ -e "$build/samples/more/$sample.png" ] || return 1
+        cp "$build/samples/more/$sample.png" "$out/$sample.png"
+    done
+}
+# credits NAME...: where they come from
+credits() {
+    for sample; do
+        awk -F "$tab" -v name="more/$sample" '$2 == name { printf "%s: %s; licence %s. ", $3, $4, $5 }' \
+            "$build/samples/list.txt"
+    done
+}
+# row TITLE TEXT PICTURE CAPTION [PICTURE CAPTION]...: pictures side by side, appended to the page
+row() {
+    printf '<h3>%s</h3>\n<p>%s</p>\n<div class="row">\n' "$1" "$2"
+    shift 2
+    while [ $# -ge 2 ]; do
+        printf '<div><img src="%s" alt="%s"><small>%s</small></div>\n' "$1" "$2" "$2"
+        shift 2
+    done
+    echo '</div>'
+} >>"$out/index.part"
+
 cat >"$out/index.part" <<'HEAD'
 <!DOCTYPE html>
 <html lang="en">
@@ -266,6 +291,7 @@ p { margin: 0.5rem 0; }
 .repeated { width: 768px; height: 768px; max-width: 100%; margin: 1.5rem 0 0.5rem; }
 .atlas { margin: -0.5rem 0 3rem; }
 .couple { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; margin: 1rem 0 3rem; }
+.row { display: grid; grid-template-columns: repeat(auto-fill, 256px); gap: 1rem; margin: 1rem 0; }
 .wide { margin: 1.5rem 0 0.5rem; }
 .source { margin-bottom: 2.5rem; }
 .trees { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; margin: 1.5rem 0; }
@@ -458,6 +484,102 @@ REMOVE
 fi
 removed rocket "a tower" 322,110,42,236 318,260,60,110
 removed camera "a tall building" 402,106,50,90
+
+
+# what else texsyn.h does, with photographs for it
+if samples autumn; then
+    echo '<h2>Texture where it is wanted</h2>' >>"$out/index.part"
+fi
+if samples autumn; then
+    holes="26,30,40,48 144,-4,50,58 154,56,34,48 108,132,36,48 132,80,112,72 -2,108,24,32 54,222,34,36
+168,220,36,34"
+    # shellcheck disable=SC2086 # boxes are words
+    "$build/draw" discs "$out/autumn-hole.png" 256 $holes
+    "$build/texkit" fill "$out/autumn.png" --mask "$out/autumn-hole.png" -o "$out/autumn-filled.png" \
+        --stats "$out/autumn.json" --quiet
+    printf 'demo: autumn   filled in %s s\n' "$(seconds total "$out/autumn.json")"
+    row "Filled" "Leaves and a twig, white in the mask, have become lawn, learned around them, in
+$(seconds total "$out/autumn.json") s (<code>texkit fill</code>)." \
+        autumn.png before autumn-hole.png "the mask" autumn-filled.png after
+fi
+if [ -e "$out/lawn.png" ] && [ -e "$out/mud-512.png" ]; then
+    "$build/draw" discs "$out/path.png" 512 -60,300,200,130 60,230,180,150 170,120,170,190 290,60,150,150 \
+        380,90,220,110
+    "$build/texkit" knit "$out/lawn-512.png" "$out/mud-512.png" --layout "$out/path.png" \
+        -o "$out/path-knit.png" --stats "$out/path.json" --quiet
+    printf 'demo: lawn and mud knit in %s s\n' "$(seconds total "$out/path.json")"
+    cat >>"$out/index.part" <<KNIT
+<section class="pair">
+<div>
+<img src="path.png" width="256" height="256" alt="the layout: a path">
+<h3>Knit together</h3>
+<p>Mud where the layout is white and lawn where it is black, with a border as rough as their grain, in
+$(seconds total "$out/path.json") s (<code>texkit knit</code>).</p>
+</div>
+<img src="path-knit.png" width="512" height="512" alt="a path of mud across a lawn">
+</section>
+KNIT
+fi
+if samples autumn && [ -e "$out/lawn.png" ]; then
+    "$build/texkit" relight "$out/lawn.png" --like "$out/autumn.png" -o "$out/lawn-relit.png" --quiet
+    echo 'demo: lawn     in the light of autumn'
+    row "Relit" "The lawn of summer in the light and colours of autumn (<code>texkit relight</code>)." \
+        lawn.png before autumn.png "the light that is wanted" lawn-relit.png after
+fi
+if samples cracked rock; then
+    for level in 0.2 0.5 1; do
+        "$build/texkit" erode "$out/rock.png" --weathered "$out/cracked.png" --level $level \
+            -o "$out/rock-eroded-$level.png" --quiet
+    done
+    echo 'demo: rock     eroded to three levels'
+    row "Eroded" "Cracks like those of another rock at three levels, each of which contains the one before
+(<code>texkit erode</code>)." rock-eroded-0.2.png "level 0.2" rock-eroded-0.5.png "level 0.5" \
+        rock-eroded-1.png "level 1"
+    if [ -x "$build/examples/pillar" ]; then
+        "$build/examples/pillar" "$out/cracked.png" "$out/pillar.png" >/dev/null
+        echo 'demo: a pillar'
+        cat >>"$out/index.part" <<'PILLAR'
+<p>A pillar of that other rock: the stone is learned where it has no cracks, and more of these are laid over
+the pillar the nearer it is to the ground (<code>examples/pillar.c</code>).</p>
+<img class="wide" src="pillar.png" width="520" height="1040" alt="a pillar, cracked at its foot">
+PILLAR
+    fi
+fi
+if samples thaw; then
+    echo '<h2>Several textures in one picture</h2>' >>"$out/index.part"
+    "$build/texkit" segment "$out/thaw.png" -o "$out/thaw-labels.png" --stats "$out/thaw.json" --quiet
+    printf 'demo: thaw     segmented in %s s\n' "$(seconds total "$out/thaw.json")"
+    row "Told apart" "The textures of a photograph, and how many there are, found in $(seconds total "$out/thaw.json") s; each label
+has its mean colour (<code>texkit segment</code>)." thaw.png "the photograph" thaw-labels.png "its labels"
+    "$build/texkit" learn "$out/thaw.png" -o "$out/thaw.txs" --quiet
+    "$build/texkit" synth "$out/thaw.txs" -o "$out/thaw-single.png" --size 384x384 --quiet
+    "$build/texkit" composite "$out/thaw.png" --labels "$out/thaw-labels.png" -o "$out/thaw-composite.png" \
+        --size 384x384 --save "$out/thaw.txc" --map "$out/thaw-map.png" --stats "$out/thaw.json" --quiet
+    printf 'demo: thaw     as a composite in %s s\n' "$(seconds total "$out/thaw.json")"
+    cat >>"$out/index.part" <<COMPOSITE
+<h3>Synthesised apart</h3>
+<p>Left: one model of the whole photograph. Right: a model for each label and for where they meet, and a label
+map that is synthesised as well, in $(seconds total "$out/thaw.json") s (<code>texkit composite</code>).</p>
+<div class="couple">
+<img src="thaw-single.png" width="384" height="384" alt="from one model">
+<img src="thaw-composite.png" width="384" height="384" alt="from a model for each label">
+</div>
+COMPOSITE
+fi
+if samples rock snow && [ -e "$out/lawn.png" ] && [ -x "$build/examples/terrain" ]; then
+    "$build/examples/terrain" "$out/lawn.png" "$out/rock.png" "$out/snow.png" "$out/terrain"
+    echo 'demo: a terrain'
+    cat >>"$out/index.part" <<'TERRAIN'
+<h3>Terrain</h3>
+<p>Heights and slopes say where lawn, rock and snow lie; 2048 &times; 2048 pixels of composite texture, learned
+from three photographs, <a href="terrain-map.png">cover it</a> without a repetition
+(<code>examples/terrain.c</code>).</p>
+<img class="wide" src="terrain.png" width="1200" height="600" alt="mountains with meadows, rock and snow">
+TERRAIN
+fi
+if samples autumn; then
+    printf '<p class="source">%s</p>\n' "$(credits autumn cracked rock snow thaw)" >>"$out/index.part"
+fi
 
 # trees: files written by the tool, and where there is OpenGL pictures drawn by examples/forest_gl
 bark=$(pick lichen 3)
