@@ -7435,7 +7435,7 @@ static void txs_run_filter(const txs_scene *s, const int16_t *plane, int filter,
         square += (uint64_t)((int64_t)raw[i] * raw[i]);
         count++;
     }
-    const double least = TXS_LAB / 4; /* weaker answers are noise of the 8-bit samples */
+    const double least = (double)TXS_LAB / 4; /* weaker answers are noise of the 8-bit samples */
     double rms = sqrt((double)square / (double)(count ? count : 1));
     if (rms < least) rms = least;
     for (int i = 0; i <= LEVELS; i++) {
@@ -7558,7 +7558,7 @@ static void txs_colour_features(const txs_features *f, size_t i, int *x) {
 }
 
 static void txs_shape_features(const txs_features *f, size_t i, int *x) {
-    for (int a = 0; a < TXS_FILTERS; a++) x[a] = f->answers[a][i];
+    for (int a = 0; a < TXS_FILTERS; a++) x[a] = 0 + f->answers[a][i];
 }
 
 static void txs_name_textons(void *context, int share) {
@@ -7634,9 +7634,9 @@ typedef struct txs_blocks {
 
 /* log2 of x >= 1 to about 1e-12, by its exponent and a series: the same everywhere */
 static double txs_log2(double x) {
-    int whole = 0;
-    for (; x >= 2; x /= 2) whole++;
-    if (x > 1.41421356237309505) x /= 2, whole++;
+    int whole;
+    x = frexp(x, &whole); /* 0.5 <= x < 1 */
+    if (x <= 0.70710678118654752) x *= 2, whole--;
     const double t = (x - 1) / (x + 1), tt = t * t;
     double sum = 0;
     for (int k = 17; k > 0; k -= 2) sum = sum * tt + 1.0 / k;
@@ -7769,7 +7769,8 @@ static void txs_set_touch(txs_region_set *r, int a, int b, int value) {
 /* Ward's: what joining two regions adds to the unlikeness within regions. */
 static int64_t txs_join_cost(const txs_region_set *r, int a, int b) {
     const int64_t d = txs_unlike(r->blocks->log_table, r->mean[a], r->mean[b]);
-    return d * (r->area[a] * r->area[b] / (r->area[a] + r->area[b]));
+    const int64_t both = r->area[a] + r->area[b];
+    return both ? d * (r->area[a] * r->area[b] / both) : 0;
 }
 
 /* the next neighbour of a region after `after`, or -1 */

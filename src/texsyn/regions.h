@@ -35,9 +35,9 @@ typedef struct txs_blocks {
 
 /* log2 of x >= 1 to about 1e-12, by its exponent and a series: the same everywhere */
 static double txs_log2(double x) {
-    int whole = 0;
-    for (; x >= 2; x /= 2) whole++;
-    if (x > 1.41421356237309505) x /= 2, whole++;
+    int whole;
+    x = frexp(x, &whole); /* 0.5 <= x < 1 */
+    if (x <= 0.70710678118654752) x *= 2, whole--;
     const double t = (x - 1) / (x + 1), tt = t * t;
     double sum = 0;
     for (int k = 17; k > 0; k -= 2) sum = sum * tt + 1.0 / k;
@@ -170,7 +170,8 @@ static void txs_set_touch(txs_region_set *r, int a, int b, int value) {
 /* Ward's: what joining two regions adds to the unlikeness within regions. */
 static int64_t txs_join_cost(const txs_region_set *r, int a, int b) {
     const int64_t d = txs_unlike(r->blocks->log_table, r->mean[a], r->mean[b]);
-    return d * (r->area[a] * r->area[b] / (r->area[a] + r->area[b]));
+    const int64_t both = r->area[a] + r->area[b];
+    return both ? d * (r->area[a] * r->area[b] / both) : 0;
 }
 
 /* the next neighbour of a region after `after`, or -1 */

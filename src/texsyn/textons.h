@@ -215,7 +215,7 @@ static void txs_run_filter(const txs_scene *s, const int16_t *plane, int filter,
         square += (uint64_t)((int64_t)raw[i] * raw[i]);
         count++;
     }
-    const double least = TXS_LAB / 4; /* weaker answers are noise of the 8-bit samples */
+    const double least = (double)TXS_LAB / 4; /* weaker answers are noise of the 8-bit samples */
     double rms = sqrt((double)square / (double)(count ? count : 1));
     if (rms < least) rms = least;
     for (int i = 0; i <= LEVELS; i++) {
@@ -338,7 +338,7 @@ static void txs_colour_features(const txs_features *f, size_t i, int *x) {
 }
 
 static void txs_shape_features(const txs_features *f, size_t i, int *x) {
-    for (int a = 0; a < TXS_FILTERS; a++) x[a] = f->answers[a][i];
+    for (int a = 0; a < TXS_FILTERS; a++) x[a] = 0 + f->answers[a][i];
 }
 
 static void txs_name_textons(void *context, int share) {
