@@ -19,17 +19,17 @@ check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contrac
     tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_standalone" -lm &&
     check "$runs mutated models and composites" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*
 
+# build NAME: fuzz_texsyn_NAME, which uses public calls alone, with the object of the unit tests
+build() {
+    # shellcheck disable=SC2086 # flags are words
+    check "fuzz_texsyn_$1 builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -DTEXSYN_IMPLEMENTED \
+        -ffp-contract=off -I. "tests/wide/fuzz/fuzz_texsyn_$1.c" "$OUT/modules/texsyn.o" -o "$OUT/fuzz_$1" -lm
+}
 runs=500
 [ "$FULL" = 1 ] && runs=5000
-check "relighting and erosion build by themselves" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off \
-    -I. tests/wide/fuzz/fuzz_texsyn_weather.c -o "$OUT/fuzz_weather" -lm &&
-    check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
-check "filling builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
-    tests/wide/fuzz/fuzz_texsyn_fill.c -o "$OUT/fuzz_fill" -lm &&
-    check "$runs random fillings" "$OUT/fuzz_fill" $runs
-check "knitting builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
-    tests/wide/fuzz/fuzz_texsyn_knit.c -o "$OUT/fuzz_knit" -lm &&
-    check "$runs random knits" "$OUT/fuzz_knit" $runs
+build weather && check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
+build fill && check "$runs random fillings" "$OUT/fuzz_fill" $runs
+build knit && check "$runs random knits" "$OUT/fuzz_knit" $runs
 
 if [ "$FULL" = 1 ] && has clang; then
     check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \
