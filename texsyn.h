@@ -5965,6 +5965,7 @@ static txm_status txs_fill_once(txs_filler *f, int index, const texsyn_model *kn
     p->hole = f->hole[index];
     p->model = model;
     p->index = index;
+    p->canvas.canvas.pixels = p->above.canvas.pixels = NULL; /* both are freed below, if made or not */
     if (known) txs_pane_adopt(p, known);
     status = txs_pane_prepare(f, p, known, &arena, env);
     if (status == TXM_OK && !known) status = txs_pane_quantise(p, &arena, env);
