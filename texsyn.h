@@ -7967,13 +7967,26 @@ static void txs_find_cliques(txs_partition *p, const txs_standard *z, int least,
     }
 }
 
-/* Groups smaller than `small` join the most similar other one, the smallest first. */
-static void txs_join_small(txs_partition *p, int64_t small, int least) {
-    while (p->count > least) {
-        int a = 0, best = -1;
-        for (int c = 1; c < p->count; c++)
-            if (p->area[c] < p->area[a]) a = c;
-        if (p->area[a] >= small) return;
+/* A strip along a boundary is a mixture of what lies beside it, and the filters see both sides:
+   it looks like a texture of its own, but is thinner than this, in blocks. */
+#define TXS_THINNEST 1.25
+
+/* The smallest group that is smaller than `small` or too thin for a texture, or -1. */
+static int txs_least_group(const txs_partition *p, int64_t small) {
+    int least = -1;
+    for (int c = 0; c < p->count; c++) {
+        if (p->area[c] >= small && txs_thickness(p, c) >= TXS_THINNEST) continue;
+        if (least < 0 || p->area[c] < p->area[least]) least = c;
+    }
+    return least;
+}
+
+/* Groups that are too small or too thin join the most similar other one, the smallest first. */
+static void txs_join_least(txs_partition *p, int64_t small) {
+    while (p->count > 1) {
+        const int a = txs_least_group(p, small);
+        int best = -1;
+        if (a < 0) return;
         for (int c = 0; c < p->count; c++) {
             if (c == a) continue;
             if (best < 0 || *txs_unlike_at(p, a, c) < *txs_unlike_at(p, a, best)) best = c;
@@ -8580,11 +8593,11 @@ static txm_status txs_group_regions(txs_segmenter *g) {
     int64_t all = 0;
     for (int a = 0; a < p->regions; a++) all += p->area[a];
     txs_find_cliques(p, &txs_strict, 1, TXS_MOST_LABELS);
-    txs_join_small(p, all / TXS_SMALL, 1);
+    txs_join_least(p, all / TXS_SMALL);
     if (p->count > 1) return TXM_OK;
     txs_first_groups(g, sum, mean); /* one texture; or several that are not very unlike? */
     txs_find_cliques(p, &txs_fine, 1, TXS_MOST_LABELS);
-    txs_join_small(p, all / TXS_SMALL, 1);
+    txs_join_least(p, all / TXS_SMALL);
     return TXM_OK;
 }
 

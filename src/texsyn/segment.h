@@ -278,11 +278,11 @@ static txm_status txs_group_regions(txs_segmenter *g) {
     int64_t all = 0;
     for (int a = 0; a < p->regions; a++) all += p->area[a];
     txs_find_cliques(p, &txs_strict, 1, TXS_MOST_LABELS);
-    txs_join_small(p, all / TXS_SMALL, 1);
+    txs_join_least(p, all / TXS_SMALL);
     if (p->count > 1) return TXM_OK;
     txs_first_groups(g, sum, mean); /* one texture; or several that are not very unlike? */
     txs_find_cliques(p, &txs_fine, 1, TXS_MOST_LABELS);
-    txs_join_small(p, all / TXS_SMALL, 1);
+    txs_join_least(p, all / TXS_SMALL);
     return TXM_OK;
 }
 
