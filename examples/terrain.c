@@ -226,9 +226,10 @@ int main(int argc, char **argv) {
 #ifdef _OPENMP
     env.parallel_for = on_all_cores;
 #endif
-    for (int i = 0; i < size * size; i++)
-        t.height[i] = (float)size *
-                      height_at((float)(i % size) / (float)size, (float)(i / size) / (float)size);
+    for (int i = 0; i < size * size; i++) {
+        const int x = i % size, y = i / size;
+        t.height[i] = (float)size * height_at((float)x / (float)size, (float)y / (float)size);
+    }
     for (int i = 0; i < size * size; i++)
         t.label[i] = (unsigned char)label_of(&t, i % size, i / size);
     cover(argv + 1, &t, &env);
