@@ -11679,8 +11679,9 @@ static txm_status txs_find_ranks(const float *strength, int width, int height, d
    over the borders of its neighbours to the left and above, and joined to them along minimum-error
    cuts [5]. What is compared is the strength along lines, so that cracks meet. Clique statistics do
    not keep thin long lines; pieces do. They are mirrored and turned as far as the exemplar
-   has no direction that this would change, and a part of the exemplar that has been used often
-   costs more, so that none becomes conspicuous. */
+   has no direction that this would change. A crack that is seen again and again, mirrored or not,
+   is conspicuous, so a part of the exemplar costs more the more often it has been used and the
+   nearer. Its cells count by their cracks: intact stone may recur. */
 
 enum {
     TXS_PIECE = 192,       /* pixels: side of a piece                                           */
@@ -11693,10 +11694,13 @@ enum {
     TXS_MOVED = (2 * TXS_MOVES + 1) * (2 * TXS_MOVES + 1),
     TXS_TRY_SHARES = 16,   /* into which the comparisons are divided for threads                */
     TXS_CELL = 16,         /* pixels: side of a cell of the exemplar whose uses are counted     */
+    TXS_NEAR_PIECES = 4,   /* pieces each way in which the same cracks would be noticed         */
     TXS_TURNS = 8          /* ways to lay a square: bit 0 mirrors x, 1 mirrors y, 2 swaps them  */
 };
 #define TXS_SAME_DIRECTION 0.2  /* the structure of an exemplar without direction is below this */
-#define TXS_USED_WEIGHT 1.0     /* of the square of uses over the average, in the cost          */
+#define TXS_USED_WEIGHT 2.0     /* of the square of uses over the average, in the cost          */
+#define TXS_NEAR_WEIGHT 32.0    /* of a piece all of whose cracks are laid beside it            */
+#define TXS_INTACT_CONTENT 0.02 /* of an intact pixel, compared with a crack of strength 1      */
 #define TXS_CRACK_WEIGHT 3.0    /* of a crack of strength 1 in the error, compared with 1        */
 
 typedef struct txs_place_of { /* a piece of the exemplar */
@@ -11709,8 +11713,10 @@ typedef struct txs_laying {
     int side, overlap;
     int32_t *source;                /* for each pixel of the picture one of the exemplar; -1    */
     uint32_t *used;                 /* per cell of the exemplar                                 */
+    double *content;                /* of all cells to the left of and above each corner of one */
     int cells_x, cells_y;
-    double pieces;                  /* laid so far                                              */
+    txs_place_of *laid;             /* the pieces laid so far, row by row                       */
+    int rows, columns, row, column; /* of pieces, and of the one that is being laid             */
     int turns[TXS_TURNS], turn_count;
     int left, top;                  /* of the piece that is being laid, in the picture          */
     int piece_width, piece_height;  /* the part of it inside the picture                        */
@@ -11758,18 +11764,82 @@ static void txs_find_turns(txs_laying *l) {
     }
 }
 
-/* mean uses of the cells under a piece, over that of all cells */
+/* What cells from..to (not included) hold of cracks. */
+static double txs_content_of(const txs_laying *l, int from_x, int from_y, int to_x, int to_y) {
+    const size_t stride = (size_t)l->cells_x + 1;
+    const double *above = l->content + (size_t)from_y * stride;
+    const double *below = l->content + (size_t)to_y * stride;
+    return below[to_x] - below[from_x] - above[to_x] + above[from_x];
+}
+
+static void txs_find_content(txs_laying *l) {
+    const txs_stone *s = l->stone;
+    const size_t stride = (size_t)l->cells_x + 1;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            const size_t i = (size_t)y * (size_t)s->width + (size_t)x;
+            const double crack = s->strength[i] > 0 ? (double)s->strength[i] : 0;
+            l->content[(size_t)(y / TXS_CELL + 1) * stride + (size_t)(x / TXS_CELL + 1)] +=
+                TXS_INTACT_CONTENT + crack * crack;
+        }
+    }
+    for (size_t y = 1; y <= (size_t)l->cells_y; y++) {
+        for (size_t x = 1; x < stride; x++) {
+            double *p = l->content + y * stride + x;
+            *p += p[-1] + *(p - stride) - *(p - stride - 1);
+        }
+    }
+}
+
+/* The cell border nearest to coordinate x. */
+static int txs_cell_border(int x) { return (x + TXS_CELL / 2) / TXS_CELL; }
+
+/* What two pieces share, as a part of what the first one holds. */
+static double txs_shared(const txs_laying *l, const txs_place_of *p, const txs_place_of *q) {
+    const int left = txs_cell_border(p->x > q->x ? p->x : q->x);
+    const int top = txs_cell_border(p->y > q->y ? p->y : q->y);
+    const int right = txs_cell_border((p->x < q->x ? p->x : q->x) + l->side);
+    const int bottom = txs_cell_border((p->y < q->y ? p->y : q->y) + l->side);
+    if (left >= right || top >= bottom) return 0;
+    const int end_x = txm_clampi(right, 0, l->cells_x), end_y = txm_clampi(bottom, 0, l->cells_y);
+    if (left >= end_x || top >= end_y) return 0;
+    const int most_x = txm_clampi(txs_cell_border(p->x + l->side), 0, l->cells_x);
+    const int most_y = txm_clampi(txs_cell_border(p->y + l->side), 0, l->cells_y);
+    return txs_content_of(l, left, top, end_x, end_y) /
+           txs_content_of(l, txs_cell_border(p->x), txs_cell_border(p->y), most_x, most_y);
+}
+
+/* How much of a piece is laid near by already, the nearer the more. */
+static double txs_seen_near(const txs_laying *l, const txs_place_of *p) {
+    double sum = 0;
+    for (int row = txm_clampi(l->row - TXS_NEAR_PIECES, 0, l->row); row <= l->row; row++) {
+        const int from = l->column - TXS_NEAR_PIECES, to = l->column + TXS_NEAR_PIECES + 1;
+        const int end = row == l->row ? l->column : to < l->columns ? to : l->columns;
+        for (int column = from > 0 ? from : 0; column < end; column++) {
+            const int across = column - l->column, down = row - l->row;
+            const double nearness =
+                1 - sqrt((double)(across * across + down * down)) / (TXS_NEAR_PIECES + 1);
+            if (nearness <= 0) continue;
+            sum += nearness * nearness * txs_shared(l, p, &l->laid[row * l->columns + column]);
+        }
+    }
+    return sum;
+}
+
+/* Mean uses of the cells under a piece, by their contents, over what they would be if all cells were
+   used alike. */
 static double txs_uses_of(const txs_laying *l, const txs_place_of *p) {
-    double sum = 0, cells = 0;
+    double sum = 0, content = 0;
     for (int y = p->y / TXS_CELL; y <= (p->y + l->side - 1) / TXS_CELL; y++) {
         for (int x = p->x / TXS_CELL; x <= (p->x + l->side - 1) / TXS_CELL; x++) {
-            sum += (double)l->used[(size_t)y * (size_t)l->cells_x + (size_t)x];
-            cells++;
+            const double c = txs_content_of(l, x, y, x + 1, y + 1);
+            sum += c * (double)l->used[(size_t)y * (size_t)l->cells_x + (size_t)x];
+            content += c;
         }
     }
     const double per_piece = (double)(l->side + TXS_CELL) * (double)(l->side + TXS_CELL) /
                              ((double)l->stone->width * (double)l->stone->height);
-    return sum / cells / (1 + l->pieces * per_piece);
+    return sum / content / (1 + (double)(l->row * l->columns + l->column) * per_piece);
 }
 
 static void txs_count_use(txs_laying *l, const txs_place_of *p) {
@@ -11777,7 +11847,8 @@ static void txs_count_use(txs_laying *l, const txs_place_of *p) {
         for (int x = p->x / TXS_CELL; x <= (p->x + l->side - 1) / TXS_CELL; x++)
             l->used[(size_t)y * (size_t)l->cells_x + (size_t)x]++;
     }
-    l->pieces++;
+    TEXSYN_ASSERT(l->row < l->rows && l->column < l->columns);
+    l->laid[l->row * l->columns + l->column] = *p;
 }
 
 /* Squared difference of strengths where a piece lies on what is there; cracks count more than what is
@@ -11806,7 +11877,8 @@ static double txs_try_cost(const txs_laying *l, const txs_place_of *p) {
     const double steep = (double)(TXS_MOST_DARK - TXS_LEAST_DARK);
     const double base = 0.02; /* so that uses count among places of equal error */
     const double uses = txs_uses_of(l, p);
-    return (base + sum / count) * (1 + TXS_USED_WEIGHT * uses * uses) +
+    const double again = TXS_USED_WEIGHT * uses * uses + TXS_NEAR_WEIGHT * txs_seen_near(l, p);
+    return (base + sum / count) * (1 + again) +
            steep * steep * unknown / seen;
 }
 
@@ -11887,6 +11959,11 @@ static void txs_lay_piece(txs_laying *l, const txs_place_of *p) {
     }
 }
 
+/* Pieces that cover a length of the picture, each but the first `overlap` over the one before. */
+static int txs_count_pieces(int length, int overlap, int step) {
+    return length <= overlap ? 1 : (length - overlap - 1) / step + 1;
+}
+
 /* Fill source; memory for the work is taken from arena. Reports from..to. */
 static txm_status txs_lay_all(const txs_stone *stone, int width, int height, uint64_t seed,
                               txm_arena *arena, int32_t *source, txm_env *env, float from,
@@ -11905,6 +11982,13 @@ static txm_status txs_lay_all(const txs_stone *stone, int width, int height, uin
     l->cells_y = (stone->height - 1) / TXS_CELL + 1;
     l->used = (uint32_t *)txm_arena_zero(arena, txs_pixels_of(l->cells_x, l->cells_y),
                                          sizeof(uint32_t));
+    l->content = (double *)txm_arena_zero(arena, txs_pixels_of(l->cells_x + 1, l->cells_y + 1),
+                                          sizeof(double));
+    const int step = l->side - l->overlap;
+    l->rows = txs_count_pieces(height, l->overlap, step);
+    l->columns = txs_count_pieces(width, l->overlap, step);
+    l->laid = (txs_place_of *)txm_arena_alloc(arena, txs_pixels_of(l->columns, l->rows),
+                                              sizeof(txs_place_of));
     const size_t strip = (size_t)l->side * (size_t)l->overlap;
     l->error = (float *)txm_arena_alloc(arena, strip, sizeof(float));
     l->scratch = (double *)txm_arena_alloc(arena, strip, sizeof(double));
@@ -11912,13 +11996,15 @@ static txm_status txs_lay_all(const txs_stone *stone, int width, int height, uin
     l->path[1] = (int *)txm_arena_alloc(arena, (size_t)l->side, sizeof(int));
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the cracks");
     txs_find_turns(l);
+    txs_find_content(l);
     txm_rng rng = txm_rng_make(seed, 1);
-    const int step = l->side - l->overlap;
-    for (l->top = 0; l->top == 0 || l->top + l->overlap < height; l->top += step) {
+    for (l->row = 0; l->row < l->rows; l->row++) {
+        l->top = l->row * step;
         if (txm_progress(env, txm_lerpf(from, to, (float)l->top / (float)height), "lay cracks"))
             return txm_fail(env, TXM_CANCELLED, "cancelled");
         l->piece_height = l->side < height - l->top ? l->side : height - l->top;
-        for (l->left = 0; l->left == 0 || l->left + l->overlap < width; l->left += step) {
+        for (l->column = 0; l->column < l->columns; l->column++) {
+            l->left = l->column * step;
             l->piece_width = l->side < width - l->left ? l->side : width - l->left;
             const txs_place_of *p = txs_choose_place(l, &rng, env);
             txs_lay_piece(l, p);
