@@ -8800,6 +8800,8 @@ enum {
     TXS_LAY_RINGS = 3                        /* of distances 1, 2, 4                    */
 };
 
+enum { TXS_LAY_ROWS_FIELD = 1, TXS_LAY_COLUMNS = 2 }; /* along which a field changes */
+
 enum { TXS_LAY_FIELD, TXS_LAY_PAIR, TXS_LAY_PARENT, TXS_LAY_RING };
 
 typedef struct txs_lay_type {
@@ -9320,6 +9322,9 @@ enum {
     TXS_LAY_COOL = 5         /* heat of the last sweep */
 };
 
+#define TXS_LAY_DOUBT \
+    0.2f /* distance of histograms that means nothing, with a single piece; ours */
+
 /* Weights of labels that make the shares of a coarse map those of the whole: where each block
    takes its most frequent label alone, what is thin or scattered would be lost. */
 typedef struct txs_lay_blocks {
@@ -9438,9 +9443,48 @@ static void txs_lay_preselect(txs_lay_level *l, const txs_lay_view *source) {
     l->type_count = kept;
 }
 
-/* Add the pairs whose histograms differ most from the source's; returns how many. */
+/* How many connected pieces of one label a map has; -1 without memory. */
+static int txs_lay_pieces(const txs_lay_plane *map, txm_arena *arena) {
+    const size_t pixels = (size_t)map->width * (size_t)map->height;
+    uint8_t *seen = (uint8_t *)txm_arena_zero(arena, pixels, 1);
+    int32_t *stack = (int32_t *)txm_arena_alloc(arena, pixels, sizeof *stack);
+    int pieces = 0;
+    if (arena->failed) return -1;
+    for (int i = 0; i < map->width * map->height; i++) {
+        int count = 1;
+        if (seen[i] || *txs_lay_at(map, i % map->width, i / map->width) == TXS_OUTSIDE) continue;
+        pieces++;
+        seen[i] = 1;
+        stack[0] = i;
+        while (count) { /* a pixel is put on the stack once, so it cannot overflow */
+            const int x = stack[--count] % map->width, y = stack[count] / map->width;
+            for (int k = 0; k < 4; k++) {
+                const int nx = x + (k == 0) - (k == 1), ny = y + (k == 2) - (k == 3);
+                const int32_t at = ny * map->width + nx;
+                if (nx < 0 || ny < 0 || nx >= map->width || ny >= map->height || seen[at] ||
+                    *txs_lay_at(map, nx, ny) != *txs_lay_at(map, x, y))
+                    continue;
+                seen[at] = 1;
+                TEXSYN_ASSERT((size_t)count < pixels);
+                stack[count++] = at;
+            }
+        }
+    }
+    return pieces;
+}
+
+/* Does an axis wrap? A border lacks the pairs that lead across it, and so attracts some labels and
+   repels others; a torus has none. Not along a field, whose ends differ, nor where pairs would reach
+   round. side: of the coarsest level. */
+static int txs_lay_wraps(int field, int axis, int side) {
+    return field != axis && side > 2 * TXS_LAY_REACH;
+}
+
+/* Add the pairs whose histograms differ most from the source's, and by more than threshold; returns
+   how many. */
 static int txs_lay_add_worst(txs_lay_level *l, const txs_lay_view *source, const txs_lay_view *map,
-                             txs_lay_type *candidates, float *distance, int count, int most) {
+                             txs_lay_type *candidates, float *distance, int count, int most,
+                             float threshold) {
     int32_t counts[TXS_LAY_BINS], share[TXS_LAY_BINS];
     int added = 0;
     for (int i = 0; i < count; i++) {
@@ -9463,7 +9507,7 @@ static int txs_lay_add_worst(txs_lay_level *l, const txs_lay_view *source, const
         int worst = 0;
         for (int i = 1; i < count; i++)
             if (distance[i] > distance[worst]) worst = i;
-        if (count == 0 || !(distance[worst] > TXS_THRESHOLD)) break;
+        if (count == 0 || !(distance[worst] > threshold)) break;
         const txs_lay_type chosen = candidates[worst];
         l->types[l->type_count++] = chosen;
         for (int i = 0; i < count; i++) /* its neighbours say the same */
@@ -9511,7 +9555,15 @@ static txm_status txs_lay_learn_level(txs_lay_level *l, int labels, const txs_la
     txm_arena_init(&arena, env);
     txs_lay_type *candidates = (txs_lay_type *)txm_arena_zero(&arena, capacity, sizeof *candidates);
     float *distance = (float *)txm_arena_zero(&arena, capacity, sizeof *distance);
-    const int room = txs_lay_plane_make(&map, env, source->map->width, source->map->height, 0, 0);
+    const int pieces = txs_lay_pieces(source->map, &arena);
+    /* a map of few pieces has little to say about where they lie */
+    const float doubt = TXS_LAY_DOUBT / txm_float(sqrt((double)(pieces > 0 ? pieces : 1)));
+    const float threshold = txm_maxf(doubt, TXS_THRESHOLD);
+    const int wraps = !source->parent;
+    const int room = txs_lay_plane_make(
+        &map, env, source->map->width, source->map->height,
+        wraps && txs_lay_wraps(source->field, TXS_LAY_COLUMNS, source->map->width),
+        wraps && txs_lay_wraps(source->field, TXS_LAY_ROWS_FIELD, source->map->height));
     view.map = &map;
     txs_lay_sampler *s = txs_lay_sampler_make(&arena, l, &view, labels, TXS_LAY_TYPES, noise, seed);
     if (!room || !s || arena.failed) {
@@ -9537,8 +9589,9 @@ static txm_status txs_lay_learn_level(txs_lay_level *l, int labels, const txs_la
             }
             txs_lay_sweep(s, sweep++);
         }
-        const int added = txs_lay_add_worst(l, source, &view, candidates, distance, candidate_count,
-                                            left < TXS_LAY_BATCH ? left : (int)TXS_LAY_BATCH);
+        const int added =
+            txs_lay_add_worst(l, source, &view, candidates, distance, candidate_count,
+                              left < TXS_LAY_BATCH ? left : (int)TXS_LAY_BATCH, threshold);
         if (added == 0) break;
         left -= added;
     }
@@ -9600,12 +9653,15 @@ static int txs_lay_fit(const txs_layout *layout, int index, int width, int heigh
 }
 
 /* Synthesise a map of any size into out, which the caller frees. Fraction from..to of the whole. */
-static txm_status txs_layout_make(const txs_layout *layout, int width, int height, int wrap_x,
-                                  int wrap_y, int quality, const int16_t *noise, uint64_t seed,
-                                  txs_lay_plane *out, txm_env *env, float from, float to) {
+static txm_status txs_layout_make(const txs_layout *layout, int width, int height, int quality,
+                                  const int16_t *noise, uint64_t seed, txs_lay_plane *out,
+                                  txm_env *env, float from, float to) {
     float work = 0, done = 0;
     for (int i = 0; i < layout->levels; i++) work += 1.0f / (float)(1 << 2 * i);
     txs_lay_plane coarse, parent;
+    const int top_level = layout->levels - 1;
+    const int wrap_x = txs_lay_wraps(layout->field, TXS_LAY_COLUMNS, width >> top_level);
+    const int wrap_y = txs_lay_wraps(layout->field, TXS_LAY_ROWS_FIELD, height >> top_level);
     memset(&coarse, 0, sizeof coarse);
     memset(out, 0, sizeof *out);
     for (int i = layout->levels - 1; i >= 0; i--) {
@@ -10086,8 +10142,8 @@ static txm_status txs_composite_run(txs_composer *w, const txs_lay_plane *map, t
         status = txs_layout_learn(map, c->labels, (int)w->desc->field - TEXSYN_FIELD_NONE, w->noise,
                                   w->desc->seed, &c->arena, &c->layout, env, 0, 0.15f);
     if (status == TXM_OK)
-        status = txs_layout_make(&c->layout, width, height, 0, 0, 0, w->noise, w->desc->seed,
-                                 &drawn, env, 0.15f, 0.2f);
+        status = txs_layout_make(&c->layout, width, height, 0, w->noise, w->desc->seed, &drawn, env,
+                                 0.15f, 0.2f);
     if (status != TXM_OK) return status;
     const int room = txs_composite_ground(&w->canvas[0], arena, &drawn, c->channels) &&
                      txs_composite_pyramid(w->canvas, arena, c->levels);
@@ -10197,7 +10253,7 @@ static txm_status txs_composite_check_desc(const texsyn_composite_desc *d, int c
 static txm_status txs_composite_map(const texsyn_composite_desc *d, const int16_t *noise,
                                     txs_lay_plane *map, txm_env *env, float to) {
     if (!d->layout.pixels)
-        return txs_layout_make(&d->composite->layout, d->width, d->height, 0, 0, d->quality, noise,
+        return txs_layout_make(&d->composite->layout, d->width, d->height, d->quality, noise,
                                txm_hash(d->seed), map, env, 0, to);
     const txm_image layout = txm_image_resolve(d->layout);
     if (!txs_lay_plane_make(map, env, d->width, d->height, 0, 0))

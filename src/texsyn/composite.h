@@ -385,8 +385,8 @@ static txm_status txs_composite_run(txs_composer *w, const txs_lay_plane *map, t
         status = txs_layout_learn(map, c->labels, (int)w->desc->field - TEXSYN_FIELD_NONE, w->noise,
                                   w->desc->seed, &c->arena, &c->layout, env, 0, 0.15f);
     if (status == TXM_OK)
-        status = txs_layout_make(&c->layout, width, height, 0, 0, 0, w->noise, w->desc->seed,
-                                 &drawn, env, 0.15f, 0.2f);
+        status = txs_layout_make(&c->layout, width, height, 0, w->noise, w->desc->seed, &drawn, env,
+                                 0.15f, 0.2f);
     if (status != TXM_OK) return status;
     const int room = txs_composite_ground(&w->canvas[0], arena, &drawn, c->channels) &&
                      txs_composite_pyramid(w->canvas, arena, c->levels);
@@ -496,7 +496,7 @@ static txm_status txs_composite_check_desc(const texsyn_composite_desc *d, int c
 static txm_status txs_composite_map(const texsyn_composite_desc *d, const int16_t *noise,
                                     txs_lay_plane *map, txm_env *env, float to) {
     if (!d->layout.pixels)
-        return txs_layout_make(&d->composite->layout, d->width, d->height, 0, 0, d->quality, noise,
+        return txs_layout_make(&d->composite->layout, d->width, d->height, d->quality, noise,
                                txm_hash(d->seed), map, env, 0, to);
     const txm_image layout = txm_image_resolve(d->layout);
     if (!txs_lay_plane_make(map, env, d->width, d->height, 0, 0))

@@ -33,6 +33,8 @@ enum {
     TXS_LAY_RINGS = 3                        /* of distances 1, 2, 4                    */
 };
 
+enum { TXS_LAY_ROWS_FIELD = 1, TXS_LAY_COLUMNS = 2 }; /* along which a field changes */
+
 enum { TXS_LAY_FIELD, TXS_LAY_PAIR, TXS_LAY_PARENT, TXS_LAY_RING };
 
 typedef struct txs_lay_type {
