@@ -264,7 +264,7 @@ static int run_composite(int argc, char **argv) {
          &j.layout_path, 0, 0},
         {CLI_TEXT, "--field", "NAME", "do labels keep to rows (a sky above) or to columns? auto, none, "
          "rows, columns", &j.field_name, 0, 0},
-        {CLI_INT, "--types", "N", "clique types added per label and level, 1 to 64; default 14",
+        {CLI_INT, "--types", "N", "clique types added per label and level, 1 to 64; default 10",
          &j.learn.max_types, 1, 64},
         {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0",
          &j.quality, -2, 2},
