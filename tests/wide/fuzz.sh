@@ -30,15 +30,7 @@ runs=500
 build weather && check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
 build fill && check "$runs random fillings" "$OUT/fuzz_fill" $runs
 build knit && check "$runs random knits" "$OUT/fuzz_knit" $runs
-check "relighting and erosion build by themselves" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off \
-    -I. tests/wide/fuzz/fuzz_texsyn_weather.c -o "$OUT/fuzz_weather" -lm &&
-    check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
-check "filling builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
-    tests/wide/fuzz/fuzz_texsyn_fill.c -o "$OUT/fuzz_fill" -lm &&
-    check "$runs random fillings" "$OUT/fuzz_fill" $runs
-check "segmentation builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
-    tests/wide/fuzz/fuzz_texsyn_segment.c -o "$OUT/fuzz_segment" -lm &&
-    check "$runs random segmentations" "$OUT/fuzz_segment" $runs
+build segment && check "$runs random segmentations" "$OUT/fuzz_segment" $runs
 
 if [ "$FULL" = 1 ] && has clang; then
     check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \
