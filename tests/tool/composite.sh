@@ -33,6 +33,8 @@ for extension in png tga bmp jpg; do
     check "writes .$extension" run 0 composite a.txc -o "e.$extension" $size
 done
 
+check "--like" run 0 composite parts.png $labels -o l.png $size --like parts-numbers.png
+refuses 1 "texkit relight" composite a.txc -o n.png $size --like parts.png
 check "labels that are found" run 0 composite parts.png -o f.png $size --map f-map.png --save f.txc
 check "the map has their numbers" look is f-map.png 40 30 1 8
 check "so many as are asked for" run 0 composite parts.png -o f.png $size --segments 2 --stats stats.json

@@ -10,27 +10,38 @@
 enum { MAX_SIDE = 1 << 24 };
 
 static const cli_manual composite_manual = {
-    "composite", "EXEMPLAR|MODEL.txc -o OUT --size WxH [options]",
+    "composite",
+    "EXEMPLAR|MODEL.txc -o OUT --size WxH [options]",
     "make a picture of several textures, laid out as in an exemplar",
-    "EXEMPLAR is a picture of two to 16 materials, at least 32 x 32 pixels; --labels tells which is\n"
-    "where; without it that is found, as by 'texkit segment --transition'. Learned are the layout,\n"
-    "the texture of each label and what happens where two of them meet. Or the input is what --save\n"
+    "EXEMPLAR is a picture of two to 16 materials, at least 32 x 32 pixels; --labels tells which "
+    "is\n"
+    "where; without it that is found, as by 'texkit segment --transition'. Learned are the "
+    "layout,\n"
+    "the texture of each label and what happens where two of them meet. Or the input is what "
+    "--save\n"
     "wrote before (the file's content decides, not its name).\n"
-    "OUT ends in .png, .tga, .bmp or .jpg; it has the channels of EXEMPLAR, and .png keeps 16 bits.\n"
+    "OUT ends in .png, .tga, .bmp or .jpg; it has the channels of EXEMPLAR, and .png keeps 16 "
+    "bits.\n"
     "A picture of labels is gray, indexed or in colour and has one colour for each label, at most\n"
-    "  16, each on 256 pixels or more. Gray values that are all below 16 are labels 0 to 15; other\n"
+    "  16, each on 256 pixels or more. Gray values that are all below 16 are labels 0 to 15; "
+    "other\n"
     "  colours are numbered from dark to bright, by red, then green, then blue. Where it is\n"
     "  transparent nothing is learned.\n"
-    "--layout is a drawn picture of labels with the colours of --labels; without --size the result\n"
+    "--layout is a drawn picture of labels with the colours of --labels; without --size the "
+    "result\n"
     "  has its size. For a saved composite without --labels it has to show every label.\n",
-    "  texkit composite slope.jpg --labels parts.png -o slope2.png --size 1024x768 --save slope.txc\n"
+    "  texkit composite slope.jpg --labels parts.png -o slope2.png --size 1024x768 --save "
+    "slope.txc\n"
     "  texkit composite slope.jpg --segments 3 -o more.png --size 1024x768 --map more-labels.png\n"
     "  texkit composite slope.txc -o drawn.png --layout drawing.png\n",
-    1, "exemplar or model", 0, "take a smaller size"};
+    1,
+    "exemplar or model",
+    0,
+    "take a smaller size"};
 
 typedef struct composite_job {
     cli run;
-    const char *labels_path, *layout_path, *field_name, *save_path, *map_path;
+    const char *labels_path, *layout_path, *field_name, *save_path, *map_path, *like_path;
     int extent[2], quality, segments;
     label_colours colours;
     texsyn_composite_learn_desc learn;
@@ -54,7 +65,8 @@ static int check_options(composite_job *j) {
         return cli_fail(run, CLI_USAGE, "--size %dx%d: at most %d pixels in all", j->extent[0],
                         j->extent[1], TEXSYN_MAX_PIXELS);
     if (j->segments && j->labels_path)
-        return cli_fail(run, CLI_USAGE, "--segments: --labels says how many there are; leave one out");
+        return cli_fail(run, CLI_USAGE,
+                        "--segments: --labels says how many there are; leave one out");
     if (j->field_name) {
         const int field = find_name(run, "--field", j->field_name, fields);
         if (field < 0) return CLI_USAGE;
@@ -97,7 +109,8 @@ static int find_labels(composite_job *j) {
     cli_stage(run, "segment");
     int status = new_picture(run, desc.image.width, desc.image.height, 1, TXM_U8, labels);
     if (!status)
-        status = check_result(run, texsyn_segment(&desc, &run->env, *labels, &count), run->inputs[0]);
+        status =
+            check_result(run, texsyn_segment(&desc, &run->env, *labels, &count), run->inputs[0]);
     uint8_t *p = (uint8_t *)labels->pixels;
     const size_t pixels = (size_t)desc.image.width * (size_t)desc.image.height;
     for (size_t i = 0; i < pixels && !status; i++)
@@ -106,13 +119,29 @@ static int find_labels(composite_job *j) {
     return status;
 }
 
+/* Give the exemplar the light of another picture before it is learned. */
+static int relight(composite_job *j) {
+    cli *run = &j->run;
+    texsyn_relight_desc desc = {0};
+    if (!j->like_path) return CLI_DONE;
+    cli_stage(run, "relight");
+    int status = read_picture(run, j->like_path, 0, TXM_U16, &desc.like);
+    desc.image = j->learn.example;
+    if (!status)
+        status =
+            check_result(run, texsyn_relight(&desc, &run->env, j->learn.example), run->inputs[0]);
+    image_free(&desc.like);
+    return status;
+}
+
 static int learn(composite_job *j) {
     cli *run = &j->run;
     texsyn_composite_learn_desc *d = &j->learn;
     int status = check_picture_fits(run, run->output, j->extent[0], j->extent[1], &d->example);
+    if (!status) status = relight(j);
     if (status) return status;
-    status = j->labels_path ? read_labels(run, j->labels_path, &j->colours, &d->labels)
-                            : find_labels(j);
+    status =
+        j->labels_path ? read_labels(run, j->labels_path, &j->colours, &d->labels) : find_labels(j);
     if (!status && j->labels_path)
         status = check_extent(run, "the picture of labels", j->labels_path, &d->labels,
                               d->example.width, d->example.height, run->inputs[0]);
@@ -136,7 +165,12 @@ static int get_composite(composite_job *j) {
     if (!bytes) return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, strerror(errno));
     file_extension(path, extension);
     const txm_status result = texsyn_composite_load(bytes, size, &run->env, &j->composite);
-    if (result == TXM_OK) status = save(j);
+    if (result == TXM_OK && j->like_path)
+        status = cli_fail(run, CLI_FAILED,
+                          "--like changes an exemplar before it is learned; '%s' is "
+                          "learned already: use 'texkit relight' on the result",
+                          path);
+    else if (result == TXM_OK) status = save(j);
     else if (!strcmp(extension, ".txc") && !image_is_known(bytes, size))
         status = check_result(run, result, path);
     else if (!image_decode_deep(bytes, size, 0, &j->learn.example, &why))
@@ -156,8 +190,8 @@ static int get_colours(composite_job *j) {
         status = read_labels(&j->run, j->labels_path, &j->colours, &unused);
         image_free(&unused);
         if (!status && j->colours.count != count)
-            status = cli_fail(&j->run, CLI_FAILED, "'%s' has %d labels; '%s' has %d", j->labels_path,
-                              j->colours.count, j->run.inputs[0], count);
+            status = cli_fail(&j->run, CLI_FAILED, "'%s' has %d labels; '%s' has %d",
+                              j->labels_path, j->colours.count, j->run.inputs[0], count);
     } else if (!j->layout_path) plain_labels(count, &j->colours);
     return status;
 }
@@ -172,8 +206,10 @@ static int read_layout(composite_job *j) {
     if (status) return status;
     const txm_image *layout = &j->desc.layout;
     if (!is_known && j->colours.count != count)
-        return cli_fail(run, CLI_FAILED, "'%s' has %d labels; '%s' has %d: add its --labels, or draw "
-                        "all of them", j->layout_path, j->colours.count, run->inputs[0], count);
+        return cli_fail(run, CLI_FAILED,
+                        "'%s' has %d labels; '%s' has %d: add its --labels, or draw "
+                        "all of them",
+                        j->layout_path, j->colours.count, run->inputs[0], count);
     if (memchr(layout->pixels, NO_LABEL, (size_t)layout->width * (size_t)layout->height))
         return cli_fail(run, CLI_FAILED, "'%s': transparent pixels are no label; paint them",
                         j->layout_path);
@@ -256,21 +292,25 @@ static int run_composite(int argc, char **argv) {
     const cli_option options[] = {
         {CLI_EXTENT, "--size", "WxH", "width and height of the result in pixels", j.extent, 1,
          MAX_SIDE},
-        {CLI_INPUT, "--labels", "L", "a picture of labels of the exemplar's size; default: found", &j.labels_path, 0,
-         0},
+        {CLI_INPUT, "--labels", "L", "a picture of labels of the exemplar's size; default: found",
+         &j.labels_path, 0, 0},
+        {CLI_INPUT, "--like", "TARGET", "give the exemplar the light of this picture first",
+         &j.like_path, 0, 0},
         {CLI_INT, "--segments", "K", "without --labels: how many textures, 1 to 16; default: found",
          &j.segments, 1, TEXSYN_MAX_SEGMENTS},
         {CLI_INPUT, "--layout", "DRAWN", "a picture of labels for the result; default: synthesised",
          &j.layout_path, 0, 0},
-        {CLI_TEXT, "--field", "NAME", "do labels keep to rows (a sky above) or to columns? auto, none, "
-         "rows, columns", &j.field_name, 0, 0},
+        {CLI_TEXT, "--field", "NAME",
+         "do labels keep to rows (a sky above) or to columns? auto, none, "
+         "rows, columns",
+         &j.field_name, 0, 0},
         {CLI_INT, "--types", "N", "clique types added per label and level, 1 to 64; default 10",
          &j.learn.max_types, 1, 64},
         {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0",
          &j.quality, -2, 2},
         {CLI_OUTPUT, "--save", "MODEL.txc", "also save what was learned", &j.save_path, 0, 0},
-        {CLI_OUTPUT, "--map", "FILE", "also write the labels of the result, in the colours of --labels",
-         &j.map_path, 0, 0},
+        {CLI_OUTPUT, "--map", "FILE",
+         "also write the labels of the result, in the colours of --labels", &j.map_path, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (cli_begin(&j.run, &composite_manual, options, argc, argv, &status)) return status;
