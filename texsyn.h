@@ -382,7 +382,7 @@ typedef struct texsyn_segment_desc {
           part, or if it has no so many segments; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
           TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(width * height) time, 0.3 s for 512 x 512. 32 MB and 3 bytes per label for each of at
-          most 2^19 pixels: 35 MB for two labels, 57 MB for 16, whatever the size                 */
+          most 2^19 pixels: 35 MB for two labels, some 60 MB for 16, whatever the size             */
 TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *env, txm_image out,
                                      int *count);
 
@@ -9415,6 +9415,7 @@ static int txs_lay_double(const txs_lay_plane *coarse, int width, int height, tx
 }
 
 static txs_lay_type *txs_lay_add(txs_lay_level *l, int kind, int dx, int dy) {
+    TEXSYN_ASSERT(l->type_count < TXS_LAY_TYPES);
     txs_lay_type *t = &l->types[l->type_count++];
     memset(t, 0, sizeof *t);
     t->kind = kind;
@@ -9546,7 +9547,7 @@ static txm_status txs_lay_learn_level(txs_lay_level *l, int labels, const txs_la
         source->map->width < source->map->height ? source->map->width : source->map->height;
     const int reach = source->parent ? (int)TXS_LAY_NEAR : txm_clampi(side / 3, 2, TXS_LAY_REACH);
     const int most = source->parent ? (int)TXS_LAY_ADDED_BELOW : (int)TXS_LAY_ADDED;
-    const size_t capacity = (size_t)(2 * reach + 1) * (size_t)(reach + 1);
+    const size_t capacity = (size_t)(2 * reach + 1) * (size_t)(reach + 1); /* half a square */
     txs_lay_plane map;
     txs_lay_view view = *source;
     txm_status status = TXM_OK;
@@ -9574,6 +9575,7 @@ static txm_status txs_lay_learn_level(txs_lay_level *l, int labels, const txs_la
     for (int y = 0; y <= reach; y++) {
         for (int x = -reach; x <= reach; x++) {
             if ((y == 0 && x <= 0) || x * x + y * y > reach * reach || abs(x) + y <= 1) continue;
+            TEXSYN_ASSERT((size_t)candidate_count < capacity);
             candidates[candidate_count].kind = TXS_LAY_PAIR;
             candidates[candidate_count].dx = x;
             candidates[candidate_count++].dy = y;

@@ -382,7 +382,7 @@ typedef struct texsyn_segment_desc {
           part, or if it has no so many segments; TXM_TOO_LARGE above TEXSYN_MAX_PIXELS;
           TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost   O(width * height) time, 0.3 s for 512 x 512. 32 MB and 3 bytes per label for each of at
-          most 2^19 pixels: 35 MB for two labels, 57 MB for 16, whatever the size                 */
+          most 2^19 pixels: 35 MB for two labels, some 60 MB for 16, whatever the size             */
 TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *env, txm_image out,
                                      int *count);
 
