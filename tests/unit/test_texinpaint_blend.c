@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "texinpaint/blend.h"
+#include "texinpaint/fill.h"
 
 #include "testkit.h"
 
@@ -125,7 +126,8 @@ static void expect(double *wanted) {
                 const double unit = (high[c] - low[c]) * (hole ? TXI_BLEND_JUMP : TXI_RIM_JUMP);
                 square += jump[c] / unit * (jump[c] / unit) / CHANNELS;
             }
-            const double weight = (hole ? 1 : TXI_RIM_WEIGHT) * (square < 9 ? (1 - square / 9) * (1 - square / 9) : 0);
+            const double weight = (hole ? 1 : TXI_RIM_WEIGHT) *
+                                  (square < 9 ? (1 - square / 9) * (1 - square / 9) : 0);
             a[i][i] += weight;
             if (hole) a[i][number[q]] -= weight;
             for (int c = 0; c < CHANNELS; c++) right[c][i] += weight * jump[c];
@@ -151,8 +153,8 @@ static void test_against_direct_solution(void **state) {
         double changed = 0;
         make_hole();
         for (int i = 0; i < CHANNELS * PIXELS; i++)
-            before[i] = (float)(0.02 * (i / CHANNELS % SIDE) * (i % 3 + 1) + 0.012 * (i / CHANNELS / SIDE) +
-                                0.1 * round * txm_rng_double(&rng));
+            before[i] = (float)(0.02 * (i / CHANNELS % SIDE) * (i % 3 + 1) +
+                                0.012 * (i / CHANNELS / SIDE) + 0.1 * round * txm_rng_double(&rng));
         memcpy(values, before, sizeof values);
         expect(wanted);
         assert_int_equal(txi_blend_map(&w, copies, poses, values, CHANNELS, 0, 0, NULL), TXM_OK);
@@ -163,7 +165,8 @@ static void test_against_direct_solution(void **state) {
                 continue;
             }
             if (fabs(values[i] - wanted[i]) > 1e-4)
-                fail_msg("round %d, pixel %d: %g, not %g", round, i / CHANNELS, (double)values[i], wanted[i]);
+                fail_msg("round %d, pixel %d: %g, not %g", round, i / CHANNELS, (double)values[i],
+                         wanted[i]);
             assert_true(beyond(i / CHANNELS, 0, 0, i % CHANNELS, &v));
             changed = fmax(changed, fabs(v - values[i]));
         }
@@ -218,7 +221,8 @@ static void test_labels(void **state) {
     assert_int_equal(txi_blend_map(&w, copies, poses, values, 1, 1, 0, NULL), TXM_OK);
     for (int i = 0; i < PIXELS; i++) {
         if (states[i] != TXI_HOLE) continue;
-        const int x = (int)floor((double)copies[i].x + 0.5), y = (int)floor((double)copies[i].y + 0.5);
+        const int x = (int)floor((double)copies[i].x + 0.5),
+                  y = (int)floor((double)copies[i].y + 0.5);
         assert_true(values[i] == before[y * SIDE + x]);
     }
 }
@@ -256,39 +260,6 @@ static void test_window_without_hole(void **state) {
     txm_arena_free(&arena);
 }
 
-/* stops what is under way once pieces are joined */
-static int stop_at_joining(void *user, float fraction, const char *stage) {
-    (void)user;
-    (void)fraction;
-    return strcmp(stage, "joining") == 0;
-}
-
-static void test_joining_can_be_cancelled(void **state) {
-    enum { WIDE = 48 };
-    static uint8_t picture[WIDE * WIDE], mask[WIDE * WIDE], out[WIDE * WIDE];
-    texinpaint_desc desc;
-    txm_env env;
-    (void)state;
-    memset(&desc, 0, sizeof desc);
-    memset(&env, 0, sizeof env);
-    for (int i = 0; i < WIDE * WIDE; i++) {
-        const int x = i % WIDE - WIDE / 2, y = i / WIDE - WIDE / 2;
-        picture[i] = (uint8_t)(txm_hash((uint64_t)i) & 255);
-        mask[i] = (uint8_t)(x * x + y * y < 64 ? 255 : 0);
-    }
-    desc.image.pixels = picture;
-    desc.image.width = desc.image.height = WIDE;
-    desc.image.channels = 1;
-    desc.mask = desc.image;
-    desc.mask.pixels = mask;
-    desc.structure = TEXINPAINT_TEXTURE;
-    txm_image made = desc.image;
-    made.pixels = out;
-    assert_int_equal(texinpaint_complete(&desc, &env, &made), TXM_OK);
-    env.progress = stop_at_joining;
-    assert_int_equal(texinpaint_complete(&desc, &env, &made), TXM_CANCELLED);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_against_direct_solution),
@@ -296,7 +267,6 @@ int main(void) {
         cmocka_unit_test(test_labels),
         cmocka_unit_test(test_faults),
         cmocka_unit_test(test_window_without_hole),
-        cmocka_unit_test(test_joining_can_be_cancelled),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,7 +19,8 @@ enum { BEGIN = 1, HARMONIC = 2, DILATE = 4, ALL = 7 };
 
 /* The calls refuse this with a message, and leave the outputs as they were. */
 static void refuse(const texinpaint_desc *d, txm_status expected, int calls) {
-    const txm_image out[2] = {view(result, SIDE, SIDE, 3, TXM_U8), view(maps_out, SIDE, SIDE, 4, TXM_U8)};
+    const txm_image out[2] = {view(result, SIDE, SIDE, 3, TXM_U8),
+                              view(maps_out, SIDE, SIDE, 4, TXM_U8)};
     memset(result, FILL, sizeof result);
     memset(maps_out, FILL, sizeof maps_out);
     for (int call = 0; call < 4; call++) {
@@ -30,7 +31,8 @@ static void refuse(const texinpaint_desc *d, txm_status expected, int calls) {
                                   : call == 1 ? texinpaint_begin(d, &env, &job)
                                   : call == 2 ? texinpaint_harmonic(d, &env, out)
                                               : texinpaint_dilate(d, &env, out);
-        if (status != expected) fail_msg("call %d: %d, not %d: %s", call, status, expected, env.message);
+        if (status != expected)
+            fail_msg("call %d: %d, not %d: %s", call, status, expected, env.message);
         assert_true(env.message[0] != 0);
         if (call == 1) assert_null(job);
         if (call == 0) assert_int_equal(texinpaint_complete(d, NULL, out), expected);
@@ -293,7 +295,8 @@ static void begin_task(task *t, int is_mesh) {
 
 static txm_status run_task(void *context, txm_env *env) {
     const task *t = (const task *)context;
-    const txm_image out[2] = {view(result, SIDE, SIDE, 3, TXM_U8), view(maps_out, SIDE, SIDE, 1, TXM_U8)};
+    const txm_image out[2] = {view(result, SIDE, SIDE, 3, TXM_U8),
+                              view(maps_out, SIDE, SIDE, 1, TXM_U8)};
     return texinpaint_complete(&t->desc, env, out);
 }
 
@@ -310,8 +313,7 @@ static void test_faults(void **state) {
     static task t;
     for (int is_mesh = 0; is_mesh < 2; is_mesh++) {
         begin_task(&t, is_mesh);
-        if (is_mesh || tk_full())
-            assert_true(sweep(&t, TK_ALLOCATION, ALLOCATION_STRIDE) > 100);
+        if (is_mesh || tk_full()) assert_true(sweep(&t, TK_ALLOCATION, ALLOCATION_STRIDE) > 100);
         if (tk_full()) assert_true(sweep(&t, TK_ONWARD, ONWARD_STRIDE) > 100);
         if (!is_mesh || tk_full()) assert_true(sweep(&t, TK_CANCEL, REPORT_STRIDE) > 10);
     }
@@ -322,7 +324,8 @@ static void test_steps_tried_again(void **state) {
     (void)state;
     static task t;
     static uint8_t wanted[3 * PIXELS];
-    const txm_image out[2] = {view(result, SIDE, SIDE, 3, TXM_U8), view(maps_out, SIDE, SIDE, 1, TXM_U8)};
+    const txm_image out[2] = {view(result, SIDE, SIDE, 3, TXM_U8),
+                              view(maps_out, SIDE, SIDE, 1, TXM_U8)};
     for (int is_mesh = 0; is_mesh < 2; is_mesh++) {
         tk_memory memory;
         tk_progress progress;
@@ -372,12 +375,50 @@ static void test_progress(void **state) {
     assert_true(progress.calls > 10 && progress.last > 0.9f);
 }
 
+/* stops what is under way once pieces are joined */
+static int stop_at_joining(void *user, float fraction, const char *stage) {
+    (void)user;
+    (void)fraction;
+    return strcmp(stage, "joining") == 0;
+}
+
+static void test_joining_can_be_cancelled(void **state) {
+    enum { WIDE = 48 };
+    static uint8_t picture[WIDE * WIDE], mask[WIDE * WIDE], out[WIDE * WIDE];
+    texinpaint_desc desc;
+    txm_env env;
+    (void)state;
+    memset(&desc, 0, sizeof desc);
+    memset(&env, 0, sizeof env);
+    for (int i = 0; i < WIDE * WIDE; i++) {
+        const int x = i % WIDE - WIDE / 2, y = i / WIDE - WIDE / 2;
+        picture[i] = (uint8_t)(txm_hash((uint64_t)i) & 255);
+        mask[i] = (uint8_t)(x * x + y * y < 64 ? 255 : 0);
+    }
+    desc.image.pixels = picture;
+    desc.image.width = desc.image.height = WIDE;
+    desc.image.channels = 1;
+    desc.mask = desc.image;
+    desc.mask.pixels = mask;
+    desc.structure = TEXINPAINT_TEXTURE;
+    txm_image made = desc.image;
+    made.pixels = out;
+    assert_int_equal(texinpaint_complete(&desc, &env, &made), TXM_OK);
+    env.progress = stop_at_joining;
+    assert_int_equal(texinpaint_complete(&desc, &env, &made), TXM_CANCELLED);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pictures), cmocka_unit_test(test_maps),
-        cmocka_unit_test(test_meshes),   cmocka_unit_test(test_fields),
-        cmocka_unit_test(test_outputs),  cmocka_unit_test(test_faults),
-        cmocka_unit_test(test_progress), cmocka_unit_test(test_steps_tried_again),
+        cmocka_unit_test(test_pictures),
+        cmocka_unit_test(test_maps),
+        cmocka_unit_test(test_meshes),
+        cmocka_unit_test(test_fields),
+        cmocka_unit_test(test_outputs),
+        cmocka_unit_test(test_faults),
+        cmocka_unit_test(test_progress),
+        cmocka_unit_test(test_steps_tried_again),
+        cmocka_unit_test(test_joining_can_be_cancelled),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
